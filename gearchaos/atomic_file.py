@@ -1,0 +1,177 @@
+"""Files that appear complete or not at all, and operating system errors in one clear sentence."""
+
+from __future__ import annotations
+
+import errno
+import os
+import re
+import secrets
+import stat
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+from gearchaos.errors import FileError
+
+PARTIAL = ".partial"
+"""Ending of the names of unfinished files; nothing reads them and they can be deleted."""
+
+_REMEDIES = {
+    errno.ENOSPC: "free some space or choose another place",
+    errno.EDQUOT: "free some space or choose another place",
+    errno.EFBIG: "raise the limit on the size of files or choose another place",
+    errno.ENOENT: "create the folder first",
+    errno.ENOTDIR: "choose a place inside a folder",
+    errno.EISDIR: "give the name of a file",
+    errno.ENAMETOOLONG: "choose a shorter name",
+}
+
+
+def reason(error: BaseException) -> str:
+    """Word the cause of a failed operation, also where it is buried in the text of HDF5."""
+    number = getattr(error, "errno", None)
+    if number is None and (found := re.search(r"errno = (\d+)", str(error))):
+        number = int(found[1])
+    if number:
+        return os.strerror(number)
+    return " ".join(str(error).split()) or type(error).__name__
+
+
+@contextmanager
+def writing(path: str | os.PathLike[str]) -> Iterator[None]:
+    """Turn whatever goes wrong while writing a file into a FileError with a remedy."""
+    try:
+        yield
+    except (OSError, RuntimeError) as error:
+        # A full disk that HDF5 meets while it closes a file is a RuntimeError.
+        if isinstance(error, RuntimeError) and "errno = " not in str(error):
+            raise
+        text = reason(error)
+        remedies = (remedy for code, remedy in _REMEDIES.items() if os.strerror(code) == text)
+        remedy = next(remedies, "choose another place")
+        raise FileError(f"{path}: cannot be written: {text}; {remedy}") from error
+
+
+def check_output(path: str | os.PathLike[str], overwrite: bool = False) -> None:
+    """Make sure that a file can be written, before anything is computed for it.
+
+    Parameters
+    ----------
+    path : path
+        The file to be; nothing is left behind beside it.
+    overwrite : bool
+        Whether the file may exist.
+
+    Raises
+    ------
+    FileError
+        If it exists and must not be overwritten, is a directory or a device, or if its folder
+        is missing or cannot be written to.
+    """
+    with writing(path):
+        target = _checked_target(path, overwrite)
+        os.unlink(_create_partial(target.parent, target.name))
+
+
+@contextmanager
+def replacing(
+    path: str | os.PathLike[str],
+    *,
+    overwrite: bool = False,
+    scratch: str | os.PathLike[str] | None = None,
+) -> Iterator[Path]:
+    """Write a file under a temporary name; it gets its own name once it is complete on the disk.
+
+    Parameters
+    ----------
+    path : path
+        The file to be. Symbolic links are followed.
+    overwrite : bool
+        Whether an existing file is replaced.
+    scratch : path, optional
+        Folder on the same file system for the temporary name; by default that of the file.
+
+    Yields
+    ------
+    Path
+        The temporary name, an empty file to be filled. It goes away if the block raises.
+
+    Raises
+    ------
+    FileError
+        If the file cannot be written; one that existed before is left as it was.
+    """
+    with writing(path):
+        target = _checked_target(path, overwrite)
+        partial = _create_partial(Path(scratch or target.parent), target.name)
+        try:
+            yield partial
+            _synchronise(partial)
+            if overwrite:
+                os.replace(partial, target)
+            else:
+                _rename_to_new(partial, target)
+            _synchronise_folder(target.parent)
+        except FileExistsError as error:
+            raise _exists(path) from error
+        finally:
+            with suppress(OSError):
+                os.unlink(partial)
+
+
+def _checked_target(path: str | os.PathLike[str], overwrite: bool) -> Path:
+    name = os.fspath(path)
+    if not name or "\0" in name:
+        raise FileError(f"{name!r}: is not a file name; give the name of a file")
+    target = Path(os.path.realpath(name))
+    try:
+        mode = os.stat(target).st_mode
+    except FileNotFoundError:
+        # realpath drops the slash that tells a folder from a file.
+        if name.endswith(os.sep):
+            raise FileError(f"{name!r}: is not a file name; give the name of a file") from None
+        return target
+    if stat.S_ISDIR(mode):
+        raise FileError(f"{path}: is a directory; give the name of a file in it")
+    if not stat.S_ISREG(mode):
+        raise FileError(f"{path}: is not a regular file; give the name of a file")
+    if not overwrite:
+        raise _exists(path)
+    return target
+
+
+def _exists(path: str | os.PathLike[str]) -> FileError:
+    return FileError(f"{path}: exists already; replace it with --overwrite or choose another name")
+
+
+def _create_partial(folder: Path, name: str) -> Path:
+    partial = folder / f".{name[:40]}.{secrets.token_hex(8)}{PARTIAL}"
+    # Not by the tempfile module: its files are readable by their owner only, and stay so.
+    os.close(os.open(partial, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666))
+    return partial
+
+
+def _rename_to_new(partial: Path, target: Path) -> None:
+    # A rename silently replaces what came to be in the meantime; a hard link does not.
+    try:
+        os.link(partial, target)
+    except FileExistsError:
+        raise
+    except OSError:
+        if target.exists():
+            raise FileExistsError(errno.EEXIST, os.strerror(errno.EEXIST)) from None
+        os.rename(partial, target)
+
+
+def _synchronise(path: Path) -> None:
+    descriptor = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
+
+
+def _synchronise_folder(path: Path) -> None:
+    # Not every system can do this; the file itself is on the disk by now.
+    with suppress(OSError):
+        _synchronise(path)

@@ -1,0 +1,92 @@
+"""What every command does alike: the text of --version, and faults turned into exit codes."""
+
+from __future__ import annotations
+
+import os
+import platform
+import sys
+from collections.abc import Callable
+from importlib.metadata import PackageNotFoundError, version
+from typing import TextIO
+
+from gearchaos.errors import FileError, GearchaosError
+
+OK = 0
+USAGE = 2
+CANNOT_READ_OR_WRITE = FileError.exit_code
+INTERRUPTED = 130
+CLOSED_PIPE = 141
+
+
+def software_version() -> str:
+    """Return the installed version of gearchaos, "0+unknown" in a clone never installed."""
+    try:
+        return version("gearchaos")
+    except PackageNotFoundError:
+        return "0+unknown"
+
+
+def version_text() -> str:
+    """Return the one line that --version prints: gearchaos, Python and the platform."""
+    return f"gearchaos {software_version()} (Python {platform.python_version()}, {sys.platform})"
+
+
+def run_command(name: str, body: Callable[[], int]) -> int:
+    """Run a command's body and turn every fault a user can cause into lines on stderr.
+
+    Parameters
+    ----------
+    name : str
+        What the lines begin with, such as "gearchaos plot".
+    body : callable
+        The command. Returns its exit code; raises GearchaosError for what it cannot do.
+
+    Returns
+    -------
+    int
+        The body's code, also that with which argparse exits; otherwise that of the
+        GearchaosError, 4 for an operating system error that nobody has worded, 130 for an
+        interrupt and 141, as the shell says, when the reader of the output has gone.
+    """
+    try:
+        code = _code_of(body)
+        if sys.stdout is not None:
+            sys.stdout.flush()
+        return code
+    except GearchaosError as error:
+        return _report(name, error.problems, error.exit_code)
+    except KeyboardInterrupt:
+        return _report(name, None, INTERRUPTED)
+    except BrokenPipeError:
+        _discard(sys.stdout)
+        return CLOSED_PIPE
+    except OSError as error:
+        return _report(name, [str(error)], CANNOT_READ_OR_WRITE)
+
+
+def _code_of(body: Callable[[], int]) -> int:
+    try:
+        return body()
+    except SystemExit as leaving:
+        return leaving.code if isinstance(leaving.code, int) else OK
+
+
+def _report(name: str, problems: list[str] | None, code: int) -> int:
+    lines = [f"{name}: interrupted"]
+    if problems is not None:
+        lines = [f"{name}: error: {problem}" for problem in problems]
+    try:
+        print("\n".join(lines), file=sys.stderr, flush=True)
+    except BrokenPipeError:
+        _discard(sys.stderr)
+    return code
+
+
+def _discard(stream: TextIO) -> None:
+    # The interpreter flushes once more on its way out; what is left must have somewhere to go.
+    try:
+        sink = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(sink, stream.fileno())
+        os.close(sink)
+    except (OSError, ValueError):
+        pass

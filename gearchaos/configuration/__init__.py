@@ -1,0 +1,8 @@
+"""What a sweep computes, read from TOML and checked before anything runs."""
+
+from gearchaos.configuration.loading import load_config
+from gearchaos.configuration.models import Configuration
+from gearchaos.configuration.run_tables import EFFECTS, STATES
+from gearchaos.configuration.sweep_values import lane_groups, swept_values
+
+__all__ = ["EFFECTS", "STATES", "Configuration", "lane_groups", "load_config", "swept_values"]

@@ -1,0 +1,59 @@
+"""A configuration file, read and checked."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable
+
+from gearchaos.configuration.models import Configuration
+from gearchaos.errors import ConfigurationError, FileError
+
+LARGEST_FILE = 10 * 1024 * 1024
+
+
+def load_config(path: str | os.PathLike[str], overrides: Iterable[str] = ()) -> Configuration:
+    """Read a configuration from a TOML file.
+
+    Parameters
+    ----------
+    path : path
+    overrides : iterable of str
+        ``key.path=value`` with the value as TOML writes it, such as
+        ``"integration.steps_per_period=100"``; what is not TOML is taken as text.
+
+    Raises
+    ------
+    FileError
+        If the file cannot be read.
+    ConfigurationError
+        If it is not a sound configuration: one message per fault, all faults at once.
+    """
+    source = os.fspath(path)
+    return Configuration.from_toml(_text(source), source, overrides)
+
+
+def _text(source: str) -> str:
+    if not source:
+        raise FileError("no configuration file: the path is empty; name a TOML file")
+    try:
+        with open(source, "rb") as file:
+            content = file.read(LARGEST_FILE + 1)
+    except FileNotFoundError:
+        raise FileError(f"{source}: no such file; check the path of the configuration") from None
+    except IsADirectoryError:
+        raise FileError(f"{source}: is a directory; name a TOML file in it") from None
+    except (OSError, ValueError) as error:
+        reason = error.strerror if isinstance(error, OSError) else str(error)
+        raise FileError(f"{source!r}: cannot be read: {reason}") from None
+    if len(content) > LARGEST_FILE:
+        raise ConfigurationError(
+            f"{source}: larger than {LARGEST_FILE // 1024**2} MB; is it a configuration?"
+        )
+    try:
+        # utf-8-sig: some editors begin a file with a byte order mark.
+        return content.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = content[: error.start].count(b"\n") + 1
+        raise ConfigurationError(
+            f"{source}: line {line} is not UTF-8 text; save the file as UTF-8"
+        ) from None

@@ -1,0 +1,211 @@
+"""Faults of a configuration as sentences: file, key, value, rule, remedy."""
+
+from __future__ import annotations
+
+import datetime
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Final
+
+from pydantic_core import ErrorDetails
+
+from gearchaos.configuration.keys import Key, suggestion
+from gearchaos.configuration.toml_text import quoted_key
+
+ABSENT: Final = object()
+_MOST_SHOWN = 100
+
+_RULES = {
+    "missing": "is missing",
+    "extra_forbidden": "unknown key",
+    "finite_number": "must be a finite number",
+    "greater_than": "must be greater than {gt:.12g}",
+    "greater_than_equal": "must be at least {ge:.12g}",
+    "less_than": "must be less than {lt:.12g}",
+    "less_than_equal": "must be at most {le:.12g}",
+    "too_short": "needs at least {min_length} value(s)",
+    "too_long": "takes at most {max_length} value(s)",
+    "literal_error": "must be one of {expected}",
+    "union_tag_invalid": "must be one of {expected_tags}",
+    "union_tag_not_found": "is missing",
+}
+_KINDS = {
+    "float_type": "a number",
+    "int_type": "a whole number",
+    "bool_type": "true or false",
+    "string_type": "a text",
+    "tuple_type": "a list",
+    "dict_type": "a table",
+    "model_type": "a table",
+    "model_attributes_type": "a table",
+}
+
+
+@dataclass(frozen=True)
+class Fault:
+    """One fault.
+
+    Attributes
+    ----------
+    key : str
+        Dotted path of the key.
+    rule : str
+        What the value violates.
+    remedy : str
+        What to do instead.
+    value : object
+        The value; `ABSENT` where there is none.
+    """
+
+    key: str
+    rule: str
+    remedy: str = ""
+    value: object = ABSENT
+
+    def text(self, source: str) -> str:
+        """Return the fault as one line that begins with the name of the file."""
+        value = "" if self.value is ABSENT else f" = {shown(self.value)}"
+        remedy = f"; {self.remedy}" if self.remedy else ""
+        return f"{source}: {self.key}{value}: {self.rule}{remedy}"
+
+
+def texts(faults: Iterable[Fault], source: str) -> list[str]:
+    """Return the faults as lines, each once, the first hundred of them."""
+    lines = list(dict.fromkeys(fault.text(source) for fault in faults))
+    rest = len(lines) - _MOST_SHOWN
+    return lines if rest <= 0 else [*lines[:_MOST_SHOWN], f"{source}: and {rest} more faults"]
+
+
+def shown(value: object) -> str:
+    """Return a value as TOML writes it, cut to a readable length."""
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, Mapping):
+        return "{...}"
+    if isinstance(value, (list, tuple)):
+        entries = [
+            "[...]" if isinstance(entry, (list, tuple)) else shown(entry) for entry in value[:5]
+        ]
+        return f"[{', '.join([*entries, '...'] if len(value) > len(entries) else entries)}]"
+    if isinstance(value, str):
+        text = repr(value[:60])[1:-1]
+        return f'"{text}..."' if len(value) > 60 else f'"{text}"'
+    if isinstance(value, int) and value.bit_length() > 200:
+        return "an integer of hundreds of digits"
+    if isinstance(value, (datetime.date, datetime.time)):
+        return value.isoformat()
+    return repr(value)
+
+
+def fault_of(error: ErrorDetails, tables: Mapping[str, Any], keys: Mapping[str, Key]) -> Fault:
+    """Word one error of pydantic.
+
+    Parameters
+    ----------
+    error : dict
+        As `ValidationError.errors` lists it.
+    tables : mapping
+        What was validated: it tells the keys in an error's location from names that pydantic adds.
+    keys : mapping of str to Key
+        Every key by its path.
+    """
+    names = _names(error["loc"], tables)
+    kind = error["type"]
+    if kind.startswith("union_tag"):
+        names.append("shape")
+    path = ".".join(name for name in names if isinstance(name, str))
+    key = keys.get(path)
+    remedy = key.remedy if key is not None else ""
+    value = ABSENT if kind in ("missing", "union_tag_not_found") else error["input"]
+    if kind == "union_tag_invalid":
+        value = error["input"]["shape"]
+    if error["loc"][-1] == "[key]":
+        value = ABSENT
+    if kind == "extra_forbidden":
+        remedy = _elsewhere(str(names[-1]), ".".join(map(str, names[:-1])), keys)
+    elif kind in ("literal_error", "union_tag_invalid") and isinstance(error["input"], str | dict):
+        remedy = (
+            suggestion(
+                str(names[-1] if value is ABSENT else value), re.findall(r"'([^']*)'", _rule(error))
+            )
+            or remedy
+        )
+    elif kind == "float_type" and isinstance(value, str) and _is_number(value):
+        remedy = f"write it without the quotes: {value.strip()}"
+    return Fault(_dotted(names), _rule(error), remedy, value)
+
+
+def _rule(error: ErrorDetails) -> str:
+    if error["type"] in _KINDS:
+        value = error["input"]
+        if isinstance(value, int) and error["type"] == "float_type" and not isinstance(value, bool):
+            return "must be a number that fits into 64 bits"
+        return f"must be {_KINDS[error['type']]}, not {_kind(value)}"
+    rule = _RULES.get(error["type"])
+    return error["msg"] if rule is None else rule.format(**error.get("ctx", {}))
+
+
+def _kind(value: object) -> str:
+    kinds = {
+        bool: "true or false",
+        str: "a text",
+        float: "a number with a decimal point",
+        int: "a number",
+    }
+    kinds |= {dict: "a table", list: "a list"}
+    return kinds.get(type(value), "a date or time")
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
+
+
+def _names(location: Sequence[int | str], tables: Mapping[str, Any]) -> list[int | str]:
+    # pydantic puts the tag of a union ("fourier") and "[key]" into the location of an error.
+    names: list[int | str] = []
+    node: object = tables
+    for position, name in enumerate(location):
+        inner = _entry(node, name)
+        if inner is not ABSENT:
+            node = inner
+        elif position < len(location) - 1 or name == "[key]":
+            continue
+        names.append(name)
+    return names
+
+
+def _entry(node: object, name: int | str) -> object:
+    if isinstance(node, Mapping):
+        return node.get(name, ABSENT)
+    if isinstance(node, (list, tuple)) and isinstance(name, int) and name < len(node):
+        return node[name]
+    return ABSENT
+
+
+def _dotted(names: Sequence[int | str]) -> str:
+    path = ""
+    for name in names:
+        path += f"[{name}]" if isinstance(name, int) else f".{quoted_key(name)}"
+    return path.lstrip(".")
+
+
+def _elsewhere(name: str, table: str, keys: Mapping[str, Key]) -> str:
+    prefix = f"{table}." if table else ""
+    here = [
+        path.removeprefix(prefix)
+        for path in keys
+        if path.startswith(prefix) and "." not in path.removeprefix(prefix)
+    ]
+    near = suggestion(name, here)
+    homes = [path for path in keys if path.rpartition(".")[2] == name]
+    if near:
+        return near
+    if homes:
+        return f"it belongs elsewhere: `{homes[0]}`"
+    place = f"[{table}]" if table else "the top level"
+    return f"the keys of {place} are {', '.join(here)}"

@@ -1,0 +1,189 @@
+"""The whole configuration of a sweep, checked."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from functools import cache
+from typing import Any, Literal, Self
+
+from pydantic import PrivateAttr, TypeAdapter, ValidationError, ValidationInfo, model_validator
+
+from gearchaos.configuration.keys import Key, keys_of
+from gearchaos.configuration.messages import Fault, fault_of, texts
+from gearchaos.configuration.physical_tables import Bearings, Mesh, Operation, Pair, PitchError
+from gearchaos.configuration.rules import RULES
+from gearchaos.configuration.run_tables import (
+    GivenGroups,
+    Integration,
+    Outputs,
+    Scene,
+    Start,
+    Sweep,
+)
+from gearchaos.configuration.sweep_rules import LANE_RULES, SWEEP_RULES
+from gearchaos.configuration.table import Table, key
+from gearchaos.configuration.toml_text import (
+    tables_from_toml,
+    toml_text,
+    with_overrides,
+    with_value,
+)
+from gearchaos.errors import ConfigurationError
+
+
+class Configuration(Table):
+    """A gear pair, the effects that exist, the sweep, and what is kept of it.
+
+    A Configuration that exists is sound: every rule has been checked, also those between tables.
+    It cannot be changed; `replace` gives a changed copy.
+    """
+
+    title: str = key("title of the sweep, for figures and files", default="")
+    formulation: Literal["published", "rederived"] = key(
+        'y_1 as printed in Pan 2021 ("published") or as its equations of motion give it',
+        default="published",
+    )
+    pair: Pair | None = key("catalogue data of the two gears", default=None)
+    operation: Operation | None = key("the point of operation", default=None)
+    mesh: Mesh | None = key("stiffness, damping and clearance of the mesh", default=None)
+    pitch_error: PitchError | None = key("one pitch error e(t)", default=None)
+    bearings: Bearings | None = key("the bearings", default=None)
+    groups: GivenGroups = key("dimensionless groups given directly", default=GivenGroups())
+    scene: Scene = key("which effects exist")
+    start: Start = key("the state in which the lanes start", default=Start())
+    sweep: Sweep = key("the swept parameter and its values")
+    integration: Integration = key("the fixed grid of the integration", default=Integration())
+    outputs: Outputs = key("what is kept of every lane", default=Outputs())
+
+    _source: str = PrivateAttr(default="<python>")
+    _text: str | None = PrivateAttr(default=None)
+
+    @property
+    def source(self) -> str:
+        """Path of the file, or a word in angle brackets for what came from no file."""
+        return self._source
+
+    @property
+    def text(self) -> str:
+        """The TOML text verbatim, before overrides; `resolved_toml` where there was none."""
+        return self.resolved_toml() if self._text is None else self._text
+
+    @classmethod
+    def from_toml(
+        cls, text: str, source: str = "<text>", overrides: Iterable[str] = ()
+    ) -> Configuration:
+        """Make a configuration from TOML text.
+
+        Parameters
+        ----------
+        text : str
+        source : str
+            What messages call the text.
+        overrides : iterable of str
+            Such as ``"integration.steps_per_period=100"``.
+
+        Raises
+        ------
+        ConfigurationError
+            With one message per fault, all faults at once.
+        """
+        tables = with_overrides(tables_from_toml(text, source), overrides, source)
+        config = cls.from_tables(tables, source)
+        config._text = text
+        return config
+
+    @classmethod
+    def from_tables(cls, tables: Mapping[str, Any], source: str = "<python>") -> Configuration:
+        """Make a configuration from nested mappings with the keys of the TOML file.
+
+        Raises
+        ------
+        ConfigurationError
+            With one message per fault, all faults at once.
+        """
+        try:
+            config = cls.model_validate(dict(tables), context={"source": source})
+        except ValidationError as error:
+            own = [
+                fault_of(details, tables, configuration_keys())
+                for details in error.errors(include_url=False)
+            ]
+            readable, unreadable = _readable_tables(tables)
+            shared = _broken_rules(cls.model_construct(**readable), unreadable)
+            raise ConfigurationError(texts([*own, *shared], source)) from None
+        config._source = source
+        return config
+
+    def replace(self, path: str, value: Any) -> Configuration:
+        """Return a copy in which one key, at its dotted path, has another value.
+
+        Parameters
+        ----------
+        path : str
+            Such as ``"integration.steps_per_period"``, or a whole table such as ``"sweep"``.
+        value : object
+            The new value; a mapping for a table; None removes the key.
+
+        Raises
+        ------
+        ConfigurationError
+            If the changed configuration breaks a rule.
+        """
+        try:
+            tables = with_value(self.tables(), path.split("."), value)
+        except KeyError as error:
+            raise ConfigurationError(f"{self.source}: {error.args[0]} is not a table") from None
+        return type(self).from_tables(tables, self.source)
+
+    def tables(self) -> dict[str, Any]:
+        """Return the nested mappings of everything that is known, defaults included."""
+        return self.model_dump(exclude_none=True)
+
+    def resolved_toml(self) -> str:
+        """Return TOML with every default filled in; it loads to an equal configuration."""
+        return toml_text(self.tables())
+
+    @model_validator(mode="after")
+    def _obeys_the_rules(self, info: ValidationInfo) -> Self:
+        faults = list(_broken_rules(self, frozenset()))
+        if faults:
+            raise ConfigurationError(texts(faults, (info.context or {}).get("source", "<python>")))
+        return self
+
+    # Where a configuration came from does not make it another one.
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Configuration) and self.__dict__ == other.__dict__
+
+    __hash__ = None  # type: ignore[assignment]
+
+
+@cache
+def configuration_keys() -> dict[str, Key]:
+    """Every key of a configuration by its dotted path."""
+    return {key.path: key for key in keys_of(Configuration)}
+
+
+def _broken_rules(config: Configuration, unreadable: frozenset[str]) -> Iterator[Fault]:
+    suspect = set(unreadable)
+    for tables, rule in (*RULES, *SWEEP_RULES):
+        if tables.isdisjoint(unreadable):
+            for fault in rule(config):
+                suspect.add(fault.key.partition(".")[0])
+                yield fault
+    for tables, rule in LANE_RULES:
+        if tables.isdisjoint(suspect):
+            yield from rule(config)
+
+
+def _readable_tables(tables: Mapping[str, Any]) -> tuple[dict[str, Any], frozenset[str]]:
+    readable, unreadable = {}, set()
+    for name, field in Configuration.model_fields.items():
+        if name in tables:
+            annotation: Any = field.annotation
+            try:
+                readable[name] = TypeAdapter(annotation).validate_python(tables[name])
+            except ValidationError:
+                unreadable.add(name)
+        elif field.is_required():
+            unreadable.add(name)
+    return readable, frozenset(unreadable)

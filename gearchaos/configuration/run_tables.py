@@ -1,0 +1,163 @@
+"""The tables that say what is computed: groups given directly, scene, start, sweep, outputs."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias, get_args
+
+from pydantic import Field, create_model
+
+from gearchaos.configuration.table import Numbers, Table, key
+from gearchaos.group_table import GROUP_TABLE, GroupRow
+
+Effect: TypeAlias = Literal["pitch_error", "stiffness_variation", "backlash", "transverse", "axial"]
+EFFECTS: tuple[str, ...] = get_args(Effect)
+
+State: TypeAlias = Literal[
+    "delta_5",
+    "delta_5_rate",
+    "delta_1",
+    "delta_1_rate",
+    "delta_2",
+    "delta_2_rate",
+    "delta_3",
+    "delta_3_rate",
+    "delta_4",
+    "delta_4_rate",
+]
+STATES: tuple[str, ...] = get_args(State)
+
+
+class GroupsTable(Table):
+    """Dimensionless groups given directly; one given here wins over the one derived."""
+
+    def given(self) -> dict[str, float | tuple[float, ...]]:
+        """Return the groups that the file gives, by name."""
+        return {name: value for name, value in self if value is not None}
+
+
+def _group_field(row: GroupRow) -> tuple[Any, Any]:
+    units = "" if row.units == "1" else row.units
+    description = f"{row.long_name} ({row.symbol})"
+    if row.is_list:
+        field = key(description, units=units, default=None, min_length=1, max_length=1000)
+        return Numbers | None, field
+    bounds = {
+        ("gt" if row.excludes_minimum else "ge"): row.minimum,
+        ("lt" if row.excludes_maximum else "le"): row.maximum,
+    }
+    rules = {rule: bound for rule, bound in bounds.items() if bound is not None}
+    return float | None, key(description, units=units, default=None, **rules)
+
+
+if TYPE_CHECKING:
+    GivenGroups = GroupsTable
+else:
+    # The table of the groups knows their names and ranges; nothing is written twice.
+    GivenGroups = create_model(
+        "GivenGroups",
+        __base__=GroupsTable,
+        __module__=__name__,
+        __doc__=GroupsTable.__doc__,
+        **{row.name: _group_field(row) for row in GROUP_TABLE},
+    )
+
+
+class Scene(Table):
+    """Which effects exist; what is not listed is not computed."""
+
+    effects: Annotated[tuple[Effect, ...], Field(strict=False)] = key(
+        "the effects that exist beside torsion and mesh damping",
+        example=["pitch_error", "stiffness_variation", "backlash", "transverse"],
+    )
+
+    @property
+    def states(self) -> tuple[str, ...]:
+        """States of the scene in the order of the kernels: 2, 6 or 10."""
+        return STATES[:2] + (
+            (STATES[2:6] if "transverse" in self.effects else ())
+            + (STATES[6:] if "axial" in self.effects else ())
+        )
+
+
+class Start(Table):
+    """The state in which the lanes start."""
+
+    kind: Literal["rest", "contact", "given", "random"] = key(
+        "all zero, on the contact flank, as in `state`, or at random", default="rest"
+    )
+    state: dict[State, float] = key(
+        'start values by state for kind = "given"; those not named are 0',
+        default={},
+        example={"delta_5": 1.0},
+    )
+    spread: float = key(
+        'for kind = "random": every state is uniform between minus and plus this',
+        units="1",
+        default=1.0,
+        gt=0,
+    )
+    seed: int = key('for kind = "random": seed', default=0, ge=0, le=2**32 - 1)
+    count: int = key(
+        'for kind = "random": starts per parameter value', default=1, ge=1, le=1_000_000
+    )
+    carry: Literal["none", "upwards", "downwards"] = key(
+        "whether each value starts from the end state of the one before it, and in which direction",
+        default="none",
+    )
+
+
+class Sweep(Table):
+    """The swept parameter and its values, from/to/count or a list."""
+
+    parameter: str = key(
+        "a group by its name, or a physical key by its path such as operation.speed_rpm",
+        example="pitch_error",
+    )
+    from_: float | None = key("first value", default=None, example=0.0, alias="from")
+    to: float | None = key("last value", default=None, example=15.0)
+    count: int | None = key(
+        "number of values, evenly spaced", default=None, example=1501, ge=1, le=10_000_000
+    )
+    values: Numbers | None = key(
+        "the values themselves, instead of from, to and count",
+        default=None,
+        example=[1.0, 2.0],
+        min_length=1,
+    )
+
+    @property
+    def span(self) -> tuple[float, float, int]:
+        """First value, last value and count of a sweep without a list of values."""
+        if self.from_ is None or self.count is None:
+            raise ValueError("the sweep lists its values")
+        last = self.from_ if self.to is None or self.count == 1 else self.to
+        return self.from_, last, self.count
+
+
+class Integration(Table):
+    """Runge-Kutta of order 4 on a fixed grid over the mesh period."""
+
+    steps_per_period: int = key("steps per mesh period", default=288, ge=1, le=1_000_000)
+    transient_periods: int = key(
+        "mesh periods discarded before anything is recorded", default=500, ge=0, le=1_000_000_000
+    )
+    recorded_periods: int = key(
+        "mesh periods observed after the transient", default=500, ge=1, le=1_000_000_000
+    )
+
+
+class Outputs(Table):
+    """What is kept of every lane."""
+
+    section: Annotated[tuple[State, ...], Field(strict=False)] = key(
+        "states recorded once per mesh period", default=("delta_5",), example=["delta_5"]
+    )
+    section_points: int = key("last mesh periods of the section that are kept", default=100, ge=1)
+    lyapunov: bool = key("whether the largest Lyapunov exponent is computed", default=True)
+    allowed_diverged_share: float = key(
+        "share of diverged lanes above which the command reports failure",
+        units="1",
+        default=0.0,
+        ge=0,
+        le=1,
+    )

@@ -1,0 +1,151 @@
+"""TOML text to tables and back, with `key.path=value` overrides."""
+
+from __future__ import annotations
+
+import json
+import re
+import tomllib
+from collections.abc import Iterable, Iterator, Mapping
+from typing import Any
+
+from gearchaos.errors import ConfigurationError
+
+_DEEPEST = 8
+_BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
+
+
+def quoted_key(name: str) -> str:
+    """Return a key as TOML writes it: bare where possible, else in quotes."""
+    return name if _BARE_KEY.fullmatch(name) else _string(name)
+
+
+def tables_from_toml(text: str, source: str) -> dict[str, Any]:
+    """Parse TOML text.
+
+    Raises
+    ------
+    ConfigurationError
+        With the line and the column where the text stops being TOML.
+    """
+    try:
+        return tomllib.loads(text)
+    except RecursionError:
+        raise ConfigurationError(
+            f"{source}: nested too deeply to be a configuration; tables go three levels deep"
+        ) from None
+    # Not only TOMLDecodeError: an integer of thousands of digits is a plain ValueError.
+    except ValueError as error:
+        raise ConfigurationError(
+            f"{source}: not valid TOML: {error}; write `key = value`, text in double quotes, "
+            "tables as [name]"
+        ) from None
+
+
+def with_overrides(
+    tables: Mapping[str, Any], overrides: Iterable[str], source: str
+) -> dict[str, Any]:
+    """Return the tables with ``key.path=value`` overrides applied, later ones over earlier ones.
+
+    Parameters
+    ----------
+    tables : mapping
+        What the file says.
+    overrides : iterable of str
+        The value is read as TOML; what is not TOML is taken as text, so that ``start.kind=rest``
+        needs no quotes.
+    source : str
+        Name of the file, for messages.
+
+    Raises
+    ------
+    ConfigurationError
+        One message per override that is not of this form or goes through a value.
+    """
+    result = dict(tables)
+    problems = []
+    for override in overrides:
+        path, equals, value = override.partition("=")
+        names = [name.strip() for name in path.split(".")]
+        if not equals or not all(names) or len(names) > _DEEPEST:
+            problems.append(
+                f"override {override!r}: must have the form key.path=value, "
+                "such as integration.steps_per_period=100"
+            )
+            continue
+        try:
+            result = with_value(result, names, _value(value))
+        except KeyError as error:
+            problems.append(
+                f"override {override!r}: {error.args[0]} is not a table in {source}; "
+                "name a key inside a table"
+            )
+    if problems:
+        raise ConfigurationError(problems)
+    return result
+
+
+def with_value(tables: Mapping[str, Any], names: list[str], value: Any) -> dict[str, Any]:
+    """Return a copy of nested tables in which one value is replaced, or removed by None.
+
+    Raises
+    ------
+    KeyError
+        With the path that would have to be a table and is a value.
+    """
+    head, *rest = names
+    result = dict(tables)
+    if not rest:
+        result[head] = value
+        return {key: entry for key, entry in result.items() if entry is not None}
+    inner = result.get(head, {})
+    if not isinstance(inner, Mapping):
+        raise KeyError(head)
+    result[head] = with_value(inner, rest, value)
+    return result
+
+
+def toml_text(tables: Mapping[str, Any]) -> str:
+    """Write nested tables of texts, numbers, truth values and lists as TOML."""
+    return "\n".join(_lines(tables, ())) + "\n"
+
+
+def _lines(table: Mapping[str, Any], path: tuple[str, ...]) -> Iterator[str]:
+    inner = {name: value for name, value in table.items() if isinstance(value, Mapping)}
+    values = [
+        f"{quoted_key(name)} = {toml_literal(value)}"
+        for name, value in table.items()
+        if name not in inner
+    ]
+    if path and (values or not inner):
+        yield f"\n[{'.'.join(map(quoted_key, path))}]"
+    yield from values
+    for name, value in inner.items():
+        yield from _lines(value, (*path, name))
+
+
+def toml_literal(value: Any) -> str:
+    """Write one value as TOML; a mapping as an inline table."""
+    if isinstance(value, str):
+        return _string(value)
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, (list, tuple)):
+        return f"[{', '.join(map(toml_literal, value))}]"
+    if isinstance(value, Mapping):
+        entries = [f"{quoted_key(name)} = {toml_literal(entry)}" for name, entry in value.items()]
+        return f"{{ {', '.join(entries)} }}"
+    return repr(value)
+
+
+def _string(text: str) -> str:
+    # A JSON string is a TOML basic string but for DEL, which TOML wants escaped.
+    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
+
+
+def _value(text: str) -> Any:
+    try:
+        parsed = tomllib.loads(f"value = {text}")
+    except (ValueError, RecursionError):
+        return text.strip()
+    # A line break in the text could have smuggled in further keys.
+    return parsed["value"] if parsed.keys() == {"value"} else text

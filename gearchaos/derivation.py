@@ -1,0 +1,213 @@
+"""Dimensionless groups from physical data (Pan 2021, eqs 8-13 and 20).
+
+Scales: length b', time 1 / omega_h with omega_h = sqrt(k_m / m_e).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection
+from functools import cached_property
+from typing import Any, TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+
+from gearchaos.errors import ConfigurationError
+from gearchaos.geometry import STEEL_DENSITY, HelicalPair
+from gearchaos.mesh_stiffness import FourierStiffness, TrapezoidalStiffness
+
+Value: TypeAlias = float | npt.NDArray[np.float64]
+
+DEFAULT_HARMONICS = 6
+"""Harmonics of a trapezoid where their number is not given, as in Pan 2021, Table 2."""
+
+_MICROMETRE = 1e-6
+_MILLIMETRE = 1e-3
+_N_PER_UM_MM = 1e9  # stiffness per unit face width: 1 N/(um mm) = 1e9 N/m^2
+
+
+def derive_groups(physical: Any, without: Collection[str] = ()) -> dict[str, Value]:
+    """Compute every group for which the physical data suffice.
+
+    Parameters
+    ----------
+    physical : object
+        With the tables ``pair``, ``operation``, ``mesh``, ``pitch_error`` and ``bearings`` of the
+        configuration as attributes. A table or a key that is None or not there is not known;
+        a number may be an array over lanes, which broadcasts.
+    without : collection of str
+        Names of groups that are not wanted.
+
+    Returns
+    -------
+    dict
+        Group name to value; a group whose inputs are not all known is absent.
+
+    Raises
+    ------
+    ConfigurationError
+        If the stiffness harmonics would differ between lanes.
+    """
+    quantities = _PhysicalQuantities(physical)
+    groups: dict[str, Value] = {}
+    for name, derivation in _DERIVATIONS.items():
+        if name in without:
+            continue
+        try:
+            groups[name] = derivation(quantities)
+        except _UnknownError:
+            continue
+    return groups
+
+
+class _UnknownError(Exception):
+    """A physical quantity that a derivation needs is not known."""
+
+
+class _PhysicalQuantities:
+    """The physical tables of a configuration in SI units, and what follows from them."""
+
+    def __init__(self, tables: Any) -> None:
+        self._tables = tables
+
+    def find(self, path: str) -> Any:
+        """Value at a dotted path, None where absent."""
+        node = self._tables
+        for name in path.split("."):
+            node = getattr(node, name, None)
+        return node
+
+    def read(self, path: str) -> Any:
+        """Value at a dotted path that has to be known."""
+        value = self.find(path)
+        if value is None:
+            raise _UnknownError(path)
+        return value
+
+    @cached_property
+    def pair(self) -> HelicalPair:
+        helix_angle_deg = self.find("pair.helix_angle_deg")
+        density = self.find("pair.density_kg_m3")
+        return HelicalPair(
+            teeth=self.read("pair.teeth"),
+            normal_module=self.read("pair.normal_module_mm") * _MILLIMETRE,
+            normal_pressure_angle=np.radians(self.read("pair.normal_pressure_angle_deg")),
+            helix_angle=np.radians(0.0 if helix_angle_deg is None else helix_angle_deg),
+            face_width=self.read("pair.face_width_mm") * _MILLIMETRE,
+            density=STEEL_DENSITY if density is None else density,
+            given_masses=self.find("pair.masses_kg"),
+            given_inertias=self.find("pair.inertias_kg_m2"),
+        )
+
+    @property
+    def mean_stiffness(self) -> Any:
+        """k_m in N/m: mean mesh stiffness per unit face width times the face width."""
+        per_width = self.read("mesh.mean_stiffness_N_per_um_mm") * _N_PER_UM_MM
+        return per_width * self.pair.face_width
+
+    @property
+    def scaling_frequency(self) -> Any:
+        """omega_h = sqrt(k_m / m_e) in rad/s."""
+        return np.sqrt(self.mean_stiffness / self.pair.equivalent_mass)
+
+    @property
+    def length_scale(self) -> Any:
+        """Length scale b' in m: the one given, else the half backlash."""
+        length_scale = self.find("mesh.length_scale_um")
+        if length_scale is None:
+            length_scale = self.read("mesh.half_backlash_um")
+        return length_scale * _MICROMETRE
+
+    def over_length_scale(self, path: str) -> Any:
+        """Length given in um, over b'."""
+        return self.read(path) * _MICROMETRE / self.length_scale
+
+    @property
+    def mesh_frequency(self) -> Any:
+        """Omega = 2 pi f / omega_h; the paper's omega (eq. 9) is f / omega_h, in cycles."""
+        mesh_frequency_hz = self.read("operation.speed_rpm") / 60.0 * self.pair.teeth[0]
+        return 2.0 * np.pi * mesh_frequency_hz / self.scaling_frequency
+
+    @property
+    def load(self) -> Any:
+        """f_n = T_p / (m_e b' r_bp omega_h^2) (Pan 2021, eq. 13)."""
+        force = self.read("operation.torque_Nm") / self.pair.base_radii[0]
+        return force / (self.mean_stiffness * self.length_scale)
+
+    @property
+    def damping_ratio(self) -> Any:
+        """The mesh damping ratio xi, or that of c_m = 2 xi sqrt(k_m m_e) (Pan 2021, eq. 20)."""
+        ratio = self.find("mesh.damping_ratio")
+        if ratio is not None:
+            return ratio
+        damping = self.read("mesh.damping_N_s_per_m")
+        return damping / (2.0 * np.sqrt(self.mean_stiffness * self.pair.equivalent_mass))
+
+    def bearing_stiffness(self, direction: str, gear: int) -> Any:
+        """Bearing stiffness k / (m omega_h^2) (Pan 2021, eq. 13, without its stray factor 2)."""
+        stiffness = self.read(f"bearings.{direction}_stiffness_N_per_m")[gear]
+        return stiffness / (self.pair.masses[gear] * self.scaling_frequency**2)
+
+    def bearing_damping(self, direction: str, gear: int) -> Any:
+        """Bearing damping c / (2 m omega_h) (Pan 2021, eq. 13)."""
+        damping = self.read(f"bearings.{direction}_damping_N_s_per_m")[gear]
+        return damping / (2.0 * self.pair.masses[gear] * self.scaling_frequency)
+
+    @cached_property
+    def mesh_stiffness(self) -> FourierStiffness:
+        """The stiffness harmonics relative to the mean (Pan 2021, eqs 15-19)."""
+        if self.read("mesh.stiffness.shape") == "fourier":
+            mean = _common_to_lanes(self.read("mesh.mean_stiffness_N_per_um_mm"))
+            return FourierStiffness(
+                cosine=np.divide(self.find("mesh.stiffness.cosine_N_per_um_mm") or (), mean),
+                sine=np.divide(self.find("mesh.stiffness.sine_N_per_um_mm") or (), mean),
+            )
+        return self._trapezoid().to_fourier(
+            self.find("mesh.stiffness.harmonics") or DEFAULT_HARMONICS
+        )
+
+    def _trapezoid(self) -> TrapezoidalStiffness:
+        names = ("rise", "top", "fall", "bottom")
+        if all(self.find(f"mesh.stiffness.{name}") is None for name in names):
+            return TrapezoidalStiffness.from_contact_ratios(
+                _common_to_lanes(self.pair.transverse_contact_ratio),
+                _common_to_lanes(self.pair.overlap_contact_ratio),
+            )
+        return TrapezoidalStiffness(
+            *(self.read(f"mesh.stiffness.{name}") for name in (*names, "half_height"))
+        )
+
+
+def _common_to_lanes(value: Any) -> float:
+    values = np.unique(np.asarray(value, dtype=np.float64))
+    if values.size != 1:
+        raise ConfigurationError(
+            "the harmonics of the mesh stiffness would differ between the swept values, but all "
+            "values of a sweep share one stiffness table: give stiffness_cosine and "
+            "stiffness_sine in [groups], or sweep stiffness_variation_scale"
+        )
+    return float(values[0])
+
+
+_DERIVATIONS: dict[str, Callable[[_PhysicalQuantities], Any]] = {
+    "mesh_frequency": lambda q: q.mesh_frequency,
+    "load": lambda q: q.load,
+    "damping_ratio": lambda q: q.damping_ratio,
+    "base_helix_angle_deg": lambda q: np.degrees(q.pair.base_helix_angle),
+    "half_backlash": lambda q: q.over_length_scale("mesh.half_backlash_um"),
+    "pitch_error_amplitude": lambda q: q.over_length_scale("pitch_error.amplitude_um"),
+    "pitch_error_mean": lambda q: q.over_length_scale("pitch_error.mean_um"),
+    "pitch_error_phase_deg": lambda q: q.read("pitch_error.phase_deg"),
+    "stiffness_cosine": lambda q: q.mesh_stiffness.coefficients().real,
+    "stiffness_sine": lambda q: -q.mesh_stiffness.coefficients().imag,
+    "mass_ratio_p": lambda q: q.pair.equivalent_mass / q.pair.masses[0],
+    "mass_ratio_g": lambda q: q.pair.equivalent_mass / q.pair.masses[1],
+    "transverse_stiffness_p": lambda q: q.bearing_stiffness("transverse", 0),
+    "transverse_damping_p": lambda q: q.bearing_damping("transverse", 0),
+    "transverse_stiffness_g": lambda q: q.bearing_stiffness("transverse", 1),
+    "transverse_damping_g": lambda q: q.bearing_damping("transverse", 1),
+    "axial_stiffness_p": lambda q: q.bearing_stiffness("axial", 0),
+    "axial_damping_p": lambda q: q.bearing_damping("axial", 0),
+    "axial_stiffness_g": lambda q: q.bearing_stiffness("axial", 1),
+    "axial_damping_g": lambda q: q.bearing_damping("axial", 1),
+}

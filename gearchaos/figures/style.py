@@ -1,0 +1,66 @@
+"""How the figures look: sizes for a journal column, fonts, and colours that also print in grey."""
+
+from __future__ import annotations
+
+from typing import Any
+
+SINGLE_COLUMN_MM = 85.0
+DOUBLE_COLUMN_MM = 180.0
+MM_PER_INCH = 25.4
+
+# Black, blue, orange and vermilion of Okabe and Ito: told apart by colour-blind readers, and by
+# their lightness in grey.
+POINTS = "#000000"
+EXPONENT = "#0072B2"
+POSITIVE = "#E69F00"
+DIVERGED = "#D55E00"
+REFERENCE = "#595959"
+
+SMALL_FONT_PT = 7.0
+FONT_PT = 8.0
+
+# The STIX fonts come with matplotlib, so that a figure is the same on every machine.
+STYLE: dict[str, Any] = {
+    "font.family": "STIXGeneral",
+    "mathtext.fontset": "stix",
+    "font.size": FONT_PT,
+    "axes.labelsize": FONT_PT,
+    "axes.titlesize": FONT_PT,
+    "axes.titleweight": "bold",
+    "axes.titlepad": 3.0,
+    "axes.labelpad": 2.5,
+    "axes.linewidth": 0.6,
+    "axes.formatter.use_mathtext": True,
+    "legend.fontsize": SMALL_FONT_PT,
+    "xtick.labelsize": SMALL_FONT_PT,
+    "ytick.labelsize": SMALL_FONT_PT,
+    "xtick.direction": "in",
+    "ytick.direction": "in",
+    "xtick.top": True,
+    "ytick.right": True,
+    "xtick.minor.visible": True,
+    "ytick.minor.visible": True,
+    "xtick.major.size": 2.8,
+    "ytick.major.size": 2.8,
+    "xtick.minor.size": 1.5,
+    "ytick.minor.size": 1.5,
+    "xtick.major.width": 0.5,
+    "ytick.major.width": 0.5,
+    "xtick.minor.width": 0.4,
+    "ytick.minor.width": 0.4,
+    "figure.constrained_layout.h_pad": 0.02,
+    "figure.constrained_layout.w_pad": 0.02,
+    "figure.constrained_layout.hspace": 0.02,
+    "figure.facecolor": "white",
+    "savefig.facecolor": "white",
+    # Whatever a user's matplotlibrc says, the saved page is as large as the figure.
+    "savefig.bbox": None,
+    # Journals ask for TrueType; matplotlib's default, Type 3, cannot be edited.
+    "pdf.fonttype": 42,
+}
+"""Settings for `matplotlib.rc_context`; nothing is ever set globally."""
+
+
+def page_height_mm(width_mm: float) -> float:
+    """Return the height of a page of two panels that suits its width, both in mm."""
+    return 55.0 + 0.35 * width_mm

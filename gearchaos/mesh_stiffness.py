@@ -1,0 +1,241 @@
+"""Mesh stiffness over one mesh period: contact-line trapezoid and Fourier series.
+
+Both forms give kappa = k / k_m, the stiffness relative to its mean, at a phase counted in mesh
+periods. The stiffness follows the total length of the contact lines (Pan 2021, eq. 18).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+
+FloatArray: TypeAlias = npt.NDArray[np.float64]
+
+MINIMUM_HARMONICS_OF_A_FIT = 3
+
+
+@dataclass(frozen=True)
+class TrapezoidalStiffness:
+    """Stiffness that rises linearly, stays, falls, stays (Pan 2021, eqs 15-18).
+
+    The fractions of the mesh period add up to one. A rise of zero is a jump.
+
+    Parameters
+    ----------
+    rise, top, fall, bottom : float
+        Fractions of the mesh period.
+    half_height : float
+        Half of the difference between top and bottom, relative to k_m.
+    scale : float
+        Factor on the variation about the mean.
+    start : float
+        Phase at which the rise begins, in mesh periods.
+
+    Raises
+    ------
+    ValueError
+        If a fraction is negative or their sum is not one.
+    """
+
+    rise: float
+    top: float
+    fall: float
+    bottom: float
+    half_height: float
+    scale: float = 1.0
+    start: float = 0.0
+
+    def __post_init__(self) -> None:
+        """Refuse fractions that do not make up a mesh period."""
+        fractions = (self.rise, self.top, self.fall, self.bottom)
+        if not all(fraction >= 0.0 for fraction in fractions):
+            raise ValueError(f"fractions of the mesh period must be >= 0, not {fractions}")
+        if not math.isclose(math.fsum(fractions), 1.0, abs_tol=1e-9):
+            raise ValueError(f"fractions of the mesh period must add up to 1, not {fractions}")
+
+    @classmethod
+    def from_contact_ratios(
+        cls, transverse: float, overlap: float, *, scale: float = 1.0
+    ) -> TrapezoidalStiffness:
+        """Stiffness proportional to the total length of a helical pair's contact lines.
+
+        Measured along the path of contact in base pitches, a tooth's contact line spans a window
+        of length eps_beta, and the part of it inside the field of contact, of length eps_alpha,
+        is in contact. Summed over the teeth, which follow each other at distance one, whole
+        windows and whole fields add constants only; what varies is the overlap of a window of
+        length v = frac(eps_beta) with a field of length u = frac(eps_alpha), both repeated every
+        period. That overlap changes at slope one during min(u, v, 1 - u, 1 - v), rests at its
+        top for abs(u - v) and at its bottom for abs(1 - u - v); the mean of the full sum is
+        eps_alpha eps_beta.
+
+        Parameters
+        ----------
+        transverse : float
+            eps_alpha > 0.
+        overlap : float
+            eps_beta >= 0; zero is a spur pair, whose contact length jumps.
+        scale : float
+            Factor on the variation about the mean.
+
+        Raises
+        ------
+        ValueError
+            If a contact ratio is outside its range.
+        """
+        if not (0.0 < transverse < math.inf and 0.0 <= overlap < math.inf):
+            raise ValueError(
+                "contact ratios must be finite, transverse > 0 and overlap >= 0, "
+                f"not {transverse} and {overlap}"
+            )
+        u, v = transverse % 1.0, overlap % 1.0
+        slope_time = min(u, v, 1.0 - u, 1.0 - v)
+        if overlap > 0.0:
+            half_height = slope_time / (2.0 * transverse * overlap)
+        else:
+            # Limit of the line above: the contact jumps by the whole width, unless u is zero.
+            half_height = 1.0 / (2.0 * transverse) if u > 0.0 else 0.0
+        return cls(
+            rise=slope_time,
+            top=abs(u - v),
+            fall=slope_time,
+            bottom=abs(1.0 - u - v),
+            half_height=half_height,
+            scale=scale,
+        )
+
+    def table(self, points: int) -> FloatArray:
+        """Return kappa at phases 0, 1/points, ..., as an array of shape (points,).
+
+        At a jump the value is the one after the jump.
+        """
+        ends_of_parts = np.cumsum([0.0, self.rise, self.top, self.fall])
+        phases = (np.arange(points) / points - self.start) % 1.0
+        shape = np.interp(phases, [*ends_of_parts, 1.0], [-1.0, 1.0, 1.0, -1.0, -1.0])
+        mean_of_shape = self.top - self.bottom
+        return 1.0 + self.scale * self.half_height * (shape - mean_of_shape)
+
+    def to_fourier(self, harmonics: int) -> FourierStiffness:
+        """Return the exact Fourier coefficients of this shape (Pan 2021, eq. 19).
+
+        The derivative of the shape is one box over the rise and one over the fall, whose
+        coefficients are sinc functions; dividing them by 2 pi i n integrates.
+        """
+        n = np.arange(1, harmonics + 1)
+        middle_of_rise = self.start + self.rise / 2.0
+        middle_of_fall = self.start + self.rise + self.top + self.fall / 2.0
+        up = np.exp(-2j * np.pi * n * middle_of_rise) * np.sinc(n * self.rise)
+        down = np.exp(-2j * np.pi * n * middle_of_fall) * np.sinc(n * self.fall)
+        coefficients = 2.0 * self.half_height * (up - down) / (1j * np.pi * n)
+        return FourierStiffness(
+            cosine=tuple(coefficients.real.tolist()),
+            sine=tuple((-coefficients.imag).tolist()),
+            scale=self.scale,
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class FourierStiffness:
+    """Stiffness as a Fourier series about its mean (Pan 2021, eq. 19).
+
+    kappa = 1 + scale * sum over n of (cosine[n-1] cos n phi + sine[n-1] sin n phi), with phi the
+    phase of the mesh in rad.
+
+    Parameters
+    ----------
+    cosine, sine : sequence of float, shape (harmonics,)
+        Harmonics n = 1, 2, ... relative to k_m; the shorter one continues with zeros.
+    scale : float
+        Factor on the variation about the mean.
+    """
+
+    cosine: Sequence[float] | FloatArray = ()
+    sine: Sequence[float] | FloatArray = ()
+    scale: float = 1.0
+
+    def coefficients(self) -> npt.NDArray[np.complex128]:
+        """Return cosine - i sine, the coefficients of exp(i n phi), without the scale.
+
+        Shape (harmonics,); kappa = 1 + scale * Re(sum of coefficient * exp(i n phi)).
+        """
+        harmonics = max(len(self.cosine), len(self.sine))
+        result = np.zeros(harmonics, dtype=np.complex128)
+        result.real[: len(self.cosine)] = self.cosine
+        result.imag[: len(self.sine)] = -np.asarray(self.sine, dtype=np.float64)
+        return result
+
+    def table(self, points: int) -> FloatArray:
+        """Return kappa at phases 0, 1/points, ..., as an array of shape (points,)."""
+        coefficients = self.coefficients()
+        n = np.arange(1, coefficients.size + 1)
+        # Whole numbers modulo points keep the phase exact for high harmonics.
+        turns = np.outer(np.arange(points), n) % points / points
+        variation: FloatArray = (np.exp(2j * np.pi * turns) @ coefficients).real
+        return 1.0 + self.scale * variation
+
+    def to_trapezoid(self) -> TrapezoidalStiffness:
+        """Return the trapezoid with equal rise and fall that fits the harmonics best.
+
+        Contact lines of equal teeth always rise as long as they fall. The phase of the first
+        harmonic places the middle of the top; rise and distance between the middles of rise
+        and fall minimise the squared distance of all harmonics, on a grid that is refined
+        around its best point; the half-height follows linearly.
+
+        Raises
+        ------
+        ValueError
+            If there are fewer than three harmonics or the first one is zero.
+        """
+        target = self.coefficients()
+        if target.size < MINIMUM_HARMONICS_OF_A_FIT:
+            raise ValueError(
+                f"a trapezoid needs at least {MINIMUM_HARMONICS_OF_A_FIT} harmonics to fit, "
+                f"not {target.size}"
+            )
+        if target[0] == 0.0:
+            raise ValueError("a trapezoid cannot be fitted to a series without first harmonic")
+        n = np.arange(1, target.size + 1)
+        middle_of_top = -np.angle(target[0]) / (2.0 * np.pi)
+        centred = (target * np.exp(2j * np.pi * n * middle_of_top)).real
+
+        rise, width, half_height = _fit_centred_trapezoid(centred)
+        return TrapezoidalStiffness(
+            rise=rise,
+            top=width - rise,
+            fall=rise,
+            bottom=max(0.0, 1.0 - width - rise),
+            half_height=half_height,
+            scale=self.scale,
+            start=float((middle_of_top - (width + rise) / 2.0) % 1.0),
+        )
+
+
+def _centred_harmonics(n: FloatArray, rise: FloatArray, width: FloatArray) -> FloatArray:
+    """Cosine harmonics of a trapezoid of half-height one about the middle of its top."""
+    return 4.0 / (np.pi * n) * np.sinc(n * rise) * np.sin(np.pi * n * width)
+
+
+def _fit_centred_trapezoid(target: FloatArray) -> tuple[float, float, float]:
+    """Rise, width (top + rise) and half-height whose cosine harmonics are nearest to target."""
+    n = np.arange(1.0, target.size + 1.0)
+    steps = np.linspace(-1.0, 1.0, 33)
+    rise, width, reach = 0.25, 0.5, 0.5
+    half_height = 0.0
+    # Shrinking slowly lets the grid follow the valley of a nearly triangular trapezoid.
+    while reach > 1e-15:
+        rises = np.clip(rise + reach * steps, 0.0, 0.5)[:, None]
+        widths = np.clip(width + reach * steps[None, :], rises, 1.0 - rises)
+        shapes = _centred_harmonics(n[:, None, None], rises[None], widths[None])
+        heights = np.maximum(
+            np.einsum("n,nrw->rw", target, shapes) / (np.square(shapes).sum(axis=0) + 1e-300), 0.0
+        )
+        residuals = np.square(target[:, None, None] - heights * shapes).sum(axis=0)
+        best = np.unravel_index(np.argmin(residuals), residuals.shape)
+        rise = float(rises[best[0], 0])
+        width, half_height = float(widths[best]), float(heights[best])
+        reach *= 0.7
+    return rise, width, half_height

@@ -1,0 +1,251 @@
+"""Reading a result file, and refusing with one sentence whatever is not one."""
+
+from __future__ import annotations
+
+import os
+import stat
+from collections.abc import Mapping
+from typing import Any
+
+import h5py
+import numpy as np
+from numpy.typing import NDArray
+
+from gearchaos.atomic_file import reason
+from gearchaos.errors import FileError
+from gearchaos.result_file import ORIGINS, PARAMETERS, SCHEMA, SCHEMA_VERSION, Parameter
+from gearchaos.variables import HARMONIC, SECTION_POINT, STATE, Variable, sweep_variables
+
+Contents = tuple[
+    list[Variable],
+    dict[str, NDArray[Any]],
+    dict[str, Parameter],
+    dict[str, str | int | float],
+]
+
+_DTYPES = {"f8": "float64", "i4": "int32", "u1": "uint8"}
+_LARGEST_CHUNK = 64 << 20
+_HIGHEST_COMPRESSION = 1100
+"""Deflate packs at best 1032 bytes into one; a dataset that claims more is not a real one."""
+
+
+class _Unfit(Exception):
+    """What is wrong with the file, in words; becomes a FileError."""
+
+
+def read_result(path: str | os.PathLike[str]) -> Contents:
+    """Read a whole result file.
+
+    Links to other files are not followed, and nothing larger than what the file can hold is
+    allocated.
+
+    Returns
+    -------
+    variables : list of Variable
+    data : dict of str to ndarray
+    parameters : dict of str to Parameter
+    metadata : dict of str to str, int or float
+
+    Raises
+    ------
+    FileError
+        If the file is missing, damaged, of another kind or of a newer major format version.
+    """
+    name = os.fspath(path)
+    try:
+        if not stat.S_ISREG(os.stat(name).st_mode):
+            raise FileError(f"{name}: is not a regular file; give the name of a result file")
+    except (OSError, ValueError) as error:
+        raise FileError(
+            f"{name}: cannot be read: {reason(error)}; give the name of a result file"
+        ) from error
+    try:
+        with h5py.File(name, "r") as file:
+            return _read(file)
+    except _Unfit as error:
+        raise FileError(f"{name}: {error}") from error
+    except Exception as error:
+        # Damage surfaces in h5py as nearly any kind of exception.
+        what = "is damaged" if h5py.is_hdf5(name) else "is not an HDF5 file, or is cut off"
+        raise FileError(f"{name}: {what} ({reason(error)}); run the sweep again") from error
+
+
+def _read(file: h5py.File) -> Contents:
+    metadata = _scalars(file)
+    _check_schema(metadata)
+    axis = str(metadata.get("axis", ""))
+    variables: list[Variable] = []
+    data: dict[str, NDArray[Any]] = {}
+    sizes: dict[str, int] = {}
+    for name in file:
+        if name == PARAMETERS:
+            continue
+        dataset = _dataset(file, name)
+        if dataset.shape == ():
+            if h5py.check_string_dtype(dataset.dtype):
+                metadata[name] = dataset.asstr()[()]
+            continue
+        dims = _dims(file, dataset, sizes)
+        if name != HARMONIC:
+            data[name] = _values(dataset)
+            variables.append(_variable(dataset, dims, data[name], on_lanes=axis in dims))
+    _check_variables(axis, variables, data)
+    return variables, data, _read_parameters(file, axis, sizes), metadata
+
+
+def _check_schema(metadata: Mapping[str, Any]) -> None:
+    if metadata.get("schema") != SCHEMA:
+        raise _Unfit(
+            f'is not a gearchaos result: it lacks the attribute schema = "{SCHEMA}"; '
+            "give the name of a file that a sweep has written"
+        )
+    version, own = str(metadata.get("schema_version", "")), SCHEMA_VERSION.split(".")[0]
+    if version.split(".")[0] != own:
+        raise _Unfit(
+            f"has version {version!r} of the file format, of which this gearchaos reads {own}.x; "
+            "use a gearchaos that knows it"
+        )
+
+
+def _check_variables(
+    axis: str, variables: list[Variable], data: Mapping[str, NDArray[Any]]
+) -> None:
+    """Compare what a sweep must yield with what there is; more than that is welcome."""
+    if STATE not in data:
+        raise _Unfit(f"lacks the variable {STATE}; run the sweep again")
+    found = {variable.name: variable for variable in variables}
+    prefix = "section_"
+    expected = sweep_variables(
+        axis,
+        units="1",
+        long_name="",
+        symbol="",
+        states=tuple(data[STATE].ravel()),
+        section=[n.removeprefix(prefix) for n in found if n.startswith(prefix + "delta_")],
+        section_points=np.size(data.get(SECTION_POINT, ())),
+        lyapunov="lyapunov_exponent" in found,
+        several_starts="start" in found,
+        status_meanings=(),
+    )
+    for due in expected:
+        got = found.get(due.name)
+        if got is None:
+            raise _Unfit(f"lacks the variable {due.name}; run the sweep again")
+        if (got.dims, got.dtype) != (due.dims, due.dtype):
+            raise _Unfit(
+                f"holds {due.name} as {got.dtype} over ({', '.join(got.dims)}), which should be "
+                f"{due.dtype} over ({', '.join(due.dims)}); run the sweep again"
+            )
+    if data["status"].max() >= max(1, len(found["status"].flags)):
+        raise _Unfit("holds a status without a meaning; run the sweep again")
+
+
+def _read_parameters(file: h5py.File, axis: str, sizes: dict[str, int]) -> dict[str, Parameter]:
+    if not isinstance(_hard_linked(file, PARAMETERS), h5py.Group):
+        raise _Unfit(f"lacks the group {PARAMETERS}; run the sweep again")
+    parameters = {}
+    for name in file[PARAMETERS]:
+        dataset = _dataset(file, f"{PARAMETERS}/{name}")
+        notes = _scalars(dataset)
+        dims = _dims(file, dataset, sizes) if dataset.shape else ()
+        origin = str(notes.get("origin"))
+        number = _DTYPES.get(dataset.dtype.str[1:]) == "float64"
+        if not number or dims not in ((), (axis,), (HARMONIC,)) or origin not in ORIGINS:
+            raise _Unfit(f"holds a parameter {name} that is none; run the sweep again")
+        values = dataset[()]
+        parameters[name] = Parameter(
+            values if dims else float(values),
+            origin,
+            **_wording(notes),
+        )
+    return parameters
+
+
+def _hard_linked(file: h5py.File, name: str) -> Any:
+    # A soft or an external link could lead anywhere.
+    if not isinstance(file.get(name, getlink=True), h5py.HardLink):
+        raise _Unfit(f"holds no {name}, or a link in its place; run the sweep again")
+    return file[name]
+
+
+def _dataset(file: h5py.File, name: str) -> h5py.Dataset:
+    """Open a dataset that lies in this file, is compressed in known ways and fits into it."""
+    dataset = _hard_linked(file, name)
+    if not isinstance(dataset, h5py.Dataset) or dataset.is_virtual or dataset.external:
+        raise _Unfit(f"keeps {name} outside of itself or not as an array; run the sweep again")
+    known = {h5py.h5z.FILTER_DEFLATE, h5py.h5z.FILTER_SHUFFLE, h5py.h5z.FILTER_FLETCHER32}
+    layout = dataset.id.get_create_plist()
+    filters = {layout.get_filter(index)[0] for index in range(layout.get_nfilters())}
+    stored = min(dataset.id.get_storage_size(), file.id.get_filesize())
+    chunk = int(np.prod(dataset.chunks or (1,), dtype=object)) * dataset.dtype.itemsize
+    size = int(np.prod(dataset.shape, dtype=object)) * dataset.dtype.itemsize
+    packed = _HIGHEST_COMPRESSION if filters else 1
+    if filters - known or chunk > _LARGEST_CHUNK or not 0 < size <= packed * stored:
+        raise _Unfit(
+            f"declares {size} bytes for {name} that it does not hold in a known way; "
+            "run the sweep again"
+        )
+    return dataset
+
+
+def _dims(file: h5py.File, dataset: h5py.Dataset, sizes: dict[str, int]) -> tuple[str, ...]:
+    name = dataset.name.lstrip("/")
+    dims = []
+    for dim, size in zip(dataset.dims, dataset.shape, strict=True):
+        scale = name if dataset.is_scale else dim[0].name.lstrip("/") if len(dim) == 1 else ""
+        if scale not in file or sizes.setdefault(scale, size) != size:
+            raise _Unfit(f"holds {name} with dimensions that do not fit; run the sweep again")
+        dims.append(scale)
+    return tuple(dims)
+
+
+def _values(dataset: h5py.Dataset) -> NDArray[Any]:
+    if h5py.check_string_dtype(dataset.dtype) is None:
+        values: NDArray[Any] = dataset[...]
+        return values.astype(_dtype(dataset), copy=False)
+    words = dataset.asstr()[...]
+    if max(map(len, words.flat)) > np.iinfo(np.uint8).max:
+        raise _Unfit(f"holds no plain words in {dataset.name}; run the sweep again")
+    return np.asarray(words, dtype="str")
+
+
+def _dtype(dataset: h5py.Dataset) -> str:
+    if h5py.check_string_dtype(dataset.dtype):
+        return "str"
+    try:
+        return _DTYPES[dataset.dtype.str[1:]]
+    except KeyError:
+        raise _Unfit(
+            f"holds {dataset.name} as {dataset.dtype}, which no variable is; run the sweep again"
+        ) from None
+
+
+def _variable(
+    dataset: h5py.Dataset, dims: tuple[str, ...], values: NDArray[Any], *, on_lanes: bool
+) -> Variable:
+    notes = _scalars(dataset)
+    fill = dataset.attrs.get("_FillValue")
+    return Variable(
+        dataset.name.lstrip("/"),
+        dims,
+        _dtype(dataset),
+        **_wording(notes),
+        fill_value=None if fill is None else np.ravel(fill)[0].item(),
+        flags=tuple(str(notes.get("flag_meanings", "")).split()),
+        values=None if on_lanes else tuple(values.tolist()),
+    )
+
+
+def _wording(notes: Mapping[str, Any]) -> dict[str, Any]:
+    return {key: str(notes.get(key, "")) for key in ("units", "long_name", "symbol")}
+
+
+def _scalars(item: h5py.HLObject) -> dict[str, Any]:
+    """Give the attributes that are a text or a number, and leave the bookkeeping of HDF5."""
+    scalars: dict[str, Any] = {}
+    for name, value in item.attrs.items():
+        if isinstance(value, str):
+            scalars[name] = value
+        elif isinstance(value, np.integer | np.floating):
+            scalars[name] = value.item()
+    return scalars

@@ -1,0 +1,252 @@
+"""A configured sweep, computed block by block."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from gearchaos_kernels import (
+    LANES,
+    STATE_ROWS,
+    STATUS_TEXTS,
+    Outcome,
+    Plan,
+    Scene,
+    Status,
+    integrate,
+)
+from numpy.typing import NDArray
+
+from gearchaos.configuration import Configuration, lane_groups
+from gearchaos.configuration.sweep_values import SWEEPABLE_GROUPS, SWEEPABLE_KEYS
+from gearchaos.group_table import GROUP_TABLE
+from gearchaos.lanes import model, select, start_states
+from gearchaos.lyapunov import largest_exponent
+from gearchaos.result import Parameter
+from gearchaos.variables import Variable, axis_name, sweep_variables
+
+Arrays = Mapping[str, NDArray[Any]]
+Bounds = tuple[int, int]
+
+
+class Simulation:
+    """One configured sweep: what it yields, and the means to compute any block of its lanes.
+
+    Lanes are ordered by the swept value; where a value has several starts, these follow one
+    another. A lane's result depends on its number in the sweep and nothing else.
+
+    Parameters
+    ----------
+    config : Configuration
+    """
+
+    def __init__(self, config: Configuration) -> None:
+        self.config = config
+        self.values, self.groups = lane_groups(config)
+        self.starts = config.start.count
+        self.lanes = self.values.size * self.starts
+        self.scene = Scene(**{effect: effect in config.scene.effects for effect in Scene._fields})
+        self.plan = Plan(
+            steps_per_period=config.integration.steps_per_period,
+            transient_periods=config.integration.transient_periods,
+            recorded_periods=config.integration.recorded_periods,
+            section_points=config.outputs.section_points if config.outputs.section else 0,
+            section_states=config.outputs.section,
+            tangent=config.outputs.lyapunov,
+        )
+
+    @property
+    def axis(self) -> str:
+        """Name of the dimension of the lanes."""
+        return axis_name(self.config.sweep.parameter)
+
+    @property
+    def carried(self) -> bool:
+        """Whether each value starts from the end state of its neighbour."""
+        return self.config.start.carry != "none"
+
+    @property
+    def steps(self) -> int:
+        """Runge-Kutta steps of the whole sweep."""
+        periods = self.plan.transient_periods + self.plan.recorded_periods
+        return self.lanes * periods * self.plan.steps_per_period
+
+    @property
+    def variables(self) -> list[Variable]:
+        """What the sweep yields."""
+        units, long_name, symbol = self._wording()
+        return sweep_variables(
+            self.axis,
+            units=units,
+            long_name=long_name,
+            symbol=symbol,
+            states=self.config.scene.states,
+            section=self.config.outputs.section,
+            section_points=self.config.outputs.section_points,
+            lyapunov=self.config.outputs.lyapunov,
+            several_starts=self.starts > 1,
+            status_meanings=[status.name.lower() for status in STATUS_TEXTS],
+        )
+
+    @property
+    def parameters(self) -> dict[str, Parameter]:
+        """The groups of the model with their origin; those that no effect needs are left out."""
+        parameters = {}
+        for row in GROUP_TABLE:
+            value = getattr(self.groups, row.name)
+            if value is None or not row.needed_by(self.config.scene.effects):
+                continue
+            swept = np.ndim(value) > 0 and not row.is_list
+            parameters[row.name] = Parameter(
+                np.repeat(value, self.starts) if swept else value,
+                "swept" if swept else self.groups.origin[row.name],
+                row.units,
+                row.long_name,
+                row.mathtext,
+            )
+        return parameters
+
+    def compile(self) -> None:
+        """Compile the kernel of this scene, or load it from the cache."""
+        self._integrate(slice(0, 1), None, self.plan._replace(transient_periods=0, recorded_periods=0))
+
+    def blocks(self, size: int) -> list[Bounds]:
+        """Return the bounds of the blocks in the order in which they are to be computed."""
+        whole_values = max(self.starts, size - size % self.starts) if self.carried else size
+        bounds = [
+            (first, min(first + whole_values, self.lanes))
+            for first in range(0, self.lanes, whole_values)
+        ]
+        return bounds[::-1] if self.config.start.carry == "downwards" else bounds
+
+    def compute(self, first: int, last: int, neighbour: Arrays | None = None) -> dict[str, Any]:
+        """Compute the lanes ``first`` to ``last - 1``.
+
+        Parameters
+        ----------
+        first, last : int
+            Bounds of the block, from `blocks`.
+        neighbour : mapping of str to ndarray, optional
+            What the block before this one yielded; a carried sweep goes on from its end states.
+
+        Returns
+        -------
+        dict
+            The lanes' part of every variable that runs over lanes, by name.
+        """
+        if not self.carried:
+            return self._arrays(first, self._integrate(slice(first, last)))
+        return self._compute_carried(first, last, neighbour)
+
+    def _compute_carried(self, first: int, last: int, neighbour: Arrays | None) -> dict[str, Any]:
+        downwards = self.config.start.carry == "downwards"
+        columns = [STATE_ROWS[name] for name in self.config.scene.states]
+        carried = None
+        if neighbour is not None:
+            carried = np.full((self.starts, len(STATE_ROWS)), 0.0)
+            edge = slice(None, self.starts) if downwards else slice(-self.starts, None)
+            carried[:, columns] = neighbour["end_state"][edge]
+        parts: list[Outcome] = []
+        for lane in range(first, last, self.starts)[:: -1 if downwards else 1]:
+            parts.append(self._integrate(slice(lane, lane + self.starts), carried))
+            carried = parts[-1].end_state
+        if downwards:
+            parts.reverse()
+        merged = (
+            None if arrays[0] is None else np.concatenate(arrays)
+            for arrays in zip(*parts, strict=True)
+        )
+        return self._arrays(first, Outcome(*merged))
+
+    def _integrate(
+        self, lanes: slice, carried: NDArray[np.float64] | None = None, plan: Plan | None = None
+    ) -> Outcome:
+        numbers = np.arange(lanes.start, lanes.stop)
+        groups = select(self.groups, numbers // self.starts)
+        lane_model = model(groups, numbers.size)
+        start = start_states(self.config, lane_model, lanes.start)
+        if carried is not None:
+            # A lane that diverged hands nothing on: its successor begins anew.
+            start = np.where(np.isfinite(carried).all(axis=1, keepdims=True), carried, start)
+        nothing = np.zeros(0)
+        return integrate(
+            self.scene,
+            lane_model,
+            nothing if groups.stiffness_cosine is None else groups.stiffness_cosine,
+            nothing if groups.stiffness_sine is None else groups.stiffness_sine,
+            start,
+            plan or self.plan,
+            rederived=self.config.formulation == "rederived",
+        )
+
+    def _arrays(self, first: int, outcome: Outcome) -> dict[str, Any]:
+        numbers = np.arange(first, first + outcome.status.size)
+        value = numbers // self.starts
+        arrays: dict[str, Any] = {
+            self.axis: self.values[value],
+            "start": numbers % self.starts,
+            "status": outcome.status,
+            "diverged_period": outcome.diverged_period,
+            "end_state": outcome.end_state[:, [STATE_ROWS[s] for s in self.config.scene.states]],
+        }
+        for column, name in enumerate(self.plan.section_states):
+            arrays[f"section_{name}"] = outcome.section[:, :, column]
+        if outcome.growth is not None:
+            frequency = select(self.groups, value).mesh_frequency
+            period = np.broadcast_to(2.0 * np.pi / np.float64(frequency), numbers.shape)
+            exponent, standard_error = largest_exponent(outcome.growth, period)
+            arrays["lyapunov_exponent"] = exponent
+            arrays["lyapunov_exponent_standard_error"] = standard_error
+        wanted = {v.name for v in self.variables if v.dims[0] == self.axis}
+        return {name: array for name, array in arrays.items() if name in wanted}
+
+    def _wording(self) -> tuple[str, str, str]:
+        parameter = self.config.sweep.parameter
+        if parameter in SWEEPABLE_GROUPS:
+            row = SWEEPABLE_GROUPS[parameter]
+            return row.units, row.long_name, row.mathtext
+        key = SWEEPABLE_KEYS[parameter]
+        return key.units or "1", key.field.description or parameter, ""
+
+
+def diverged_share(blocks: Sequence[Arrays]) -> float:
+    """Return the share of lanes that diverged."""
+    status = np.concatenate([block["status"] for block in blocks])
+    return float(np.mean(status == Status.DIVERGED))
+
+
+def compute_all(
+    simulation: Simulation,
+    bounds: Sequence[Bounds],
+    finished: Mapping[Bounds, Callable[[], Arrays]] | None = None,
+) -> Iterator[tuple[Bounds, Arrays]]:
+    """Compute blocks in order, skipping the finished ones.
+
+    Parameters
+    ----------
+    simulation : Simulation
+    bounds : sequence of (first, last)
+        From `Simulation.blocks`.
+    finished : mapping, optional
+        Bounds of finished blocks with a way to read them; a carried sweep goes on from them.
+    """
+    finished = finished or {}
+    neighbour: Callable[[], Arrays] | None = None
+    for first, last in bounds:
+        if (first, last) in finished:
+            neighbour = finished[first, last]
+            continue
+        before = neighbour() if neighbour is not None and simulation.carried else None
+        arrays = simulation.compute(first, last, before)
+        yield (first, last), arrays
+
+        def handed_on(arrays: Arrays = arrays) -> Arrays:
+            return arrays
+
+        neighbour = handed_on
+
+
+def default_block(threads: int) -> int:
+    """Return how many lanes make a block: enough for every thread, few enough to show progress."""
+    return LANES * max(8, 2 * threads)

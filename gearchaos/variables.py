@@ -1,0 +1,151 @@
+"""What a sweep yields: the name, dimensions, type, unit and wording of every variable, in one place."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+SECTION_POINT = "section_point"
+STATE = "state"
+HARMONIC = "harmonic"
+
+STATE_WORDING: dict[str, tuple[str, str]] = {
+    "delta_5": ("relative torsional displacement", r"$\delta_5$"),
+    "delta_5_rate": ("relative torsional velocity", r"$\delta_5'$"),
+    "delta_1": ("transverse displacement of the driving gear", r"$\delta_1$"),
+    "delta_1_rate": ("transverse velocity of the driving gear", r"$\delta_1'$"),
+    "delta_2": ("transverse displacement of the driven gear", r"$\delta_2$"),
+    "delta_2_rate": ("transverse velocity of the driven gear", r"$\delta_2'$"),
+    "delta_3": ("axial displacement of the driving gear", r"$\delta_3$"),
+    "delta_3_rate": ("axial velocity of the driving gear", r"$\delta_3'$"),
+    "delta_4": ("axial displacement of the driven gear", r"$\delta_4$"),
+    "delta_4_rate": ("axial velocity of the driven gear", r"$\delta_4'$"),
+}
+"""Long name and mathtext symbol of each state (all dimensionless), in the order of the kernels."""
+
+
+@dataclass(frozen=True)
+class Variable:
+    """One named array of a sweep.
+
+    Parameters
+    ----------
+    name : str
+    dims : tuple of str
+        Names of the dimensions; the first one of everything that differs from lane to lane is
+        the axis of the sweep.
+    dtype : str
+        ``"float64"``, ``"int32"``, ``"uint8"`` or ``"str"``.
+    units, long_name, symbol : str
+        Unit (``"1"`` where dimensionless), wording and mathtext symbol for axis labels.
+    fill_value : float or int, optional
+        The value that stands for "none here"; ``None`` where every value means something.
+    flags : tuple of str
+        Meanings of the values 0, 1, 2, ... of an enumeration, one word each.
+    values : tuple, optional
+        The values themselves where they are known before the sweep (``section_point``, ``state``).
+    """
+
+    name: str
+    dims: tuple[str, ...]
+    dtype: str
+    units: str
+    long_name: str
+    symbol: str = ""
+    fill_value: float | int | None = None
+    flags: tuple[str, ...] = ()
+    values: tuple[int, ...] | tuple[str, ...] | None = None
+
+    @property
+    def attributes(self) -> dict[str, Any]:
+        """Everything a file says about the variable beside its values."""
+        attributes: dict[str, Any] = {"units": self.units, "long_name": self.long_name}
+        if self.symbol:
+            attributes["symbol"] = self.symbol
+        if self.flags:
+            attributes["flag_values"] = np.arange(len(self.flags), dtype=self.dtype)
+            attributes["flag_meanings"] = " ".join(self.flags)
+        return attributes
+
+
+def axis_name(parameter: str) -> str:
+    """Give the name of the dimension of a swept parameter, e.g. ``operation_speed_rpm``."""
+    return parameter.replace(".", "_")
+
+
+def sweep_variables(
+    axis: str,
+    *,
+    units: str,
+    long_name: str,
+    symbol: str,
+    states: Sequence[str],
+    section: Sequence[str],
+    section_points: int,
+    lyapunov: bool,
+    several_starts: bool,
+    status_meanings: Sequence[str],
+) -> list[Variable]:
+    """List the variables of a sweep in the order of the file.
+
+    Parameters
+    ----------
+    axis : str
+        The swept parameter, bare or as a dotted path.
+    units, long_name, symbol : str
+        Of the swept parameter.
+    states : sequence of str
+        States of the scene, in the order of the kernels.
+    section : sequence of str
+        States recorded once a mesh period.
+    section_points : int
+        Mesh periods recorded.
+    lyapunov : bool
+        Whether the largest Lyapunov exponent is computed.
+    several_starts : bool
+        Whether each parameter value has several lanes that differ in their start.
+    status_meanings : sequence of str
+        Meanings of the lane status 0, 1, ...
+
+    Returns
+    -------
+    list of Variable
+    """
+    lane = axis_name(axis)
+    nan = float("nan")
+    variables = [Variable(lane, (lane,), "float64", units, long_name, symbol)]
+    if several_starts:
+        start = "number of the start among those of one parameter value"
+        variables.append(Variable("start", (lane,), "int32", "1", start))
+    if section and section_points > 0:
+        points = tuple(range(section_points))
+        text = "recorded mesh period, counted from the first recorded one"
+        dims: tuple[str, ...] = (SECTION_POINT,)
+        variables.append(Variable(SECTION_POINT, dims, "int32", "1", text, values=points))
+        dims = (lane, SECTION_POINT)
+        for state in section:
+            text, mark = STATE_WORDING[state]
+            text += " at the stroboscopic section"
+            variables.append(Variable(f"section_{state}", dims, "float64", "1", text, mark, nan))
+    if lyapunov:
+        name, text = "lyapunov_exponent", "largest Lyapunov exponent"
+        error, error_text = f"{name}_standard_error", f"standard error of the {text}"
+        variables += [
+            Variable(name, (lane,), "float64", "1", text, r"$\lambda_1$", nan),
+            Variable(error, (lane,), "float64", "1", error_text, r"$s_{\lambda_1}$", nan),
+        ]
+    flags = tuple("_".join(meaning.split()) for meaning in status_meanings)
+    diverged = "mesh period in which the lane diverged, -1 where it did not"
+    names = tuple(states)
+    return [
+        *variables,
+        Variable("status", (lane,), "uint8", "1", "status of the lane", flags=flags),
+        Variable("diverged_period", (lane,), "int32", "1", diverged, fill_value=-1),
+        Variable(STATE, (STATE,), "str", "1", "name of the state variable", values=names),
+        Variable(
+            "end_state", (lane, STATE), "float64", "1", "state at the end of the lane", "", nan
+        ),
+    ]

@@ -1,0 +1,18 @@
+"""The compiled layer: arrays and numbers in, arrays out."""
+
+from gearchaos_kernels.batch import STATE_ROWS, Outcome, Plan, Scene, integrate
+from gearchaos_kernels.coefficients import Model
+from gearchaos_kernels.lane import LANES
+from gearchaos_kernels.status import STATUS_TEXTS, Status
+
+__all__ = [
+    "LANES",
+    "STATE_ROWS",
+    "STATUS_TEXTS",
+    "Model",
+    "Outcome",
+    "Plan",
+    "Scene",
+    "Status",
+    "integrate",
+]

@@ -1,0 +1,183 @@
+"""The batch driver: splits lanes into blocks, runs them side by side, returns arrays."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import prange
+from numpy.typing import NDArray
+
+from gearchaos_kernels.block_loop import integrate_block
+from gearchaos_kernels.coefficients import Model, lane_coefficients, phase_table, state_scales
+from gearchaos_kernels.compilation import driver
+from gearchaos_kernels.lane import LANES, STATES
+from gearchaos_kernels.status import Status
+
+STATE_ROWS = {
+    "delta_5": 0,
+    "delta_1": 1,
+    "delta_2": 2,
+    "delta_3": 3,
+    "delta_4": 4,
+    "delta_5_rate": 5,
+    "delta_1_rate": 6,
+    "delta_2_rate": 7,
+    "delta_3_rate": 8,
+    "delta_4_rate": 9,
+}
+"""Column of each state of eq. 13 in the arrays of this layer."""
+
+
+class Scene(NamedTuple):
+    """Which effects exist; what is off is absent from the compiled loop."""
+
+    pitch_error: bool = True
+    stiffness_variation: bool = True
+    backlash: bool = True
+    transverse: bool = True
+    axial: bool = True
+
+
+class Plan(NamedTuple):
+    """How long and how finely a batch is integrated, and what is kept of it."""
+
+    steps_per_period: int
+    transient_periods: int
+    recorded_periods: int
+    section_points: int
+    section_states: tuple[str, ...] = ()
+    tangent: bool = False
+
+
+class Outcome(NamedTuple):
+    """What a batch yields; lanes first.
+
+    ``section`` (lanes, section points, section states), ``growth`` (lanes, recorded periods): the
+    logarithm of the tangent vector's growth over each recorded period, None without tangent;
+    ``end_state`` (lanes, 10) in the columns of `STATE_ROWS`; ``status`` (lanes,) of `Status`;
+    ``diverged_period`` (lanes,): number of the period in which a lane diverged, or -1.
+    """
+
+    section: NDArray[np.float64]
+    growth: NDArray[np.float64] | None
+    end_state: NDArray[np.float64]
+    status: NDArray[np.uint8]
+    diverged_period: NDArray[np.int32]
+
+
+@driver
+def _integrate_blocks(
+    coefficients,
+    scales,
+    start,
+    tangent_start,
+    table,
+    transient_periods,
+    recorded_periods,
+    section_states,
+    pitch_error,
+    phase,
+    stiffness_variation,
+    backlash,
+    transverse,
+    axial,
+    section,
+    growth,
+    end_state,
+    status,
+    diverged_period,
+):
+    for number in prange((status.shape[0] + LANES - 1) // LANES):
+        integrate_block(
+            number * LANES,
+            coefficients,
+            scales,
+            start,
+            tangent_start,
+            table,
+            transient_periods,
+            recorded_periods,
+            section_states,
+            pitch_error,
+            phase,
+            stiffness_variation,
+            backlash,
+            transverse,
+            axial,
+            section,
+            growth,
+            end_state,
+            status,
+            diverged_period,
+        )
+
+
+def integrate(
+    scene: Scene,
+    model: Model,
+    stiffness_cosine: NDArray[np.float64],
+    stiffness_sine: NDArray[np.float64],
+    start: NDArray[np.float64],
+    plan: Plan,
+    *,
+    rederived: bool = False,
+) -> Outcome:
+    """Integrate a batch of lanes with fixed-step RK4 from tau = 0.
+
+    Parameters
+    ----------
+    scene : Scene
+        Effects that exist.
+    model : Model
+        Dimensionless groups, arrays of shape (lanes,).
+    stiffness_cosine, stiffness_sine : ndarray, shape (harmonics,)
+        Mesh stiffness relative to its mean (eq. 19).
+    start : ndarray, shape (lanes, 10)
+        States of eq. 13 at tau = 0, columns as in `STATE_ROWS`.
+    plan : Plan
+        Steps, periods and what is kept.
+    rederived : bool
+        Which form of eq. 6 holds (see `coefficients.lane_coefficients`).
+
+    Returns
+    -------
+    Outcome
+        Identical bit for bit for any number of threads, any split and any order of the lanes.
+    """
+    lanes = start.shape[0]
+    steps = plan.steps_per_period
+    outcome = Outcome(
+        section=np.full((lanes, plan.section_points, len(plan.section_states)), np.nan),
+        growth=np.full((lanes, plan.recorded_periods), np.nan) if plan.tangent else None,
+        end_state=np.full((lanes, STATES), np.nan),
+        status=np.full(lanes, Status.OK, dtype=np.uint8),
+        diverged_period=np.full(lanes, -1, dtype=np.int32),
+    )
+    present = np.repeat([True, scene.transverse, scene.axial], [1, 2, 2])
+    present = np.tile(present, 2)
+    # An equal share of every state the scene has: no special direction.
+    tangent_start = present / np.sqrt(np.count_nonzero(present))
+    _integrate_blocks(
+        lane_coefficients(model, steps, rederived),
+        state_scales(model, steps),
+        np.where(present, start, 0.0),
+        tangent_start,
+        phase_table(stiffness_cosine, stiffness_sine, steps),
+        plan.transient_periods,
+        plan.recorded_periods,
+        np.array([STATE_ROWS[name] for name in plan.section_states], dtype=np.intp),
+        _flag(scene.pitch_error),
+        _flag(scene.pitch_error and bool(np.any(model.error_phase))),
+        _flag(scene.stiffness_variation),
+        _flag(scene.backlash),
+        _flag(scene.transverse),
+        _flag(scene.axial),
+        *outcome,
+    )
+    return outcome
+
+
+def _flag(present: bool) -> tuple[()] | None:
+    """Encode an effect in a type, so that every scene is compiled for itself."""
+    return () if present else None

@@ -1,0 +1,112 @@
+"""How the kernels are compiled: flags, vector width, stack alignment and the on-disk cache.
+
+Every flag is named here and nowhere else. Two facts about Numba shape this file:
+
+* the cache of a function is keyed by its own source file only, so a cached caller would keep the
+  old code of a callee edited in another file. The cache folder is therefore named after a hash of
+  all kernel sources;
+* LLVM prefers 256-bit vectors on some AVX-512 processors, and it spills vector registers to an
+  unaligned stack. Both cost up to half of the speed of the lane loop.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import llvmlite.binding
+import numba
+from llvmlite import ir
+from numba import config, types
+from numba.core import cgutils
+from numba.extending import intrinsic
+from numba.misc.appdirs import user_cache_dir
+
+FASTMATH = {"contract", "nsz"}
+"""Fused multiply-add and unsigned zeros only: NaN and infinity keep their meaning."""
+
+CACHE_LINE = 64
+"""Bytes that one aligned 512-bit vector occupies."""
+
+_SHARED_FLAGS: dict[str, Any] = {"fastmath": FASTMATH, "error_model": "numpy"}
+
+
+def source_hash() -> str:
+    """Return a hash of every source file of this package and of Numba's version."""
+    digest = hashlib.sha256(numba.__version__.encode())
+    for source in sorted(Path(__file__).parent.glob("*.py")):
+        digest.update(source.name.encode())
+        digest.update(source.read_bytes())
+    return digest.hexdigest()[:16]
+
+
+def cache_folder() -> Path:
+    """Return a writable folder for compiled code, named after the sources it was compiled from.
+
+    Numba's own setting (``NUMBA_CACHE_DIR``) is the parent folder where it is set, otherwise the
+    user's cache folder. Where that cannot be written, a private temporary folder serves one process
+    (a cache holds code: nobody else must be able to write it).
+    """
+    folder = Path(config.CACHE_DIR or user_cache_dir("gearchaos"), source_hash())
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder):
+            return folder
+    except OSError:
+        return Path(tempfile.mkdtemp(prefix="gearchaos-"))
+
+
+def widest_vectors() -> str:
+    """Return the processor's features without the preference for 256-bit vectors."""
+    return str(llvmlite.binding.get_host_cpu_features().flatten()) + ",-prefer-256-bit"
+
+
+CACHE_FOLDER = cache_folder()
+if config.CPU_FEATURES is None:
+    config.CPU_FEATURES = widest_vectors()
+
+
+def _decorate(function: Callable[..., Any], **flags: Any) -> Any:
+    return numba.njit(**_SHARED_FLAGS, **flags)(function)
+
+
+def scalar(function: Callable[..., Any]) -> Any:
+    """Compile a formula of plain numbers that is inlined wherever it is used."""
+    return _decorate(function, forceinline=True)
+
+
+def driver(function: Callable[..., Any]) -> Any:
+    """Compile a function that only splits, calls and merges, in parallel and cached on disk."""
+    user_setting = config.CACHE_DIR
+    # The cache folder is read once, at decoration: other users of Numba keep their own.
+    config.CACHE_DIR = str(CACHE_FOLDER)
+    try:
+        return _decorate(function, parallel=True, nogil=True, cache=True)
+    finally:
+        config.CACHE_DIR = user_setting
+
+
+def block(function: Callable[..., Any]) -> Any:
+    """Compile a function that integrates one block of lanes on one thread."""
+    return _decorate(function, nogil=True)
+
+
+@intrinsic
+def align_stack(typing_context: Any) -> Any:
+    """Align the caller's stack frame to a cache line, so that spilled vectors do not straddle two.
+
+    LLVM realigns a frame only if it holds an over-aligned variable before registers are allocated:
+    this one is it. The empty assembly keeps it from being optimised away.
+    """
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        slot = cgutils.alloca_once(builder, ir.ArrayType(ir.IntType(8), CACHE_LINE))
+        slot.align = CACHE_LINE
+        takes_pointer = ir.FunctionType(ir.VoidType(), [slot.type])
+        builder.asm(takes_pointer, "", "r,~{memory}", [slot], True)
+        return context.get_dummy_value()
+
+    return types.void(), generate

@@ -1,0 +1,165 @@
+"""A block of lanes in memory: which row holds which number, and how the inner loop reads it.
+
+A lane is one parameter value of the batch. A block holds ``LANES`` of them as a structure of
+arrays, one flat array in which row r of lane l is element ``r * STRIDE + l``: one base pointer and
+constant distances, so that the compiler can prove that the loop over lanes vectorises.
+
+Coordinates are *scaled* so that the mesh force enters every equation with coefficient -1 (beta_b:
+base helix angle, mu: mass ratio)::
+
+    torsion = delta_5 / cos(beta_b)
+    transverse_p = delta_1 / (mu_p cos(beta_b))    transverse_g = -delta_2 / (mu_g cos(beta_b))
+    axial_p = delta_3 / (mu_p sin(beta_b))         axial_g = -delta_4 / (mu_g sin(beta_b))
+
+and rates are displacements per step (h times d/d tau).
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from gearchaos_kernels.compilation import scalar
+
+LANES = 32
+"""Lanes of one block: a few vectors wide, small enough for the first-level cache."""
+
+STRIDE = LANES + 8
+"""Distance between rows: no two rows fall on the same cache set at a distance of 4096 bytes."""
+
+COORDINATES = 5
+POSITION, RATE, TANGENT_POSITION, TANGENT_RATE = 0, 5, 10, 15
+"""First row of each group of coordinates, in the order of `Coordinates`."""
+
+STATES = 2 * COORDINATES
+COEFFICIENT = 4 * COORDINATES
+"""First row of the coefficients, in the order of `Lane`."""
+
+
+class Coordinates(NamedTuple):
+    """One number for each of the five scaled coordinates; 0 for those a scene leaves out."""
+
+    torsion: float
+    transverse_p: float
+    transverse_g: float
+    axial_p: float
+    axial_g: float
+
+
+class Lane(NamedTuple):
+    """Coefficients of one lane, made dimensionless with the step (see `coefficients`)."""
+
+    mass_ratio_p: float
+    mass_ratio_g: float
+    transverse_damping_p: float
+    transverse_damping_g: float
+    transverse_stiffness_p: float
+    transverse_stiffness_g: float
+    axial_damping_p: float
+    axial_damping_g: float
+    axial_stiffness_p: float
+    axial_stiffness_g: float
+    mean_stiffness: float
+    stiffness_variation: float
+    mesh_damping: float
+    axial_share: float
+    half_backlash: float
+    load: float
+    error_inertia: float
+    error_mean: float
+    error_amplitude: float
+    error_rate: float
+    axial_error_mean: float
+    axial_error_amplitude: float
+    axial_error_rate: float
+    cos_phase: float
+    sin_phase: float
+
+
+ROWS = COEFFICIENT + len(Lane._fields)
+
+
+@scalar
+def read_lane(block, lane):
+    """Return the coefficients of one lane; those that a scene does not use cost nothing."""
+    first = COEFFICIENT * STRIDE + lane
+    return Lane(
+        block[first],
+        block[first + STRIDE],
+        block[first + 2 * STRIDE],
+        block[first + 3 * STRIDE],
+        block[first + 4 * STRIDE],
+        block[first + 5 * STRIDE],
+        block[first + 6 * STRIDE],
+        block[first + 7 * STRIDE],
+        block[first + 8 * STRIDE],
+        block[first + 9 * STRIDE],
+        block[first + 10 * STRIDE],
+        block[first + 11 * STRIDE],
+        block[first + 12 * STRIDE],
+        block[first + 13 * STRIDE],
+        block[first + 14 * STRIDE],
+        block[first + 15 * STRIDE],
+        block[first + 16 * STRIDE],
+        block[first + 17 * STRIDE],
+        block[first + 18 * STRIDE],
+        block[first + 19 * STRIDE],
+        block[first + 20 * STRIDE],
+        block[first + 21 * STRIDE],
+        block[first + 22 * STRIDE],
+        block[first + 23 * STRIDE],
+        block[first + 24 * STRIDE],
+    )
+
+
+@scalar
+def read(block, row, lane, transverse, axial):
+    """Return five coordinates from consecutive rows; an absent pair is the constant 0."""
+    first = row * STRIDE + lane
+    transverse_p = 0.0
+    transverse_g = 0.0
+    axial_p = 0.0
+    axial_g = 0.0
+    if transverse is not None:
+        transverse_p = block[first + STRIDE]
+        transverse_g = block[first + 2 * STRIDE]
+    if axial is not None:
+        axial_p = block[first + 3 * STRIDE]
+        axial_g = block[first + 4 * STRIDE]
+    return Coordinates(block[first], transverse_p, transverse_g, axial_p, axial_g)
+
+
+@scalar
+def write(block, row, lane, values, transverse, axial):
+    """Store the coordinates that the scene has into consecutive rows."""
+    first = row * STRIDE + lane
+    block[first] = values.torsion
+    if transverse is not None:
+        block[first + STRIDE] = values.transverse_p
+        block[first + 2 * STRIDE] = values.transverse_g
+    if axial is not None:
+        block[first + 3 * STRIDE] = values.axial_p
+        block[first + 4 * STRIDE] = values.axial_g
+
+
+@scalar
+def plus(a, b):
+    """Return a + b, coordinate by coordinate."""
+    return Coordinates(
+        a.torsion + b.torsion,
+        a.transverse_p + b.transverse_p,
+        a.transverse_g + b.transverse_g,
+        a.axial_p + b.axial_p,
+        a.axial_g + b.axial_g,
+    )
+
+
+@scalar
+def along(a, factor, b):
+    """Return a + factor * b, coordinate by coordinate."""
+    return Coordinates(
+        a.torsion + factor * b.torsion,
+        a.transverse_p + factor * b.transverse_p,
+        a.transverse_g + factor * b.transverse_g,
+        a.axial_p + factor * b.axial_p,
+        a.axial_g + factor * b.axial_g,
+    )

@@ -1,0 +1,18 @@
+"""What became of a lane."""
+
+from __future__ import annotations
+
+from enum import IntEnum
+
+
+class Status(IntEnum):
+    """Outcome of the integration of one lane; the values are those of the result file."""
+
+    OK = 0
+    DIVERGED = 1
+
+
+STATUS_TEXTS = {
+    Status.OK: "integrated to the end",
+    Status.DIVERGED: "left the range of numbers (or became not a number) and was stopped",
+}

@@ -1,0 +1,275 @@
+"""What a configuration file becomes: tables, swept values, groups of the lanes, TOML again."""
+
+import json
+import math
+import pickle
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from gearchaos.configuration import (
+    EFFECTS,
+    STATES,
+    Configuration,
+    lane_groups,
+    load_config,
+    swept_values,
+)
+from gearchaos.configuration.models import configuration_keys
+from gearchaos.configuration.schema import json_schema, key_tables
+from gearchaos.errors import ConfigurationError
+from gearchaos.group_table import GROUP_TABLE
+from gearchaos.variables import STATE_WORDING
+
+ROOT = Path(__file__).resolve().parents[2]
+SWEEPS = sorted((ROOT / "sweeps").glob("*.toml"))
+PAN2021 = ROOT / "sweeps" / "pan2021.toml"
+
+SMALLEST = """
+[groups]
+mesh_frequency = 0.9
+load = 0.3
+damping_ratio = 0.03
+base_helix_angle_deg = 0.0
+[scene]
+effects = []
+[sweep]
+parameter = "load"
+values = [0.3, 0.1]
+"""
+
+PHYSICAL = """
+[pair]
+teeth = [21, 38]
+normal_module_mm = 2.166
+normal_pressure_angle_deg = 20.0
+helix_angle_deg = 20.0
+face_width_mm = 15.0
+[operation]
+speed_rpm = 2000.0
+torque_Nm = 50.0
+[mesh]
+mean_stiffness_N_per_um_mm = 13.3548
+half_backlash_um = 40.0
+damping_N_s_per_m = 247.331
+stiffness = { shape = "trapezoid" }
+[pitch_error]
+amplitude_um = 11.0
+[bearings]
+transverse_stiffness_N_per_m = [1e9, 5e8]
+transverse_damping_N_s_per_m = [500.0, 400.0]
+axial_stiffness_N_per_m = [1e9, 5e8]
+axial_damping_N_s_per_m = [500.0, 400.0]
+[scene]
+effects = ["pitch_error", "stiffness_variation", "backlash", "transverse", "axial"]
+[sweep]
+parameter = "operation.speed_rpm"
+from = 500.0
+to = 4000.0
+count = 8
+"""
+
+
+@pytest.mark.parametrize("path", SWEEPS, ids=lambda path: path.stem)
+def test_every_sweep_of_the_project_loads_and_resolves(path):
+    config = load_config(path)
+    values, groups = lane_groups(config)
+    assert groups.missing(config.scene.effects) == []
+    assert np.array_equal(getattr(groups, config.sweep.parameter), values)
+
+
+@pytest.mark.parametrize("path", SWEEPS, ids=lambda path: path.stem)
+def test_the_resolved_toml_loads_to_an_equal_configuration(path):
+    config = load_config(path)
+    again = Configuration.from_toml(config.resolved_toml())
+    assert again == config
+    assert again.resolved_toml() == config.resolved_toml()
+
+
+@pytest.mark.parametrize("text", [SMALLEST, PHYSICAL], ids=["smallest", "physical"])
+def test_the_resolved_toml_states_every_default(text):
+    config = Configuration.from_toml(text)
+    tables = tomllib.loads(config.resolved_toml())
+    assert tables["integration"] == {
+        "steps_per_period": 288,
+        "transient_periods": 500,
+        "recorded_periods": 500,
+    }
+    assert tables["start"]["kind"] == "rest"
+    assert Configuration.from_tables(tables) == config
+
+
+def test_any_title_survives_the_round_trip():
+    title = 'quote " backslash \\ newline \n tab \t delete \x7f null \x00 \u03b4 \U0001f600'
+    config = Configuration.from_toml(SMALLEST).replace("title", title)
+    assert Configuration.from_toml(config.resolved_toml()).title == title
+
+
+def test_the_main_sweep_is_the_one_of_the_paper():
+    config = load_config(PAN2021)
+    values, groups = lane_groups(config)
+    assert values.shape == (1501,)
+    assert (values[0], values[586], values[-1]) == (0.0, 5.86, 15.0)
+    assert groups.mesh_frequency == pytest.approx(2 * math.pi * 0.1394, rel=1e-15)
+    assert groups.damping_ratio == pytest.approx(0.1 / math.sqrt(15), rel=1e-15)
+    assert groups.base_helix_angle_deg == pytest.approx(18.747237251037504, rel=1e-12)
+    assert round(groups.mass_ratio_p, 6) == 0.440487
+    assert round(groups.mass_ratio_g, 6) == 0.134525
+    assert groups.stiffness_cosine[0] == pytest.approx(-1.202 / 13.3548, rel=1e-15)
+    assert groups.origin["mass_ratio_p"] == "derived"
+    assert groups.origin["load"] == "given"
+    assert groups.origin["pitch_error_mean"] == "default"
+
+
+def test_the_full_sweep_differs_from_the_main_one_by_the_axial_motion_only():
+    main = load_config(PAN2021).tables()
+    full = load_config(ROOT / "sweeps" / "pan2021_full.toml").tables()
+    added = {name for name in full["groups"] if name not in main["groups"]}
+    assert {name.split("_")[0] for name in added} == {"axial"}
+    assert set(full["scene"]["effects"]) - set(main["scene"]["effects"]) == {"axial"}
+    for table in ("pair", "mesh", "start", "sweep", "integration"):
+        assert full[table] == main[table]
+
+
+def test_swept_values_come_in_ascending_order():
+    config = Configuration.from_toml(SMALLEST)
+    values, groups = lane_groups(config)
+    assert values.tolist() == [0.1, 0.3]
+    assert groups.load is not None
+    assert np.asarray(groups.load).tolist() == [0.1, 0.3]
+    assert groups.mesh_frequency == 0.9
+
+
+def test_a_span_has_its_ends_and_one_rounding_per_value():
+    config = load_config(PAN2021, ["sweep.from=0.1", "sweep.to=0.7", "sweep.count=7"])
+    assert swept_values(config).tolist() == [0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7]
+
+
+def test_a_span_of_one_value_needs_no_end():
+    table = {"parameter": "load", "from": 0.2, "count": 1}
+    config = Configuration.from_toml(SMALLEST).replace("sweep", table)
+    assert swept_values(config).tolist() == [0.2]
+
+
+def test_a_swept_physical_quantity_moves_every_group_derived_from_it():
+    values, groups = lane_groups(Configuration.from_toml(PHYSICAL))
+    assert groups.mesh_frequency / values == pytest.approx(groups.mesh_frequency[0] / 500.0)
+    assert np.ndim(groups.load) == 0
+
+
+def test_a_group_given_directly_wins_over_the_physical_data():
+    text = PHYSICAL + "[groups]\nload = 0.25\n"
+    _, groups = lane_groups(Configuration.from_toml(text))
+    assert groups.load == 0.25
+    assert groups.origin["load"] == "given"
+
+
+def test_a_swept_group_replaces_the_one_in_the_file():
+    config = load_config(PAN2021, ['sweep={parameter="load", values=[0.1, 0.2]}'])
+    assert np.asarray(lane_groups(config)[1].load).tolist() == [0.1, 0.2]
+
+
+def test_an_effect_that_is_off_does_not_forbid_sweeping_what_its_harmonics_depend_on():
+    config = Configuration.from_toml(
+        PHYSICAL, overrides=['scene.effects=["backlash"]', 'sweep.parameter="pair.face_width_mm"']
+    )
+    assert np.ndim(lane_groups(config)[1].load) == 1
+
+
+def test_overrides_are_toml_and_bare_words_are_text():
+    config = load_config(
+        PAN2021,
+        [
+            "start.kind=contact",
+            "integration.steps_per_period=100",
+            "title=two words",
+            "title = x=y",
+        ],
+    )
+    assert config.start.kind == "contact"
+    assert config.integration.steps_per_period == 100
+    assert config.title == "x=y"
+
+
+def test_the_text_is_verbatim_and_the_source_is_the_path():
+    config = load_config(PAN2021, ["integration.steps_per_period=100"])
+    assert config.text == PAN2021.read_text(encoding="utf-8")
+    assert config.source == str(PAN2021)
+
+
+def test_a_byte_order_mark_and_dos_line_ends_are_accepted(tmp_path):
+    path = tmp_path / "dos.toml"
+    path.write_bytes(b"\xef\xbb\xbf" + SMALLEST.replace("\n", "\r\n").encode())
+    assert load_config(path) == Configuration.from_toml(SMALLEST)
+
+
+def test_a_whole_number_serves_as_a_float():
+    assert Configuration.from_toml(SMALLEST.replace("0.9", "1")).groups.given()[
+        "mesh_frequency"
+    ] == pytest.approx(1.0)
+
+
+def test_a_configuration_cannot_be_changed_but_replaced():
+    config = Configuration.from_toml(SMALLEST)
+    finer = config.replace("integration.steps_per_period", 500)
+    assert finer.integration.steps_per_period == 500
+    assert config.integration.steps_per_period == 288
+    assert finer != config
+    with pytest.raises(ValueError, match="frozen"):
+        config.integration.steps_per_period = 500
+    with pytest.raises(ConfigurationError, match=r"integration\.steps_per_period = 0: "):
+        config.replace("integration.steps_per_period", 0)
+
+
+def test_a_configuration_survives_pickling():
+    config = load_config(PAN2021)
+    copy = pickle.loads(pickle.dumps(config))
+    assert copy == config
+    assert (copy.text, copy.source) == (config.text, config.source)
+
+
+@pytest.mark.parametrize(
+    ("effects", "states"),
+    [
+        ([], STATES[:2]),
+        (["transverse"], STATES[:6]),
+        (["axial"], STATES[:2] + STATES[6:]),
+        (["transverse", "axial"], STATES),
+    ],
+)
+def test_the_effects_decide_the_states(effects, states):
+    scene = Configuration.from_toml(PHYSICAL, overrides=[f"scene.effects={effects}"]).scene
+    assert scene.states == tuple(states)
+
+
+def test_states_and_effects_are_those_of_the_files_and_the_groups():
+    assert tuple(STATE_WORDING) == STATES
+    assert set().union(*(row.effects for row in GROUP_TABLE)) == set(EFFECTS)
+
+
+def test_every_group_is_a_key_of_the_groups_table():
+    keys = configuration_keys()
+    assert all(f"groups.{row.name}" in keys for row in GROUP_TABLE)
+
+
+def test_the_command_prints_the_schema():
+    command = [sys.executable, "-m", "gearchaos.configuration"]
+    output = subprocess.run(command, check=True, capture_output=True, text=True, cwd=ROOT).stdout
+    assert json.loads(output) == json_schema()
+
+
+def test_the_schema_knows_every_key_without_null():
+    schema = json_schema()
+    assert "null" not in json.dumps(schema)
+    described = set(schema["properties"])
+    for table in schema["$defs"].values():
+        described |= set(table.get("properties", ()))
+    assert {path.rpartition(".")[2] for path in configuration_keys()} <= described
+
+
+def test_the_documentation_has_the_tables_of_keys_as_the_models_declare_them():
+    assert key_tables() in (ROOT / "docs" / "configuration.md").read_text(encoding="utf-8")

@@ -1,0 +1,295 @@
+"""Every fault of a configuration gives one clear message, all of them at once."""
+
+from pathlib import Path
+
+import pytest
+
+from gearchaos.configuration import Configuration, load_config
+from gearchaos.errors import ConfigurationError, FileError
+
+ROOT = Path(__file__).resolve().parents[2]
+PAN2021 = ROOT / "sweeps" / "pan2021.toml"
+TEXT = PAN2021.read_text(encoding="utf-8")
+
+TRAPEZOID = 'shape = "trapezoid", rise = 0.25, top = 0.25, fall = 0.25'
+FREE_OF_GROUPS = "groups={mesh_frequency=1.0, damping_ratio=0.1, pitch_error_amplitude=0.1}"
+
+
+def problems_of(*overrides):
+    with pytest.raises(ConfigurationError) as caught:
+        Configuration.from_toml(TEXT, "pan.toml", overrides)
+    assert caught.value.exit_code == 2
+    return caught.value.problems
+
+
+ONE_FAULT = [
+    # misspelt and misplaced keys
+    ("sweep.cuont=3", "sweep.cuont = 3", "unknown key", "did you mean `count`?"),
+    ("sweeep.count=3", "sweeep = {...}", "unknown key", "did you mean `sweep`?"),
+    ("pair.torque_Nm=3.0", "pair.torque_Nm = 3.0", "unknown key", "`operation.torque_Nm`"),
+    ("start.qqq=3", "start.qqq = 3", "unknown key", "the keys of [start] are kind, state"),
+    ("mesh.stiffness.sine=[1.0]", "sine = [1.0]", "unknown key", "`sine_N_per_um_mm`"),
+    # wrong types
+    (
+        'pair.face_width_mm="15"',
+        'face_width_mm = "15"',
+        "must be a number",
+        "without the quotes: 15",
+    ),
+    ("pair.face_width_mm=true", "face_width_mm = true", "must be a number", "face width, in mm"),
+    ("pair.teeth=[21, 38.0]", "pair.teeth[1] = 38.0", "must be a whole number", "[21, 38]"),
+    ("pair.teeth=[21]", "pair.teeth[1]", "is missing", "[21, 38]"),
+    ("pair.teeth=[21, 38, 1]", "pair.teeth", "at most 2", "[21, 38]"),
+    ("pair.teeth=21", "pair.teeth = 21", "must be a list", "[21, 38]"),
+    ("integration.steps_per_period=100.0", "steps_per_period = 100.0", "a whole number", "steps"),
+    ("outputs.lyapunov=yes", 'outputs.lyapunov = "yes"', "must be true or false", "exponent"),
+    ("start=rest", 'start = "rest"', "must be a table", "start"),
+    ("title=1979-05-27", "title = 1979-05-27", "must be a text, not a date", "title"),
+    # values out of range
+    ("pair.masses_kg=[0.2, -0.7]", "pair.masses_kg[1] = -0.7", "greater than 0", "masses"),
+    ("pair.teeth=[21, 0]", "pair.teeth[1] = 0", "must be at least 1", "[21, 38]"),
+    ("groups.load=nan", "groups.load = nan", "must be a finite number", "static load"),
+    ("groups.load=-inf", "groups.load = -inf", "must be a finite number", "static load"),
+    ("groups.damping_ratio=-1.0", "damping_ratio = -1.0", "at least 0", "mesh damping ratio"),
+    ("pair.helix_angle_deg=90", "helix_angle_deg = 90", "less than 90", "helix angle"),
+    ("sweep.count=0", "sweep.count = 0", "must be at least 1", "number of values"),
+    ("outputs.allowed_diverged_share=2.0", "share = 2.0", "must be at most 1", "diverged lanes"),
+    # words
+    ('scene.effects=["backlsh"]', '[0] = "backlsh"', "must be one of", "did you mean `backlash`?"),
+    ("start.kind=rset", 'start.kind = "rset"', "must be one of", "did you mean `rest`?"),
+    ("formulation=printed", 'formulation = "printed"', "'published'", "Pan 2021"),
+    ('mesh.stiffness.shape="fourrier"', '"fourrier"', "must be one of", "`fourier`"),
+    ('outputs.section=["delta5"]', '"delta5"', "must be one of", "did you mean `delta_5`?"),
+    ("start={kind='given', state={delta5=1.0}}", "start.state.delta5", "one of", "`delta_5`"),
+    # rules between keys
+    (
+        "mesh={damping_ratio=0.1, damping_N_s_per_m=2.0}",
+        "mesh.damping_N_s_per_m = 2.0",
+        "mesh.damping_ratio = 0.1 is given as well",
+        "keep one of the two",
+    ),
+    (
+        "mesh.half_backlash_um=0.0",
+        "mesh.half_backlash_um = 0.0",
+        "cannot be the length scale",
+        "give mesh.length_scale_um",
+    ),
+    (
+        f"mesh.stiffness={{ {TRAPEZOID}, half_height = 0.1 }}",
+        "mesh.stiffness",
+        "gives 3 of the four shares",
+        "give all four",
+    ),
+    (
+        f"mesh.stiffness={{ {TRAPEZOID}, bottom = 0.3, half_height = 0.1 }}",
+        "mesh.stiffness",
+        "rise + top + fall + bottom = 1.05, must be 1",
+        "shares of one mesh period",
+    ),
+    (
+        f"mesh.stiffness={{ {TRAPEZOID}, bottom = 0.25 }}",
+        "mesh.stiffness.half_height",
+        "must be given with the four shares",
+        "contact ratio",
+    ),
+    (
+        'scene.effects=["backlash", "pitch_error", "backlash"]',
+        "scene.effects",
+        "names `backlash` 2 times",
+        "once",
+    ),
+    (
+        'outputs.section=["delta_5", "delta_5"]',
+        "outputs.section",
+        "names `delta_5` 2 times",
+        "once",
+    ),
+    (
+        'outputs.section=["delta_3"]',
+        'outputs.section = ["delta_3"]',
+        "the scene has no state `delta_3`",
+        'add "axial" to scene.effects',
+    ),
+    ("start.kind=given", "start.state", "is missing", "state = {"),
+    (
+        'start={kind="given", state={delta_4=1.0}}',
+        "start.state",
+        "the scene has no state `delta_4`",
+        'add "axial"',
+    ),
+    ("start.seed=5", "start.seed = 5", 'no meaning with start.kind = "rest"', '"random"'),
+    (
+        "outputs.section_points=501",
+        "outputs.section_points = 501",
+        "at most integration.recorded_periods = 500",
+        "record more periods",
+    ),
+    # the sweep
+    ("sweep.parameter=pitch_eror", '"pitch_eror"', "can be swept", "did you mean `pitch_error`?"),
+    ("sweep.parameter=speed", '"speed"', "can be swept", "operation.speed_rpm"),
+    ("sweep.parameter=stiffness_sine", "stiffness_sine", "harmonics", "stiffness_variation_scale"),
+    (
+        "sweep.parameter=bearings.axial_damping_N_s_per_m",
+        "bearings.axial_damping_N_s_per_m",
+        "holds two values",
+        "axial_damping_p",
+    ),
+    ("sweep.to=-1.0", "sweep.to = -1.0", "greater than sweep.from = 0.0", "start.carry"),
+    ("sweep.to=1e-320", "sweep.count = 1501", "would coincide", "lower the count"),
+    ('sweep={parameter="load"}', "sweep.from", "is missing", "`values`"),
+    ('sweep={parameter="load", values=[]}', "sweep.values = []", "at least 1 value", "values"),
+    ('sweep={parameter="load", values=[1, 1]}', "sweep.values", "lists 1 twice", "once"),
+    ('sweep={parameter="load", values=[1, 2], count=2}', "sweep.count = 2", "as well", "keep"),
+    (
+        'sweep={parameter="damping_ratio", values=[-0.5, 1]}',
+        "sweep.values = -0.5",
+        "damping_ratio must be finite and >= 0",
+        "inside that range",
+    ),
+    (
+        'sweep={parameter="axial_stiffness_p", values=[1, 2]}',
+        'sweep.parameter = "axial_stiffness_p"',
+        "an effect that is off",
+        'add "axial" to scene.effects',
+    ),
+    (
+        'sweep={parameter="operation.speed_rpm", values=[1000, 2000]}',
+        'sweep.parameter = "operation.speed_rpm"',
+        "changes nothing",
+        "remove mesh_frequency from [groups]",
+    ),
+    (
+        'sweep={parameter="pair.density_kg_m3", values=[7800, 7900]}',
+        'sweep.parameter = "pair.density_kg_m3"',
+        "changes nothing",
+        "no group follows",
+    ),
+    (
+        'sweep={parameter="mesh.mean_stiffness_N_per_um_mm", values=[13, 14]}',
+        "sweep.parameter",
+        "harmonics of the mesh stiffness would differ",
+        "stiffness_variation_scale",
+    ),
+    # the groups
+    (
+        'scene.effects=["pitch_error", "backlash", "axial"]',
+        "groups.axial_stiffness_p",
+        'needed for "axial" and neither given nor derivable',
+        "or derive it by giving bearings.axial_stiffness_N_per_m as well",
+    ),
+    ("pair.normal_module_mm=1e300", "groups.mass_ratio_p", "derived from pair", "magnitudes"),
+    # overrides
+    ("steps", "override 'steps'", "must have the form key.path=value", "steps_per_period=100"),
+    ("title.x=1", "override 'title.x=1'", "title is not a table", "a key inside a table"),
+]
+
+
+@pytest.mark.parametrize("case", ONE_FAULT, ids=[case[0] for case in ONE_FAULT])
+def test_a_fault_names_key_value_rule_and_remedy(case):
+    override, *fragments = case
+    message = problems_of(override)[0]
+    for fragment in fragments:
+        assert fragment in message
+    assert message.startswith(("pan.toml: ", "override "))
+
+
+def test_all_faults_are_reported_at_once_each_on_its_own():
+    problems = problems_of(
+        "titel=x",
+        "pair.face_width_mm=-1.0",
+        "pair.normal_modul_mm=2.0",
+        "groups.load=nan",
+        'scene.effects=["backlsh"]',
+        "sweep.count=0",
+        "outputs.section_points=1000",
+        'start={kind="rest", count=3}',
+    )
+    wanted = ["titel", "face_width_mm", "normal_modul_mm", "groups.load", "scene.effects[0]"]
+    wanted += ["sweep.count", "outputs.section_points", "start.count"]
+    assert len(problems) == len(wanted)
+    for key in wanted:
+        assert sum(key in problem.split(" = ")[0] for problem in problems) == 1
+    assert all("\n" not in problem for problem in problems)
+
+
+def test_every_missing_group_has_its_own_message():
+    problems = problems_of("groups={}")
+    keys = [problem.split(": ")[1] for problem in problems]
+    assert "groups.load" in keys
+    assert "groups.transverse_damping_g" in keys
+    assert "groups.mass_ratio_p" not in keys
+    assert len(set(keys)) == len(keys)
+
+
+def test_a_missing_group_names_only_the_physical_keys_that_lack():
+    (problem,) = (text for text in problems_of("groups={}") if "groups.mesh_frequency" in text)
+    assert "operation.speed_rpm" in problem
+    assert "mean_stiffness" not in problem
+
+
+def test_the_axial_effect_needs_a_helix_angle():
+    text = (ROOT / "sweeps" / "pan2021_full.toml").read_text(encoding="utf-8")
+    with pytest.raises(ConfigurationError, match="a spur pair nothing drives the axial motion"):
+        Configuration.from_toml(text, overrides=["pair.helix_angle_deg=0"])
+
+
+def test_a_swept_physical_key_without_its_effect_names_the_effect():
+    (problem,) = problems_of(
+        'sweep={parameter="pitch_error.phase_deg", values=[0, 90]}', 'scene.effects=["backlash"]'
+    )
+    assert "add pitch_error to scene.effects" in problem
+
+
+def test_what_is_not_toml_is_located():
+    with pytest.raises(ConfigurationError, match=r"x\.toml: not valid TOML: .* line 2, column"):
+        Configuration.from_toml("title = 'a'\ntitle 'b'", "x.toml")
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["title = " + "[" * 100_000, "a" + ".a" * 2000 + " = 1", "x = 1" + "0" * 5000, "x = \x00"],
+    ids=["nested lists", "dotted keys", "digits", "null byte"],
+)
+def test_hostile_toml_is_refused_in_words(text):
+    with pytest.raises(ConfigurationError) as caught:
+        Configuration.from_toml(text)
+    assert all(len(problem) < 1000 for problem in caught.value.problems)
+
+
+def test_a_thousand_faults_are_cut_to_a_hundred():
+    with pytest.raises(ConfigurationError) as caught:
+        Configuration.from_toml("".join(f"key{i} = 1\n" for i in range(1000)), "many.toml")
+    assert len(caught.value.problems) == 101
+    assert caught.value.problems[-1] == "many.toml: and 902 more faults"
+
+
+def test_a_missing_file_a_directory_and_an_empty_path_cannot_be_read(tmp_path):
+    for path, reason in (
+        (tmp_path / "none.toml", "no such file"),
+        (tmp_path, "is a directory"),
+        ("", "the path is empty"),
+        ("a\0b", "null byte"),
+        (PAN2021 / "x", "cannot be read"),
+    ):
+        with pytest.raises(FileError, match=reason) as caught:
+            load_config(path)
+        assert caught.value.exit_code == 4
+
+
+def test_what_is_not_utf_8_is_located_by_its_line(tmp_path):
+    path = tmp_path / "latin.toml"
+    path.write_bytes(b"# first line\ntitle = 'Z\xe4hne'\n")
+    with pytest.raises(ConfigurationError, match=r"latin\.toml: line 2 is not UTF-8"):
+        load_config(path)
+
+
+def test_a_huge_file_is_refused(tmp_path):
+    path = tmp_path / "huge.toml"
+    path.write_bytes(b"#" * (10 * 1024 * 1024 + 1))
+    with pytest.raises(ConfigurationError, match="larger than 10 MB"):
+        load_config(path)
+
+
+def test_tables_made_in_python_obey_the_same_rules():
+    with pytest.raises(ConfigurationError, match=r"<python>: scene: is missing"):
+        Configuration.from_tables({"sweep": {"parameter": "load", "values": [1.0]}})

@@ -1,0 +1,265 @@
+"""The dimensionless groups, derived, given and by default."""
+
+from dataclasses import fields
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from gearchaos.errors import ConfigurationError
+from gearchaos.groups import (
+    GROUP_TABLE,
+    GROUPS_BY_NAME,
+    Groups,
+    derive_groups,
+    resolve_groups,
+)
+
+MEAN_STIFFNESS = 13.3548 * 15 * 1e6  # N/m
+EQUIVALENT_MASS = 0.095448  # kg, to the digits of the geometry's own test
+ALL_EFFECTS = ("pitch_error", "stiffness_variation", "backlash", "transverse", "axial")
+
+
+def physical(**changes):
+    """Tables of a Pan 2021 pair with invented load, backlash and bearings."""
+    tables = {
+        "pair": SimpleNamespace(
+            teeth=(21, 38),
+            normal_module_mm=2.166,
+            normal_pressure_angle_deg=20.0,
+            helix_angle_deg=20.0,
+            face_width_mm=15.0,
+            density_kg_m3=7850.0,
+            masses_kg=None,
+            inertias_kg_m2=None,
+        ),
+        "operation": SimpleNamespace(speed_rpm=2000.0, torque_Nm=50.0),
+        "mesh": SimpleNamespace(
+            mean_stiffness_N_per_um_mm=13.3548,
+            length_scale_um=None,
+            half_backlash_um=25.0,
+            damping_ratio=0.1,
+            damping_N_s_per_m=None,
+            stiffness=SimpleNamespace(
+                shape="fourier",
+                cosine_N_per_um_mm=(-1.202, 0.0, -0.1339),
+                sine_N_per_um_mm=(1.203, 0.0, -0.1335),
+            ),
+        ),
+        "pitch_error": SimpleNamespace(amplitude_um=11.0, mean_um=2.0, phase_deg=30.0),
+        "bearings": SimpleNamespace(
+            transverse_stiffness_N_per_m=(1e8, 2e8),
+            transverse_damping_N_s_per_m=(100.0, 300.0),
+            axial_stiffness_N_per_m=(3e7, 4e7),
+            axial_damping_N_s_per_m=(50.0, 60.0),
+        ),
+    }
+    for path, value in changes.items():
+        table, _, key = path.partition("__")
+        if key:
+            setattr(tables[table], key, value)
+        else:
+            tables[table] = value
+    return SimpleNamespace(**tables)
+
+
+def trapezoid(**parts):
+    names = ("rise", "top", "fall", "bottom", "half_height", "harmonics")
+    return SimpleNamespace(shape="trapezoid", **(dict.fromkeys(names) | parts))
+
+
+def test_the_table_and_the_groups_name_the_same_things():
+    assert [row.name for row in GROUP_TABLE] == [f.name for f in fields(Groups)][:-1]
+    assert len(GROUPS_BY_NAME) == len(GROUP_TABLE)
+
+
+def test_complete_physical_data_give_every_group_without_a_default_of_its_own():
+    derived = derive_groups(physical())
+    free = {"pitch_error", "stiffness_variation_scale"}
+    assert derived.keys() == {row.name for row in GROUP_TABLE} - free
+    assert all(GROUPS_BY_NAME[name].admits(value) for name, value in derived.items())
+
+
+def test_derived_groups_follow_their_definitions():
+    groups = resolve_groups(physical(), {})
+    omega_h = np.sqrt(MEAN_STIFFNESS / EQUIVALENT_MASS)
+    expected = {
+        "mesh_frequency": 2 * np.pi * 700.0 / omega_h,
+        "load": 50.0 / (EQUIVALENT_MASS * 25e-6 * 22.5688e-3 * omega_h**2),
+        "damping_ratio": 0.1,
+        "base_helix_angle_deg": 18.7472,
+        "half_backlash": 1.0,
+        "pitch_error": 1.0,
+        "pitch_error_amplitude": 11 / 25,
+        "pitch_error_mean": 2 / 25,
+        "pitch_error_phase_deg": 30.0,
+        "stiffness_variation_scale": 1.0,
+        "mass_ratio_p": 0.440487,
+        "mass_ratio_g": 0.134525,
+        "transverse_stiffness_p": 1e8 / (0.21669 * omega_h**2),
+        "transverse_damping_p": 100.0 / (2 * 0.21669 * omega_h),
+        "transverse_stiffness_g": 2e8 / (0.70952 * omega_h**2),
+        "transverse_damping_g": 300.0 / (2 * 0.70952 * omega_h),
+        "axial_stiffness_p": 3e7 / (0.21669 * omega_h**2),
+        "axial_damping_p": 50.0 / (2 * 0.21669 * omega_h),
+        "axial_stiffness_g": 4e7 / (0.70952 * omega_h**2),
+        "axial_damping_g": 60.0 / (2 * 0.70952 * omega_h),
+    }
+    computed = {name: getattr(groups, name) for name in expected}
+    assert computed == pytest.approx(expected, rel=2e-5)
+    assert groups.stiffness_cosine == pytest.approx(np.array([-1.202, 0, -0.1339]) / 13.3548)
+    assert groups.stiffness_sine == pytest.approx(np.array([1.203, 0, -0.1335]) / 13.3548)
+
+
+def test_length_scale_defaults_to_the_half_backlash_and_cancels_where_it_must():
+    scaled = resolve_groups(physical(mesh__length_scale_um=50.0), {})
+    plain = resolve_groups(physical(), {})
+    assert scaled.half_backlash == pytest.approx(0.5)
+    for name in ("load", "pitch_error_amplitude", "pitch_error_mean", "half_backlash"):
+        assert getattr(scaled, name) == pytest.approx(getattr(plain, name) / 2)
+    assert scaled.mesh_frequency == plain.mesh_frequency
+
+
+def test_damping_of_the_mesh_becomes_a_ratio_by_eq_20():
+    tables = physical(mesh__damping_ratio=None, mesh__damping_N_s_per_m=247.331)
+    critical = 2 * np.sqrt(MEAN_STIFFNESS * EQUIVALENT_MASS)
+    assert derive_groups(tables)["damping_ratio"] == pytest.approx(247.331 / critical, rel=1e-5)
+
+
+def test_a_given_group_wins_over_a_derived_one_and_a_derived_one_over_the_default():
+    groups = resolve_groups(physical(), {"damping_ratio": 0.02, "pitch_error": 5.86})
+    assert (groups.damping_ratio, groups.origin["damping_ratio"]) == (0.02, "given")
+    assert (groups.pitch_error, groups.origin["pitch_error"]) == (5.86, "given")
+    assert groups.origin["load"] == groups.origin["pitch_error_mean"] == "derived"
+    assert groups.origin["stiffness_variation_scale"] == "default"
+    assert groups.missing(ALL_EFFECTS) == []
+
+
+def test_groups_alone_need_no_physical_data():
+    nothing = physical(pair=None, operation=None, mesh=None, pitch_error=None, bearings=None)
+    assert derive_groups(nothing) == {}
+    groups = resolve_groups(
+        nothing, {"mesh_frequency": 0.876, "load": 0.268, "damping_ratio": None}
+    )
+    assert [row.name for row in groups.missing(())] == ["damping_ratio", "base_helix_angle_deg"]
+    assert groups.origin == {
+        "mesh_frequency": "given",
+        "load": "given",
+        "pitch_error": "default",
+        "pitch_error_mean": "default",
+        "pitch_error_phase_deg": "default",
+        "stiffness_variation_scale": "default",
+    }
+
+
+@pytest.mark.parametrize(
+    ("absent", "lost"),
+    [
+        ("operation__torque_Nm", {"load"}),
+        ("operation__speed_rpm", {"mesh_frequency"}),
+        (
+            "mesh__half_backlash_um",
+            {"half_backlash", "load", "pitch_error_amplitude", "pitch_error_mean"},
+        ),
+        ("mesh__stiffness", {"stiffness_cosine", "stiffness_sine"}),
+        ("bearings__axial_damping_N_s_per_m", {"axial_damping_p", "axial_damping_g"}),
+    ],
+)
+def test_a_missing_quantity_loses_exactly_the_groups_that_need_it(absent, lost):
+    assert (
+        derive_groups(physical()).keys() - derive_groups(physical(**{absent: None})).keys() == lost
+    )
+
+
+def test_catalogue_defaults_are_a_spur_pair_of_steel():
+    spur = physical(pair__helix_angle_deg=None, pair__density_kg_m3=None)
+    explicit = physical(pair__helix_angle_deg=0.0, pair__density_kg_m3=7850.0)
+    assert derive_groups(spur)["base_helix_angle_deg"] == 0.0
+    assert derive_groups(spur)["load"] == derive_groups(explicit)["load"]
+
+
+def test_pan_2021_trapezoid_gives_the_harmonics_of_table_2():
+    parts = dict.fromkeys(("rise", "top", "fall", "bottom"), 0.25)
+    shape = trapezoid(**parts, half_height=1 / 9, harmonics=6)
+    groups = resolve_groups(physical(mesh__stiffness=shape), {})
+    assert groups.stiffness_cosine.shape == groups.stiffness_sine.shape == (6,)
+    assert groups.stiffness_cosine[0] * 13.3548 == pytest.approx(-1.202, abs=1e-3)
+    assert groups.stiffness_sine[0] * 13.3548 == pytest.approx(1.203, abs=1e-3)
+
+
+def test_trapezoid_without_fractions_comes_from_the_contact_ratios_of_the_pair():
+    groups = resolve_groups(physical(mesh__stiffness=trapezoid()), {})
+    # The exact contact ratios are 1.5050 and 0.7539, near the 1.5 and 0.75 behind Table 2.
+    assert groups.stiffness_cosine.size == 6
+    assert groups.stiffness_cosine[0] * 13.3548 == pytest.approx(-1.202, rel=0.05)
+
+
+def test_given_harmonics_replace_the_derived_ones_as_a_whole():
+    groups = resolve_groups(physical(), {"stiffness_cosine": [-0.09, 0.0, -0.01]})
+    assert np.array_equal(groups.stiffness_cosine, [-0.09, 0.0, -0.01])
+    assert np.array_equal(groups.stiffness_sine, [0.0, 0.0, 0.0])
+    assert groups.origin["stiffness_cosine"] == "given"
+    assert groups.origin["stiffness_sine"] == "default"
+
+
+def test_swept_physical_quantity_gives_one_value_per_lane():
+    speeds = np.linspace(1000.0, 3000.0, 5)
+    groups = resolve_groups(physical(operation__speed_rpm=speeds), {})
+    one_by_one = [
+        resolve_groups(physical(operation__speed_rpm=speed), {}).mesh_frequency for speed in speeds
+    ]
+    assert np.array_equal(groups.mesh_frequency, one_by_one)
+    assert isinstance(groups.load, float)
+
+
+def test_stiffness_shape_that_differs_between_lanes_is_refused_with_a_remedy():
+    angles = np.array([15.0, 20.0, 25.0])
+    tables = physical(mesh__stiffness=trapezoid(), pair__helix_angle_deg=angles)
+    with pytest.raises(
+        ConfigurationError, match=r"stiffness_cosine and stiffness_sine in \[groups]"
+    ):
+        resolve_groups(tables, {})
+    given = {"stiffness_cosine": [-0.09], "stiffness_sine": [0.09]}
+    assert resolve_groups(tables, given).base_helix_angle_deg.shape == (3,)
+
+
+def test_a_name_that_is_no_group_is_refused():
+    with pytest.raises(KeyError, match="helix"):
+        resolve_groups(physical(), {"helix": 1.0})
+
+
+@pytest.mark.parametrize(
+    ("name", "valid", "invalid", "rule"),
+    [
+        ("mesh_frequency", 0.1, 0.0, "finite and > 0"),
+        ("load", -3.0, np.nan, "finite"),
+        ("damping_ratio", 0.0, -0.1, "finite and >= 0"),
+        ("base_helix_angle_deg", 89.9, 90.0, "finite and >= 0 and < 90"),
+        ("half_backlash", 0.0, -1.0, "finite and >= 0"),
+        ("pitch_error_amplitude", -1.0, np.inf, "finite"),
+        ("mass_ratio_p", 0.5, 0.0, "finite and > 0"),
+        ("axial_stiffness_g", 0.0, -1.0, "finite and >= 0"),
+    ],
+)
+def test_valid_ranges(name, valid, invalid, rule):
+    row = GROUPS_BY_NAME[name]
+    assert row.admits(valid)
+    assert not row.admits(invalid)
+    assert not row.admits([valid, invalid])
+    assert row.rule == rule
+
+
+def test_a_scene_needs_the_groups_of_its_effects_only():
+    needed = {row.name for row in GROUP_TABLE if row.needed_by(["axial"])}
+    assert needed == {
+        "mesh_frequency",
+        "load",
+        "damping_ratio",
+        "base_helix_angle_deg",
+        "mass_ratio_p",
+        "mass_ratio_g",
+        "axial_stiffness_p",
+        "axial_damping_p",
+        "axial_stiffness_g",
+        "axial_damping_g",
+    }
