@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import math
+import os
 import sys
 from collections.abc import Sequence
 from functools import partial
@@ -36,6 +37,8 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 def _run(argv: Sequence[str] | None) -> int:
     options = _parser().parse_args(argv)
+    # No display is needed, and matplotlib refuses to be imported under a name it does not know.
+    os.environ["MPLBACKEND"] = "agg"
     # Imported only now: --help and --version answer at once, and an interrupt is caught.
     from gearchaos.figures import bifurcation_page, save_figure
     from gearchaos.result import open_result
@@ -89,12 +92,12 @@ def _parser() -> argparse.ArgumentParser:
     add("--full-range", action="store_true", help="show every lane, however few lie far out")
     add(
         "--width",
-        type=_length,
+        type=_width,
         default=85.0,
         metavar="MM",
         help="width of the page (default: 85, one column of a journal; two: 180)",
     )
-    add("--height", type=_length, metavar="MM", help="height of the page (default: by the width)")
+    add("--height", type=_height, metavar="MM", help="height of the page (default: by the width)")
     add("--dpi", type=_dpi, default=300, help="pixels per inch (default: 300)")
     add("--overwrite", action="store_true", help="replace files that this command did not draw")
     add("-q", "--quiet", action="store_true", help="say nothing on stderr unless something fails")
@@ -172,33 +175,35 @@ def _formats(text: str) -> tuple[str, ...]:
 
 
 def _number(text: str) -> float:
-    value = float(text)
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
     if not math.isfinite(value):
-        raise argparse.ArgumentTypeError(f"{text} is not a finite number")
+        raise argparse.ArgumentTypeError(f"{text!r} is not a finite number")
     return value
 
 
-_number.__name__ = "number"
-
-
-def _length(text: str) -> float:
+def _within(text: str, low: float, high: float) -> float:
     value = _number(text)
-    if not 50.0 <= value <= 1000.0:
-        raise argparse.ArgumentTypeError(f"{text} mm is not between 50 and 1000 mm")
+    if not low <= value <= high:
+        raise argparse.ArgumentTypeError(f"{text} is not between {low:g} and {high:g}")
     return value
 
 
-_length.__name__ = "length"
+def _width(text: str) -> float:
+    return _within(text, 60.0, 1000.0)
+
+
+def _height(text: str) -> float:
+    return _within(text, 70.0, 1000.0)
 
 
 def _dpi(text: str) -> int:
-    value = int(text)
-    if not 50 <= value <= 2400:
-        raise argparse.ArgumentTypeError(f"{text} is not between 50 and 2400")
-    return value
-
-
-_dpi.__name__ = "number of pixels per inch"
+    value = _within(text, 50.0, 1200.0)
+    if value != int(value):
+        raise argparse.ArgumentTypeError(f"{text} is not a whole number")
+    return int(value)
 
 
 if __name__ == "__main__":

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gearchaos.atomic_file import replacing
+from gearchaos.checksum_line import append_checksum
 from gearchaos.variables import HARMONIC, Variable
 
 SCHEMA = "gearchaos-sweep"
@@ -94,20 +95,19 @@ def write_result(
     axis = str(metadata["axis"])
     everything = [*variables, *_harmonics(axis, parameters)]
     sizes = {v.name: len(v.values) for v in everything if v.values is not None} | {axis: lanes}
-    with (
-        replacing(path, overwrite=overwrite, scratch=scratch) as partial,
-        h5py.File(partial, "w", track_order=True, rdcc_nbytes=_CACHE_BYTES) as file,
-    ):
-        _write_metadata(file, metadata)
-        for variable in everything:
-            _create(file, variable, tuple(sizes[dim] for dim in variable.dims))
-        for variable in everything:
-            _attach_scales(file, variable.name, variable.dims)
-        _write_parameters(file, axis, parameters)
-        for first, last, arrays in blocks:
+    with replacing(path, overwrite=overwrite, scratch=scratch) as partial:
+        with h5py.File(partial, "w", track_order=True, rdcc_nbytes=_CACHE_BYTES) as file:
+            _write_metadata(file, metadata)
             for variable in everything:
-                if variable.dims[0] == axis:
-                    file[variable.name][first:last] = arrays[variable.name]
+                _create(file, variable, tuple(sizes[dim] for dim in variable.dims))
+            for variable in everything:
+                _attach_scales(file, variable.name, variable.dims)
+            _write_parameters(file, axis, parameters)
+            for first, last, arrays in blocks:
+                for variable in everything:
+                    if variable.dims[0] == axis:
+                        file[variable.name][first:last] = arrays[variable.name]
+        append_checksum(partial)
 
 
 def _write_metadata(file: h5py.File, metadata: Metadata) -> None:

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gearchaos.atomic_file import reason
+from gearchaos.checksum_line import checksum_fits
 from gearchaos.errors import FileError
 from gearchaos.result_file import ORIGINS, PARAMETERS, SCHEMA, SCHEMA_VERSION, Parameter
 from gearchaos.variables import HARMONIC, SECTION_POINT, STATE, Variable, sweep_variables
@@ -55,6 +56,8 @@ def read_result(path: str | os.PathLike[str]) -> Contents:
     try:
         if not stat.S_ISREG(os.stat(name).st_mode):
             raise FileError(f"{name}: is not a regular file; give the name of a result file")
+        if checksum_fits(name) is False:
+            raise FileError(f"{name}: is damaged (its checksum does not fit); run the sweep again")
     except (OSError, ValueError) as error:
         raise FileError(
             f"{name}: cannot be read: {reason(error)}; give the name of a result file"
@@ -224,13 +227,12 @@ def _variable(
     dataset: h5py.Dataset, dims: tuple[str, ...], values: NDArray[Any], *, on_lanes: bool
 ) -> Variable:
     notes = _scalars(dataset)
-    fill = dataset.attrs.get("_FillValue")
     return Variable(
         dataset.name.lstrip("/"),
         dims,
         _dtype(dataset),
         **_wording(notes),
-        fill_value=None if fill is None else np.ravel(fill)[0].item(),
+        fill_value=notes.get("_FillValue"),
         flags=tuple(str(notes.get("flag_meanings", "")).split()),
         values=None if on_lanes else tuple(values.tolist()),
     )
@@ -243,9 +245,12 @@ def _wording(notes: Mapping[str, Any]) -> dict[str, Any]:
 def _scalars(item: h5py.HLObject) -> dict[str, Any]:
     """Give the attributes that are a text or a number, and leave the bookkeeping of HDF5."""
     scalars: dict[str, Any] = {}
-    for name, value in item.attrs.items():
+    for name in item.attrs:
+        if item.attrs.get_id(name).shape not in ((), (1,)):
+            continue
+        value = np.ravel(item.attrs[name])[0]
         if isinstance(value, str):
-            scalars[name] = value
+            scalars[name] = str(value)
         elif isinstance(value, np.integer | np.floating):
             scalars[name] = value.item()
     return scalars

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable
+from pathlib import Path
 
 from gearchaos.configuration.models import Configuration
 from gearchaos.errors import ConfigurationError, FileError
@@ -36,7 +37,7 @@ def _text(source: str) -> str:
     if not source:
         raise FileError("no configuration file: the path is empty; name a TOML file")
     try:
-        with open(source, "rb") as file:
+        with Path(source).open("rb") as file:
             content = file.read(LARGEST_FILE + 1)
     except FileNotFoundError:
         raise FileError(f"{source}: no such file; check the path of the configuration") from None

@@ -1,5 +1,8 @@
 """The tables that describe a gear pair in the terms of its drawing and its bearings."""
 
+# The units are part of the keys, capitals and all.
+# ruff: noqa: N815
+
 from __future__ import annotations
 
 from typing import Annotated, Literal, TypeAlias

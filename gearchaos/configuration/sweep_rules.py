@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
@@ -76,7 +77,7 @@ def _values_are_distinct(config: Configuration) -> Iterator[Fault]:
             remedy = "exchange the two; start.carry says in which direction a sweep runs"
             rule = f"must be greater than sweep.from = {sweep.from_}"
             yield Fault("sweep.to", rule, remedy, sweep.to)
-        elif not np.isfinite(sweep.to - sweep.from_):
+        elif not math.isfinite((sweep.to - sweep.from_) * (sweep.count or 1)):
             yield Fault("sweep.to", "is too far from sweep.from", "narrow the sweep", sweep.to)
         elif (sweep.to - sweep.from_) / (sweep.count or 1) < 2 * np.spacing(abs(sweep.to)):
             remedy = "lower the count or widen the sweep"

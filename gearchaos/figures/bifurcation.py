@@ -52,7 +52,9 @@ class BifurcationArtists:
 
 def section_variables(result: Result) -> tuple[str, ...]:
     """Return the section variables of a result, `section_delta_5` first where there is one."""
-    names = [name for name in result.names if name.startswith(SECTION) and len(result.dims(name)) == 2]
+    names = [
+        name for name in result.names if name.startswith(SECTION) and len(result.dims(name)) == 2
+    ]
     return tuple(sorted(names, key=lambda name: name != DEFAULT_VARIABLE))
 
 
@@ -107,7 +109,7 @@ def bifurcation(
         y[finite],
         linestyle="none",
         marker=".",
-        markersize=float(np.clip(300.0 / lanes, 0.8, 2.5)),
+        markersize=float(np.clip(200.0 / lanes, 0.8, 1.8)),
         markeredgewidth=0.0,
         color=POINTS,
         alpha=min(1.0, 4.0 / max(1, values.shape[1]) ** 0.5),

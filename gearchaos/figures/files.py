@@ -47,7 +47,9 @@ def save_figure(
     """
     kind = Path(path).suffix.lower().removeprefix(".")
     if kind not in FORMATS:
-        raise ConfigurationError(f"{path}: a figure ends in {' or '.join('.' + f for f in FORMATS)}")
+        raise ConfigurationError(
+            f"{path}: a figure ends in {' or '.join('.' + f for f in FORMATS)}"
+        )
     software = f"{SIGNATURE} {software_version()}"
     metadata: dict[str, str | None] = {"Title": title, "Software": software}
     if kind == "pdf":

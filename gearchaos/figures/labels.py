@@ -36,12 +36,13 @@ def axis_label(result: Result, name: str, line_length: int = 60) -> str:
         words[-1] += ", " + (symbol if _is_mathtext(symbol) else plain(symbol))
     if units not in DIMENSIONLESS:
         words[-1] += f" ({plain(units)})"
-    lines = [words[0]]
-    for word in words[1:]:
-        if len(lines[-1]) + 1 + len(word.split("$")[0]) <= line_length:
-            lines[-1] += " " + word
-        else:
-            lines.append(word)
+    lines = _broken(words, line_length)
+    # No shorter last line than need be: the narrowest lines that are as few.
+    for shorter in range(line_length, 0, -1):
+        narrower = _broken(words, shorter)
+        if len(narrower) > len(lines):
+            break
+        lines = narrower
     return "\n".join(lines)
 
 
@@ -53,6 +54,17 @@ def number(value: float) -> str:
 def plain(text: str) -> str:
     """Return a text in which a dollar sign is a dollar sign, not the start of a formula."""
     return text.replace("$", r"\$")
+
+
+def _broken(words: list[str], line_length: int) -> list[str]:
+    lines = [words[0]]
+    for word in words[1:]:
+        # Of a formula, however long its source, little is to be seen.
+        if len(lines[-1]) + 1 + len(word.split("$")[0]) <= line_length:
+            lines[-1] += " " + word
+        else:
+            lines.append(word)
+    return lines
 
 
 def _is_mathtext(symbol: str) -> bool:

@@ -53,7 +53,9 @@ def select_lanes(result: Result, between: Between = (None, None)) -> tuple[Float
     if high is not None:
         chosen &= parameter <= high
     if not chosen.any():
-        wanted = f"from {low if low is not None else '...'} to {high if high is not None else '...'}"
+        wanted = (
+            f"from {low if low is not None else '...'} to {high if high is not None else '...'}"
+        )
         there = f"{parameter.min():g} to {parameter.max():g}" if parameter.size else "no lane"
         raise ConfigurationError(f"no lane with {result.axis} {wanted}; the result has {there}")
     if "status" in result:
@@ -143,8 +145,16 @@ def mark_off_scale(axes: Axes, parameter: Floats, low: Floats, high: Floats) -> 
 def say_nothing_to_show(axes: Axes, lanes: int, diverged: int) -> None:
     """Write into an empty panel why it is empty."""
     reason = f"all {lanes} lanes diverged" if lanes == diverged else "no finite values"
-    axes.set_yticks([])
-    axes.text(0.5, 0.5, reason, transform=axes.transAxes, ha="center", va="center")
+    axes.tick_params(axis="y", which="both", left=False, right=False, labelleft=False)
+    axes.text(
+        0.5,
+        0.5,
+        reason,
+        transform=axes.transAxes,
+        ha="center",
+        va="center",
+        backgroundcolor="white",
+    )
 
 
 def legend_above(axes: Axes, artists: Iterable[Artist | None]) -> Legend | None:

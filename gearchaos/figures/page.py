@@ -17,6 +17,7 @@ from gearchaos.figures.style import MM_PER_INCH, SINGLE_COLUMN_MM, STYLE, page_h
 from gearchaos.result import Result
 
 HEIGHT_RATIOS = (1.6, 1.0)
+MOST_INTERVALS = (7, 8)
 
 
 def bifurcation_page(
@@ -89,8 +90,8 @@ def bifurcation_page(
             stack[0].set_xlabel("")
             for axes, letter in zip(stack, "ab", strict=True):
                 axes.set_title(f"({letter})", loc="left")
-        for axes in stack:
-            axes.yaxis.set_major_locator(MaxNLocator(6, steps=[1, 2, 5, 10]))
+        for axes, intervals in zip(reversed(stack), MOST_INTERVALS, strict=False):
+            axes.yaxis.set_major_locator(MaxNLocator(intervals, steps=[1, 2, 5, 10]))
             axes.yaxis.label.set_linespacing(1.0)
         figure.align_ylabels(stack)
         # Ticks are made at the first drawing, in the style of that moment.

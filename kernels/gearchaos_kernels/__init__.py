@@ -4,6 +4,7 @@ from gearchaos_kernels.batch import STATE_ROWS, Outcome, Plan, Scene, integrate
 from gearchaos_kernels.coefficients import Model
 from gearchaos_kernels.lane import LANES
 from gearchaos_kernels.status import STATUS_TEXTS, Status
+from gearchaos_kernels.threads import current_threads, most_threads, processor, use_threads
 
 __all__ = [
     "LANES",
@@ -14,5 +15,9 @@ __all__ = [
     "Plan",
     "Scene",
     "Status",
+    "current_threads",
     "integrate",
+    "most_threads",
+    "processor",
+    "use_threads",
 ]

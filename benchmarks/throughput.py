@@ -1,0 +1,116 @@
+"""How many Runge-Kutta steps a second does a core do, and how many times a textbook kernel's?
+
+    python benchmarks/throughput.py [--rounds 7]
+
+Rounds alternate between the kernels, so that a machine that slows down slows all of them; every
+figure is the median over the rounds, and ratios are medians of the ratios within a round.
+"""
+
+import argparse
+import statistics
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+from gearchaos_kernels import Plan, Scene, integrate, most_threads, use_threads
+from machine import print_machine
+from textbook import run_textbook
+
+from gearchaos import load_config
+from gearchaos.configuration import lane_groups
+from gearchaos.lanes import model
+
+SWEEP = Path(__file__).parent.parent / "sweeps" / "pan2021_full.toml"
+STEPS = 144
+PERIODS = 100
+LANES = 512
+TEXTBOOK_LANES = 16
+SCENES = {
+    "full, 10 states": Scene(),
+    "no axial pair, 6 states": Scene(axial=False),
+    "torsion, 2 states": Scene(transverse=False, axial=False),
+}
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--rounds", type=int, default=7)
+    rounds = parser.parse_args().rounds
+    print_machine()
+    print(f"{STEPS} steps per period, median of {rounds} rounds, million steps per second\n")
+    contestants = list(_contestants())
+    for _, _, work in contestants:
+        work()
+    rates: dict[tuple[str, bool], list[float]] = {}
+    for _ in range(rounds):
+        for name, tangent, work in contestants:
+            rates.setdefault((name, tangent), []).append(_rate(work))
+    _print_table(rates)
+
+
+def _contestants():
+    """Yield (name, with tangent, work); the work returns the number of steps it did."""
+    for tangent in (False, True):
+        yield "textbook, 10 states", tangent, _textbook(tangent)
+        for name, scene in SCENES.items():
+            yield name, tangent, _engine(scene, tangent, threads=1)
+        yield f"full, {most_threads()} threads", tangent, _engine(Scene(), tangent, most_threads())
+
+
+def _pan(lanes: int):
+    config = load_config(SWEEP, ["sweep.from=0.0", "sweep.to=15.0", f"sweep.count={lanes}"])
+    _, groups = lane_groups(config)
+    return model(groups, lanes), groups.stiffness_cosine, groups.stiffness_sine
+
+
+def _engine(scene: Scene, tangent: bool, threads: int) -> Callable[[], int]:
+    lanes = LANES * threads
+    data = _pan(lanes)
+    # The end state is written in full, so that no effect can be optimised away.
+    plan = Plan(STEPS, 0, PERIODS, 1, ("delta_5",), tangent)
+
+    def work() -> int:
+        use_threads(threads)
+        integrate(scene, *data, np.zeros((lanes, 10)), plan)
+        return lanes * PERIODS * STEPS
+
+    return work
+
+
+def _textbook(tangent: bool) -> Callable[[], int]:
+    data = _pan(TEXTBOOK_LANES)
+
+    def work() -> int:
+        use_threads(1)
+        run_textbook(*data, PERIODS, STEPS, tangent)
+        return TEXTBOOK_LANES * PERIODS * STEPS
+
+    return work
+
+
+def _rate(work: Callable[[], int]) -> float:
+    began = time.perf_counter()
+    steps = work()
+    return steps / (time.perf_counter() - began) / 1e6
+
+
+def _print_table(rates: dict[tuple[str, bool], list[float]]) -> None:
+    print(f"{'kernel':28}{'plain':>8}{'ratio':>8}{'tangent':>10}{'ratio':>8}")
+    for name in dict.fromkeys(name for name, _ in rates):
+        cells = ""
+        for tangent, width in ((False, 8), (True, 10)):
+            mine, yardstick = rates[name, tangent], rates["textbook, 10 states", tangent]
+            ratio = statistics.median(a / b for a, b in zip(mine, yardstick, strict=True))
+            cells += f"{statistics.median(mine):{width}.1f}{ratio:8.1f}"
+        print(f"{name:28}{cells}")
+    threaded = f"full, {most_threads()} threads"
+    for tangent in (False, True):
+        pairs = zip(rates[threaded, tangent], rates["full, 10 states", tangent], strict=True)
+        speedup = statistics.median(a / b for a, b in pairs)
+        kind = "with tangent" if tangent else "plain"
+        print(f"{most_threads()} threads over 1, {kind}: {speedup:.2f}")
+
+
+if __name__ == "__main__":
+    main()

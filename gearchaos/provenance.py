@@ -1,0 +1,51 @@
+"""Where a result comes from: versions, processor, threads, time, commit."""
+
+from __future__ import annotations
+
+import platform
+import subprocess
+from datetime import UTC, datetime
+from importlib.metadata import version
+from pathlib import Path
+
+from gearchaos_kernels import processor
+
+from gearchaos.command_line import software_version
+
+
+def provenance(threads: int, seconds: float) -> dict[str, str | int | float]:
+    """Return what a result file says about the run that made it.
+
+    Parameters
+    ----------
+    threads : int
+        Threads that computed.
+    seconds : float
+        Wall time of the computation in s.
+    """
+    facts: dict[str, str | int | float] = {
+        "created": datetime.now(UTC).isoformat(timespec="seconds"),
+        "software": f"gearchaos {software_version()}",
+        "python_version": platform.python_version(),
+        "numpy_version": version("numpy"),
+        "numba_version": version("numba"),
+        "h5py_version": version("h5py"),
+        "system": f"{platform.system()} {platform.machine()}",
+        "processor": processor(),
+        "threads": threads,
+        "wall_time_seconds": round(seconds, 3),
+    }
+    commit = _commit()
+    return {**facts, "git_commit": commit} if commit else facts
+
+
+def _commit() -> str:
+    clone = Path(__file__).parent.parent
+    if not (clone / ".git").exists():
+        return ""
+    command = ["git", "-C", str(clone), "describe", "--always", "--dirty", "--abbrev=40"]
+    try:
+        found = subprocess.run(command, capture_output=True, text=True, timeout=5, check=True)
+    except (OSError, subprocess.SubprocessError):
+        return ""
+    return found.stdout.strip()

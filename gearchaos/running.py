@@ -1,0 +1,105 @@
+"""Run a sweep from Python: a configuration in, a result out."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from gearchaos_kernels import current_threads, most_threads, use_threads
+
+from gearchaos.configuration import Configuration
+from gearchaos.errors import ConfigurationError
+from gearchaos.progress import Progress, notice
+from gearchaos.provenance import provenance
+from gearchaos.result import Result
+from gearchaos.simulation import Simulation, compute_all, default_block
+
+COMPILING = "gearchaos: compiling the kernel of this scene (once per machine, a few seconds)"
+
+
+def run(config: Configuration, threads: int | None = None, progress: bool = False) -> Result:
+    """Compute a sweep in memory.
+
+    Parameters
+    ----------
+    config : Configuration
+        From `load_config`.
+    threads : int, optional
+        Threads to use; by default all that there are.
+    progress : bool
+        Whether to show a progress bar on stderr.
+
+    Returns
+    -------
+    Result
+        Named arrays with units; `Result.save` writes them to a file.
+
+    Raises
+    ------
+    ConfigurationError
+        If there are not so many threads.
+    """
+    choose_threads(threads)
+    simulation = Simulation(config)
+    with notice(COMPILING, quiet=not progress):
+        simulation.compile()
+    began = time.monotonic()
+    bounds = simulation.blocks(default_block(current_threads()))
+    parts = {}
+    with Progress(simulation.lanes, quiet=not progress) as bar:
+        for (first, last), arrays in compute_all(simulation, bounds):
+            parts[first] = arrays
+            bar.advance(last - first)
+    in_order = [parts[first] for first in sorted(parts)]
+    data = {name: np.concatenate([part[name] for part in in_order]) for name in in_order[0]}
+    return Result(
+        simulation.axis,
+        simulation.variables,
+        data,
+        simulation.parameters,
+        metadata(simulation, time.monotonic() - began),
+    )
+
+
+def choose_threads(threads: int | None) -> None:
+    """Use so many threads from now on; all that there are by default.
+
+    Raises
+    ------
+    ConfigurationError
+        If there are not so many.
+    """
+    most = most_threads()
+    if threads is not None and not 1 <= threads <= most:
+        raise ConfigurationError(
+            f"threads = {threads}: must be between 1 and {most}, the number of cores here "
+            "(the variable NUMBA_NUM_THREADS, if set, takes its place)"
+        )
+    use_threads(most if threads is None else threads)
+
+
+def metadata(simulation: Simulation, seconds: float) -> Mapping[str, Any]:
+    """Return what a result says about itself beside its arrays.
+
+    Parameters
+    ----------
+    simulation : Simulation
+    seconds : float
+        Wall time of the computation in s.
+    """
+    config = simulation.config
+    return {
+        "axis": simulation.axis,
+        "title": config.title,
+        "formulation": config.formulation,
+        "effects": " ".join(config.scene.effects),
+        "start": config.start.kind,
+        "carry": config.start.carry,
+        "method": "classical Runge-Kutta of order 4 with fixed steps",
+        **config.integration.model_dump(),
+        **provenance(current_threads(), seconds),
+        "configuration": config.text,
+        "configuration_resolved": config.resolved_toml(),
+    }

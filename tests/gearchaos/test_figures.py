@@ -1,0 +1,321 @@
+"""What the figures show is what the result holds, and they say what they leave out."""
+
+import os
+import subprocess
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+import matplotlib as mpl
+import numpy as np
+import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.text import Text
+
+from gearchaos.errors import ConfigurationError
+from gearchaos.figures import bifurcation, bifurcation_page, lyapunov, save_figure
+from gearchaos.figures.lanes import robust_limits
+from gearchaos.result import Result, open_result
+from gearchaos.variables import sweep_variables
+
+POINTS = 60
+LANES = 121
+
+
+def logistic_sweep(
+    values: Sequence[float] | np.ndarray,
+    *,
+    diverged: Sequence[int] = (),
+    section: Sequence[str] = ("delta_5", "delta_1"),
+    with_exponent: bool = True,
+    starts: int = 1,
+    symbol: str = "$r$",
+    units: str = "1",
+) -> Result:
+    """Make a result of the logistic map, whose bifurcations and exponents are well known."""
+    r = np.repeat(np.asarray(values, dtype=float), starts)
+    x = np.full(r.shape, 0.4)
+    orbit, slopes = [], []
+    for n in range(600 + POINTS):
+        x = r * x * (1.0 - x)
+        slopes.append(np.log(np.abs(r * (1.0 - 2.0 * x)) + 1e-300))
+        if n >= 600:
+            orbit.append(x)
+    points = np.array(orbit).T
+    blocks = np.array(slopes)[60:].reshape(20, -1, r.size).mean(axis=1)
+    exponent, error = blocks.mean(axis=0), blocks.std(axis=0) / 19**0.5
+    status = np.zeros(r.shape)
+    status[list(diverged)] = 1
+    for values_of_lane in (points, exponent, error):
+        values_of_lane[list(diverged)] = np.nan
+    variables = sweep_variables(
+        "growth",
+        units=units,
+        long_name="growth rate",
+        symbol=symbol,
+        states=("delta_5",),
+        section=section,
+        section_points=POINTS,
+        lyapunov=with_exponent,
+        several_starts=starts > 1,
+        status_meanings=("ok", "diverged"),
+    )
+    data = {
+        "growth": r,
+        "start": np.tile(np.arange(starts), r.size // starts),
+        "section_delta_5": points,
+        "section_delta_1": -points,
+        "lyapunov_exponent": exponent,
+        "lyapunov_exponent_standard_error": error,
+        "status": status,
+        "diverged_period": np.where(status == 1, 3, -1),
+        "end_state": points[:, -1:],
+    }
+    return Result("growth", variables, data, {}, {"title": "logistic map"})
+
+
+@pytest.fixture
+def result() -> Result:
+    return logistic_sweep(np.linspace(2.8, 3.9, LANES))
+
+
+@pytest.fixture
+def axes():
+    figure = Figure()
+    FigureCanvasAgg(figure)
+    return figure.subplots()
+
+
+def test_every_section_point_of_the_file_is_drawn(axes, result, tmp_path):
+    result.save(tmp_path / "r.h5")
+    stored = open_result(tmp_path / "r.h5")
+    points = bifurcation(axes, stored, "section_delta_1").points
+    assert points.axes is axes
+    np.testing.assert_array_equal(points.get_xdata(), np.repeat(stored["growth"], POINTS))
+    np.testing.assert_array_equal(points.get_ydata(), stored["section_delta_1"].ravel())
+    assert points.get_rasterized()
+    assert axes.get_xlim() == (2.8, 3.9)
+
+
+def test_the_torsional_section_is_drawn_unless_another_is_asked_for(axes, result):
+    drawn = bifurcation(axes, result).points.get_ydata()
+    np.testing.assert_array_equal(drawn, result["section_delta_5"].ravel())
+    assert axes.get_ylabel().endswith(r"$\delta_5$")
+
+
+def test_a_variable_the_result_lacks_is_named_with_those_it_has(axes, result):
+    with pytest.raises(ConfigurationError, match=r"'section_delta_2'.*section_delta_5"):
+        bifurcation(axes, result, "section_delta_2")
+
+
+def test_labels_come_from_the_file_and_name_units_only_where_there_are_some(axes):
+    bifurcation(axes, logistic_sweep([3.0, 3.1], units="rpm"))
+    assert axes.get_xlabel() == "Growth rate, $r$ (rpm)"
+    lyapunov(axes, logistic_sweep([3.0, 3.1]))
+    assert axes.get_xlabel() == "Growth rate, $r$"
+    assert axes.get_ylabel().replace("\n", " ") == r"Largest Lyapunov exponent, $\lambda_1$"
+
+
+@pytest.mark.parametrize("symbol", [r"$\frac{$", "100 $", "$", r"$\nonsense$"])
+def test_a_symbol_that_is_no_formula_is_shown_as_text(symbol, tmp_path):
+    page = bifurcation_page(logistic_sweep([3.0, 3.1], symbol=symbol))
+    save_figure(page, tmp_path / "page.png")
+    assert page.axes[-1].get_xlabel() == "Growth rate, " + symbol.replace("$", r"\$")
+
+
+def test_a_diverged_lane_is_marked_and_its_points_are_not_drawn(axes):
+    result = logistic_sweep(np.linspace(2.8, 3.9, LANES), diverged=[7, 50])
+    artists = bifurcation(axes, result)
+    np.testing.assert_array_equal(artists.diverged.get_xdata(), result["growth"][[7, 50]])
+    assert [text.get_text() for text in artists.legend.get_texts()] == ["diverged"]
+    assert artists.points.get_xdata().size == (LANES - 2) * POINTS
+    chart = lyapunov(axes, result)
+    np.testing.assert_array_equal(chart.diverged.get_xdata(), result["growth"][[7, 50]])
+    np.testing.assert_array_equal(np.flatnonzero(np.isnan(chart.line.get_ydata())), [7, 50])
+
+
+def test_values_left_over_in_a_diverged_lane_are_not_drawn(axes):
+    result = logistic_sweep([3.0, 3.1, 3.2])
+    result["status"][1] = 1
+    assert 3.1 not in bifurcation(axes, result).points.get_xdata()
+    assert np.isnan(lyapunov(axes, result).line.get_ydata()[1])
+
+
+def test_nothing_is_marked_where_every_lane_is_well(axes, result):
+    artists = bifurcation(axes, result)
+    assert (artists.diverged, artists.off_scale, artists.legend) == (None, [], None)
+
+
+def test_the_chart_shows_exponent_uncertainty_zero_and_positive_part(axes, result):
+    chart = lyapunov(axes, result)
+    exponent, error = (result[f"lyapunov_exponent{end}"] for end in ("", "_standard_error"))
+    np.testing.assert_array_equal(chart.line.get_xdata(), result["growth"])
+    np.testing.assert_array_equal(chart.line.get_ydata(), exponent)
+    band = chart.band.get_paths()[0].vertices[:, 1]
+    np.testing.assert_allclose(band.max(), (exponent + 2 * error).max())
+    np.testing.assert_allclose(band.min(), (exponent - 2 * error).min())
+    assert set(chart.zero.get_ydata()) == {0.0}
+    heights = np.concatenate([path.vertices[:, 1] for path in chart.positive.get_paths()])
+    assert heights.min() >= 0.0
+    assert heights.max() == exponent.max() > 0.4
+    assert axes.get_ylim()[0] < 0.0 < axes.get_ylim()[1]
+
+
+def test_unsorted_lanes_give_the_same_chart(axes, result):
+    order = np.random.default_rng(1).permutation(LANES)
+    shuffled = logistic_sweep(result["growth"][order])
+    one, other = lyapunov(axes, result).line, lyapunov(axes, shuffled).line
+    np.testing.assert_array_equal(one.get_xydata(), other.get_xydata())
+
+
+def test_several_starts_of_one_value_are_not_joined_by_a_line(axes):
+    result = logistic_sweep([3.0, 3.3, 3.9], starts=2)
+    chart = lyapunov(axes, result)
+    assert chart.line.get_linestyle() == "None"
+    np.testing.assert_array_equal(chart.points.get_xdata(), result["growth"])
+    assert len(chart.bars.get_segments()) == 6
+    assert bifurcation(axes, result).points.get_xdata().size == 6 * POINTS
+
+
+def test_a_lane_between_diverged_ones_is_still_seen(axes):
+    chart = lyapunov(axes, logistic_sweep([3.0, 3.1, 3.2, 3.3], diverged=[0, 2]))
+    np.testing.assert_array_equal(chart.points.get_xdata(), [3.1, 3.3])
+
+
+def test_a_few_outlying_lanes_are_marked_and_do_not_flatten_the_rest(axes, result):
+    result["lyapunov_exponent"][[30, 31]] = -400.0
+    result["section_delta_5"][60, 5] = 1e4
+    chart = lyapunov(axes, result)
+    assert axes.get_ylim()[0] > -5.0
+    np.testing.assert_array_equal(chart.off_scale[0].get_xdata(), result["growth"][[30, 31]])
+    assert chart.off_scale[0].get_label() == "off scale (to \N{MINUS SIGN}400)"
+    diagram = bifurcation(axes, result)
+    assert axes.get_ylim()[1] < 1.1
+    np.testing.assert_array_equal(diagram.off_scale[0].get_xdata(), result["growth"][[60]])
+    assert bifurcation(axes, result, full_range=True).off_scale == []
+    assert axes.get_ylim()[1] > 1e4
+
+
+def test_limits_hold_everything_where_nothing_lies_far_out():
+    low, high = np.linspace(-1.0, 0.0, 400), np.linspace(0.0, 2.0, 400)
+    bottom, top = robust_limits(low, high)
+    assert -1.2 < bottom < -1.0
+    assert 2.0 < top < 2.2
+
+
+def test_a_part_of_the_range_shows_its_lanes_only(axes, result):
+    points = bifurcation(axes, result, between=(3.5, None)).points
+    assert points.get_xdata().min() >= 3.5
+    assert axes.get_xlim() == (3.5, 3.9)
+    with pytest.raises(ConfigurationError, match=r"growth from 5\.0 to 6\.0.*2\.8 to 3\.9"):
+        lyapunov(axes, result, between=(5.0, 6.0))
+
+
+def test_the_page_stacks_diagram_and_chart_on_one_axis(result):
+    page = bifurcation_page(result)
+    upper, lower = page.axes
+    assert upper.get_shared_x_axes().joined(upper, lower)
+    assert upper.get_position().y0 > lower.get_position().y1
+    np.testing.assert_allclose(upper.get_position().intervalx, lower.get_position().intervalx)
+    assert [axes.get_title("left") for axes in page.axes] == ["(a)", "(b)"]
+    assert (upper.get_xlabel(), lower.get_xlabel()) == ("", "Growth rate, $r$")
+
+
+@pytest.mark.parametrize(("width", "height"), [(85.0, None), (180.0, None), (85.0, 110.0)])
+def test_the_page_has_the_asked_size_and_texts_a_journal_accepts(width, height):
+    result = logistic_sweep(np.linspace(2.8, 3.9, LANES), diverged=[7])
+    page = bifurcation_page(result, "section_delta_1", width_mm=width, height_mm=height)
+    inches = page.get_size_inches()
+    assert inches[0] * 25.4 == pytest.approx(width)
+    assert height is None or inches[1] * 25.4 == pytest.approx(height)
+    written = [text for text in page.findobj(Text) if text.get_text()]
+    assert min(text.get_fontsize() for text in written) >= 7.0
+    drawn = page.get_tightbbox()
+    assert min(drawn.x0, drawn.y0) >= 0.0
+    assert (drawn.x1 <= inches[0], drawn.y1 <= inches[1]) == (True, True)
+
+
+def test_a_periodic_lane_is_a_black_line_and_chaos_is_grey():
+    page = bifurcation_page(logistic_sweep(np.linspace(2.8, 3.9, 1101)), width_mm=85)
+    page.set_dpi(300)
+    page.canvas.draw()
+    picture = np.asarray(page.canvas.buffer_rgba())[::-1, :, 0]
+    for growth in (2.9, 2.95):
+        x, y = page.axes[0].transData.transform((growth, 1.0 - 1.0 / growth)).astype(int)
+        column = picture[y - 100 : y + 100, x]
+        assert column.min() < 40
+        assert 1 <= np.count_nonzero(column < 128) < 8
+    left, right = (int(page.axes[0].transData.transform((g, 0.5))[0]) for g in (3.7, 3.8))
+    bottom, top = (int(page.axes[0].transData.transform((3.7, y))[1]) for y in (0.4, 0.8))
+    assert 60 < picture[bottom:top, left:right].mean() < 245
+
+
+@pytest.mark.parametrize(
+    ("result", "panels"),
+    [
+        (logistic_sweep([3.2]), 2),
+        (logistic_sweep([3.2], diverged=[0]), 2),
+        (logistic_sweep([3.0, 3.2, 3.4], diverged=[0, 1, 2]), 2),
+        (logistic_sweep([0.0, 0.0]), 2),
+        (logistic_sweep([3.0, 3.2], section=[]), 1),
+        (logistic_sweep([3.0, 3.2], section=["delta_1"], with_exponent=False), 1),
+    ],
+    ids=["one lane", "diverged", "all diverged", "all zero", "no section", "no exponent"],
+)
+def test_every_kind_of_result_gives_a_page(result, panels, tmp_path):
+    page = bifurcation_page(result)
+    save_figure(page, tmp_path / "page.png")
+    assert len(page.axes) == panels
+
+
+def test_a_panel_without_lanes_says_why(axes):
+    lyapunov(axes, logistic_sweep([3.0, 3.2], diverged=[0, 1]))
+    assert [text.get_text() for text in axes.texts] == ["all 2 lanes diverged"]
+
+
+def test_a_result_with_nothing_to_draw_is_refused():
+    with pytest.raises(ConfigurationError, match="neither section points nor Lyapunov"):
+        bifurcation_page(logistic_sweep([3.0], section=[], with_exponent=False))
+
+
+def test_drawing_leaves_the_users_settings_alone(result, tmp_path):
+    before = dict(mpl.rcParams)
+    save_figure(bifurcation_page(result), tmp_path / "page.pdf")
+    assert dict(mpl.rcParams) == before
+
+
+@pytest.mark.parametrize("kind", ["png", "pdf"])
+def test_the_same_result_gives_the_same_bits(result, kind, tmp_path):
+    names = [tmp_path / f"{n}.{kind}" for n in range(2)]
+    for name in names:
+        save_figure(bifurcation_page(result), name, title="Größe 1 µm")
+    assert names[0].read_bytes() == names[1].read_bytes()
+
+
+def test_a_figure_of_another_format_is_refused(result, tmp_path):
+    with pytest.raises(ConfigurationError, match=r"\.png or \.pdf"):
+        save_figure(bifurcation_page(result), tmp_path / "page.gif")
+
+
+def test_figures_need_neither_numba_nor_the_kernels_nor_pyplot(result, tmp_path):
+    result.save(tmp_path / "r.h5")
+    code = """
+import sys
+class Forbidden:
+    def find_spec(self, name, path=None, target=None):
+        if name.split(".")[0] in ("numba", "gearchaos_kernels") or name == "matplotlib.pyplot":
+            raise AssertionError(name)
+sys.meta_path.insert(0, Forbidden())
+from gearchaos.plot import main
+sys.exit(main([sys.argv[1], "--quiet"]))
+"""
+    done = subprocess.run(
+        [sys.executable, "-W", "error", "-c", code, str(tmp_path / "r.h5")],
+        capture_output=True,
+        text=True,
+        check=False,
+        env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
+    )
+    assert (done.returncode, done.stderr) == (0, "")
+    assert [Path(line).name for line in done.stdout.splitlines()] == ["r.png", "r.pdf"]

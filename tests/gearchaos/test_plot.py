@@ -1,0 +1,210 @@
+"""The plot command on real files: what it writes, what it says, and how it ends."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+
+from gearchaos.plot import main
+from gearchaos.result import Result
+from gearchaos.variables import sweep_variables
+
+
+@pytest.fixture
+def result_file(tmp_path) -> Path:
+    """Write a result of 50 lanes, of which one diverged."""
+    load = np.linspace(0.0, 1.0, 50)
+    points = np.sqrt(load)[:, np.newaxis] * [-1.0, 1.0]
+    status = np.zeros(50)
+    status[20] = 1
+    points[20] = np.nan
+    variables = sweep_variables(
+        "load",
+        units="1",
+        long_name="load",
+        symbol="$f_n$",
+        states=("delta_5",),
+        section=("delta_5", "delta_1"),
+        section_points=2,
+        lyapunov=True,
+        several_starts=False,
+        status_meanings=("ok", "diverged"),
+    )
+    data = {
+        "load": load,
+        "section_delta_5": points,
+        "section_delta_1": -points,
+        "lyapunov_exponent": points[:, 0],
+        "lyapunov_exponent_standard_error": np.full(50, 0.01),
+        "status": status,
+        "diverged_period": np.where(status == 1, 9, -1),
+        "end_state": points[:, 1:],
+    }
+    path = tmp_path / "pair.h5"
+    Result("load", variables, data, {}, {"title": "a pair"}).save(path)
+    return path
+
+
+def run(*arguments: object, **environment: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-W", "error", "-m", "gearchaos.plot", *map(str, arguments)],
+        capture_output=True,
+        text=True,
+        check=False,
+        env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path), **environment},
+    )
+
+
+def test_png_and_pdf_appear_beside_the_result_and_their_paths_on_stdout(result_file):
+    done = run(result_file)
+    written = [result_file.with_suffix(ending) for ending in (".png", ".pdf")]
+    assert done.returncode == 0
+    assert done.stdout.splitlines() == [str(path) for path in written]
+    assert done.stderr == (
+        "gearchaos plot: 50 lanes over load, 1 of them diverged, 85 mm x 85 mm at 300 dpi\n"
+    )
+    assert written[0].read_bytes().startswith(b"\x89PNG")
+    assert written[1].read_bytes().startswith(b"%PDF")
+    assert {path.name for path in result_file.parent.iterdir()} == {
+        "pair.h5",
+        "pair.png",
+        "pair.pdf",
+    }
+
+
+@pytest.mark.parametrize("backend", ["nonsense", "tkagg", ""])
+def test_no_display_is_needed_whatever_the_backend(result_file, backend):
+    done = run(result_file, "--quiet", "--format", "png", MPLBACKEND=backend, DISPLAY="")
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+def test_running_twice_draws_the_same_bits_twice(result_file):
+    def draw() -> list[bytes]:
+        assert main([str(result_file)]) == 0
+        return [result_file.with_suffix(ending).read_bytes() for ending in (".png", ".pdf")]
+
+    assert draw() == draw()
+
+
+@pytest.mark.parametrize("ending", [".png", ".pdf"])
+def test_a_file_that_the_command_did_not_draw_is_kept(result_file, ending, capsys):
+    foreign = result_file.with_suffix(ending)
+    foreign.write_text("a photograph of gearchaos")
+    assert main([str(result_file)]) == 4
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert err.startswith(f"gearchaos plot: error: {foreign}: ")
+    assert "--overwrite" in err
+    assert foreign.read_text() == "a photograph of gearchaos"
+    assert len(list(result_file.parent.iterdir())) == 2
+    assert main([str(result_file), "--overwrite"]) == 0
+    assert foreign.stat().st_size > 5000
+
+
+@pytest.mark.parametrize(
+    ("arguments", "names"),
+    [
+        (["--format", "pdf"], ["pair.pdf"]),
+        (["--output", "{}/fig.7"], ["fig.7.png", "fig.7.pdf"]),
+        (["--output", "{}/fig7.pdf"], ["fig7.pdf"]),
+        (["--output", "{}", "--format", "png"], ["pair.png"]),
+        (["--variable", "section_delta_5", "--format", "png"], ["pair.png"]),
+        (["--variable", "section_delta_1", "--format", "png"], ["pair_section_delta_1.png"]),
+        (["--from", "0.25", "--to", "1", "--format", "png"], ["pair_from_0.25_to_1.png"]),
+    ],
+)
+def test_names_say_what_is_drawn(result_file, arguments, names, capsys):
+    folder = result_file.parent
+    assert main([str(result_file), *(text.format(folder) for text in arguments)]) == 0
+    assert capsys.readouterr().out.splitlines() == [str(folder / name) for name in names]
+    assert all((folder / name).is_file() for name in names)
+
+
+def test_width_height_and_dpi_decide_the_pixels(result_file):
+    sizes = "--width 127 --height 101.6 --dpi 100 --format png".split()
+    assert main([str(result_file), *sizes]) == 0
+    header = result_file.with_suffix(".png").read_bytes()[16:24]
+    assert (int.from_bytes(header[:4]), int.from_bytes(header[4:])) == (500, 400)
+
+
+def test_figures_name_their_title_and_software_but_no_date(result_file):
+    assert main([str(result_file)]) == 0
+    png, pdf = (result_file.with_suffix(ending).read_bytes() for ending in (".png", ".pdf"))
+    assert b"Title\0a pair" in png
+    assert b"Software\0gearchaos " in png
+    assert b"/Title (a pair)" in pdf
+    assert b"/Creator (gearchaos " in pdf
+    assert b"Date" not in pdf
+
+
+@pytest.mark.parametrize("kind", ["missing", "truncated", "text", "folder", "other HDF5"])
+def test_a_file_that_is_no_result_is_named_and_nothing_is_written(result_file, kind, capsys):
+    if kind == "missing":
+        result_file.unlink()
+    elif kind == "truncated":
+        result_file.write_bytes(result_file.read_bytes()[:3000])
+    elif kind == "text":
+        result_file.write_text("load = 1\n")
+    elif kind == "folder":
+        result_file.unlink()
+        result_file.mkdir()
+    else:
+        with h5py.File(result_file, "w") as file:
+            file["load"] = [1.0]
+    before = list(result_file.parent.iterdir())
+    assert main([str(result_file)]) == 4
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert err.startswith("gearchaos plot: error: ")
+    assert str(result_file) in err
+    assert err.count("\n") == 1
+    assert list(result_file.parent.iterdir()) == before
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--variable", "section_delta_9"], "it has section_delta_5, section_delta_1"),
+        (["--from", "5"], "the result has 0 to 1"),
+        (["--from", "nan"], "not a finite number"),
+        (["--width", "1"], "not between 60 and 1000"),
+        (["--dpi", "99.5"], "not a whole number"),
+        (["--format", "png,gif"], "'gif' is none of png, pdf"),
+        (["--output", "fig.png", "--format", "pdf"], "leave the ending off"),
+        (["--colour"], "unrecognized arguments"),
+    ],
+)
+def test_what_cannot_be_drawn_is_a_usage_error(result_file, arguments, message, capsys):
+    assert main([str(result_file), *arguments]) == 2
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert message in err
+    assert len(list(result_file.parent.iterdir())) == 1
+
+
+@pytest.mark.parametrize("output", ["nowhere/fig", "nowhere/", "pair.h5/fig"])
+def test_a_place_that_cannot_be_written_to_is_an_error(result_file, output, capsys):
+    assert main([str(result_file), "--output", f"{result_file.parent}/{output}"]) == 4
+    out, err = capsys.readouterr()
+    assert out == ""
+    # One line for the PNG and one for the PDF.
+    assert [line[:23] for line in err.splitlines()] == ["gearchaos plot: error: "] * 2
+
+
+def test_the_result_itself_is_never_replaced(result_file, capsys):
+    disguised = result_file.rename(result_file.with_suffix(".png"))
+    before = disguised.read_bytes()
+    assert main([str(disguised), "--output", str(disguised), "--overwrite"]) == 4
+    assert "is the result file itself" in capsys.readouterr().err
+    assert disguised.read_bytes() == before
+
+
+def test_version_and_help_answer_on_stdout(capsys):
+    assert main(["--version"]) == 0
+    assert capsys.readouterr().out.startswith("gearchaos ")
+    assert main(["--help"]) == 0
+    assert "RESULT.h5" in capsys.readouterr().out

@@ -1,0 +1,83 @@
+"""How every command ends: faults become lines on stderr and exit codes, never tracebacks."""
+
+import os
+import subprocess
+import sys
+
+import pytest
+
+from gearchaos.command_line import run_command, version_text
+from gearchaos.errors import ConfigurationError, FileError
+
+
+def raising(fault: BaseException):
+    def body() -> int:
+        raise fault
+
+    return body
+
+
+@pytest.mark.parametrize(
+    ("fault", "code", "lines"),
+    [
+        (ConfigurationError(["one", "two"]), 2, "gear: error: one\ngear: error: two\n"),
+        (FileError("a.h5: is not there"), 4, "gear: error: a.h5: is not there\n"),
+        (PermissionError(13, "Permission denied", "b"), 4, "denied: 'b'\n"),
+        (KeyboardInterrupt(), 130, "gear: interrupted\n"),
+    ],
+)
+def test_each_fault_has_its_code_and_its_lines(fault, code, lines, capsys):
+    assert run_command("gear", raising(fault)) == code
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert err.endswith(lines)
+
+
+def test_a_fault_nobody_foresaw_is_not_hidden():
+    with pytest.raises(ZeroDivisionError):
+        run_command("gear", raising(ZeroDivisionError()))
+
+
+def test_the_codes_of_the_body_and_of_argparse_are_kept():
+    assert run_command("gear", lambda: 3) == 3
+    assert run_command("gear", raising(SystemExit(2))) == 2
+    assert run_command("gear", raising(SystemExit())) == 0
+
+
+def test_a_reader_that_goes_away_ends_the_command_quietly():
+    code = """
+import sys
+from gearchaos.command_line import run_command
+def body():
+    sys.stdin.read()
+    print("a path")
+    return 0
+sys.exit(run_command("gear", body))
+"""
+    with subprocess.Popen(
+        [sys.executable, "-c", code],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
+    ) as process:
+        process.stdout.close()
+        process.stdin.close()
+        assert process.stderr.read() == b""
+        assert process.wait() == 141
+
+
+def test_closed_streams_do_no_harm():
+    command = "import sys; from gearchaos.plot import main; sys.exit(main(['--version']))"
+    done = subprocess.run(
+        ["sh", "-c", 'exec "$0" -c "$1" >&- 2>&-', sys.executable, command],
+        check=False,
+        env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
+    )
+    assert done.returncode == 0
+
+
+def test_the_version_is_one_line_with_software_and_interpreter():
+    assert version_text().startswith("gearchaos ")
+    assert f"Python {sys.version_info.major}.{sys.version_info.minor}" in version_text()
+    assert "\n" not in version_text()
