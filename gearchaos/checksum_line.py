@@ -1,6 +1,6 @@
 """The last line of a result file, a checksum of all that comes before it.
 
-HDF5 checks the numbers of a dataset, but neither its texts nor the bookkeeping between datasets, and
+HDF5 checks the numbers of a dataset, but neither texts nor the bookkeeping between datasets, and
 damage in the latter can make its library run forever. A line after the end of the HDF5 data
 disturbs no reader, and is checked before the library sees the file.
 """

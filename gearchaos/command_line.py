@@ -7,6 +7,7 @@ import platform
 import sys
 from collections.abc import Callable
 from importlib.metadata import PackageNotFoundError, version
+from io import TextIOWrapper
 from typing import TextIO
 
 from gearchaos.errors import FileError, GearchaosError
@@ -48,6 +49,9 @@ def run_command(name: str, body: Callable[[], int]) -> int:
         GearchaosError, 4 for an operating system error that nobody has worded, 130 for an
         interrupt and 141, as the shell says, when the reader of the output has gone.
     """
+    if isinstance(sys.stdout, TextIOWrapper):
+        # Paths that are not Unicode go out byte for byte, as they came in.
+        sys.stdout.reconfigure(errors="surrogateescape")
     try:
         code = _code_of(body)
         if sys.stdout is not None:

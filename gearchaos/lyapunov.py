@@ -42,5 +42,6 @@ def largest_exponent(
 
 
 def _weights(periods: int) -> NDArray[np.float64]:
-    weights = np.sin(np.pi * (np.arange(periods) + 0.5) / periods) ** 2
-    return weights / np.sum(weights)
+    weights: NDArray[np.float64] = np.sin(np.pi * (np.arange(periods) + 0.5) / periods) ** 2
+    weights /= np.sum(weights)
+    return weights

@@ -37,9 +37,9 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 def _run(argv: Sequence[str] | None) -> int:
     options = _parser().parse_args(argv)
-    # No display is needed, and matplotlib refuses to be imported under a name it does not know.
+    # Matplotlib is imported only now: --help and --version answer at once, and an interrupt is
+    # caught. It would refuse to be imported where the environment names an unknown backend.
     os.environ["MPLBACKEND"] = "agg"
-    # Imported only now: --help and --version answer at once, and an interrupt is caught.
     from gearchaos.figures import bifurcation_page, save_figure
     from gearchaos.result import open_result
 
@@ -80,12 +80,7 @@ def _parser() -> argparse.ArgumentParser:
         metavar="PATH",
         help="folder for the figures, their name without its ending, or one file .png or .pdf",
     )
-    add(
-        "--format",
-        type=_formats,
-        metavar="FORMATS",
-        help="png, pdf or both (default: png,pdf)",
-    )
+    add("--format", metavar="FORMATS", help="png, pdf or both (default: png,pdf)")
     add("--variable", metavar="NAME", help="section variable (default: section_delta_5)")
     add("--from", dest="low", type=_number, metavar="VALUE", help="lowest parameter to show")
     add("--to", dest="high", type=_number, metavar="VALUE", help="highest parameter to show")
@@ -108,7 +103,14 @@ def _parser() -> argparse.ArgumentParser:
 def _targets(options: argparse.Namespace) -> list[Path]:
     from gearchaos.figures.files import FORMATS
 
-    formats: tuple[str, ...] = options.format or FORMATS
+    formats = FORMATS
+    if options.format is not None:
+        formats = tuple(dict.fromkeys(kind.strip().lower() for kind in options.format.split(",")))
+        unknown = [repr(kind) for kind in formats if kind not in FORMATS]
+        if unknown:
+            raise ConfigurationError(
+                f"--format: {', '.join(unknown)} is none of {', '.join(FORMATS)}"
+            )
     name = _default_name(options)
     if options.output is None:
         return [options.result.parent / f"{name}.{kind}" for kind in formats]
@@ -117,7 +119,7 @@ def _targets(options: argparse.Namespace) -> list[Path]:
         return [output / f"{name}.{kind}" for kind in formats]
     ending = output.suffix.lower().removeprefix(".")
     if ending in FORMATS:
-        if options.format not in (None, (ending,)):
+        if options.format is not None and formats != (ending,):
             raise ConfigurationError(
                 f"--output {output} is one {ending} file, but --format asks for "
                 f"{','.join(formats)}; leave the ending off"
@@ -162,16 +164,6 @@ def _lanes_in_words(result: Result) -> str:
     words = f"{lanes} lane{'s' if lanes != 1 else ''} over {result.axis}"
     diverged = int((result["status"] != 0).sum()) if "status" in result else 0
     return f"{words}, {diverged} of them diverged" if diverged else words
-
-
-def _formats(text: str) -> tuple[str, ...]:
-    from gearchaos.figures.files import FORMATS
-
-    kinds = tuple(dict.fromkeys(kind.strip().lower() for kind in text.split(",")))
-    unknown = [kind for kind in kinds if kind not in FORMATS]
-    if unknown:
-        raise argparse.ArgumentTypeError(f"{unknown[0]!r} is none of {', '.join(FORMATS)}")
-    return kinds
 
 
 def _number(text: str) -> float:

@@ -42,9 +42,7 @@ class Progress:
         self._done += lanes
         self._bar.update(lanes)
         now = time.monotonic()
-        if self._lines and (
-            now - self._spoke > SECONDS_BETWEEN_LINES or self._done == self._lanes
-        ):
+        if self._lines and (now - self._spoke > SECONDS_BETWEEN_LINES or self._done == self._lanes):
             self._spoke = now
             rate = (self._done - self._began_with) / max(now - self._began, 1e-9)
             left = (self._lanes - self._done) / rate

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gearchaos.result_file import SCHEMA, SCHEMA_VERSION, Parameter, write_result
+from gearchaos.result_file import OWN_METADATA, Parameter, write_result
 from gearchaos.result_reader import read_result
 from gearchaos.variables import Variable, axis_name
 
@@ -37,7 +37,7 @@ class Result:
     Raises
     ------
     ValueError
-        If an array is missing or its shape contradicts the dimensions.
+        If an array is missing, its shape contradicts the dimensions, or there are no lanes.
     """
 
     def __init__(
@@ -51,12 +51,7 @@ class Result:
         self.axis = axis_name(axis)
         self.variables = {variable.name: variable for variable in variables}
         self.parameters = dict(parameters)
-        own: dict[str, str | int | float] = {
-            "schema": SCHEMA,
-            "schema_version": SCHEMA_VERSION,
-            "axis": self.axis,
-        }
-        self.metadata = {**own, **metadata, **own}
+        self.metadata = {**metadata, **OWN_METADATA, "axis": self.axis}
         self._data: dict[str, NDArray[Any]] = {}
         sizes: dict[str, int] = {}
         for name, variable in self.variables.items():
@@ -70,6 +65,8 @@ class Result:
             ):
                 raise ValueError(f"{name} has shape {array.shape}, but dimensions {variable.dims}")
             self._data[name] = array
+        if not sizes.get(self.axis):
+            raise ValueError(f"no lanes along {self.axis}")
 
     @property
     def names(self) -> tuple[str, ...]:

@@ -17,6 +17,7 @@ from gearchaos.variables import HARMONIC, Variable
 
 SCHEMA = "gearchaos-sweep"
 SCHEMA_VERSION = "1.0"
+OWN_METADATA = {"schema": SCHEMA, "schema_version": SCHEMA_VERSION}
 PARAMETERS = "parameters"
 ORIGINS = ("given", "derived", "default", "swept")
 TEXTS = {
@@ -72,12 +73,14 @@ def write_result(
     Parameters
     ----------
     path : path
+        The file to be.
     variables : sequence of Variable
         What the file holds, in this order. Those that do not run over the lanes carry their
         values.
     blocks : iterable of (first, last, arrays)
         The lanes first to last - 1 of every other variable, by name.
     parameters : mapping of str to Parameter
+        Dimensionless groups of the model.
     metadata : mapping of str to str, int or float
         Root attributes; ``"axis"`` among them names the dimension of the lanes.
     lanes : int
@@ -97,7 +100,7 @@ def write_result(
     sizes = {v.name: len(v.values) for v in everything if v.values is not None} | {axis: lanes}
     with replacing(path, overwrite=overwrite, scratch=scratch) as partial:
         with h5py.File(partial, "w", track_order=True, rdcc_nbytes=_CACHE_BYTES) as file:
-            _write_metadata(file, metadata)
+            _write_metadata(file, {**metadata, **OWN_METADATA})
             for variable in everything:
                 _create(file, variable, tuple(sizes[dim] for dim in variable.dims))
             for variable in everything:

@@ -30,7 +30,7 @@ _HIGHEST_COMPRESSION = 1100
 """Deflate packs at best 1032 bytes into one; a dataset that claims more is not a real one."""
 
 
-class _Unfit(Exception):
+class _UnfitError(Exception):
     """What is wrong with the file, in words; becomes a FileError."""
 
 
@@ -65,7 +65,7 @@ def read_result(path: str | os.PathLike[str]) -> Contents:
     try:
         with h5py.File(name, "r") as file:
             return _read(file)
-    except _Unfit as error:
+    except _UnfitError as error:
         raise FileError(f"{name}: {error}") from error
     except Exception as error:
         # Damage surfaces in h5py as nearly any kind of exception.
@@ -98,13 +98,13 @@ def _read(file: h5py.File) -> Contents:
 
 def _check_schema(metadata: Mapping[str, Any]) -> None:
     if metadata.get("schema") != SCHEMA:
-        raise _Unfit(
+        raise _UnfitError(
             f'is not a gearchaos result: it lacks the attribute schema = "{SCHEMA}"; '
             "give the name of a file that a sweep has written"
         )
     version, own = str(metadata.get("schema_version", "")), SCHEMA_VERSION.split(".")[0]
     if version.split(".")[0] != own:
-        raise _Unfit(
+        raise _UnfitError(
             f"has version {version!r} of the file format, of which this gearchaos reads {own}.x; "
             "use a gearchaos that knows it"
         )
@@ -115,7 +115,7 @@ def _check_variables(
 ) -> None:
     """Compare what a sweep must yield with what there is; more than that is welcome."""
     if STATE not in data:
-        raise _Unfit(f"lacks the variable {STATE}; run the sweep again")
+        raise _UnfitError(f"lacks the variable {STATE}; run the sweep again")
     found = {variable.name: variable for variable in variables}
     prefix = "section_"
     expected = sweep_variables(
@@ -133,19 +133,19 @@ def _check_variables(
     for due in expected:
         got = found.get(due.name)
         if got is None:
-            raise _Unfit(f"lacks the variable {due.name}; run the sweep again")
+            raise _UnfitError(f"lacks the variable {due.name}; run the sweep again")
         if (got.dims, got.dtype) != (due.dims, due.dtype):
-            raise _Unfit(
+            raise _UnfitError(
                 f"holds {due.name} as {got.dtype} over ({', '.join(got.dims)}), which should be "
                 f"{due.dtype} over ({', '.join(due.dims)}); run the sweep again"
             )
     if data["status"].max() >= max(1, len(found["status"].flags)):
-        raise _Unfit("holds a status without a meaning; run the sweep again")
+        raise _UnfitError("holds a status without a meaning; run the sweep again")
 
 
 def _read_parameters(file: h5py.File, axis: str, sizes: dict[str, int]) -> dict[str, Parameter]:
     if not isinstance(_hard_linked(file, PARAMETERS), h5py.Group):
-        raise _Unfit(f"lacks the group {PARAMETERS}; run the sweep again")
+        raise _UnfitError(f"lacks the group {PARAMETERS}; run the sweep again")
     parameters = {}
     for name in file[PARAMETERS]:
         dataset = _dataset(file, f"{PARAMETERS}/{name}")
@@ -154,7 +154,7 @@ def _read_parameters(file: h5py.File, axis: str, sizes: dict[str, int]) -> dict[
         origin = str(notes.get("origin"))
         number = _DTYPES.get(dataset.dtype.str[1:]) == "float64"
         if not number or dims not in ((), (axis,), (HARMONIC,)) or origin not in ORIGINS:
-            raise _Unfit(f"holds a parameter {name} that is none; run the sweep again")
+            raise _UnfitError(f"holds a parameter {name} that is none; run the sweep again")
         values = dataset[()]
         parameters[name] = Parameter(
             values if dims else float(values),
@@ -167,7 +167,7 @@ def _read_parameters(file: h5py.File, axis: str, sizes: dict[str, int]) -> dict[
 def _hard_linked(file: h5py.File, name: str) -> Any:
     # A soft or an external link could lead anywhere.
     if not isinstance(file.get(name, getlink=True), h5py.HardLink):
-        raise _Unfit(f"holds no {name}, or a link in its place; run the sweep again")
+        raise _UnfitError(f"holds no {name}, or a link in its place; run the sweep again")
     return file[name]
 
 
@@ -175,7 +175,7 @@ def _dataset(file: h5py.File, name: str) -> h5py.Dataset:
     """Open a dataset that lies in this file, is compressed in known ways and fits into it."""
     dataset = _hard_linked(file, name)
     if not isinstance(dataset, h5py.Dataset) or dataset.is_virtual or dataset.external:
-        raise _Unfit(f"keeps {name} outside of itself or not as an array; run the sweep again")
+        raise _UnfitError(f"keeps {name} outside of itself or not as an array; run the sweep again")
     known = {h5py.h5z.FILTER_DEFLATE, h5py.h5z.FILTER_SHUFFLE, h5py.h5z.FILTER_FLETCHER32}
     layout = dataset.id.get_create_plist()
     filters = {layout.get_filter(index)[0] for index in range(layout.get_nfilters())}
@@ -184,7 +184,7 @@ def _dataset(file: h5py.File, name: str) -> h5py.Dataset:
     size = int(np.prod(dataset.shape, dtype=object)) * dataset.dtype.itemsize
     packed = _HIGHEST_COMPRESSION if filters else 1
     if filters - known or chunk > _LARGEST_CHUNK or not 0 < size <= packed * stored:
-        raise _Unfit(
+        raise _UnfitError(
             f"declares {size} bytes for {name} that it does not hold in a known way; "
             "run the sweep again"
         )
@@ -197,7 +197,7 @@ def _dims(file: h5py.File, dataset: h5py.Dataset, sizes: dict[str, int]) -> tupl
     for dim, size in zip(dataset.dims, dataset.shape, strict=True):
         scale = name if dataset.is_scale else dim[0].name.lstrip("/") if len(dim) == 1 else ""
         if scale not in file or sizes.setdefault(scale, size) != size:
-            raise _Unfit(f"holds {name} with dimensions that do not fit; run the sweep again")
+            raise _UnfitError(f"holds {name} with dimensions that do not fit; run the sweep again")
         dims.append(scale)
     return tuple(dims)
 
@@ -208,7 +208,7 @@ def _values(dataset: h5py.Dataset) -> NDArray[Any]:
         return values.astype(_dtype(dataset), copy=False)
     words = dataset.asstr()[...]
     if max(map(len, words.flat)) > np.iinfo(np.uint8).max:
-        raise _Unfit(f"holds no plain words in {dataset.name}; run the sweep again")
+        raise _UnfitError(f"holds no plain words in {dataset.name}; run the sweep again")
     return np.asarray(words, dtype="str")
 
 
@@ -218,7 +218,7 @@ def _dtype(dataset: h5py.Dataset) -> str:
     try:
         return _DTYPES[dataset.dtype.str[1:]]
     except KeyError:
-        raise _Unfit(
+        raise _UnfitError(
             f"holds {dataset.name} as {dataset.dtype}, which no variable is; run the sweep again"
         ) from None
 

@@ -14,8 +14,9 @@ from gearchaos.errors import ConfigurationError
 from gearchaos.progress import Progress, notice
 from gearchaos.provenance import provenance
 from gearchaos.result import Result
-from gearchaos.simulation import Simulation, compute_all, default_block
+from gearchaos.simulation import Simulation, compute_all
 
+PILOT_SECONDS = 0.2
 COMPILING = "gearchaos: compiling the kernel of this scene (once per machine, a few seconds)"
 
 
@@ -46,7 +47,9 @@ def run(config: Configuration, threads: int | None = None, progress: bool = Fals
     with notice(COMPILING, quiet=not progress):
         simulation.compile()
     began = time.monotonic()
-    bounds = simulation.blocks(default_block(current_threads()))
+    size = simulation.block_lanes(current_threads())
+    edges = range(0, simulation.lanes, size)
+    bounds = simulation.in_order((first, min(first + size, simulation.lanes)) for first in edges)
     parts = {}
     with Progress(simulation.lanes, quiet=not progress) as bar:
         for (first, last), arrays in compute_all(simulation, bounds):
@@ -61,6 +64,25 @@ def run(config: Configuration, threads: int | None = None, progress: bool = Fals
         simulation.parameters,
         metadata(simulation, time.monotonic() - began),
     )
+
+
+def pilot_rate(simulation: Simulation) -> float:
+    """Measure how many Runge-Kutta steps a second this sweep makes here.
+
+    Parameters
+    ----------
+    simulation : Simulation
+        Compiled; a few mesh periods of its first block are integrated.
+    """
+    lanes = min(simulation.lanes, simulation.block_lanes(current_threads()))
+    periods = 1
+    while True:
+        began = time.perf_counter()
+        steps = simulation.rehearse(lanes, periods)
+        seconds = time.perf_counter() - began
+        if seconds > PILOT_SECONDS:
+            return steps / seconds
+        periods *= 2
 
 
 def choose_threads(threads: int | None) -> None:

@@ -6,7 +6,6 @@ import hashlib
 import json
 import os
 import re
-import shutil
 import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
@@ -14,17 +13,17 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, NamedTuple, Self
 
-import numpy as np
 from numpy.typing import NDArray
 
-from gearchaos.atomic_file import PARTIAL, reason, replacing, writing
+from gearchaos.atomic_file import PARTIAL, reason, replacing
 from gearchaos.errors import FileError
-from gearchaos.result_file import Block, Metadata, Parameter, write_result
-from gearchaos.store_lock import StoreLock
+from gearchaos.result_file import Metadata, Parameter, write_result
+from gearchaos.shard_file import SHARD_SCHEMA_VERSION, ShardFormat
+from gearchaos.store_lock import LOCK, StoreLock
 from gearchaos.variables import Variable
 
-SHARDS_SCHEMA = "gearchaos-shards"
-SHARDS_SCHEMA_VERSION = "1.0"
+STORE_SCHEMA = "gearchaos-shards"
+_MANIFEST = "manifest.json"
 _NAME = re.compile(r"(\d{12})-(\d{12})\.shard")
 
 
@@ -88,15 +87,22 @@ class ShardStore:
         self.variables = list(variables)
         self.lanes = lanes
         self.axis = axis
-        self._manifest = {
-            "schema": SHARDS_SCHEMA,
-            "schema_version": SHARDS_SCHEMA_VERSION,
+        sizes = {v.name: len(v.values) for v in variables if v.values is not None}
+        columns = tuple(
+            (v.name, v.dtype, tuple(sizes[dim] for dim in v.dims[1:]))
+            for v in variables
+            if v.dims[0] == axis
+        )
+        self._manifest: dict[str, Any] = {
+            "schema": STORE_SCHEMA,
+            "schema_version": SHARD_SCHEMA_VERSION,
             "lanes": lanes,
-            "variables": [[v.name, v.dtype, self._row(v)] for v in self._on_lanes()],
+            "variables": columns,
             "configuration": configuration,
         }
         text = json.dumps(self._manifest, sort_keys=True)
-        self.fingerprint = hashlib.sha256(text.encode("utf-8", "surrogatepass")).hexdigest()
+        fingerprint = hashlib.sha256(text.encode()).hexdigest()
+        self._format = ShardFormat(fingerprint, lanes, columns)
         self._lock = StoreLock(self.folder, self.output)
         try:
             self._open(resume)
@@ -118,7 +124,7 @@ class ShardStore:
     def close(self) -> None:
         """Let go of the lock; finished blocks stay."""
         if self._lock.held and not self._names():
-            shutil.rmtree(self.folder, ignore_errors=True)
+            self._remove()
         self._lock.release()
 
     def finished(self) -> Finished:
@@ -154,23 +160,9 @@ class ShardStore:
         FileError
             If the shard cannot be written.
         ValueError
-            If the arrays are not what the variables say.
+            If an array has another shape than the variables say.
         """
-        pieces = []
-        for variable in self._on_lanes():
-            array = np.ascontiguousarray(arrays[variable.name], dtype=_stored(variable))
-            if array.shape != (last - first, *self._row(variable)):
-                raise ValueError(f"{variable.name} of lanes {first} to {last} has {array.shape}")
-            pieces.append(array)
-        head = self._head(first, last)
-        digest = hashlib.sha256(head)
-        for array in pieces:
-            digest.update(array)
-        path = self._path(first, last)
-        with replacing(path, overwrite=True) as partial, open(partial, "wb") as file:
-            file.write(head + digest.digest())
-            for array in pieces:
-                file.write(array)
+        self._format.write(self._path(first, last), first, last, arrays)
 
     def read(self, first: int, last: int) -> dict[str, NDArray[Any]]:
         """Give the arrays of one shard, verified.
@@ -180,29 +172,109 @@ class ShardStore:
         FileError
             If the shard is missing or damaged, or belongs to another sweep.
         """
-        path = self._path(first, last)
-        head = self._head(first, last)
-        on_lanes = [(v, (last - first, *self._row(v))) for v in self._on_lanes()]
-        sizes = [int(np.prod(shape)) * _stored(v).itemsize for v, shape in on_lanes]
+        return self._format.read(self._path(first, last), first, last)
+
+    def merge(
+        self,
+        parameters: Mapping[str, Parameter],
+        metadata: Metadata,
+        *,
+        overwrite: bool = False,
+    ) -> Path:
+        """Make the result file of all blocks, one block in memory at a time, and tidy up.
+
+        Returns
+        -------
+        Path
+            The result file.
+
+        Raises
+        ------
+        FileError
+            If blocks are missing or the file cannot be written; the shards stay.
+        """
+        bounds, problems = self.finished()
+        if gaps := self.missing(bounds, self.lanes):
+            first, last = gaps[0]
+            here = f"{self.folder}: lanes {first} to {last - 1} are missing; use --resume"
+            raise FileError([*problems, here])
+        write_result(
+            self.output,
+            self.variables,
+            ((first, last, self.read(first, last)) for first, last in bounds),
+            parameters,
+            {**metadata, "axis": self.axis},
+            lanes=self.lanes,
+            overwrite=overwrite,
+            scratch=self.folder,
+        )
+        self._remove()
+        return self.output
+
+    def _open(self, resume: bool) -> None:
+        names = self._names()
+        path = self.folder / _MANIFEST
+        if names and not resume:
+            raise FileError(
+                f"{self.folder}: holds {len(names)} finished blocks of an earlier run; continue "
+                "it with --resume, or delete this folder"
+            )
+        if names:
+            self._compare(path)
+        for partial in self.folder.glob(f".*{PARTIAL}"):
+            partial.unlink(missing_ok=True)
+        if not names:
+            with replacing(path, overwrite=True) as partial:
+                partial.write_text(json.dumps(self._manifest, indent=1), encoding="utf-8")
+
+    def _compare(self, path: Path) -> None:
         try:
-            size = path.stat().st_size
-            if not 0 <= first < last <= self.lanes:
-                raise FileError(f"{path}: has bounds outside of the {self.lanes} lanes")
-            if size != len(head) + hashlib.sha256().digest_size + sum(sizes):
-                raise FileError(f"{path}: has {size} bytes, which is not what its lanes take")
-            content = memoryview(path.read_bytes())
-        except OSError as error:
-            raise FileError(f"{path}: cannot be read: {reason(error)}") from error
-        start = len(head) + hashlib.sha256().digest_size
-        if content[: len(head)] != head:
-            raise FileError(f"{path}: belongs to another sweep")
-        digest = hashlib.sha256(head)
-        digest.update(content[start:])
-        if content[len(head) : start] != digest.digest():
-            raise FileError(f"{path}: is damaged, its checksum does not fit")
-        arrays = {}
-        for (variable, shape), length in zip(on_lanes, sizes, strict=True):
-            values = np.frombuffer(content[start : start + length], dtype=_stored(variable))
-            arrays[variable.name] = values.reshape(shape)
-            start += length
-        return arrays
+            earlier = json.loads(path.read_text(encoding="utf-8"))
+            keys = differing_keys(earlier["configuration"], self._manifest["configuration"])
+        except (OSError, ValueError, LookupError, TypeError, AttributeError, RecursionError) as e:
+            raise FileError(
+                f"{path}: is damaged or missing ({reason(e)}); delete the folder to start again"
+            ) from e
+        own = json.loads(json.dumps(self._manifest))
+        keys = keys or [key for key in own if own[key] != earlier.get(key)]
+        if keys:
+            raise FileError(
+                f"{self.folder}: holds blocks of another configuration, which differs in "
+                f"{', '.join(keys)}; restore these values, delete the folder or choose another "
+                "--output"
+            )
+
+    def _remove(self) -> None:
+        # Only what the store has made: the folder may hold files of the user.
+        for name in [*self._names(), _MANIFEST, LOCK]:
+            with suppress(OSError):
+                (self.folder / name).unlink()
+        with suppress(OSError):
+            self.folder.rmdir()
+
+    def _names(self) -> list[str]:
+        try:
+            return sorted(name for name in os.listdir(self.folder) if _NAME.fullmatch(name))
+        except OSError:
+            return []
+
+    def _path(self, first: int, last: int) -> Path:
+        return self.folder / f"{first:012d}-{last:012d}.shard"
+
+
+def differing_keys(one: str, other: str) -> list[str]:
+    """List the dotted keys in which two TOML texts differ, with both values."""
+    first, second = (dict(_flat(tomllib.loads(text))) for text in (one, other))
+    return [
+        f"{key} ({first.get(key, 'absent')}, now {second.get(key, 'absent')})"
+        for key in {**first, **second}
+        if key not in first or key not in second or repr(first[key]) != repr(second[key])
+    ]
+
+
+def _flat(table: Mapping[str, Any], path: str = "") -> Iterator[tuple[str, Any]]:
+    for key, value in table.items():
+        if isinstance(value, dict):
+            yield from _flat(value, f"{path}{key}.")
+        else:
+            yield f"{path}{key}", value

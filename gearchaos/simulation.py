@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -13,12 +14,12 @@ from gearchaos_kernels import (
     Outcome,
     Plan,
     Scene,
-    Status,
     integrate,
 )
 from numpy.typing import NDArray
 
 from gearchaos.configuration import Configuration, lane_groups
+from gearchaos.configuration.run_tables import states_of
 from gearchaos.configuration.sweep_values import SWEEPABLE_GROUPS, SWEEPABLE_KEYS
 from gearchaos.group_table import GROUP_TABLE
 from gearchaos.lanes import model, select, start_states
@@ -46,7 +47,9 @@ class Simulation:
         self.values, self.groups = lane_groups(config)
         self.starts = config.start.count
         self.lanes = self.values.size * self.starts
-        self.scene = Scene(**{effect: effect in config.scene.effects for effect in Scene._fields})
+        self.effects = config.needed_effects
+        self.states = states_of(self.effects)
+        self.scene = Scene(**{effect: effect in self.effects for effect in Scene._fields})
         self.plan = Plan(
             steps_per_period=config.integration.steps_per_period,
             transient_periods=config.integration.transient_periods,
@@ -81,7 +84,7 @@ class Simulation:
             units=units,
             long_name=long_name,
             symbol=symbol,
-            states=self.config.scene.states,
+            states=self.states,
             section=self.config.outputs.section,
             section_points=self.config.outputs.section_points,
             lyapunov=self.config.outputs.lyapunov,
@@ -95,7 +98,7 @@ class Simulation:
         parameters = {}
         for row in GROUP_TABLE:
             value = getattr(self.groups, row.name)
-            if value is None or not row.needed_by(self.config.scene.effects):
+            if value is None or not row.needed_by(self.effects):
                 continue
             swept = np.ndim(value) > 0 and not row.is_list
             parameters[row.name] = Parameter(
@@ -109,16 +112,30 @@ class Simulation:
 
     def compile(self) -> None:
         """Compile the kernel of this scene, or load it from the cache."""
-        self._integrate(slice(0, 1), None, self.plan._replace(transient_periods=0, recorded_periods=0))
+        self.rehearse(1, 0)
 
-    def blocks(self, size: int) -> list[Bounds]:
-        """Return the bounds of the blocks in the order in which they are to be computed."""
-        whole_values = max(self.starts, size - size % self.starts) if self.carried else size
-        bounds = [
-            (first, min(first + whole_values, self.lanes))
-            for first in range(0, self.lanes, whole_values)
-        ]
-        return bounds[::-1] if self.config.start.carry == "downwards" else bounds
+    def rehearse(self, lanes: int, periods: int) -> int:
+        """Integrate the first lanes for a few mesh periods and return the number of steps."""
+        plan = self.plan._replace(transient_periods=0, recorded_periods=periods, section_points=0)
+        self._integrate(slice(0, lanes), plan=plan)
+        return lanes * periods * plan.steps_per_period
+
+    def block_memory(self, threads: int) -> int:
+        """Return about how many bytes the arrays of one block take while it is computed."""
+        numbers = self.plan.section_points * len(self.plan.section_states) + 4 * len(STATE_ROWS)
+        if self.plan.tangent:
+            numbers += self.plan.recorded_periods
+        return 8 * self.block_lanes(threads) * numbers
+
+    def block_lanes(self, threads: int) -> int:
+        """Return how many lanes make a block: work for every thread, and progress to be seen."""
+        lanes = LANES * max(8, 2 * threads)
+        # A carried sweep hands on whole values.
+        return max(self.starts, lanes - lanes % self.starts) if self.carried else lanes
+
+    def in_order(self, bounds: Iterable[Bounds]) -> list[Bounds]:
+        """Sort the bounds of blocks into the order in which they are to be computed."""
+        return sorted(bounds, reverse=self.config.start.carry == "downwards")
 
     def compute(self, first: int, last: int, neighbour: Arrays | None = None) -> dict[str, Any]:
         """Compute the lanes ``first`` to ``last - 1``.
@@ -141,7 +158,7 @@ class Simulation:
 
     def _compute_carried(self, first: int, last: int, neighbour: Arrays | None) -> dict[str, Any]:
         downwards = self.config.start.carry == "downwards"
-        columns = [STATE_ROWS[name] for name in self.config.scene.states]
+        columns = [STATE_ROWS[name] for name in self.states]
         carried = None
         if neighbour is not None:
             carried = np.full((self.starts, len(STATE_ROWS)), 0.0)
@@ -153,10 +170,10 @@ class Simulation:
             carried = parts[-1].end_state
         if downwards:
             parts.reverse()
-        merged = (
+        merged: Any = [
             None if arrays[0] is None else np.concatenate(arrays)
             for arrays in zip(*parts, strict=True)
-        )
+        ]
         return self._arrays(first, Outcome(*merged))
 
     def _integrate(
@@ -188,7 +205,7 @@ class Simulation:
             "start": numbers % self.starts,
             "status": outcome.status,
             "diverged_period": outcome.diverged_period,
-            "end_state": outcome.end_state[:, [STATE_ROWS[s] for s in self.config.scene.states]],
+            "end_state": outcome.end_state[:, [STATE_ROWS[name] for name in self.states]],
         }
         for column, name in enumerate(self.plan.section_states):
             arrays[f"section_{name}"] = outcome.section[:, :, column]
@@ -210,43 +227,32 @@ class Simulation:
         return key.units or "1", key.field.description or parameter, ""
 
 
-def diverged_share(blocks: Sequence[Arrays]) -> float:
-    """Return the share of lanes that diverged."""
-    status = np.concatenate([block["status"] for block in blocks])
-    return float(np.mean(status == Status.DIVERGED))
-
-
 def compute_all(
     simulation: Simulation,
     bounds: Sequence[Bounds],
     finished: Mapping[Bounds, Callable[[], Arrays]] | None = None,
 ) -> Iterator[tuple[Bounds, Arrays]]:
-    """Compute blocks in order, skipping the finished ones.
+    """Compute blocks one after the other, skipping the finished ones.
 
     Parameters
     ----------
     simulation : Simulation
     bounds : sequence of (first, last)
-        From `Simulation.blocks`.
+        Blocks that cover the sweep, ordered by `Simulation.in_order`.
     finished : mapping, optional
         Bounds of finished blocks with a way to read them; a carried sweep goes on from them.
     """
     finished = finished or {}
-    neighbour: Callable[[], Arrays] | None = None
-    for first, last in bounds:
-        if (first, last) in finished:
-            neighbour = finished[first, last]
+    read: Callable[[], Arrays] | None = None
+    for block in bounds:
+        if block in finished:
+            read = finished[block]
             continue
-        before = neighbour() if neighbour is not None and simulation.carried else None
-        arrays = simulation.compute(first, last, before)
-        yield (first, last), arrays
-
-        def handed_on(arrays: Arrays = arrays) -> Arrays:
-            return arrays
-
-        neighbour = handed_on
+        neighbour = read() if read is not None and simulation.carried else None
+        arrays = simulation.compute(*block, neighbour)
+        yield block, arrays
+        read = partial(_same, arrays)
 
 
-def default_block(threads: int) -> int:
-    """Return how many lanes make a block: enough for every thread, few enough to show progress."""
-    return LANES * max(8, 2 * threads)
+def _same(arrays: Arrays) -> Arrays:
+    return arrays

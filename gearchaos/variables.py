@@ -1,4 +1,4 @@
-"""What a sweep yields: the name, dimensions, type, unit and wording of every variable, in one place."""
+"""What a sweep yields: name, dimensions, type, unit and wording of every variable, in one place."""
 
 from __future__ import annotations
 

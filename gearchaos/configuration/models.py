@@ -19,6 +19,7 @@ from gearchaos.configuration.run_tables import (
     Scene,
     Start,
     Sweep,
+    states_of,
 )
 from gearchaos.configuration.sweep_rules import LANE_RULES, SWEEP_RULES
 from gearchaos.configuration.table import Table, key
@@ -67,6 +68,18 @@ class Configuration(Table):
     def text(self) -> str:
         """The TOML text verbatim, before overrides; `resolved_toml` where there was none."""
         return self.resolved_toml() if self._text is None else self._text
+
+    @property
+    def needed_effects(self) -> tuple[str, ...]:
+        """The effects of the scene that act on what is kept.
+
+        The axial pair is driven one way: without an axial state in the section and without the
+        exponent of the whole system, nothing that is kept depends on it.
+        """
+        axial_states = set(states_of({"axial"})) - set(states_of(()))
+        if self.outputs.lyapunov or not axial_states.isdisjoint(self.outputs.section):
+            return self.scene.effects
+        return tuple(effect for effect in self.scene.effects if effect != "axial")
 
     @classmethod
     def from_toml(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias, get_args
 
 from pydantic import Field, create_model
@@ -25,6 +26,13 @@ State: TypeAlias = Literal[
     "delta_4_rate",
 ]
 STATES: tuple[str, ...] = get_args(State)
+
+
+def states_of(effects: Collection[str]) -> tuple[str, ...]:
+    """Return the states of a scene with these effects, in the order of the kernels."""
+    transverse = STATES[2:6] if "transverse" in effects else ()
+    axial = STATES[6:] if "axial" in effects else ()
+    return STATES[:2] + transverse + axial
 
 
 class GroupsTable(Table):
@@ -73,10 +81,7 @@ class Scene(Table):
     @property
     def states(self) -> tuple[str, ...]:
         """States of the scene in the order of the kernels: 2, 6 or 10."""
-        return STATES[:2] + (
-            (STATES[2:6] if "transverse" in self.effects else ())
-            + (STATES[6:] if "axial" in self.effects else ())
-        )
+        return states_of(self.effects)
 
 
 class Start(Table):

@@ -116,6 +116,17 @@ def _swept_effect_is_on(config: Configuration) -> Iterator[Fault]:
         )
 
 
+def _swept_effect_is_kept(config: Configuration) -> Iterator[Fault]:
+    row = SWEEPABLE_GROUPS.get(config.sweep.parameter)
+    if row is not None and row.effects == {"axial"} and "axial" not in config.needed_effects:
+        yield Fault(
+            "sweep.parameter",
+            "acts on the axial pair only, and nothing that is kept depends on that",
+            "add an axial state such as delta_3 to outputs.section, or set outputs.lyapunov = true",
+            row.name,
+        )
+
+
 def _groups_are_known_and_move(config: Configuration) -> Iterator[Fault]:
     values = swept_values(config)
     # The groups are smooth in every parameter: both ends of the sweep and a value between them
@@ -222,6 +233,7 @@ SWEEP_RULES: tuple[tuple[frozenset[str], Rule], ...] = (
     (frozenset({"sweep"}), _values_are_distinct),
     (frozenset({"sweep"}), _values_are_in_range),
     (frozenset({"sweep", "scene"}), _swept_effect_is_on),
+    (frozenset({"sweep", "scene", "outputs"}), _swept_effect_is_kept),
 )
 """Each rule with the tables it reads, as in `gearchaos.configuration.rules`."""
 

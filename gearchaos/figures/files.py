@@ -12,7 +12,7 @@ from gearchaos.command_line import software_version
 from gearchaos.errors import ConfigurationError
 from gearchaos.figures.style import STYLE
 
-FORMATS = ("png", "pdf")
+FORMATS: tuple[str, ...] = ("png", "pdf")
 PDF_FINENESS = 2
 SIGNATURE = "gearchaos"
 
@@ -50,6 +50,8 @@ def save_figure(
         raise ConfigurationError(
             f"{path}: a figure ends in {' or '.join('.' + f for f in FORMATS)}"
         )
+    # The name of a file, which may not be Unicode, can serve as a title.
+    title = title.encode("utf-8", "replace").decode("utf-8")
     software = f"{SIGNATURE} {software_version()}"
     metadata: dict[str, str | None] = {"Title": title, "Software": software}
     if kind == "pdf":

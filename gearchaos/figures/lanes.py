@@ -20,7 +20,7 @@ Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 Between = tuple[float | None, float | None]
 
-OUTLYING_SHARE = 0.025
+OUTLYING_SHARE = 0.05
 MARGIN = 0.05
 
 
@@ -76,7 +76,7 @@ def parameter_limits(parameter: Floats, between: Between = (None, None)) -> tupl
 def robust_limits(low: Floats, high: Floats, full_range: bool = False) -> tuple[float, float]:
     """Return limits that a few outlying lanes cannot stretch.
 
-    An end of the range that at most 2.5 % of the lanes reach is left out if it lies further than
+    An end of the range that at most 5 % of the lanes reach is left out if it lies further than
     half the range of the others beyond them; `mark_off_scale` then says so.
 
     Parameters

@@ -95,14 +95,14 @@ def block(function: Callable[..., Any]) -> Any:
 
 
 @intrinsic
-def align_stack(typing_context: Any) -> Any:
+def align_stack(_typing_context: Any) -> Any:
     """Align the caller's stack frame to a cache line, so that spilled vectors do not straddle two.
 
     LLVM realigns a frame only if it holds an over-aligned variable before registers are allocated:
     this one is it. The empty assembly keeps it from being optimised away.
     """
 
-    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+    def generate(context: Any, builder: Any, _signature: Any, _arguments: Any) -> Any:
         slot = cgutils.alloca_once(builder, ir.ArrayType(ir.IntType(8), CACHE_LINE))
         slot.align = CACHE_LINE
         takes_pointer = ir.FunctionType(ir.VoidType(), [slot.type])

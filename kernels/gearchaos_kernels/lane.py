@@ -16,7 +16,10 @@ and rates are displacements per step (h times d/d tau).
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
 
 from gearchaos_kernels.compilation import scalar
 
@@ -35,6 +38,9 @@ COEFFICIENT = 4 * COORDINATES
 """First row of the coefficients, in the order of `Lane`."""
 
 
+Number: TypeAlias = float | NDArray[np.float64]
+
+
 class Coordinates(NamedTuple):
     """One number for each of the five scaled coordinates; 0 for those a scene leaves out."""
 
@@ -46,33 +52,33 @@ class Coordinates(NamedTuple):
 
 
 class Lane(NamedTuple):
-    """Coefficients of one lane, made dimensionless with the step (see `coefficients`)."""
+    """Coefficients of one lane (numbers) or of many (arrays), per step; see `coefficients`."""
 
-    mass_ratio_p: float
-    mass_ratio_g: float
-    transverse_damping_p: float
-    transverse_damping_g: float
-    transverse_stiffness_p: float
-    transverse_stiffness_g: float
-    axial_damping_p: float
-    axial_damping_g: float
-    axial_stiffness_p: float
-    axial_stiffness_g: float
-    mean_stiffness: float
-    stiffness_variation: float
-    mesh_damping: float
-    axial_share: float
-    half_backlash: float
-    load: float
-    error_inertia: float
-    error_mean: float
-    error_amplitude: float
-    error_rate: float
-    axial_error_mean: float
-    axial_error_amplitude: float
-    axial_error_rate: float
-    cos_phase: float
-    sin_phase: float
+    mass_ratio_p: Number
+    mass_ratio_g: Number
+    transverse_damping_p: Number
+    transverse_damping_g: Number
+    transverse_stiffness_p: Number
+    transverse_stiffness_g: Number
+    axial_damping_p: Number
+    axial_damping_g: Number
+    axial_stiffness_p: Number
+    axial_stiffness_g: Number
+    mean_stiffness: Number
+    stiffness_variation: Number
+    mesh_damping: Number
+    axial_share: Number
+    half_backlash: Number
+    load: Number
+    error_inertia: Number
+    error_mean: Number
+    error_amplitude: Number
+    error_rate: Number
+    axial_error_mean: Number
+    axial_error_amplitude: Number
+    axial_error_rate: Number
+    cos_phase: Number
+    sin_phase: Number
 
 
 ROWS = COEFFICIENT + len(Lane._fields)

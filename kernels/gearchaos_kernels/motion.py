@@ -77,8 +77,10 @@ def approach(values, lane, transverse):
     """Return q = delta_1 - delta_2 + delta_5 (eq. 6) over cos(beta_b)."""
     if transverse is None:
         return values.torsion
-    return values.torsion + lane.mass_ratio_p * values.transverse_p + (
-        lane.mass_ratio_g * values.transverse_g
+    return (
+        values.torsion
+        + lane.mass_ratio_p * values.transverse_p
+        + (lane.mass_ratio_g * values.transverse_g)
     )
 
 
@@ -134,9 +136,7 @@ def accelerations(position, rate, lane, forcing, backlash, transverse, axial):
             lane.half_backlash,
             backlash,
         )
-    acceleration = respond(
-        position, rate, force_y, force_z, forcing.drive, lane, transverse, axial
-    )
+    acceleration = respond(position, rate, force_y, force_z, forcing.drive, lane, transverse, axial)
     return acceleration, Slopes(slope_y, slope_z)
 
 

@@ -124,8 +124,26 @@ def test_names_say_what_is_drawn(result_file, arguments, names, capsys):
     assert all((folder / name).is_file() for name in names)
 
 
+@pytest.mark.parametrize(
+    "name", [b"pair $ 50 %.h5", b"gr\xc3\xb6\xc3\x9fe.h5", b"not unicode \xff.h5"]
+)
+def test_odd_names_come_out_as_they_went_in(result_file, name):
+    path = os.fsencode(result_file.parent) + b"/" + name
+    with h5py.File(result_file, "r+") as file:
+        file.attrs["title"] = ""
+    result_file.rename(os.fsdecode(path))
+    done = subprocess.run(
+        [sys.executable, "-m", "gearchaos.plot", path, "--quiet"],
+        capture_output=True,
+        check=False,
+        env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
+    )
+    assert (done.returncode, done.stderr) == (0, b"")
+    assert done.stdout == path[:-3] + b".png\n" + path[:-3] + b".pdf\n"
+
+
 def test_width_height_and_dpi_decide_the_pixels(result_file):
-    sizes = "--width 127 --height 101.6 --dpi 100 --format png".split()
+    sizes = ["--width", "127", "--height", "101.6", "--dpi", "100", "--format", "png"]
     assert main([str(result_file), *sizes]) == 0
     header = result_file.with_suffix(".png").read_bytes()[16:24]
     assert (int.from_bytes(header[:4]), int.from_bytes(header[4:])) == (500, 400)

@@ -1,0 +1,203 @@
+"""The command that computes a sweep: ``python -m gearchaos.sweep config.toml``."""
+
+from __future__ import annotations
+
+import argparse
+import shlex
+import sys
+import time
+from collections.abc import Sequence
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from gearchaos.command_line import INTERRUPTED, OK, run_command, version_text
+
+if TYPE_CHECKING:
+    from gearchaos.shards import ShardStore
+    from gearchaos.simulation import Bounds, Simulation
+
+NAME = "gearchaos sweep"
+TOO_MANY_DIVERGED = 3
+
+DESCRIPTION = "Compute the sweep that a TOML file describes and write it to an HDF5 file."
+
+EPILOG = """\
+The path of the result goes to stdout, everything else to stderr. Exit codes: 0 done, 2 the
+command line or the configuration asks for what cannot be, 3 done, but more lanes diverged than
+outputs.allowed_diverged_share, 4 a file cannot be read or written, 130 interrupted: finished
+blocks are kept and --resume goes on from them."""
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the command and return its exit code."""
+    return run_command(NAME, partial(_run, argv))
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog=NAME, description=DESCRIPTION, epilog=EPILOG, allow_abbrev=False
+    )
+    add = parser.add_argument
+    add("config", metavar="config.toml", help="what to compute")
+    add(
+        "-o",
+        "--output",
+        metavar="PATH",
+        help="result file (default: the name of the configuration, .h5, in the current folder)",
+    )
+    add("--overwrite", action="store_true", help="replace an existing result")
+    add("--resume", action="store_true", help="go on from the finished blocks of a stopped sweep")
+    add("--threads", type=int, metavar="N", help="threads to use (default: all cores)")
+    add(
+        "--set",
+        action="append",
+        default=[],
+        metavar="KEY=VALUE",
+        help="replace one key of the configuration, such as integration.steps_per_period=400",
+    )
+    add("--dry-run", action="store_true", help="say what would be computed, and stop")
+    add("-q", "--quiet", action="store_true", help="say nothing on stderr unless something fails")
+    add("--version", action="version", version=version_text())
+    return parser
+
+
+def _run(argv: Sequence[str] | None) -> int:
+    arguments = list(sys.argv[1:] if argv is None else argv)
+    options = _parser().parse_args(arguments)
+    # Imported only now: --help and --version answer at once, and an interrupt is caught.
+    from gearchaos.configuration import load_config
+
+    config = load_config(options.config, options.set)
+    from gearchaos.running import choose_threads
+    from gearchaos.simulation import Simulation
+
+    choose_threads(options.threads)
+    simulation = Simulation(config)
+    output = Path(options.output or f"{Path(options.config).stem}.h5")
+    if options.dry_run:
+        _describe(simulation, output, options.quiet)
+        return OK
+    return _compute(simulation, output, options, arguments)
+
+
+def _compute(
+    simulation: Simulation, output: Path, options: argparse.Namespace, arguments: list[str]
+) -> int:
+    from gearchaos_kernels import current_threads
+
+    from gearchaos.atomic_file import check_output
+    from gearchaos.progress import notice
+    from gearchaos.running import COMPILING, metadata
+    from gearchaos.shards import ShardStore
+
+    check_output(output, options.overwrite)
+    began = time.monotonic()
+    with ShardStore(
+        output,
+        simulation.variables,
+        simulation.lanes,
+        simulation.config.resolved_toml(),
+        axis=simulation.axis,
+        resume=options.resume,
+    ) as store:
+        found = store.finished()
+        for problem in found.problems:
+            print(f"{NAME}: {problem}; it is computed again", file=sys.stderr)
+        missing = store.missing(found.bounds, simulation.block_lanes(current_threads()))
+        try:
+            with notice(COMPILING, options.quiet):
+                simulation.compile()
+            diverged = _fill(simulation, store, found.bounds, missing, options.quiet)
+        except KeyboardInterrupt:
+            kept = sum(last - first for first, last in store.finished().bounds)
+            _tell_how_to_go_on(kept, simulation.lanes, arguments)
+            return INTERRUPTED
+        seconds = time.monotonic() - began
+        store.merge(
+            simulation.parameters, metadata(simulation, seconds), overwrite=options.overwrite
+        )
+    print(output, flush=True)
+    if not options.quiet:
+        text = f"{simulation.lanes} lanes, {diverged} diverged, {seconds:.1f} s"
+        print(f"{NAME}: {text}", file=sys.stderr)
+    allowed = simulation.config.outputs.allowed_diverged_share
+    if diverged > allowed * simulation.lanes:
+        print(
+            f"{NAME}: {diverged} of {simulation.lanes} lanes diverged, more than "
+            f"outputs.allowed_diverged_share = {allowed:g} allows; the file marks them: raise "
+            "integration.steps_per_period",
+            file=sys.stderr,
+        )
+        return TOO_MANY_DIVERGED
+    return OK
+
+
+def _fill(
+    simulation: Simulation,
+    store: ShardStore,
+    finished: Sequence[Bounds],
+    missing: Sequence[Bounds],
+    quiet: bool,
+) -> int:
+    """Compute the missing blocks into the store and return how many lanes of all diverged."""
+    from gearchaos.progress import Progress
+    from gearchaos.simulation import compute_all
+
+    readers = {bounds: partial(store.read, *bounds) for bounds in finished}
+    diverged = sum(int((read()["status"] != 0).sum()) for read in readers.values())
+    order = simulation.in_order([*finished, *missing])
+    done = sum(last - first for first, last in finished)
+    with Progress(simulation.lanes, done, quiet) as progress:
+        for (first, last), arrays in compute_all(simulation, order, readers):
+            store.write(first, last, arrays)
+            diverged += int((arrays["status"] != 0).sum())
+            progress.advance(last - first)
+    return diverged
+
+
+def _tell_how_to_go_on(kept: int, lanes: int, arguments: list[str]) -> None:
+    again = [argument for argument in arguments if argument != "--resume"]
+    command = shlex.join(["python", "-m", "gearchaos.sweep", *again, "--resume"])
+    print(f"{NAME}: interrupted; {kept} of {lanes} lanes are kept", file=sys.stderr)
+    print(f"{NAME}: go on with: {command}", file=sys.stderr)
+
+
+def _describe(simulation: Simulation, output: Path, quiet: bool) -> None:
+    """Say what a run would compute and how long it would take, judged by a few real lanes."""
+    from gearchaos_kernels import current_threads
+
+    from gearchaos.progress import notice
+    from gearchaos.running import COMPILING, pilot_rate
+
+    with notice(COMPILING, quiet):
+        simulation.compile()
+    seconds = simulation.steps / pilot_rate(simulation)
+    config = simulation.config
+    bytes_kept = simulation.lanes * sum(
+        8 * (config.outputs.section_points if "section_point" in variable.dims else 1)
+        for variable in simulation.variables
+        if variable.dims[0] == simulation.axis
+    )
+    threads = current_threads()
+    for key, value in {
+        "output": f"{output}{' (exists)' if output.exists() else ''}",
+        "effects": ", ".join(config.scene.effects) or "none",
+        "states": f"{len(simulation.states)}{_left_out(simulation)}",
+        "lanes": f"{simulation.lanes} ({simulation.values.size} values of "
+        f"{config.sweep.parameter} from {simulation.values[0]:g} to {simulation.values[-1]:g})",
+        "steps": f"{simulation.steps:.3g} ({config.integration.steps_per_period} per period)",
+        "file": f"at most {bytes_kept / 1e6:.1f} MB before compression",
+        "memory": f"about {simulation.block_memory(threads) / 1e6:.0f} MB per block of lanes",
+        "time": f"about {seconds:.1f} s with {threads} threads",
+    }.items():
+        print(f"{key + ':':10}{value}", file=sys.stderr)
+
+
+def _left_out(simulation: Simulation) -> str:
+    unused = [name for name in simulation.config.scene.effects if name not in simulation.effects]
+    return f" (nothing that is kept needs {', '.join(unused)})" if unused else ""
+
+
+if __name__ == "__main__":
+    sys.exit(main())

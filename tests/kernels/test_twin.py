@@ -1,0 +1,109 @@
+"""The kernels against their slow twin: every combination of effects, both formulations."""
+
+import itertools
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from gearchaos_kernels import Model, Scene
+
+from .reference import pan2021, run, state
+from .twin import Twin
+
+STEPS = 60
+PERIODS = 3
+ROUNDING = 2e-11
+
+ALL_SCENES = [Scene(*effects) for effects in itertools.product([True, False], repeat=5)]
+
+# Different enough from Pan 2021 that no two groups could be mixed up unnoticed.
+MODEL = pan2021(
+    [5.0, 11.0],
+    error_mean=[0.21, -0.13],
+    error_phase=[0.7, -2.1],
+    load=[0.25, -0.31],
+    damping_ratio=[0.03, 0.05],
+    half_backlash=[0.7, 0.4],
+    base_helix_angle=[0.33, -0.4],
+    mesh_frequency=[0.9, 1.3],
+    axial_stiffness_p=[22.0, 17.0],
+    axial_damping_p=[0.11, 0.07],
+    axial_stiffness_g=[9.0, 5.0],
+    axial_damping_g=[0.02, 0.03],
+)
+START = np.stack(
+    [
+        state(delta_5=1.0, delta_1=0.02, delta_2_rate=-0.05, delta_3=0.3, delta_4_rate=0.1),
+        state(delta_5=-0.8, delta_5_rate=0.3, delta_2=0.04, delta_3_rate=0.2, delta_4=-0.2),
+    ]
+)
+
+
+def lane(number: int) -> SimpleNamespace:
+    groups = zip(Model._fields, MODEL, strict=True)
+    return SimpleNamespace(**{name: float(values[number]) for name, values in groups})
+
+
+def named(scene: Scene) -> str:
+    effects = [name for name, present in scene._asdict().items() if present]
+    return "+".join(effects) or "torsion"
+
+
+def scene_cases() -> list:
+    """Every scene; half of them, each one effect away from a quick one, are marked slow."""
+    cases = []
+    for scene in ALL_SCENES:
+        quick = sum(scene) % 2 == 1
+        cases.append(pytest.param(scene, id=named(scene), marks=() if quick else pytest.mark.slow))
+    return cases
+
+
+@pytest.mark.parametrize("scene", scene_cases())
+def test_kernels_follow_the_printed_equations(scene):
+    for rederived in (False, True):
+        outcome = run(
+            MODEL, scene, START, steps=STEPS, periods=PERIODS, tangent=True, rederived=rederived
+        )
+        for number in range(2):
+            twin = Twin(lane(number), scene, rederived).integrate(START[number], STEPS, PERIODS)
+            assert outcome.section[number] == pytest.approx(twin.states, rel=0, abs=ROUNDING)
+            assert outcome.growth[number] == pytest.approx(twin.growth, rel=0, abs=ROUNDING)
+
+
+def test_the_lanes_of_the_twin_test_visit_every_branch_of_the_clearance():
+    class Watched(Twin):
+        def clearance(self, y, half_backlash):
+            elastic, slope = super().clearance(y, half_backlash)
+            direction = "y" if half_backlash == self.half_backlash_y else "z"
+            visited.add((direction, int(np.sign(elastic))))
+            return elastic, slope
+
+    visited: set[tuple[str, int]] = set()
+    for number in range(2):
+        groups = lane(number)
+        twin = Watched(groups, Scene())
+        twin.half_backlash_y = groups.half_backlash * np.cos(groups.base_helix_angle)
+        twin.integrate(START[number], STEPS, PERIODS)
+    assert visited == {(direction, branch) for direction in "yz" for branch in (-1, 0, 1)}
+
+
+def test_states_that_a_scene_leaves_out_stay_zero():
+    outcome = run(MODEL, Scene(transverse=False), START, steps=STEPS, periods=PERIODS)
+    absent = [1, 2, 6, 7]
+    assert not outcome.section[:, :, absent].any()
+    assert not outcome.end_state[:, absent].any()
+
+
+@pytest.mark.parametrize("scene", [Scene(), Scene(axial=False)], ids=named)
+def test_plain_loop_gives_the_states_of_the_loop_with_tangent(scene):
+    plain = run(MODEL, scene, START, steps=STEPS, periods=PERIODS, tangent=False)
+    both = run(MODEL, scene, START, steps=STEPS, periods=PERIODS, tangent=True)
+    assert plain.growth is None
+    assert plain.section == pytest.approx(both.section, rel=0, abs=ROUNDING)
+
+
+def test_axial_motion_acts_on_nothing_else():
+    full = run(MODEL, Scene(), START, steps=STEPS, periods=PERIODS)
+    without = run(MODEL, Scene(axial=False), START, steps=STEPS, periods=PERIODS)
+    rows = [0, 1, 2, 5, 6, 7]
+    assert full.section[:, :, rows] == pytest.approx(without.section[:, :, rows], abs=ROUNDING)

@@ -1,0 +1,139 @@
+"""The slow, obvious twin of the kernels: eq. 13 of Pan 2021 as printed, one lane, NumPy only.
+
+It integrates delta_1 ... delta_5 themselves with the textbook form of the Runge-Kutta method, and
+the tangent vector by the variational equation: none of the kernels' scalings, tables or stages.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from gearchaos_kernels import Scene
+
+from .reference import COSINE, SINE
+
+DELTA_5, DELTA_1, DELTA_2, DELTA_3, DELTA_4 = range(5)
+
+
+class Motion(NamedTuple):
+    """State after each period, shape (periods, 10), and growth of the tangent in each."""
+
+    states: np.ndarray
+    growth: np.ndarray
+
+
+class Twin:
+    """One lane: groups are plain numbers, named as in `Model`."""
+
+    def __init__(self, groups, scene: Scene, rederived: bool = False) -> None:
+        self.groups = groups
+        self.scene = scene
+        self.rederived = rederived
+        self.present = np.tile(np.repeat([True, scene.transverse, scene.axial], [1, 2, 2]), 2)
+
+    def stiffness(self, tau):
+        """kappa(tau), eq. 19."""
+        if not self.scene.stiffness_variation:
+            return 1.0
+        order = np.arange(1, COSINE.size + 1) * self.groups.mesh_frequency * tau
+        variation = np.sum(COSINE * np.cos(order) + SINE * np.sin(order))
+        return 1.0 + self.groups.stiffness_variation_scale * variation
+
+    def error(self, tau):
+        """e(tau), its rate, and the inertial term Omega^2 e of the sine, eqs 13 and 14."""
+        if not self.scene.pitch_error:
+            return 0.0, 0.0, 0.0
+        omega, amplitude = self.groups.mesh_frequency, self.groups.error_amplitude
+        angle = omega * tau + self.groups.error_phase
+        sine = amplitude * np.sin(angle)
+        return self.groups.error_mean + sine, omega * amplitude * np.cos(angle), omega**2 * sine
+
+    def relative(self, delta, error):
+        """y_1 and y_2, eqs 6 and 7; with rates instead of displacements, their rates."""
+        beta = self.groups.base_helix_angle
+        along_mesh = delta[DELTA_1] - delta[DELTA_2] + delta[DELTA_5]
+        if self.rederived:
+            along_mesh = along_mesh + error
+        y_1 = along_mesh - error * np.cos(beta)
+        y_2 = delta[DELTA_3] - delta[DELTA_4] - np.tan(beta) * along_mesh - error * np.sin(beta)
+        return y_1, y_2
+
+    def clearance(self, y, half_backlash):
+        """f(y; b) and its slope, eqs 22 and 23."""
+        if not self.scene.backlash:
+            return y, 1.0
+        if y > half_backlash:
+            return y - half_backlash, 1.0
+        if y < -half_backlash:
+            return y + half_backlash, 1.0
+        return 0.0, 0.0
+
+    def accelerations(self, delta, rate, force_y, force_z, drive):
+        """Rows of eq. 13 for given mesh forces N_y and N_z."""
+        g = self.groups
+        cosine, sine = np.cos(g.base_helix_angle), np.sin(g.base_helix_angle)
+        acceleration = np.zeros(5)
+        acceleration[DELTA_5] = drive - cosine * force_y
+        for row, sign, force, ratio, damping, stiffness in (
+            (DELTA_1, -1, cosine * force_y, g.mass_ratio_p, *self.bearing("transverse", "p")),
+            (DELTA_2, +1, cosine * force_y, g.mass_ratio_g, *self.bearing("transverse", "g")),
+            (DELTA_3, -1, sine * force_z, g.mass_ratio_p, *self.bearing("axial", "p")),
+            (DELTA_4, +1, sine * force_z, g.mass_ratio_g, *self.bearing("axial", "g")),
+        ):
+            bearing = 2.0 * damping * rate[row] + stiffness * delta[row]
+            acceleration[row] = sign * ratio * force - bearing
+        return np.where(self.present[:5], acceleration, 0.0)
+
+    def bearing(self, direction, gear):
+        """eta and k of one bearing."""
+        damping = getattr(self.groups, f"{direction}_damping_{gear}")
+        return damping, getattr(self.groups, f"{direction}_stiffness_{gear}")
+
+    def slope(self, tau, joint):
+        """Time derivative of state and tangent vector together, shape (20,)."""
+        g = self.groups
+        delta, rate, tangent, tangent_rate = joint.reshape(4, 5)
+        kappa = self.stiffness(tau)
+        error, error_rate, inertia = self.error(tau)
+        y_1, y_2 = self.relative(delta, error)
+        y_1_rate, y_2_rate = self.relative(rate, error_rate)
+        elastic_y, active_y = self.clearance(y_1, g.half_backlash * np.cos(g.base_helix_angle))
+        elastic_z, active_z = self.clearance(y_2, g.half_backlash * np.sin(g.base_helix_angle))
+        acceleration = self.accelerations(
+            delta,
+            rate,
+            kappa * elastic_y + 2.0 * g.damping_ratio * y_1_rate,
+            kappa * elastic_z + 2.0 * g.damping_ratio * y_2_rate,
+            g.load + inertia,
+        )
+        varied_y, varied_z = self.relative(tangent, 0.0)
+        varied_y_rate, varied_z_rate = self.relative(tangent_rate, 0.0)
+        tangent_acceleration = self.accelerations(
+            tangent,
+            tangent_rate,
+            kappa * active_y * varied_y + 2.0 * g.damping_ratio * varied_y_rate,
+            kappa * active_z * varied_z + 2.0 * g.damping_ratio * varied_z_rate,
+            0.0,
+        )
+        return np.concatenate([rate, acceleration, tangent_rate, tangent_acceleration])
+
+    def integrate(self, start, steps: int, periods: int) -> Motion:
+        """Take ``steps`` Runge-Kutta steps in each mesh period."""
+        start = np.where(self.present, start, 0.0)
+        joint = np.concatenate([start, self.present / np.sqrt(np.sum(self.present))])
+        h = 2.0 * np.pi / self.groups.mesh_frequency / steps
+        states, growth = [], []
+        for period in range(periods):
+            for number in range(steps):
+                tau = (period * steps + number) * h
+                k_1 = self.slope(tau, joint)
+                k_2 = self.slope(tau + h / 2.0, joint + h / 2.0 * k_1)
+                k_3 = self.slope(tau + h / 2.0, joint + h / 2.0 * k_2)
+                k_4 = self.slope(tau + h, joint + h * k_3)
+                joint = joint + h / 6.0 * (k_1 + 2.0 * k_2 + 2.0 * k_3 + k_4)
+            length = np.linalg.norm(joint[10:])
+            joint[10:] /= length
+            states.append(joint[:10].copy())
+            growth.append(np.log(length))
+        return Motion(np.array(states), np.array(growth))
