@@ -70,7 +70,7 @@ def check_output(path: str | os.PathLike[str], overwrite: bool = False) -> None:
     """
     with writing(path):
         target = _checked_target(path, overwrite)
-        os.unlink(_create_partial(target.parent, target.name))
+        _create_partial(target.parent, target.name).unlink()
 
 
 @contextmanager
@@ -108,7 +108,7 @@ def replacing(
             yield partial
             _synchronise(partial)
             if overwrite:
-                os.replace(partial, target)
+                partial.replace(target)
             else:
                 _rename_to_new(partial, target)
             _synchronise_folder(target.parent)
@@ -116,7 +116,7 @@ def replacing(
             raise _exists(path) from error
         finally:
             with suppress(OSError):
-                os.unlink(partial)
+                partial.unlink()
 
 
 def _checked_target(path: str | os.PathLike[str], overwrite: bool) -> Path:
@@ -125,7 +125,7 @@ def _checked_target(path: str | os.PathLike[str], overwrite: bool) -> Path:
         raise FileError(f"{name!r}: is not a file name; give the name of a file")
     target = Path(os.path.realpath(name))
     try:
-        mode = os.stat(target).st_mode
+        mode = target.stat().st_mode
     except FileNotFoundError:
         # realpath drops the slash that tells a folder from a file.
         if name.endswith(os.sep):
@@ -154,13 +154,13 @@ def _create_partial(folder: Path, name: str) -> Path:
 def _rename_to_new(partial: Path, target: Path) -> None:
     # A rename silently replaces what came to be in the meantime; a hard link does not.
     try:
-        os.link(partial, target)
+        target.hardlink_to(partial)
     except FileExistsError:
         raise
     except OSError:
         if target.exists():
             raise FileExistsError(errno.EEXIST, os.strerror(errno.EEXIST)) from None
-        os.rename(partial, target)
+        partial.rename(target)
 
 
 def _synchronise(path: Path) -> None:

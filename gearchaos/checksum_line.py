@@ -9,26 +9,27 @@ from __future__ import annotations
 
 import hashlib
 import os
+from pathlib import Path
 
 _PREFIX = b"gearchaos sha256 "
 _LENGTH = len(_PREFIX) + 2 * hashlib.sha256().digest_size + 1
 _PIECE = 1 << 20
 
 
-def append_checksum(path: str | os.PathLike[str]) -> None:
+def append_checksum(path: Path) -> None:
     """Append the checksum line to a complete file."""
-    with open(path, "r+b") as file:
+    with path.open("r+b") as file:
         digest = hashlib.file_digest(file, "sha256").hexdigest()
         file.seek(0, os.SEEK_END)
         file.write(_PREFIX + digest.encode() + b"\n")
 
 
-def checksum_fits(path: str | os.PathLike[str]) -> bool | None:
+def checksum_fits(path: Path) -> bool | None:
     """Tell whether a file is as it was written; None if it has no checksum line.
 
     Other programs that change a result file drop the line, so that its absence is no damage.
     """
-    with open(path, "rb") as file:
+    with path.open("rb") as file:
         size = file.seek(0, os.SEEK_END)
         file.seek(max(0, size - _LENGTH))
         tail = file.read()

@@ -4,10 +4,14 @@ from __future__ import annotations
 
 import os
 import platform
+import signal
 import sys
-from collections.abc import Callable
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from importlib.metadata import PackageNotFoundError, version
 from io import TextIOWrapper
+from types import FrameType
 from typing import TextIO
 
 from gearchaos.errors import FileError, GearchaosError
@@ -17,6 +21,11 @@ USAGE = 2
 CANNOT_READ_OR_WRITE = FileError.exit_code
 INTERRUPTED = 130
 CLOSED_PIPE = 141
+TERMINATED = 143
+
+
+class Termination(KeyboardInterrupt):
+    """SIGTERM, with which batch systems end a job: the command stops as after Ctrl-C."""
 
 
 def software_version() -> str:
@@ -46,26 +55,30 @@ def run_command(name: str, body: Callable[[], int]) -> int:
     -------
     int
         The body's code, also that with which argparse exits; otherwise that of the
-        GearchaosError, 4 for an operating system error that nobody has worded, 130 for an
-        interrupt and 141, as the shell says, when the reader of the output has gone.
+        GearchaosError, 4 for an operating system error that nobody has worded and, as the shell
+        says, 130 for an interrupt, 143 for SIGTERM and 141 when the reader of the output has gone.
+        The notes of a fault are printed after it.
     """
     if isinstance(sys.stdout, TextIOWrapper):
         # Paths that are not Unicode go out byte for byte, as they came in.
         sys.stdout.reconfigure(errors="surrogateescape")
     try:
-        code = _code_of(body)
+        with _termination_interrupts():
+            code = _code_of(body)
         if sys.stdout is not None:
             sys.stdout.flush()
         return code
     except GearchaosError as error:
-        return _report(name, error.problems, error.exit_code)
-    except KeyboardInterrupt:
-        return _report(name, None, INTERRUPTED)
+        return _report(name, error, [f"error: {text}" for text in error.problems], error.exit_code)
+    except Termination as termination:
+        return _report(name, termination, ["terminated"], TERMINATED)
+    except KeyboardInterrupt as interrupt:
+        return _report(name, interrupt, ["interrupted"], INTERRUPTED)
     except BrokenPipeError:
         _discard(sys.stdout)
         return CLOSED_PIPE
     except OSError as error:
-        return _report(name, [str(error)], CANNOT_READ_OR_WRITE)
+        return _report(name, error, [f"error: {error}"], CANNOT_READ_OR_WRITE)
 
 
 def _code_of(body: Callable[[], int]) -> int:
@@ -75,10 +88,26 @@ def _code_of(body: Callable[[], int]) -> int:
         return leaving.code if isinstance(leaving.code, int) else OK
 
 
-def _report(name: str, problems: list[str] | None, code: int) -> int:
-    lines = [f"{name}: interrupted"]
-    if problems is not None:
-        lines = [f"{name}: error: {problem}" for problem in problems]
+@contextmanager
+def _termination_interrupts() -> Iterator[None]:
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.signal(signal.SIGTERM, _terminate)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before or signal.SIG_DFL)
+
+
+def _terminate(number: int, _frame: FrameType | None) -> None:
+    # A second one ends the process at once.
+    signal.signal(number, signal.SIG_DFL)
+    raise Termination
+
+
+def _report(name: str, fault: BaseException, texts: list[str], code: int) -> int:
+    lines = [f"{name}: {text}" for text in [*texts, *getattr(fault, "__notes__", [])]]
     try:
         print("\n".join(lines), file=sys.stderr, flush=True)
     except BrokenPipeError:

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from gearchaos.atomic_file import replacing
 from gearchaos.checksum_line import append_checksum
+from gearchaos.sink import Sink
 from gearchaos.variables import HARMONIC, Variable
 
 SCHEMA = "gearchaos-sweep"
@@ -99,7 +100,10 @@ def write_result(
     everything = [*variables, *_harmonics(axis, parameters)]
     sizes = {v.name: len(v.values) for v in everything if v.values is not None} | {axis: lanes}
     with replacing(path, overwrite=overwrite, scratch=scratch) as partial:
-        with h5py.File(partial, "w", track_order=True, rdcc_nbytes=_CACHE_BYTES) as file:
+        with (
+            Sink(partial) as sink,
+            h5py.File(sink, "w", track_order=True, rdcc_nbytes=_CACHE_BYTES) as file,
+        ):
             _write_metadata(file, {**metadata, **OWN_METADATA})
             for variable in everything:
                 _create(file, variable, tuple(sizes[dim] for dim in variable.dims))
@@ -110,6 +114,7 @@ def write_result(
                 for variable in everything:
                     if variable.dims[0] == axis:
                         file[variable.name][first:last] = arrays[variable.name]
+                sink.check()
         append_checksum(partial)
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import stat
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
 import h5py
@@ -54,9 +55,9 @@ def read_result(path: str | os.PathLike[str]) -> Contents:
     """
     name = os.fspath(path)
     try:
-        if not stat.S_ISREG(os.stat(name).st_mode):
+        if not stat.S_ISREG(Path(name).stat().st_mode):
             raise FileError(f"{name}: is not a regular file; give the name of a result file")
-        if checksum_fits(name) is False:
+        if checksum_fits(Path(name)) is False:
             raise FileError(f"{name}: is damaged (its checksum does not fit); run the sweep again")
     except (OSError, ValueError) as error:
         raise FileError(
@@ -204,8 +205,14 @@ def _dims(file: h5py.File, dataset: h5py.Dataset, sizes: dict[str, int]) -> tupl
 
 def _values(dataset: h5py.Dataset) -> NDArray[Any]:
     if h5py.check_string_dtype(dataset.dtype) is None:
-        values: NDArray[Any] = dataset[...]
-        return values.astype(_dtype(dataset), copy=False)
+        kind = _dtype(dataset)
+        try:
+            values: NDArray[Any] = dataset[...]
+        except OSError as error:
+            raise _UnfitError(
+                f"is damaged in {dataset.name} ({reason(error)}); run the sweep again"
+            ) from error
+        return values.astype(kind, copy=False)
     words = dataset.asstr()[...]
     if max(map(len, words.flat)) > np.iinfo(np.uint8).max:
         raise _UnfitError(f"holds no plain words in {dataset.name}; run the sweep again")

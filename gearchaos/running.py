@@ -17,7 +17,7 @@ from gearchaos.result import Result
 from gearchaos.simulation import Simulation, compute_all
 
 PILOT_SECONDS = 0.2
-COMPILING = "gearchaos: compiling the kernel of this scene (once per machine, a few seconds)"
+COMPILING = "gearchaos: preparing the kernel of this scene; the first time this takes some seconds"
 
 
 def run(config: Configuration, threads: int | None = None, progress: bool = False) -> Result:
@@ -75,6 +75,8 @@ def pilot_rate(simulation: Simulation) -> float:
         Compiled; a few mesh periods of its first block are integrated.
     """
     lanes = min(simulation.lanes, simulation.block_lanes(current_threads()))
+    if simulation.carried:  # One value after the other.
+        lanes = simulation.starts
     periods = 1
     while True:
         began = time.perf_counter()

@@ -57,7 +57,7 @@ class ShardFormat:
         digest = hashlib.sha256(head)
         for piece in pieces:
             digest.update(piece)
-        with replacing(path, overwrite=True) as partial, open(partial, "wb") as file:
+        with replacing(path, overwrite=True) as partial, partial.open("wb") as file:
             file.write(head + digest.digest())
             for piece in pieces:
                 file.write(piece)

@@ -254,7 +254,7 @@ class ShardStore:
 
     def _names(self) -> list[str]:
         try:
-            return sorted(name for name in os.listdir(self.folder) if _NAME.fullmatch(name))
+            return sorted(p.name for p in self.folder.iterdir() if _NAME.fullmatch(p.name))
         except OSError:
             return []
 

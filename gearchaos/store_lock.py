@@ -60,7 +60,7 @@ class StoreLock:
         descriptor = os.open(self._path, os.O_RDWR | os.O_CREAT, 0o666)
         try:
             _lock(descriptor)
-            if os.path.samestat(os.fstat(descriptor), os.stat(self._path)):
+            if os.path.samestat(os.fstat(descriptor), self._path.stat()):
                 self._descriptor = descriptor
         except BlockingIOError as error:
             raise FileError(

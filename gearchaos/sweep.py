@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import argparse
+import math
+import os
 import shlex
 import sys
 import time
 from collections.abc import Sequence
+from datetime import timedelta
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from gearchaos.command_line import INTERRUPTED, OK, run_command, version_text
+from gearchaos.command_line import OK, run_command, version_text
+from gearchaos.errors import FileError
 
 if TYPE_CHECKING:
     from gearchaos.shards import ShardStore
@@ -25,8 +29,8 @@ DESCRIPTION = "Compute the sweep that a TOML file describes and write it to an H
 EPILOG = """\
 The path of the result goes to stdout, everything else to stderr. Exit codes: 0 done, 2 the
 command line or the configuration asks for what cannot be, 3 done, but more lanes diverged than
-outputs.allowed_diverged_share, 4 a file cannot be read or written, 130 interrupted: finished
-blocks are kept and --resume goes on from them."""
+outputs.allowed_diverged_share, 4 a file cannot be read or written, 130 interrupted and 143
+terminated: finished blocks are kept and --resume goes on from them."""
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -74,7 +78,10 @@ def _run(argv: Sequence[str] | None) -> int:
 
     choose_threads(options.threads)
     simulation = Simulation(config)
-    output = Path(options.output or f"{Path(options.config).stem}.h5")
+    # A text, not a Path, which would drop the slash that tells a folder from a file.
+    output = f"{Path(options.config).stem}.h5" if options.output is None else options.output
+    if os.path.exists(output) and os.path.samefile(output, options.config):
+        raise FileError(f"{output}: is the configuration itself; choose another --output")
     if options.dry_run:
         _describe(simulation, output, options.quiet)
         return OK
@@ -82,7 +89,7 @@ def _run(argv: Sequence[str] | None) -> int:
 
 
 def _compute(
-    simulation: Simulation, output: Path, options: argparse.Namespace, arguments: list[str]
+    simulation: Simulation, output: str, options: argparse.Namespace, arguments: list[str]
 ) -> int:
     from gearchaos_kernels import current_threads
 
@@ -109,14 +116,15 @@ def _compute(
             with notice(COMPILING, options.quiet):
                 simulation.compile()
             diverged = _fill(simulation, store, found.bounds, missing, options.quiet)
-        except KeyboardInterrupt:
+            seconds = time.monotonic() - began
+            store.merge(
+                simulation.parameters, metadata(simulation, seconds), overwrite=options.overwrite
+            )
+        except (KeyboardInterrupt, FileError) as fault:
             kept = sum(last - first for first, last in store.finished().bounds)
-            _tell_how_to_go_on(kept, simulation.lanes, arguments)
-            return INTERRUPTED
-        seconds = time.monotonic() - began
-        store.merge(
-            simulation.parameters, metadata(simulation, seconds), overwrite=options.overwrite
-        )
+            fault.add_note(f"{kept} of {simulation.lanes} lanes are kept")
+            fault.add_note(f"go on with: {_resuming(arguments)}")
+            raise
     print(output, flush=True)
     if not options.quiet:
         text = f"{simulation.lanes} lanes, {diverged} diverged, {seconds:.1f} s"
@@ -156,16 +164,16 @@ def _fill(
     return diverged
 
 
-def _tell_how_to_go_on(kept: int, lanes: int, arguments: list[str]) -> None:
+def _resuming(arguments: list[str]) -> str:
     again = [argument for argument in arguments if argument != "--resume"]
-    command = shlex.join(["python", "-m", "gearchaos.sweep", *again, "--resume"])
-    print(f"{NAME}: interrupted; {kept} of {lanes} lanes are kept", file=sys.stderr)
-    print(f"{NAME}: go on with: {command}", file=sys.stderr)
+    return shlex.join([sys.orig_argv[0], "-m", "gearchaos.sweep", *again, "--resume"])
 
 
-def _describe(simulation: Simulation, output: Path, quiet: bool) -> None:
+def _describe(simulation: Simulation, output: str, quiet: bool) -> None:
     """Say what a run would compute and how long it would take, judged by a few real lanes."""
+    import numpy as np
     from gearchaos_kernels import current_threads
+    from tqdm import tqdm
 
     from gearchaos.progress import notice
     from gearchaos.running import COMPILING, pilot_rate
@@ -173,23 +181,27 @@ def _describe(simulation: Simulation, output: Path, quiet: bool) -> None:
     with notice(COMPILING, quiet):
         simulation.compile()
     seconds = simulation.steps / pilot_rate(simulation)
+    duration = f"{seconds:.1f} s" if seconds < 100 else str(timedelta(seconds=round(seconds)))
     config = simulation.config
+    sizes = {v.name: len(v.values) for v in simulation.variables if v.values is not None}
     bytes_kept = simulation.lanes * sum(
-        8 * (config.outputs.section_points if "section_point" in variable.dims else 1)
-        for variable in simulation.variables
-        if variable.dims[0] == simulation.axis
+        np.dtype(v.dtype).itemsize * math.prod(sizes[dim] for dim in v.dims[1:])
+        for v in simulation.variables
+        if v.dims[0] == simulation.axis
     )
-    threads = current_threads()
+    starts = f", {simulation.starts} starts each" if simulation.starts > 1 else ""
+    values, threads = simulation.values, current_threads()
+    memory = simulation.block_memory(threads)
     for key, value in {
-        "output": f"{output}{' (exists)' if output.exists() else ''}",
+        "output": f"{output}{' (exists)' if os.path.exists(output) else ''}",
         "effects": ", ".join(config.scene.effects) or "none",
         "states": f"{len(simulation.states)}{_left_out(simulation)}",
-        "lanes": f"{simulation.lanes} ({simulation.values.size} values of "
-        f"{config.sweep.parameter} from {simulation.values[0]:g} to {simulation.values[-1]:g})",
+        "lanes": f"{simulation.lanes} ({values.size} values of {config.sweep.parameter} from "
+        f"{values[0]:g} to {values[-1]:g}{starts})",
         "steps": f"{simulation.steps:.3g} ({config.integration.steps_per_period} per period)",
-        "file": f"at most {bytes_kept / 1e6:.1f} MB before compression",
-        "memory": f"about {simulation.block_memory(threads) / 1e6:.0f} MB per block of lanes",
-        "time": f"about {seconds:.1f} s with {threads} threads",
+        "file": f"about {tqdm.format_sizeof(bytes_kept, 'B')} before compression",
+        "memory": f"about {tqdm.format_sizeof(memory, 'B')} for a block of lanes",
+        "time": f"about {duration} with {threads} thread{'s' if threads > 1 else ''}",
     }.items():
         print(f"{key + ':':10}{value}", file=sys.stderr)
 

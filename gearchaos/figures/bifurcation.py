@@ -122,7 +122,7 @@ def bifurcation(
     off_scale: list[Line2D] = []
     if finite.any():
         drawn, low, high = _extremes(parameter[shown], values)
-        axes.set_ylim(robust_limits(low, high, full_range))
+        axes.set_ylim(robust_limits(low, high, full_range=full_range))
         off_scale = mark_off_scale(axes, drawn, low, high)
     else:
         say_nothing_to_show(axes, lanes, int(np.count_nonzero(chosen & diverged)))

@@ -20,7 +20,7 @@ Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 Between = tuple[float | None, float | None]
 
-OUTLYING_SHARE = 0.05
+OUTLYING_SHARE = 0.03
 MARGIN = 0.05
 
 
@@ -73,27 +73,33 @@ def parameter_limits(parameter: Floats, between: Between = (None, None)) -> tupl
     return low - pad, high + pad
 
 
-def robust_limits(low: Floats, high: Floats, full_range: bool = False) -> tuple[float, float]:
+def robust_limits(
+    low: Floats, high: Floats, *, hold_zero: bool = False, full_range: bool = False
+) -> tuple[float, float]:
     """Return limits that a few outlying lanes cannot stretch.
 
-    An end of the range that at most 5 % of the lanes reach is left out if it lies further than
-    half the range of the others beyond them; `mark_off_scale` then says so.
+    Where the outermost 3 % of the lanes at either end would take more than half of the height
+    from all the others, those that lie far out are left out; `mark_off_scale` then says so.
 
     Parameters
     ----------
     low, high : ndarray of float, shape (lanes,)
         Lowest and highest value of each lane, all finite.
+    hold_zero : bool
+        Zero is part of what is to be shown.
     full_range : bool
         Show every lane however far it lies.
     """
     bottom, top = float(low.min()), float(high.max())
-    if not full_range:
-        inner_bottom = float(np.quantile(low, OUTLYING_SHARE))
-        inner_top = float(np.quantile(high, 1.0 - OUTLYING_SHARE))
-        reach = (inner_top - inner_bottom) / 2.0
-        if reach > 0.0:
-            bottom = float(low[low >= inner_bottom - reach].min())
-            top = float(high[high <= inner_top + reach].max())
+    inner_bottom = float(np.quantile(low, OUTLYING_SHARE))
+    inner_top = float(np.quantile(high, 1.0 - OUTLYING_SHARE))
+    if hold_zero:
+        bottom, inner_bottom = min(bottom, 0.0), min(inner_bottom, 0.0)
+        top, inner_top = max(top, 0.0), max(inner_top, 0.0)
+    inner = inner_top - inner_bottom
+    if not full_range and 0.0 < 2.0 * inner < top - bottom:
+        bottom = min(inner_bottom, float(low[low >= inner_bottom - inner / 2.0].min()))
+        top = max(inner_top, float(high[high <= inner_top + inner / 2.0].max()))
     pad = MARGIN * (top - bottom) or abs(top) * MARGIN or 0.5
     return bottom - pad, top + pad
 

@@ -179,7 +179,6 @@ def _set_limits(
         axes.set_ylim(-1.0, 1.0)
         return []
     spread = np.nan_to_num(reach[there])
-    bottom, top = robust_limits(exponent[there] - spread, exponent[there] + spread, full_range)
-    pad = 0.05 * max(top, -bottom)
-    axes.set_ylim(min(bottom, -pad), max(top, pad))
+    low, high = exponent[there] - spread, exponent[there] + spread
+    axes.set_ylim(robust_limits(low, high, hold_zero=True, full_range=full_range))
     return mark_off_scale(axes, x[there], exponent[there], exponent[there])

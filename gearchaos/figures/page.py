@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from io import BytesIO
+
 import matplotlib as mpl
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -17,7 +19,18 @@ from gearchaos.figures.style import MM_PER_INCH, SINGLE_COLUMN_MM, STYLE, page_h
 from gearchaos.result import Result
 
 HEIGHT_RATIOS = (1.6, 1.0)
+NOTEBOOK_DPI = 200
 MOST_INTERVALS = (7, 8)
+
+
+class Page(Figure):
+    """A matplotlib figure that a notebook shows by itself, without pyplot."""
+
+    def _repr_png_(self) -> bytes:
+        picture = BytesIO()
+        with mpl.rc_context(STYLE):
+            self.savefig(picture, format="png", dpi=NOTEBOOK_DPI)
+        return picture.getvalue()
 
 
 def bifurcation_page(
@@ -28,7 +41,7 @@ def bifurcation_page(
     full_range: bool = False,
     width_mm: float = SINGLE_COLUMN_MM,
     height_mm: float | None = None,
-) -> Figure:
+) -> Page:
     """Draw the bifurcation diagram (a) over the Lyapunov chart (b).
 
     A result without section points or without exponents gives the one panel it has data for.
@@ -48,8 +61,9 @@ def bifurcation_page(
 
     Returns
     -------
-    Figure
-        Not known to pyplot; `savefig` or `gearchaos.figures.save_figure` writes it.
+    Page
+        A Figure not known to pyplot, which a notebook shows; `savefig` or
+        `gearchaos.figures.save_figure` writes it.
 
     Raises
     ------
@@ -66,9 +80,7 @@ def bifurcation_page(
     panels = has_section + has_exponent
     height = height_mm or page_height_mm(width_mm) * (1.0 if panels == 2 else 0.7)
     with mpl.rc_context(STYLE):
-        figure = Figure(
-            figsize=(width_mm / MM_PER_INCH, height / MM_PER_INCH), layout="constrained"
-        )
+        figure = Page(figsize=(width_mm / MM_PER_INCH, height / MM_PER_INCH), layout="constrained")
         FigureCanvasAgg(figure)
         ratios = HEIGHT_RATIOS if panels == 2 else (1.0,)
         stack: list[Axes] = list(

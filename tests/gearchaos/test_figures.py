@@ -204,6 +204,14 @@ def test_limits_hold_everything_where_nothing_lies_far_out():
     assert 2.0 < top < 2.2
 
 
+def test_a_narrow_peak_on_a_level_line_is_no_outlier():
+    exponent = np.full(400, -0.01) + 1e-6 * np.arange(400)
+    exponent[200:206] = -0.003
+    bottom, top = robust_limits(exponent, exponent, hold_zero=True)
+    assert bottom < -0.01
+    assert 0.0 < top < 0.001
+
+
 def test_a_part_of_the_range_shows_its_lanes_only(axes, result):
     points = bifurcation(axes, result, between=(3.5, None)).points
     assert points.get_xdata().min() >= 3.5
@@ -291,6 +299,10 @@ def test_the_same_result_gives_the_same_bits(result, kind, tmp_path):
     for name in names:
         save_figure(bifurcation_page(result), name, title="Größe 1 µm")
     assert names[0].read_bytes() == names[1].read_bytes()
+
+
+def test_a_notebook_can_show_the_page(result):
+    assert bifurcation_page(result)._repr_png_().startswith(b"\x89PNG")
 
 
 def test_a_figure_of_another_format_is_refused(result, tmp_path):

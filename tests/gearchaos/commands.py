@@ -1,0 +1,119 @@
+"""A small sweep, and the means to run commands on it as a user does."""
+
+import subprocess
+import sys
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+import gearchaos
+
+SMALL = """\
+# every effect, so that every parameter can be swept with one kernel
+title = "a small sweep"
+
+[pair]
+teeth = [21, 38]
+normal_module_mm = 2.166
+normal_pressure_angle_deg = 20.0
+helix_angle_deg = 20.0
+face_width_mm = 15.0
+
+[operation]
+speed_rpm = 8000.0
+torque_Nm = 50.0
+
+[mesh]
+mean_stiffness_N_per_um_mm = 13.3548
+length_scale_um = 25.0
+half_backlash_um = 20.0
+damping_ratio = 0.1
+
+[mesh.stiffness]
+shape = "fourier"
+cosine_N_per_um_mm = [-1.202, 0.0, -0.1339]
+sine_N_per_um_mm = [1.203, 0.0, -0.1335]
+
+[pitch_error]
+amplitude_um = 11.0
+mean_um = 2.0
+phase_deg = 30.0
+
+[bearings]
+transverse_stiffness_N_per_m = [1e8, 2e8]
+transverse_damping_N_s_per_m = [100.0, 300.0]
+axial_stiffness_N_per_m = [3e7, 4e7]
+axial_damping_N_s_per_m = [50.0, 60.0]
+
+[groups]
+damping_ratio = 0.05
+
+[scene]
+effects = ["pitch_error", "stiffness_variation", "backlash", "transverse", "axial"]
+
+[sweep]
+parameter = "pitch_error"
+from = 0.0
+to = 5.0
+count = 40
+
+[integration]
+steps_per_period = 40
+transient_periods = 5
+recorded_periods = 10
+
+[outputs]
+section = ["delta_5", "delta_3"]
+section_points = 5
+lyapunov = true
+"""
+
+DIVERGING = ("--set", "groups.transverse_stiffness_p=1e6")
+"""Bearings so stiff that forty steps per mesh period are far too few."""
+
+
+class Ended(NamedTuple):
+    """How a command ended."""
+
+    code: int
+    out: str
+    err: str
+
+
+def small_config(folder: Path) -> Path:
+    """Write the small sweep into a folder as ``gears.toml``."""
+    path = folder / "gears.toml"
+    path.write_text(SMALL, encoding="utf-8")
+    return path
+
+
+def run_module(module: str, *arguments: str, cwd: Path, **options) -> Ended:
+    """Run ``python -m module`` in a folder."""
+    command = [sys.executable, "-m", module, *arguments]
+    done = subprocess.run(command, cwd=cwd, capture_output=True, text=True, timeout=300, **options)
+    assert "Traceback" not in done.stderr, done.stderr
+    return Ended(done.returncode, done.stdout, done.stderr)
+
+
+def sweep(folder: Path, *arguments: str, **options) -> Ended:
+    """Run the sweep command on the small sweep in a folder."""
+    small_config(folder)
+    return run_module("gearchaos.sweep", "gears.toml", *arguments, cwd=folder, **options)
+
+
+def names_in(folder: Path) -> list[str]:
+    """List what a folder holds, hidden files too."""
+    return sorted(path.name for path in folder.iterdir())
+
+
+def same_data(one: gearchaos.Result, other: gearchaos.Result) -> bool:
+    """Whether two results hold the same variables and parameters, bit for bit."""
+    assert one.names == other.names
+    assert one.parameters.keys() == other.parameters.keys()
+    arrays = [(one[name], other[name]) for name in one.names]
+    arrays += [
+        (np.asarray(parameter.value), np.asarray(other.parameters[name].value))
+        for name, parameter in one.parameters.items()
+    ]
+    return all(a.dtype == b.dtype and a.tobytes() == b.tobytes() for a, b in arrays)

@@ -1,0 +1,279 @@
+"""A result file holds what was put in, and any program for HDF5 or netCDF reads it."""
+
+import re
+import shutil
+import subprocess
+from pathlib import Path
+from typing import Any
+
+import h5py
+import netCDF4
+import numpy as np
+import pytest
+import xarray as xr
+
+from gearchaos.result import Parameter, Result, open_result
+from gearchaos.variables import STATE_WORDING, sweep_variables
+
+LANES = 300
+POINTS = 1000
+STATES = ("delta_5", "delta_5_rate")
+SIZES = {"section_point": POINTS, "state": len(STATES)}
+
+
+def make_result(axis: str = "pitch_error", **metadata: Any) -> Result:
+    variables = sweep_variables(
+        axis,
+        units="1",
+        long_name="pitch error",
+        symbol="$P$",
+        states=STATES,
+        section=["delta_5"],
+        section_points=POINTS,
+        lyapunov=True,
+        several_starts=True,
+        status_meanings=["ok", "diverged"],
+    )
+    random = np.random.default_rng(1)
+    data: dict[str, Any] = {
+        v.name: random.normal(size=(LANES, *(SIZES[dim] for dim in v.dims[1:])))
+        for v in variables
+        if v.values is None
+    }
+    data["start"] = np.arange(LANES) % 3
+    data["status"] = (np.arange(LANES) == 7).astype(np.uint8)
+    data["diverged_period"] = np.where(data["status"], 12, -1)
+    data["section_delta_5"][7] = data["lyapunov_exponent"][7] = np.nan
+    parameters = {
+        "load": Parameter(0.1, "given", "1", "static load", "$f_n$"),
+        "pitch_error": Parameter(data[axis.replace(".", "_")], "swept", "1", "pitch error", "$P$"),
+        "stiffness_cosine": Parameter(np.array([0.3, 0.2, 0.1]), "derived", "1", "cosine", "$a$"),
+    }
+    texts = {
+        "title": "Δ sweep",
+        "effects": "pitch_error backlash",
+        "threads": 2,
+        "wall_time_seconds": 1.5,
+        "configuration": "# every line counts\n" * 10_000,
+        "configuration_resolved": "[scene]\n",
+    }
+    return Result(axis, variables, data, parameters, texts | metadata)
+
+
+@pytest.fixture(scope="module")
+def result() -> Result:
+    return make_result()
+
+
+@pytest.fixture(scope="module")
+def path(result: Result, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("result") / "sweep.h5"
+    result.save(path)
+    return path
+
+
+def assert_same(one: Result, other: Result) -> None:
+    assert one.names == other.names
+    assert one.metadata == other.metadata
+    for name in one:
+        np.testing.assert_array_equal(one[name], other[name], strict=True)
+        assert one.dims(name) == other.dims(name)
+        np.testing.assert_equal(one.attributes(name), other.attributes(name))
+    assert list(one.parameters) == list(other.parameters)
+    for name, parameter in one.parameters.items():
+        np.testing.assert_equal(vars(parameter), vars(other.parameters[name]))
+
+
+def test_what_is_read_is_what_was_saved(result: Result, path: Path) -> None:
+    assert_same(open_result(path), result)
+
+
+def test_what_was_read_can_be_saved_again(path: Path, tmp_path: Path) -> None:
+    first = open_result(path)
+    first.save(tmp_path / "again.h5")
+    assert_same(open_result(tmp_path / "again.h5"), first)
+
+
+def test_a_dotted_parameter_gives_its_axis_underscores(tmp_path: Path) -> None:
+    make_result("operation.speed_rpm").save(tmp_path / "speed.h5")
+    speed = open_result(tmp_path / "speed.h5")
+    assert speed.axis == "operation_speed_rpm"
+    assert speed.dims("status") == ("operation_speed_rpm",)
+
+
+def test_a_name_that_is_not_there_is_told_with_those_that_are(result: Result) -> None:
+    with pytest.raises(KeyError, match=r"'delta'.*pitch_error, start, section_point"):
+        result["delta"]
+
+
+def test_arrays_that_contradict_their_dimensions_are_refused(result: Result) -> None:
+    data = {name: result[name] for name in result}
+    variables = list(result.variables.values())
+    for wrong in (result["status"][1:], result["end_state"]):
+        with pytest.raises(ValueError, match="status has shape"):
+            Result(result.axis, variables, data | {"status": wrong}, {}, {})
+    none = {name: v[:0] if result.axis in result.dims(name) else v for name, v in data.items()}
+    with pytest.raises(ValueError, match="no lanes"):
+        Result(result.axis, variables, none, {}, {})
+
+
+def test_texts_that_hdf5_cannot_hold_lose_nothing_else(tmp_path: Path) -> None:
+    odd = make_result(title="a\0b\udc80c", note="x" * 70_000)
+    odd.save(tmp_path / "odd.h5")
+    metadata = open_result(tmp_path / "odd.h5").metadata
+    assert metadata["title"] == "a\ufffdb?c"
+    assert metadata["note"] == "x" * 70_000
+
+
+@pytest.mark.parametrize("engine", ["netcdf4", "h5netcdf"])
+def test_xarray_reads_it_as_the_same_labelled_arrays(
+    engine: Any, path: Path, result: Result
+) -> None:
+    with xr.open_dataset(path, engine=engine, mask_and_scale=False) as dataset:
+        assert set(dataset.variables) == {
+            *result,
+            "harmonic",
+            "configuration",
+            "configuration_resolved",
+        }
+        assert set(dataset.coords) == {"pitch_error", "section_point", "state", "harmonic"}
+        assert dataset.attrs["title"] == "Δ sweep"
+        assert dataset.attrs["threads"] == 2
+        assert dataset["configuration"].item() == result.metadata["configuration"]
+        for name in result:
+            np.testing.assert_array_equal(dataset[name].values, result[name])
+            assert dataset[name].dims == result.dims(name)
+            assert dataset[name].attrs["units"] == "1"
+        middle = dataset["end_state"].sel(state="delta_5_rate").isel(pitch_error=4)
+        assert middle.item() == result["end_state"][4, 1]
+
+
+@pytest.mark.parametrize("engine", ["netcdf4", "h5netcdf"])
+def test_xarray_masks_what_is_not_there(engine: Any, path: Path) -> None:
+    with xr.open_dataset(path, engine=engine) as dataset:
+        assert np.flatnonzero(dataset["diverged_period"].notnull()).tolist() == [7]
+        assert dataset["diverged_period"][7] == 12
+    with xr.open_dataset(path, engine=engine, group="parameters") as parameters:
+        assert parameters["load"].attrs == {
+            "units": "1",
+            "long_name": "static load",
+            "symbol": "$f_n$",
+            "origin": "given",
+        }
+        assert parameters["stiffness_cosine"].dims == ("harmonic",)
+        assert parameters["pitch_error"].dims == ("pitch_error",)
+
+
+def test_netcdf_finds_real_dimensions_only(path: Path, result: Result) -> None:
+    with netCDF4.Dataset(path) as file:
+        sizes = {name: dimension.size for name, dimension in file.dimensions.items()}
+        assert sizes == {
+            "pitch_error": LANES,
+            "section_point": POINTS,
+            "state": len(STATES),
+            "harmonic": 3,
+        }
+        assert not file.groups["parameters"].dimensions
+        assert [name for name in file.variables if name in result] == list(result)
+        status = file.variables["status"]
+        assert status.flag_meanings.split() == ["ok", "diverged"]
+        assert status.flag_values.dtype == status.dtype == np.uint8
+
+
+def test_every_dataset_follows_the_rules_of_the_format(path: Path) -> None:
+    with h5py.File(path) as file:
+        assert file.libver[0] == "earliest"
+        assert (file.attrs["schema"], file.attrs["schema_version"]) == ("gearchaos-sweep", "1.0")
+        datasets: list[h5py.Dataset] = []
+        file.visititems(lambda _, item: datasets.append(item) if hasattr(item, "shape") else None)
+        assert len(datasets) == 16
+        for dataset in datasets:
+            assert {"units", "long_name"} <= set(dataset.attrs)
+            assert h5py.check_string_dtype(dataset.dtype) or dataset.dtype.str in {
+                "<f8",
+                "<i4",
+                "|u1",
+            }
+            if "_FillValue" in dataset.attrs:
+                assert dataset.attrs["_FillValue"].dtype == dataset.dtype
+                np.testing.assert_equal(dataset.attrs["_FillValue"][0], dataset.fillvalue)
+            if dataset.is_scale:
+                assert dataset.attrs["NAME"].decode() == dataset.name.lstrip("/")
+            else:
+                assert [len(dim) for dim in dataset.dims] == [1] * dataset.ndim
+            if dataset.chunks:
+                assert (dataset.compression, dataset.compression_opts) == ("gzip", 4)
+                assert dataset.shuffle
+                assert dataset.fletcher32
+
+
+def test_chunks_hold_whole_rows_and_are_neither_small_nor_large(path: Path) -> None:
+    with h5py.File(path) as file:
+        lanes, points = file["section_delta_5"].chunks
+        assert points == POINTS
+        assert 2**18 <= lanes * points * 8 <= 2**20
+        assert file["status"].chunks == (LANES,)
+
+
+def run(program: str, *arguments: str | Path) -> str:
+    if shutil.which(program) is None:
+        pytest.skip(f"the program {program} is not installed")
+    done = subprocess.run([program, *arguments], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
+    return done.stdout
+
+
+def test_h5dump_shows_a_variable_with_its_filters(path: Path) -> None:
+    text = run("h5dump", "-p", "-d", "/status", path)
+    assert "H5T_STD_U8LE" in text
+    assert "CHECKSUM FLETCHER32" in text
+    assert '"diverged_period"' not in text
+    assert '"ok diverged"' in text
+    run("h5dump", path)
+
+
+def test_ncdump_shows_the_dimensions(path: Path) -> None:
+    text = run("ncdump", "-h", path)
+    assert f"pitch_error = {LANES} ;" in text
+    assert "double section_delta_5(pitch_error, section_point) ;" in text
+    run("ncdump", path)
+
+
+def test_the_last_line_is_a_checksum_that_standard_tools_confirm(path: Path) -> None:
+    if not all(map(shutil.which, ("sh", "head", "tail", "sha256sum"))):
+        pytest.skip("sh, head, tail and sha256sum are not all installed")
+    line = run("tail", "-c", "82", path)
+    command = 'head -c "-82" "$1" | sha256sum'
+    assert run("sh", "-c", command, "sh", path).split()[0] == line.split()[-1]
+
+
+def test_another_program_may_change_the_file(path: Path, tmp_path: Path) -> None:
+    changed = tmp_path / "changed.h5"
+    shutil.copy(path, changed)
+    with h5py.File(changed, "r+") as file:
+        file["parameters/load"][()] = 0.2
+    assert open_result(changed).parameters["load"].value == 0.2
+    with h5py.File(changed, "r+") as file:
+        file.attrs["note"] = "seen by a referee"
+        file.create_dataset("reference", data=np.arange(3.0))
+        file["reference"].make_scale("reference")
+    again = open_result(changed)
+    assert again.metadata["note"] == "seen by a referee"
+    assert again["reference"].tolist() == [0, 1, 2]
+
+
+def test_every_state_has_a_wording_of_its_own() -> None:
+    assert len(set(STATE_WORDING.values())) == len(STATE_WORDING) == 10
+
+
+def test_the_documented_variables_are_those_that_are_written(result: Result) -> None:
+    page = (Path(__file__).parents[2] / "docs" / "file-format.md").read_text(encoding="utf-8")
+    lines = re.findall(r"^\| `\w+` \| \(.*$", page, re.M)
+    rows = [[cell.strip(" `") for cell in line.split("|")[1:5]] for line in lines]
+    documented = {name: (dims.strip("()"), dtype, fill) for name, dims, dtype, fill in rows}
+    for name, variable in result.variables.items():
+        dims = ", ".join("A" if dim == result.axis else dim for dim in variable.dims)
+        name = {result.axis: "A", "section_delta_5": "section_STATE"}.get(name, name)
+        fill = "" if variable.fill_value is None else str(variable.fill_value)
+        assert documented.pop(name) == (dims, variable.dtype, fill.replace("nan", "NaN"))
+    assert set(documented) == {"harmonic", "configuration", "configuration_resolved"}

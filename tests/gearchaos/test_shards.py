@@ -1,0 +1,371 @@
+"""Finished blocks survive whatever ends a sweep, are verified, and become one file."""
+
+import errno
+import os
+import resource
+import signal
+import subprocess
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from gearchaos.errors import FileError
+from gearchaos.result import Parameter, Result, open_result
+from gearchaos.shards import ShardStore, differing_keys
+from gearchaos.variables import sweep_variables
+
+LANES = 100
+POINTS = 7
+CONFIGURATION = """\
+title = "t"
+[integration]
+steps_per_period = 288
+[sweep]
+values = [1.0, 2.0]
+"""
+VARIABLES = sweep_variables(
+    "load",
+    units="1",
+    long_name="static load",
+    symbol="$f_n$",
+    states=["delta_5", "delta_5_rate"],
+    section=["delta_5"],
+    section_points=POINTS,
+    lyapunov=True,
+    several_starts=False,
+    status_meanings=["ok", "diverged"],
+)
+PARAMETERS = {"damping_ratio": Parameter(0.1, "given", "1", "damping", "$d$")}
+BLOCKS = [(0, 30), (30, 60), (60, 90), (90, 100)]
+
+
+def sweep(lanes: int = LANES) -> dict[str, np.ndarray]:
+    sizes = {"section_point": POINTS, "state": 2}
+    random = np.random.default_rng(4)
+    numbers = {
+        v.name: random.normal(size=(lanes, *(sizes[dim] for dim in v.dims[1:])))
+        for v in VARIABLES
+        if v.dims[0] == "load"
+    }
+    numbers["status"] = np.zeros(lanes, np.uint8)
+    numbers["diverged_period"] = np.full(lanes, -1, np.int32)
+    return numbers
+
+
+DATA = sweep()
+
+
+def block(first: int, last: int) -> dict[str, np.ndarray]:
+    return {name: values[first:last] for name, values in DATA.items()}
+
+
+def open_store(
+    output: Path, *, resume: bool = False, configuration: str = CONFIGURATION, lanes: int = LANES
+) -> ShardStore:
+    return ShardStore(output, VARIABLES, lanes, configuration, axis="load", resume=resume)
+
+
+def fill(store: ShardStore, blocks: Sequence[tuple[int, int]] = BLOCKS) -> None:
+    for first, last in blocks:
+        store.write(first, last, block(first, last))
+
+
+def assert_whole(path: Path) -> None:
+    result = open_result(path)
+    for name, values in DATA.items():
+        np.testing.assert_array_equal(result[name], values)
+    assert result["state"].tolist() == ["delta_5", "delta_5_rate"]
+
+
+@pytest.fixture
+def output(tmp_path: Path) -> Path:
+    return tmp_path / "sweep.h5"
+
+
+def test_blocks_in_any_order_become_the_file_of_the_whole_sweep(output: Path) -> None:
+    with open_store(output) as store:
+        fill(store, BLOCKS[::-1])
+        assert not output.exists()
+        assert store.merge(PARAMETERS, {"title": "t"}) == output
+    assert list(output.parent.iterdir()) == [output]
+    whole = output.with_name("whole.h5")
+    Result("load", VARIABLES, DATA, PARAMETERS, {"title": "t"}).save(whole)
+    merged, saved = open_result(output), open_result(whole)
+    assert merged.metadata == saved.metadata
+    assert merged.names == saved.names
+    for name in saved:
+        np.testing.assert_array_equal(merged[name], saved[name], strict=True)
+
+
+def test_a_later_run_goes_on_from_what_is_finished(output: Path) -> None:
+    with open_store(output) as store:
+        fill(store, BLOCKS[:1] + BLOCKS[2:3])
+    with open_store(output, resume=True) as store:
+        bounds, problems = store.finished()
+        assert (bounds, problems) == ([(0, 30), (60, 90)], [])
+        missing = store.missing(bounds, block=20)
+        assert missing == [(30, 50), (50, 60), (90, 100)]
+        np.testing.assert_array_equal(store.read(0, 30)["end_state"], DATA["end_state"][:30])
+        fill(store, missing)
+        store.merge(PARAMETERS, {})
+    assert_whole(output)
+
+
+def test_resuming_what_was_never_begun_begins_it(output: Path) -> None:
+    with open_store(output, resume=True) as store:
+        assert store.finished() == ([], [])
+        assert store.missing([], block=60) == [(0, 60), (60, 100)]
+
+
+def test_a_sweep_that_finished_no_block_leaves_no_folder(output: Path) -> None:
+    with open_store(output):
+        pass
+    assert not list(output.parent.iterdir())
+
+
+def test_files_of_the_user_in_the_folder_stay(output: Path) -> None:
+    folder = output.with_name("sweep.h5.shards")
+    folder.mkdir()
+    (folder / "notes.txt").write_text("mine", encoding="utf-8")
+    with open_store(output) as store:
+        fill(store)
+        store.merge(PARAMETERS, {})
+    assert [path.name for path in folder.iterdir()] == ["notes.txt"]
+
+
+def test_finished_blocks_are_not_thrown_away_without_being_told(output: Path) -> None:
+    with open_store(output) as store:
+        fill(store)
+    with pytest.raises(FileError, match=r"holds 4 finished blocks .* --resume, or delete"):
+        open_store(output)
+    with open_store(output, resume=True) as store:
+        assert store.finished().bounds == BLOCKS
+
+
+def test_a_store_of_another_configuration_is_refused_with_the_keys(output: Path) -> None:
+    with open_store(output) as store:
+        fill(store)
+    other = CONFIGURATION.replace("288", "400").replace('title = "t"', "seed = 1")
+    with pytest.raises(FileError) as caught:
+        open_store(output, resume=True, configuration=other)
+    (message,) = caught.value.problems
+    assert "title (t, now absent)" in message
+    assert "integration.steps_per_period (288, now 400)" in message
+    assert "seed (absent, now 1)" in message
+    assert "sweep.values" not in message
+    with pytest.raises(FileError, match="differs in lanes"):
+        open_store(output, resume=True, lanes=LANES + 1)
+    with open_store(output, resume=True) as store:
+        assert store.finished().bounds == BLOCKS
+
+
+def test_types_and_nans_are_told_apart_where_they_matter() -> None:
+    assert differing_keys("a = 1", "a = 1.0") == ["a (1, now 1.0)"]
+    assert differing_keys("a = nan", "a = nan") == []
+
+
+@pytest.mark.parametrize("content", ["", "{", "[]", '{"configuration": 3}', "[" * 100_000])
+def test_a_damaged_manifest_is_named(content: str, output: Path) -> None:
+    with open_store(output) as store:
+        fill(store)
+    manifest = output.with_name("sweep.h5.shards") / "manifest.json"
+    manifest.write_text(content, encoding="utf-8")
+    with pytest.raises(FileError, match=r"manifest.json: is damaged or missing"):
+        open_store(output, resume=True)
+    assert len(list(manifest.parent.glob("*.shard"))) == len(BLOCKS)
+
+
+def test_bad_shards_are_named_and_left_out(output: Path, tmp_path: Path) -> None:
+    (tmp_path / "other").mkdir()
+    another = tmp_path / "other" / "sweep.h5"
+    with open_store(another, configuration="title = 'other'") as store:
+        fill(store)
+    with open_store(output) as store:
+        fill(store)
+    names = [f"{first:012d}-{last:012d}.shard" for first, last in BLOCKS]
+    folder = output.with_name("sweep.h5.shards")
+    flipped = bytearray((folder / names[0]).read_bytes())
+    flipped[-5] ^= 4
+    (folder / names[0]).write_bytes(flipped)
+    (folder / names[1]).write_bytes((folder / names[1]).read_bytes()[:-1])
+    os.replace(another.with_name("sweep.h5.shards") / names[2], folder / names[2])
+    (folder / f"{95:012d}-{105:012d}.shard").write_bytes(b"")
+    (folder / f"{91:012d}-{92:012d}.shard").write_bytes(b"x" * 1000)
+    with open_store(output, resume=True) as store:
+        bounds, problems = store.finished()
+        assert bounds == [(90, 100)]
+        reasons = ["checksum", "bytes", "another sweep", "overlaps", "overlaps"]
+        assert len(problems) == len(reasons)
+        for problem, word in zip(problems, reasons, strict=True):
+            assert problem.startswith(str(folder))
+            assert word in problem
+        with pytest.raises(FileError, match="lanes 0 to 89 are missing") as caught:
+            store.merge(PARAMETERS, {})
+        assert len(caught.value.problems) == len(reasons) + 1
+        fill(store, store.missing(bounds, block=30))
+        store.merge(PARAMETERS, {})
+    assert_whole(output)
+
+
+@pytest.mark.parametrize("position", [0, 20, 100, 200, 250, 300, 1000])
+def test_any_changed_byte_of_a_shard_is_noticed(position: int, output: Path) -> None:
+    with open_store(output) as store:
+        fill(store)
+        (path, *_) = sorted(store.folder.glob("*.shard"))
+        content = bytearray(path.read_bytes())
+        content[position] ^= 0x20
+        path.write_bytes(content)
+        assert store.finished().bounds == BLOCKS[1:]
+
+
+def test_a_second_sweep_on_the_same_output_is_refused_at_once(output: Path) -> None:
+    link = output.with_name("link.h5")
+    link.symlink_to(output)
+    with open_store(output) as store:
+        for path in (output, link):
+            with pytest.raises(FileError, match="another sweep is writing to it"):
+                open_store(path, resume=True)
+        fill(store)
+        store.merge(PARAMETERS, {})
+    assert_whole(output)
+
+
+PROGRAM = """
+import sys
+sys.path.insert(0, sys.argv[2])
+from pathlib import Path
+from test_shards import BLOCKS, PARAMETERS, FileError, fill, open_store
+output = Path(sys.argv[1])
+"""
+
+
+def start(program: str, output: Path, limit: int | None = None) -> subprocess.Popen[str]:
+    def restrict() -> None:
+        if limit is not None:
+            signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+            resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit))
+
+    here = str(Path(__file__).parent)
+    command = [sys.executable, "-c", PROGRAM + program, str(output), here]
+    return subprocess.Popen(command, stdout=subprocess.PIPE, text=True, preexec_fn=restrict)
+
+
+def test_a_killed_sweep_neither_blocks_nor_loses_anything(output: Path) -> None:
+    program = (
+        "store = open_store(output); fill(store, BLOCKS[:2]); print('go', flush=True); input()"
+    )
+    with start(program, output) as process:
+        assert process.stdout is not None
+        assert process.stdout.readline() == "go\n"
+        with pytest.raises(FileError, match="another sweep"):
+            open_store(output, resume=True)
+        process.kill()
+    partial = output.with_name("sweep.h5.shards") / ".sweep.h5.0.partial"
+    partial.write_bytes(b"half a file")
+    with open_store(output, resume=True) as store:
+        assert not partial.exists()
+        bounds, problems = store.finished()
+        assert (bounds, problems) == (BLOCKS[:2], [])
+        fill(store, store.missing(bounds, block=50))
+        store.merge(PARAMETERS, {})
+    assert_whole(output)
+
+
+def test_a_full_disk_keeps_what_is_finished(output: Path) -> None:
+    program = """
+with open_store(output) as store:
+    try:
+        fill(store)
+        store.merge(PARAMETERS, {})
+    except FileError as error:
+        print(error)
+"""
+    with start(program, output, limit=4000) as process:
+        text, _ = process.communicate()
+    assert os.strerror(errno.EFBIG) in text
+    assert not output.exists()
+    output.write_bytes(b"earlier")
+    with open_store(output, resume=True) as store:
+        fill(store, store.missing(store.finished().bounds, block=30))
+        with pytest.raises(FileError, match="exists already"):
+            store.merge(PARAMETERS, {})
+        assert output.read_bytes() == b"earlier"
+        assert store.finished().bounds == BLOCKS
+        store.merge(PARAMETERS, {}, overwrite=True)
+    assert_whole(output)
+
+
+def test_a_merge_on_a_full_disk_can_be_repeated(output: Path) -> None:
+    with open_store(output) as store:
+        fill(store)
+    program = """
+with open_store(output, resume=True) as store:
+    try:
+        store.merge(PARAMETERS, {})
+    except FileError as error:
+        print(error)
+"""
+    with start(program, output, limit=8000) as process:
+        text, _ = process.communicate()
+    assert f"{output}: cannot be written: {os.strerror(errno.EFBIG)}" in text
+    assert process.returncode == 0
+    assert not output.exists()
+    with open_store(output, resume=True) as store:
+        store.merge(PARAMETERS, {})
+    assert_whole(output)
+
+
+def test_a_folder_that_vanishes_is_reported(output: Path) -> None:
+    with open_store(output) as store:
+        fill(store, BLOCKS[:1])
+        for path in store.folder.iterdir():
+            path.unlink()
+        store.folder.rmdir()
+        with pytest.raises(FileError, match="No such file or directory"):
+            fill(store, BLOCKS[1:])
+
+
+def test_an_output_whose_folder_cannot_be_made_is_reported(tmp_path: Path) -> None:
+    for output in (tmp_path / "missing" / "sweep.h5", Path("/proc/sweep.h5")):
+        with pytest.raises(FileError, match=r"\.shards: cannot be written: No such file"):
+            open_store(output)
+
+
+def test_arrays_of_another_shape_are_refused(output: Path) -> None:
+    with open_store(output) as store, pytest.raises(ValueError, match="of lanes 0 to 29"):
+        store.write(0, 30, block(0, 29))
+
+
+@pytest.mark.slow
+def test_merging_takes_the_memory_of_a_block(output: Path) -> None:
+    program = """
+import numpy as np
+from test_shards import CONFIGURATION, POINTS
+from gearchaos.shards import ShardStore
+from gearchaos.variables import sweep_variables
+points, size, count = 500, 250, 80
+variables = sweep_variables(
+    "load", units="1", long_name="load", symbol="", states=["delta_5"], section=["delta_5"],
+    section_points=points, lyapunov=False, several_starts=False, status_meanings=["ok"],
+)
+random = np.random.default_rng(0)
+one = {
+    "load": np.zeros(size), "section_delta_5": random.integers(0, 9, (size, points)),
+    "status": np.zeros(size), "diverged_period": np.zeros(size), "end_state": np.zeros((size, 1)),
+}
+memory = lambda: resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+import resource
+with ShardStore(output, variables, size * count, CONFIGURATION, axis="load") as store:
+    for number in range(count):
+        store.write(number * size, (number + 1) * size, one)
+    before = memory()
+    store.merge({}, {})
+print(memory() - before)
+"""
+    with start(program, output) as process:
+        text, _ = process.communicate()
+    numbers = 80 * 250 * 500 * 8
+    assert int(text) * 1024 < numbers / 4

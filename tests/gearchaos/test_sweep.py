@@ -1,0 +1,137 @@
+"""The sweep command: what it prints where, what it writes, and how it ends."""
+
+import os
+import pty
+import re
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+import gearchaos
+
+from .commands import DIVERGING, names_in, run_module, small_config, sweep
+
+
+def test_the_path_of_the_result_is_all_that_stdout_holds(tmp_path):
+    ended = sweep(tmp_path)
+    assert (ended.code, ended.out) == (0, "gears.h5\n")
+    assert names_in(tmp_path) == ["gears.h5", "gears.toml"]
+    lines = [line for line in ended.err.splitlines() if "preparing the kernel" not in line]
+    assert len(lines) == 2
+    assert re.fullmatch(r"gearchaos sweep: 40 of 40 lanes, \d+ lanes/s, 0 s left", lines[0])
+    assert re.fullmatch(r"gearchaos sweep: 40 lanes, 0 diverged, \d+\.\d s", lines[1])
+
+
+def test_the_output_goes_where_it_is_told_to_and_the_path_is_printed_as_given(tmp_path):
+    (tmp_path / "results").mkdir()
+    ended = sweep(tmp_path, "--output", "results/grün und gut.hdf5", "--quiet")
+    assert ended == (0, "results/grün und gut.hdf5\n", "")
+    assert names_in(tmp_path / "results") == ["grün und gut.hdf5"]
+    assert gearchaos.open_result(tmp_path / "results/grün und gut.hdf5").axis == "pitch_error"
+
+
+def test_a_terminal_gets_a_bar_with_lanes_per_second_and_the_time_left(tmp_path):
+    small_config(tmp_path)
+    here, there = pty.openpty()
+    with subprocess.Popen(
+        [sys.executable, "-m", "gearchaos.sweep", "gears.toml"],
+        cwd=tmp_path,
+        stdout=subprocess.PIPE,
+        stderr=there,
+    ) as process:
+        os.close(there)
+        shown = b""
+        while chunk := _read_terminal(here):
+            shown += chunk
+        assert process.stdout.read() == b"gears.h5\n"
+    os.close(here)
+    assert process.returncode == 0
+    assert re.search(rb"\r100%\|\S+\| 40/40 \[\d\d:\d\d<00:00, +[\d.]+k?lane/s\]", shown)
+    assert b"40 of 40 lanes" not in shown
+
+
+def _read_terminal(descriptor):
+    try:
+        return os.read(descriptor, 4096)
+    except OSError:  # The other side is closed.
+        return b""
+
+
+def test_a_new_scene_is_announced_once_and_compiled_once_per_machine(tmp_path):
+    plainest = ("--set", "scene.effects=[]", "--set", "sweep.parameter=load", "--overwrite")
+    plainest += ("--set", "sweep.from=1.0", "--set", 'outputs.section=["delta_5"]')
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "cache")}
+    first = sweep(tmp_path, *plainest, env=environment)
+    assert first.code == 0
+    assert first.err.count("preparing the kernel of this scene") == 1
+    compiled = {path: path.stat().st_mtime_ns for path in (tmp_path / "cache").rglob("*.nb?")}
+    assert compiled
+    assert sweep(tmp_path, *plainest, env=environment).code == 0
+    again = {path: path.stat().st_mtime_ns for path in (tmp_path / "cache").rglob("*.nb?")}
+    assert again == compiled
+
+
+def test_help_and_version_come_at_once_on_stdout(tmp_path):
+    for module in ("gearchaos.sweep", "gearchaos"):
+        ended = run_module(module, "--version", cwd=tmp_path)
+        assert re.fullmatch(r"gearchaos \S+ \(Python \S+, \w+\)\n", ended.out)
+        assert (ended.code, ended.err) == (0, "")
+    ended = run_module("gearchaos.sweep", "--help", cwd=tmp_path)
+    assert (ended.code, ended.err) == (0, "")
+    for word in ("--output", "--overwrite", "--resume", "--threads", "--set", "--dry-run"):
+        assert word in ended.out
+    assert "Exit codes: 0 done" in ended.out
+
+
+def test_a_dry_run_tells_lanes_steps_memory_and_time_and_writes_nothing(tmp_path):
+    ended = sweep(tmp_path, "--dry-run", "--set", "start.kind=random", "--set", "start.count=3")
+    assert (ended.code, ended.out) == (0, "")
+    assert names_in(tmp_path) == ["gears.toml"]
+    told = dict(re.findall(r"^(\w+): +(.+)$", ended.err, re.MULTILINE))
+    assert told.pop("effects").startswith("pitch_error, stiffness_variation, backlash")
+    assert re.fullmatch(r"about [\d.]+[kM]B for a block of lanes", told.pop("memory"))
+    assert re.fullmatch(r"about \d+\.\d s with \d+ threads?", told.pop("time"))
+    # Per lane: swept value, 2 x 5 section points, exponent, its error, 10 states; start, period,
+    # status.
+    assert told.pop("file") == f"about {120 * (8 * 23 + 4 + 4 + 1) / 1000:.1f}kB before compression"
+    assert told == {
+        "output": "gears.h5",
+        "states": "10",
+        "lanes": "120 (40 values of pitch_error from 0 to 5, 3 starts each)",
+        "steps": "7.2e+04 (40 per period)",
+    }
+
+
+def test_a_dry_run_says_that_the_output_exists_and_leaves_it_alone(tmp_path):
+    (tmp_path / "gears.h5").write_bytes(b"precious")
+    assert "gears.h5 (exists)\n" in sweep(tmp_path, "--dry-run").err
+    assert (tmp_path / "gears.h5").read_bytes() == b"precious"
+
+
+def test_diverged_lanes_are_written_and_marked_and_make_the_exit_code_3(tmp_path):
+    ended = sweep(tmp_path, *DIVERGING, "--quiet")
+    assert (ended.code, ended.out) == (3, "gears.h5\n")
+    (line,) = ended.err.splitlines()
+    assert "40 of 40 lanes diverged, more than outputs.allowed_diverged_share = 0" in line
+    assert line.endswith("raise integration.steps_per_period")
+    result = gearchaos.open_result(tmp_path / "gears.h5")
+    assert (result["status"] == 1).all()
+    assert (result["diverged_period"] >= 0).all()
+    assert np.isnan(result["lyapunov_exponent"]).all()
+    assert result.attributes("status")["flag_meanings"].split()[1] == "diverged"
+
+
+@pytest.mark.parametrize(("share", "code"), [("1.0", 0), ("0.5", 3)])
+def test_as_many_lanes_may_diverge_as_the_configuration_allows(tmp_path, share, code):
+    # Forty steps are enough for the softer half of these bearings.
+    values = "sweep={parameter='transverse_stiffness_p', values=[1.0, 1e5, 1e6]}"
+    allowed = f"outputs.allowed_diverged_share={share}"
+    ended = sweep(tmp_path, "--set", values, "--set", allowed)
+    assert ended.code == code
+    assert "3 lanes, 2 diverged" in ended.err
+    result = gearchaos.open_result(tmp_path / "gears.h5")
+    assert result["status"].tolist() == [0, 1, 1]
+    assert result["diverged_period"][0] == -1
+    assert np.isfinite(result["end_state"][0]).all()

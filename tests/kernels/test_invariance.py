@@ -1,0 +1,85 @@
+"""What a piecewise linear system owes to its form: scaling and symmetry, bit for bit."""
+
+import numpy as np
+import pytest
+
+from .reference import FULL, STATES, pan2021, run, state
+
+LENGTHS = ("load", "half_backlash", "error_mean", "error_amplitude")
+MODEL = pan2021([0.5, 5.86, 12.47, 14.2], error_mean=0.05)
+START = np.tile(state(delta_5=1.0, delta_1_rate=0.1, delta_3=0.02), (4, 1))
+HOW = {"steps": 144, "transient": 5, "periods": 20, "section": STATES}
+
+
+def scaled(factor: float, start_factor: float | None = None):
+    """Integrate with every length of the model multiplied by one factor."""
+    lengths = {name: factor * getattr(MODEL, name) for name in LENGTHS}
+    start = START * (factor if start_factor is None else start_factor)
+    return run(MODEL._replace(**lengths), FULL, start, **HOW)
+
+
+@pytest.fixture(scope="module")
+def original():
+    return scaled(1.0)
+
+
+@pytest.mark.parametrize("power", [-40, -1, 3, 60])
+def test_scaling_all_lengths_by_a_power_of_two_scales_every_bit(original, power):
+    outcome = scaled(2.0**power)
+    assert np.array_equal(outcome.section, 2.0**power * original.section)
+    assert np.array_equal(outcome.end_state, 2.0**power * original.end_state)
+    assert np.array_equal(outcome.growth, original.growth)
+
+
+def test_scaling_all_lengths_by_ten_scales_the_motion_to_rounding(original):
+    outcome = scaled(10.0)
+    # Rounding grows along the chaotic lane, by e^(0.1 tau) at most.
+    assert outcome.section[:, :5] == pytest.approx(10.0 * original.section[:, :5], abs=1e-10)
+    regular = slice(0, 2)
+    assert outcome.section[regular] == pytest.approx(10.0 * original.section[regular], abs=1e-10)
+
+
+@pytest.mark.parametrize("left_out", LENGTHS)
+def test_scaling_all_lengths_but_one_changes_the_motion(original, left_out):
+    lengths = {name: 8.0 * getattr(MODEL, name) for name in LENGTHS if name != left_out}
+    outcome = run(MODEL._replace(**lengths), FULL, 8.0 * START, **HOW)
+    assert not np.allclose(outcome.section, 8.0 * original.section, rtol=1e-3)
+
+
+def test_scaling_the_model_but_not_the_start_changes_the_motion(original):
+    outcome = scaled(8.0, start_factor=1.0)
+    assert not np.allclose(outcome.section, 8.0 * original.section, rtol=1e-3)
+
+
+def test_turning_state_load_and_error_around_turns_the_motion_around(original):
+    turned = {name: -getattr(MODEL, name) for name in LENGTHS if name != "half_backlash"}
+    outcome = run(MODEL._replace(**turned), FULL, -START, **HOW)
+    assert np.array_equal(outcome.section, -original.section)
+    assert np.array_equal(outcome.growth, original.growth)
+
+
+@pytest.mark.parametrize("name", ["error_phase", "mesh_frequency"])
+def test_a_full_turn_of_phase_or_twice_the_time_unit_changes_nothing(name):
+    if name == "error_phase":
+        one = run(MODEL._replace(error_phase=np.full(4, 0.5)), FULL, START, **HOW)
+        other = run(MODEL._replace(error_phase=np.full(4, 0.5 + 2.0 * np.pi)), FULL, START, **HOW)
+        assert other.section[:2] == pytest.approx(one.section[:2], abs=1e-9)
+        return
+    # tau -> 2 tau: frequencies and damping halve, stiffness, load and acceleration fall to 1/4.
+    # The mesh stiffness itself is the unit of time, so only a scene without mesh can show it:
+    # an endless clearance, no mesh damping.
+    free = MODEL._replace(half_backlash=np.full(4, 1e9), damping_ratio=np.zeros(4), load=np.zeros(4))
+    slow = free._replace(
+        mesh_frequency=free.mesh_frequency / 2.0,
+        **{
+            f"{way}_{what}_{gear}": getattr(free, f"{way}_{what}_{gear}") / by
+            for way in ("transverse", "axial")
+            for what, by in (("stiffness", 4.0), ("damping", 2.0))
+            for gear in "pg"
+        },
+    )
+    one = run(free, FULL, START, **HOW)
+    halved = np.concatenate([START[:, :5], START[:, 5:] / 2.0], axis=1)
+    other = run(slow, FULL, halved, **HOW)
+    assert np.array_equal(other.section[:, :, :5], one.section[:, :, :5])
+    assert np.array_equal(other.section[:, :, 5:], one.section[:, :, 5:] / 2.0)
