@@ -32,13 +32,19 @@ def largest_exponent(
         The standard error is that of the same average over each of ten blocks; it is not a number
         where fewer than two periods were recorded. Both are not a number where the lane diverged.
     """
-    exponent = growth @ _weights(growth.shape[1]) / period
+    exponent = _weighted_mean(growth) / period
     blocks = np.array_split(growth, min(BLOCKS, growth.shape[1]), axis=1)
     if len(blocks) < 2:
         return exponent, np.full_like(exponent, np.nan)
-    means = np.stack([block @ _weights(block.shape[1]) for block in blocks], axis=1)
+    means = np.stack([_weighted_mean(block) for block in blocks], axis=1)
     spread = np.std(means, axis=1, ddof=1) / period
     return exponent, spread / np.sqrt(len(blocks))
+
+
+def _weighted_mean(growth: NDArray[np.float64]) -> NDArray[np.float64]:
+    # A matrix product would sum in an order that depends on the number of lanes.
+    means: NDArray[np.float64] = np.sum(growth * _weights(growth.shape[1]), axis=1)
+    return means
 
 
 def _weights(periods: int) -> NDArray[np.float64]:

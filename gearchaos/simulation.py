@@ -224,7 +224,7 @@ class Simulation:
             row = SWEEPABLE_GROUPS[parameter]
             return row.units, row.long_name, row.mathtext
         key = SWEEPABLE_KEYS[parameter]
-        return key.units or "1", key.field.description or parameter, ""
+        return key.units or "1", key.wording, ""
 
 
 def compute_all(

@@ -13,7 +13,7 @@ from gearchaos.configuration.schema import json_schema, key_tables
 def main(arguments: list[str] | None = None) -> int:
     """Print the description of the configuration file to stdout."""
     parser = argparse.ArgumentParser(
-        prog="python -m gearchaos.configuration",
+        prog="gearchaos configuration",
         description="Print the JSON Schema of a configuration file, for completion in editors.",
     )
     parser.add_argument("--keys", action="store_true", help="print Markdown tables of all keys")

@@ -42,6 +42,11 @@ class Key:
         return str(extra.get("units", "")) if isinstance(extra, dict) else ""
 
     @property
+    def wording(self) -> str:
+        """The meaning without the unit."""
+        return (self.field.description or "").removesuffix(f", in {self.units}")
+
+    @property
     def is_number(self) -> bool:
         """Whether the value is a single float."""
         return float in (self.field.annotation, *typing.get_args(self.field.annotation))

@@ -118,7 +118,8 @@ def _swept_effect_is_on(config: Configuration) -> Iterator[Fault]:
 
 def _swept_effect_is_kept(config: Configuration) -> Iterator[Fault]:
     row = SWEEPABLE_GROUPS.get(config.sweep.parameter)
-    if row is not None and row.effects == {"axial"} and "axial" not in config.needed_effects:
+    unused = set(config.scene.effects) - set(config.needed_effects)
+    if row is not None and row.effects and row.effects <= unused:
         yield Fault(
             "sweep.parameter",
             "acts on the axial pair only, and nothing that is kept depends on that",

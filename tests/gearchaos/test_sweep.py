@@ -5,6 +5,7 @@ import pty
 import re
 import subprocess
 import sys
+import termios
 
 import numpy as np
 import pytest
@@ -35,6 +36,7 @@ def test_the_output_goes_where_it_is_told_to_and_the_path_is_printed_as_given(tm
 def test_a_terminal_gets_a_bar_with_lanes_per_second_and_the_time_left(tmp_path):
     small_config(tmp_path)
     here, there = pty.openpty()
+    termios.tcsetwinsize(there, (24, 100))
     with subprocess.Popen(
         [sys.executable, "-m", "gearchaos.sweep", "gears.toml"],
         cwd=tmp_path,
@@ -82,7 +84,7 @@ def test_help_and_version_come_at_once_on_stdout(tmp_path):
     assert (ended.code, ended.err) == (0, "")
     for word in ("--output", "--overwrite", "--resume", "--threads", "--set", "--dry-run"):
         assert word in ended.out
-    assert "Exit codes: 0 done" in ended.out
+    assert "Exit codes: 0 done, 2 " in " ".join(ended.out.split())
 
 
 def test_a_dry_run_tells_lanes_steps_memory_and_time_and_writes_nothing(tmp_path):

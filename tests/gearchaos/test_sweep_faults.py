@@ -36,7 +36,12 @@ def test_a_fault_of_the_configuration_is_one_line_and_code_2(tmp_path, fault):
 
 def test_all_faults_of_a_configuration_are_told_at_once(tmp_path):
     text = small_config(tmp_path).read_text()
-    text = text.replace("teeth", "theet").replace("count = 40", "count = 0").replace("50.0", "nan")
+    for right, wrong in {
+        "teeth": "theet",
+        "count = 40": "count = 0",
+        "m = 50.0": "m = nan",
+    }.items():
+        text = text.replace(right, wrong)
     (tmp_path / "bad.toml").write_text(text)
     ended = run_module("gearchaos.sweep", "bad.toml", cwd=tmp_path)
     assert ended.code == 2

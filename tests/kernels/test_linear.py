@@ -2,15 +2,14 @@
 
 import numpy as np
 import pytest
-from gearchaos_kernels import Model
+from gearchaos_kernels import Model, Scene
 
 from gearchaos.lyapunov import largest_exponent
 
-from .reference import BASE_HELIX_ANGLE, LINEAR, OMEGA, PERIOD, pan2021, run, state
-from .reference import TORSION_ONLY as WITH_CLEARANCE
+from .reference import BASE_HELIX_ANGLE, LINEAR, PERIOD, pan2021, run, state
 
-# With its own Python name: one degree of freedom and no other effect.
-TORSION = WITH_CLEARANCE._replace(pitch_error=False, stiffness_variation=False, backlash=False)
+TORSION = Scene(*[False] * len(Scene._fields))
+CLEARANCE = TORSION._replace(backlash=True)
 
 MODEL = pan2021(5.86, error_mean=0.1, error_phase=0.4)
 
@@ -51,7 +50,8 @@ def steady_state(model: Model, rederived: bool) -> np.ndarray:
     else:
         in_y, in_z = -np.cos(beta), -np.sin(beta)
     forced = in_y * row_y + in_z * row_z
-    constant = -np.linalg.solve(matrix, one(model, "load") * torsion + one(model, "error_mean") * forced)
+    lasting = one(model, "load") * torsion + one(model, "error_mean") * forced
+    constant = -np.linalg.solve(matrix, lasting)
     # e is the imaginary part of amplitude exp(i (Omega tau + phi)).
     damped = 1.0 + 2.0j * one(model, "damping_ratio") * omega
     force = damped * forced + omega**2 * torsion
@@ -128,9 +128,8 @@ def test_exponent_with_negative_damping_is_positive():
 def test_exponent_inside_the_clearance_is_that_of_the_mesh_damping_alone():
     # Without load and far from both flanks only 2 xi y' acts: the position does not decay.
     model = pan2021(0.0, load=0.0, half_backlash=1e6)
-    scene = WITH_CLEARANCE._replace(pitch_error=False, stiffness_variation=False)
     start = state(delta_5=0.3)
-    found = exponent_of(model, scene, start, steps=100, transient=100, periods=200)
+    found = exponent_of(model, CLEARANCE, start, steps=100, transient=100, periods=200)
     assert abs(found) < 1e-12
 
 
@@ -145,4 +144,3 @@ def test_free_oscillation_keeps_its_frequency_and_decay():
         np.cos(frequency * tau) + decay / frequency * np.sin(frequency * tau)
     )
     assert outcome.section[0, :, 0] == pytest.approx(wanted, rel=0, abs=1e-9)
-    assert OMEGA * PERIOD == pytest.approx(2.0 * np.pi)

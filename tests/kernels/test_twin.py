@@ -87,6 +87,18 @@ def test_the_lanes_of_the_twin_test_visit_every_branch_of_the_clearance():
     assert visited == {(direction, branch) for direction in "yz" for branch in (-1, 0, 1)}
 
 
+@pytest.mark.parametrize("rederived", [False, True])
+def test_a_spur_pair_has_an_axial_motion_of_its_bearings_alone(rederived):
+    spur = MODEL._replace(base_helix_angle=np.zeros(2))
+    outcome = run(spur, Scene(), START, steps=STEPS, periods=PERIODS, rederived=rederived)
+    for number in range(2):
+        groups = lane(number)
+        groups.base_helix_angle = 0.0
+        twin = Twin(groups, Scene(), rederived).integrate(START[number], STEPS, PERIODS)
+        assert outcome.section[number] == pytest.approx(twin.states, rel=0, abs=ROUNDING)
+        assert outcome.growth[number] == pytest.approx(twin.growth, rel=0, abs=ROUNDING)
+
+
 def test_states_that_a_scene_leaves_out_stay_zero():
     outcome = run(MODEL, Scene(transverse=False), START, steps=STEPS, periods=PERIODS)
     absent = [1, 2, 6, 7]

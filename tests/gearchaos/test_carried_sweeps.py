@@ -1,0 +1,123 @@
+"""Sweeps whose lanes start where their neighbours ended, and lanes that hand nothing on."""
+
+import numpy as np
+import pytest
+from gearchaos_kernels import Status
+
+from gearchaos.simulation import compute_all
+
+from .short_sweeps import (
+    COLUMNS,
+    RANDOM,
+    assert_same,
+    blocks,
+    computed,
+    kernel,
+    listing,
+    simulation,
+    starts_of,
+)
+
+
+@pytest.mark.parametrize("direction", ["upwards", "downwards"])
+def test_carried_sweep_is_the_chain_of_its_lanes_made_by_hand(direction):
+    sweep = simulation(f"start.carry={direction}")
+    arrays = computed(sweep, 5)
+    state = np.zeros(10)
+    for value in range(13) if direction == "upwards" else reversed(range(13)):
+        state = kernel(sweep, value, state)
+        assert np.array_equal(arrays["end_state"][value], state[COLUMNS])
+
+
+@pytest.mark.parametrize("direction", ["upwards", "downwards"])
+@pytest.mark.parametrize("overrides", [(), RANDOM])
+def test_carried_sweep_does_not_depend_on_the_size_of_its_blocks(direction, overrides):
+    sweep = simulation(f"start.carry={direction}", *overrides)
+    whole = computed(sweep)
+    for values in (1, 4, 9):
+        assert_same(computed(sweep, values), whole)
+
+
+@pytest.mark.parametrize("direction", ["upwards", "downwards"])
+def test_carried_sweep_goes_on_from_a_finished_block(direction):
+    sweep = simulation(f"start.carry={direction}", *RANDOM)
+    bounds = blocks(sweep, 3)
+    everything = dict(compute_all(sweep, bounds))
+    finished = {block: lambda block=block: everything[block] for block in bounds[:2]}
+    rest = dict(compute_all(sweep, bounds, finished))
+    assert len(rest) == len(bounds) - 2
+    for block, arrays in rest.items():
+        assert_same(arrays, everything[block])
+
+
+def test_several_starts_are_carried_side_by_side():
+    sweep = simulation("start.carry=upwards", *RANDOM)
+    arrays = computed(sweep)
+    states = list(starts_of(sweep, 0, 3))
+    for value in range(13):
+        for start in range(3):
+            states[start] = kernel(sweep, value, states[start])
+            lane = 3 * value + start
+            assert np.array_equal(arrays["end_state"][lane], states[start][COLUMNS])
+    assert arrays["start"].tolist() == [0, 1, 2] * 13
+    assert arrays["pitch_error"].tolist() == np.repeat(sweep.values, 3).tolist()
+
+
+def test_sweeping_up_and_down_differ_where_two_motions_coexist():
+    where = ("sweep.from=0.4", "sweep.to=2.4", "sweep.count=41")
+    long = ("integration.transient_periods=150", *where)
+    up = computed(simulation("start.carry=upwards", *long))["section_delta_5"][:, -1]
+    down = computed(simulation("start.carry=downwards", *long))["section_delta_5"][:, -1]
+    apart = np.abs(up - down) > 1e-3
+    values = simulation(*long).values
+    assert apart[(values > 0.9) & (values < 1.5)].all()
+    assert not apart[(values < 0.6) | (values > 2.0)].any()
+
+
+# A period so long, a bearing so stiff that the step is too long for it: the first lane of its way.
+FIRST_DIVERGES = {
+    "upwards": ("mesh_frequency", [0.01, 0.8, 0.9]),
+    "downwards": ("transverse_stiffness_p", [20.0, 36.0, 1e6]),
+}
+
+
+@pytest.mark.parametrize("values", [1, 3])
+@pytest.mark.parametrize("direction", FIRST_DIVERGES)
+def test_a_lane_that_diverged_hands_nothing_on(tmp_path, direction, values):
+    sweep = listing(
+        tmp_path,
+        *FIRST_DIVERGES[direction],
+        "start.kind=contact",
+        f"start.carry={direction}",
+    )
+    arrays = computed(sweep, values)
+    way = [0, 1, 2] if direction == "upwards" else [2, 1, 0]
+    assert arrays["status"][way].tolist() == [Status.DIVERGED, Status.OK, Status.OK]
+    assert np.isnan(arrays["end_state"][way[0]]).all()
+    anew = kernel(sweep, way[1], starts_of(sweep)[way[1]])
+    assert np.array_equal(arrays["end_state"][way[1]], anew[COLUMNS])
+    carried = kernel(sweep, way[2], anew)
+    assert np.array_equal(arrays["end_state"][way[2]], carried[COLUMNS])
+
+
+def test_a_lane_that_diverged_has_a_status_a_period_and_no_numbers(tmp_path):
+    arrays = computed(listing(tmp_path, *FIRST_DIVERGES["upwards"]))
+    assert arrays["diverged_period"].tolist() == [0, -1, -1]
+    for name in ("section_delta_5", "lyapunov_exponent", "end_state"):
+        assert np.isnan(arrays[name][0]).all()
+        assert np.isfinite(arrays[name][1:]).all()
+
+
+def test_exponent_of_a_swept_mesh_frequency_is_per_unit_of_time(tmp_path):
+    # Bearings and mesh decay at their own pace whatever the period of the forcing.
+    frequencies = [0.4, 0.8, 1.6]
+    sweep = listing(
+        tmp_path,
+        "mesh_frequency",
+        frequencies,
+        "scene.effects=[]",
+        "integration.recorded_periods=400",
+        "integration.steps_per_period=200",
+    )
+    decay = sweep.groups.damping_ratio * np.cos(np.radians(sweep.groups.base_helix_angle_deg))
+    assert computed(sweep)["lyapunov_exponent"] == pytest.approx(np.full(3, -decay), rel=1e-4)

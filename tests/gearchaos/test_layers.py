@@ -1,0 +1,58 @@
+"""Who knows whom: results and figures work on a machine without the engine."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from importlinter.cli import lint_imports
+
+ROOT = Path(__file__).resolve().parents[2]
+
+ENGINE = {"numba", "llvmlite", "gearchaos_kernels"}
+HEAVY = ENGINE | {"numpy", "h5py", "matplotlib", "pydantic", "tqdm"}
+
+
+def imported_by(statement: str) -> set[str]:
+    """List the top-level packages that a statement imports into a new process."""
+    code = f"import sys\n{statement}\nprint(*{{name.split('.')[0] for name in sys.modules}})"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    return set(done.stdout.split())
+
+
+def test_the_import_contracts_of_the_project_are_kept(capsys, monkeypatch):
+    monkeypatch.chdir(ROOT)
+    code = lint_imports(config_filename=str(ROOT / "pyproject.toml"), no_cache=True)
+    assert code == 0, capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    "statement",
+    [
+        "import gearchaos.result",
+        "import gearchaos.figures",
+        "import gearchaos.plot",
+        "from gearchaos import open_result, load_config, GearchaosError",
+    ],
+)
+def test_results_figures_and_configurations_need_no_engine(statement):
+    assert not imported_by(statement) & ENGINE
+
+
+@pytest.mark.parametrize(
+    "statement",
+    ["import gearchaos", "import gearchaos.__main__", "import gearchaos.sweep", "dir(gearchaos)"],
+)
+def test_commands_start_light(statement):
+    assert not imported_by(f"import gearchaos; {statement}") & HEAVY
+
+
+def test_the_kernels_know_nothing_of_the_layers_above():
+    above = {"gearchaos", "h5py", "matplotlib", "pydantic", "tqdm"}
+    assert not imported_by("import gearchaos_kernels") & above
+
+
+def test_running_needs_the_kernels_but_no_figures():
+    packages = imported_by("from gearchaos import run")
+    assert packages >= ENGINE
+    assert "matplotlib" not in packages

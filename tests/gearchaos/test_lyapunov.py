@@ -1,0 +1,108 @@
+"""The largest Lyapunov exponent from growth rates whose mean is known."""
+
+import numpy as np
+import pytest
+
+from gearchaos.lyapunov import largest_exponent
+
+PERIOD = 7.1736
+GOLDEN = (np.sqrt(5.0) - 1.0) / 2.0
+
+
+def estimate(growth: np.ndarray, period: float = PERIOD) -> tuple[np.ndarray, np.ndarray]:
+    return largest_exponent(growth, np.full(growth.shape[0], period))
+
+
+@pytest.mark.parametrize("periods", [2, 3, 9, 10, 11, 500])
+def test_constant_growth_is_the_exponent_without_error(periods):
+    growth = np.tile(np.array([[0.3], [0.0], [-2.0]]), periods)
+    exponent, error = estimate(growth)
+    assert exponent == pytest.approx(growth[:, 0] / PERIOD, rel=1e-14)
+    assert error == pytest.approx(np.zeros(3), abs=1e-15)
+
+
+def test_exponent_is_per_unit_of_time_of_each_lanes_own_period():
+    growth = np.full((3, 40), 0.2)
+    period = np.array([1.0, 2.0, 8.0])
+    exponent, _ = largest_exponent(growth, period)
+    assert exponent == pytest.approx([0.2, 0.1, 0.025])
+
+
+def test_a_single_period_gives_an_exponent_without_a_standard_error():
+    exponent, error = estimate(np.array([[0.5]]))
+    assert exponent == pytest.approx([0.5 / PERIOD])
+    assert np.isnan(error).all()
+
+
+def test_two_periods_give_a_standard_error():
+    _, error = estimate(np.array([[0.5, 0.7]]))
+    assert error == pytest.approx([0.1 / PERIOD])
+
+
+def quasi_periodic_error(periods: int) -> float:
+    """Largest error over many phases of a growth that swings about a mean of 0.01."""
+    phase = np.linspace(0.0, 1.0, 64, endpoint=False)[:, np.newaxis]
+    angle = 2.0 * np.pi * (GOLDEN * np.arange(periods) + phase)
+    growth = 0.01 + np.cos(angle) + 0.5 * np.sin(2.0 * angle)
+    return float(np.abs(estimate(growth)[0] * PERIOD - 0.01).max())
+
+
+def test_quasi_periodic_growth_converges_with_the_third_power_of_the_number_of_periods():
+    periods = np.array([100, 200, 400, 800, 1600])
+    errors = [quasi_periodic_error(number) for number in periods]
+    order = -np.polyfit(np.log(periods), np.log(errors), 1)[0]
+    assert order == pytest.approx(3.0, abs=0.2)
+    assert errors[-1] < 1e-8
+
+
+def test_quasi_periodic_growth_is_far_closer_than_its_plain_mean():
+    growth = 0.01 + np.cos(2.0 * np.pi * GOLDEN * np.arange(500))[np.newaxis]
+    exponent, error = estimate(growth)
+    plain = abs(growth.mean() - 0.01)
+    assert abs(exponent[0] * PERIOD - 0.01) < 1e-3 * plain
+    assert error[0] * PERIOD < 1e-3
+
+
+@pytest.mark.parametrize("periods", [100, 500, 1003])
+def test_standard_error_of_white_noise_is_calibrated(periods):
+    rng = np.random.default_rng(periods)
+    lanes = 6_000
+    growth = 0.4 + rng.standard_normal((lanes, periods))
+    exponent, error = estimate(growth)
+    true_spread = np.std(exponent)
+    z = (exponent - 0.4 / PERIOD) / error
+    # 9 / 7 would be the mean for a plain average of ten blocks (a t distribution).
+    assert 1.0 < np.mean(z**2) < 9.0 / 7.0 * 1.05
+    assert np.sqrt(np.mean(error**2)) == pytest.approx(true_spread, rel=0.05)
+    # sqrt(3/2) is the price of the smooth weights.
+    assert true_spread * PERIOD == pytest.approx(np.sqrt(1.5 / periods), rel=0.05)
+
+
+def test_standard_error_of_correlated_growth_is_not_far_too_small():
+    rng = np.random.default_rng(3)
+    noise = rng.standard_normal((4000, 1100))
+    # A memory of about five periods, as in a chaotic motion near a window.
+    growth = np.zeros_like(noise)
+    for period in range(1, noise.shape[1]):
+        growth[:, period] = 0.8 * growth[:, period - 1] + noise[:, period]
+    exponent, error = estimate(growth[:, 100:])
+    assert np.sqrt(np.mean(error**2)) == pytest.approx(np.std(exponent), rel=0.1)
+
+
+def test_a_lane_that_diverged_has_neither_and_leaves_the_others_alone():
+    growth = np.random.default_rng(0).standard_normal((3, 60))
+    sound = estimate(growth[[0, 2]])
+    growth[1, 40:] = np.nan
+    exponent, error = estimate(growth)
+    assert np.isnan([exponent[1], error[1]]).all()
+    assert np.array_equal(exponent[[0, 2]], sound[0])
+    assert np.array_equal(error[[0, 2]], sound[1])
+
+
+def test_exponent_of_a_lane_does_not_depend_on_the_lanes_beside_it():
+    growth = np.random.default_rng(1).standard_normal((97, 487))
+    exponent, error = estimate(growth)
+    for first in range(0, 97, 13):
+        part = estimate(growth[first : first + 13])
+        assert np.array_equal(part[0], exponent[first : first + 13])
+        assert np.array_equal(part[1], error[first : first + 13])

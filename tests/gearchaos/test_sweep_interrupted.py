@@ -1,0 +1,135 @@
+"""A sweep that is stopped half-way: what is kept, what is said, and how it goes on."""
+
+import re
+import shlex
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+
+import gearchaos
+
+from .commands import names_in, same_data, small_config, sweep
+
+# Eight blocks of lanes that take a second or so together.
+LONG = (
+    "--threads",
+    "1",
+    "--set",
+    "sweep.count=1000",
+    "--set",
+    "integration.transient_periods=2000",
+)
+SHARDS = "gears.h5.shards"
+
+
+@pytest.fixture(scope="module")
+def undisturbed(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("undisturbed")
+    assert sweep(folder, *LONG, "--quiet").code == 0
+    return gearchaos.open_result(folder / "gears.h5")
+
+
+def stop_half_way(folder, number, *arguments):
+    """Start the long sweep, send it a signal once a block is finished, and return how it ended."""
+    small_config(folder)
+    with subprocess.Popen(
+        [sys.executable, "-m", "gearchaos.sweep", "gears.toml", *LONG, *arguments],
+        cwd=folder,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        # A test run in the background may have been told to ignore Ctrl-C, and hands that on.
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
+    ) as process:
+        while process.poll() is None and not list((folder / SHARDS).glob("*.shard")):
+            time.sleep(0.005)
+        process.send_signal(number)
+        out, err = process.communicate(timeout=60)
+    assert "Traceback" not in err
+    assert out == ""
+    assert names_in(folder) == [SHARDS, "gears.toml"]
+    return process.returncode, err
+
+
+@pytest.mark.parametrize(
+    ("number", "code", "word"),
+    [(signal.SIGINT, 130, "interrupted"), (signal.SIGTERM, 143, "terminated")],
+)
+def test_the_command_printed_after_an_interrupt_gives_the_undisturbed_result(
+    tmp_path, undisturbed, number, code, word
+):
+    ended, err = stop_half_way(tmp_path, number, "--resume")
+    assert ended == code
+    stopped, kept, how = [line for line in err.splitlines() if "kernel of this scene" not in line]
+    assert stopped == f"gearchaos sweep: {word}"
+    lanes = int(re.fullmatch(r"gearchaos sweep: (\d+) of 1000 lanes are kept", kept)[1])
+    assert 0 < lanes < 1000
+    command = shlex.split(how.removeprefix("gearchaos sweep: go on with: "))
+    assert command.count("--resume") == 1
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
+    assert (done.returncode, done.stdout) == (0, "gears.h5\n")
+    assert names_in(tmp_path) == ["gears.h5", "gears.toml"]
+    assert same_data(gearchaos.open_result(tmp_path / "gears.h5"), undisturbed)
+
+
+def test_a_killed_sweep_leaves_nothing_that_looks_like_a_result_and_can_be_resumed(
+    tmp_path, undisturbed
+):
+    ended, _ = stop_half_way(tmp_path, signal.SIGKILL)
+    assert ended == -signal.SIGKILL
+    for path in (tmp_path / SHARDS).iterdir():
+        with pytest.raises(gearchaos.GearchaosError):
+            gearchaos.open_result(path)
+    # Neither lost by accident nor mixed with another sweep.
+    refused = sweep(tmp_path, *LONG)
+    assert refused.code == 4
+    assert re.search(r"holds \d finished blocks? of an earlier run; continue it with", refused.err)
+    other = sweep(tmp_path, *LONG, "--resume", "--set", "groups.damping_ratio=0.06")
+    assert other.code == 4
+    assert "another configuration, which differs in groups.damping_ratio (0.05, now 0.06)" in (
+        other.err
+    )
+    assert names_in(tmp_path) == [SHARDS, "gears.toml"]
+    # A block that was damaged is told and computed again.
+    block = min((tmp_path / SHARDS).glob("*.shard"))
+    block.write_bytes(block.read_bytes()[:-100])
+    resumed = sweep(tmp_path, *LONG, "--resume")
+    assert (resumed.code, resumed.out) == (0, "gears.h5\n")
+    assert f"{block.name}: " in resumed.err
+    assert "; it is computed again\n" in resumed.err
+    assert same_data(gearchaos.open_result(tmp_path / "gears.h5"), undisturbed)
+
+
+@pytest.mark.parametrize("direction", ["upwards", "downwards"])
+def test_a_carried_sweep_goes_on_from_the_end_states_of_the_finished_blocks(tmp_path, direction):
+    carried = ("--set", f"start.carry={direction}", "--set", "sweep.count=130")
+    carried += ("--set", "start.kind=random", "--set", "start.count=3")
+    carried += ("--set", "integration.transient_periods=400")
+    ended, _ = stop_half_way(tmp_path, signal.SIGINT, *carried)
+    assert ended == 130
+    assert sweep(tmp_path, *LONG, *carried, "--resume", "--quiet") == (0, "gears.h5\n", "")
+    pieces = gearchaos.open_result(tmp_path / "gears.h5")
+    overrides = [*LONG[3::2], *carried[1::2]]
+    at_once = gearchaos.run(gearchaos.load_config(tmp_path / "gears.toml", overrides))
+    assert same_data(pieces, at_once)
+
+
+def test_resume_without_an_earlier_run_simply_computes(tmp_path):
+    assert sweep(tmp_path, "--resume", "--quiet") == (0, "gears.h5\n", "")
+
+
+def test_two_sweeps_do_not_write_to_the_same_output(tmp_path):
+    small_config(tmp_path)
+    command = [sys.executable, "-m", "gearchaos.sweep", "gears.toml", *LONG]
+    with subprocess.Popen(command, cwd=tmp_path, stderr=subprocess.DEVNULL) as first:
+        while first.poll() is None and not list((tmp_path / SHARDS).glob("*.shard")):
+            time.sleep(0.005)
+        second = sweep(tmp_path, *LONG, "--resume")
+        assert second.code == 4
+        assert "gears.h5: another sweep is writing to it; wait for its end" in second.err
+        first.terminate()
+    assert first.returncode == 143
+    assert names_in(tmp_path) == [SHARDS, "gears.toml"]

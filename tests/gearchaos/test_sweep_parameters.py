@@ -1,0 +1,71 @@
+"""Any parameter of the model can be the swept one: groups and physical quantities alike."""
+
+import numpy as np
+import pytest
+
+import gearchaos
+from gearchaos.configuration.sweep_values import SWEEPABLE_GROUPS, SWEEPABLE_KEYS
+
+from .commands import SMALL
+
+# Where the values of the small sweep do not serve.
+SPANS = {
+    "base_helix_angle_deg": (10.0, 20.0),
+    "mesh_frequency": (0.4, 0.6),
+    "pair.normal_pressure_angle_deg": (15.0, 25.0),
+    "pair.helix_angle_deg": (10.0, 25.0),
+    "pair.face_width_mm": (12.0, 18.0),
+    "pair.density_kg_m3": (7000.0, 8000.0),
+    "pitch_error.phase_deg": (10.0, 90.0),
+    "pitch_error_phase_deg": (10.0, 90.0),
+    "operation.speed_rpm": (8000.0, 9000.0),
+    "operation.torque_Nm": (40.0, 60.0),
+    "mesh.mean_stiffness_N_per_um_mm": (12.0, 14.0),
+    "mesh.length_scale_um": (20.0, 30.0),
+    "mesh.half_backlash_um": (15.0, 25.0),
+    "mesh.damping_N_s_per_m": (100.0, 500.0),
+}
+
+# What the small sweep has to give in another way for a parameter to act, or to act alone.
+CHANGES = {
+    "mesh.damping_ratio": {"[groups]\ndamping_ratio = 0.05": ""},
+    "mesh.damping_N_s_per_m": {
+        "[groups]\ndamping_ratio = 0.05": "",
+        "damping_ratio = 0.1": "damping_N_s_per_m = 300.0",
+    },
+    "mesh.mean_stiffness_N_per_um_mm": {"[groups]": "[groups]\nstiffness_cosine = [-0.09]"},
+}
+
+
+def configured(parameter, low, high, count=3):
+    text = SMALL
+    for old, new in CHANGES.get(parameter, {}).items():
+        assert old in text
+        text = text.replace(old, new)
+    span = f"sweep={{parameter='{parameter}', from={low!r}, to={high!r}, count={count}}}"
+    return gearchaos.Configuration.from_toml(text, "gears.toml", [span])
+
+
+@pytest.mark.parametrize("parameter", [*SWEEPABLE_GROUPS, *SWEEPABLE_KEYS])
+def test_a_sweep_moves_the_motion_and_each_lane_is_the_sweep_of_its_value_alone(parameter):
+    low, high = SPANS.get(parameter, (0.5, 1.5))
+    result = gearchaos.run(configured(parameter, low, high))
+    assert result.axis == parameter.replace(".", "_")
+    assert np.array_equal(result[result.axis], np.linspace(low, high, 3))
+    assert (result["status"] == 0).all()
+    ends = result["end_state"]
+    assert not np.array_equal(ends[0], ends[2])
+    alone = gearchaos.run(configured(parameter, high, high, count=1))
+    for name in result.names:
+        if result.dims(name)[0] == result.axis:
+            assert np.array_equal(result[name][2:], alone[name]), name
+
+
+def test_a_swept_speed_is_the_sweep_of_the_mesh_frequency_that_it_gives():
+    by_speed = gearchaos.run(configured("operation.speed_rpm", 7000.0, 9000.0))
+    frequency = by_speed.parameters["mesh_frequency"]
+    assert frequency.origin == "swept"
+    assert frequency.value == pytest.approx(frequency.value[1] * np.array([7, 8, 9]) / 8)
+    low, high = frequency.value[[0, 2]].tolist()
+    by_frequency = gearchaos.run(configured("mesh_frequency", low, high))
+    assert by_frequency["end_state"] == pytest.approx(by_speed["end_state"], rel=1e-8, abs=1e-10)

@@ -1,0 +1,93 @@
+"""The same bits for any number of threads, any split, any order and any neighbours."""
+
+import numba
+import numpy as np
+import pytest
+from gearchaos_kernels import LANES, Outcome
+
+from .reference import FULL, assert_same_bits, lanes_of, lanes_out_of, pan2021, run, state
+
+TOTAL = 3 * LANES + 4
+MODEL = pan2021(
+    np.linspace(0.0, 15.0, TOTAL),
+    mesh_frequency=np.linspace(0.7, 1.4, TOTAL),
+    load=np.linspace(0.2, 0.3, TOTAL),
+)
+START = np.random.default_rng(7).uniform(-1.5, 1.5, (TOTAL, 10))
+# Two lanes that diverge: one in its first period, one later.
+START[40] = state(delta_5=np.nan)
+MODEL.transverse_damping_g[77] = -0.9
+HOW = {"steps": 72, "transient": 20, "periods": 40, "points": 30}
+
+
+def integrate(chosen) -> Outcome:
+    return run(lanes_of(MODEL, chosen), FULL, START[chosen], **HOW)
+
+
+@pytest.fixture(scope="module")
+def whole() -> Outcome:
+    return integrate(np.arange(TOTAL))
+
+
+def joined(parts: list[Outcome]) -> Outcome:
+    return Outcome(*(np.concatenate(arrays) for arrays in zip(*parts, strict=True)))
+
+
+def test_two_lanes_of_this_test_diverge_and_the_others_differ_from_one_another(whole):
+    assert np.flatnonzero(whole.status).tolist() == [40, 77]
+    assert whole.diverged_period[40] == 0
+    assert whole.diverged_period[77] > HOW["transient"]
+    assert np.unique(whole.end_state[:, 0]).size == TOTAL - 1
+
+
+@pytest.mark.skipif(numba.config.NUMBA_NUM_THREADS < 2, reason="needs two threads")
+def test_one_thread_and_two_give_the_same_bits(whole):
+    threads = numba.get_num_threads()
+    try:
+        for number in (1, 2):
+            numba.set_num_threads(number)
+            assert_same_bits(integrate(np.arange(TOTAL)), whole)
+    finally:
+        numba.set_num_threads(threads)
+
+
+@pytest.mark.parametrize("size", [1, LANES - 1, LANES, LANES + 1, TOTAL])
+def test_any_split_into_batches_gives_the_same_bits(whole, size):
+    parts = [
+        integrate(np.arange(first, min(first + size, TOTAL))) for first in range(0, TOTAL, size)
+    ]
+    assert_same_bits(joined(parts), whole)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_any_order_of_lanes_gives_the_same_bits(whole, seed):
+    order = np.random.default_rng(seed).permutation(TOTAL)
+    assert_same_bits(integrate(order), lanes_out_of(whole, order))
+
+
+def test_a_second_run_gives_the_same_bits(whole):
+    assert_same_bits(integrate(np.arange(TOTAL)), whole)
+
+
+def test_integration_leaves_its_arguments_alone(whole):
+    model = pan2021(np.linspace(0.0, 15.0, TOTAL))
+    copies = [group.copy() for group in model]
+    start = START.copy()
+    run(model, FULL, start, **HOW)
+    assert np.array_equal(start, START, equal_nan=True)
+    assert all(np.array_equal(group, copy) for group, copy in zip(model, copies, strict=True))
+    assert whole.section.shape == (TOTAL, HOW["points"], 10)
+
+
+def test_a_longer_transient_is_the_same_motion_recorded_later():
+    longer = run(MODEL, FULL, START, **{**HOW, "transient": 25, "periods": 35})
+    shorter = run(MODEL, FULL, START, **HOW)
+    assert np.array_equal(longer.section, shorter.section, equal_nan=True)
+    assert np.array_equal(longer.growth, shorter.growth[:, 5:], equal_nan=True)
+    assert np.array_equal(longer.end_state, shorter.end_state, equal_nan=True)
+
+
+def test_no_lanes_give_empty_arrays():
+    nothing = integrate(np.arange(0))
+    assert nothing.section.shape == (0, HOW["points"], 10)
+    assert nothing.status.shape == (0,)

@@ -1,0 +1,48 @@
+"""Every group may differ from lane to lane: a batch is its lanes, integrated one by one."""
+
+import numpy as np
+import pytest
+from gearchaos_kernels import Model
+
+from .reference import FULL, assert_same_bits, lanes_of, lanes_out_of, pan2021, run, state
+
+LANES = 5
+BASE = pan2021(np.full(LANES, 5.86), error_mean=0.03, error_phase=0.5)
+START = np.tile(state(delta_5=1.1, delta_1_rate=0.02, delta_3=0.01), (LANES, 1))
+HOW = {"steps": 96, "transient": 4, "periods": 6}
+
+
+def swept(group: str) -> Model:
+    return BASE._replace(**{group: getattr(BASE, group) * np.linspace(0.8, 1.2, LANES)})
+
+
+def alone(model: Model, lane: int):
+    return run(lanes_of(model, [lane]), FULL, START[[lane]], **HOW)
+
+
+@pytest.mark.parametrize("group", Model._fields)
+def test_a_group_swept_over_the_lanes_gives_the_lanes_integrated_alone(group):
+    model = swept(group)
+    batch = run(model, FULL, START, **HOW)
+    for lane in range(LANES):
+        assert_same_bits(lanes_out_of(batch, [lane]), alone(model, lane))
+    # No group is ignored: each moves the end state of the scene with every effect.
+    ends = batch.end_state[:, [0, 1, 2, 3, 4]]
+    assert (np.abs(ends[1:] - ends[:-1]).max(axis=1) > 1e-9).all()
+
+
+def test_a_phase_swept_through_zero_gives_the_lanes_integrated_alone():
+    # The lane of phase zero, alone, runs in a loop compiled without phase.
+    model = BASE._replace(error_phase=np.linspace(-0.4, 0.4, LANES))
+    assert model.error_phase[2] == 0.0
+    batch = run(model, FULL, START, **HOW)
+    for lane in range(LANES):
+        assert_same_bits(lanes_out_of(batch, [lane]), alone(model, lane))
+
+
+def test_a_swept_mesh_frequency_keeps_the_number_of_steps_in_each_lanes_own_period():
+    model = swept("mesh_frequency")
+    batch = run(model, FULL, START, **{**HOW, "steps": 1600})
+    fine = run(model, FULL, START, **{**HOW, "steps": 3200})
+    assert batch.section == pytest.approx(fine.section, rel=0, abs=2e-4)
+    assert np.unique(batch.section[:, -1, 0]).size == LANES

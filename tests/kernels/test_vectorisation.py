@@ -1,0 +1,142 @@
+"""What the compiler makes of the lane loop: wide registers, and nothing that the scene lacks."""
+
+import functools
+import platform
+import re
+from collections import Counter
+
+import llvmlite.binding
+import numba
+import numpy as np
+import pytest
+from gearchaos_kernels import Outcome, Scene
+from gearchaos_kernels.block_loop import integrate_block
+from gearchaos_kernels.coefficients import lane_coefficients, phase_table, state_scales
+
+from .reference import COSINE, FULL, SINE, pan2021
+
+pytestmark = pytest.mark.skipif(
+    platform.machine().lower() not in ("x86_64", "amd64")
+    or not llvmlite.binding.get_host_cpu_features().get("avx2", False),
+    reason="reads the assembly of x86 processors with AVX2",
+)
+
+ARITHMETIC = re.compile(r"v(add|sub|mul|f(n?)m(add|sub)\d+)(pd|sd)$")
+WIDE = ("ymm", "zmm")
+TORSION = Scene(*[False] * len(Scene._fields))
+
+
+def arguments(scene: Scene, tangent: bool) -> tuple:
+    """Return what the driver hands to the block loop for a single lane."""
+    model, steps = pan2021(1.0), 4
+    outcome = Outcome(
+        section=np.zeros((1, 1, 1)),
+        growth=np.zeros((1, 1)) if tangent else None,
+        end_state=np.zeros((1, 10)),
+        status=np.zeros(1, dtype=np.uint8),
+        diverged_period=np.zeros(1, dtype=np.int32),
+    )
+    flags = {effect: () if present else None for effect, present in scene._asdict().items()}
+    return (
+        0,
+        lane_coefficients(model, steps, False),
+        state_scales(model, steps),
+        np.zeros((1, 10)),
+        np.ones(10),
+        phase_table(COSINE, SINE, steps),
+        0,
+        1,
+        np.zeros(1, dtype=np.intp),
+        flags["pitch_error"],
+        None,
+        flags["stiffness_variation"],
+        flags["backlash"],
+        flags["transverse"],
+        flags["axial"],
+        *outcome,
+    )
+
+
+@functools.cache
+def instructions(scene: Scene, tangent: bool) -> Counter[tuple[str, str]]:
+    """Count the vector instructions of one compiled scene by mnemonic and register width."""
+    # Called directly: the driver may come from the cache and then compiles nothing.
+    given = arguments(scene, tangent)
+    integrate_block(*given)
+    assembly = integrate_block.inspect_asm(tuple(numba.typeof(value) for value in given))
+    counts: Counter[tuple[str, str]] = Counter()
+    for mnemonic, operands in re.findall(r"^\s+(v\w+)\s+(.*)$", assembly, re.MULTILINE):
+        width = next((name for name in ("zmm", "ymm", "xmm") if name in operands), "")
+        counts[mnemonic, width] += 1
+    return counts
+
+
+def wide_arithmetic(counts: Counter[tuple[str, str]]) -> int:
+    return sum(
+        number
+        for (mnemonic, width), number in counts.items()
+        if width in WIDE and ARITHMETIC.match(mnemonic)
+    )
+
+
+def wide(counts: Counter[tuple[str, str]], mnemonic: str) -> int:
+    """Number of instructions of one kind on wide registers, whatever their suffix."""
+    return sum(
+        number
+        for (found, width), number in counts.items()
+        if width in WIDE and found.startswith(mnemonic)
+    )
+
+
+@pytest.mark.parametrize("tangent", [False, True], ids=["plain", "tangent"])
+def test_a_step_is_done_on_many_lanes_at_once(tangent):
+    counts = instructions(FULL, tangent)
+    # 10 states need about 190 operations a step, 350 with tangent, after fusion somewhat less.
+    assert wide_arithmetic(counts) > (300 if tangent else 150)
+    assert wide(counts, "vfmadd") > 20
+    assert wide(counts, "vmul") > 20
+
+
+@pytest.mark.parametrize("tangent", [False, True], ids=["plain", "tangent"])
+def test_scalar_arithmetic_is_left_only_outside_the_lane_loop(tangent):
+    counts = instructions(FULL, tangent)
+    scalar = sum(n for (mnemonic, _), n in counts.items() if re.match(r"v(add|sub)sd", mnemonic))
+    fused = sum(n for (mnemonic, _), n in counts.items() if re.match(r"vfn?m\w+sd", mnemonic))
+    assert scalar + fused < 20
+
+
+def test_the_widest_registers_of_the_processor_are_used():
+    if not llvmlite.binding.get_host_cpu_features().get("avx512f", False):
+        pytest.skip("needs AVX-512")
+    counts = instructions(FULL, False)
+    by_width = {
+        width: sum(n for (name, w), n in counts.items() if w == width and ARITHMETIC.match(name))
+        for width in WIDE
+    }
+    assert by_width["zmm"] > 10 * by_width["ymm"]
+
+
+def test_the_clearance_costs_one_minimum_and_one_maximum_for_each_stage_and_direction():
+    counts = instructions(FULL, False)
+    registers_per_lane_group = wide(counts, "vmax") / 8
+    assert registers_per_lane_group == int(registers_per_lane_group) >= 1
+    assert wide(counts, "vmin") == wide(counts, "vmax")
+
+
+def test_a_scene_without_backlash_has_no_minimum_or_maximum():
+    counts = instructions(FULL._replace(backlash=False), False)
+    assert wide(counts, "vmax") == wide(counts, "vmin") == 0
+    assert wide_arithmetic(counts) < wide_arithmetic(instructions(FULL, False))
+
+
+def test_a_torsional_scene_has_none_of_the_arithmetic_of_the_bearings():
+    # Its loop may be unrolled four times and is still shorter.
+    assert wide_arithmetic(instructions(TORSION, False)) < 0.6 * wide_arithmetic(
+        instructions(FULL, False)
+    )
+
+
+def test_a_run_without_exponent_has_none_of_the_arithmetic_of_the_tangent_vector():
+    plain, tangent = instructions(FULL, False), instructions(FULL, True)
+    assert wide_arithmetic(plain) < 0.65 * wide_arithmetic(tangent)
+    assert wide(plain, "vcmp") == 0
