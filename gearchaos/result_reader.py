@@ -130,6 +130,7 @@ def _check_variables(
         lyapunov="lyapunov_exponent" in found,
         several_starts="start" in found,
         status_meanings=(),
+        crossings="crossings_per_period" in found,
     )
     for due in expected:
         got = found.get(due.name)

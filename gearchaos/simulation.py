@@ -14,7 +14,9 @@ from gearchaos_kernels import (
     Outcome,
     Plan,
     Scene,
+    Status,
     integrate,
+    steps_between_scalings,
 )
 from numpy.typing import NDArray
 
@@ -57,6 +59,10 @@ class Simulation:
             section_points=config.outputs.section_points if config.outputs.section else 0,
             section_states=config.outputs.section,
             tangent=config.outputs.lyapunov,
+            resolved=config.integration.crossings == "resolved",
+            steps_between_scalings=steps_between_scalings(
+                model(self.groups, self.values.size), config.integration.steps_per_period
+            ),
         )
 
     @property
@@ -68,6 +74,11 @@ class Simulation:
     def carried(self) -> bool:
         """Whether each value starts from the end state of its neighbour."""
         return self.config.start.carry != "none"
+
+    @property
+    def splits_steps(self) -> bool:
+        """Whether steps are split where they cross a clearance boundary."""
+        return self.plan.resolved and self.scene.backlash
 
     @property
     def steps(self) -> int:
@@ -88,6 +99,7 @@ class Simulation:
             section=self.config.outputs.section,
             section_points=self.config.outputs.section_points,
             lyapunov=self.config.outputs.lyapunov,
+            crossings=self.splits_steps,
             several_starts=self.starts > 1,
             status_meanings=[status.name.lower() for status in STATUS_TEXTS],
         )
@@ -207,6 +219,13 @@ class Simulation:
             "diverged_period": outcome.diverged_period,
             "end_state": outcome.end_state[:, [STATE_ROWS[name] for name in self.states]],
         }
+        if self.splits_steps:
+            sound = outcome.status == Status.OK
+            crossings = outcome.crossings / self.plan.recorded_periods
+            arrays["crossings_per_period"] = np.where(sound, crossings, np.nan)
+            slowest = np.where(outcome.crossings > 0, outcome.slowest_crossing, np.nan)
+            arrays["slowest_crossing"] = np.where(sound, slowest, np.nan)
+            arrays["unsplit_steps"] = outcome.overflows
         for column, name in enumerate(self.plan.section_states):
             arrays[f"section_{name}"] = outcome.section[:, :, column]
         if outcome.growth is not None:

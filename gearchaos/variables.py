@@ -38,7 +38,7 @@ class Variable:
         Names of the dimensions; the first one of everything that differs from lane to lane is
         the axis of the sweep.
     dtype : str
-        ``"float64"``, ``"int32"``, ``"uint8"`` or ``"str"``.
+        ``"float64"``, ``"int64"``, ``"int32"``, ``"uint8"`` or ``"str"``.
     units, long_name, symbol : str
         Unit (``"1"`` where dimensionless), wording and mathtext symbol for axis labels.
     fill_value : float or int, optional
@@ -88,6 +88,7 @@ def sweep_variables(
     lyapunov: bool,
     several_starts: bool,
     status_meanings: Sequence[str],
+    crossings: bool = False,
 ) -> list[Variable]:
     """List the variables of a sweep in the order of the file.
 
@@ -105,6 +106,8 @@ def sweep_variables(
         Mesh periods recorded.
     lyapunov : bool
         Whether the largest Lyapunov exponent is computed.
+    crossings : bool
+        Whether steps are split at clearance boundaries, and their crossings counted.
     several_starts : bool
         Whether each parameter value has several lanes that differ in their start.
     status_meanings : sequence of str
@@ -136,6 +139,15 @@ def sweep_variables(
         variables += [
             Variable(name, (lane,), "float64", "1", text, r"$\lambda_1$", nan),
             Variable(error, (lane,), "float64", "1", error_text, r"$s_{\lambda_1}$", nan),
+        ]
+    if crossings:
+        text = "clearance boundaries crossed per mesh period, tangential and axial together"
+        slow = "smallest speed of a gap at a crossing of its clearance boundary"
+        unsplit = "steps with more crossings than they were split at"
+        variables += [
+            Variable("crossings_per_period", (lane,), "float64", "1", text, "", nan),
+            Variable("slowest_crossing", (lane,), "float64", "1", slow, "", nan),
+            Variable("unsplit_steps", (lane,), "int64", "1", unsplit),
         ]
     flags = tuple("_".join(meaning.split()) for meaning in status_meanings)
     diverged = "mesh period in which the lane diverged, -1 where it did not"

@@ -142,7 +142,12 @@ class Sweep(Table):
 class Integration(Table):
     """Runge-Kutta of order 4 on a fixed grid over the mesh period."""
 
-    steps_per_period: int = key("steps per mesh period", default=288, ge=1, le=1_000_000)
+    steps_per_period: int = key("steps per mesh period", default=200, ge=1, le=1_000_000)
+    crossings: Literal["resolved", "plain"] = key(
+        "whether a step that crosses a clearance boundary is split there, which keeps the order "
+        "of the method, or is a plain step",
+        default="resolved",
+    )
     transient_periods: int = key(
         "mesh periods discarded before anything is recorded", default=500, ge=0, le=1_000_000_000
     )

@@ -9,8 +9,9 @@ from numba import prange
 from numpy.typing import NDArray
 
 from gearchaos_kernels.block_loop import integrate_block
-from gearchaos_kernels.coefficients import Model, lane_coefficients, phase_table, state_scales
+from gearchaos_kernels.coefficients import Model, lane_coefficients, state_scales
 from gearchaos_kernels.compilation import driver
+from gearchaos_kernels.forcing import phase_table
 from gearchaos_kernels.lane import LANES, STATES
 from gearchaos_kernels.status import Status
 
@@ -40,7 +41,12 @@ class Scene(NamedTuple):
 
 
 class Plan(NamedTuple):
-    """How long and how finely a batch is integrated, and what is kept of it."""
+    """How long and how finely a batch is integrated, and what is kept of it.
+
+    ``resolved`` splits the steps that cross a clearance boundary; without it they are plain steps.
+    ``steps_between_scalings`` keeps the tangent vector within the range of numbers over long
+    periods (see `coefficients.steps_between_scalings`); 0 scales it once a period.
+    """
 
     steps_per_period: int
     transient_periods: int
@@ -48,6 +54,8 @@ class Plan(NamedTuple):
     section_points: int
     section_states: tuple[str, ...] = ()
     tangent: bool = False
+    resolved: bool = True
+    steps_between_scalings: int = 0
 
 
 class Outcome(NamedTuple):
@@ -55,15 +63,23 @@ class Outcome(NamedTuple):
 
     ``section`` (lanes, section points, section states), ``growth`` (lanes, recorded periods): the
     logarithm of the tangent vector's growth over each recorded period, None without tangent;
-    ``end_state`` (lanes, 10) in the columns of `STATE_ROWS`; ``status`` (lanes,) of `Status`;
-    ``diverged_period`` (lanes,): number of the period in which a lane diverged, or -1.
+    ``end_state``, ``end_tangent`` (lanes, 10) in the columns of `STATE_ROWS`; ``status`` (lanes,)
+    of `Status`; ``diverged_period`` (lanes,): number of the period in which a lane diverged, or -1;
+    ``crossings`` (lanes,): clearance boundaries crossed in the recorded periods;
+    ``slowest_crossing`` (lanes,): smallest speed of y_1 or y_2 at one of them, or infinity;
+    ``overflows`` (lanes,): steps that crossed more often than they were split, in all periods.
+    The last three stay as they began in scenes without backlash and with plain steps.
     """
 
     section: NDArray[np.float64]
     growth: NDArray[np.float64] | None
     end_state: NDArray[np.float64]
+    end_tangent: NDArray[np.float64]
     status: NDArray[np.uint8]
     diverged_period: NDArray[np.int32]
+    crossings: NDArray[np.int64]
+    slowest_crossing: NDArray[np.float64]
+    overflows: NDArray[np.int64]
 
 
 @driver
@@ -75,18 +91,24 @@ def _integrate_blocks(
     table,
     transient_periods,
     recorded_periods,
+    steps_between_scalings,
     section_states,
     pitch_error,
     phase,
     stiffness_variation,
     backlash,
+    resolved,
     transverse,
     axial,
     section,
     growth,
     end_state,
+    end_tangent,
     status,
     diverged_period,
+    crossings,
+    slowest_crossing,
+    overflows,
 ):
     for number in prange((status.shape[0] + LANES - 1) // LANES):
         integrate_block(
@@ -98,18 +120,24 @@ def _integrate_blocks(
             table,
             transient_periods,
             recorded_periods,
+            steps_between_scalings,
             section_states,
             pitch_error,
             phase,
             stiffness_variation,
             backlash,
+            resolved,
             transverse,
             axial,
             section,
             growth,
             end_state,
+            end_tangent,
             status,
             diverged_period,
+            crossings,
+            slowest_crossing,
+            overflows,
         )
 
 
@@ -122,6 +150,7 @@ def integrate(
     plan: Plan,
     *,
     rederived: bool = False,
+    tangent_start: NDArray[np.float64] | None = None,
 ) -> Outcome:
     """Integrate a batch of lanes with fixed-step RK4 from tau = 0.
 
@@ -139,6 +168,8 @@ def integrate(
         Steps, periods and what is kept.
     rederived : bool
         Which form of eq. 6 holds (see `coefficients.lane_coefficients`).
+    tangent_start : ndarray, shape (lanes, 10), optional
+        Tangent vectors at tau = 0; by default an equal share of every state that the scene has.
 
     Returns
     -------
@@ -147,30 +178,35 @@ def integrate(
     """
     lanes = start.shape[0]
     steps = plan.steps_per_period
+    present = np.tile(np.repeat([True, scene.transverse, scene.axial], [1, 2, 2]), 2)
+    if tangent_start is None:
+        tangent_start = np.ones((lanes, STATES)) / np.sqrt(np.count_nonzero(present))
     outcome = Outcome(
         section=np.full((lanes, plan.section_points, len(plan.section_states)), np.nan),
         growth=np.full((lanes, plan.recorded_periods), np.nan) if plan.tangent else None,
         end_state=np.full((lanes, STATES), np.nan),
+        end_tangent=np.full((lanes, STATES), np.nan),
         status=np.full(lanes, Status.OK, dtype=np.uint8),
         diverged_period=np.full(lanes, -1, dtype=np.int32),
+        crossings=np.zeros(lanes, dtype=np.int64),
+        slowest_crossing=np.full(lanes, np.inf),
+        overflows=np.zeros(lanes, dtype=np.int64),
     )
-    present = np.repeat([True, scene.transverse, scene.axial], [1, 2, 2])
-    present = np.tile(present, 2)
-    # An equal share of every state the scene has: no special direction.
-    tangent_start = present / np.sqrt(np.count_nonzero(present))
     _integrate_blocks(
         lane_coefficients(model, steps, rederived),
         state_scales(model, steps),
         np.where(present, start, 0.0),
-        tangent_start,
+        np.where(present, tangent_start, 0.0),
         phase_table(stiffness_cosine, stiffness_sine, steps),
         plan.transient_periods,
         plan.recorded_periods,
+        plan.steps_between_scalings or steps,
         np.array([STATE_ROWS[name] for name in plan.section_states], dtype=np.intp),
         _flag(scene.pitch_error),
         _flag(scene.pitch_error and bool(np.any(model.error_phase))),
         _flag(scene.stiffness_variation),
         _flag(scene.backlash),
+        _flag(scene.backlash and plan.resolved),
         _flag(scene.transverse),
         _flag(scene.axial),
         *outcome,

@@ -1,8 +1,9 @@
 """One block of lanes through all its mesh periods, on one thread.
 
 The inner loop runs over lanes and its body is a whole step in plain local numbers: this is what
-the compiler turns into vector instructions. Everything done once per mesh period (section,
-renormalisation, check for divergence) stands outside it.
+the compiler turns into vector instructions. What is done once per mesh period (section,
+renormalisation, check for divergence) stands outside it, and so does the splitting of the few
+steps that cross a clearance boundary.
 """
 
 from __future__ import annotations
@@ -12,22 +13,35 @@ import math
 import numpy as np
 
 from gearchaos_kernels.compilation import CACHE_LINE, align_stack, block, scalar
+from gearchaos_kernels.contact import Branches, branch_at, may_leave
+from gearchaos_kernels.forcing import forcing_on_grid
 from gearchaos_kernels.lane import (
+    BEFORE,
     COEFFICIENT,
+    COORDINATES,
+    GROWTH,
     LANES,
     POSITION,
     RATE,
     ROWS,
     STATES,
     STRIDE,
+    SUSPECT,
+    TANGENT,
     TANGENT_POSITION,
     TANGENT_RATE,
     read,
     read_lane,
     write,
 )
-from gearchaos_kernels.motion import forcing_at
+from gearchaos_kernels.motion import (
+    axial_gap,
+    axial_gap_rate,
+    tangential_gap,
+    tangential_gap_rate,
+)
 from gearchaos_kernels.rk4 import step, tangent_step
+from gearchaos_kernels.splitting import split_step
 from gearchaos_kernels.status import Status
 
 LARGEST_STATE = 1e100
@@ -38,6 +52,191 @@ _DIVERGED = int(Status.DIVERGED)
 _ITEM = 8
 
 
+@block
+def integrate_block(
+    first,
+    coefficients,
+    scales,
+    start,
+    tangent_start,
+    table,
+    transient_periods,
+    recorded_periods,
+    steps_between_scalings,
+    section_states,
+    pitch_error,
+    phase,
+    stiffness_variation,
+    backlash,
+    resolved,
+    transverse,
+    axial,
+    section,
+    growth,
+    end_state,
+    end_tangent,
+    status,
+    diverged_period,
+    crossings,
+    slowest_crossing,
+    overflows,
+):
+    """Integrate lanes ``first`` to ``first + LANES``; see `batch.integrate` for the arrays."""
+    align_stack()
+    memory = aligned_memory()
+    last = status.shape[0] - 1
+    lanes = min(LANES, last + 1 - first)
+    steps = (table.shape[0] - 1) // 2
+    periods = transient_periods + recorded_periods
+    first_point = periods - section.shape[1]
+
+    for slot in range(LANES):
+        # A block that is not full repeats the last lane, and nothing of that is stored.
+        lane = min(first + slot, last)
+        for row in range(STATES):
+            memory[row * STRIDE + slot] = start[lane, row] / scales[lane, row]
+            memory[(TANGENT + row) * STRIDE + slot] = tangent_start[lane, row] / scales[lane, row]
+        for row in range(coefficients.shape[1]):
+            memory[(COEFFICIENT + row) * STRIDE + slot] = coefficients[lane, row]
+        memory[GROWTH * STRIDE + slot] = 0.0
+
+    for period in range(periods):
+        for number in range(steps):
+            suspects = 0
+            for slot in range(LANES):
+                lane = read_lane(memory, slot)
+                y = read(memory, POSITION, slot, transverse, axial)
+                w = read(memory, RATE, slot, transverse, axial)
+                begin = forcing_on_grid(
+                    lane,
+                    table,
+                    2 * number,
+                    pitch_error,
+                    phase,
+                    stiffness_variation,
+                    axial,
+                )
+                middle = forcing_on_grid(
+                    lane,
+                    table,
+                    2 * number + 1,
+                    pitch_error,
+                    phase,
+                    stiffness_variation,
+                    axial,
+                )
+                end = forcing_on_grid(
+                    lane,
+                    table,
+                    2 * number + 2,
+                    pitch_error,
+                    phase,
+                    stiffness_variation,
+                    axial,
+                )
+                if resolved is None:
+                    y_end, w_end, slopes = step(
+                        y,
+                        w,
+                        1.0,
+                        lane,
+                        begin,
+                        middle,
+                        end,
+                        None,
+                        backlash,
+                        transverse,
+                        axial,
+                    )
+                else:
+                    y_end, w_end, slopes, suspect = step_on_branches(
+                        y, w, lane, begin, middle, end, transverse, axial
+                    )
+                    suspects += suspect
+                    memory[SUSPECT * STRIDE + slot] = suspect
+                    write(memory, BEFORE + POSITION, slot, y, transverse, axial)
+                    write(memory, BEFORE + RATE, slot, w, transverse, axial)
+                write(memory, POSITION, slot, y_end, transverse, axial)
+                write(memory, RATE, slot, w_end, transverse, axial)
+                if growth is not None:
+                    dy = read(memory, TANGENT_POSITION, slot, transverse, axial)
+                    dw = read(memory, TANGENT_RATE, slot, transverse, axial)
+                    if resolved is not None:
+                        write(
+                            memory,
+                            BEFORE + TANGENT_POSITION,
+                            slot,
+                            dy,
+                            transverse,
+                            axial,
+                        )
+                        write(memory, BEFORE + TANGENT_RATE, slot, dw, transverse, axial)
+                    dy, dw = tangent_step(dy, dw, 1.0, lane, slopes, transverse, axial)
+                    write(memory, TANGENT_POSITION, slot, dy, transverse, axial)
+                    write(memory, TANGENT_RATE, slot, dw, transverse, axial)
+            if resolved is not None:
+                if suspects > 0:
+                    for slot in range(lanes):
+                        if memory[SUSPECT * STRIDE + slot] == 0.0:
+                            continue
+                        lane = first + slot
+                        # The rates of the gaps are those of delta_5 and (delta_3 - delta_4).
+                        count, slowest, overflow = split_step(
+                            memory,
+                            slot,
+                            table,
+                            number,
+                            scales[lane, COORDINATES],
+                            axial_speed(scales[lane], coefficients[lane]),
+                            pitch_error,
+                            phase,
+                            stiffness_variation,
+                            transverse,
+                            axial,
+                            growth,
+                        )
+                        overflows[lane] += overflow
+                        if period >= transient_periods:
+                            crossings[lane] += count
+                            slowest_crossing[lane] = min(slowest_crossing[lane], slowest)
+
+            if growth is not None:
+                if (number + 1) % steps_between_scalings == 0 or number == steps - 1:
+                    for slot in range(lanes):
+                        logarithm = renormalise(memory, slot, scales[first + slot])
+                        memory[GROWTH * STRIDE + slot] += logarithm
+
+        for slot in range(lanes):
+            lane = first + slot
+            if status[lane] != _OK:
+                continue
+            sound = within_range(memory, slot, scales[lane])
+            if growth is not None:
+                sound = sound and math.isfinite(memory[GROWTH * STRIDE + slot])
+            if not sound:
+                status[lane] = _DIVERGED
+                diverged_period[lane] = period
+                for row in range(COEFFICIENT):
+                    memory[row * STRIDE + slot] = math.nan
+                continue
+            if period >= first_point:
+                for variable in range(section_states.shape[0]):
+                    row = section_states[variable]
+                    section[lane, period - first_point, variable] = (
+                        memory[row * STRIDE + slot] * scales[lane, row]
+                    )
+            if growth is not None:
+                if period >= transient_periods:
+                    growth[lane, period - transient_periods] = memory[GROWTH * STRIDE + slot]
+                memory[GROWTH * STRIDE + slot] = 0.0
+
+    for slot in range(lanes):
+        lane = first + slot
+        for row in range(STATES):
+            end_state[lane, row] = memory[row * STRIDE + slot] * scales[lane, row]
+            end_tangent[lane, row] = memory[(TANGENT + row) * STRIDE + slot] * scales[lane, row]
+
+
 @scalar
 def aligned_memory():
     """Return memory for one block that starts on a cache line."""
@@ -46,106 +245,35 @@ def aligned_memory():
     return memory[misfit : misfit + ROWS * STRIDE]
 
 
-@block
-def integrate_block(
-    first,
-    coefficients,
-    scales,
-    start,
-    tangent_start,
-    phase_table,
-    transient_periods,
-    recorded_periods,
-    section_states,
-    pitch_error,
-    phase,
-    stiffness_variation,
-    backlash,
-    transverse,
-    axial,
-    section,
-    growth,
-    end_state,
-    status,
-    diverged_period,
-):
-    """Integrate lanes ``first`` to ``first + LANES``; see `batch.integrate` for the arrays."""
-    align_stack()
-    memory = aligned_memory()
-    last = status.shape[0] - 1
-    steps = (phase_table.shape[1] - 1) // 2
-    points = section.shape[1]
-    periods = transient_periods + recorded_periods
+@scalar
+def step_on_branches(y, w, lane, begin, middle, end, transverse, axial):
+    """Advance one lane on the contact branches on which it is, and tell if it may leave them."""
+    b = lane.half_backlash
+    gap0 = tangential_gap(y, lane, begin, transverse)
+    gap0_z = 0.0
+    if axial is not None:
+        gap0_z = axial_gap(y, gap0, lane, begin)
+    branches = Branches(branch_at(gap0, b), branch_at(gap0_z, b))
+    y_end, w_end, slopes = step(
+        y, w, 1.0, lane, begin, middle, end, branches, None, transverse, axial
+    )
+    gap1 = tangential_gap(y_end, lane, end, transverse)
+    rate0 = tangential_gap_rate(w, lane, begin, transverse)
+    rate1 = tangential_gap_rate(w_end, lane, end, transverse)
+    suspect = may_leave(gap0, rate0, gap1, rate1, b)
+    if axial is not None:
+        gap1_z = axial_gap(y_end, gap1, lane, end)
+        rate0_z = axial_gap_rate(w, rate0, 1.0, lane, begin)
+        rate1_z = axial_gap_rate(w_end, rate1, 1.0, lane, end)
+        suspect = suspect | may_leave(gap0_z, rate0_z, gap1_z, rate1_z, b)
+    return y_end, w_end, slopes, 1 if suspect else 0
 
-    for slot in range(LANES):
-        # A block that is not full repeats the last lane, and nothing of it is stored.
-        lane = min(first + slot, last)
-        for row in range(STATES):
-            memory[row * STRIDE + slot] = start[lane, row] / scales[lane, row]
-            if growth is not None:
-                memory[(STATES + row) * STRIDE + slot] = tangent_start[row] / scales[lane, row]
-        for row in range(coefficients.shape[1]):
-            memory[(COEFFICIENT + row) * STRIDE + slot] = coefficients[lane, row]
 
-    for period in range(periods):
-        for number in range(steps):
-            column = 2 * number
-            variation0 = phase_table[0, column]
-            variation1 = phase_table[0, column + 1]
-            variation2 = phase_table[0, column + 2]
-            sine0 = phase_table[1, column]
-            sine1 = phase_table[1, column + 1]
-            sine2 = phase_table[1, column + 2]
-            cosine0 = phase_table[2, column]
-            cosine1 = phase_table[2, column + 1]
-            cosine2 = phase_table[2, column + 2]
-            for slot in range(LANES):
-                lane = read_lane(memory, slot)
-                y = read(memory, POSITION, slot, transverse, axial)
-                w = read(memory, RATE, slot, transverse, axial)
-                begin = forcing_at(
-                    lane, variation0, sine0, cosine0, pitch_error, phase, stiffness_variation, axial
-                )
-                middle = forcing_at(
-                    lane, variation1, sine1, cosine1, pitch_error, phase, stiffness_variation, axial
-                )
-                end = forcing_at(
-                    lane, variation2, sine2, cosine2, pitch_error, phase, stiffness_variation, axial
-                )
-                y, w, slopes = step(y, w, lane, begin, middle, end, backlash, transverse, axial)
-                write(memory, POSITION, slot, y, transverse, axial)
-                write(memory, RATE, slot, w, transverse, axial)
-                if growth is not None:
-                    dy = read(memory, TANGENT_POSITION, slot, transverse, axial)
-                    dw = read(memory, TANGENT_RATE, slot, transverse, axial)
-                    dy, dw = tangent_step(dy, dw, lane, slopes, transverse, axial)
-                    write(memory, TANGENT_POSITION, slot, dy, transverse, axial)
-                    write(memory, TANGENT_RATE, slot, dw, transverse, axial)
-
-        point = period + 1 - (periods - points) - 1
-        for slot in range(min(LANES, last + 1 - first)):
-            lane = first + slot
-            if status[lane] != _OK:
-                continue
-            if not within_range(memory, slot, scales[lane]):
-                status[lane] = _DIVERGED
-                diverged_period[lane] = period
-                for row in range(2 * STATES):
-                    memory[row * STRIDE + slot] = math.nan
-                continue
-            if point >= 0:
-                for variable in range(section_states.shape[0]):
-                    row = section_states[variable]
-                    section[lane, point, variable] = memory[row * STRIDE + slot] * scales[lane, row]
-            if growth is not None:
-                logarithm = renormalise(memory, slot, scales[lane])
-                if period >= transient_periods:
-                    growth[lane, period - transient_periods] = logarithm
-
-    for slot in range(min(LANES, last + 1 - first)):
-        lane = first + slot
-        for row in range(STATES):
-            end_state[lane, row] = memory[row * STRIDE + slot] * scales[lane, row]
+@scalar
+def axial_speed(scale, coefficients):
+    """Return what turns the rate of the axial gap into that of y_2."""
+    # scale is sin(beta_b) mu_p over the step; mu_p is the first coefficient of a lane.
+    return scale[COORDINATES + 3] / coefficients[0]
 
 
 @scalar
@@ -162,8 +290,8 @@ def renormalise(memory, slot, scale):
     """Scale the tangent vector to length 1 and return the logarithm of its length before."""
     square = 0.0
     for row in range(STATES):
-        square += (memory[(STATES + row) * STRIDE + slot] * scale[row]) ** 2
+        square += (memory[(TANGENT + row) * STRIDE + slot] * scale[row]) ** 2
     length = math.sqrt(square)
     for row in range(STATES):
-        memory[(STATES + row) * STRIDE + slot] /= length
+        memory[(TANGENT + row) * STRIDE + slot] /= length
     return math.log(length)

@@ -15,6 +15,9 @@ from gearchaos_kernels.lane import STATES, Lane
 
 Floats = NDArray[np.float64]
 
+LARGEST_EXPONENT = 200.0
+"""Natural logarithm of the growth or decay allowed between scalings; numbers end near 700."""
+
 
 class Model(NamedTuple):
     """Dimensionless groups of a batch, each an array of shape (lanes,).
@@ -106,23 +109,24 @@ def lane_coefficients(model: Model, steps_per_period: int, rederived: bool) -> F
     return np.stack(np.broadcast_arrays(*lane), axis=1).astype(np.float64)
 
 
-def phase_table(cosine: Floats, sine: Floats, steps_per_period: int) -> Floats:
-    """Return stiffness variation, sine and cosine of the mesh phase at every half step.
+def steps_between_scalings(model: Model, steps_per_period: int) -> int:
+    """Return after how many steps the tangent vector is to be scaled back to length 1.
 
-    Parameters
-    ----------
-    cosine, sine : ndarray, shape (harmonics,)
-        Fourier coefficients of the mesh stiffness relative to its mean (eq. 19).
-    steps_per_period : int
-        Steps of one mesh period.
-
-    Returns
-    -------
-    ndarray, shape (3, 2 steps + 1)
-        The last column repeats the first: the phase starts anew with every period.
+    Between two scalings it must neither overflow nor vanish. Its rate of growth or decay is bounded
+    by the damping and by the square root of the largest stiffness of the mesh, as one direction
+    feels it; bearings only exchange energy and dissipate it.
     """
-    half_steps = np.arange(2 * steps_per_period + 1) % (2 * steps_per_period)
-    angle = np.pi * half_steps / steps_per_period
-    order = np.arange(1, len(cosine) + 1)[:, np.newaxis]
-    variation = cosine @ np.cos(order * angle) + sine @ np.sin(order * angle)
-    return np.stack([variation, np.sin(angle), np.cos(angle)])
+    bearings = np.maximum.reduce(
+        [
+            model.transverse_damping_p,
+            model.transverse_damping_g,
+            model.axial_damping_p,
+            model.axial_damping_g,
+        ]
+    )
+    feels = 1.0 + model.mass_ratio_p + model.mass_ratio_g
+    damping = 2.0 * model.damping_ratio * feels + 2.0 * bearings
+    rate = np.max(damping + np.sqrt(feels * (1.0 + np.abs(model.stiffness_variation_scale))))
+    period = 2.0 * np.pi / np.min(model.mesh_frequency)
+    scalings = int(np.ceil(rate * period / LARGEST_EXPONENT))
+    return max(1, steps_per_period // scalings)

@@ -11,7 +11,9 @@ Every flag is named here and nowhere else. Two facts about Numba shape this file
 
 from __future__ import annotations
 
+import atexit
 import hashlib
+import shutil
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
@@ -56,7 +58,9 @@ def cache_folder() -> Path:
         with tempfile.TemporaryFile(dir=folder):
             return folder
     except OSError:
-        return Path(tempfile.mkdtemp(prefix="gearchaos-"))
+        private = Path(tempfile.mkdtemp(prefix="gearchaos-"))
+        atexit.register(shutil.rmtree, private, ignore_errors=True)
+        return private
 
 
 def widest_vectors() -> str:

@@ -34,7 +34,13 @@ POSITION, RATE, TANGENT_POSITION, TANGENT_RATE = 0, 5, 10, 15
 """First row of each group of coordinates, in the order of `Coordinates`."""
 
 STATES = 2 * COORDINATES
-COEFFICIENT = 4 * COORDINATES
+TANGENT = STATES
+"""First row of the tangent vector."""
+
+BEFORE = 2 * STATES
+"""First row of a copy of all that, as it was before the step."""
+
+COEFFICIENT = 2 * BEFORE
 """First row of the coefficients, in the order of `Lane`."""
 
 
@@ -81,7 +87,13 @@ class Lane(NamedTuple):
     sin_phase: Number
 
 
-ROWS = COEFFICIENT + len(Lane._fields)
+SUSPECT = COEFFICIENT + len(Lane._fields)
+"""Row that marks the lanes whose step may have left a contact branch."""
+
+GROWTH = SUSPECT + 1
+"""Row of the logarithm of the tangent vector's growth since the period began."""
+
+ROWS = GROWTH + 1
 
 
 @scalar

@@ -18,48 +18,11 @@ from gearchaos_kernels.compilation import scalar
 from gearchaos_kernels.lane import Coordinates
 
 
-class Forcing(NamedTuple):
-    """What acts on a lane at one instant; what a scene leaves out is the constant 0."""
-
-    stiffness: float
-    drive: float
-    error: float
-    error_rate: float
-    axial_error: float
-    axial_error_rate: float
-
-
 class Slopes(NamedTuple):
     """Stiffness of the active contact branch in the two directions: d(mesh force)/d(gap)."""
 
     tangential: float
     axial: float
-
-
-@scalar
-def forcing_at(lane, variation, sine, cosine, pitch_error, phase, stiffness_variation, axial):
-    """Return mesh stiffness (eq. 19), load and pitch error (eq. 14) at one tabulated instant."""
-    stiffness = lane.mean_stiffness
-    if stiffness_variation is not None:
-        stiffness = lane.mean_stiffness + lane.stiffness_variation * variation
-    drive = lane.load
-    error = 0.0
-    error_rate = 0.0
-    axial_error = 0.0
-    axial_error_rate = 0.0
-    if pitch_error is not None:
-        if phase is not None:
-            shifted = lane.cos_phase * sine + lane.sin_phase * cosine
-            cosine = lane.cos_phase * cosine - lane.sin_phase * sine
-            sine = shifted
-        # -e'' = Omega^2 e of the sine drives delta_5, which is measured from e (eq. 13).
-        drive = lane.load + lane.error_inertia * sine
-        error = lane.error_mean + lane.error_amplitude * sine
-        error_rate = lane.error_rate * cosine
-        if axial is not None:
-            axial_error = lane.axial_error_mean + lane.axial_error_amplitude * sine
-            axial_error_rate = lane.axial_error_rate * cosine
-    return Forcing(stiffness, drive, error, error_rate, axial_error, axial_error_rate)
 
 
 @scalar
@@ -70,6 +33,13 @@ def mesh_force(gap, gap_rate, stiffness, damping, half_backlash, backlash):
     deflection = gap - min(max(gap, -half_backlash), half_backlash)
     slope = stiffness if deflection != 0.0 else 0.0
     return stiffness * deflection + damping * gap_rate, slope
+
+
+@scalar
+def branch_force(gap, gap_rate, stiffness, damping, branch):
+    """Return the mesh force and its stiffness on one linear piece of the clearance function."""
+    deflection = branch.engaged * gap - branch.offset
+    return stiffness * deflection + damping * gap_rate, stiffness * branch.engaged
 
 
 @scalar
@@ -118,24 +88,63 @@ def respond(position, rate, force_y, force_z, drive, lane, transverse, axial):
 
 
 @scalar
-def accelerations(position, rate, lane, forcing, backlash, transverse, axial):
-    """Return the accelerations of eq. 13 and the slopes of the active contact branches."""
-    gap = approach(position, lane, transverse) - forcing.error
-    gap_rate = approach(rate, lane, transverse) - forcing.error_rate
-    force_y, slope_y = mesh_force(
-        gap, gap_rate, forcing.stiffness, lane.mesh_damping, lane.half_backlash, backlash
-    )
-    force_z = 0.0
-    slope_z = 0.0
-    if axial is not None:
-        force_z, slope_z = mesh_force(
-            axial_approach(position, lane) - gap - forcing.axial_error,
-            axial_approach(rate, lane) - gap_rate - forcing.axial_error_rate,
-            lane.axial_share * forcing.stiffness,
-            lane.axial_share * lane.mesh_damping,
+def tangential_gap(position, lane, forcing, transverse):
+    """Return y_1 (eq. 6) over cos(beta_b)."""
+    return approach(position, lane, transverse) - forcing.error
+
+
+@scalar
+def tangential_gap_rate(rate, lane, forcing, transverse):
+    """Return the rate of y_1 over cos(beta_b), per step."""
+    return approach(rate, lane, transverse) - forcing.error_rate
+
+
+@scalar
+def axial_gap(position, gap, lane, forcing):
+    """Return y_2 (eq. 7) over sin(beta_b) from the tangential gap at the same instant."""
+    return axial_approach(position, lane) - gap - forcing.axial_error
+
+
+@scalar
+def axial_gap_rate(rate, gap_rate, length, lane, forcing):
+    """Return the rate of y_2 over sin(beta_b) from that of y_1, per so many steps."""
+    return length * (axial_approach(rate, lane) - forcing.axial_error_rate) - gap_rate
+
+
+@scalar
+def accelerations(position, rate, lane, forcing, branches, backlash, transverse, axial):
+    """Return the accelerations of eq. 13 and the slopes of the active contact branches.
+
+    Without ``branches`` the clearance function itself is evaluated.
+    """
+    gap = tangential_gap(position, lane, forcing, transverse)
+    gap_rate = tangential_gap_rate(rate, lane, forcing, transverse)
+    if branches is None:
+        force_y, slope_y = mesh_force(
+            gap,
+            gap_rate,
+            forcing.stiffness,
+            lane.mesh_damping,
             lane.half_backlash,
             backlash,
         )
+    else:
+        force_y, slope_y = branch_force(
+            gap, gap_rate, forcing.stiffness, lane.mesh_damping, branches.tangential
+        )
+    force_z = 0.0
+    slope_z = 0.0
+    if axial is not None:
+        gap_z = axial_gap(position, gap, lane, forcing)
+        gap_rate_z = axial_gap_rate(rate, gap_rate, 1.0, lane, forcing)
+        stiffness = lane.axial_share * forcing.stiffness
+        damping = lane.axial_share * lane.mesh_damping
+        if branches is None:
+            force_z, slope_z = mesh_force(
+                gap_z, gap_rate_z, stiffness, damping, lane.half_backlash, backlash
+            )
+        else:
+            force_z, slope_z = branch_force(gap_z, gap_rate_z, stiffness, damping, branches.axial)
     acceleration = respond(position, rate, force_y, force_z, forcing.drive, lane, transverse, axial)
     return acceleration, Slopes(slope_y, slope_z)
 

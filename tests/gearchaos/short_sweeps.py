@@ -3,7 +3,7 @@
 from pathlib import Path
 
 import numpy as np
-from gearchaos_kernels import STATE_ROWS, Plan, Scene, integrate
+from gearchaos_kernels import STATE_ROWS, Scene, integrate
 
 from gearchaos.configuration import load_config
 from gearchaos.lanes import model, select, start_states
@@ -63,7 +63,7 @@ def kernel(sweep: Simulation, value: int, start: np.ndarray) -> np.ndarray:
         np.asarray(sweep.groups.stiffness_cosine),
         np.asarray(sweep.groups.stiffness_sine),
         start[np.newaxis],
-        Plan(96, 6, 12, 8, ("delta_5",), True),
+        sweep.plan,
     )
     return outcome.end_state[0]
 

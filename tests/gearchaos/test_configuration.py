@@ -95,7 +95,8 @@ def test_the_resolved_toml_states_every_default(text):
     config = Configuration.from_toml(text)
     tables = tomllib.loads(config.resolved_toml())
     assert tables["integration"] == {
-        "steps_per_period": 288,
+        "steps_per_period": 200,
+        "crossings": "resolved",
         "transient_periods": 500,
         "recorded_periods": 500,
     }
@@ -217,7 +218,7 @@ def test_a_configuration_cannot_be_changed_but_replaced():
     config = Configuration.from_toml(SMALLEST)
     finer = config.replace("integration.steps_per_period", 500)
     assert finer.integration.steps_per_period == 500
-    assert config.integration.steps_per_period == 288
+    assert config.integration.steps_per_period == 200
     assert finer != config
     with pytest.raises(ValueError, match="frozen"):
         config.integration.steps_per_period = 500

@@ -106,17 +106,18 @@ def run(
     section: tuple[str, ...] = STATES,
     tangent: bool = True,
     rederived: bool = False,
+    resolved: bool = False,
 ) -> Outcome:
     """Integrate Pan 2021's mesh stiffness, by default keeping every state after every period.
 
     The tangent vector is on unless a test is about the plain loop: one compiled scene then serves
-    many tests.
+    many tests. Steps are plain ones unless ``resolved`` splits those that cross a clearance.
     """
     lanes = model.load.size
     rest = np.zeros((lanes, len(STATE_ROWS)))
     start = rest if start is None else np.broadcast_to(start, rest.shape)
     points = transient + periods if points is None else points
-    plan = Plan(steps, transient, periods, points, section, tangent)
+    plan = Plan(steps, transient, periods, points, section, tangent, resolved)
     return integrate(scene, model, COSINE, SINE, start, plan, rederived=rederived)
 
 

@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 from gearchaos_kernels import Outcome, Scene
 from gearchaos_kernels.block_loop import integrate_block
-from gearchaos_kernels.coefficients import lane_coefficients, phase_table, state_scales
+from gearchaos_kernels.coefficients import lane_coefficients, state_scales
+from gearchaos_kernels.forcing import phase_table
 
 from .reference import COSINE, FULL, SINE, pan2021
 
@@ -26,15 +27,19 @@ WIDE = ("ymm", "zmm")
 TORSION = Scene(*[False] * len(Scene._fields))
 
 
-def arguments(scene: Scene, tangent: bool) -> tuple:
+def arguments(scene: Scene, tangent: bool, resolved: bool) -> tuple:
     """Return what the driver hands to the block loop for a single lane."""
     model, steps = pan2021(1.0), 4
     outcome = Outcome(
         section=np.zeros((1, 1, 1)),
         growth=np.zeros((1, 1)) if tangent else None,
         end_state=np.zeros((1, 10)),
+        end_tangent=np.zeros((1, 10)),
         status=np.zeros(1, dtype=np.uint8),
         diverged_period=np.zeros(1, dtype=np.int32),
+        crossings=np.zeros(1, dtype=np.int64),
+        slowest_crossing=np.zeros(1),
+        overflows=np.zeros(1, dtype=np.int64),
     )
     flags = {effect: () if present else None for effect, present in scene._asdict().items()}
     return (
@@ -42,15 +47,17 @@ def arguments(scene: Scene, tangent: bool) -> tuple:
         lane_coefficients(model, steps, False),
         state_scales(model, steps),
         np.zeros((1, 10)),
-        np.ones(10),
+        np.ones((1, 10)),
         phase_table(COSINE, SINE, steps),
         0,
         1,
+        steps,
         np.zeros(1, dtype=np.intp),
         flags["pitch_error"],
         None,
         flags["stiffness_variation"],
         flags["backlash"],
+        flags["backlash"] if resolved else None,
         flags["transverse"],
         flags["axial"],
         *outcome,
@@ -58,10 +65,10 @@ def arguments(scene: Scene, tangent: bool) -> tuple:
 
 
 @functools.cache
-def instructions(scene: Scene, tangent: bool) -> Counter[tuple[str, str]]:
+def instructions(scene: Scene, tangent: bool, resolved: bool = False) -> Counter[tuple[str, str]]:
     """Count the vector instructions of one compiled scene by mnemonic and register width."""
     # Called directly: the driver may come from the cache and then compiles nothing.
-    given = arguments(scene, tangent)
+    given = arguments(scene, tangent, resolved)
     integrate_block(*given)
     assembly = integrate_block.inspect_asm(tuple(numba.typeof(value) for value in given))
     counts: Counter[tuple[str, str]] = Counter()

@@ -1,0 +1,136 @@
+"""Contact branches of a clearance, and the moment at which a step leaves one.
+
+On one branch the clearance function (eqs 22, 23) is linear, f(x) = engaged x - offset: engaged is 1
+on a flank and 0 between the flanks, offset is +b, -b or 0. A step that stays on its branch meets a
+smooth field, so that the method keeps its order; one that leaves it has to be split where it does.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from gearchaos_kernels.compilation import scalar
+
+NEVER = 2.0
+"""Fraction of a step returned where the step does not leave its branch: beyond its end."""
+
+_REACH = 4.0 / 27.0
+_ITERATIONS = 60
+_LAST_CORRECTION = 1e-6
+"""Newton's method squares the error: after so small a correction it is far below the cubic's."""
+
+
+class Branch(NamedTuple):
+    """One linear piece of the clearance function."""
+
+    engaged: float
+    offset: float
+
+
+class Branches(NamedTuple):
+    """The active pieces of the tangential and of the axial clearance."""
+
+    tangential: Branch
+    axial: Branch
+
+
+@scalar
+def branch_at(gap, half_backlash):
+    """Return the piece on which a gap lies."""
+    engaged = 1.0 if abs(gap) >= half_backlash else 0.0
+    return Branch(engaged, engaged * math.copysign(half_backlash, gap))
+
+
+@scalar
+def next_branch(branch, gap, half_backlash):
+    """Return the piece that follows where a gap leaves one."""
+    if branch.engaged != 0.0:
+        return Branch(0.0, 0.0)
+    return Branch(1.0, math.copysign(half_backlash, gap))
+
+
+@scalar
+def may_leave(gap0, rate0, gap1, rate1, half_backlash):
+    """Tell whether a step may leave its branch, be it for a moment only.
+
+    Rates are per step. A gap that ends on the branch on which it began was outside in between only
+    if it turned around, and a cubic that turns around overshoots its ends by 4/27 of the rates at
+    most.
+    """
+    outside0 = abs(gap0) - half_backlash
+    outside1 = abs(gap1) - half_backlash
+    nearest = min(abs(outside0), abs(outside1))
+    return (
+        ((outside0 >= 0.0) != (outside1 >= 0.0))
+        | ((gap0 * gap1 < 0.0) & (outside0 >= 0.0))
+        | ((rate0 * rate1 < 0.0) & (nearest < _REACH * (abs(rate0) + abs(rate1))))
+    )
+
+
+@scalar
+def leaving_fraction(gap0, rate0, gap1, rate1, branch, half_backlash):
+    """Return the fraction of a step at which the gap leaves its branch, or `NEVER`.
+
+    The gap over the step is the cubic through its values and rates at both ends (rates per step).
+    The field is continuous, so an error of the moment moves the state by its square only.
+    """
+    if half_backlash == 0.0:
+        return NEVER
+    if branch.engaged != 0.0:
+        side = math.copysign(1.0, branch.offset)
+        return first_fall(
+            side * gap0 - half_backlash,
+            side * rate0,
+            side * gap1 - half_backlash,
+            side * rate1,
+        )
+    return min(
+        first_fall(half_backlash - gap0, -rate0, half_backlash - gap1, -rate1),
+        first_fall(half_backlash + gap0, rate0, half_backlash + gap1, rate1),
+    )
+
+
+@scalar
+def first_fall(d0, r0, d1, r1):
+    """Return where a cubic, given by values and slopes at 0 and 1, first falls below zero."""
+    # A step that begins where the last one ended at the boundary begins on the right side of it.
+    d0 = max(d0, 0.0)
+    c2 = 3.0 * (d1 - d0) - 2.0 * r0 - r1
+    c3 = 2.0 * (d0 - d1) + r0 + r1
+    high = 1.0
+    value_high = d1
+    low = 0.0
+    discriminant = c2 * c2 - 3.0 * c3 * r0
+    if discriminant > 0.0:
+        root = math.sqrt(discriminant)
+        lowest = (root - c2) / (3.0 * c3) if r0 >= 0.0 else -r0 / (c2 + root)
+        if 0.0 < lowest < 1.0:
+            value = d0 + lowest * (r0 + lowest * (c2 + lowest * c3))
+            if value < 0.0:
+                high = lowest
+                value_high = value
+        if d0 == 0.0 and r0 > 0.0:
+            highest = -r0 / (c2 - root)
+            if 0.0 < highest < high:
+                low = highest
+    if value_high >= 0.0:
+        return NEVER
+    if d0 == 0.0 and r0 <= 0.0:
+        return 0.0
+    value_low = d0 + low * (r0 + low * (c2 + low * c3))
+    at = low - (high - low) * value_low / (value_high - value_low)
+    for _ in range(_ITERATIONS):
+        value = d0 + at * (r0 + at * (c2 + at * c3))
+        slope = r0 + at * (2.0 * c2 + at * 3.0 * c3)
+        if value > 0.0:
+            low = at
+        else:
+            high = at
+        following = at - value / slope
+        if not low < following < high:
+            following = 0.5 * (low + high)
+        if abs(following - at) < _LAST_CORRECTION:
+            return following
+        at = following
+    return at

@@ -1,0 +1,135 @@
+"""What acts on a lane at one instant: mesh stiffness, load and pitch error.
+
+With a fixed number of steps per mesh period, every period meets the same phases, so that all of it
+comes from one table: the inner loop evaluates no trigonometric function. Between the points of
+the table the series about the nearest one is as exact as the table itself.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gearchaos_kernels.compilation import scalar
+
+SINE, COSINE, VARIATION = 0, 1, 2
+"""Columns of the table; from `VARIATION` on the Taylor coefficients of the stiffness variation."""
+
+_SERIES_ERROR = 1e-15
+_MOST_TERMS = 40
+
+
+class Forcing(NamedTuple):
+    """What acts on a lane at one instant; what a scene leaves out is the constant 0."""
+
+    stiffness: float
+    drive: float
+    error: float
+    error_rate: float
+    axial_error: float
+    axial_error_rate: float
+
+
+def phase_table(
+    cosine: NDArray[np.float64], sine: NDArray[np.float64], steps_per_period: int
+) -> NDArray[np.float64]:
+    """Return sine, cosine and stiffness variation at every half step of a mesh period.
+
+    Parameters
+    ----------
+    cosine, sine : ndarray, shape (harmonics,)
+        Fourier coefficients of the mesh stiffness relative to its mean (eq. 19).
+    steps_per_period : int
+        Steps of one mesh period.
+
+    Returns
+    -------
+    ndarray, shape (2 steps + 1, 2 + terms)
+        The last row repeats the first: the phase begins anew with every period. The terms are the
+        variation and its further Taylor coefficients in the mesh phase, as many as it takes to
+        reach halfway to the next row.
+    """
+    half_steps = np.arange(2 * steps_per_period + 1) % (2 * steps_per_period)
+    angle = np.pi * half_steps / steps_per_period
+    order = np.arange(1, cosine.size + 1)
+    amplitude = cosine - 1j * sine
+    reach = order * np.pi / (4 * steps_per_period)
+    waves = amplitude * np.exp(1j * np.outer(angle, order))
+    coefficients = [np.sum(waves.real, axis=1)]
+    for term in range(1, _MOST_TERMS):
+        waves = waves * 1j * order / term
+        coefficients.append(np.sum(waves.real, axis=1))
+        if np.sum(np.abs(amplitude) * reach**term) < _SERIES_ERROR * math.factorial(term):
+            break
+    return np.stack([np.sin(angle), np.cos(angle), *coefficients], axis=1)
+
+
+@scalar
+def forcing_on_grid(lane, table, row, pitch_error, phase, stiffness_variation, axial):
+    """Return the forcing at one row of the table."""
+    return forcing_at(
+        lane,
+        table[row, VARIATION],
+        table[row, SINE],
+        table[row, COSINE],
+        pitch_error,
+        phase,
+        stiffness_variation,
+        axial,
+    )
+
+
+@scalar
+def forcing_within(lane, table, number, fraction, pitch_error, phase, stiffness_variation, axial):
+    """Return the forcing at a fraction of a step, from the series about the nearest row."""
+    nearest = int(2.0 * fraction + 0.5)
+    row = 2 * number + nearest
+    angle = (2.0 * fraction - nearest) * (2.0 * math.pi / (table.shape[0] - 1))
+    square = angle * angle
+    sine = angle * (1.0 - square * (1.0 / 6.0 - square * (1.0 / 120.0 - square / 5040.0)))
+    cosine = 1.0 - square * (
+        0.5 - square * (1.0 / 24.0 - square * (1.0 / 720.0 - square / 40320.0))
+    )
+    variation = 0.0
+    if stiffness_variation is not None:
+        for term in range(table.shape[1] - 1, VARIATION - 1, -1):
+            variation = variation * angle + table[row, term]
+    return forcing_at(
+        lane,
+        variation,
+        table[row, SINE] * cosine + table[row, COSINE] * sine,
+        table[row, COSINE] * cosine - table[row, SINE] * sine,
+        pitch_error,
+        phase,
+        stiffness_variation,
+        axial,
+    )
+
+
+@scalar
+def forcing_at(lane, variation, sine, cosine, pitch_error, phase, stiffness_variation, axial):
+    """Return mesh stiffness (eq. 19), load and pitch error (eq. 14) of a lane at one mesh phase."""
+    stiffness = lane.mean_stiffness
+    if stiffness_variation is not None:
+        stiffness = lane.mean_stiffness + lane.stiffness_variation * variation
+    drive = lane.load
+    error = 0.0
+    error_rate = 0.0
+    axial_error = 0.0
+    axial_error_rate = 0.0
+    if pitch_error is not None:
+        if phase is not None:
+            shifted = lane.cos_phase * sine + lane.sin_phase * cosine
+            cosine = lane.cos_phase * cosine - lane.sin_phase * sine
+            sine = shifted
+        # -e'' = Omega^2 e of the sine drives delta_5, which is measured from e (eq. 13).
+        drive = lane.load + lane.error_inertia * sine
+        error = lane.error_mean + lane.error_amplitude * sine
+        error_rate = lane.error_rate * cosine
+        if axial is not None:
+            axial_error = lane.axial_error_mean + lane.axial_error_amplitude * sine
+            axial_error_rate = lane.axial_error_rate * cosine
+    return Forcing(stiffness, drive, error, error_rate, axial_error, axial_error_rate)
