@@ -53,9 +53,12 @@ def _contestants():
     """Yield (name, with tangent, work); the work returns the number of steps it did."""
     for tangent in (False, True):
         yield "textbook, 10 states", tangent, _textbook(tangent)
-        for name, scene in SCENES.items():
-            yield name, tangent, _engine(scene, tangent, threads=1)
-        yield f"full, {most_threads()} threads", tangent, _engine(Scene(), tangent, most_threads())
+        for resolved in (False, True):
+            for name, scene in SCENES.items():
+                kind = f"{name}, resolved" if resolved else name
+                yield kind, tangent, _engine(scene, tangent, resolved, threads=1)
+        everything = _engine(Scene(), tangent, False, most_threads())
+        yield f"full, {most_threads()} threads", tangent, everything
 
 
 def _pan(lanes: int):
@@ -64,11 +67,11 @@ def _pan(lanes: int):
     return model(groups, lanes), groups.stiffness_cosine, groups.stiffness_sine
 
 
-def _engine(scene: Scene, tangent: bool, threads: int) -> Callable[[], int]:
+def _engine(scene: Scene, tangent: bool, resolved: bool, threads: int) -> Callable[[], int]:
     lanes = LANES * threads
     data = _pan(lanes)
     # The end state is written in full, so that no effect can be optimised away.
-    plan = Plan(STEPS, 0, PERIODS, 1, ("delta_5",), tangent)
+    plan = Plan(STEPS, 0, PERIODS, 1, ("delta_5",), tangent, resolved)
 
     def work() -> int:
         use_threads(threads)
@@ -96,14 +99,14 @@ def _rate(work: Callable[[], int]) -> float:
 
 
 def _print_table(rates: dict[tuple[str, bool], list[float]]) -> None:
-    print(f"{'kernel':28}{'plain':>8}{'ratio':>8}{'tangent':>10}{'ratio':>8}")
+    print(f"{'kernel':34}{'plain':>8}{'ratio':>8}{'tangent':>10}{'ratio':>8}")
     for name in dict.fromkeys(name for name, _ in rates):
         cells = ""
         for tangent, width in ((False, 8), (True, 10)):
             mine, yardstick = rates[name, tangent], rates["textbook, 10 states", tangent]
             ratio = statistics.median(a / b for a, b in zip(mine, yardstick, strict=True))
             cells += f"{statistics.median(mine):{width}.1f}{ratio:8.1f}"
-        print(f"{name:28}{cells}")
+        print(f"{name:34}{cells}")
     threaded = f"full, {most_threads()} threads"
     for tangent in (False, True):
         pairs = zip(rates[threaded, tangent], rates["full, 10 states", tangent], strict=True)

@@ -14,7 +14,7 @@ import numpy as np
 
 from gearchaos_kernels.compilation import CACHE_LINE, align_stack, block, scalar
 from gearchaos_kernels.contact import Branches, branch_at, may_leave
-from gearchaos_kernels.forcing import forcing_on_grid
+from gearchaos_kernels.forcing import forcing_at, phase_on_grid
 from gearchaos_kernels.lane import (
     BEFORE,
     COEFFICIENT,
@@ -102,38 +102,22 @@ def integrate_block(
 
     for period in range(periods):
         for number in range(steps):
+            # Not in the loop over lanes: nobody tells the compiler that its stores spare the table.
+            begin_phase = phase_on_grid(table, 2 * number)
+            middle_phase = phase_on_grid(table, 2 * number + 1)
+            end_phase = phase_on_grid(table, 2 * number + 2)
             suspects = 0
             for slot in range(LANES):
                 lane = read_lane(memory, slot)
                 y = read(memory, POSITION, slot, transverse, axial)
                 w = read(memory, RATE, slot, transverse, axial)
-                begin = forcing_on_grid(
-                    lane,
-                    table,
-                    2 * number,
-                    pitch_error,
-                    phase,
-                    stiffness_variation,
-                    axial,
+                begin = forcing_at(
+                    lane, begin_phase, pitch_error, phase, stiffness_variation, axial
                 )
-                middle = forcing_on_grid(
-                    lane,
-                    table,
-                    2 * number + 1,
-                    pitch_error,
-                    phase,
-                    stiffness_variation,
-                    axial,
+                middle = forcing_at(
+                    lane, middle_phase, pitch_error, phase, stiffness_variation, axial
                 )
-                end = forcing_on_grid(
-                    lane,
-                    table,
-                    2 * number + 2,
-                    pitch_error,
-                    phase,
-                    stiffness_variation,
-                    axial,
-                )
+                end = forcing_at(lane, end_phase, pitch_error, phase, stiffness_variation, axial)
                 if resolved is None:
                     y_end, w_end, slopes = step(
                         y,

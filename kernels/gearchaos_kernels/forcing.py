@@ -22,6 +22,14 @@ _SERIES_ERROR = 1e-15
 _MOST_TERMS = 40
 
 
+class Phase(NamedTuple):
+    """A mesh phase: stiffness variation relative to the mean, sine and cosine of the angle."""
+
+    variation: float
+    sine: float
+    cosine: float
+
+
 class Forcing(NamedTuple):
     """What acts on a lane at one instant; what a scene leaves out is the constant 0."""
 
@@ -68,23 +76,14 @@ def phase_table(
 
 
 @scalar
-def forcing_on_grid(lane, table, row, pitch_error, phase, stiffness_variation, axial):
-    """Return the forcing at one row of the table."""
-    return forcing_at(
-        lane,
-        table[row, VARIATION],
-        table[row, SINE],
-        table[row, COSINE],
-        pitch_error,
-        phase,
-        stiffness_variation,
-        axial,
-    )
+def phase_on_grid(table, row):
+    """Return one row of the table."""
+    return Phase(table[row, VARIATION], table[row, SINE], table[row, COSINE])
 
 
 @scalar
-def forcing_within(lane, table, number, fraction, pitch_error, phase, stiffness_variation, axial):
-    """Return the forcing at a fraction of a step, from the series about the nearest row."""
+def phase_within(table, number, fraction):
+    """Return the mesh phase at a fraction of a step, from the series about the nearest row."""
     nearest = int(2.0 * fraction + 0.5)
     row = 2 * number + nearest
     angle = (2.0 * fraction - nearest) * (2.0 * math.pi / (table.shape[0] - 1))
@@ -94,37 +93,32 @@ def forcing_within(lane, table, number, fraction, pitch_error, phase, stiffness_
         0.5 - square * (1.0 / 24.0 - square * (1.0 / 720.0 - square / 40320.0))
     )
     variation = 0.0
-    if stiffness_variation is not None:
-        for term in range(table.shape[1] - 1, VARIATION - 1, -1):
-            variation = variation * angle + table[row, term]
-    return forcing_at(
-        lane,
+    for term in range(table.shape[1] - 1, VARIATION - 1, -1):
+        variation = variation * angle + table[row, term]
+    return Phase(
         variation,
         table[row, SINE] * cosine + table[row, COSINE] * sine,
         table[row, COSINE] * cosine - table[row, SINE] * sine,
-        pitch_error,
-        phase,
-        stiffness_variation,
-        axial,
     )
 
 
 @scalar
-def forcing_at(lane, variation, sine, cosine, pitch_error, phase, stiffness_variation, axial):
-    """Return mesh stiffness (eq. 19), load and pitch error (eq. 14) of a lane at one mesh phase."""
+def forcing_at(lane, point, pitch_error, phase, stiffness_variation, axial):
+    """Return mesh stiffness (eq. 19), load and pitch error (eq. 14) of a lane at a mesh phase."""
     stiffness = lane.mean_stiffness
     if stiffness_variation is not None:
-        stiffness = lane.mean_stiffness + lane.stiffness_variation * variation
+        stiffness = lane.mean_stiffness + lane.stiffness_variation * point.variation
     drive = lane.load
     error = 0.0
     error_rate = 0.0
     axial_error = 0.0
     axial_error_rate = 0.0
     if pitch_error is not None:
+        sine = point.sine
+        cosine = point.cosine
         if phase is not None:
-            shifted = lane.cos_phase * sine + lane.sin_phase * cosine
-            cosine = lane.cos_phase * cosine - lane.sin_phase * sine
-            sine = shifted
+            sine = lane.cos_phase * point.sine + lane.sin_phase * point.cosine
+            cosine = lane.cos_phase * point.cosine - lane.sin_phase * point.sine
         # -e'' = Omega^2 e of the sine drives delta_5, which is measured from e (eq. 13).
         drive = lane.load + lane.error_inertia * sine
         error = lane.error_mean + lane.error_amplitude * sine

@@ -17,7 +17,7 @@ from gearchaos_kernels.contact import (
     leaving_fraction,
     next_branch,
 )
-from gearchaos_kernels.forcing import forcing_on_grid, forcing_within
+from gearchaos_kernels.forcing import forcing_at, phase_on_grid, phase_within
 from gearchaos_kernels.lane import (
     BEFORE,
     POSITION,
@@ -84,9 +84,11 @@ def split_step(
     if tangent is not None:
         dy = read(memory, BEFORE + TANGENT_POSITION, slot, transverse, axial)
         dw = read(memory, BEFORE + TANGENT_RATE, slot, transverse, axial)
-    begin = forcing_on_grid(lane, table, 2 * number, pitch_error, phase, stiffness_variation, axial)
-    end = forcing_on_grid(
-        lane, table, 2 * number + 2, pitch_error, phase, stiffness_variation, axial
+    begin = forcing_at(
+        lane, phase_on_grid(table, 2 * number), pitch_error, phase, stiffness_variation, axial
+    )
+    end = forcing_at(
+        lane, phase_on_grid(table, 2 * number + 2), pitch_error, phase, stiffness_variation, axial
     )
     gap = tangential_gap(y, lane, begin, transverse)
     gap_z = axial_gap(y, gap, lane, begin)
@@ -115,19 +117,17 @@ def split_step(
             break
 
         first *= left
-        middle = forcing_within(
+        middle = forcing_at(
             lane,
-            table,
-            number,
-            done + 0.5 * first,
+            phase_within(table, number, done + 0.5 * first),
             pitch_error,
             phase,
             stiffness_variation,
             axial,
         )
         done += first
-        crossing = forcing_within(
-            lane, table, number, done, pitch_error, phase, stiffness_variation, axial
+        crossing = forcing_at(
+            lane, phase_within(table, number, done), pitch_error, phase, stiffness_variation, axial
         )
         y, w, slopes = step(
             y,
@@ -157,11 +157,9 @@ def split_step(
             branches = Branches(branches.tangential, next_branch(branches.axial, gap_z, b))
 
         left = 1.0 - done
-        middle = forcing_within(
+        middle = forcing_at(
             lane,
-            table,
-            number,
-            done + 0.5 * left,
+            phase_within(table, number, done + 0.5 * left),
             pitch_error,
             phase,
             stiffness_variation,
