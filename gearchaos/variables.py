@@ -38,7 +38,7 @@ class Variable:
         Names of the dimensions; the first one of everything that differs from lane to lane is
         the axis of the sweep.
     dtype : str
-        ``"float64"``, ``"int64"``, ``"int32"``, ``"uint8"`` or ``"str"``.
+        ``"float64"``, ``"int32"``, ``"uint8"`` or ``"str"``.
     units, long_name, symbol : str
         Unit (``"1"`` where dimensionless), wording and mathtext symbol for axis labels.
     fill_value : float or int, optional
@@ -147,7 +147,7 @@ def sweep_variables(
         variables += [
             Variable("crossings_per_period", (lane,), "float64", "1", text, "", nan),
             Variable("slowest_crossing", (lane,), "float64", "1", slow, "", nan),
-            Variable("unsplit_steps", (lane,), "int64", "1", unsplit),
+            Variable("unsplit_steps", (lane,), "int32", "1", unsplit),
         ]
     flags = tuple("_".join(meaning.split()) for meaning in status_meanings)
     diverged = "mesh period in which the lane diverged, -1 where it did not"

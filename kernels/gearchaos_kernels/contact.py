@@ -64,7 +64,7 @@ def may_leave(gap0, rate0, gap1, rate1, half_backlash):
     return (
         ((outside0 >= 0.0) != (outside1 >= 0.0))
         | ((gap0 * gap1 < 0.0) & (outside0 >= 0.0))
-        | ((rate0 * rate1 < 0.0) & (nearest < _REACH * (abs(rate0) + abs(rate1))))
+        | ((rate0 * rate1 <= 0.0) & (nearest < _REACH * (abs(rate0) + abs(rate1))))
     )
 
 
@@ -111,7 +111,8 @@ def first_fall(d0, r0, d1, r1):
                 high = lowest
                 value_high = value
         if d0 == 0.0 and r0 > 0.0:
-            highest = -r0 / (c2 - root)
+            # Of the two forms of a root, the one in which nothing cancels.
+            highest = (c2 + root) / (-3.0 * c3) if c2 > 0.0 else -r0 / (c2 - root)
             if 0.0 < highest < high:
                 low = highest
     if value_high >= 0.0:

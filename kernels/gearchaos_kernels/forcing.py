@@ -64,7 +64,7 @@ def phase_table(
     angle = np.pi * half_steps / steps_per_period
     order = np.arange(1, cosine.size + 1)
     amplitude = cosine - 1j * sine
-    reach = order * np.pi / (4 * steps_per_period)
+    reach = order * np.pi / (2 * steps_per_period)
     waves = amplitude * np.exp(1j * np.outer(angle, order))
     coefficients = [np.sum(waves.real, axis=1)]
     for term in range(1, _MOST_TERMS):
@@ -88,9 +88,15 @@ def phase_within(table, number, fraction):
     row = 2 * number + nearest
     angle = (2.0 * fraction - nearest) * (2.0 * math.pi / (table.shape[0] - 1))
     square = angle * angle
-    sine = angle * (1.0 - square * (1.0 / 6.0 - square * (1.0 / 120.0 - square / 5040.0)))
+    sine = angle * (
+        1.0
+        - square
+        * (1.0 / 6.0 - square * (1.0 / 120.0 - square * (1.0 / 5040.0 - square / 362880.0)))
+    )
     cosine = 1.0 - square * (
-        0.5 - square * (1.0 / 24.0 - square * (1.0 / 720.0 - square / 40320.0))
+        0.5
+        - square
+        * (1.0 / 24.0 - square * (1.0 / 720.0 - square * (1.0 / 40320.0 - square / 3628800.0)))
     )
     variation = 0.0
     for term in range(table.shape[1] - 1, VARIATION - 1, -1):

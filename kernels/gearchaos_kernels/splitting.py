@@ -113,7 +113,8 @@ def split_step(
                 b,
             )
         first = min(part, part_z)
-        if first > 1.0 or crossings == MOST_SPLITS:
+        # Also where the lane has left the range of numbers, and the fraction is not one.
+        if not first <= 1.0 or crossings == MOST_SPLITS:
             break
 
         first *= left
