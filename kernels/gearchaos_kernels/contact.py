@@ -104,20 +104,20 @@ def first_fall(d0, r0, d1, r1):
     discriminant = c2 * c2 - 3.0 * c3 * r0
     if discriminant > 0.0:
         root = math.sqrt(discriminant)
-        lowest = (root - c2) / (3.0 * c3) if r0 >= 0.0 else -r0 / (c2 + root)
+        # Of the two forms of each turning point, the one in which nothing cancels.
+        lowest = (root - c2) / (3.0 * c3) if c2 < 0.0 else -r0 / (c2 + root)
         if 0.0 < lowest < 1.0:
             value = d0 + lowest * (r0 + lowest * (c2 + lowest * c3))
             if value < 0.0:
                 high = lowest
                 value_high = value
-        if d0 == 0.0 and r0 > 0.0:
-            # Of the two forms of a root, the one in which nothing cancels.
+        if d0 == 0.0 and r0 >= 0.0:
             highest = (c2 + root) / (-3.0 * c3) if c2 > 0.0 else -r0 / (c2 - root)
             if 0.0 < highest < high:
                 low = highest
     if value_high >= 0.0:
         return NEVER
-    if d0 == 0.0 and r0 <= 0.0:
+    if d0 == 0.0 and low == 0.0:
         return 0.0
     value_low = d0 + low * (r0 + low * (c2 + low * c3))
     at = low - (high - low) * value_low / (value_high - value_low)
@@ -129,9 +129,9 @@ def first_fall(d0, r0, d1, r1):
         else:
             high = at
         following = at - value / slope
-        if not low < following < high:
+        if not low <= following <= high:
             following = 0.5 * (low + high)
-        if abs(following - at) < _LAST_CORRECTION:
+        elif abs(following - at) < _LAST_CORRECTION:
             return following
         at = following
     return at
