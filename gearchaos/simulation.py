@@ -16,7 +16,6 @@ from gearchaos_kernels import (
     Scene,
     Status,
     integrate,
-    steps_between_scalings,
 )
 from numpy.typing import NDArray
 
@@ -60,9 +59,6 @@ class Simulation:
             section_states=config.outputs.section,
             tangent=config.outputs.lyapunov,
             resolved=config.integration.crossings == "resolved",
-            steps_between_scalings=steps_between_scalings(
-                model(self.groups, self.values.size), config.integration.steps_per_period
-            ),
         )
 
     @property

@@ -1,7 +1,7 @@
 """The compiled layer: arrays and numbers in, arrays out."""
 
 from gearchaos_kernels.batch import STATE_ROWS, Outcome, Plan, Scene, integrate
-from gearchaos_kernels.coefficients import Model, steps_between_scalings
+from gearchaos_kernels.coefficients import Model
 from gearchaos_kernels.lane import LANES
 from gearchaos_kernels.status import STATUS_TEXTS, Status
 from gearchaos_kernels.threads import current_threads, most_threads, processor, use_threads
@@ -19,6 +19,5 @@ __all__ = [
     "integrate",
     "most_threads",
     "processor",
-    "steps_between_scalings",
     "use_threads",
 ]

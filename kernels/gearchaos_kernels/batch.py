@@ -9,7 +9,12 @@ from numba import prange
 from numpy.typing import NDArray
 
 from gearchaos_kernels.block_loop import integrate_block
-from gearchaos_kernels.coefficients import Model, lane_coefficients, state_scales
+from gearchaos_kernels.coefficients import (
+    Model,
+    lane_coefficients,
+    state_scales,
+    steps_between_scalings,
+)
 from gearchaos_kernels.compilation import driver
 from gearchaos_kernels.forcing import phase_table
 from gearchaos_kernels.lane import LANES, STATES
@@ -44,8 +49,6 @@ class Plan(NamedTuple):
     """How long and how finely a batch is integrated, and what is kept of it.
 
     ``resolved`` splits the steps that cross a clearance boundary; without it they are plain steps.
-    ``steps_between_scalings`` keeps the tangent vector within the range of numbers over long
-    periods (see `coefficients.steps_between_scalings`); 0 scales it once a period.
     """
 
     steps_per_period: int
@@ -55,7 +58,6 @@ class Plan(NamedTuple):
     section_states: tuple[str, ...] = ()
     tangent: bool = False
     resolved: bool = True
-    steps_between_scalings: int = 0
 
 
 class Outcome(NamedTuple):
@@ -200,7 +202,7 @@ def integrate(
         phase_table(stiffness_cosine, stiffness_sine, steps),
         plan.transient_periods,
         plan.recorded_periods,
-        plan.steps_between_scalings or steps,
+        steps_between_scalings(model, steps),
         np.array([STATE_ROWS[name] for name in plan.section_states], dtype=np.intp),
         _flag(scene.pitch_error),
         _flag(scene.pitch_error and bool(np.any(model.error_phase))),

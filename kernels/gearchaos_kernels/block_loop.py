@@ -100,6 +100,11 @@ def integrate_block(
             memory[(COEFFICIENT + row) * STRIDE + slot] = coefficients[lane, row]
         memory[GROWTH * STRIDE + slot] = 0.0
 
+    # A scaling interval belongs to a lane, whatever its neighbours need.
+    shortest_interval = steps_between_scalings[first]
+    for slot in range(1, lanes):
+        shortest_interval = min(shortest_interval, steps_between_scalings[first + slot])
+
     for period in range(periods):
         for number in range(steps):
             # Not in the loop over lanes: nobody tells the compiler that its stores spare the table.
@@ -185,10 +190,12 @@ def integrate_block(
                             slowest_crossing[lane] = min(slowest_crossing[lane], slowest)
 
             if growth is not None:
-                if (number + 1) % steps_between_scalings == 0 or number == steps - 1:
+                if (number + 1) % shortest_interval == 0 or number == steps - 1:
                     for slot in range(lanes):
-                        logarithm = renormalise(memory, slot, scales[first + slot])
-                        memory[GROWTH * STRIDE + slot] += logarithm
+                        interval = steps_between_scalings[first + slot]
+                        if (number + 1) % interval == 0 or number == steps - 1:
+                            logarithm = renormalise(memory, slot, scales[first + slot])
+                            memory[GROWTH * STRIDE + slot] += logarithm
 
         for slot in range(lanes):
             lane = first + slot

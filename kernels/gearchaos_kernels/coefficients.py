@@ -109,8 +109,8 @@ def lane_coefficients(model: Model, steps_per_period: int, rederived: bool) -> F
     return np.stack(np.broadcast_arrays(*lane), axis=1).astype(np.float64)
 
 
-def steps_between_scalings(model: Model, steps_per_period: int) -> int:
-    """Return after how many steps the tangent vector is to be scaled back to length 1.
+def steps_between_scalings(model: Model, steps_per_period: int) -> NDArray[np.intp]:
+    """Return after how many steps each tangent vector is scaled back to length 1, shape (lanes,).
 
     Between two scalings it must neither overflow nor vanish. Its rate of growth or decay is bounded
     by the damping and by the square root of the largest stiffness of the mesh, as one direction
@@ -126,7 +126,8 @@ def steps_between_scalings(model: Model, steps_per_period: int) -> int:
     )
     feels = 1.0 + model.mass_ratio_p + model.mass_ratio_g
     damping = 2.0 * model.damping_ratio * feels + 2.0 * bearings
-    rate = np.max(damping + np.sqrt(feels * (1.0 + np.abs(model.stiffness_variation_scale))))
-    period = 2.0 * np.pi / np.min(model.mesh_frequency)
-    scalings = int(np.ceil(rate * period / LARGEST_EXPONENT))
-    return max(1, steps_per_period // scalings)
+    rate = damping + np.sqrt(feels * (1.0 + np.abs(model.stiffness_variation_scale)))
+    scalings = rate * 2.0 * np.pi / model.mesh_frequency / LARGEST_EXPONENT
+    # Powers of two, so that the shortest interval of a block divides all others.
+    interval = np.exp2(np.floor(np.log2(np.maximum(1.0, steps_per_period / scalings))))
+    return np.where(scalings > 1.0, interval, steps_per_period).astype(np.intp)

@@ -1,5 +1,6 @@
 """Contact branches, and the first moment at which a gap leaves one, against slow obvious twins."""
 
+import itertools
 import math
 
 import numpy as np
@@ -63,7 +64,7 @@ def twin_of_first_fall(curve: np.polynomial.Polynomial) -> float:
     real = np.sort(roots.real[np.abs(roots.imag) < 1e-9])
     inner = real[(real > 0.0) & (real < 1.0)]
     marks = np.concatenate([[0.0], inner, [1.0]])
-    for begin, end in zip(marks[:-1], marks[1:], strict=True):
+    for begin, end in itertools.pairwise(marks):
         if curve(0.5 * (begin + end)) < 0.0:
             return float(begin)
     return NEVER
@@ -211,9 +212,7 @@ def test_a_step_that_leaves_its_branch_is_suspected(gap0, rate0, gap1, rate1):
 
 
 @PROPERTY
-@given(
-    st.floats(0.0, 0.5), st.floats(-6.0, 0.0), st.floats(0.0, 0.5), st.floats(0.0, 6.0)
-)
+@given(st.floats(0.0, 0.5), st.floats(-6.0, 0.0), st.floats(0.0, 0.5), st.floats(0.0, 6.0))
 def test_a_dip_with_one_turn_is_always_suspected(above0, rate0, above1, rate1):
     gap0, gap1 = HALF_BACKLASH + above0, HALF_BACKLASH + above1
     curve = cubic(gap0, rate0, gap1, rate1)

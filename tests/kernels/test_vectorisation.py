@@ -51,7 +51,7 @@ def arguments(scene: Scene, tangent: bool, resolved: bool) -> tuple:
         phase_table(COSINE, SINE, steps),
         0,
         1,
-        steps,
+        np.full(1, steps),
         np.zeros(1, dtype=np.intp),
         flags["pitch_error"],
         None,

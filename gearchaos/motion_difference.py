@@ -1,0 +1,75 @@
+"""How far the motions that two grids give for the same lanes lie apart."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gearchaos.motion_period import motion_period, section_distance
+
+Floats = NDArray[np.float64]
+
+MOST = 0.95
+"""Share of the lanes that `bound` speaks for: the rest lies next to a bifurcation."""
+
+_ANOTHER_ORBIT = 0.1
+
+
+class Motion(NamedTuple):
+    """What one grid gives for some lanes.
+
+    ``section`` (lanes, points, states), ``exponent`` (lanes,) or None where it was not computed,
+    ``diverged`` (lanes,).
+    """
+
+    section: Floats
+    exponent: Floats | None
+    diverged: NDArray[np.bool_]
+
+
+class Difference(NamedTuple):
+    """How far two grids lie apart, by lane.
+
+    ``period`` (lanes,): common period in mesh periods, 0 where the two have none in common;
+    ``section_error`` (lanes,): largest difference of the sections, NaN where the period is 0;
+    ``exponent_error`` (lanes,): difference of the largest Lyapunov exponents, NaN where a lane
+    diverged or no exponent was computed; ``changed`` (lanes,): whether the lane moves in another
+    way.
+    """
+
+    period: NDArray[np.int32]
+    section_error: Floats
+    exponent_error: Floats
+    changed: NDArray[np.bool_]
+
+
+def difference(one: Motion, other: Motion) -> Difference:
+    """Compare two motions lane by lane.
+
+    A lane moves in another way if its period is another one, if it diverged in one of the two
+    only, or if the orbits of equal period lie further apart than a tenth of their size: then
+    they are two attractors, and not one attractor and its error.
+    """
+    first, second = motion_period(one.section), motion_period(other.section)
+    period = np.where(first == second, first, np.int32(0))
+    distance = section_distance(one.section, other.section, period)
+    size = np.max(np.abs(other.section), axis=(1, 2), initial=0.0)
+    apart = distance > _ANOTHER_ORBIT * size
+    period[apart] = 0
+    exponent = np.full(period.shape, np.nan)
+    if one.exponent is not None and other.exponent is not None:
+        exponent = np.abs(one.exponent - other.exponent)
+    return Difference(
+        period,
+        np.where(period > 0, distance, np.nan),
+        exponent,
+        (first != second) | apart | (one.diverged != other.diverged),
+    )
+
+
+def bound(errors: Floats) -> float:
+    """Return the error that 95 % of the lanes do not exceed; NaN where there are no lanes."""
+    known = errors[np.isfinite(errors)]
+    return float(np.quantile(known, MOST, method="higher")) if known.size else float("nan")

@@ -1,0 +1,305 @@
+"""Steps that are split where a clearance is crossed: the order of the method holds there.
+
+The stored runs were restarted at every crossing of either clearance, over all their periods: their
+number of crossings is the number that a run from the same start has to find.
+"""
+
+import functools
+
+import numpy as np
+import pytest
+from gearchaos_kernels import Plan, Scene, integrate
+
+from .reference import (
+    BASE_HELIX_ANGLE,
+    COSINE,
+    FULL,
+    NO_BACKLASH,
+    PERIOD,
+    SINE,
+    SOLUTIONS,
+    assert_same_bits,
+    pan2021,
+    run,
+    state,
+    stored_state,
+)
+from .test_order import measured_order
+from .test_twin import ALL_SCENES, MODEL, START, named
+
+STEPS = np.array([100, 141, 200, 283, 400, 566, 800])
+RUNS = [solution for solution in SOLUTIONS["runs"] if solution["crossings"] > 0]
+CHAOTIC = (12.47, 12.97, 14.68)
+ORBITS = [orbit for orbit in SOLUTIONS["periodic_orbits"] if orbit["crossings"] > 0]
+CLEARANCE = Scene(False, False, True, False, False)
+
+
+def scene_of(solution: dict) -> Scene:
+    return Scene(**{effect: effect in solution["effects"] for effect in Scene._fields})
+
+
+def name_of(solution: dict) -> str:
+    return f"{solution['scene']}-{solution.get('formulation', 'orbit')}-{solution['pitch_error']}"
+
+
+def stored_run(pitch_error: float) -> int:
+    """Return the number of the stored run of the full scene at one multiple of the error."""
+    return [name_of(solution) for solution in RUNS].index(f"full-published-{pitch_error}")
+
+
+@functools.cache
+def followed(number: int, steps: int) -> tuple[float, int, int]:
+    """Return the largest error of the full state along a stored run, crossings and overflows."""
+    solution = RUNS[number]
+    periods = np.array(solution["periods"])
+    outcome = run(
+        pan2021(solution["pitch_error"]),
+        scene_of(solution),
+        stored_state(solution["start"]),
+        steps=steps,
+        periods=periods[-1],
+        rederived=solution["formulation"] == "rederived",
+        resolved=True,
+    )
+    wanted = np.stack([stored_state(values) for values in solution["state"]])
+    error = np.abs(outcome.section[0, periods - 1] - wanted).max()
+    return float(error), int(outcome.crossings[0]), int(outcome.overflows[0])
+
+
+@pytest.mark.parametrize(
+    ("pitch_error", "steps", "largest"),
+    [
+        (5.86, 100, 1e-4),
+        (5.86, 200, 7e-6),
+        (5.86, 400, 5e-7),
+        (10.75, 100, 3e-4),
+        (10.75, 200, 2e-5),
+        (10.75, 400, 1e-6),
+    ],
+)
+def test_a_run_with_tooth_separation_stays_within_the_error_of_a_smooth_one(
+    pitch_error, steps, largest
+):
+    assert followed(stored_run(pitch_error), steps)[0] < largest
+
+
+@pytest.mark.parametrize("number", range(len(RUNS)), ids=map(name_of, RUNS))
+def test_states_of_a_run_with_crossings_converge_with_order_four(number):
+    # A chaotic run amplifies its errors: it needs finer steps until they are small.
+    steps = 2 * STEPS if RUNS[number]["pitch_error"] in CHAOTIC else STEPS
+    assert measured_order([followed(number, int(s))[0] for s in steps], steps) > 3.8
+
+
+@pytest.mark.parametrize("number", range(len(RUNS)), ids=map(name_of, RUNS))
+def test_a_run_crosses_as_often_as_the_stored_solution(number):
+    for steps in STEPS:
+        _, crossings, overflows = followed(number, int(steps))
+        assert crossings == RUNS[number]["crossings"]
+        assert overflows == 0
+
+
+def multipliers(orbit: dict, steps: int, resolved: bool = True) -> np.ndarray:
+    """Return the Floquet multipliers of an orbit, from one tangent vector for each state."""
+    scene = Scene(axial=orbit["scene"] == "full")
+    present = [0, 1, 2, 5, 6, 7] if not scene.axial else list(range(10))
+    count = len(present)
+    plan = Plan(steps, 0, orbit["period"], 0, (), True, resolved)
+    outcome = integrate(
+        scene,
+        pan2021(np.full(count, orbit["pitch_error"])),
+        COSINE,
+        SINE,
+        np.tile(stored_state(orbit["section_points"][0]), (count, 1)),
+        plan,
+        tangent_start=np.eye(10)[present],
+    )
+    length = np.exp(outcome.growth.sum(axis=1))
+    return np.linalg.eigvals(outcome.end_tangent[:, present] * length[:, np.newaxis])
+
+
+def exponent_error(orbit: dict, steps: int, resolved: bool = True) -> float:
+    largest = np.abs(multipliers(orbit, steps, resolved)).max()
+    return abs(np.log(largest) / (orbit["period"] * PERIOD) - orbit["largest_exponent"])
+
+
+def multiplier_error(orbit: dict, steps: int) -> float:
+    wanted = np.array([complex(*pair) for pair in orbit["floquet_multipliers"]])
+    found = multipliers(orbit, steps)
+    return float(np.abs(wanted[:, np.newaxis] - found).min(axis=1).max())
+
+
+@pytest.mark.parametrize("orbit", ORBITS, ids=name_of)
+def test_floquet_multipliers_of_an_orbit_with_crossings_converge_with_order_four(orbit):
+    errors = [multiplier_error(orbit, int(steps)) for steps in STEPS]
+    assert measured_order(errors, STEPS) > 3.8
+
+
+@pytest.mark.parametrize("orbit", ORBITS, ids=name_of)
+def test_the_exponent_of_an_orbit_with_crossings_converges_as_fast(orbit):
+    errors = [exponent_error(orbit, int(steps)) for steps in STEPS]
+    assert measured_order(errors, STEPS) > 3.5
+    for steps, largest in ((100, 2e-5), (200, 2e-6), (400, 2e-7), (800, 2e-8)):
+        assert errors[list(STEPS).index(steps)] < largest
+
+
+def test_plain_steps_give_no_such_exponent():
+    orbit = next(o for o in ORBITS if o["scene"] == "no_axial" and o["pitch_error"] == 12.97)
+    for steps in (100, 200, 400):
+        plain = exponent_error(orbit, steps, resolved=False)
+        assert plain > 50.0 * exponent_error(orbit, steps)
+
+
+@pytest.mark.parametrize("orbit", ORBITS, ids=name_of)
+def test_an_orbit_crosses_the_known_number_of_times_in_every_period(orbit):
+    turns = 20
+    outcome = run(
+        pan2021(orbit["pitch_error"]),
+        Scene(axial=orbit["scene"] == "full"),
+        stored_state(orbit["section_points"][0]),
+        steps=200,
+        periods=turns * orbit["period"],
+        resolved=True,
+    )
+    assert outcome.crossings[0] == turns * orbit["crossings"]
+    assert 0.0 < outcome.slowest_crossing[0] < np.inf
+    points = np.stack([stored_state(values) for values in orbit["section_points"]])
+    assert outcome.section[0, -1] == pytest.approx(points[0], rel=0, abs=2e-5)
+
+
+def test_no_crossing_is_counted_twice_wherever_in_its_step_it_falls():
+    # Neighbours of one period-1 motion: their crossings fall everywhere within the steps.
+    lanes, periods = 320, 50
+    model = pan2021(np.linspace(5.0, 7.0, lanes))
+    outcome = run(
+        model, FULL, steps=100, transient=600, periods=periods, points=1, section=(), resolved=True
+    )
+    assert (outcome.crossings == 4 * periods).all()
+    assert not outcome.overflows.any()
+
+
+def test_crossings_are_counted_in_the_recorded_periods_only():
+    how = {"steps": 100, "points": 1, "resolved": True}
+    parts = [
+        int(run(pan2021(5.86), transient=transient, periods=periods, **how).crossings[0])
+        for transient, periods in ((0, 20), (8, 12), (0, 8))
+    ]
+    assert parts[0] == parts[1] + parts[2]
+    assert min(parts) > 0
+
+
+SPEEDS = 0.3, 0.5
+"""Load and half backlash of a free oscillation that leaves its flank by a little or by a lot."""
+
+
+@pytest.mark.parametrize("excess", [1e-2, 0.1, 0.5, 1.0])
+def test_the_slowest_crossing_is_the_one_that_energy_gives(excess):
+    # An oscillation about the loaded equilibrium leaves the flank where its amplitude exceeds the
+    # static deflection, and comes back as fast as it left.
+    load, half_backlash = SPEEDS
+    cosine = np.cos(BASE_HELIX_ANGLE)
+    deflection = load / cosine
+    amplitude = (1.0 + excess) * deflection
+    model = pan2021(0.0, load=load, half_backlash=half_backlash, damping_ratio=0.0)
+    start = state(delta_5=half_backlash * cosine + deflection + amplitude)
+    wanted = np.sqrt(cosine * (amplitude**2 - deflection**2))
+    errors = []
+    for steps in (100, 200, 400):
+        outcome = run(model, CLEARANCE, start, steps=steps, periods=10, resolved=True)
+        assert outcome.crossings[0] >= 12
+        errors.append(abs(outcome.slowest_crossing[0] / wanted - 1.0))
+    assert errors[0] < 3e-3
+    assert errors[2] < 2e-5
+    assert measured_order(errors, np.array([100, 200, 400])) > 3.5
+
+
+def test_the_slowest_crossing_of_the_axial_clearance_is_a_speed_of_y_2():
+    # Scene and lane in which the tangential clearance is never crossed, and the axial one is.
+    model = pan2021(0.0, load=0.0, damping_ratio=0.0, axial_damping_p=0.0, axial_damping_g=0.0)
+    model = model._replace(axial_stiffness_p=np.zeros(1), axial_stiffness_g=np.zeros(1))
+    scene = Scene(pitch_error=False, stiffness_variation=False)
+    speed = 0.3
+    # y_2 runs from 0 through the clearance at constant speed and springs back at the flank.
+    outcome = run(model, scene, state(delta_3_rate=speed), steps=200, periods=2, resolved=True)
+    assert outcome.crossings[0] >= 2
+    assert outcome.slowest_crossing[0] == pytest.approx(speed, rel=1e-5)
+
+
+def test_without_a_crossing_the_slowest_one_is_infinite():
+    orbit = next(
+        o for o in SOLUTIONS["periodic_orbits"] if o["scene"] == "full" and o["crossings"] == 0
+    )
+    point = stored_state(orbit["section_points"][0])
+    outcome = run(pan2021(orbit["pitch_error"]), FULL, point, periods=20, resolved=True)
+    assert outcome.crossings.tolist() == [0]
+    assert outcome.slowest_crossing.tolist() == [np.inf]
+
+
+def test_a_step_that_crosses_too_often_is_counted_and_never_silent():
+    # The mesh would oscillate more than once within one step, which RK4 cannot follow.
+    lanes = 64
+    steps = 20
+    swing = np.linspace(6.6, 12.0, lanes)
+    frequency = 2.0 * np.pi * np.sqrt(np.cos(BASE_HELIX_ANGLE)) / (steps * swing)
+    model = pan2021(np.full(lanes, 5.86), mesh_frequency=frequency)
+    outcome = run(model, CLEARANCE, state(delta_5=1.0), steps=steps, periods=40, resolved=True)
+    assert (outcome.overflows > 0).all()
+    assert (outcome.status != 0).all()
+
+
+def scenes(backlash: bool) -> list:
+    """Half of the scenes, each one effect away from a quick one, are marked slow."""
+    return [
+        pytest.param(scene, id=named(scene), marks=() if sum(scene) % 2 else pytest.mark.slow)
+        for scene in ALL_SCENES
+        if scene.backlash == backlash
+    ]
+
+
+@pytest.mark.parametrize("scene", scenes(backlash=False))
+def test_without_backlash_resolved_steps_are_the_plain_ones(scene):
+    how = {"steps": 60, "periods": 3}
+    resolved = run(MODEL, scene, START, **how, resolved=True)
+    assert_same_bits(resolved, run(MODEL, scene, START, **how))
+    assert not resolved.crossings.any()
+
+
+# Fast enough to cross the clearance in every scene.
+FAST = START + np.stack(
+    [
+        state(delta_5_rate=-1.5, delta_3_rate=1.5, delta_4_rate=-1.5),
+        state(delta_5_rate=1.5, delta_3_rate=-1.5, delta_4_rate=1.5),
+    ]
+)
+
+
+@pytest.mark.parametrize("scene", scenes(backlash=True))
+def test_resolved_steps_agree_with_plain_ones_so_fine_that_crossings_do_not_matter(scene):
+    for rederived in (False, True):
+        how = {"periods": 3, "rederived": rederived}
+        fine = run(MODEL, scene, FAST, steps=25_600, **how)
+        for steps, tolerance in ((400, 2e-5), (800, 1.5e-6)):
+            resolved = run(MODEL, scene, FAST, steps=steps, **how, resolved=True)
+            assert resolved.section == pytest.approx(fine.section, rel=0, abs=tolerance)
+            # A plain tangent vector has an error of first order in every step that crosses.
+            assert resolved.growth == pytest.approx(fine.growth, rel=0, abs=2e-3)
+            assert (resolved.crossings > 0).all()
+
+
+@pytest.mark.parametrize("scene", [FULL, Scene(axial=False)], ids=named)
+def test_resolved_steps_without_tangent_give_the_states_of_those_with_it(scene):
+    how = {"steps": 60, "periods": 3, "resolved": True}
+    plain = run(MODEL, scene, START, **how, tangent=False)
+    both = run(MODEL, scene, START, **how)
+    assert plain.growth is None
+    assert plain.section == pytest.approx(both.section, rel=0, abs=2e-11)
+    assert plain.crossings.tolist() == both.crossings.tolist()
+
+
+def test_without_clearance_resolved_steps_are_those_of_the_scene_without_backlash():
+    model = MODEL._replace(half_backlash=np.zeros(2))
+    how = {"steps": 100, "periods": 5}
+    clearance = run(model, FULL, START, **how, resolved=True)
+    linear = run(model, NO_BACKLASH, START, **how)
+    assert clearance.section == pytest.approx(linear.section, rel=0, abs=1e-12)
+    assert clearance.growth == pytest.approx(linear.growth, rel=0, abs=1e-12)
+    assert not clearance.crossings.any()

@@ -1,0 +1,189 @@
+"""Long runs: what RK4 does to energy and phase is known exactly, and nothing else may happen."""
+
+import numpy as np
+import pytest
+from gearchaos_kernels import Scene, Status
+
+from .reference import BASE_HELIX_ANGLE, FULL, TORSION_ONLY, pan2021, run, state
+from .test_linear import system
+
+COS = np.cos(BASE_HELIX_ANGLE)
+LINEAR = Scene(pitch_error=False, stiffness_variation=False, backlash=False)
+WITH_BACKLASH = LINEAR._replace(backlash=True)
+CLEARANCE = Scene(False, False, True, False, False)
+UNDAMPED = {
+    "load": 0.0,
+    "damping_ratio": 0.0,
+    "transverse_damping_p": 0.0,
+    "transverse_damping_g": 0.0,
+    "axial_damping_p": 0.0,
+    "axial_damping_g": 0.0,
+}
+WAYS = [(LINEAR, False), (WITH_BACKLASH, False), (WITH_BACKLASH, True)]
+NAMED = ["no-backlash", "zero-clearance-plain", "zero-clearance-resolved"]
+
+
+def after(model, start: np.ndarray, steps: int, periods: int) -> np.ndarray:
+    """Return the state that RK4 itself has: R(h A)^n with R(z) = 1 + z + z^2/2 + z^3/6 + z^4/24."""
+    values, vectors = np.linalg.eig(system(model)[0])
+    z = values * 2.0 * np.pi / model.mesh_frequency[0] / steps
+    factor = 1.0 + z * (1.0 + z / 2.0 * (1.0 + z / 3.0 * (1.0 + z / 4.0)))
+    modes = np.linalg.solve(vectors, start.astype(complex))
+    return (vectors @ (factor ** (steps * periods) * modes)).real
+
+
+def energy(model, states: np.ndarray) -> np.ndarray:
+    """Return the energy of the pair without axial mesh force; masses are those of eq. 13."""
+    ratios = np.array([1.0, *(getattr(model, f"mass_ratio_{gear}")[0] for gear in "pgpg")])
+    stiffness = np.array(
+        [0.0]
+        + [
+            getattr(model, f"{way}_stiffness_{gear}")[0]
+            for way in ("transverse", "axial")
+            for gear in "pg"
+        ]
+    )
+    delta, rate = states[..., :5], states[..., 5:]
+    y_1 = delta[..., 0] + delta[..., 1] - delta[..., 2]
+    own = np.sum((rate**2 + stiffness * delta**2) / ratios, axis=-1)
+    return 0.5 * (own + COS * y_1**2)
+
+
+
+
+@pytest.mark.parametrize(("scene", "resolved"), WAYS, ids=NAMED)
+@pytest.mark.parametrize("steps", [40, 100])
+def test_an_undamped_pair_does_after_ten_thousand_periods_what_the_method_predicts(
+    scene, resolved, steps
+):
+    model = pan2021(0.0, **UNDAMPED, half_backlash=0.0)
+    start = state(delta_5=1.0, delta_1_rate=-0.4, delta_2=0.3, delta_3_rate=0.7, delta_4=-0.2)
+    periods = 10_000
+    outcome = run(
+        model,
+        scene,
+        start,
+        steps=steps,
+        periods=periods,
+        tangent=False,
+        resolved=resolved,
+    )
+    assert outcome.status.tolist() == [Status.OK]
+    assert outcome.crossings.tolist() == [0]
+    for number in (1, 100, 1000, periods):
+        wanted = after(model, start, steps, number)
+        assert outcome.section[0, number - 1] == pytest.approx(wanted, rel=0, abs=1e-8)
+
+
+@pytest.mark.parametrize(("scene", "resolved"), WAYS, ids=NAMED)
+@pytest.mark.parametrize("steps", [40, 100, 288])
+def test_energy_without_damping_never_grows_and_falls_as_the_method_predicts(
+    scene, resolved, steps
+):
+    scene = scene._replace(axial=False)
+    model = pan2021(0.0, **UNDAMPED, half_backlash=0.0)
+    start = state(delta_5=1.0)
+    outcome = run(
+        model, scene, start, steps=steps, periods=10_000, tangent=False, resolved=resolved
+    )
+    found = energy(model, outcome.section[0])
+    assert np.diff(found).max() < 1e-13
+    predicted = np.stack([after(model, start, steps, number) for number in (1, 2000, 10_000)])
+    # The axial pair, which acts on nothing, is not part of this scene.
+    predicted[:, [3, 4, 8, 9]] = 0.0
+    wanted = energy(model, predicted)
+    assert found[[0, 1999, 9999]] == pytest.approx(wanted, rel=1e-8)
+
+
+@pytest.mark.parametrize("steps", [20, 60])
+def test_the_amplitude_of_a_single_oscillator_falls_by_the_sixth_power_of_the_step(steps):
+    # |R(ix)|^2 = 1 - x^6/72 + x^8/576.
+    scene = CLEARANCE
+    model = pan2021(0.0, **UNDAMPED, half_backlash=0.0)
+    periods = 10_000
+    outcome = run(
+        model,
+        scene,
+        state(delta_5=1.0),
+        steps=steps,
+        periods=periods,
+        tangent=False,
+        resolved=True,
+    )
+    position, rate = outcome.section[0, :, 0], outcome.section[0, :, 5]
+    found = position**2 + rate**2 / COS
+    x = 2.0 * np.pi / model.mesh_frequency[0] * np.sqrt(COS) / steps
+    wanted = (1.0 - x**6 / 72.0 + x**8 / 576.0) ** (steps * np.arange(1.0, periods + 1.0))
+    assert found == pytest.approx(wanted, rel=1e-9, abs=1e-300)
+
+
+@pytest.mark.parametrize(("resolved", "largest"), [(True, 1e-5), (False, 3e-2)])
+def test_energy_of_an_undamped_pair_that_rattles_between_its_flanks_is_kept(resolved, largest):
+    # A split step keeps what a plain one, off by the second order at every impact, does not.
+    starts = np.stack([state(delta_5_rate=speed) for speed in np.linspace(0.5, 2.0, 32)])
+    model = pan2021(np.zeros(32), **UNDAMPED)
+    outcome = run(
+        model, CLEARANCE, starts, steps=200, periods=500, tangent=False, resolved=resolved
+    )
+    position, rate = outcome.section[..., 0], outcome.section[..., 5]
+    deflection = np.maximum(np.abs(position) - 0.94518 * COS, 0.0)
+    found = 0.5 * (rate**2 + COS * deflection**2)
+    drift = np.abs(found / (0.5 * starts[:, np.newaxis, 5] ** 2) - 1.0).max()
+    assert drift < largest
+    if resolved:
+        assert (outcome.crossings > 4 * 300).all()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("resolved", [False, True], ids=["plain", "resolved"])
+@pytest.mark.parametrize(("steps", "multiple"), [(24, 0.5), (32, 5.86), (101, 5.86)])
+def test_a_periodic_motion_stays_where_it_is_for_a_hundred_thousand_periods(
+    resolved, steps, multiple
+):
+    outcome = run(
+        pan2021(multiple),
+        TORSION_ONLY,
+        steps=steps,
+        transient=2000,
+        periods=100_000,
+        points=100_000,
+        section=("delta_5", "delta_5_rate"),
+        resolved=resolved,
+    )
+    assert outcome.status.tolist() == [Status.OK]
+    # Neither the place nor the phase of the motion drifts: both coordinates keep their digits.
+    assert np.ptp(outcome.section, axis=1).max() < 1e-13
+    assert np.ptp(outcome.growth[0].reshape(100, 1000).mean(axis=1)) < 1e-2
+    if resolved:
+        assert outcome.crossings[0] % 100_000 == 0
+        assert outcome.crossings[0] == (200_000 if multiple > 1.0 else 0)
+
+
+def test_a_hundred_thousand_periods_of_free_oscillation_keep_the_phase_of_the_method():
+    model = pan2021(0.0, **UNDAMPED, half_backlash=0.0)
+    steps, periods = 200, 100_000
+    outcome = run(
+        model,
+        CLEARANCE._replace(backlash=False),
+        state(delta_5=1.0),
+        steps=steps,
+        periods=periods,
+        points=1,
+        tangent=False,
+    )
+    x = 2.0 * np.pi / model.mesh_frequency[0] * np.sqrt(COS) / steps
+    turn = np.angle(1.0 - x**2 / 2.0 + x**4 / 24.0 + 1j * (x - x**3 / 6.0))
+    length = (1.0 - x**6 / 72.0 + x**8 / 576.0) ** (0.5 * steps * periods)
+    phase = turn * steps * periods
+    position, rate = outcome.section[0, 0, [0, 5]]
+    assert position == pytest.approx(length * np.cos(phase), rel=0, abs=1e-6)
+    assert rate == pytest.approx(-length * np.sqrt(COS) * np.sin(phase), rel=0, abs=1e-6)
+
+
+def test_the_exponent_of_the_full_scene_does_not_depend_on_how_the_run_is_cut():
+    model = pan2021([0.5, 5.86])
+    whole = run(model, FULL, steps=100, periods=400, resolved=True)
+    first = run(model, FULL, steps=100, periods=150, resolved=True)
+    second = run(model, FULL, first.end_state, steps=100, periods=250, resolved=True)
+    assert second.section == pytest.approx(whole.section[:, 150:], rel=0, abs=1e-9)
+    assert (first.crossings + second.crossings).tolist() == whole.crossings.tolist()
