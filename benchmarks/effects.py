@@ -18,7 +18,7 @@ from machine import machine_facts, print_machine
 from matplotlib.figure import Figure
 from throughput import engine, nanoseconds_per_step
 
-from gearchaos.figures.style import STYLE
+from gearchaos.figures.style import EXPONENT, POSITIVE, STYLE
 
 SCENES = {
     "linear torsion": Scene(False, False, False, False, False),
@@ -33,6 +33,13 @@ MODES = {
     "plain, tangent": {"tangent": True, "resolved": False},
     "resolved": {"tangent": False, "resolved": True},
     "resolved, tangent": {"tangent": True, "resolved": True},
+}
+
+LOOKS = {
+    "plain": {"color": POSITIVE},
+    "plain, tangent": {"facecolor": "white", "edgecolor": POSITIVE, "hatch": "//////"},
+    "resolved": {"color": EXPONENT},
+    "resolved, tangent": {"facecolor": "white", "edgecolor": EXPONENT, "hatch": "//////"},
 }
 
 
@@ -86,7 +93,8 @@ def _draw(table: dict[str, dict[str, float]], path: Path) -> None:
         height = 0.8 / len(table)
         for number, (mode, times) in enumerate(table.items()):
             places = [row + (number - 1.5) * height for row in rows]
-            axes.barh(places, list(times.values()), height=height, label=mode)
+            axes.barh(places, list(times.values()), height=height, label=mode, **LOOKS[mode])
+        axes.tick_params(axis="y", which="both", left=False, right=False)
         axes.set_yticks(list(rows), list(SCENES))
         axes.invert_yaxis()
         axes.set_xlabel("time per step and lane (ns)")

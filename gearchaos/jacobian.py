@@ -8,19 +8,6 @@ from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 
-OUTSIDE = frozenset(
-    {
-        "mesh_frequency",
-        "load",
-        "half_backlash",
-        "error_mean",
-        "error_amplitude",
-        "error_phase",
-        "stiffness_variation_scale",
-    }
-)
-"""Groups that do not appear in the Jacobian of a branch of given stiffness."""
-
 COORDINATES = (
     "torsion",
     "transverse bearing of the driving gear",

@@ -1,26 +1,21 @@
-"""The fewest steps per mesh period with which the Runge-Kutta method of order 4 is stable.
+"""The fewest steps per mesh period with which the integration of a lane is stable.
 
-On a contact branch with its mesh stiffness held, eq. 13 is linear, and a step of length h
-multiplies the mode of an eigenvalue lambda by R(h lambda), R(z) = 1 + z + z^2/2 + z^3/6 + z^4/24
-(Hairer, Wanner 1996, sec. IV.2). A mode that does not grow by itself must not grow in the steps.
-
-The size of R need not rise steadily along a ray from 0 into the left half plane: on the negative
-real axis it first falls. But it leaves 1 only once, so that all step numbers from the fewest
-stable one on are stable.
+On a contact branch with its mesh stiffness held, eq. 13 is linear with the eigenvalues of its
+Jacobian. None of them may lie outside the stable region of the Runge-Kutta method of order 4, or
+the computed motion grows where the true one decays.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cache
 
 import numpy as np
 from gearchaos_kernels import Model, Scene
 from numpy.typing import NDArray
 
 from gearchaos.configuration.messages import Fault
-from gearchaos.jacobian import COORDINATES, OUTSIDE, coordinates, jacobian
+from gearchaos.jacobian import COORDINATES, coordinates, jacobian
+from gearchaos.stable_region import ROUNDING, SHORTEST_RAY, steps_per_time
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -28,8 +23,6 @@ Integers = NDArray[np.int64]
 MOST_STEPS = 2**53
 """Stands for every number of steps beyond it."""
 
-_RAYS = 2**14
-_ROUNDING = 1e-9
 _LANES_AT_ONCE = 2**14
 _POINTS_PER_WAVE = 64
 
@@ -113,10 +106,9 @@ def stability_limit(
     unstable = np.flatnonzero(fewest > steps)
     if unstable.size == 0:
         return None
-    worst = unstable[[np.argmax(fewest[unstable])]]
-    eigenvalue, owner = _strictest_mode(
-        scene, Model(*(group[worst] for group in part)), stiffness_cosine, stiffness_sine
-    )
+    worst = Model(*(group[unstable[[np.argmax(fewest[unstable])]]] for group in part))
+    stiffnesses = _stiffnesses(scene, worst, stiffness_cosine, stiffness_sine)
+    eigenvalue, owner = _strictest_mode(scene, worst, stiffnesses)
     return StabilityLimit(doubtful[unstable], fewest[unstable], eigenvalue, owner)
 
 
@@ -143,19 +135,14 @@ def fewest_stable_steps(
         Whole numbers of at least 1. Every larger number of steps is stable too.
     """
     stiffnesses = _stiffnesses(scene, model, stiffness_cosine, stiffness_sine)
-    first, lane = _distinct(model, stiffnesses)
-    demand = np.zeros(first.size)
-    for begin in range(0, first.size, _LANES_AT_ONCE):
-        chosen = first[begin : begin + _LANES_AT_ONCE]
+    demand = np.zeros(model.load.size)
+    for begin in range(0, demand.size, _LANES_AT_ONCE):
+        chosen = slice(begin, begin + _LANES_AT_ONCE)
         part = Model(*(group[chosen] for group in model))
-        for stiffness in stiffnesses:
-            for block in _diagonal_blocks(scene, part, stiffness[chosen]):
-                eigenvalues = _where_finite(np.linalg.eigvals, block)
-                most = np.max(steps_per_time(eigenvalues), axis=1)
-                demand[begin : begin + _LANES_AT_ONCE] = np.maximum(
-                    demand[begin : begin + _LANES_AT_ONCE], most
-                )
-    return _per_period(demand[lane], model)
+        for stiffness in stiffnesses[:, chosen]:
+            for block in _diagonal_blocks(scene, part, stiffness):
+                demand[chosen] = np.maximum(demand[chosen], _demand(block))
+    return _per_period(demand, model)
 
 
 def sufficient_steps(
@@ -190,33 +177,83 @@ def sufficient_steps(
     k = k + mesh_stiffness * feels
     half = 0.5 * c + model.damping_ratio * feels
     largest = half + np.sqrt(half**2 + k)
-    return _per_period(largest / np.min(_rays()[1]), model)
+    return _per_period(largest / SHORTEST_RAY, model)
 
 
-def steps_per_time(eigenvalues: NDArray[np.complex128]) -> Floats:
-    """Return the fewest stable steps per unit of tau for every eigenvalue; 0 if it grows."""
-    angles, lengths = _rays()
-    size = np.abs(eigenvalues)
-    # An undamped mode lies on the imaginary axis up to rounding.
-    decays = eigenvalues.real <= _ROUNDING * size
-    angle = np.abs(np.angle(eigenvalues))
-    return np.where(decays, size / np.interp(angle, angles, lengths), 0.0)
+def _stiffnesses(
+    scene: Scene, model: Model, stiffness_cosine: Floats, stiffness_sine: Floats
+) -> Floats:
+    """kappa f' on the branches, shape (stiffnesses, lanes): no contact and the extremes of it."""
+    values = [np.ones_like(model.load)]
+    if scene.stiffness_variation:
+        amplitude = stiffness_cosine - 1j * stiffness_sine
+        points = _POINTS_PER_WAVE * (amplitude.size + 1)
+        waves = np.fft.fft(np.concatenate([[0.0], amplitude.conj()]), points).real
+        extremes = np.min(waves), np.max(waves)
+        values = [1.0 + model.stiffness_variation_scale * extreme for extreme in extremes]
+    if scene.backlash:
+        values.append(np.zeros_like(model.load))
+    return np.stack(values)
 
 
-@cache
-def _rays() -> tuple[Floats, Floats]:
-    """Angles from pi/2 to pi, and how far the stability region reaches along them."""
-    angles = np.linspace(0.5 * np.pi, np.pi, _RAYS)
-    direction = np.exp(1j * angles)
-    inside, outside = np.full(_RAYS, 2.0), np.full(_RAYS, 4.0)
-    # |R|^2 - 1 on the imaginary axis is rounding near 0, so that the search begins further out.
-    while np.max(outside - inside) > 1e-14:
-        middle = 0.5 * (inside + outside)
-        z = middle * direction
-        stable = np.abs(1.0 + z * (1.0 + z / 2.0 * (1.0 + z / 3.0 * (1.0 + z / 4.0)))) <= 1.0
-        inside, outside = np.where(stable, middle, inside), np.where(stable, outside, middle)
-        if np.all((inside == middle) | (outside == middle)) and np.all(
-            np.nextafter(inside, outside) >= outside
-        ):
-            break
-    return angles, inside
+def _diagonal_blocks(scene: Scene, model: Model, stiffness: Floats) -> list[Floats]:
+    """Jacobians of the tangential and of the axial motion at one stiffness of the mesh.
+
+    The axial motion acts on nothing else, so that the eigenvalues of any branch are those of its
+    tangential block together with those of its axial one.
+    """
+    whole = jacobian(scene, model, stiffness, stiffness)
+    first = 6 if scene.transverse else 2
+    blocks = [whole[:, :first, :first], whole[:, first:, first:]]
+    return blocks[: 1 + scene.axial]
+
+
+def _demand(block: Floats) -> Floats:
+    """Return the fewest stable steps per unit of tau of every matrix; inf if one overflowed."""
+    distinct, kind = _distinct(block.reshape(block.shape[0], -1))
+    matrices = block[distinct]
+    finite = np.isfinite(matrices).all(axis=(1, 2))
+    demand = np.full(distinct.size, np.inf)
+    demand[finite] = np.max(steps_per_time(np.linalg.eigvals(matrices[finite])), axis=1)
+    return demand[kind]
+
+
+def _distinct(rows: Floats) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Return the numbers of rows that differ from each other, and which of them every row is."""
+    varying = rows[:, np.any(rows != rows[:1], axis=0)]
+    if varying.size == 0:
+        same = np.zeros(rows.shape[0], dtype=np.intp)
+        return same[:1], same
+    order = np.lexsort(varying.T)
+    begins = np.ones(order.size, dtype=bool)
+    begins[1:] = np.any(varying[order[1:]] != varying[order[:-1]], axis=1)
+    kind = np.empty_like(order)
+    kind[order] = np.cumsum(begins) - 1
+    return order[begins], kind
+
+
+def _per_period(demand: Floats, model: Model) -> Integers:
+    steps = np.ceil(demand * (2.0 * np.pi / model.mesh_frequency) * (1.0 - ROUNDING))
+    return np.clip(steps, 1.0, MOST_STEPS).astype(np.int64)
+
+
+def _strictest_mode(scene: Scene, model: Model, stiffnesses: Floats) -> tuple[complex, str]:
+    """Return the eigenvalue of one lane that asks for the most steps, and what moves with it."""
+    kept = coordinates(scene)
+    weights = np.concatenate(
+        [np.ones(1), *2 * [np.concatenate([model.mass_ratio_p, model.mass_ratio_g])]]
+    )[kept]
+    modes = []
+    for stiffness in stiffnesses:
+        owned = 0
+        for block in _diagonal_blocks(scene, model, stiffness):
+            values, vectors = np.linalg.eig(block[0])
+            mode = np.argmax(steps_per_time(values))
+            owners = slice(owned, owned + values.size // 2)
+            # Kinetic energy: the mass ratios are those of the equivalent mass to each mass.
+            energy = np.abs(vectors[1::2, mode]) ** 2 / weights[owners]
+            owner = COORDINATES[kept[owners][np.argmax(energy)]]
+            modes.append((steps_per_time(values[mode]), complex(values[mode]), owner))
+            owned = owners.stop
+    _, eigenvalue, owner = max(modes, key=lambda mode: float(mode[0]))
+    return eigenvalue, owner

@@ -77,6 +77,7 @@ def leaving_fraction(gap0, rate0, gap1, rate1, branch, half_backlash):
     """
     if half_backlash == 0.0:
         return NEVER
+    # One formula for a motion and its mirror image: the compiler then rounds both alike.
     if branch.engaged != 0.0:
         side = math.copysign(1.0, branch.offset)
         return first_fall(
@@ -85,9 +86,20 @@ def leaving_fraction(gap0, rate0, gap1, rate1, branch, half_backlash):
             side * gap1 - half_backlash,
             side * rate1,
         )
+    side = math.copysign(1.0, gap1)
     return min(
-        first_fall(half_backlash - gap0, -rate0, half_backlash - gap1, -rate1),
-        first_fall(half_backlash + gap0, rate0, half_backlash + gap1, rate1),
+        first_fall(
+            half_backlash - side * gap0,
+            -side * rate0,
+            half_backlash - side * gap1,
+            -side * rate1,
+        ),
+        first_fall(
+            half_backlash + side * gap0,
+            side * rate0,
+            half_backlash + side * gap1,
+            side * rate1,
+        ),
     )
 
 

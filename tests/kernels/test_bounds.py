@@ -1,0 +1,190 @@
+"""Random pairs and starts: finite or flagged, bounded by the energy put in, symmetric, scalable.
+
+All examples share one compiled scene, with every effect, tangent vector and split steps.
+"""
+
+import numpy as np
+from gearchaos_kernels import Model, Status
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from .reference import COSINE, FULL, SINE, assert_same_bits, pan2021, run
+
+settings.register_profile("bounds", derandomize=True, deadline=None, max_examples=60)
+PROPERTY = settings.get_profile("bounds")
+
+PERIODS = 6
+LENGTHS = ("load", "half_backlash", "error_mean", "error_amplitude")
+BEARINGS = [f"{way}_{{}}_{gear}" for way in ("transverse", "axial") for gear in "pg"]
+
+groups = st.fixed_dictionaries(
+    {
+        "mesh_frequency": st.floats(0.4, 3.0),
+        "load": st.floats(-1.0, 1.0),
+        "damping_ratio": st.floats(0.0, 1.0),
+        "base_helix_angle": st.floats(0.05, 0.7),
+        "half_backlash": st.sampled_from([0.0, 1e-9, 1e-3, 0.1, 1.0, 1e9]) | st.floats(0.0, 2.0),
+        "error_mean": st.floats(-0.5, 0.5),
+        "error_amplitude": st.floats(0.0, 2.0),
+        # Never zero: the loop without phase is compiled apart.
+        "error_phase": st.floats(0.1, 6.0),
+        "stiffness_variation_scale": st.floats(0.0, 2.0),
+        "mass_ratio_p": st.floats(0.05, 1.0),
+        "mass_ratio_g": st.floats(0.05, 1.0),
+        **{name.format("stiffness"): st.floats(0.0, 60.0) for name in BEARINGS},
+        **{name.format("damping"): st.floats(0.0, 0.5) for name in BEARINGS},
+    }
+)
+starts = st.lists(st.floats(-3.0, 3.0), min_size=10, max_size=10).map(np.array)
+anything = st.sampled_from([0.0, 1e-300, 1e-9, 1.0, 1e3, 1e9, 1e30, 1e150, np.inf, np.nan])
+
+
+def value(model: Model, name: str) -> float:
+    return float(getattr(model, name)[0])
+
+
+def stiffness_wave(model: Model) -> np.ndarray:
+    """Return kappa over one period, eq. 19."""
+    angle = np.linspace(0.0, 2.0 * np.pi, 4001)[:, np.newaxis] * np.arange(1, COSINE.size + 1)
+    variation = np.cos(angle) @ COSINE + np.sin(angle) @ SINE
+    return 1.0 + value(model, "stiffness_variation_scale") * variation
+
+
+def relative(model: Model, states: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return y_1 and y_2 of eqs 6 and 7 as printed, at the end of a period."""
+    beta = value(model, "base_helix_angle")
+    phase = value(model, "error_phase")
+    error = value(model, "error_mean") + value(model, "error_amplitude") * np.sin(phase)
+    along_mesh = states[..., 1] - states[..., 2] + states[..., 0]
+    y_1 = along_mesh - error * np.cos(beta)
+    y_2 = states[..., 3] - states[..., 4] - np.tan(beta) * along_mesh - error * np.sin(beta)
+    return y_1, y_2
+
+
+def stored_in(y, half_backlash, kappa) -> np.ndarray:
+    """Return the energy of the mesh spring, per unit of the direction's share."""
+    return 0.5 * kappa * np.maximum(np.abs(y) - half_backlash, 0.0) ** 2
+
+
+def energies(model: Model, states: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the energy of the torsional and transverse motion, and that of the axial one."""
+    beta, half_backlash = value(model, "base_helix_angle"), value(model, "half_backlash")
+    kappa = stiffness_wave(model)[0]
+    y_1, y_2 = relative(model, states)
+    cosine, sine = np.cos(beta), np.sin(beta)
+    tangential = 0.5 * states[..., 5] ** 2 + cosine * stored_in(
+        y_1, half_backlash * cosine, kappa
+    )
+    axial = sine * stored_in(y_2, half_backlash * sine, kappa)
+    for row, way, gear in ((1, "transverse", "p"), (2, "transverse", "g")):
+        tangential = tangential + of_gear(model, states, row, way, gear)
+    for row, way, gear in ((3, "axial", "p"), (4, "axial", "g")):
+        axial = axial + of_gear(model, states, row, way, gear)
+    return tangential, axial
+
+
+def of_gear(model: Model, states: np.ndarray, row: int, way: str, gear: str) -> np.ndarray:
+    """Return the energy of one gear and its bearing in one direction."""
+    stiffness = value(model, f"{way}_stiffness_{gear}")
+    energy = 0.5 * (states[..., row + 5] ** 2 + stiffness * states[..., row] ** 2)
+    return energy / value(model, f"mass_ratio_{gear}")
+
+
+def bound(before, power, leak, rises, tau) -> np.ndarray:
+    """Return the largest energy if E' <= sqrt(2 E) power + leak + E (rise of ln kappa)."""
+    root = np.sqrt(before + leak * tau) + power * tau / np.sqrt(2.0)
+    return (root * np.exp(0.5 * rises)) ** 2
+
+
+@PROPERTY
+@given(groups, starts)
+def test_the_energy_of_a_motion_is_bounded_by_what_load_error_and_stiffness_put_in(given, start):
+    model = pan2021(0.0, **given)
+    outcome = run(model, FULL, start, steps=200, periods=PERIODS, resolved=True)
+    assert outcome.status.tolist() == [Status.OK]
+
+    kappa = stiffness_wave(model)
+    periods = np.arange(1, PERIODS + 1)
+    tau = periods * 2.0 * np.pi / value(model, "mesh_frequency")
+    rises = periods * np.maximum(np.diff(np.log(kappa)), 0.0).sum()
+    beta, ratio = value(model, "base_helix_angle"), value(model, "damping_ratio")
+    cosine, sine = np.cos(beta), np.sin(beta)
+    frequency, amplitude = value(model, "mesh_frequency"), value(model, "error_amplitude")
+    error_rate = frequency * amplitude
+    first, first_axial = energies(model, start)
+
+    # Load and inertial term act on delta_5, and the error's rate on the mesh force.
+    power = abs(value(model, "load")) + frequency**2 * amplitude
+    power += np.sqrt(kappa.max() * cosine) * cosine * error_rate
+    leak = 0.5 * ratio * cosine * (cosine * error_rate) ** 2
+    largest = bound(first, power, leak, rises, tau)
+    tangential, axial = energies(model, outcome.section[0])
+    assert (tangential <= 1.01 * largest + 1e-6).all()
+
+    # The axial pair is driven by the approach of the gears, whose speed that energy bounds.
+    feels = 1.0 + value(model, "mass_ratio_p") + value(model, "mass_ratio_g")
+    driven = np.tan(beta) * np.sqrt(2.0 * feels * largest) + sine * error_rate
+    largest_axial = bound(
+        first_axial,
+        np.sqrt(kappa.max() * sine) * driven,
+        0.5 * ratio * sine * driven**2,
+        rises,
+        tau,
+    )
+    assert (axial <= 1.01 * largest_axial + 1e-6).all()
+
+
+@PROPERTY
+@given(groups, starts, st.sampled_from([2, 5, 20, 100]), anything, st.integers(0, 9))
+def test_a_motion_is_finite_or_its_lane_says_that_it_is_not(given, start, steps, size, row):
+    start[row] *= size
+    model = pan2021(0.0, **given)
+    outcome = run(model, FULL, start, steps=steps, periods=PERIODS, resolved=True)
+    if outcome.status[0] == Status.OK:
+        kept = PERIODS
+        assert outcome.diverged_period[0] == -1
+        assert np.isfinite(outcome.end_state).all()
+        assert np.isfinite(outcome.end_tangent).all()
+    else:
+        kept = outcome.diverged_period[0]
+        assert 0 <= kept < PERIODS
+        assert np.isnan(outcome.end_state).all()
+    for array in (outcome.section[0], outcome.growth[0]):
+        assert np.isfinite(array[:kept]).all()
+        assert np.isnan(array[kept:]).all()
+    assert 0 <= outcome.overflows[0] <= steps * PERIODS
+    assert outcome.crossings[0] >= 0
+
+
+@PROPERTY
+@given(groups, starts, st.sampled_from([7, 50]))
+def test_a_motion_turned_around_is_the_motion_of_the_pair_turned_around(given, start, steps):
+    model = pan2021(0.0, **given)
+    turned = {name: -getattr(model, name) for name in LENGTHS if name != "half_backlash"}
+    how = {"steps": steps, "periods": PERIODS, "resolved": True}
+    one = run(model, FULL, start, **how)
+    other = run(model._replace(**turned), FULL, -start, **how)
+    # Only the signs of section and end state differ, and of their zeros.
+    assert np.array_equal(other.section, -one.section, equal_nan=True)
+    assert np.array_equal(other.end_state, -one.end_state, equal_nan=True)
+    same = {"section": one.section, "end_state": one.end_state}
+    assert_same_bits(other._replace(**same), one)
+
+
+@PROPERTY
+@given(groups, starts, st.sampled_from([7, 50]), st.integers(-30, 30))
+def test_a_motion_scales_with_every_length_of_its_pair(given, start, steps, power):
+    factor = 2.0**power
+    model = pan2021(0.0, **given)
+    scaled = model._replace(**{name: factor * getattr(model, name) for name in LENGTHS})
+    how = {"steps": steps, "periods": 3, "resolved": True}
+    one = run(model, FULL, start, **how)
+    other = run(scaled, FULL, factor * start, **how)
+    if one.status[0] != Status.OK or other.status[0] != Status.OK:
+        # What is out of range depends on the unit of length.
+        return
+    assert np.array_equal(other.section, factor * one.section)
+    assert np.array_equal(other.end_state, factor * one.end_state)
+    assert np.array_equal(other.growth, one.growth)
+    assert other.crossings.tolist() == one.crossings.tolist()
+    assert other.slowest_crossing.tolist() == (factor * one.slowest_crossing).tolist()
