@@ -61,6 +61,12 @@ class Progress:
         self._bar.close()
 
 
+def say(text: str, quiet: bool = False) -> None:
+    """Print a line on stderr."""
+    if not quiet:
+        print(f"gearchaos sweep: {text}", file=sys.stderr, flush=True)
+
+
 @contextmanager
 def notice(text: str, quiet: bool = False) -> Iterator[None]:
     """Print a line on stderr if what follows takes longer than a moment."""

@@ -11,7 +11,7 @@ from gearchaos_kernels import current_threads, most_threads, use_threads
 
 from gearchaos.configuration import Configuration
 from gearchaos.errors import ConfigurationError
-from gearchaos.progress import Progress, notice
+from gearchaos.progress import Progress, notice, say
 from gearchaos.provenance import provenance
 from gearchaos.result import Result
 from gearchaos.simulation import Simulation, compute_all
@@ -44,6 +44,8 @@ def run(config: Configuration, threads: int | None = None, progress: bool = Fals
     """
     choose_threads(threads)
     simulation = Simulation(config)
+    for note in simulation.notes:
+        say(note, quiet=not progress)
     with notice(COMPILING, quiet=not progress):
         simulation.compile()
     began = time.monotonic()
@@ -122,7 +124,8 @@ def metadata(simulation: Simulation, seconds: float) -> Mapping[str, Any]:
         "start": config.start.kind,
         "carry": config.start.carry,
         "method": "classical Runge-Kutta of order 4 with fixed steps",
-        **config.integration.model_dump(),
+        **config.integration.model_dump(exclude_none=True),
+        "steps_per_period": simulation.plan.steps_per_period,
         **provenance(current_threads(), seconds),
         "configuration": config.text,
         "configuration_resolved": config.resolved_toml(),

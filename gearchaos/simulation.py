@@ -22,10 +22,12 @@ from numpy.typing import NDArray
 from gearchaos.configuration import Configuration, lane_groups
 from gearchaos.configuration.run_tables import states_of
 from gearchaos.configuration.sweep_values import SWEEPABLE_GROUPS, SWEEPABLE_KEYS
+from gearchaos.errors import ConfigurationError
 from gearchaos.group_table import GROUP_TABLE
 from gearchaos.lanes import model, select, start_states
 from gearchaos.lyapunov import largest_exponent
 from gearchaos.result import Parameter
+from gearchaos.stability import stability_limit
 from gearchaos.variables import Variable, axis_name, sweep_variables
 
 Arrays = Mapping[str, NDArray[Any]]
@@ -60,6 +62,9 @@ class Simulation:
             tangent=config.outputs.lyapunov,
             resolved=config.integration.crossings == "resolved",
         )
+        self.notes: list[str] = []
+        """What a user should know before the sweep begins."""
+        self._keep_stable()
 
     @property
     def axis(self) -> str:
@@ -164,6 +169,29 @@ class Simulation:
             return self._arrays(first, self._integrate(slice(first, last)))
         return self._compute_carried(first, last, neighbour)
 
+    def _keep_stable(self) -> None:
+        """Refuse or raise a number of steps with which the method itself would blow up."""
+        steps = self.plan.steps_per_period
+        harmonics = self._harmonics()
+        limit = stability_limit(
+            self.scene, model(self.groups, self.values.size), *harmonics, steps=steps
+        )
+        if limit is None:
+            return
+        fault = limit.fault(steps, self.config.sweep.parameter, self.values)
+        if self.config.integration.unstable == "refuse":
+            raise ConfigurationError(fault.text(self.config.source))
+        self.plan = self.plan._replace(steps_per_period=limit.steps)
+        self.notes.append(
+            f"integration.steps_per_period raised from {steps} to {limit.steps}, the stability "
+            f"limit of {limit.lanes.size} of {self.values.size} values"
+        )
+
+    def _harmonics(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        nothing = np.zeros(0)
+        cosine, sine = self.groups.stiffness_cosine, self.groups.stiffness_sine
+        return nothing if cosine is None else cosine, nothing if sine is None else sine
+
     def _compute_carried(self, first: int, last: int, neighbour: Arrays | None) -> dict[str, Any]:
         downwards = self.config.start.carry == "downwards"
         columns = [STATE_ROWS[name] for name in self.states]
@@ -194,12 +222,10 @@ class Simulation:
         if carried is not None:
             # A lane that diverged hands nothing on: its successor begins anew.
             start = np.where(np.isfinite(carried).all(axis=1, keepdims=True), carried, start)
-        nothing = np.zeros(0)
         return integrate(
             self.scene,
             lane_model,
-            nothing if groups.stiffness_cosine is None else groups.stiffness_cosine,
-            nothing if groups.stiffness_sine is None else groups.stiffness_sine,
+            *self._harmonics(),
             start,
             plan or self.plan,
             rederived=self.config.formulation == "rederived",

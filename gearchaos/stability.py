@@ -23,6 +23,7 @@ Integers = NDArray[np.int64]
 MOST_STEPS = 2**53
 """Stands for every number of steps beyond it."""
 
+_BEYOND_MEASURE = 1e150
 _LANES_AT_ONCE = 2**14
 _POINTS_PER_WAVE = 64
 
@@ -54,17 +55,7 @@ class StabilityLimit:
         return int(np.max(self.fewest))
 
     def fault(self, configured: int, axis: str, values: Floats) -> Fault:
-        """Word the limit for whoever configured so few steps.
-
-        Parameters
-        ----------
-        configured : int
-            Steps per period.
-        axis : str
-            Name of the swept parameter.
-        values : ndarray, shape (lanes,)
-            Its value in every lane.
-        """
+        """Word the limit, given the configured steps and the swept parameter of every lane."""
         low, high = np.min(values[self.lanes]), np.max(values[self.lanes])
         where = f"= {low:.6g}" if low == high else f"from {low:.6g} to {high:.6g}"
         imaginary = abs(self.eigenvalue.imag)
@@ -82,31 +73,19 @@ class StabilityLimit:
 def stability_limit(
     scene: Scene, model: Model, stiffness_cosine: Floats, stiffness_sine: Floats, steps: int
 ) -> StabilityLimit | None:
-    """Find the lanes in which a number of steps per period is unstable.
+    """Find the lanes in which so many steps per period are unstable; None if there are none.
 
-    Eigenvalues are computed only where `sufficient_steps` leaves a doubt.
-
-    Parameters
-    ----------
-    scene, model, stiffness_cosine, stiffness_sine
-        As for `fewest_stable_steps`.
-    steps : int
-        Steps per period.
-
-    Returns
-    -------
-    StabilityLimit or None
-        None if all lanes are stable.
+    Eigenvalues are computed only where `sufficient_steps` leaves a doubt. The other parameters are
+    those of `fewest_stable_steps`.
     """
-    doubtful = np.flatnonzero(
-        sufficient_steps(scene, model, stiffness_cosine, stiffness_sine) > steps
-    )
-    part = Model(*(group[doubtful] for group in model))
+    sufficient = sufficient_steps(scene, model, stiffness_cosine, stiffness_sine)
+    doubtful = np.flatnonzero(sufficient > steps)
+    part = _lanes(model, doubtful)
     fewest = fewest_stable_steps(scene, part, stiffness_cosine, stiffness_sine)
     unstable = np.flatnonzero(fewest > steps)
     if unstable.size == 0:
         return None
-    worst = Model(*(group[unstable[[np.argmax(fewest[unstable])]]] for group in part))
+    worst = _lanes(part, unstable[[np.argmax(fewest[unstable])]])
     stiffnesses = _stiffnesses(scene, worst, stiffness_cosine, stiffness_sine)
     eigenvalue, owner = _strictest_mode(scene, worst, stiffnesses)
     return StabilityLimit(doubtful[unstable], fewest[unstable], eigenvalue, owner)
@@ -118,8 +97,9 @@ def fewest_stable_steps(
     """Return the fewest steps per period with which every lane is stable on every branch.
 
     The branches are those with and without contact in either direction, with the mesh stiffness
-    held at its smallest and at its largest value. Eigenvalues whose real part is positive grow
-    by themselves and set no limit.
+    held at its smallest and at its largest value. A motion that stays on one branch for part of the
+    time only may survive with fewer steps. Eigenvalues whose real part is positive grow by
+    themselves and set no limit.
 
     Parameters
     ----------
@@ -138,7 +118,7 @@ def fewest_stable_steps(
     demand = np.zeros(model.load.size)
     for begin in range(0, demand.size, _LANES_AT_ONCE):
         chosen = slice(begin, begin + _LANES_AT_ONCE)
-        part = Model(*(group[chosen] for group in model))
+        part = _lanes(model, chosen)
         for stiffness in stiffnesses[:, chosen]:
             for block in _diagonal_blocks(scene, part, stiffness):
                 demand[chosen] = np.maximum(demand[chosen], _demand(block))
@@ -160,6 +140,7 @@ def sufficient_steps(
     -------
     ndarray, shape (lanes,)
     """
+    model = _lanes(model, slice(None))
     mesh_stiffness = np.max(
         np.abs(_stiffnesses(scene, model, stiffness_cosine, stiffness_sine)), axis=0
     )
@@ -176,8 +157,13 @@ def sufficient_steps(
     feels = np.max([np.abs(projection) * moved for projection, moved in directions], axis=0)
     k = k + mesh_stiffness * feels
     half = 0.5 * c + model.damping_ratio * feels
-    largest = half + np.sqrt(half**2 + k)
+    largest = half + np.hypot(half, np.sqrt(k))
     return _per_period(largest / SHORTEST_RAY, model)
+
+
+def _lanes(model: Model, chosen: slice | NDArray[np.intp]) -> Model:
+    """Return some lanes, with groups that no computation could hold cut short of overflow."""
+    return Model(*(np.clip(group[chosen], -_BEYOND_MEASURE, _BEYOND_MEASURE) for group in model))
 
 
 def _stiffnesses(
@@ -186,10 +172,9 @@ def _stiffnesses(
     """kappa f' on the branches, shape (stiffnesses, lanes): no contact and the extremes of it."""
     values = [np.ones_like(model.load)]
     if scene.stiffness_variation:
-        amplitude = stiffness_cosine - 1j * stiffness_sine
-        points = _POINTS_PER_WAVE * (amplitude.size + 1)
-        waves = np.fft.fft(np.concatenate([[0.0], amplitude.conj()]), points).real
-        extremes = np.min(waves), np.max(waves)
+        harmonics = np.concatenate([[0.0], stiffness_cosine + 1j * stiffness_sine])
+        variation = np.fft.fft(harmonics, _POINTS_PER_WAVE * harmonics.size).real
+        extremes = np.min(variation), np.max(variation)
         values = [1.0 + model.stiffness_variation_scale * extreme for extreme in extremes]
     if scene.backlash:
         values.append(np.zeros_like(model.load))
@@ -209,12 +194,10 @@ def _diagonal_blocks(scene: Scene, model: Model, stiffness: Floats) -> list[Floa
 
 
 def _demand(block: Floats) -> Floats:
-    """Return the fewest stable steps per unit of tau of every matrix; inf if one overflowed."""
+    """Return the fewest stable steps per unit of tau of every matrix."""
     distinct, kind = _distinct(block.reshape(block.shape[0], -1))
-    matrices = block[distinct]
-    finite = np.isfinite(matrices).all(axis=(1, 2))
-    demand = np.full(distinct.size, np.inf)
-    demand[finite] = np.max(steps_per_time(np.linalg.eigvals(matrices[finite])), axis=1)
+    eigenvalues = np.linalg.eigvals(block[distinct]).astype(np.complex128)
+    demand: Floats = np.max(steps_per_time(eigenvalues), axis=1)
     return demand[kind]
 
 
@@ -233,27 +216,23 @@ def _distinct(rows: Floats) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
 
 
 def _per_period(demand: Floats, model: Model) -> Integers:
-    steps = np.ceil(demand * (2.0 * np.pi / model.mesh_frequency) * (1.0 - ROUNDING))
+    with np.errstate(over="ignore"):
+        steps = np.ceil(demand * (1.0 - ROUNDING) * (2.0 * np.pi / model.mesh_frequency))
     return np.clip(steps, 1.0, MOST_STEPS).astype(np.int64)
 
 
 def _strictest_mode(scene: Scene, model: Model, stiffnesses: Floats) -> tuple[complex, str]:
     """Return the eigenvalue of one lane that asks for the most steps, and what moves with it."""
     kept = coordinates(scene)
-    weights = np.concatenate(
-        [np.ones(1), *2 * [np.concatenate([model.mass_ratio_p, model.mass_ratio_g])]]
-    )[kept]
-    modes = []
+    most, strictest, owner = -1.0, 0j, ""
     for stiffness in stiffnesses:
-        owned = 0
+        first = 0
         for block in _diagonal_blocks(scene, model, stiffness):
-            values, vectors = np.linalg.eig(block[0])
-            mode = np.argmax(steps_per_time(values))
-            owners = slice(owned, owned + values.size // 2)
-            # Kinetic energy: the mass ratios are those of the equivalent mass to each mass.
-            energy = np.abs(vectors[1::2, mode]) ** 2 / weights[owners]
-            owner = COORDINATES[kept[owners][np.argmax(energy)]]
-            modes.append((steps_per_time(values[mode]), complex(values[mode]), owner))
-            owned = owners.stop
-    _, eigenvalue, owner = max(modes, key=lambda mode: float(mode[0]))
-    return eigenvalue, owner
+            values, vectors = np.linalg.eig(block[0].astype(np.complex128))
+            demand = steps_per_time(values)
+            mode = np.argmax(demand)
+            if demand[mode] > most:
+                most, strictest = demand[mode], complex(values[mode])
+                owner = COORDINATES[kept[first + np.argmax(np.abs(vectors[1::2, mode]))]]
+            first += values.size // 2
+    return strictest, owner

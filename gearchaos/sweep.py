@@ -73,11 +73,14 @@ def _run(argv: Sequence[str] | None) -> int:
     from gearchaos.configuration import load_config
 
     config = load_config(options.config, options.set)
+    from gearchaos.progress import say
     from gearchaos.running import choose_threads
     from gearchaos.simulation import Simulation
 
     choose_threads(options.threads)
     simulation = Simulation(config)
+    for note in simulation.notes:
+        say(note, options.quiet)
     # A text, not a Path, which would drop the slash that tells a folder from a file.
     output = f"{Path(options.config).stem}.h5" if options.output is None else options.output
     if os.path.exists(output) and os.path.samefile(output, options.config):
@@ -133,8 +136,8 @@ def _compute(
     if diverged > allowed * simulation.lanes:
         print(
             f"{NAME}: {diverged} of {simulation.lanes} lanes diverged, more than "
-            f"outputs.allowed_diverged_share = {allowed:g} allows; the file marks them: raise "
-            "integration.steps_per_period",
+            f"outputs.allowed_diverged_share = {allowed:g} allows; the file marks them: "
+            "raise integration.steps_per_period, or check the load and the start state",
             file=sys.stderr,
         )
         return TOO_MANY_DIVERGED

@@ -148,6 +148,10 @@ class Integration(Table):
         "of the method, or is a plain step",
         default="resolved",
     )
+    unstable: Literal["refuse", "raise"] = key(
+        "whether a number of steps below the stability limit of a lane is refused, or raised to it",
+        default="refuse",
+    )
     transient_periods: int = key(
         "mesh periods discarded before anything is recorded", default=500, ge=0, le=1_000_000_000
     )

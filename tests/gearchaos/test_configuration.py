@@ -97,6 +97,7 @@ def test_the_resolved_toml_states_every_default(text):
     assert tables["integration"] == {
         "steps_per_period": 200,
         "crossings": "resolved",
+        "unstable": "refuse",
         "transient_periods": 500,
         "recorded_periods": 500,
     }

@@ -117,7 +117,7 @@ def test_diverged_lanes_are_written_and_marked_and_make_the_exit_code_3(tmp_path
     assert (ended.code, ended.out) == (3, "gears.h5\n")
     (line,) = ended.err.splitlines()
     assert "40 of 40 lanes diverged, more than outputs.allowed_diverged_share = 0" in line
-    assert line.endswith("raise integration.steps_per_period")
+    assert line.endswith("check the load and the start state")
     result = gearchaos.open_result(tmp_path / "gears.h5")
     assert (result["status"] == 1).all()
     assert (result["diverged_period"] >= 0).all()
@@ -125,10 +125,26 @@ def test_diverged_lanes_are_written_and_marked_and_make_the_exit_code_3(tmp_path
     assert result.attributes("status")["flag_meanings"].split()[1] == "diverged"
 
 
+def test_an_unstable_number_of_steps_is_refused_with_the_limit_and_the_way_out(tmp_path):
+    stiff = ("--set", "groups.transverse_stiffness_p=1e6")
+    ended = sweep(tmp_path, *stiff)
+    assert (ended.code, ended.out) == (2, "")
+    (line,) = ended.err.splitlines()
+    limit = int(re.search(r"RK4 is unstable below (\d+) steps per period for 40 of 40", line)[1])
+    assert "transverse bearing of the driving gear" in line
+    assert names_in(tmp_path) == ["gears.toml"]
+    raised = sweep(tmp_path, *stiff, "--set", "integration.unstable=raise")
+    assert raised.code == 0
+    assert f"raised from 40 to {limit}, the stability limit" in raised.err
+    result = gearchaos.open_result(tmp_path / "gears.h5")
+    assert result.metadata["steps_per_period"] == limit
+    assert not result["status"].any()
+
+
 @pytest.mark.parametrize(("share", "code"), [("1.0", 0), ("0.5", 3)])
 def test_as_many_lanes_may_diverge_as_the_configuration_allows(tmp_path, share, code):
-    # Forty steps are enough for the softer half of these bearings.
-    values = "sweep={parameter='transverse_stiffness_p', values=[1.0, 1e5, 1e6]}"
+    # Two of these loads drive a lane beyond every length scale.
+    values = "sweep={parameter='load', values=[0.3, 1e150, 1e151]}"
     allowed = f"outputs.allowed_diverged_share={share}"
     ended = sweep(tmp_path, "--set", values, "--set", allowed)
     assert ended.code == code

@@ -72,9 +72,7 @@ def energies(model: Model, states: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     kappa = stiffness_wave(model)[0]
     y_1, y_2 = relative(model, states)
     cosine, sine = np.cos(beta), np.sin(beta)
-    tangential = 0.5 * states[..., 5] ** 2 + cosine * stored_in(
-        y_1, half_backlash * cosine, kappa
-    )
+    tangential = 0.5 * states[..., 5] ** 2 + cosine * stored_in(y_1, half_backlash * cosine, kappa)
     axial = sine * stored_in(y_2, half_backlash * sine, kappa)
     for row, way, gear in ((1, "transverse", "p"), (2, "transverse", "g")):
         tangential = tangential + of_gear(model, states, row, way, gear)

@@ -1,5 +1,7 @@
 """The same bits for any number of threads, any split, any order and any neighbours."""
 
+from collections.abc import Callable
+
 import numba
 import numpy as np
 import pytest
@@ -20,12 +22,19 @@ MODEL.transverse_damping_g[77] = -0.9
 HOW = {"steps": 72, "transient": 20, "periods": 40, "points": 30}
 
 
-def integrate(chosen) -> Outcome:
-    return run(lanes_of(MODEL, chosen), FULL, START[chosen], **HOW)
+@pytest.fixture(scope="module", params=[False, True], ids=["plain", "resolved"])
+def integrate(request) -> Callable[..., Outcome]:
+    """What integrates some lanes of this test, with plain steps or with split ones."""
+
+    def some(chosen) -> Outcome:
+        model, start = lanes_of(MODEL, chosen), START[chosen]
+        return run(model, FULL, start, **HOW, resolved=request.param)
+
+    return some
 
 
 @pytest.fixture(scope="module")
-def whole() -> Outcome:
+def whole(integrate) -> Outcome:
     return integrate(np.arange(TOTAL))
 
 
@@ -38,10 +47,12 @@ def test_two_lanes_of_this_test_diverge_and_the_others_differ_from_one_another(w
     assert whole.diverged_period[40] == 0
     assert whole.diverged_period[77] > HOW["transient"]
     assert np.unique(whole.end_state[:, 0]).size == TOTAL - 1
+    # With split steps, most lanes cross and no two alike.
+    assert np.unique(whole.slowest_crossing).size in (1, TOTAL)
 
 
 @pytest.mark.skipif(numba.config.NUMBA_NUM_THREADS < 2, reason="needs two threads")
-def test_one_thread_and_two_give_the_same_bits(whole):
+def test_one_thread_and_two_give_the_same_bits(integrate, whole):
     threads = numba.get_num_threads()
     try:
         for number in (1, 2):
@@ -52,7 +63,7 @@ def test_one_thread_and_two_give_the_same_bits(whole):
 
 
 @pytest.mark.parametrize("size", [1, LANES - 1, LANES, LANES + 1, TOTAL])
-def test_any_split_into_batches_gives_the_same_bits(whole, size):
+def test_any_split_into_batches_gives_the_same_bits(integrate, whole, size):
     parts = [
         integrate(np.arange(first, min(first + size, TOTAL))) for first in range(0, TOTAL, size)
     ]
@@ -60,12 +71,12 @@ def test_any_split_into_batches_gives_the_same_bits(whole, size):
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_any_order_of_lanes_gives_the_same_bits(whole, seed):
+def test_any_order_of_lanes_gives_the_same_bits(integrate, whole, seed):
     order = np.random.default_rng(seed).permutation(TOTAL)
     assert_same_bits(integrate(order), lanes_out_of(whole, order))
 
 
-def test_a_second_run_gives_the_same_bits(whole):
+def test_a_second_run_gives_the_same_bits(integrate, whole):
     assert_same_bits(integrate(np.arange(TOTAL)), whole)
 
 
@@ -79,15 +90,17 @@ def test_integration_leaves_its_arguments_alone(whole):
     assert whole.section.shape == (TOTAL, HOW["points"], 10)
 
 
-def test_a_longer_transient_is_the_same_motion_recorded_later():
-    longer = run(MODEL, FULL, START, **{**HOW, "transient": 25, "periods": 35})
-    shorter = run(MODEL, FULL, START, **HOW)
+@pytest.mark.parametrize("resolved", [False, True])
+def test_a_longer_transient_is_the_same_motion_recorded_later(resolved):
+    how = {**HOW, "resolved": resolved}
+    longer = run(MODEL, FULL, START, **{**how, "transient": 25, "periods": 35})
+    shorter = run(MODEL, FULL, START, **how)
     assert np.array_equal(longer.section, shorter.section, equal_nan=True)
     assert np.array_equal(longer.growth, shorter.growth[:, 5:], equal_nan=True)
     assert np.array_equal(longer.end_state, shorter.end_state, equal_nan=True)
 
 
-def test_no_lanes_give_empty_arrays():
+def test_no_lanes_give_empty_arrays(integrate):
     nothing = integrate(np.arange(0))
     assert nothing.section.shape == (0, HOW["points"], 10)
     assert nothing.status.shape == (0,)

@@ -11,27 +11,40 @@ START = np.tile(state(delta_5=1.0, delta_1_rate=0.1, delta_3=0.02), (4, 1))
 HOW = {"steps": 144, "transient": 5, "periods": 20, "section": STATES}
 
 
-def scaled(factor: float, start_factor: float | None = None):
-    """Integrate with every length of the model multiplied by one factor."""
-    lengths = {name: factor * getattr(MODEL, name) for name in LENGTHS}
-    start = START * (factor if start_factor is None else start_factor)
-    return run(MODEL._replace(**lengths), FULL, start, **HOW)
+@pytest.fixture(scope="module", params=[False, True], ids=["plain", "resolved"])
+def how(request):
+    """Plain steps, or such as are split where they cross the clearance."""
+    return {**HOW, "resolved": request.param}
 
 
 @pytest.fixture(scope="module")
-def original():
+def scaled(how):
+    """Integrate with every length of the model multiplied by one factor."""
+
+    def integrate(factor: float, start_factor: float | None = None):
+        lengths = {name: factor * getattr(MODEL, name) for name in LENGTHS}
+        start = START * (factor if start_factor is None else start_factor)
+        return run(MODEL._replace(**lengths), FULL, start, **how)
+
+    return integrate
+
+
+@pytest.fixture(scope="module")
+def original(scaled):
     return scaled(1.0)
 
 
 @pytest.mark.parametrize("power", [-40, -1, 3, 60])
-def test_scaling_all_lengths_by_a_power_of_two_scales_every_bit(original, power):
+def test_scaling_all_lengths_by_a_power_of_two_scales_every_bit(scaled, original, power):
     outcome = scaled(2.0**power)
     assert np.array_equal(outcome.section, 2.0**power * original.section)
     assert np.array_equal(outcome.end_state, 2.0**power * original.end_state)
     assert np.array_equal(outcome.growth, original.growth)
+    assert np.array_equal(outcome.crossings, original.crossings)
+    assert np.array_equal(outcome.slowest_crossing, 2.0**power * original.slowest_crossing)
 
 
-def test_scaling_all_lengths_by_ten_scales_the_motion_to_rounding(original):
+def test_scaling_all_lengths_by_ten_scales_the_motion_to_rounding(scaled, original):
     outcome = scaled(10.0)
     # Rounding grows along the chaotic lane, by e^(0.1 tau) at most.
     assert outcome.section[:, :5] == pytest.approx(10.0 * original.section[:, :5], abs=1e-10)
@@ -40,31 +53,31 @@ def test_scaling_all_lengths_by_ten_scales_the_motion_to_rounding(original):
 
 
 @pytest.mark.parametrize("left_out", LENGTHS)
-def test_scaling_all_lengths_but_one_changes_the_motion(original, left_out):
+def test_scaling_all_lengths_but_one_changes_the_motion(how, original, left_out):
     lengths = {name: 8.0 * getattr(MODEL, name) for name in LENGTHS if name != left_out}
-    outcome = run(MODEL._replace(**lengths), FULL, 8.0 * START, **HOW)
+    outcome = run(MODEL._replace(**lengths), FULL, 8.0 * START, **how)
     assert not np.allclose(outcome.section, 8.0 * original.section, rtol=1e-3)
 
 
-def test_scaling_the_model_but_not_the_start_changes_the_motion(original):
+def test_scaling_the_model_but_not_the_start_changes_the_motion(scaled, original):
     outcome = scaled(8.0, start_factor=1.0)
     assert not np.allclose(outcome.section, 8.0 * original.section, rtol=1e-3)
 
 
-def test_turning_state_load_and_error_around_turns_the_motion_around(original):
+def test_turning_state_load_and_error_around_turns_the_motion_around(how, original):
     turned = {name: -getattr(MODEL, name) for name in LENGTHS if name != "half_backlash"}
-    outcome = run(MODEL._replace(**turned), FULL, -START, **HOW)
+    outcome = run(MODEL._replace(**turned), FULL, -START, **how)
     assert np.array_equal(outcome.section, -original.section)
     assert np.array_equal(outcome.growth, original.growth)
 
 
-def test_a_full_turn_of_phase_changes_nothing():
-    one = run(MODEL._replace(error_phase=np.full(4, 0.5)), FULL, START, **HOW)
-    other = run(MODEL._replace(error_phase=np.full(4, 0.5 + 2.0 * np.pi)), FULL, START, **HOW)
+def test_a_full_turn_of_phase_changes_nothing(how):
+    one = run(MODEL._replace(error_phase=np.full(4, 0.5)), FULL, START, **how)
+    other = run(MODEL._replace(error_phase=np.full(4, 0.5 + 2.0 * np.pi)), FULL, START, **how)
     assert other.section[:2] == pytest.approx(one.section[:2], abs=1e-9)
 
 
-def test_half_of_every_frequency_is_the_same_motion_at_half_the_rates():
+def test_half_of_every_frequency_is_the_same_motion_at_half_the_rates(how):
     # The mesh stiffness is the unit of time, so this needs a scene whose mesh carries nothing.
     nothing = np.zeros(4)
     free = MODEL._replace(half_backlash=np.full(4, 1e9), damping_ratio=nothing, load=nothing)
@@ -75,6 +88,6 @@ def test_half_of_every_frequency_is_the_same_motion_at_half_the_rates():
         for gear in "pg"
     }
     slow = free._replace(mesh_frequency=free.mesh_frequency / 2.0, **slower)
-    one = run(free, FULL, START, **HOW)
-    other = run(slow, FULL, START * np.repeat([1.0, 0.5], 5), **HOW)
+    one = run(free, FULL, START, **how)
+    other = run(slow, FULL, START * np.repeat([1.0, 0.5], 5), **how)
     assert np.array_equal(other.section, one.section * np.repeat([1.0, 0.5], 5))

@@ -10,34 +10,37 @@ LANES = 5
 BASE = pan2021(np.full(LANES, 5.86), error_mean=0.03, error_phase=0.5)
 START = np.tile(state(delta_5=1.1, delta_1_rate=0.02, delta_3=0.01), (LANES, 1))
 HOW = {"steps": 96, "transient": 4, "periods": 6}
+BOTH = pytest.mark.parametrize("resolved", [False, True], ids=["plain", "resolved"])
 
 
 def swept(group: str) -> Model:
     return BASE._replace(**{group: getattr(BASE, group) * np.linspace(0.8, 1.2, LANES)})
 
 
-def alone(model: Model, lane: int):
-    return run(lanes_of(model, [lane]), FULL, START[[lane]], **HOW)
+def alone(model: Model, lane: int, resolved: bool):
+    return run(lanes_of(model, [lane]), FULL, START[[lane]], **HOW, resolved=resolved)
 
 
+@BOTH
 @pytest.mark.parametrize("group", Model._fields)
-def test_a_group_swept_over_the_lanes_gives_the_lanes_integrated_alone(group):
+def test_a_group_swept_over_the_lanes_gives_the_lanes_integrated_alone(group, resolved):
     model = swept(group)
-    batch = run(model, FULL, START, **HOW)
+    batch = run(model, FULL, START, **HOW, resolved=resolved)
     for lane in range(LANES):
-        assert_same_bits(lanes_out_of(batch, [lane]), alone(model, lane))
+        assert_same_bits(lanes_out_of(batch, [lane]), alone(model, lane, resolved))
     # No group is ignored: each moves the end state of the scene with every effect.
     ends = batch.end_state[:, [0, 1, 2, 3, 4]]
     assert (np.abs(ends[1:] - ends[:-1]).max(axis=1) > 1e-9).all()
 
 
-def test_a_phase_swept_through_zero_gives_the_lanes_integrated_alone():
+@BOTH
+def test_a_phase_swept_through_zero_gives_the_lanes_integrated_alone(resolved):
     # The lane of phase zero, alone, runs in a loop compiled without phase.
     model = BASE._replace(error_phase=np.linspace(-0.4, 0.4, LANES))
     assert model.error_phase[2] == 0.0
-    batch = run(model, FULL, START, **HOW)
+    batch = run(model, FULL, START, **HOW, resolved=resolved)
     for lane in range(LANES):
-        assert_same_bits(lanes_out_of(batch, [lane]), alone(model, lane))
+        assert_same_bits(lanes_out_of(batch, [lane]), alone(model, lane, resolved))
 
 
 def test_a_swept_mesh_frequency_keeps_the_number_of_steps_in_each_lanes_own_period():

@@ -95,9 +95,10 @@ def wide(counts: Counter[tuple[str, str]], mnemonic: str) -> int:
     )
 
 
+@pytest.mark.parametrize("resolved", [False, True], ids=["whole", "split"])
 @pytest.mark.parametrize("tangent", [False, True], ids=["plain", "tangent"])
-def test_a_step_is_done_on_many_lanes_at_once(tangent):
-    counts = instructions(FULL, tangent)
+def test_a_step_is_done_on_many_lanes_at_once(tangent, resolved):
+    counts = instructions(FULL, tangent, resolved)
     # 10 states need about 190 operations a step, 350 with tangent, after fusion somewhat less.
     assert wide_arithmetic(counts) > (300 if tangent else 150)
     assert wide(counts, "vfmadd") > 20
@@ -128,6 +129,13 @@ def test_the_clearance_costs_one_minimum_and_one_maximum_for_each_stage_and_dire
     registers_per_lane_group = wide(counts, "vmax") / 8
     assert registers_per_lane_group == int(registers_per_lane_group) >= 1
     assert wide(counts, "vmin") == wide(counts, "vmax")
+
+
+def test_on_a_branch_the_stages_need_no_minimum_or_maximum():
+    counts = instructions(FULL, False, resolved=True)
+    assert wide(counts, "vmax") == 0
+    # The nearer end of the step, for each direction, in the test for a crossing.
+    assert wide(counts, "vmin") <= 2
 
 
 def test_a_scene_without_backlash_has_no_minimum_or_maximum():

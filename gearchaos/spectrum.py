@@ -1,0 +1,220 @@
+"""All Lyapunov exponents of a scene, and the Jacobian of its map over mesh periods.
+
+The kernels carry one tangent vector per lane. Here every lane is repeated once per state, each copy
+with a tangent vector of its own; the copies see the same motion bit for bit. Lengths and angles of
+tangent vectors are the Euclidean ones of the states of eq. 13.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from gearchaos_kernels import STATE_ROWS, Model, Plan, Scene, integrate
+from numpy.typing import NDArray
+
+from gearchaos.configuration.run_tables import states_of
+from gearchaos.jacobian import jacobian
+from gearchaos.lyapunov import largest_exponent
+
+Floats = NDArray[np.float64]
+
+SMALLEST_PART = 1e-8
+"""Share of a tangent vector that must be left when those before it are taken out."""
+
+
+class Spectrum(NamedTuple):
+    """Lyapunov exponents and their standard errors, shape (lanes, states), largest first."""
+
+    exponents: Floats
+    standard_errors: Floats
+
+
+class _Carried(NamedTuple):
+    """End states (lanes, 10), unit tangent vectors as columns, logarithms of their growth."""
+
+    end_state: Floats
+    vectors: Floats
+    growth: Floats
+
+
+def exponents(
+    scene: Scene,
+    model: Model,
+    stiffness_cosine: Floats,
+    stiffness_sine: Floats,
+    start: Floats,
+    plan: Plan,
+    *,
+    rederived: bool = False,
+) -> Spectrum:
+    """Compute all Lyapunov exponents of every lane, per unit of tau.
+
+    An orthonormal frame of tangent vectors is carried along and made orthonormal again after every
+    mesh period, from the transient on (Benettin et al. 1980). The logarithms of the stretches of
+    the recorded periods are averaged as those of a single vector are, see `largest_exponent`; the
+    first vector of the frame is that single vector.
+
+    Parameters
+    ----------
+    scene, model, stiffness_cosine, stiffness_sine, start, rederived
+        As for `gearchaos_kernels.integrate`.
+    plan : Plan
+        Steps and periods; what it says of the section and of the tangent is ignored.
+
+    Returns
+    -------
+    Spectrum
+        Not a number in lanes that diverged, and from the first exponent on that the numbers do not
+        resolve: two directions whose exponents times the mesh period differ by more than about 18
+        are parallel in double precision after one period. `sum_of_exponents` is an exact check.
+    """
+    once = plan._replace(transient_periods=0, recorded_periods=1)
+    lanes, states = start.shape[0], len(_columns(scene))
+    logarithms = np.full((lanes, states, plan.recorded_periods), np.nan)
+    frame = np.broadcast_to(_first_frame(states), (lanes, states, states))
+    state = start
+    for period in range(-plan.transient_periods, plan.recorded_periods):
+        state, vectors, growth = _carry(
+            scene, model, stiffness_cosine, stiffness_sine, state, frame, once, rederived
+        )
+        frame, triangle = np.linalg.qr(vectors)
+        part = np.abs(np.diagonal(triangle, axis1=1, axis2=2))
+        resolved = np.logical_and.accumulate(part > SMALLEST_PART, axis=1)
+        if period >= 0:
+            logarithms[:, :, period] = growth[:, :, 0] + np.log(np.where(resolved, part, np.nan))
+    mesh_period = np.repeat(2.0 * np.pi / model.mesh_frequency, states)
+    mean, error = largest_exponent(logarithms.reshape(lanes * states, -1), mesh_period)
+    mean, error = mean.reshape(lanes, states), error.reshape(lanes, states)
+    descending = np.argsort(-mean, axis=1, kind="stable")
+    return Spectrum(*(np.take_along_axis(values, descending, axis=1) for values in (mean, error)))
+
+
+def sum_of_exponents(scene: Scene, model: Model) -> Floats:
+    """Return the sum of all Lyapunov exponents of every lane, per unit of tau.
+
+    It is the trace of the Jacobian of eq. 13. The damping is constant and also acts where the teeth
+    are apart, so that the trace depends neither on contact nor on stiffness, load or pitch error::
+
+        -2 xi [cos(beta_b) (1 + m_e/m_p + m_e/m_g) + sin(beta_b) (m_e/m_p + m_e/m_g)]
+        -2 (eta_11 + eta_21 + eta_12 + eta_22)
+
+    in the full scene.
+
+    Parameters
+    ----------
+    scene : Scene
+    model : Model
+        Dimensionless groups, arrays of shape (lanes,).
+
+    Returns
+    -------
+    ndarray, shape (lanes,)
+    """
+    apart = np.zeros_like(model.load)
+    trace: Floats = np.trace(jacobian(scene, model, apart, apart), axis1=1, axis2=2)
+    return trace
+
+
+def period_jacobian(
+    scene: Scene,
+    model: Model,
+    stiffness_cosine: Floats,
+    stiffness_sine: Floats,
+    start: Floats,
+    plan: Plan,
+    *,
+    rederived: bool = False,
+) -> Floats:
+    """Return the Jacobian of the map over the recorded mesh periods, taken after the transient.
+
+    On a periodic orbit over its own number of periods this is the monodromy matrix, whose
+    eigenvalues are the Floquet multipliers.
+
+    Parameters
+    ----------
+    scene, model, stiffness_cosine, stiffness_sine, start, rederived
+        As for `gearchaos_kernels.integrate`.
+    plan : Plan
+        Steps and periods; what it says of the section and of the tangent is ignored.
+
+    Returns
+    -------
+    ndarray, shape (lanes, states, states)
+        Column j is the derivative with respect to state j of the scene, in the order
+        delta_5, its rate, delta_1, ...; not a number in lanes that diverged.
+    """
+    if plan.transient_periods:
+        before = plan._replace(
+            transient_periods=0,
+            recorded_periods=plan.transient_periods,
+            section_points=0,
+            tangent=False,
+        )
+        start = integrate(
+            scene, model, stiffness_cosine, stiffness_sine, start, before, rederived=rederived
+        ).end_state
+    states = len(_columns(scene))
+    frame = np.broadcast_to(np.eye(states), (start.shape[0], states, states))
+    carried = _carry(
+        scene,
+        model,
+        stiffness_cosine,
+        stiffness_sine,
+        start,
+        frame,
+        plan._replace(transient_periods=0),
+        rederived,
+    )
+    lengths: Floats = np.exp(np.sum(carried.growth, axis=2))
+    return carried.vectors * lengths[:, np.newaxis, :]
+
+
+def _carry(
+    scene: Scene,
+    model: Model,
+    stiffness_cosine: Floats,
+    stiffness_sine: Floats,
+    start: Floats,
+    frame: Floats,
+    plan: Plan,
+    rederived: bool,
+) -> _Carried:
+    """Integrate every lane once for every column of its frame (lanes, states, states)."""
+    lanes, states, _ = frame.shape
+    columns = _columns(scene)
+    tangents = np.zeros((lanes * states, len(STATE_ROWS)))
+    tangents[:, columns] = frame.transpose(0, 2, 1).reshape(-1, states)
+    outcome = integrate(
+        scene,
+        Model(*(np.repeat(group, states) for group in model)),
+        stiffness_cosine,
+        stiffness_sine,
+        np.repeat(start, states, axis=0),
+        plan._replace(section_points=0, section_states=(), tangent=True),
+        rederived=rederived,
+        tangent_start=tangents,
+    )
+    assert outcome.growth is not None
+    vectors = outcome.end_tangent[:, columns].reshape(lanes, states, states)
+    return _Carried(
+        outcome.end_state[::states],
+        vectors.transpose(0, 2, 1),
+        outcome.growth.reshape(lanes, states, -1),
+    )
+
+
+def _columns(scene: Scene) -> list[int]:
+    """Columns of the kernels' arrays in the order of the scene's states."""
+    return [STATE_ROWS[name] for name in states_of([e for e in Scene._fields if getattr(scene, e)])]
+
+
+def _first_frame(states: int) -> Floats:
+    """Orthonormal columns, the first an equal share of every state, as for a single vector."""
+    equal = np.ones(states) / np.sqrt(states)
+    # The reflection that exchanges this vector and the first axis.
+    difference = equal - np.eye(states)[0]
+    frame: Floats = np.eye(states) - 2.0 * np.outer(difference, difference) / (
+        difference @ difference
+    )
+    return frame

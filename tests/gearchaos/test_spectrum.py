@@ -1,0 +1,192 @@
+"""All Lyapunov exponents: their exact sum, stored multipliers, the single-vector exponent."""
+
+import numpy as np
+import pytest
+from gearchaos_kernels import Plan, Scene, integrate
+
+from gearchaos.jacobian import jacobian
+from gearchaos.lyapunov import largest_exponent
+from gearchaos.spectrum import exponents, period_jacobian, sum_of_exponents
+from gearchaos.stable_region import amplification
+
+from ..kernels.reference import (
+    COSINE,
+    FULL,
+    LINEAR,
+    NO_AXIAL,
+    PERIOD,
+    SINE,
+    SOLUTIONS,
+    TORSION_ONLY,
+    lanes_of,
+    pan2021,
+    stored_state,
+)
+
+ORBITS = SOLUTIONS["periodic_orbits"]
+NO_TRANSVERSE = Scene(transverse=False)
+PERIODIC_AND_CHAOTIC = [0.5, 5.86, 10.75, 12.5, 14.2]
+REST = np.zeros((1, 10))
+
+
+def plan(steps: int, periods: int, transient: int = 0, resolved: bool = True) -> Plan:
+    return Plan(steps, transient, periods, 0, resolved=resolved)
+
+
+def spectrum(scene, model, steps, periods, transient=0, start=REST, resolved=True):
+    start = np.broadcast_to(start, (model.load.size, 10))
+    wanted = plan(steps, periods, transient, resolved)
+    return exponents(scene, model, COSINE, SINE, start, wanted)
+
+
+def multipliers(orbit: dict, steps: int) -> np.ndarray:
+    scene = {"full": FULL, "no_axial": NO_AXIAL}[orbit["scene"]]
+    monodromy = period_jacobian(
+        scene,
+        pan2021(orbit["pitch_error"]),
+        COSINE,
+        SINE,
+        stored_state(orbit["section_points"][0])[np.newaxis],
+        plan(steps, orbit["period"]),
+    )
+    return np.linalg.eigvals(monodromy[0])
+
+
+def distance(found: np.ndarray, wanted: np.ndarray) -> float:
+    """Largest distance of a wanted multiplier from the nearest found one, and the reverse."""
+    between = np.abs(found[:, np.newaxis] - wanted)
+    return float(max(between.min(axis=0).max(), between.min(axis=1).max()))
+
+
+def sum_error(scene, model, steps, resolved=True) -> float:
+    total = spectrum(scene, model, steps, 6, 2, resolved=resolved).exponents.sum(axis=1)
+    return float(np.max(np.abs(total - sum_of_exponents(scene, model))))
+
+
+@pytest.mark.parametrize(
+    ("scene", "steps"),
+    [(TORSION_ONLY, 800), (NO_TRANSVERSE, 6400), (NO_AXIAL, 6400), (FULL, 6400)],
+    ids=["torsion", "axial", "transverse", "full"],
+)
+def test_sum_of_all_exponents_is_the_trace_whether_periodic_or_chaotic(scene, steps):
+    assert sum_error(scene, pan2021(PERIODIC_AND_CHAOTIC), steps) < 1e-10
+
+
+def test_error_of_the_sum_falls_with_the_fourth_power_of_the_step():
+    steps = np.array([200, 400, 800, 1600])
+    model = pan2021(PERIODIC_AND_CHAOTIC)
+    errors = [sum_error(TORSION_ONLY, model, number) for number in steps]
+    assert -np.polyfit(np.log(steps), np.log(errors), 1)[0] > 3.8
+
+
+@pytest.mark.parametrize("steps", [16, 50, 200, 3200])
+def test_sum_in_a_linear_scene_is_that_of_the_amplifications_of_a_step(steps):
+    model, stiffness = pan2021(5.86), np.ones(1)
+    step = PERIOD / steps
+    modes = np.linalg.eigvals(jacobian(LINEAR, model, stiffness, stiffness)[0])
+    wanted = np.sum(np.log(amplification(step * modes))) / step
+    found = spectrum(LINEAR, model, steps, 6, 2).exponents.sum()
+    assert found == pytest.approx(wanted, rel=0, abs=1e-12)
+
+
+def test_sum_in_closed_form_follows_every_damping_and_nothing_else():
+    rng = np.random.default_rng(0)
+    names = [name for name in pan2021(1.0)._fields if name != "error_amplitude"]
+    model = pan2021(np.ones(20), **{name: rng.uniform(0.1, 1.0, 20) for name in names})
+    cosine, sine = np.cos(model.base_helix_angle), np.sin(model.base_helix_angle)
+    masses = model.mass_ratio_p + model.mass_ratio_g
+    torsion = -2.0 * model.damping_ratio * cosine
+    transverse = torsion * masses - 2.0 * (model.transverse_damping_p + model.transverse_damping_g)
+    axial = -2.0 * model.damping_ratio * sine * masses
+    axial -= 2.0 * (model.axial_damping_p + model.axial_damping_g)
+    for scene, wanted in (
+        (TORSION_ONLY, torsion),
+        (NO_AXIAL, torsion + transverse),
+        (NO_TRANSVERSE, torsion + axial),
+        (FULL, torsion + transverse + axial),
+    ):
+        assert sum_of_exponents(scene, model) == pytest.approx(wanted, rel=1e-13)
+
+
+@pytest.mark.parametrize("orbit", ORBITS, ids=lambda o: f"{o['scene']}-{o['pitch_error']}")
+def test_multipliers_of_a_periodic_orbit_are_the_stored_ones_and_converge_with_order_four(orbit):
+    stored = np.array([complex(*pair) for pair in orbit["floquet_multipliers"]])
+    steps = np.array([200, 400, 800, 1600])
+    errors = [distance(multipliers(orbit, number), stored) for number in steps]
+    assert errors[-1] < 2e-7
+    assert -np.polyfit(np.log(steps), np.log(errors), 1)[0] == pytest.approx(4.0, abs=0.1)
+
+
+@pytest.mark.parametrize("orbit", ORBITS, ids=lambda o: f"{o['scene']}-{o['pitch_error']}")
+def test_largest_exponent_of_a_periodic_orbit_is_that_of_its_largest_multiplier(orbit):
+    largest = np.max(np.abs(multipliers(orbit, 1600)))
+    exponent = np.log(largest) / (orbit["period"] * PERIOD)
+    assert exponent == pytest.approx(orbit["largest_exponent"], rel=0, abs=1e-9)
+
+
+def test_exponents_of_a_linear_scene_are_the_stored_real_parts():
+    stored = sorted((real for real, _ in SOLUTIONS["linear_scene_eigenvalues"]), reverse=True)
+    found = spectrum(LINEAR, pan2021(5.86), 400, 400, 800)
+    assert found.exponents[0] == pytest.approx(stored, rel=0, abs=2e-6)
+
+
+def test_largest_of_the_spectrum_is_the_exponent_of_a_single_vector():
+    model, start = pan2021([5.86, 10.75, 12.5, 14.2]), np.zeros((4, 10))
+    single = plan(200, 400, 300)._replace(tangent=True)
+    growth = integrate(NO_AXIAL, model, COSINE, SINE, start, single).growth
+    exponent, error = largest_exponent(growth, np.full(4, PERIOD))
+    found = spectrum(NO_AXIAL, model, 200, 400, 300)
+    assert found.exponents[:2, 0] == pytest.approx(exponent[:2], rel=0, abs=1e-6)
+    # Two records of one chaotic motion.
+    margin = 4.0 * np.hypot(error, found.standard_errors[:, 0])
+    assert np.all(np.abs(found.exponents[2:, 0] - exponent[2:]) < margin[2:])
+    assert np.all(found.exponents[2:, 0] > 0.03)
+    assert np.all(np.diff(found.exponents, axis=1) <= 0.0)
+
+
+def test_jacobian_over_several_periods_is_the_product_of_those_over_one():
+    model, start = pan2021([5.86, 14.2]), np.full((2, 10), 0.1)
+    arguments = (FULL, model, COSINE, SINE, start)
+    parts = [period_jacobian(*arguments, plan(100, 1, before)) for before in range(3)]
+    whole = period_jacobian(*arguments, plan(100, 3))
+    product = parts[2] @ parts[1] @ parts[0]
+    assert whole == pytest.approx(product, rel=0, abs=1e-12 * np.max(np.abs(product)))
+
+
+@pytest.mark.parametrize(("resolved", "steps", "apart"), [(False, 100, 1e-8), (True, 1600, 2e-6)])
+def test_jacobian_is_the_difference_of_neighbouring_motions(resolved, steps, apart):
+    # A split step takes the crossing of the motion itself for its neighbours: an error of order 4.
+    start = np.random.default_rng(2).standard_normal((1, 10))
+    model, wanted = pan2021(5.86), plan(steps, 1, resolved=resolved)
+    found = period_jacobian(FULL, model, COSINE, SINE, start, wanted)[0]
+    order = [0, 5, 1, 6, 2, 7, 3, 8, 4, 9]
+    shifts = 1e-6 * np.eye(10)[order]
+    both = np.concatenate([start + shifts, start - shifts])
+    ends = integrate(FULL, pan2021(np.full(20, 5.86)), COSINE, SINE, both, wanted).end_state
+    quotients = (ends[:10] - ends[10:]).T[order] / 2e-6
+    assert found == pytest.approx(quotients, rel=0, abs=apart)
+
+
+def test_a_lane_that_diverges_has_no_spectrum_and_leaves_the_others_alone():
+    model = pan2021([5.86, 5.86, 10.75], transverse_stiffness_p=[36.315, 1e5, 36.315])
+    found = spectrum(NO_AXIAL, model, 50, 20)
+    assert np.isnan(found.exponents[1]).all()
+    assert np.isnan(found.standard_errors[1]).all()
+    alone = spectrum(NO_AXIAL, lanes_of(model, [0, 2]), 50, 20)
+    assert np.array_equal(found.exponents[[0, 2]], alone.exponents)
+
+
+def test_directions_that_become_parallel_within_a_period_are_not_told_apart():
+    # 63 units of tau contract one direction by e^-100 and more against the slowest.
+    model = pan2021(0.0, mesh_frequency=0.1, damping_ratio=1.5)
+    found = spectrum(TORSION_ONLY, model, 1000, 20, 5).exponents[0]
+    assert np.isfinite(found[0])
+    assert np.isnan(found[1])
+    assert np.all(np.isfinite(spectrum(TORSION_ONLY, pan2021(0.0), 1000, 20).exponents))
+
+
+def test_one_period_gives_exponents_without_standard_errors():
+    found = spectrum(TORSION_ONLY, pan2021([1.0, 2.0]), 100, 1)
+    assert np.isfinite(found.exponents).all()
+    assert np.isnan(found.standard_errors).all()
+    assert found.exponents.shape == (2, 2)

@@ -1,0 +1,194 @@
+"""The fewest stable steps: known limits, and limits found by integrating on either side of them."""
+
+import itertools
+
+import numpy as np
+import pytest
+from gearchaos_kernels import Model, Scene, Status
+
+from gearchaos.jacobian import jacobian
+from gearchaos.mesh_stiffness import FourierStiffness
+from gearchaos.stability import (
+    MOST_STEPS,
+    fewest_stable_steps,
+    stability_limit,
+    sufficient_steps,
+)
+from gearchaos.stable_region import steps_per_time
+
+from ..kernels.reference import COSINE, FULL, LINEAR, PERIOD, SINE, lanes_of, pan2021, run, state
+from .random_pairs import EVERY_SCENE, name_of, random_pairs
+
+NO_HARMONICS = np.zeros(0)
+TORSION = Scene(False, False, False, False, False)
+LOOSE_TORSION = TORSION._replace(backlash=True)
+REACH_OF_DECAY = 2.785293563405282
+
+
+def fewest(scene: Scene, model: Model) -> np.ndarray:
+    return fewest_stable_steps(scene, model, COSINE, SINE)
+
+
+def oscillator(damping_ratio, mesh_frequency=0.01) -> Model:
+    """A spur pair: delta_5'' + 2 xi delta_5' + delta_5 = 0."""
+    return pan2021(
+        1.0, damping_ratio=damping_ratio, mesh_frequency=mesh_frequency, base_helix_angle=0.0
+    )
+
+
+@pytest.mark.parametrize("steps", [3, 57, 1000])
+def test_undamped_oscillator_needs_steps_of_at_most_the_square_root_of_eight(steps):
+    just_enough = 2.0 * np.pi / (np.sqrt(8.0) * steps)
+    frequency = just_enough * np.array([1.0, 1.0 - 1e-6, 1.0 + 1e-6])
+    found = fewest(TORSION, oscillator(0.0, frequency))
+    assert found.tolist() == [steps, steps + 1, steps]
+
+
+@pytest.mark.parametrize("damping_ratio", [1.0, 1.5, 2.0, 20.0])
+def test_overdamped_oscillator_is_limited_by_its_fast_decay(damping_ratio):
+    fast = damping_ratio + np.sqrt(damping_ratio**2 - 1.0)
+    wanted = np.ceil(2.0 * np.pi / 0.01 * fast / REACH_OF_DECAY)
+    assert fewest(TORSION, oscillator(damping_ratio)) == wanted
+
+
+def test_mesh_damping_without_contact_is_a_branch_of_its_own():
+    wanted = np.ceil(2.0 * np.pi / 0.01 * 4.0 / REACH_OF_DECAY)
+    assert fewest(LOOSE_TORSION, oscillator(2.0)) == wanted
+    assert fewest(TORSION, oscillator(2.0)) < wanted
+
+
+def test_the_stiffest_moment_of_the_mesh_decides():
+    scale = np.array([0.0, 2.0 / 3.0, -1.0])
+    model = oscillator(0.0, np.full(3, 0.001))._replace(stiffness_variation_scale=scale)
+    largest = [np.max(FourierStiffness(COSINE, SINE, s).table(20_000)) for s in scale]
+    wanted = 2.0 * np.pi / 0.001 * np.sqrt(largest) / np.sqrt(8.0)
+    found = fewest(TORSION._replace(stiffness_variation=True), model)
+    assert found == pytest.approx(wanted, rel=1e-3)
+
+
+def test_a_mode_that_grows_by_itself_sets_no_limit():
+    # Mesh stiffness -0.5 at its lowest: exponents +-0.7, beside the oscillation at 1.5.
+    model = oscillator(0.0)._replace(stiffness_variation_scale=np.ones(1))
+    scene = TORSION._replace(stiffness_variation=True)
+    found = fewest_stable_steps(scene, model, np.array([1.5]), np.zeros(1))
+    assert found == np.ceil(200.0 * np.pi * np.sqrt(2.5) / np.sqrt(8.0))
+
+
+@pytest.mark.parametrize("scene", EVERY_SCENE, ids=name_of)
+def test_limit_of_every_scene_is_that_of_its_whole_jacobian_and_no_more_than_the_bound(scene):
+    model = random_pairs(40, 7)
+    stiffness = FourierStiffness(COSINE, SINE, 2.0 / 3.0).table(4096)
+    extremes = [np.min(stiffness), np.max(stiffness)] if scene.stiffness_variation else [1.0]
+    branches = [*extremes, 0.0] if scene.backlash else extremes
+    demand = np.zeros(40)
+    for tangential, axial in itertools.product(branches, repeat=2):
+        whole = jacobian(scene, model, np.full(40, tangential), np.full(40, axial))
+        demand = np.maximum(demand, steps_per_time(np.linalg.eigvals(whole)).max(axis=1))
+    wanted = 2.0 * np.pi / model.mesh_frequency * demand
+    found = fewest(scene, model)
+    # Stiffness sampled on another grid, and rounding up to whole steps.
+    assert np.all(found >= wanted * (1.0 - 1e-3))
+    assert np.all(found <= wanted * (1.0 + 1e-3) + 1.0)
+    assert np.all(sufficient_steps(scene, model, COSINE, SINE) >= found)
+
+
+def largest_state(model: Model, steps: int) -> float:
+    outcome = run(model, LINEAR, start_of_all_modes(), steps=steps, periods=400, points=1)
+    if outcome.status[0] == Status.DIVERGED:
+        return np.inf
+    return float(np.max(np.abs(outcome.end_state)))
+
+
+def start_of_all_modes() -> np.ndarray:
+    return np.random.default_rng(1).standard_normal(10)
+
+
+@pytest.mark.parametrize("lane", range(12))
+def test_integration_grows_with_one_step_less_and_is_bounded_with_the_fewest(lane):
+    model = lanes_of(random_pairs(12, 3), [lane])._replace(error_amplitude=np.zeros(1))
+    steps = int(fewest(LINEAR, model)[0])
+    assert largest_state(model, steps) < 1e3
+    assert largest_state(model, steps - 1) > 1e6
+
+
+def test_stiffer_bearings_never_need_fewer_steps():
+    stiffness = np.geomspace(1e-3, 1e4, 500)
+    dampings = [name for name in Model._fields if "damping" in name]
+    undamped = pan2021(1.0, **dict.fromkeys(dampings, 0.0))
+    for name in ("transverse_stiffness_p", "axial_stiffness_g"):
+        steps = fewest(FULL, pan2021(1.0, **undamped_with(undamped, name, stiffness)))
+        assert np.all(np.diff(steps) >= 0)
+        assert steps[-1] == np.ceil(2.0 * np.pi / undamped.mesh_frequency[0] * 100.0 / np.sqrt(8))
+
+
+def undamped_with(model: Model, name: str, values: np.ndarray) -> dict:
+    return {**{group: value[0] for group, value in model._asdict().items()}, name: values}
+
+
+def test_pan2021_is_stable_from_sixteen_steps_per_period_on_whatever_its_pitch_error():
+    assert np.all(fewest(FULL, pan2021(np.linspace(0.0, 15.0, 1501))) == 16)
+
+
+def test_a_lane_does_not_depend_on_its_neighbours_or_their_number():
+    pairs = random_pairs(50, 5)
+    many = np.random.default_rng(0).integers(0, 50, 40_000)
+    alone = np.concatenate([fewest(FULL, lanes_of(pairs, [lane])) for lane in range(50)])
+    assert np.array_equal(fewest(FULL, lanes_of(pairs, many)), alone[many])
+
+
+def test_lanes_that_share_some_groups_but_not_all_are_told_apart():
+    values = np.array([5.0, 50.0, 500.0])
+    shared, own = np.tile(values, 3), np.repeat(values, 3)
+    grid = pan2021(1.0, transverse_stiffness_p=shared, axial_stiffness_g=own, mass_ratio_p=0.1)
+    stiffest = np.sqrt(np.maximum.reduce([shared, own, np.full(9, 36.315)]))
+    wanted = PERIOD * stiffest / np.sqrt(8.0)
+    assert fewest(FULL, grid) == pytest.approx(wanted, rel=0.02, abs=1.0)
+
+
+def test_limit_names_the_lanes_the_steps_and_the_cause():
+    stiffness = np.linspace(10.0, 1000.0, 100)
+    model = pan2021(1.0, transverse_stiffness_g=stiffness)
+    limit = stability_limit(FULL, model, COSINE, SINE, 60)
+    assert limit is not None
+    steps = fewest(FULL, model)
+    assert np.array_equal(limit.lanes, np.flatnonzero(steps > 60))
+    assert np.array_equal(limit.fewest, steps[limit.lanes])
+    assert limit.owner == "transverse bearing of the driven gear"
+    assert limit.eigenvalue.imag**2 == pytest.approx(1000.0, rel=1e-2)
+    first = stiffness[limit.lanes[0]]
+    assert limit.fault(60, "transverse_stiffness_g", stiffness).text("pair.toml") == (
+        "pair.toml: integration.steps_per_period = 60: RK4 is unstable below "
+        f"{steps[-1]} steps per period for {limit.lanes.size} of 100 lanes "
+        f"(transverse_stiffness_g from {first:g} to 1000), because of the eigenvalue "
+        "-0.00914 ± 31.6i of the transverse bearing of the driven gear; "
+        f'raise it to {steps[-1]} or more, or set integration.unstable = "raise"'
+    )
+
+
+def test_limit_of_a_decay_names_a_real_eigenvalue_and_a_single_value():
+    limit = stability_limit(TORSION, oscillator(2.0), NO_HARMONICS, NO_HARMONICS, 100)
+    assert limit is not None
+    text = limit.fault(100, "damping_ratio", np.array([2.0])).text("spur.toml")
+    assert (
+        "1 of 1 lanes (damping_ratio = 2), because of the eigenvalue -3.73 of the torsion" in text
+    )
+
+
+@pytest.mark.parametrize("steps", [16, 17, 18, 100])
+def test_a_stable_number_of_steps_has_no_limit(steps):
+    assert stability_limit(FULL, pan2021([0.0, 15.0]), COSINE, SINE, steps) is None
+    assert stability_limit(FULL, pan2021([0.0, 15.0]), COSINE, SINE, 15) is not None
+
+
+@pytest.mark.parametrize("name", ["transverse_stiffness_p", "damping_ratio", "axial_damping_g"])
+def test_groups_beyond_all_measure_ask_for_more_steps_than_there_are(name):
+    model = pan2021(1.0, **{name: np.array([1.0, 1e300, 1.7e308])})
+    assert fewest(FULL, model)[1:].tolist() == [MOST_STEPS, MOST_STEPS]
+    limit = stability_limit(FULL, model, COSINE, SINE, 10**6)
+    assert limit is not None
+    assert limit.lanes.tolist() == [1, 2]
+
+
+def test_a_state_at_rest_without_load_stays_there_with_any_number_of_steps():
+    outcome = run(pan2021(0.0, load=0.0), LINEAR, state(), steps=2, periods=50)
+    assert np.all(outcome.end_state == 0.0)
