@@ -141,7 +141,10 @@ def _checked_target(path: str | os.PathLike[str], overwrite: bool) -> Path:
 
 
 def _exists(path: str | os.PathLike[str]) -> FileError:
-    return FileError(f"{path}: exists already; replace it with --overwrite or choose another name")
+    return FileError(
+        f"{path}: exists already; replace it with --overwrite (overwrite=True in Python) or "
+        "choose another name"
+    )
 
 
 def _create_partial(folder: Path, name: str) -> Path:

@@ -125,7 +125,7 @@ def sweep_variables(
         variables.append(Variable("start", (lane,), "int32", "1", start))
     if section and section_points > 0:
         points = tuple(range(section_points))
-        text = "recorded mesh period, counted from the first recorded one"
+        text = "number of the section point, one mesh period apart; the last one ends the lane"
         dims: tuple[str, ...] = (SECTION_POINT,)
         variables.append(Variable(SECTION_POINT, dims, "int32", "1", text, values=points))
         dims = (lane, SECTION_POINT)

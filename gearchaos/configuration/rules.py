@@ -28,7 +28,7 @@ def _one_damping(config: Configuration) -> Iterator[Fault]:
         )
 
 
-def _length_scale_is_positive(config: Configuration) -> Iterator[Fault]:
+def _length_scale_is_known(config: Configuration) -> Iterator[Fault]:
     mesh = config.mesh
     if mesh and mesh.length_scale_um is None and mesh.half_backlash_um == 0:
         yield Fault(
@@ -36,6 +36,13 @@ def _length_scale_is_positive(config: Configuration) -> Iterator[Fault]:
             "cannot be the length scale when it is 0",
             "give mesh.length_scale_um",
             mesh.half_backlash_um,
+        )
+    if mesh and mesh.length_scale_um is None and config.sweep.parameter == "mesh.half_backlash_um":
+        yield Fault(
+            "sweep.parameter",
+            "is also the length scale, so that sweeping it would change the unit of every length",
+            "give mesh.length_scale_um",
+            config.sweep.parameter,
         )
 
 
@@ -148,7 +155,7 @@ def _section_points_are_recorded(config: Configuration) -> Iterator[Fault]:
 
 RULES: tuple[tuple[frozenset[str], Rule], ...] = (
     (frozenset({"mesh"}), _one_damping),
-    (frozenset({"mesh"}), _length_scale_is_positive),
+    (frozenset({"mesh", "sweep"}), _length_scale_is_known),
     (frozenset({"mesh"}), _shares_fill_the_period),
     (frozenset({"mesh", "pair"}), _contact_ratio_is_known),
     (frozenset({"scene"}), _effects_are_named_once),

@@ -137,10 +137,9 @@ def test_a_lane_does_not_depend_on_its_neighbours_or_their_number():
 
 
 def test_lanes_that_share_some_groups_but_not_all_are_told_apart():
-    values = np.array([5.0, 50.0, 500.0])
-    shared, own = np.tile(values, 3), np.repeat(values, 3)
-    grid = pan2021(1.0, transverse_stiffness_p=shared, axial_stiffness_g=own, mass_ratio_p=0.1)
-    stiffest = np.sqrt(np.maximum.reduce([shared, own, np.full(9, 36.315)]))
+    p, g = np.array([5.0, 5.0, 50.0, 50.0]), np.array([5.0, 500.0, 500.0, 2000.0])
+    grid = pan2021(1.0, transverse_stiffness_p=p, transverse_stiffness_g=g)
+    stiffest = np.sqrt(np.maximum.reduce([p, g, np.full(4, 36.315)]))
     wanted = PERIOD * stiffest / np.sqrt(8.0)
     assert fewest(FULL, grid) == pytest.approx(wanted, rel=0.02, abs=1.0)
 
@@ -163,6 +162,16 @@ def test_limit_names_the_lanes_the_steps_and_the_cause():
         "-0.00914 ± 31.6i of the transverse bearing of the driven gear; "
         f'raise it to {steps[-1]} or more, or set integration.unstable = "raise"'
     )
+
+
+@pytest.mark.parametrize("direction", ["transverse", "axial"])
+@pytest.mark.parametrize(("gear", "word"), [("p", "driving"), ("g", "driven")])
+def test_limit_names_the_stiffest_bearing(direction, gear, word):
+    model = pan2021(1.0, **{f"{direction}_stiffness_{gear}": 1e4})
+    limit = stability_limit(FULL, model, COSINE, SINE, 100)
+    assert limit is not None
+    assert limit.owner == f"{direction} bearing of the {word} gear"
+    assert limit.steps == fewest(FULL, model)[0]
 
 
 def test_limit_of_a_decay_names_a_real_eigenvalue_and_a_single_value():
