@@ -131,6 +131,7 @@ def _check_variables(
         several_starts="start" in found,
         status_meanings=(),
         crossings="crossings_per_period" in found,
+        spectrum="lyapunov_spectrum" in found,
     )
     for due in expected:
         got = found.get(due.name)

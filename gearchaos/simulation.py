@@ -11,6 +11,7 @@ from gearchaos_kernels import (
     LANES,
     STATE_ROWS,
     STATUS_TEXTS,
+    Model,
     Outcome,
     Plan,
     Scene,
@@ -27,6 +28,7 @@ from gearchaos.group_table import GROUP_TABLE
 from gearchaos.lanes import model, select, start_states
 from gearchaos.lyapunov import largest_exponent
 from gearchaos.result import Parameter
+from gearchaos.spectrum import exponents, sum_of_exponents
 from gearchaos.stability import stability_limit
 from gearchaos.variables import Variable, axis_name, sweep_variables
 
@@ -101,6 +103,7 @@ class Simulation:
             section_points=self.config.outputs.section_points,
             lyapunov=self.config.outputs.lyapunov,
             crossings=self.splits_steps,
+            spectrum=self.config.outputs.spectrum,
             several_starts=self.starts > 1,
             status_meanings=[status.name.lower() for status in STATUS_TEXTS],
         )
@@ -166,7 +169,10 @@ class Simulation:
             The lanes' part of every variable that runs over lanes, by name.
         """
         if not self.carried:
-            return self._arrays(first, self._integrate(slice(first, last)))
+            arrays = self._arrays(first, self._integrate(slice(first, last)))
+            if self.config.outputs.spectrum:
+                arrays |= self._spectrum(slice(first, last))
+            return arrays
         return self._compute_carried(first, last, neighbour)
 
     def _keep_stable(self) -> None:
@@ -212,12 +218,30 @@ class Simulation:
         ]
         return self._arrays(first, Outcome(*merged))
 
+    def _lane_model(self, lanes: slice) -> Model:
+        numbers = np.arange(lanes.start, lanes.stop)
+        return model(select(self.groups, numbers // self.starts), numbers.size)
+
+    def _spectrum(self, lanes: slice) -> dict[str, Any]:
+        lane_model = self._lane_model(lanes)
+        spectrum = exponents(
+            self.scene,
+            lane_model,
+            *self._harmonics(),
+            start_states(self.config, lane_model, lanes.start),
+            self.plan,
+            rederived=self.config.formulation == "rederived",
+        )
+        return {
+            "lyapunov_spectrum": spectrum.exponents,
+            "lyapunov_spectrum_standard_error": spectrum.standard_errors,
+            "lyapunov_sum": sum_of_exponents(self.scene, lane_model),
+        }
+
     def _integrate(
         self, lanes: slice, carried: NDArray[np.float64] | None = None, plan: Plan | None = None
     ) -> Outcome:
-        numbers = np.arange(lanes.start, lanes.stop)
-        groups = select(self.groups, numbers // self.starts)
-        lane_model = model(groups, numbers.size)
+        lane_model = self._lane_model(lanes)
         start = start_states(self.config, lane_model, lanes.start)
         if carried is not None:
             # A lane that diverged hands nothing on: its successor begins anew.

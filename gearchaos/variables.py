@@ -10,6 +10,7 @@ import numpy as np
 
 SECTION_POINT = "section_point"
 STATE = "state"
+EXPONENT = "exponent"
 HARMONIC = "harmonic"
 
 STATE_WORDING: dict[str, tuple[str, str]] = {
@@ -89,6 +90,7 @@ def sweep_variables(
     several_starts: bool,
     status_meanings: Sequence[str],
     crossings: bool = False,
+    spectrum: bool = False,
 ) -> list[Variable]:
     """List the variables of a sweep in the order of the file.
 
@@ -108,6 +110,8 @@ def sweep_variables(
         Whether the largest Lyapunov exponent is computed.
     crossings : bool
         Whether steps are split at clearance boundaries, and their crossings counted.
+    spectrum : bool
+        Whether all Lyapunov exponents are computed.
     several_starts : bool
         Whether each parameter value has several lanes that differ in their start.
     status_meanings : sequence of str
@@ -139,6 +143,18 @@ def sweep_variables(
         variables += [
             Variable(name, (lane,), "float64", "1", text, r"$\lambda_1$", nan),
             Variable(error, (lane,), "float64", "1", error_text, r"$s_{\lambda_1}$", nan),
+        ]
+    if spectrum:
+        numbers = tuple(range(1, len(states) + 1))
+        text = "number of the Lyapunov exponent, the largest first"
+        variables.append(Variable(EXPONENT, (EXPONENT,), "int32", "1", text, "$i$", values=numbers))
+        dims, name = (lane, EXPONENT), "lyapunov_spectrum"
+        error, error_text = f"{name}_standard_error", "standard error of each Lyapunov exponent"
+        total = "sum of all Lyapunov exponents as the damping gives it, exactly"
+        variables += [
+            Variable(name, dims, "float64", "1", "all Lyapunov exponents", r"$\lambda_i$", nan),
+            Variable(error, dims, "float64", "1", error_text, "", nan),
+            Variable("lyapunov_sum", (lane,), "float64", "1", total, r"$\sum\lambda_i$", nan),
         ]
     if crossings:
         text = "clearance boundaries crossed per mesh period, tangential and axial together"

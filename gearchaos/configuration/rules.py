@@ -153,6 +153,16 @@ def _section_points_are_recorded(config: Configuration) -> Iterator[Fault]:
         )
 
 
+def _spectrum_is_not_carried(config: Configuration) -> Iterator[Fault]:
+    if config.outputs.spectrum and config.start.carry != "none":
+        yield Fault(
+            "outputs.spectrum",
+            f'cannot be computed with start.carry = "{config.start.carry}"',
+            'set start.carry = "none", or compute the spectrum in a sweep of its own',
+            config.outputs.spectrum,
+        )
+
+
 RULES: tuple[tuple[frozenset[str], Rule], ...] = (
     (frozenset({"mesh"}), _one_damping),
     (frozenset({"mesh", "sweep"}), _length_scale_is_known),
@@ -164,5 +174,6 @@ RULES: tuple[tuple[frozenset[str], Rule], ...] = (
     (frozenset({"scene", "start"}), _start_states_exist),
     (frozenset({"start"}), _start_keys_belong_to_the_kind),
     (frozenset({"outputs", "integration"}), _section_points_are_recorded),
+    (frozenset({"outputs", "start"}), _spectrum_is_not_carried),
 )
 """Each rule with the tables it reads; it needs them free of faults of their own."""

@@ -168,6 +168,9 @@ class Outputs(Table):
     )
     section_points: int = key("last mesh periods of the section that are kept", default=100, ge=1)
     lyapunov: bool = key("whether the largest Lyapunov exponent is computed", default=True)
+    spectrum: bool = key(
+        "whether all Lyapunov exponents are computed, at about ten times the cost", default=False
+    )
     allowed_diverged_share: float = key(
         "share of diverged lanes above which the command reports failure",
         units="1",

@@ -18,7 +18,7 @@ from gearchaos.variables import STATE_WORDING, sweep_variables
 LANES = 300
 POINTS = 1000
 STATES = ("delta_5", "delta_5_rate")
-SIZES = {"section_point": POINTS, "state": len(STATES)}
+SIZES = {"section_point": POINTS, "state": len(STATES), "exponent": len(STATES)}
 
 
 def make_result(axis: str = "pitch_error", **metadata: Any) -> Result:
@@ -34,6 +34,7 @@ def make_result(axis: str = "pitch_error", **metadata: Any) -> Result:
         several_starts=True,
         status_meanings=["ok", "diverged"],
         crossings=True,
+        spectrum=True,
     )
     random = np.random.default_rng(1)
     data: dict[str, Any] = {
@@ -138,7 +139,13 @@ def test_xarray_reads_it_as_the_same_labelled_arrays(
             "configuration",
             "configuration_resolved",
         }
-        assert set(dataset.coords) == {"pitch_error", "section_point", "state", "harmonic"}
+        assert set(dataset.coords) == {
+            "pitch_error",
+            "section_point",
+            "state",
+            "exponent",
+            "harmonic",
+        }
         assert dataset.attrs["title"] == "Δ sweep"
         assert dataset.attrs["threads"] == 2
         assert dataset["configuration"].item() == result.metadata["configuration"]
@@ -174,6 +181,7 @@ def test_netcdf_finds_real_dimensions_only(path: Path, result: Result) -> None:
             "section_point": POINTS,
             "state": len(STATES),
             "harmonic": 3,
+            "exponent": len(STATES),
         }
         assert not file.groups["parameters"].dimensions
         assert [name for name in file.variables if name in result] == list(result)
@@ -188,7 +196,7 @@ def test_every_dataset_follows_the_rules_of_the_format(path: Path) -> None:
         assert (file.attrs["schema"], file.attrs["schema_version"]) == ("gearchaos-sweep", "1.0")
         datasets: list[h5py.Dataset] = []
         file.visititems(lambda _, item: datasets.append(item) if hasattr(item, "shape") else None)
-        assert len(datasets) == 19
+        assert len(datasets) == 23
         for dataset in datasets:
             assert {"units", "long_name"} <= set(dataset.attrs)
             assert h5py.check_string_dtype(dataset.dtype) or dataset.dtype.str in {

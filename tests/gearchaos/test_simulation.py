@@ -1,5 +1,6 @@
 """A configured sweep, computed block by block."""
 
+import numpy as np
 import pytest
 
 from gearchaos.simulation import compute_all
@@ -57,3 +58,11 @@ def test_every_array_of_a_block_is_a_variable_of_the_sweep():
     assert {*arrays} == lanes
     without = simulation("outputs.lyapunov=false").compute(0, 2)
     assert not [name for name in without if "lyapunov" in name]
+
+
+def test_all_exponents_come_with_the_sum_that_the_damping_gives():
+    sweep = simulation("outputs.spectrum=true", "integration.steps_per_period=800")
+    arrays = sweep.compute(0, 3)
+    assert arrays["lyapunov_spectrum"].shape == (3, len(sweep.states))
+    total = arrays["lyapunov_spectrum"].sum(axis=1)
+    assert np.allclose(total, arrays["lyapunov_sum"], rtol=0.0, atol=1e-6)
