@@ -68,8 +68,8 @@ def model(groups: Groups, lanes: int) -> Model:
     )
 
 
-def start_states(config: Configuration, model: Model, first: int) -> Floats:
-    """Return the start states of consecutive lanes, shape (lanes, 10), columns of `STATE_ROWS`.
+def start_states(config: Configuration, model: Model, numbers: NDArray[np.intp]) -> Floats:
+    """Return the start states of some lanes, shape (lanes, 10), columns of `STATE_ROWS`.
 
     Parameters
     ----------
@@ -77,9 +77,9 @@ def start_states(config: Configuration, model: Model, first: int) -> Floats:
         Its table ``start`` decides.
     model : Model
         Of these lanes.
-    first : int
-        Number of the first of these lanes in the whole sweep: the random state of a lane depends
-        on that number and the seed alone.
+    numbers : ndarray of int, shape (lanes,)
+        Their numbers in the whole sweep, ascending: the random state of a lane depends on its
+        number and the seed alone.
     """
     lanes = model.load.size
     start = np.zeros((lanes, len(STATE_ROWS)))
@@ -91,9 +91,11 @@ def start_states(config: Configuration, model: Model, first: int) -> Floats:
     elif kind == "contact":
         start[:, STATE_ROWS["delta_5"]] = _contact(config, model)
     elif kind == "random":
+        first = int(numbers[0])
         generator = np.random.Philox(config.start.seed)
         generator.advance(first * (_DRAWS_PER_LANE // _PHILOX_WIDTH))
-        draws = np.random.Generator(generator).uniform(-1.0, 1.0, (lanes, _DRAWS_PER_LANE))
+        shape = (int(numbers[-1]) - first + 1, _DRAWS_PER_LANE)
+        draws = np.random.Generator(generator).uniform(-1.0, 1.0, shape)[numbers - first]
         start[:, columns] = config.start.spread * draws[:, : len(columns)]
     return start
 

@@ -132,6 +132,7 @@ def _check_variables(
         status_meanings=(),
         crossings="crossings_per_period" in found,
         spectrum="lyapunov_spectrum" in found,
+        check_meanings=["same"] if "motion_changed" in found else [],
     )
     for due in expected:
         got = found.get(due.name)

@@ -10,6 +10,7 @@ import numpy as np
 from gearchaos_kernels import current_threads, most_threads, use_threads
 
 from gearchaos.configuration import Configuration
+from gearchaos.error_check import Tally
 from gearchaos.errors import ConfigurationError
 from gearchaos.progress import Progress, notice, say
 from gearchaos.provenance import provenance
@@ -44,19 +45,24 @@ def run(config: Configuration, threads: int | None = None, progress: bool = Fals
     """
     choose_threads(threads)
     simulation = Simulation(config)
-    for note in simulation.notes:
-        say(note, quiet=not progress)
     with notice(COMPILING, quiet=not progress):
         simulation.compile()
+    simulation.choose_steps()
+    for note in simulation.notes:
+        say(note, quiet=not progress)
     began = time.monotonic()
     size = simulation.block_lanes(current_threads())
     edges = range(0, simulation.lanes, size)
     bounds = simulation.in_order((first, min(first + size, simulation.lanes)) for first in edges)
     parts = {}
+    tally = Tally()
     with Progress(simulation.lanes, quiet=not progress) as bar:
         for (first, last), arrays in compute_all(simulation, bounds):
             parts[first] = arrays
+            tally.add(arrays)
             bar.advance(last - first)
+    if tally.errors:
+        say(tally.errors, quiet=not progress)
     in_order = [parts[first] for first in sorted(parts)]
     data = {name: np.concatenate([part[name] for part in in_order]) for name in in_order[0]}
     return Result(

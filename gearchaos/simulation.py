@@ -23,14 +23,18 @@ from numpy.typing import NDArray
 from gearchaos.configuration import Configuration, lane_groups
 from gearchaos.configuration.run_tables import states_of
 from gearchaos.configuration.sweep_values import SWEEPABLE_GROUPS, SWEEPABLE_KEYS
+from gearchaos.error_check import MEANINGS, check_arrays, checked_lanes
 from gearchaos.errors import ConfigurationError
 from gearchaos.group_table import GROUP_TABLE
 from gearchaos.lanes import model, select, start_states
 from gearchaos.lyapunov import largest_exponent
+from gearchaos.motion_difference import Motion, difference
+from gearchaos.motion_period import POINTS_NEEDED
 from gearchaos.result import Parameter
 from gearchaos.spectrum import exponents, sum_of_exponents
 from gearchaos.stability import stability_limit
-from gearchaos.variables import Variable, axis_name, sweep_variables
+from gearchaos.step_choice import PILOT_LANES, PILOT_PERIODS, Candidate, choose_steps
+from gearchaos.variables import Variable, axis_name, step_choice_variables, sweep_variables
 
 Arrays = Mapping[str, NDArray[Any]]
 Bounds = tuple[int, int]
@@ -64,6 +68,7 @@ class Simulation:
             tangent=config.outputs.lyapunov,
             resolved=config.integration.crossings == "resolved",
         )
+        self._choice: list[Variable] = []
         self.notes: list[str] = []
         """What a user should know before the sweep begins."""
         self._keep_stable()
@@ -93,7 +98,8 @@ class Simulation:
     def variables(self) -> list[Variable]:
         """What the sweep yields."""
         units, long_name, symbol = self._wording()
-        return sweep_variables(
+        checked = self.config.integration.error_check > 0.0
+        of_the_lanes = sweep_variables(
             self.axis,
             units=units,
             long_name=long_name,
@@ -106,7 +112,9 @@ class Simulation:
             spectrum=self.config.outputs.spectrum,
             several_starts=self.starts > 1,
             status_meanings=[status.name.lower() for status in STATUS_TEXTS],
+            check_meanings=MEANINGS if checked else (),
         )
+        return of_the_lanes + self._choice
 
     @property
     def parameters(self) -> dict[str, Parameter]:
@@ -133,7 +141,8 @@ class Simulation:
     def rehearse(self, lanes: int, periods: int) -> int:
         """Integrate the first lanes for a few mesh periods and return the number of steps."""
         plan = self.plan._replace(transient_periods=0, recorded_periods=periods, section_points=0)
-        self._integrate(slice(0, lanes), plan=plan)
+        numbers = np.arange(lanes)
+        self._integrate(numbers, self._start(numbers), plan)
         return lanes * periods * plan.steps_per_period
 
     def block_memory(self, threads: int) -> int:
@@ -169,10 +178,12 @@ class Simulation:
             The lanes' part of every variable that runs over lanes, by name.
         """
         if not self.carried:
-            arrays = self._arrays(first, self._integrate(slice(first, last)))
+            lanes = np.arange(first, last)
+            start = self._start(lanes)
+            arrays = self._arrays(first, self._integrate(lanes, start))
             if self.config.outputs.spectrum:
-                arrays |= self._spectrum(slice(first, last))
-            return arrays
+                arrays |= self._spectrum(lanes, start)
+            return arrays | self._check(arrays, lanes, start)
         return self._compute_carried(first, last, neighbour)
 
     def _keep_stable(self) -> None:
@@ -207,28 +218,107 @@ class Simulation:
             edge = slice(None, self.starts) if downwards else slice(-self.starts, None)
             carried[:, columns] = neighbour["end_state"][edge]
         parts: list[Outcome] = []
+        starts: list[NDArray[np.float64]] = []
         for lane in range(first, last, self.starts)[:: -1 if downwards else 1]:
-            parts.append(self._integrate(slice(lane, lane + self.starts), carried))
+            lanes = np.arange(lane, lane + self.starts)
+            starts.append(self._start(lanes, carried))
+            parts.append(self._integrate(lanes, starts[-1]))
             carried = parts[-1].end_state
         if downwards:
             parts.reverse()
+            starts.reverse()
         merged: Any = [
             None if arrays[0] is None else np.concatenate(arrays)
             for arrays in zip(*parts, strict=True)
         ]
-        return self._arrays(first, Outcome(*merged))
+        arrays = self._arrays(first, Outcome(*merged))
+        return arrays | self._check(arrays, np.arange(first, last), np.concatenate(starts))
 
-    def _lane_model(self, lanes: slice) -> Model:
-        numbers = np.arange(lanes.start, lanes.stop)
-        return model(select(self.groups, numbers // self.starts), numbers.size)
+    def _check(
+        self, arrays: Arrays, lanes: NDArray[np.intp], start: NDArray[np.float64]
+    ) -> dict[str, Any]:
+        """Compute a share of the lanes again with half the step and compare."""
+        share = self.config.integration.error_check
+        if share == 0.0:
+            return {}
+        checked = checked_lanes(int(lanes[0]), int(lanes[-1]) + 1, share)
+        finer = self._motion(
+            lanes[checked],
+            start[checked],
+            self.plan._replace(steps_per_period=2 * self.plan.steps_per_period),
+        )
+        exponent = arrays.get("lyapunov_exponent")
+        coarser = Motion(
+            np.stack([arrays[f"section_{n}"][checked] for n in self.plan.section_states], axis=2),
+            None if exponent is None else exponent[checked],
+            arrays["status"][checked] != Status.OK,
+        )
+        return check_arrays(lanes.size, checked, difference(coarser, finer))
 
-    def _spectrum(self, lanes: slice) -> dict[str, Any]:
+    def _motion(self, lanes: NDArray[np.intp], start: NDArray[np.float64], plan: Plan) -> Motion:
+        outcome = self._integrate(lanes, start, plan)
+        exponent = None
+        if outcome.growth is not None:
+            exponent, _ = largest_exponent(outcome.growth, self._periods(lanes))
+        return Motion(outcome.section, exponent, outcome.status != Status.OK)
+
+    def choose_steps(self) -> None:
+        """Measure which number of steps the configured tolerance needs, and take it."""
+        tolerance = self.config.integration.tolerance
+        if tolerance is None:
+            return
+        count = min(PILOT_LANES, self.lanes)
+        lanes = np.unique(np.linspace(0, self.lanes - 1, count).round().astype(np.intp))
+        coarsest = self.plan.steps_per_period
+        transient = self.plan._replace(
+            steps_per_period=4 * coarsest, recorded_periods=0, section_points=0, tangent=False
+        )
+        common = self._integrate(lanes, self._start(lanes), transient).end_state
+
+        def motion(steps: int) -> Motion:
+            plan = self.plan._replace(
+                steps_per_period=steps,
+                transient_periods=PILOT_PERIODS,
+                recorded_periods=PILOT_PERIODS,
+                section_points=min(POINTS_NEEDED, PILOT_PERIODS),
+            )
+            return self._motion(lanes, common, plan)
+
+        candidates = choose_steps(motion, coarsest, tolerance, self.config.source)
+        steps, *measured = zip(*candidates, strict=True)
+        self._choice = step_choice_variables(
+            steps, dict(zip(Candidate._fields[1:], measured, strict=True))
+        )
+        self.plan = self.plan._replace(steps_per_period=candidates[-1].steps)
+        self.notes.append(
+            f"{candidates[-1].steps} steps per period: on {lanes.size} lanes the error is "
+            f"{candidates[-1].error:.1e}, wanted is {tolerance:g}"
+        )
+
+    def _periods(self, lanes: NDArray[np.intp]) -> NDArray[np.float64]:
+        """Mesh period of each lane in units of tau."""
+        frequency = select(self.groups, lanes // self.starts).mesh_frequency
+        return np.broadcast_to(2.0 * np.pi / np.float64(frequency), lanes.shape)
+
+    def _lane_model(self, lanes: NDArray[np.intp]) -> Model:
+        return model(select(self.groups, lanes // self.starts), lanes.size)
+
+    def _start(
+        self, lanes: NDArray[np.intp], carried: NDArray[np.float64] | None = None
+    ) -> NDArray[np.float64]:
+        start = start_states(self.config, self._lane_model(lanes), lanes)
+        if carried is None:
+            return start
+        # A lane that diverged hands nothing on: its successor begins anew.
+        return np.where(np.isfinite(carried).all(axis=1, keepdims=True), carried, start)
+
+    def _spectrum(self, lanes: NDArray[np.intp], start: NDArray[np.float64]) -> dict[str, Any]:
         lane_model = self._lane_model(lanes)
         spectrum = exponents(
             self.scene,
             lane_model,
             *self._harmonics(),
-            start_states(self.config, lane_model, lanes.start),
+            start,
             self.plan,
             rederived=self.config.formulation == "rederived",
         )
@@ -239,16 +329,11 @@ class Simulation:
         }
 
     def _integrate(
-        self, lanes: slice, carried: NDArray[np.float64] | None = None, plan: Plan | None = None
+        self, lanes: NDArray[np.intp], start: NDArray[np.float64], plan: Plan | None = None
     ) -> Outcome:
-        lane_model = self._lane_model(lanes)
-        start = start_states(self.config, lane_model, lanes.start)
-        if carried is not None:
-            # A lane that diverged hands nothing on: its successor begins anew.
-            start = np.where(np.isfinite(carried).all(axis=1, keepdims=True), carried, start)
         return integrate(
             self.scene,
-            lane_model,
+            self._lane_model(lanes),
             *self._harmonics(),
             start,
             plan or self.plan,
@@ -275,9 +360,7 @@ class Simulation:
         for column, name in enumerate(self.plan.section_states):
             arrays[f"section_{name}"] = outcome.section[:, :, column]
         if outcome.growth is not None:
-            frequency = select(self.groups, value).mesh_frequency
-            period = np.broadcast_to(2.0 * np.pi / np.float64(frequency), numbers.shape)
-            exponent, standard_error = largest_exponent(outcome.growth, period)
+            exponent, standard_error = largest_exponent(outcome.growth, self._periods(numbers))
             arrays["lyapunov_exponent"] = exponent
             arrays["lyapunov_exponent_standard_error"] = standard_error
         wanted = {v.name for v in self.variables if v.dims[0] == self.axis}

@@ -18,6 +18,7 @@ from gearchaos.command_line import OK, run_command, version_text
 from gearchaos.errors import FileError
 
 if TYPE_CHECKING:
+    from gearchaos.error_check import Tally
     from gearchaos.shards import ShardStore
     from gearchaos.simulation import Bounds, Simulation
 
@@ -73,14 +74,11 @@ def _run(argv: Sequence[str] | None) -> int:
     from gearchaos.configuration import load_config
 
     config = load_config(options.config, options.set)
-    from gearchaos.progress import say
     from gearchaos.running import choose_threads
     from gearchaos.simulation import Simulation
 
     choose_threads(options.threads)
     simulation = Simulation(config)
-    for note in simulation.notes:
-        say(note, options.quiet)
     # A text, not a Path, which would drop the slash that tells a folder from a file.
     output = f"{Path(options.config).stem}.h5" if options.output is None else options.output
     if os.path.exists(output) and os.path.samefile(output, options.config):
@@ -97,12 +95,13 @@ def _compute(
     from gearchaos_kernels import current_threads
 
     from gearchaos.atomic_file import check_output
-    from gearchaos.progress import notice
-    from gearchaos.running import COMPILING, metadata
+    from gearchaos.progress import say
+    from gearchaos.running import metadata
     from gearchaos.shards import ShardStore
 
     check_output(output, options.overwrite)
     began = time.monotonic()
+    _prepare(simulation, options.quiet)
     with ShardStore(
         output,
         simulation.variables,
@@ -116,9 +115,7 @@ def _compute(
             print(f"{NAME}: {problem}; it is computed again", file=sys.stderr)
         missing = store.missing(found.bounds, simulation.block_lanes(current_threads()))
         try:
-            with notice(COMPILING, options.quiet):
-                simulation.compile()
-            diverged = _fill(simulation, store, found.bounds, missing, options.quiet)
+            tally = _fill(simulation, store, found.bounds, missing, options.quiet)
             seconds = time.monotonic() - began
             store.merge(
                 simulation.parameters, metadata(simulation, seconds), overwrite=options.overwrite
@@ -129,9 +126,10 @@ def _compute(
             fault.add_note(f"go on with: {_resuming(arguments)}")
             raise
     print(output, flush=True)
-    if not options.quiet:
-        text = f"{simulation.lanes} lanes, {diverged} diverged, {seconds:.1f} s"
-        print(f"{NAME}: {text}", file=sys.stderr)
+    say(f"{simulation.lanes} lanes, {tally.diverged} diverged, {seconds:.1f} s", options.quiet)
+    if tally.errors:
+        say(tally.errors, options.quiet)
+    diverged = tally.diverged
     allowed = simulation.config.outputs.allowed_diverged_share
     if diverged > allowed * simulation.lanes:
         print(
@@ -144,27 +142,42 @@ def _compute(
     return OK
 
 
+def _prepare(simulation: Simulation, quiet: bool) -> None:
+    """Compile the kernel, choose the steps where a tolerance is wanted, and say what was found."""
+    from gearchaos.progress import notice, say
+    from gearchaos.running import COMPILING
+
+    with notice(COMPILING, quiet):
+        simulation.compile()
+    simulation.choose_steps()
+    for note in simulation.notes:
+        say(note, quiet)
+
+
 def _fill(
     simulation: Simulation,
     store: ShardStore,
     finished: Sequence[Bounds],
     missing: Sequence[Bounds],
     quiet: bool,
-) -> int:
-    """Compute the missing blocks into the store and return how many lanes of all diverged."""
+) -> Tally:
+    """Compute the missing blocks into the store and add up all of them."""
+    from gearchaos.error_check import Tally
     from gearchaos.progress import Progress
     from gearchaos.simulation import compute_all
 
     readers = {bounds: partial(store.read, *bounds) for bounds in finished}
-    diverged = sum(int((read()["status"] != 0).sum()) for read in readers.values())
+    tally = Tally()
+    for read in readers.values():
+        tally.add(read())
     order = simulation.in_order([*finished, *missing])
     done = sum(last - first for first, last in finished)
     with Progress(simulation.lanes, done, quiet) as progress:
         for (first, last), arrays in compute_all(simulation, order, readers):
             store.write(first, last, arrays)
-            diverged += int((arrays["status"] != 0).sum())
+            tally.add(arrays)
             progress.advance(last - first)
-    return diverged
+    return tally
 
 
 def _resuming(arguments: list[str]) -> str:
@@ -178,11 +191,9 @@ def _describe(simulation: Simulation, output: str, quiet: bool) -> None:
     from gearchaos_kernels import current_threads
     from tqdm import tqdm
 
-    from gearchaos.progress import notice
-    from gearchaos.running import COMPILING, pilot_rate
+    from gearchaos.running import pilot_rate
 
-    with notice(COMPILING, quiet):
-        simulation.compile()
+    _prepare(simulation, quiet)
     seconds = simulation.steps / pilot_rate(simulation)
     duration = f"{seconds:.1f} s" if seconds < 100 else str(timedelta(seconds=round(seconds)))
     config = simulation.config
@@ -201,7 +212,7 @@ def _describe(simulation: Simulation, output: str, quiet: bool) -> None:
         "states": f"{len(simulation.states)}{_left_out(simulation)}",
         "lanes": f"{simulation.lanes} ({values.size} values of {config.sweep.parameter} from "
         f"{values[0]:g} to {values[-1]:g}{starts})",
-        "steps": f"{simulation.steps:.3g} ({config.integration.steps_per_period} per period)",
+        "steps": f"{simulation.steps:.3g} ({simulation.plan.steps_per_period} per period)",
         "file": f"about {tqdm.format_sizeof(bytes_kept, 'B')} before compression",
         "memory": f"about {tqdm.format_sizeof(memory, 'B')} for a block of lanes",
         "time": f"about {duration} with {threads} thread{'s' if threads > 1 else ''}",

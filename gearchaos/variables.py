@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -58,7 +58,7 @@ class Variable:
     symbol: str = ""
     fill_value: float | int | None = None
     flags: tuple[str, ...] = ()
-    values: tuple[int, ...] | tuple[str, ...] | None = None
+    values: tuple[int, ...] | tuple[float, ...] | tuple[str, ...] | None = None
 
     @property
     def attributes(self) -> dict[str, Any]:
@@ -91,6 +91,7 @@ def sweep_variables(
     status_meanings: Sequence[str],
     crossings: bool = False,
     spectrum: bool = False,
+    check_meanings: Sequence[str] = (),
 ) -> list[Variable]:
     """List the variables of a sweep in the order of the file.
 
@@ -112,6 +113,8 @@ def sweep_variables(
         Whether steps are split at clearance boundaries, and their crossings counted.
     spectrum : bool
         Whether all Lyapunov exponents are computed.
+    check_meanings : sequence of str
+        Meanings of ``motion_changed`` where lanes are computed twice to measure their error.
     several_starts : bool
         Whether each parameter value has several lanes that differ in their start.
     status_meanings : sequence of str
@@ -165,6 +168,16 @@ def sweep_variables(
             Variable("slowest_crossing", (lane,), "float64", "1", slow, "", nan),
             Variable("unsplit_steps", (lane,), "int32", "1", unsplit),
         ]
+    if check_meanings:
+        text = "change of the section of a periodic lane when the step is halved"
+        exponent = "change of the largest Lyapunov exponent when the step is halved"
+        motion = "whether the lane moves in another way when the step is halved"
+        meanings = tuple(check_meanings)
+        variables += [
+            Variable("section_error", (lane,), "float64", "1", text, "", nan),
+            Variable("exponent_error", (lane,), "float64", "1", exponent, "", nan),
+            Variable("motion_changed", (lane,), "uint8", "1", motion, flags=meanings),
+        ]
     flags = tuple("_".join(meaning.split()) for meaning in status_meanings)
     diverged = "mesh period in which the lane diverged, -1 where it did not"
     names = tuple(states)
@@ -175,5 +188,35 @@ def sweep_variables(
         Variable(STATE, (STATE,), "str", "1", "name of the state variable", values=names),
         Variable(
             "end_state", (lane, STATE), "float64", "1", "state at the end of the lane", "", nan
+        ),
+    ]
+
+
+def step_choice_variables(
+    steps: Sequence[int], measured: Mapping[str, Sequence[float]]
+) -> list[Variable]:
+    """List what was measured to choose the number of steps, one value per candidate.
+
+    Parameters
+    ----------
+    steps : sequence of int
+        Numbers of steps per period that were tried; the last one was taken.
+    measured : mapping of str to sequence of float
+        ``section_error``, ``exponent_error``, ``changed_share`` of each.
+    """
+    name = "candidate_steps"
+    wording = {
+        "section_error": "error of the section of periodic lanes against four times as many steps",
+        "exponent_error": "error of their exponent against four times as many steps",
+        "changed_share": "share of lanes that move in another way with four times as many steps",
+    }
+    text = "steps per period that were tried before the sweep; the last number was taken"
+    return [
+        Variable(name, (name,), "int32", "1", text, "$N$", values=tuple(steps)),
+        *(
+            Variable(
+                f"candidate_{key}", (name,), "float64", "1", wording[key], values=tuple(values)
+            )
+            for key, values in measured.items()
         ),
     ]

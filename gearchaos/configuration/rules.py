@@ -153,6 +153,21 @@ def _section_points_are_recorded(config: Configuration) -> Iterator[Fault]:
         )
 
 
+def _errors_are_measured_on_a_section(config: Configuration) -> Iterator[Fault]:
+    integration = config.integration
+    for name, value in {
+        "tolerance": integration.tolerance,
+        "error_check": integration.error_check or None,
+    }.items():
+        if value is not None and not config.outputs.section:
+            yield Fault(
+                f"integration.{name}",
+                "needs a section to measure errors on",
+                'keep a state in outputs.section, such as "delta_5"',
+                value,
+            )
+
+
 def _spectrum_is_not_carried(config: Configuration) -> Iterator[Fault]:
     if config.outputs.spectrum and config.start.carry != "none":
         yield Fault(
@@ -175,5 +190,6 @@ RULES: tuple[tuple[frozenset[str], Rule], ...] = (
     (frozenset({"start"}), _start_keys_belong_to_the_kind),
     (frozenset({"outputs", "integration"}), _section_points_are_recorded),
     (frozenset({"outputs", "start"}), _spectrum_is_not_carried),
+    (frozenset({"outputs", "integration"}), _errors_are_measured_on_a_section),
 )
 """Each rule with the tables it reads; it needs them free of faults of their own."""

@@ -143,6 +143,20 @@ class Integration(Table):
     """Runge-Kutta of order 4 on a fixed grid over the mesh period."""
 
     steps_per_period: int = key("steps per mesh period", default=200, ge=1, le=1_000_000)
+    tolerance: float | None = key(
+        "largest error of section and exponent; the steps are then doubled, from steps_per_period "
+        "on, until lanes of the sweep that are tried beforehand reach it",
+        default=None,
+        example=1e-6,
+        gt=0,
+    )
+    error_check: float = key(
+        "share of the lanes that are computed again with half the step, to measure their error",
+        units="1",
+        default=0.0,
+        ge=0,
+        le=1,
+    )
     crossings: Literal["resolved", "plain"] = key(
         "whether a step that crosses a clearance boundary is split there, which keeps the order "
         "of the method, or is a plain step",

@@ -52,7 +52,7 @@ def assert_same(one: dict[str, np.ndarray], other: dict[str, np.ndarray]) -> Non
 def starts_of(sweep: Simulation, first: int = 0, last: int | None = None) -> np.ndarray:
     numbers = np.arange(first, sweep.lanes if last is None else last)
     lane_model = model(select(sweep.groups, numbers // sweep.starts), numbers.size)
-    return start_states(sweep.config, lane_model, first)
+    return start_states(sweep.config, lane_model, numbers)
 
 
 def kernel(sweep: Simulation, value: int, start: np.ndarray) -> np.ndarray:

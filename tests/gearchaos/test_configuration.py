@@ -96,6 +96,7 @@ def test_the_resolved_toml_states_every_default(text):
     tables = tomllib.loads(config.resolved_toml())
     assert tables["integration"] == {
         "steps_per_period": 200,
+        "error_check": 0.0,
         "crossings": "resolved",
         "unstable": "refuse",
         "transient_periods": 500,

@@ -1,0 +1,85 @@
+"""With a tolerance, the number of steps is measured and not guessed."""
+
+import numpy as np
+import pytest
+
+import gearchaos
+from gearchaos.errors import ConfigurationError
+from gearchaos.motion_difference import Motion
+from gearchaos.step_choice import choose_steps
+
+from .short_sweeps import simulation
+
+SHORT = (
+    "integration.transient_periods=200",
+    "integration.recorded_periods=20",
+    "outputs.section_points=10",
+    "integration.steps_per_period=25",
+)
+
+
+def method_of_order_four(steps: int) -> Motion:
+    """Lanes of period 1 whose section and exponent have the error 100 steps^-4."""
+    error = 100.0 * steps**-4.0
+    lanes = np.linspace(0.5, 1.5, 20)
+    section = np.repeat((lanes + error)[:, np.newaxis, np.newaxis], 48, axis=1)
+    return Motion(section, -0.01 + error * np.ones(20), np.zeros(20, dtype=bool))
+
+
+@pytest.mark.parametrize("tolerance", [1e-4, 1e-6, 1e-8])
+def test_the_steps_are_the_first_doubling_that_reaches_the_tolerance(tolerance):
+    candidates = choose_steps(method_of_order_four, 10, tolerance, "x.toml")
+    assert [c.steps for c in candidates] == [10 * 2**k for k in range(len(candidates))]
+    assert candidates[-1].error <= tolerance
+    assert all(candidate.error > tolerance for candidate in candidates[:-1])
+    exact = 100.0 * (candidates[-1].steps ** -4.0) * (1 - 4.0**-4)
+    assert candidates[-1].section_error == pytest.approx(exact, rel=1e-6)
+
+
+def test_a_tolerance_out_of_reach_is_refused_with_what_was_reached():
+    with pytest.raises(ConfigurationError, match=r"x.toml: integration.tolerance = 1e-20: .* 5120"):
+        choose_steps(method_of_order_four, 10, 1e-20, "x.toml")
+
+
+def test_where_nothing_is_periodic_no_error_is_claimed():
+    def noise(steps: int) -> Motion:
+        return Motion(
+            np.random.default_rng(steps).uniform(size=(20, 48, 1)), None, np.zeros(20, dtype=bool)
+        )
+
+    with pytest.raises(ConfigurationError, match="none of the lanes"):
+        choose_steps(noise, 10, 1e-3, "x.toml")
+
+
+def test_a_sweep_takes_the_steps_that_its_tolerance_needs_and_keeps_the_measurement(tmp_path):
+    sweeps = {}
+    for tolerance in ("1e-3", "1e-6"):
+        config = simulation(*SHORT, f"integration.tolerance={tolerance}").config
+        result = gearchaos.run(config)
+        result.save(tmp_path / f"{tolerance}.h5")
+        sweeps[tolerance] = gearchaos.open_result(tmp_path / f"{tolerance}.h5")
+    for tolerance, result in sweeps.items():
+        steps = result["candidate_steps"]
+        assert steps[0] == 25
+        assert result.metadata["steps_per_period"] == steps[-1]
+        assert result["candidate_section_error"][-1] <= float(tolerance)
+        assert result["candidate_exponent_error"][-1] <= float(tolerance)
+    assert sweeps["1e-6"]["candidate_steps"][-1] > sweeps["1e-3"]["candidate_steps"][-1]
+
+
+def test_the_choice_follows_from_the_configuration_alone():
+    chosen = []
+    for _ in range(2):
+        sweep = simulation(*SHORT, "integration.tolerance=1e-5")
+        sweep.choose_steps()
+        measured = [v.values for v in sweep.variables if v.name.startswith("candidate")]
+        chosen.append((sweep.plan, measured))
+    assert len(chosen[0][1]) == 4
+    assert chosen[0] == chosen[1]
+
+
+def test_without_a_tolerance_nothing_is_tried():
+    sweep = simulation(*SHORT)
+    sweep.choose_steps()
+    assert sweep.plan.steps_per_period == 25
+    assert not any(v.name.startswith("candidate") for v in sweep.variables)
