@@ -11,6 +11,7 @@ from gearchaos.command_line import OK, USAGE, version_text
 COMMANDS = {
     "sweep": "compute a sweep from a configuration file",
     "plot": "draw a result file",
+    "accuracy": "measure what accuracy costs on some lanes of a sweep",
     "configuration": "print the JSON Schema of a configuration file",
 }
 _HOMES = {"configuration": "gearchaos.configuration.__main__"}

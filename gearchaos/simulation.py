@@ -267,33 +267,61 @@ class Simulation:
         tolerance = self.config.integration.tolerance
         if tolerance is None:
             return
-        count = min(PILOT_LANES, self.lanes)
-        lanes = np.unique(np.linspace(0, self.lanes - 1, count).round().astype(np.intp))
         coarsest = self.plan.steps_per_period
-        transient = self.plan._replace(
-            steps_per_period=4 * coarsest, recorded_periods=0, section_points=0, tangent=False
+        lanes, motion = self.pilot(PILOT_LANES, 4 * coarsest)
+        candidates = choose_steps(
+            partial(motion, resolved=self.plan.resolved), coarsest, tolerance, self.config.source
         )
-        common = self._integrate(lanes, self._start(lanes), transient).end_state
-
-        def motion(steps: int) -> Motion:
-            plan = self.plan._replace(
-                steps_per_period=steps,
-                transient_periods=PILOT_PERIODS,
-                recorded_periods=PILOT_PERIODS,
-                section_points=min(POINTS_NEEDED, PILOT_PERIODS),
-            )
-            return self._motion(lanes, common, plan)
-
-        candidates = choose_steps(motion, coarsest, tolerance, self.config.source)
         steps, *measured = zip(*candidates, strict=True)
         self._choice = step_choice_variables(
             steps, dict(zip(Candidate._fields[1:], measured, strict=True))
         )
         self.plan = self.plan._replace(steps_per_period=candidates[-1].steps)
         self.notes.append(
-            f"{candidates[-1].steps} steps per period: on {lanes.size} lanes the error is "
+            f"{candidates[-1].steps} steps per period: on {lanes} lanes the error is "
             f"{candidates[-1].error:.1e}, wanted is {tolerance:g}"
         )
+
+    def pilot(self, lanes: int, finest: int) -> tuple[int, Callable[..., Motion]]:
+        """Prepare to integrate some lanes of the sweep on several grids, to compare them.
+
+        Parameters
+        ----------
+        lanes : int
+            Lanes wanted, spread evenly over the sweep.
+        finest : int
+            Steps per period of the transient that all grids go on from, so that a lane comes to
+            the same one of several coexisting motions on each of them.
+
+        Returns
+        -------
+        lanes : int
+            Number of lanes that there are.
+        motion : callable
+            ``motion(steps, resolved)`` settles on that grid and returns the `Motion`.
+        """
+        count = min(lanes, self.lanes)
+        numbers = np.unique(np.linspace(0, self.lanes - 1, count).round().astype(np.intp))
+        transient = self.plan._replace(
+            steps_per_period=finest,
+            recorded_periods=0,
+            section_points=0,
+            tangent=False,
+            resolved=True,
+        )
+        common = self._integrate(numbers, self._start(numbers), transient).end_state
+
+        def motion(steps: int, resolved: bool) -> Motion:
+            plan = self.plan._replace(
+                steps_per_period=steps,
+                transient_periods=PILOT_PERIODS,
+                recorded_periods=PILOT_PERIODS,
+                section_points=min(POINTS_NEEDED, PILOT_PERIODS),
+                resolved=resolved,
+            )
+            return self._motion(numbers, common, plan)
+
+        return numbers.size, motion
 
     def _periods(self, lanes: NDArray[np.intp]) -> NDArray[np.float64]:
         """Mesh period of each lane in units of tau."""

@@ -1,0 +1,71 @@
+"""Error against time: what accuracy costs."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.lines import Line2D
+
+from gearchaos.figures.page import Page
+from gearchaos.figures.style import EXPONENT, MM_PER_INCH, POSITIVE, SINGLE_COLUMN_MM, STYLE
+
+LOOKS: dict[str, dict[str, Any]] = {
+    "plain": {"color": POSITIVE, "marker": "o"},
+    "resolved": {"color": EXPONENT, "marker": "s"},
+}
+HEIGHT_MM = 65.0
+
+Points = Sequence[tuple[float, float, int]]
+
+
+def work_precision(axes: Axes, modes: Mapping[str, Points]) -> list[Line2D]:
+    """Draw the error of each mode against its time, both logarithmic.
+
+    Parameters
+    ----------
+    axes : Axes
+    modes : mapping of str to sequence of (seconds, error, steps)
+        Points are labelled with their steps; those without an error are left out.
+
+    Returns
+    -------
+    list of Line2D
+        One for each mode.
+    """
+    lines = []
+    for mode, points in modes.items():
+        known = [point for point in points if np.isfinite(point[1]) and point[1] > 0.0]
+        seconds = [point[0] for point in known]
+        errors = [point[1] for point in known]
+        lines += axes.plot(seconds, errors, label=mode, markersize=3, linewidth=0.8, **LOOKS[mode])
+        # Labels of the two modes keep apart: above to the right, below to the left.
+        offset, side = ((3, 3), "left") if mode == "plain" else ((-3, -7), "right")
+        for x, y, steps in known:
+            axes.annotate(
+                f"{steps}",
+                (x, y),
+                offset,
+                textcoords="offset points",
+                fontsize=6,
+                ha=side,
+                color=LOOKS[mode]["color"],
+            )
+    axes.set_xscale("log")
+    axes.set_yscale("log")
+    axes.margins(0.12)
+    axes.set_xlabel("Time (s)")
+    axes.set_ylabel("Error of section and exponent")
+    axes.legend(frameon=False)
+    return lines
+
+
+def work_precision_page(modes: Mapping[str, Points], width_mm: float = SINGLE_COLUMN_MM) -> Page:
+    """Draw `work_precision` as a figure of its own."""
+    with mpl.rc_context(STYLE):
+        page = Page(figsize=(width_mm / MM_PER_INCH, HEIGHT_MM / MM_PER_INCH), layout="constrained")
+        work_precision(page.add_subplot(), modes)
+    return page

@@ -1,0 +1,83 @@
+"""The accuracy command measures errors that are real, and recommends what it measured."""
+
+import json
+import re
+
+import numpy as np
+import pytest
+
+import gearchaos
+from gearchaos.accuracy import Setting, measure, recommendation
+from gearchaos.simulation import Simulation
+
+from .commands import names_in, run_module
+from .short_sweeps import PAN2021
+
+SHORT = ("--set", "integration.transient_periods=150", "--steps", "50,100,200", "--lanes", "8")
+
+
+@pytest.fixture(scope="module")
+def ended(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("accuracy")
+    return run_module("gearchaos.accuracy", str(PAN2021), *SHORT, cwd=folder), folder
+
+
+def test_the_table_is_all_that_stdout_holds_and_ends_with_recommendations(ended):
+    run, folder = ended
+    assert run.code == 0
+    lines = run.out.splitlines()
+    assert len(lines) == 1 + 6 + 3
+    for line, error in zip(lines[-3:], ("1e-04", "1e-06", "1e-08"), strict=True):
+        assert re.fullmatch(
+            rf"For an error of {error}: (\d+ (plain|resolved) steps per mesh period\."
+            r"|none of these; give finer --steps\.)",
+            line,
+        )
+    assert names_in(folder) == [f"pan2021_accuracy.{end}" for end in ("json", "pdf", "png")]
+
+
+def test_the_json_holds_what_the_table_says_and_the_machine(ended):
+    facts = json.loads((ended[1] / "pan2021_accuracy.json").read_text())
+    assert [s["steps"] for s in facts["settings"]] == [50, 100, 200] * 2
+    assert facts["machine"]["processor"]
+    assert all(s["seconds"] > 0 for s in facts["settings"])
+
+
+def test_existing_files_are_kept_unless_overwriting_is_asked_for(ended):
+    folder = ended[1]
+    before = (folder / "pan2021_accuracy.json").read_bytes()
+    again = run_module("gearchaos.accuracy", str(PAN2021), *SHORT, cwd=folder)
+    assert again.code == 4
+    assert "--overwrite" in again.err
+    assert (folder / "pan2021_accuracy.json").read_bytes() == before
+
+
+@pytest.mark.parametrize("steps", ["0", "x", "", "100000"])
+def test_senseless_steps_are_refused(tmp_path, steps):
+    run = run_module("gearchaos.accuracy", str(PAN2021), "--steps", steps, cwd=tmp_path)
+    assert run.code == 2
+    assert "Traceback" not in run.err
+    assert names_in(tmp_path) == []
+
+
+def test_resolved_errors_fall_with_order_four_and_lie_below_plain_ones():
+    overrides = ["integration.transient_periods=150", "sweep.to=10.0"]
+    simulation = Simulation(gearchaos.load_config(PAN2021, overrides))
+    found = {(s.mode, s.steps): s for s in measure(simulation, [100, 200, 400], 12)}
+    errors = [found["resolved", steps].section_error for steps in (100, 200, 400)]
+    order = -np.polyfit(np.log([100, 200, 400]), np.log(errors), 1)[0]
+    assert order == pytest.approx(4.0, abs=0.3)
+    for steps in (200, 400):
+        plain, resolved = found["plain", steps], found["resolved", steps]
+        assert resolved.section_error < 0.1 * plain.section_error
+
+
+def test_the_cheapest_setting_that_is_good_enough_is_recommended():
+    settings = [
+        Setting(100, "plain", 1e-5, 1e-5, 0.0, 1.0),
+        Setting(100, "resolved", 1e-7, 1e-7, 0.0, 2.0),
+        Setting(400, "plain", 1e-7, 1e-7, 0.0, 3.0),
+    ]
+    assert "100 plain" in recommendation(settings, 1e-4)
+    assert "100 resolved" in recommendation(settings, 1e-6)
+    assert "none of these" in recommendation(settings, 1e-8)
