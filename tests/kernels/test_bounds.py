@@ -17,25 +17,33 @@ PERIODS = 6
 LENGTHS = ("load", "half_backlash", "error_mean", "error_amplitude")
 BEARINGS = [f"{way}_{{}}_{gear}" for way in ("transverse", "axial") for gear in "pg"]
 
+SMALLEST = 1e-60
+"""Below this a number is taken as 0: scaled down, it would lose digits near the end of range."""
+
+
+def numbers(low: float, high: float) -> st.SearchStrategy[float]:
+    return st.floats(low, high).map(lambda x: x if abs(x) > SMALLEST else 0.0)
+
+
 groups = st.fixed_dictionaries(
     {
         "mesh_frequency": st.floats(0.4, 3.0),
-        "load": st.floats(-1.0, 1.0),
-        "damping_ratio": st.floats(0.0, 1.0),
+        "load": numbers(-1.0, 1.0),
+        "damping_ratio": numbers(0.0, 1.0),
         "base_helix_angle": st.floats(0.05, 0.7),
-        "half_backlash": st.sampled_from([0.0, 1e-9, 1e-3, 0.1, 1.0, 1e9]) | st.floats(0.0, 2.0),
-        "error_mean": st.floats(-0.5, 0.5),
-        "error_amplitude": st.floats(0.0, 2.0),
+        "half_backlash": st.sampled_from([0.0, 1e-9, 1e-3, 0.1, 1.0, 1e9]) | numbers(0.0, 2.0),
+        "error_mean": numbers(-0.5, 0.5),
+        "error_amplitude": numbers(0.0, 2.0),
         # Never zero: the loop without phase is compiled apart.
         "error_phase": st.floats(0.1, 6.0),
-        "stiffness_variation_scale": st.floats(0.0, 2.0),
+        "stiffness_variation_scale": numbers(0.0, 2.0),
         "mass_ratio_p": st.floats(0.05, 1.0),
         "mass_ratio_g": st.floats(0.05, 1.0),
-        **{name.format("stiffness"): st.floats(0.0, 60.0) for name in BEARINGS},
-        **{name.format("damping"): st.floats(0.0, 0.5) for name in BEARINGS},
+        **{name.format("stiffness"): numbers(0.0, 60.0) for name in BEARINGS},
+        **{name.format("damping"): numbers(0.0, 0.5) for name in BEARINGS},
     }
 )
-starts = st.lists(st.floats(-3.0, 3.0), min_size=10, max_size=10).map(np.array)
+starts = st.lists(numbers(-3.0, 3.0), min_size=10, max_size=10).map(np.array)
 anything = st.sampled_from([0.0, 1e-300, 1e-9, 1.0, 1e3, 1e9, 1e30, 1e150, np.inf, np.nan])
 
 
