@@ -11,82 +11,32 @@ from gearchaos_kernels import (
     LANES,
     STATE_ROWS,
     STATUS_TEXTS,
-    Model,
     Outcome,
-    Plan,
-    Scene,
     Status,
-    integrate,
 )
 from numpy.typing import NDArray
 
-from gearchaos.configuration import Configuration, lane_groups
-from gearchaos.configuration.run_tables import states_of
 from gearchaos.configuration.sweep_values import SWEEPABLE_GROUPS, SWEEPABLE_KEYS
 from gearchaos.error_check import MEANINGS, check_arrays, checked_lanes
-from gearchaos.errors import ConfigurationError
 from gearchaos.group_table import GROUP_TABLE
-from gearchaos.lanes import model, select, start_states
 from gearchaos.lyapunov import largest_exponent
 from gearchaos.motion_difference import Motion, difference
-from gearchaos.motion_period import POINTS_NEEDED
 from gearchaos.result import Parameter
 from gearchaos.spectrum import exponents, sum_of_exponents
-from gearchaos.stability import stability_limit
-from gearchaos.step_choice import PILOT_LANES, PILOT_PERIODS, Candidate, choose_steps
-from gearchaos.variables import Variable, axis_name, step_choice_variables, sweep_variables
+from gearchaos.sweep_lanes import SweepLanes
+from gearchaos.variables import Variable, sweep_variables
 
 Arrays = Mapping[str, NDArray[Any]]
 Bounds = tuple[int, int]
 
 
-class Simulation:
+class Simulation(SweepLanes):
     """One configured sweep: what it yields, and the means to compute any block of its lanes.
-
-    Lanes are ordered by the swept value; where a value has several starts, these follow one
-    another. A lane's result depends on its number in the sweep and nothing else.
 
     Parameters
     ----------
     config : Configuration
     """
-
-    def __init__(self, config: Configuration) -> None:
-        self.config = config
-        self.values, self.groups = lane_groups(config)
-        self.starts = config.start.count
-        self.lanes = self.values.size * self.starts
-        self.effects = config.needed_effects
-        self.states = states_of(self.effects)
-        self.scene = Scene(**{effect: effect in self.effects for effect in Scene._fields})
-        self.plan = Plan(
-            steps_per_period=config.integration.steps_per_period,
-            transient_periods=config.integration.transient_periods,
-            recorded_periods=config.integration.recorded_periods,
-            section_points=config.outputs.section_points if config.outputs.section else 0,
-            section_states=config.outputs.section,
-            tangent=config.outputs.lyapunov,
-            resolved=config.integration.crossings == "resolved",
-        )
-        self._choice: list[Variable] = []
-        self.notes: list[str] = []
-        """What a user should know before the sweep begins."""
-        self._keep_stable()
-
-    @property
-    def axis(self) -> str:
-        """Name of the dimension of the lanes."""
-        return axis_name(self.config.sweep.parameter)
-
-    @property
-    def carried(self) -> bool:
-        """Whether each value starts from the end state of its neighbour."""
-        return self.config.start.carry != "none"
-
-    @property
-    def splits_steps(self) -> bool:
-        """Whether steps are split where they cross a clearance boundary."""
-        return self.plan.resolved and self.scene.backlash
 
     @property
     def steps(self) -> int:
@@ -142,7 +92,7 @@ class Simulation:
         """Integrate the first lanes for a few mesh periods and return the number of steps."""
         plan = self.plan._replace(transient_periods=0, recorded_periods=periods, section_points=0)
         numbers = np.arange(lanes)
-        self._integrate(numbers, self._start(numbers), plan)
+        self.integrate(numbers, self.start_of(numbers), plan)
         return lanes * periods * plan.steps_per_period
 
     def block_memory(self, threads: int) -> int:
@@ -179,35 +129,12 @@ class Simulation:
         """
         if not self.carried:
             lanes = np.arange(first, last)
-            start = self._start(lanes)
-            arrays = self._arrays(first, self._integrate(lanes, start))
+            start = self.start_of(lanes)
+            arrays = self._arrays(first, self.integrate(lanes, start))
             if self.config.outputs.spectrum:
                 arrays |= self._spectrum(lanes, start)
             return arrays | self._check(arrays, lanes, start)
         return self._compute_carried(first, last, neighbour)
-
-    def _keep_stable(self) -> None:
-        """Refuse or raise a number of steps with which the method itself would blow up."""
-        steps = self.plan.steps_per_period
-        harmonics = self._harmonics()
-        limit = stability_limit(
-            self.scene, model(self.groups, self.values.size), *harmonics, steps=steps
-        )
-        if limit is None:
-            return
-        fault = limit.fault(steps, self.config.sweep.parameter, self.values)
-        if self.config.integration.unstable == "refuse":
-            raise ConfigurationError(fault.text(self.config.source))
-        self.plan = self.plan._replace(steps_per_period=limit.steps)
-        self.notes.append(
-            f"integration.steps_per_period raised from {steps} to {limit.steps}, the stability "
-            f"limit of {limit.lanes.size} of {self.values.size} values"
-        )
-
-    def _harmonics(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        nothing = np.zeros(0)
-        cosine, sine = self.groups.stiffness_cosine, self.groups.stiffness_sine
-        return nothing if cosine is None else cosine, nothing if sine is None else sine
 
     def _compute_carried(self, first: int, last: int, neighbour: Arrays | None) -> dict[str, Any]:
         downwards = self.config.start.carry == "downwards"
@@ -221,8 +148,8 @@ class Simulation:
         starts: list[NDArray[np.float64]] = []
         for lane in range(first, last, self.starts)[:: -1 if downwards else 1]:
             lanes = np.arange(lane, lane + self.starts)
-            starts.append(self._start(lanes, carried))
-            parts.append(self._integrate(lanes, starts[-1]))
+            starts.append(self.start_of(lanes, carried))
+            parts.append(self.integrate(lanes, starts[-1]))
             carried = parts[-1].end_state
         if downwards:
             parts.reverse()
@@ -242,7 +169,7 @@ class Simulation:
         if share == 0.0:
             return {}
         checked = checked_lanes(int(lanes[0]), int(lanes[-1]) + 1, share)
-        finer = self._motion(
+        finer = self.motion_of(
             lanes[checked],
             start[checked],
             self.plan._replace(steps_per_period=2 * self.plan.steps_per_period),
@@ -255,97 +182,12 @@ class Simulation:
         )
         return check_arrays(lanes.size, checked, difference(coarser, finer))
 
-    def _motion(self, lanes: NDArray[np.intp], start: NDArray[np.float64], plan: Plan) -> Motion:
-        outcome = self._integrate(lanes, start, plan)
-        exponent = None
-        if outcome.growth is not None:
-            exponent, _ = largest_exponent(outcome.growth, self._periods(lanes))
-        return Motion(outcome.section, exponent, outcome.status != Status.OK)
-
-    def choose_steps(self) -> None:
-        """Measure which number of steps the configured tolerance needs, and take it."""
-        tolerance = self.config.integration.tolerance
-        if tolerance is None:
-            return
-        coarsest = self.plan.steps_per_period
-        lanes, motion = self.pilot(PILOT_LANES, 4 * coarsest)
-        candidates = choose_steps(
-            partial(motion, resolved=self.plan.resolved), coarsest, tolerance, self.config.source
-        )
-        steps, *measured = zip(*candidates, strict=True)
-        self._choice = step_choice_variables(
-            steps, dict(zip(Candidate._fields[1:], measured, strict=True))
-        )
-        self.plan = self.plan._replace(steps_per_period=candidates[-1].steps)
-        self.notes.append(
-            f"{candidates[-1].steps} steps per period: on {lanes} lanes the error is "
-            f"{candidates[-1].error:.1e}, wanted is {tolerance:g}"
-        )
-
-    def pilot(self, lanes: int, finest: int) -> tuple[int, Callable[..., Motion]]:
-        """Prepare to integrate some lanes of the sweep on several grids, to compare them.
-
-        Parameters
-        ----------
-        lanes : int
-            Lanes wanted, spread evenly over the sweep.
-        finest : int
-            Steps per period of the transient that all grids go on from, so that a lane comes to
-            the same one of several coexisting motions on each of them.
-
-        Returns
-        -------
-        lanes : int
-            Number of lanes that there are.
-        motion : callable
-            ``motion(steps, resolved)`` settles on that grid and returns the `Motion`.
-        """
-        count = min(lanes, self.lanes)
-        numbers = np.unique(np.linspace(0, self.lanes - 1, count).round().astype(np.intp))
-        transient = self.plan._replace(
-            steps_per_period=finest,
-            recorded_periods=0,
-            section_points=0,
-            tangent=False,
-            resolved=True,
-        )
-        common = self._integrate(numbers, self._start(numbers), transient).end_state
-
-        def motion(steps: int, resolved: bool) -> Motion:
-            plan = self.plan._replace(
-                steps_per_period=steps,
-                transient_periods=PILOT_PERIODS,
-                recorded_periods=PILOT_PERIODS,
-                section_points=min(POINTS_NEEDED, PILOT_PERIODS),
-                resolved=resolved,
-            )
-            return self._motion(numbers, common, plan)
-
-        return numbers.size, motion
-
-    def _periods(self, lanes: NDArray[np.intp]) -> NDArray[np.float64]:
-        """Mesh period of each lane in units of tau."""
-        frequency = select(self.groups, lanes // self.starts).mesh_frequency
-        return np.broadcast_to(2.0 * np.pi / np.float64(frequency), lanes.shape)
-
-    def _lane_model(self, lanes: NDArray[np.intp]) -> Model:
-        return model(select(self.groups, lanes // self.starts), lanes.size)
-
-    def _start(
-        self, lanes: NDArray[np.intp], carried: NDArray[np.float64] | None = None
-    ) -> NDArray[np.float64]:
-        start = start_states(self.config, self._lane_model(lanes), lanes)
-        if carried is None:
-            return start
-        # A lane that diverged hands nothing on: its successor begins anew.
-        return np.where(np.isfinite(carried).all(axis=1, keepdims=True), carried, start)
-
     def _spectrum(self, lanes: NDArray[np.intp], start: NDArray[np.float64]) -> dict[str, Any]:
-        lane_model = self._lane_model(lanes)
+        lane_model = self.model_of(lanes)
         spectrum = exponents(
             self.scene,
             lane_model,
-            *self._harmonics(),
+            *self.harmonics(),
             start,
             self.plan,
             rederived=self.config.formulation == "rederived",
@@ -355,18 +197,6 @@ class Simulation:
             "lyapunov_spectrum_standard_error": spectrum.standard_errors,
             "lyapunov_sum": sum_of_exponents(self.scene, lane_model),
         }
-
-    def _integrate(
-        self, lanes: NDArray[np.intp], start: NDArray[np.float64], plan: Plan | None = None
-    ) -> Outcome:
-        return integrate(
-            self.scene,
-            self._lane_model(lanes),
-            *self._harmonics(),
-            start,
-            plan or self.plan,
-            rederived=self.config.formulation == "rederived",
-        )
 
     def _arrays(self, first: int, outcome: Outcome) -> dict[str, Any]:
         numbers = np.arange(first, first + outcome.status.size)
@@ -388,7 +218,7 @@ class Simulation:
         for column, name in enumerate(self.plan.section_states):
             arrays[f"section_{name}"] = outcome.section[:, :, column]
         if outcome.growth is not None:
-            exponent, standard_error = largest_exponent(outcome.growth, self._periods(numbers))
+            exponent, standard_error = largest_exponent(outcome.growth, self.periods_of(numbers))
             arrays["lyapunov_exponent"] = exponent
             arrays["lyapunov_exponent_standard_error"] = standard_error
         wanted = {v.name for v in self.variables if v.dims[0] == self.axis}
