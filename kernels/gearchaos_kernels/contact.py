@@ -55,16 +55,24 @@ def may_leave(gap0, rate0, gap1, rate1, half_backlash):
     """Tell whether a step may leave its branch, be it for a moment only.
 
     Rates are per step. A gap that ends on the branch on which it began was outside in between only
-    if it turned around, and a cubic that turns around overshoots its ends by 4/27 of the rates at
-    most.
+    if it turned around. A cubic does not turn if its rates have the sign of its change and are at
+    most three times as large (Fritsch and Carlson 1980), and one that turns overshoots its ends by
+    4/27 of the rates at most.
     """
     outside0 = abs(gap0) - half_backlash
     outside1 = abs(gap1) - half_backlash
     nearest = min(abs(outside0), abs(outside1))
+    change = gap1 - gap0
+    turns = (
+        (rate0 * change <= 0.0)
+        | (rate1 * change <= 0.0)
+        | (abs(rate0) > 3.0 * abs(change))
+        | (abs(rate1) > 3.0 * abs(change))
+    )
     return (
         ((outside0 >= 0.0) != (outside1 >= 0.0))
         | ((gap0 * gap1 < 0.0) & (outside0 >= 0.0))
-        | ((rate0 * rate1 <= 0.0) & (nearest < _REACH * (abs(rate0) + abs(rate1))))
+        | (turns & (nearest < _REACH * (abs(rate0) + abs(rate1))))
     )
 
 

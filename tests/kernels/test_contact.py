@@ -199,16 +199,16 @@ def test_a_gap_leaves_its_branch_where_dense_sampling_sees_it_leave(gap0, rate0,
 
 @PROPERTY
 @given(gap, rate, gap, rate)
+@example(0.6875, 3.0, 0.734375, 1.0)
 def test_a_step_that_leaves_its_branch_is_suspected(gap0, rate0, gap1, rate1):
     branch = branch_at(gap0, HALF_BACKLASH)
     curve = cubic(gap0, rate0, gap1, rate1)
     leaves = leaving_fraction(gap0, rate0, gap1, rate1, branch, HALF_BACKLASH) <= 1.0
     if not leaves or may_leave(gap0, rate0, gap1, rate1, HALF_BACKLASH):
         return
-    # A gap that turns twice within one step can dip unseen, but by a length of third order only:
-    # this leaves the order of the method as it is.
-    assert turning_points(curve).size == 2
-    assert distance_inside(curve, branch).min() >= -abs(curve.coef[3]) / 12.0
+    # Only what rounding sees outside is missed.
+    nearly = 10.0 * ROUNDING * (size_of(curve) + HALF_BACKLASH)
+    assert distance_inside(curve, branch).min() >= -nearly
 
 
 @PROPERTY
