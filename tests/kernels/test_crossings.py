@@ -243,7 +243,7 @@ def test_a_step_that_crosses_too_often_is_counted_and_never_silent():
     model = pan2021(np.full(lanes, 5.86), mesh_frequency=frequency)
     outcome = run(model, CLEARANCE, state(delta_5=1.0), steps=steps, periods=40, resolved=True)
     assert np.mean(outcome.overflows > 0) > 0.9
-    assert (outcome.status != 0).all()
+    assert ((outcome.overflows > 0) | (outcome.status != 0)).all()
 
 
 def scenes(backlash: bool) -> list:
