@@ -49,6 +49,7 @@ class Plan(NamedTuple):
     """How long and how finely a batch is integrated, and what is kept of it.
 
     ``resolved`` splits the steps that cross a clearance boundary; without it they are plain steps.
+    ``history_periods`` are the last ones, of which every step is kept.
     """
 
     steps_per_period: int
@@ -58,6 +59,7 @@ class Plan(NamedTuple):
     section_states: tuple[str, ...] = ()
     tangent: bool = False
     resolved: bool = True
+    history_periods: int = 0
 
 
 class Outcome(NamedTuple):
@@ -69,8 +71,9 @@ class Outcome(NamedTuple):
     of `Status`; ``diverged_period`` (lanes,): number of the period in which a lane diverged, or -1;
     ``crossings`` (lanes,): clearance boundaries crossed in the recorded periods;
     ``slowest_crossing`` (lanes,): smallest speed of y_1 or y_2 at one of them, or infinity;
-    ``overflows`` (lanes,): steps that crossed more often than they were split, in all periods.
-    The last three stay as they began in scenes without backlash and with plain steps.
+    ``overflows`` (lanes,): steps that crossed more often than they were split, in all periods;
+    these three stay as they began in scenes without backlash and with plain steps; ``history``
+    (lanes, history periods times steps + 1, 10): the state at every step, or None.
     """
 
     section: NDArray[np.float64]
@@ -82,6 +85,7 @@ class Outcome(NamedTuple):
     crossings: NDArray[np.int64]
     slowest_crossing: NDArray[np.float64]
     overflows: NDArray[np.int64]
+    history: NDArray[np.float64] | None
 
 
 @driver
@@ -111,6 +115,7 @@ def _integrate_blocks(
     crossings,
     slowest_crossing,
     overflows,
+    history,
 ):
     for number in prange((status.shape[0] + LANES - 1) // LANES):
         integrate_block(
@@ -140,6 +145,7 @@ def _integrate_blocks(
             crossings,
             slowest_crossing,
             overflows,
+            history,
         )
 
 
@@ -193,6 +199,9 @@ def integrate(
         crossings=np.zeros(lanes, dtype=np.int64),
         slowest_crossing=np.full(lanes, np.inf),
         overflows=np.zeros(lanes, dtype=np.int64),
+        history=np.full((lanes, plan.history_periods * steps + 1, STATES), np.nan)
+        if plan.history_periods
+        else None,
     )
     _integrate_blocks(
         lane_coefficients(model, steps, rederived),

@@ -80,6 +80,7 @@ def integrate_block(
     crossings,
     slowest_crossing,
     overflows,
+    history,
 ):
     """Integrate lanes ``first`` to ``first + LANES``; see `batch.integrate` for the arrays."""
     align_stack()
@@ -89,6 +90,9 @@ def integrate_block(
     steps = (table.shape[0] - 1) // 2
     periods = transient_periods + recorded_periods
     first_point = periods - section.shape[1]
+    first_sample = 0
+    if history is not None:
+        first_sample = history.shape[1] - 1 - periods * steps
 
     for slot in range(LANES):
         # A block that is not full repeats the last lane, and nothing of that is stored.
@@ -107,6 +111,10 @@ def integrate_block(
 
     for period in range(periods):
         for number in range(steps):
+            if history is not None:
+                sample = first_sample + period * steps + number
+                for slot in range(lanes if sample >= 0 else 0):
+                    copy_state(memory, slot, scales[first + slot], history[first + slot, sample])
             # Not in the loop over lanes: nobody tells the compiler that its stores spare the table.
             begin_phase = phase_on_grid(table, 2 * number)
             middle_phase = phase_on_grid(table, 2 * number + 1)
@@ -223,8 +231,10 @@ def integrate_block(
 
     for slot in range(lanes):
         lane = first + slot
+        copy_state(memory, slot, scales[lane], end_state[lane])
+        if history is not None:
+            copy_state(memory, slot, scales[lane], history[lane, history.shape[1] - 1])
         for row in range(STATES):
-            end_state[lane, row] = memory[row * STRIDE + slot] * scales[lane, row]
             end_tangent[lane, row] = memory[(TANGENT + row) * STRIDE + slot] * scales[lane, row]
 
 
@@ -265,6 +275,13 @@ def axial_speed(scale, coefficients):
     """Return what turns the rate of the axial gap into that of y_2."""
     # scale is sin(beta_b) mu_p over the step; mu_p is the first coefficient of a lane.
     return scale[COORDINATES + 3] / coefficients[0]
+
+
+@scalar
+def copy_state(memory, slot, scale, target):
+    """Write the state of a lane in the units of eq. 13."""
+    for row in range(STATES):
+        target[row] = memory[row * STRIDE + slot] * scale[row]
 
 
 @scalar

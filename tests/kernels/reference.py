@@ -124,9 +124,13 @@ def run(
 def assert_same_bits(one: Outcome, other: Outcome) -> None:
     """Compare every array of two outcomes bit for bit, NaN included."""
     for name, array, twin in zip(Outcome._fields, one, other, strict=True):
-        assert np.array_equal(array.view(np.uint8), twin.view(np.uint8)), name
+        assert (array is None) == (twin is None), name
+        if array is not None:
+            assert np.array_equal(array.view(np.uint8), twin.view(np.uint8)), name
 
 
 def lanes_out_of(outcome: Outcome, chosen: Any) -> Outcome:
     """Return the outcome of some lanes, in the order given."""
-    return Outcome(*(np.ascontiguousarray(array[chosen]) for array in outcome))
+    return Outcome(
+        *(None if array is None else np.ascontiguousarray(array[chosen]) for array in outcome)
+    )

@@ -40,6 +40,7 @@ def arguments(scene: Scene, tangent: bool, resolved: bool) -> tuple:
         crossings=np.zeros(1, dtype=np.int64),
         slowest_crossing=np.zeros(1),
         overflows=np.zeros(1, dtype=np.int64),
+        history=None,
     )
     flags = {effect: () if present else None for effect, present in scene._asdict().items()}
     return (

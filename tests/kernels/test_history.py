@@ -1,0 +1,50 @@
+"""The state at every step of the last periods: what the sections and the end state are part of."""
+
+import numpy as np
+import pytest
+from gearchaos_kernels import STATE_ROWS, Outcome, Plan, integrate
+
+from .reference import COSINE, FULL, OMEGA, SINE, assert_same_bits, pan2021
+
+STEPS, RECORDED, KEPT, LANES = 60, 7, 3, 35
+
+
+def run(transient: int, kept: int) -> Outcome:
+    plan = Plan(STEPS, transient, RECORDED, RECORDED, tuple(STATE_ROWS), True, True, kept)
+    model = pan2021(np.linspace(0.0, 15.0, LANES))
+    return integrate(FULL, model, COSINE, SINE, np.zeros((LANES, 10)), plan)
+
+
+@pytest.fixture(scope="module")
+def outcome() -> Outcome:
+    return run(5, KEPT)
+
+
+def test_the_history_meets_the_section_once_a_period(outcome):
+    once_a_period = outcome.history[:, STEPS::STEPS]
+    assert np.array_equal(once_a_period, outcome.section[:, -KEPT:])
+
+
+def test_the_history_begins_where_the_period_before_ended(outcome):
+    assert np.array_equal(outcome.history[:, 0], outcome.section[:, -KEPT - 1])
+
+
+def test_the_history_ends_with_the_lane(outcome):
+    assert np.array_equal(outcome.history[:, -1], outcome.end_state)
+
+
+def test_a_history_of_the_whole_run_begins_at_the_start():
+    assert np.array_equal(run(0, RECORDED).history[:, 0], np.zeros((LANES, 10)))
+
+
+def test_keeping_the_history_changes_nothing_else(outcome):
+    assert_same_bits(outcome._replace(history=None), run(5, 0))
+
+
+def test_between_two_steps_displacements_follow_the_rates(outcome):
+    """The trapezoidal rule over one step: what a wrong order of the samples would break."""
+    step = 2.0 * np.pi / OMEGA / STEPS
+    moved = np.diff(outcome.history[:, :, :5], axis=1)
+    rates = outcome.history[:, :, 5:]
+    expected = 0.5 * step * (rates[:, 1:] + rates[:, :-1])
+    assert np.max(np.abs(moved - expected)) < 0.01 * np.max(np.abs(moved))
