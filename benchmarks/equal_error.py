@@ -19,7 +19,7 @@ from machine import print_machine
 
 from gearchaos import load_config
 from gearchaos.configuration import lane_groups
-from gearchaos.lanes import model
+from gearchaos.engine.lanes import model
 
 SWEEP = Path(__file__).parent.parent / "sweeps" / "pan2021_full.toml"
 LANES = 64

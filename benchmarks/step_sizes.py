@@ -22,8 +22,8 @@ from matplotlib.ticker import NullLocator
 
 import gearchaos
 from gearchaos.figures.style import EXPONENT, POSITIVE, STYLE
-from gearchaos.motion_period import motion_period
-from gearchaos.result import Result
+from gearchaos.motion.period import motion_period
+from gearchaos.results.result import Result
 
 SWEEP = Path(__file__).parent.parent / "sweeps" / "pan2021.toml"
 CHAOTIC = 0.01

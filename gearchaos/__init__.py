@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from gearchaos.command_line import software_version
     from gearchaos.configuration import Configuration, load_config
+    from gearchaos.engine.running import run
     from gearchaos.errors import ConfigurationError, FileError, GearchaosError
-    from gearchaos.result import Result, open_result
-    from gearchaos.running import run
+    from gearchaos.results.result import Result, open_result
 
 __all__ = [
     "Configuration",
@@ -36,10 +36,10 @@ _HOMES = {
     "ConfigurationError": "gearchaos.errors",
     "FileError": "gearchaos.errors",
     "GearchaosError": "gearchaos.errors",
-    "Result": "gearchaos.result",
+    "Result": "gearchaos.results.result",
     "load_config": "gearchaos.configuration",
-    "open_result": "gearchaos.result",
-    "run": "gearchaos.running",
+    "open_result": "gearchaos.results.result",
+    "run": "gearchaos.engine.running",
     "software_version": "gearchaos.command_line",
 }
 

@@ -16,7 +16,7 @@ from gearchaos.command_line import OK, run_command, version_text
 from gearchaos.errors import ConfigurationError
 
 if TYPE_CHECKING:
-    from gearchaos.simulation import Simulation
+    from gearchaos.engine.simulation import Simulation
 
 NAME = "gearchaos accuracy"
 MODES = ("plain", "resolved")
@@ -87,13 +87,13 @@ def _run(argv: Sequence[str] | None) -> int:
     options = _parser().parse_args(argv)
     from gearchaos_kernels import current_threads
 
-    from gearchaos.atomic_file import check_output, replacing
     from gearchaos.configuration import load_config
+    from gearchaos.engine.running import choose_threads
+    from gearchaos.engine.simulation import Simulation
     from gearchaos.figures.files import FORMATS, save_figure
     from gearchaos.figures.work_precision import work_precision_page
-    from gearchaos.provenance import provenance
-    from gearchaos.running import choose_threads
-    from gearchaos.simulation import Simulation
+    from gearchaos.results.atomic_file import check_output, replacing
+    from gearchaos.results.provenance import provenance
 
     if options.lanes < 1:
         raise ConfigurationError(f"--lanes {options.lanes}: must be at least 1")
@@ -150,9 +150,9 @@ def measure(
     """
     import numpy as np
 
-    from gearchaos.motion_difference import bound, difference
+    from gearchaos.engine.running import COMPILING
+    from gearchaos.motion.difference import bound, difference
     from gearchaos.progress import notice
-    from gearchaos.running import COMPILING
 
     with notice(COMPILING, quiet):
         _, motion = simulation.pilot(lanes, TRUTH_STEPS)

@@ -15,7 +15,7 @@ from gearchaos.command_line import OK, run_command, version_text
 from gearchaos.errors import ConfigurationError, FileError
 
 if TYPE_CHECKING:
-    from gearchaos.result import Result
+    from gearchaos.results.result import Result
 
 NAME = "gearchaos plot"
 RESULT_ENDINGS = (".h5", ".hdf5", ".nc")
@@ -41,7 +41,7 @@ def _run(argv: Sequence[str] | None) -> int:
     # caught. It would refuse to be imported where the environment names an unknown backend.
     os.environ["MPLBACKEND"] = "agg"
     from gearchaos.figures import bifurcation_page, save_figure
-    from gearchaos.result import open_result
+    from gearchaos.results.result import open_result
 
     targets = _targets(options)
     _check_targets(targets, options.result, options.overwrite)
@@ -144,8 +144,8 @@ def _default_name(options: argparse.Namespace) -> str:
 
 
 def _check_targets(targets: Sequence[Path], result: Path, overwrite: bool) -> None:
-    from gearchaos.atomic_file import check_output
     from gearchaos.figures.files import is_own_figure
+    from gearchaos.results.atomic_file import check_output
 
     problems: list[str] = []
     for target in targets:

@@ -18,9 +18,9 @@ from gearchaos.command_line import OK, run_command, version_text
 from gearchaos.errors import FileError
 
 if TYPE_CHECKING:
-    from gearchaos.error_check import Tally
-    from gearchaos.shards import ShardStore
-    from gearchaos.simulation import Bounds, Simulation
+    from gearchaos.engine.error_check import Tally
+    from gearchaos.engine.simulation import Bounds, Simulation
+    from gearchaos.results.shards import ShardStore
 
 NAME = "gearchaos sweep"
 TOO_MANY_DIVERGED = 3
@@ -74,8 +74,8 @@ def _run(argv: Sequence[str] | None) -> int:
     from gearchaos.configuration import load_config
 
     config = load_config(options.config, options.set)
-    from gearchaos.running import choose_threads
-    from gearchaos.simulation import Simulation
+    from gearchaos.engine.running import choose_threads
+    from gearchaos.engine.simulation import Simulation
 
     choose_threads(options.threads)
     simulation = Simulation(config)
@@ -94,10 +94,10 @@ def _compute(
 ) -> int:
     from gearchaos_kernels import current_threads
 
-    from gearchaos.atomic_file import check_output
+    from gearchaos.engine.running import metadata
     from gearchaos.progress import say
-    from gearchaos.running import metadata
-    from gearchaos.shards import ShardStore
+    from gearchaos.results.atomic_file import check_output
+    from gearchaos.results.shards import ShardStore
 
     check_output(output, options.overwrite)
     began = time.monotonic()
@@ -144,8 +144,8 @@ def _compute(
 
 def _prepare(simulation: Simulation, quiet: bool) -> None:
     """Compile the kernel, choose the steps where a tolerance is wanted, and say what was found."""
+    from gearchaos.engine.running import COMPILING
     from gearchaos.progress import notice, say
-    from gearchaos.running import COMPILING
 
     with notice(COMPILING, quiet):
         simulation.compile()
@@ -162,9 +162,9 @@ def _fill(
     quiet: bool,
 ) -> Tally:
     """Compute the missing blocks into the store and add up all of them."""
-    from gearchaos.error_check import Tally
+    from gearchaos.engine.error_check import Tally
+    from gearchaos.engine.simulation import compute_all
     from gearchaos.progress import Progress
-    from gearchaos.simulation import compute_all
 
     readers = {bounds: partial(store.read, *bounds) for bounds in finished}
     tally = Tally()
@@ -191,7 +191,7 @@ def _describe(simulation: Simulation, output: str, quiet: bool) -> None:
     from gearchaos_kernels import current_threads
     from tqdm import tqdm
 
-    from gearchaos.running import pilot_rate
+    from gearchaos.engine.running import pilot_rate
 
     _prepare(simulation, quiet)
     seconds = simulation.steps / pilot_rate(simulation)

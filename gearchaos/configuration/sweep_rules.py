@@ -22,8 +22,8 @@ from gearchaos.configuration.sweep_values import (
     swept_values,
 )
 from gearchaos.errors import ConfigurationError
-from gearchaos.group_table import GROUP_TABLE, GROUPS_BY_NAME, GroupRow
-from gearchaos.groups import Groups
+from gearchaos.physics.group_table import GROUP_TABLE, GROUPS_BY_NAME, GroupRow
+from gearchaos.physics.groups import Groups
 
 if TYPE_CHECKING:
     from gearchaos.configuration.models import Configuration

@@ -23,7 +23,7 @@ from gearchaos.figures.lanes import (
     select_lanes,
 )
 from gearchaos.figures.style import POINTS
-from gearchaos.result import Result
+from gearchaos.results.result import Result
 
 SECTION = "section_"
 DEFAULT_VARIABLE = "section_delta_5"

@@ -7,10 +7,10 @@ from pathlib import Path
 import matplotlib as mpl
 from matplotlib.figure import Figure
 
-from gearchaos.atomic_file import replacing
 from gearchaos.command_line import software_version
 from gearchaos.errors import ConfigurationError
 from gearchaos.figures.style import STYLE
+from gearchaos.results.atomic_file import replacing
 
 FORMATS: tuple[str, ...] = ("png", "pdf")
 PDF_FINENESS = 2

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from matplotlib.mathtext import MathTextParser
 
-from gearchaos.result import Result
+from gearchaos.results.result import Result
 
 DIMENSIONLESS = ("", "1")
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from gearchaos.errors import ConfigurationError
 from gearchaos.figures.labels import number, plain
 from gearchaos.figures.style import DIVERGED, REFERENCE, SMALL_FONT_PT
-from gearchaos.result import Result
+from gearchaos.results.result import Result
 
 Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]

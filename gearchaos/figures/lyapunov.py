@@ -25,7 +25,7 @@ from gearchaos.figures.lanes import (
     select_lanes,
 )
 from gearchaos.figures.style import EXPONENT, POSITIVE, REFERENCE
-from gearchaos.result import Result
+from gearchaos.results.result import Result
 
 VARIABLE = "lyapunov_exponent"
 ERROR_VARIABLE = "lyapunov_exponent_standard_error"

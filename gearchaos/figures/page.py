@@ -16,7 +16,7 @@ from gearchaos.figures.lanes import Between, legend_above
 from gearchaos.figures.lyapunov import VARIABLE as LYAPUNOV_VARIABLE
 from gearchaos.figures.lyapunov import lyapunov
 from gearchaos.figures.style import MM_PER_INCH, SINGLE_COLUMN_MM, STYLE, page_height_mm
-from gearchaos.result import Result
+from gearchaos.results.result import Result
 
 HEIGHT_RATIOS = (1.6, 1.0)
 NOTEBOOK_DPI = 200

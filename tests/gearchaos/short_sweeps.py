@@ -6,8 +6,8 @@ import numpy as np
 from gearchaos_kernels import STATE_ROWS, Scene, integrate
 
 from gearchaos.configuration import load_config
-from gearchaos.lanes import model, select, start_states
-from gearchaos.simulation import Simulation, compute_all
+from gearchaos.engine.lanes import model, select, start_states
+from gearchaos.engine.simulation import Simulation, compute_all
 
 PAN2021 = Path(__file__).resolve().parents[2] / "sweeps" / "pan2021.toml"
 SHORT = (

@@ -8,7 +8,7 @@ import pytest
 
 import gearchaos
 from gearchaos.accuracy import Setting, measure, recommendation
-from gearchaos.simulation import Simulation
+from gearchaos.engine.simulation import Simulation
 
 from .commands import names_in, run_module
 from .short_sweeps import PAN2021

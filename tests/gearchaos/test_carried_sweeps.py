@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from gearchaos_kernels import Status
 
-from gearchaos.simulation import compute_all
+from gearchaos.engine.simulation import compute_all
 
 from .short_sweeps import (
     COLUMNS,

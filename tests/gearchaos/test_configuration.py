@@ -22,8 +22,8 @@ from gearchaos.configuration import (
 from gearchaos.configuration.models import configuration_keys
 from gearchaos.configuration.schema import json_schema, key_tables
 from gearchaos.errors import ConfigurationError
-from gearchaos.group_table import GROUP_TABLE
-from gearchaos.variables import STATE_WORDING
+from gearchaos.physics.group_table import GROUP_TABLE
+from gearchaos.results.variables import STATE_WORDING
 
 ROOT = Path(__file__).resolve().parents[2]
 SWEEPS = sorted((ROOT / "sweeps").glob("*.toml"))

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import gearchaos
-from gearchaos.error_check import CHANGED, MEANINGS, NOT_CHECKED, SAME, Tally, checked_lanes
+from gearchaos.engine.error_check import CHANGED, MEANINGS, NOT_CHECKED, SAME, Tally, checked_lanes
 
 from .short_sweeps import assert_same, computed, simulation
 

@@ -16,8 +16,8 @@ from matplotlib.text import Text
 from gearchaos.errors import ConfigurationError
 from gearchaos.figures import bifurcation, bifurcation_page, lyapunov, save_figure
 from gearchaos.figures.lanes import robust_limits
-from gearchaos.result import Result, open_result
-from gearchaos.variables import sweep_variables
+from gearchaos.results.result import Result, open_result
+from gearchaos.results.variables import sweep_variables
 
 POINTS = 60
 LANES = 121

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from gearchaos.geometry import HelicalPair
+from gearchaos.physics.geometry import HelicalPair
 
 
 def pan_2021_pair(**changes):

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from gearchaos.errors import ConfigurationError
-from gearchaos.groups import (
+from gearchaos.physics.groups import (
     GROUP_TABLE,
     GROUPS_BY_NAME,
     Groups,

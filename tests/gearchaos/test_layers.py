@@ -29,7 +29,7 @@ def test_the_import_contracts_of_the_project_are_kept(capsys, monkeypatch):
 @pytest.mark.parametrize(
     "statement",
     [
-        "import gearchaos.result",
+        "import gearchaos.results.result",
         "import gearchaos.figures",
         "import gearchaos.plot",
         "from gearchaos import open_result, load_config, GearchaosError",

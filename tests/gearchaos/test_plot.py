@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from gearchaos.plot import main
-from gearchaos.result import Result
-from gearchaos.variables import sweep_variables
+from gearchaos.results.result import Result
+from gearchaos.results.variables import sweep_variables
 
 
 @pytest.fixture

@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from gearchaos.result import Parameter, Result, open_result
-from gearchaos.variables import STATE_WORDING, sweep_variables
+from gearchaos.results.result import Parameter, Result, open_result
+from gearchaos.results.variables import STATE_WORDING, sweep_variables
 
 LANES = 300
 POINTS = 1000

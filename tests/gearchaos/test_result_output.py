@@ -12,17 +12,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gearchaos.atomic_file import check_output, replacing
 from gearchaos.errors import FileError
-from gearchaos.result import Result, open_result
-from gearchaos.variables import sweep_variables
+from gearchaos.results.atomic_file import check_output, replacing
+from gearchaos.results.result import Result, open_result
+from gearchaos.results.variables import sweep_variables
 
 PROGRAM = """
 import sys
 import numpy as np
 from gearchaos.errors import FileError
-from gearchaos.result import Result
-from gearchaos.variables import sweep_variables
+from gearchaos.results.result import Result
+from gearchaos.results.variables import sweep_variables
 
 def result(lanes):
     variables = sweep_variables(

@@ -13,9 +13,9 @@ import numpy as np
 import pytest
 
 from gearchaos.errors import FileError
-from gearchaos.result import Parameter, Result, open_result
-from gearchaos.shards import ShardStore, differing_keys
-from gearchaos.variables import sweep_variables
+from gearchaos.results.result import Parameter, Result, open_result
+from gearchaos.results.shards import ShardStore, differing_keys
+from gearchaos.results.variables import sweep_variables
 
 LANES = 100
 POINTS = 7
@@ -344,8 +344,8 @@ def test_merging_takes_the_memory_of_a_block(output: Path) -> None:
     program = """
 import numpy as np
 from test_shards import CONFIGURATION, POINTS
-from gearchaos.shards import ShardStore
-from gearchaos.variables import sweep_variables
+from gearchaos.results.shards import ShardStore
+from gearchaos.results.variables import sweep_variables
 points, size, count = 500, 250, 80
 variables = sweep_variables(
     "load", units="1", long_name="load", symbol="", states=["delta_5"], section=["delta_5"],

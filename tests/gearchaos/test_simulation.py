@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from gearchaos.simulation import compute_all
+from gearchaos.engine.simulation import compute_all
 
 from .short_sweeps import RANDOM, assert_same, blocks, computed, joined, simulation
 

@@ -6,15 +6,15 @@ import numpy as np
 import pytest
 from gearchaos_kernels import Model, Scene, Status
 
-from gearchaos.jacobian import jacobian
-from gearchaos.mesh_stiffness import FourierStiffness
-from gearchaos.stability import (
+from gearchaos.physics.jacobian import jacobian
+from gearchaos.physics.mesh_stiffness import FourierStiffness
+from gearchaos.physics.stability import (
     MOST_STEPS,
     fewest_stable_steps,
     stability_limit,
     sufficient_steps,
 )
-from gearchaos.stable_region import steps_per_time
+from gearchaos.physics.stable_region import steps_per_time
 
 from ..kernels.reference import COSINE, FULL, LINEAR, PERIOD, SINE, lanes_of, pan2021, run, state
 from .random_pairs import EVERY_SCENE, name_of, random_pairs

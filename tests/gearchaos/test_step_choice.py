@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 import gearchaos
+from gearchaos.engine.step_choice import choose_steps
 from gearchaos.errors import ConfigurationError
-from gearchaos.motion_difference import Motion
-from gearchaos.step_choice import choose_steps
+from gearchaos.motion.difference import Motion
 
 from .short_sweeps import simulation
 

@@ -11,10 +11,10 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from gearchaos.atomic_file import replacing
-from gearchaos.checksum_line import append_checksum
-from gearchaos.sink import Sink
-from gearchaos.variables import HARMONIC, Variable
+from gearchaos.results.atomic_file import replacing
+from gearchaos.results.checksum_line import append_checksum
+from gearchaos.results.sink import Sink
+from gearchaos.results.variables import HARMONIC, Variable
 
 SCHEMA = "gearchaos-sweep"
 SCHEMA_VERSION = "1.0"

@@ -6,8 +6,8 @@ import os
 from contextlib import suppress
 from pathlib import Path
 
-from gearchaos.atomic_file import writing
 from gearchaos.errors import FileError
+from gearchaos.results.atomic_file import writing
 
 try:
     import fcntl

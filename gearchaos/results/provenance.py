@@ -40,7 +40,7 @@ def provenance(threads: int, seconds: float) -> dict[str, str | int | float]:
 
 
 def _commit() -> str:
-    clone = Path(__file__).parent.parent
+    clone = Path(__file__).parents[2]
     if not (clone / ".git").exists():
         return ""
     command = ["git", "-C", str(clone), "describe", "--always", "--dirty", "--abbrev=40"]

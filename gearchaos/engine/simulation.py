@@ -17,14 +17,14 @@ from gearchaos_kernels import (
 from numpy.typing import NDArray
 
 from gearchaos.configuration.sweep_values import SWEEPABLE_GROUPS, SWEEPABLE_KEYS
-from gearchaos.error_check import MEANINGS, check_arrays, checked_lanes
-from gearchaos.group_table import GROUP_TABLE
-from gearchaos.lyapunov import largest_exponent
-from gearchaos.motion_difference import Motion, difference
-from gearchaos.result import Parameter
-from gearchaos.spectrum import exponents, sum_of_exponents
-from gearchaos.sweep_lanes import SweepLanes
-from gearchaos.variables import Variable, sweep_variables
+from gearchaos.engine.error_check import MEANINGS, check_arrays, checked_lanes
+from gearchaos.engine.sweep_lanes import SweepLanes
+from gearchaos.motion.difference import Motion, difference
+from gearchaos.motion.lyapunov import largest_exponent
+from gearchaos.motion.spectrum import exponents, sum_of_exponents
+from gearchaos.physics.group_table import GROUP_TABLE
+from gearchaos.results.result import Parameter
+from gearchaos.results.variables import Variable, sweep_variables
 
 Arrays = Mapping[str, NDArray[Any]]
 Bounds = tuple[int, int]

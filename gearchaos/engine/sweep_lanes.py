@@ -11,14 +11,14 @@ from numpy.typing import NDArray
 
 from gearchaos.configuration import Configuration, lane_groups
 from gearchaos.configuration.run_tables import states_of
+from gearchaos.engine.lanes import model, select, start_states
+from gearchaos.engine.step_choice import PILOT_LANES, PILOT_PERIODS, Candidate, choose_steps
 from gearchaos.errors import ConfigurationError
-from gearchaos.lanes import model, select, start_states
-from gearchaos.lyapunov import largest_exponent
-from gearchaos.motion_difference import Motion
-from gearchaos.motion_period import POINTS_NEEDED
-from gearchaos.stability import stability_limit
-from gearchaos.step_choice import PILOT_LANES, PILOT_PERIODS, Candidate, choose_steps
-from gearchaos.variables import Variable, axis_name, step_choice_variables
+from gearchaos.motion.difference import Motion
+from gearchaos.motion.lyapunov import largest_exponent
+from gearchaos.motion.period import POINTS_NEEDED
+from gearchaos.physics.stability import stability_limit
+from gearchaos.results.variables import Variable, axis_name, step_choice_variables
 
 Floats = NDArray[np.float64]
 Numbers = NDArray[np.intp]

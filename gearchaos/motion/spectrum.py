@@ -14,8 +14,8 @@ from gearchaos_kernels import STATE_ROWS, Model, Plan, Scene, integrate
 from numpy.typing import NDArray
 
 from gearchaos.configuration.run_tables import states_of
-from gearchaos.jacobian import jacobian
-from gearchaos.lyapunov import largest_exponent
+from gearchaos.motion.lyapunov import largest_exponent
+from gearchaos.physics.jacobian import jacobian
 
 Floats = NDArray[np.float64]
 

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gearchaos.result_file import OWN_METADATA, Parameter, write_result
-from gearchaos.result_reader import read_result
-from gearchaos.variables import Variable, axis_name
+from gearchaos.results.result_file import OWN_METADATA, Parameter, write_result
+from gearchaos.results.result_reader import read_result
+from gearchaos.results.variables import Variable, axis_name
 
 __all__ = ["Parameter", "Result", "open_result"]
 

@@ -15,12 +15,12 @@ from typing import Any, NamedTuple, Self
 
 from numpy.typing import NDArray
 
-from gearchaos.atomic_file import PARTIAL, reason, replacing
 from gearchaos.errors import FileError
-from gearchaos.result_file import Metadata, Parameter, write_result
-from gearchaos.shard_file import SHARD_SCHEMA_VERSION, ShardFormat
-from gearchaos.store_lock import LOCK, StoreLock
-from gearchaos.variables import Variable
+from gearchaos.results.atomic_file import PARTIAL, reason, replacing
+from gearchaos.results.result_file import Metadata, Parameter, write_result
+from gearchaos.results.shard_file import SHARD_SCHEMA_VERSION, ShardFormat
+from gearchaos.results.store_lock import LOCK, StoreLock
+from gearchaos.results.variables import Variable
 
 STORE_SCHEMA = "gearchaos-shards"
 _MANIFEST = "manifest.json"

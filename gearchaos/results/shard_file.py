@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gearchaos.atomic_file import reason, replacing
 from gearchaos.errors import FileError
+from gearchaos.results.atomic_file import reason, replacing
 
 SHARD_SCHEMA = "gearchaos-shard"
 SHARD_SCHEMA_VERSION = "1.0"

@@ -12,11 +12,11 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from gearchaos.atomic_file import reason
-from gearchaos.checksum_line import checksum_fits
 from gearchaos.errors import FileError
-from gearchaos.result_file import ORIGINS, PARAMETERS, SCHEMA, SCHEMA_VERSION, Parameter
-from gearchaos.variables import HARMONIC, SECTION_POINT, STATE, Variable, sweep_variables
+from gearchaos.results.atomic_file import reason
+from gearchaos.results.checksum_line import checksum_fits
+from gearchaos.results.result_file import ORIGINS, PARAMETERS, SCHEMA, SCHEMA_VERSION, Parameter
+from gearchaos.results.variables import HARMONIC, SECTION_POINT, STATE, Variable, sweep_variables
 
 Contents = tuple[
     list[Variable],

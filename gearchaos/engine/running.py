@@ -10,12 +10,12 @@ import numpy as np
 from gearchaos_kernels import current_threads, most_threads, use_threads
 
 from gearchaos.configuration import Configuration
-from gearchaos.error_check import Tally
+from gearchaos.engine.error_check import Tally
+from gearchaos.engine.simulation import Simulation, compute_all
 from gearchaos.errors import ConfigurationError
 from gearchaos.progress import Progress, notice, say
-from gearchaos.provenance import provenance
-from gearchaos.result import Result
-from gearchaos.simulation import Simulation, compute_all
+from gearchaos.results.provenance import provenance
+from gearchaos.results.result import Result
 
 PILOT_SECONDS = 0.2
 COMPILING = "gearchaos: preparing the kernel of this scene; the first time this takes some seconds"

@@ -1,0 +1,1 @@
+"""Named arrays with units, and the HDF5 files that hold them."""
