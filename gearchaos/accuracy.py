@@ -88,12 +88,12 @@ def _run(argv: Sequence[str] | None) -> int:
     from gearchaos_kernels import current_threads
 
     from gearchaos.configuration import load_config
+    from gearchaos.engine.provenance import provenance
     from gearchaos.engine.running import choose_threads
     from gearchaos.engine.simulation import Simulation
     from gearchaos.figures.files import FORMATS, save_figure
     from gearchaos.figures.work_precision import work_precision_page
     from gearchaos.results.atomic_file import check_output, replacing
-    from gearchaos.results.provenance import provenance
 
     if options.lanes < 1:
         raise ConfigurationError(f"--lanes {options.lanes}: must be at least 1")

@@ -11,10 +11,10 @@ from gearchaos_kernels import current_threads, most_threads, use_threads
 
 from gearchaos.configuration import Configuration
 from gearchaos.engine.error_check import Tally
+from gearchaos.engine.provenance import provenance
 from gearchaos.engine.simulation import Simulation, compute_all
 from gearchaos.errors import ConfigurationError
 from gearchaos.progress import Progress, notice, say
-from gearchaos.results.provenance import provenance
 from gearchaos.results.result import Result
 
 PILOT_SECONDS = 0.2

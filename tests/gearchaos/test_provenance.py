@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import gearchaos
-from gearchaos.results.provenance import provenance
+from gearchaos.engine.provenance import provenance
 
 from .commands import SMALL, sweep
 
