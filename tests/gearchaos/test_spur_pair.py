@@ -1,0 +1,230 @@
+"""The spur pair of Kahraman and Singh: the equation, its linear response, its softening jumps."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from scipy.optimize import brentq
+
+from gearchaos.configuration import load_config
+from gearchaos.engine.simulation import Simulation
+
+from .short_sweeps import computed
+
+SPUR_PAIR = Path(__file__).resolve().parents[2] / "sweeps" / "spur_pair.toml"
+CONSTANT_STIFFNESS = "groups.stiffness_variation_scale=0.0"
+SETTLED = (
+    "integration.transient_periods=120",
+    "integration.recorded_periods=20",
+    "outputs.section_points=8",
+)
+RUN_UP = ("sweep.from=0.5", "sweep.to=1.6", "sweep.count=111", *SETTLED)
+APART = 1e-6
+SAMPLES = 512
+
+
+@dataclass
+class Oscillator:
+    """x'' + 2 zeta x' + kappa f(x) = F_m + F_ah Omega^2 cos(Omega tau), kappa = 1 + k_1 cos."""
+
+    zeta: float
+    load: float
+    forcing: float
+    variation: float | np.ndarray
+
+    def rates(self, time, state, frequency):
+        x, rate = state
+        turn = np.cos(frequency * time)
+        spring = x - 1.0 if x > 1.0 else x + 1.0 if x < -1.0 else 0.0
+        force = self.load + self.forcing * frequency**2 * turn
+        return rate, force - 2.0 * self.zeta * rate - (1.0 + self.variation * turn) * spring
+
+    def run(self, start, frequency, periods):
+        """Integrate whole mesh periods; return x evenly in time and the state at the end."""
+        times = np.linspace(0.0, 2.0 * np.pi * periods / frequency, SAMPLES * periods + 1)
+        tight = {"method": "DOP853", "rtol": 1e-12, "atol": 1e-13, "max_step": 10.0 * times[1]}
+        motion = solve_ivp(
+            self.rates, (0.0, times[-1]), start, t_eval=times, args=(frequency,), **tight
+        )
+        return motion.y[0, :-1], motion.y[:, -1]
+
+    def linear_response(self, frequency):
+        """Complex amplitude at constant stiffness while the teeth stay together."""
+        forcing = self.forcing * frequency**2
+        return forcing / (1.0 - frequency**2 + 2j * self.zeta * frequency)
+
+
+def simulation(*overrides):
+    return Simulation(load_config(SPUR_PAIR, overrides))
+
+
+def oscillator(sweep):
+    groups = sweep.groups
+    return Oscillator(
+        zeta=groups.damping_ratio,
+        load=groups.load,
+        forcing=groups.pitch_error * groups.pitch_error_amplitude,
+        variation=groups.stiffness_variation_scale * groups.stiffness_cosine[0],
+    )
+
+
+@dataclass
+class Branches:
+    """The sweep upwards and downwards over the same mesh frequencies."""
+
+    pair: Oscillator
+    frequency: np.ndarray
+    up: dict
+    down: dict
+
+    @property
+    def apart(self):
+        distance = np.abs(self.up["end_state"] - self.down["end_state"])
+        return distance.max(axis=1) > APART
+
+
+def branches(*overrides):
+    up, down = (
+        simulation(*RUN_UP, f"start.carry={direction}", *overrides)
+        for direction in ("upwards", "downwards")
+    )
+    return Branches(oscillator(up), up.values, computed(up, 111), computed(down, 111))
+
+
+@pytest.fixture(scope="module")
+def constant():
+    return branches(CONSTANT_STIFFNESS)
+
+
+@pytest.fixture(scope="module")
+def shipped():
+    return branches()
+
+
+def test_the_model_is_the_classical_equation():
+    # A light load and a strong forcing: contact is lost and made on both flanks.
+    periods = 6
+    sweep = simulation(
+        "sweep={parameter='mesh_frequency', values=[0.6, 0.9, 1.4]}",
+        "start.carry=none",
+        "groups.load=0.03",
+        "groups.pitch_error_amplitude=0.9",
+        "integration.steps_per_period=1600",
+        "integration.transient_periods=0",
+        f"integration.recorded_periods={periods}",
+        f"outputs.section_points={periods}",
+    )
+    ends = computed(sweep)["end_state"]
+    pair = oscillator(sweep)
+    for frequency, end in zip(sweep.values, ends, strict=True):
+        x, expected = pair.run([1.0 + pair.load, 0.0], frequency, periods)
+        assert x.min() < -1.0 < 1.0 < x.max()
+        assert end == pytest.approx(expected, abs=1e-8)
+
+
+def test_response_is_linear_while_the_teeth_stay_together():
+    # The largest linear amplitude is F_ah / (2 zeta sqrt(1 - zeta^2)) = 0.5006.
+    sweep = simulation(*RUN_UP, CONSTANT_STIFFNESS, "groups.load=0.51")
+    pair, arrays = oscillator(sweep), computed(sweep, 111)
+    assert not arrays["crossings_per_period"].any()
+    response = pair.linear_response(sweep.values)
+    # The section lies at phase 0, where x shows the real part and x' the imaginary one.
+    x, rate = arrays["end_state"].T
+    found = x - (1.0 + pair.load) - 1j * rate / sweep.values
+    assert np.abs(found - response).max() < 1e-6
+    assert arrays["lyapunov_exponent"] == pytest.approx(-pair.zeta, abs=1e-3)
+
+
+def test_contact_is_lost_where_the_linear_amplitude_exceeds_the_load(constant):
+    amplitude = np.abs(constant.pair.linear_response(constant.frequency))
+    lost = constant.up["crossings_per_period"] > 0.0
+    assert np.array_equal(lost, amplitude > constant.pair.load)
+
+
+@pytest.mark.parametrize(
+    ("scene", "first", "last"), [("constant", 0.71, 0.82), ("shipped", 0.66, 0.79)]
+)
+def test_sweeps_differ_in_one_interval_below_resonance(scene, first, last, request):
+    both = request.getfixturevalue(scene)
+    apart = np.flatnonzero(both.apart)
+    assert both.frequency[apart[[0, -1]]] == pytest.approx([first, last])
+    assert np.array_equal(apart, np.arange(apart[0], apart[-1] + 1))
+    # The lower branch keeps contact, but for a little just before it jumps.
+    assert not both.up["crossings_per_period"][apart[: apart.size // 2]].any()
+    assert (both.down["crossings_per_period"][apart] == 2.0).all()
+
+
+@pytest.mark.parametrize("scene", ["constant", "shipped"])
+def test_every_motion_of_the_run_up_repeats_each_mesh_period(scene, request):
+    both = request.getfixturevalue(scene)
+    for arrays in (both.up, both.down):
+        assert np.ptp(arrays["section_delta_5"], axis=1).max() < APART
+        assert arrays["lyapunov_exponent"].max() < 0.0
+
+
+def amplitude_of(both, arrays, index):
+    """Amplitude of the first harmonic on an orbit, followed by the equation written out here."""
+    start = arrays["end_state"][index]
+    x, end = both.pair.run(start, both.frequency[index], 1)
+    assert end == pytest.approx(start, abs=1e-5)
+    return np.abs(np.fft.rfft(x)[1]) * 2.0 / SAMPLES
+
+
+def test_the_peak_leans_to_lower_frequencies(constant):
+    first, last = np.flatnonzero(constant.apart)[[0, -1]]
+    resonance = np.argmin(np.abs(constant.frequency - 1.0))
+    peak = amplitude_of(constant, constant.down, first)
+    assert peak > 4.0 * amplitude_of(constant, constant.up, first)
+    assert peak > amplitude_of(constant, constant.down, last)
+    assert peak > 1.5 * amplitude_of(constant, constant.down, resonance)
+    # The clearance takes the resonance at 1 away.
+    without_clearance = constant.pair.forcing / (2.0 * constant.pair.zeta)
+    assert amplitude_of(constant, constant.down, resonance) < 0.5 * without_clearance
+
+
+def harmonic_balance(pair, amplitude):
+    """Frequencies at which mean and first harmonic balance, with contact on one flank only."""
+    angle = 2.0 * np.pi * np.arange(SAMPLES) / SAMPLES
+
+    def spring(mean):
+        return np.maximum(mean + amplitude * np.cos(angle) - 1.0, 0.0)
+
+    mean = brentq(lambda mean: spring(mean).mean() - pair.load, 1.0 - amplitude, 1.0 + pair.load)
+    stiffness = 2.0 * np.mean(spring(mean) * np.cos(angle)) / amplitude
+    squares = np.roots(
+        [
+            1.0 - (pair.forcing / amplitude) ** 2,
+            4.0 * pair.zeta**2 - 2.0 * stiffness,
+            stiffness**2,
+        ]
+    )
+    return np.sqrt(squares)
+
+
+@pytest.mark.parametrize(("frequency", "share"), [(0.75, 0.02), (0.82, 0.02), (1.3, 0.002)])
+def test_harmonic_balance_finds_the_branch_that_loses_contact(constant, frequency, share):
+    # One harmonic: what it neglects shrinks with the part of the period without contact.
+    index = np.argmin(np.abs(constant.frequency - frequency))
+    amplitude = amplitude_of(constant, constant.down, index)
+    found = harmonic_balance(constant.pair, amplitude)
+    assert np.abs(found / constant.frequency[index] - 1.0).min() < share
+
+
+def test_at_twice_the_resonance_the_stiffness_drives_a_motion_of_two_periods():
+    sweep = simulation(
+        *SETTLED,
+        "integration.transient_periods=400",
+        "groups.mesh_frequency=2.0",
+        "start.carry=none",
+        "sweep={parameter='stiffness_variation_scale', values=[0.5, 1.0, 1.5, 2.1]}",
+    )
+    arrays = computed(sweep)
+    # To first order, the principal parametric resonance grows at k_1/4 - zeta.
+    growth = np.abs(oscillator(sweep).variation) / 4.0 - sweep.groups.damping_ratio
+    assert arrays["lyapunov_exponent"][:3] == pytest.approx(growth[:3], abs=1e-4)
+    assert not arrays["crossings_per_period"][:3].any()
+    assert growth[3] > 0.0 > arrays["lyapunov_exponent"][3]
+    points = arrays["section_delta_5"][3]
+    assert np.ptp(points[::2]) < APART < 0.05 < abs(points[1] - points[0])
