@@ -182,6 +182,10 @@ class Outputs(Table):
     )
     section_points: int = key("last mesh periods of the section that are kept", default=100, ge=1)
     lyapunov: bool = key("whether the largest Lyapunov exponent is computed", default=True)
+    motion: bool = key(
+        "whether the motion is labelled: its kind, its period, and the distance of its return",
+        default=True,
+    )
     spectrum: bool = key(
         "whether all Lyapunov exponents are computed, at about ten times the cost", default=False
     )

@@ -12,14 +12,17 @@ from gearchaos_kernels import (
     STATE_ROWS,
     STATUS_TEXTS,
     Outcome,
+    Plan,
     Status,
 )
 from numpy.typing import NDArray
 
 from gearchaos.configuration.sweep_values import SWEEPABLE_GROUPS, SWEEPABLE_KEYS
 from gearchaos.engine.error_check import MEANINGS, check_arrays, checked_lanes
+from gearchaos.engine.labelling import labelling_plan, labels_of
 from gearchaos.engine.sweep_lanes import SweepLanes
 from gearchaos.motion.difference import Motion, difference
+from gearchaos.motion.label import MEANINGS as MOTION_MEANINGS
 from gearchaos.motion.lyapunov import largest_exponent
 from gearchaos.motion.spectrum import exponents, sum_of_exponents
 from gearchaos.physics.group_table import GROUP_TABLE
@@ -63,6 +66,7 @@ class Simulation(SweepLanes):
             several_starts=self.starts > 1,
             status_meanings=[status.name.lower() for status in STATUS_TEXTS],
             check_meanings=MEANINGS if checked else (),
+            motion_meanings=MOTION_MEANINGS if self.config.outputs.motion else (),
         )
         return of_the_lanes + self._choice
 
@@ -84,6 +88,11 @@ class Simulation(SweepLanes):
             )
         return parameters
 
+    @property
+    def recording(self) -> Plan:
+        """The plan with all that is recorded: what is kept, and what the labels are read off."""
+        return labelling_plan(self) if self.config.outputs.motion else self.plan
+
     def compile(self) -> None:
         """Compile the kernel of this scene, or load it from the cache."""
         self.rehearse(1, 0)
@@ -97,7 +106,8 @@ class Simulation(SweepLanes):
 
     def block_memory(self, threads: int) -> int:
         """Return about how many bytes the arrays of one block take while it is computed."""
-        numbers = self.plan.section_points * len(self.plan.section_states) + 4 * len(STATE_ROWS)
+        plan = self.recording
+        numbers = plan.section_points * len(plan.section_states) + 4 * len(STATE_ROWS)
         if self.plan.tangent:
             numbers += self.plan.recorded_periods
         return 8 * self.block_lanes(threads) * numbers
@@ -130,7 +140,7 @@ class Simulation(SweepLanes):
         if not self.carried:
             lanes = np.arange(first, last)
             start = self.start_of(lanes)
-            arrays = self._arrays(first, self.integrate(lanes, start))
+            arrays = self._arrays(first, self.integrate(lanes, start, self.recording))
             if self.config.outputs.spectrum:
                 arrays |= self._spectrum(lanes, start)
             return arrays | self._check(arrays, lanes, start)
@@ -149,7 +159,7 @@ class Simulation(SweepLanes):
         for lane in range(first, last, self.starts)[:: -1 if downwards else 1]:
             lanes = np.arange(lane, lane + self.starts)
             starts.append(self.start_of(lanes, carried))
-            parts.append(self.integrate(lanes, starts[-1]))
+            parts.append(self.integrate(lanes, starts[-1], self.recording))
             carried = parts[-1].end_state
         if downwards:
             parts.reverse()
@@ -215,12 +225,16 @@ class Simulation(SweepLanes):
             slowest = np.where(outcome.crossings > 0, outcome.slowest_crossing, np.nan)
             arrays["slowest_crossing"] = np.where(sound, slowest, np.nan)
             arrays["unsplit_steps"] = outcome.overflows
-        for column, name in enumerate(self.plan.section_states):
-            arrays[f"section_{name}"] = outcome.section[:, :, column]
+        recorded, points = self.recording.section_states, self.plan.section_points
+        for name in self.plan.section_states:
+            # A copy: a view would keep alive all that was recorded.
+            arrays[f"section_{name}"] = outcome.section[:, -points:, recorded.index(name)].copy()
         if outcome.growth is not None:
             exponent, standard_error = largest_exponent(outcome.growth, self.periods_of(numbers))
             arrays["lyapunov_exponent"] = exponent
             arrays["lyapunov_exponent_standard_error"] = standard_error
+        if self.config.outputs.motion:
+            arrays |= labels_of(self, numbers, outcome)._asdict()
         wanted = {v.name for v in self.variables if v.dims[0] == self.axis}
         return {name: array for name, array in arrays.items() if name in wanted}
 

@@ -39,16 +39,64 @@ def motion_period(section: NDArray[np.float64]) -> NDArray[np.int32]:
         0 where no such period is found: chaos, quasi-periodic motion, a transient that has not
         died away, longer periods, a section with NaN, or too few points.
     """
+    return period_of(return_distances(section))
+
+
+def period_of(distances: NDArray[np.float64]) -> NDArray[np.int32]:
+    """Return the smallest period whose return distance is within the tolerance, 0 for none.
+
+    Parameters
+    ----------
+    distances : ndarray, shape (lanes, 16)
+        From `return_distances`.
+    """
+    returns = distances <= TOLERANCE
+    first = np.argmax(returns, axis=1) + 1
+    return np.where(returns.any(axis=1), first, 0).astype(np.int32)
+
+
+def return_distances(section: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return how far from itself every section comes back after 1, 2, ... 16 mesh periods.
+
+    Parameters
+    ----------
+    section : ndarray, shape (lanes, points, states)
+        Once a mesh period, in the order of time; the last 48 points are looked at.
+
+    Returns
+    -------
+    ndarray, shape (lanes, 16)
+        Largest distance over all points and coordinates, each coordinate measured as in
+        `motion_period`; NaN for periods that the section does not hold three times, and in lanes
+        with NaN.
+    """
     points = section[:, -POINTS_NEEDED:]
-    period = np.zeros(points.shape[0], dtype=np.int32)
+    distances = np.full((points.shape[0], LONGEST_PERIOD), np.nan)
     if points.size == 0:
-        return period
-    scale = np.max(np.abs(points), axis=1, keepdims=True)
-    scale = np.maximum(scale, _SMALLEST_SCALE * np.max(scale, axis=2, keepdims=True))
-    for n in range(min(LONGEST_PERIOD, points.shape[1] // RETURNS), 0, -1):
-        distance = np.abs(points[:, n:] - points[:, :-n])
-        period[np.all(distance <= TOLERANCE * scale, axis=(1, 2))] = n
-    return period
+        return distances
+    points = points / coordinate_scale(points)[:, np.newaxis]
+    for n in range(1, min(LONGEST_PERIOD, points.shape[1] // RETURNS) + 1):
+        distances[:, n - 1] = np.max(np.abs(points[:, n:] - points[:, :-n]), axis=(1, 2))
+    return distances
+
+
+def coordinate_scale(section: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return what distances in every coordinate are measured by.
+
+    Parameters
+    ----------
+    section : ndarray, shape (lanes, points, states)
+        With at least one point and one state.
+
+    Returns
+    -------
+    ndarray, shape (lanes, states)
+        The largest magnitude of the coordinate, or a thousandth of that of the largest coordinate
+        where this is more; positive.
+    """
+    scale: NDArray[np.float64] = np.max(np.abs(section), axis=1)
+    scale = np.maximum(scale, _SMALLEST_SCALE * np.max(scale, axis=1, keepdims=True))
+    return np.maximum(scale, np.finfo(np.float64).tiny)
 
 
 def section_distance(

@@ -70,7 +70,7 @@ def exponents(
         are parallel in double precision after one period. `sum_of_exponents` is an exact check.
     """
     once = plan._replace(transient_periods=0, recorded_periods=1)
-    lanes, states = start.shape[0], len(_columns(scene))
+    lanes, states = start.shape[0], len(state_columns(scene))
     logarithms = np.full((lanes, states, plan.recorded_periods), np.nan)
     frame = np.broadcast_to(_first_frame(states), (lanes, states, states))
     state = start
@@ -154,7 +154,7 @@ def period_jacobian(
         start = integrate(
             scene, model, stiffness_cosine, stiffness_sine, start, before, rederived=rederived
         ).end_state
-    states = len(_columns(scene))
+    states = len(state_columns(scene))
     frame = np.broadcast_to(np.eye(states), (start.shape[0], states, states))
     carried = _carry(
         scene,
@@ -182,7 +182,7 @@ def _carry(
 ) -> _Carried:
     """Integrate every lane once for every column of its frame (lanes, states, states)."""
     lanes, states, _ = frame.shape
-    columns = _columns(scene)
+    columns = state_columns(scene)
     tangents = np.zeros((lanes * states, len(STATE_ROWS)))
     tangents[:, columns] = frame.transpose(0, 2, 1).reshape(-1, states)
     outcome = integrate(
@@ -204,8 +204,8 @@ def _carry(
     )
 
 
-def _columns(scene: Scene) -> list[int]:
-    """Columns of the kernels' arrays in the order of the scene's states."""
+def state_columns(scene: Scene) -> list[int]:
+    """Return the columns of the kernels' arrays in the order of the scene's states."""
     return [STATE_ROWS[name] for name in states_of([e for e in Scene._fields if getattr(scene, e)])]
 
 

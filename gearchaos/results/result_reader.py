@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import os
 import stat
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,7 @@ from numpy.typing import NDArray
 from gearchaos.errors import FileError
 from gearchaos.results.atomic_file import reason
 from gearchaos.results.checksum_line import checksum_fits
+from gearchaos.results.global_heap import heaps_end
 from gearchaos.results.result_file import ORIGINS, PARAMETERS, SCHEMA, SCHEMA_VERSION, Parameter
 from gearchaos.results.variables import HARMONIC, SECTION_POINT, STATE, Variable, sweep_variables
 
@@ -26,6 +28,8 @@ Contents = tuple[
 ]
 
 _DTYPES = {"f8": "float64", "i4": "int32", "u1": "uint8"}
+SOON_HASHED = 1 << 30
+"""Bytes whose checksum takes about a second."""
 _LARGEST_CHUNK = 64 << 20
 _HIGHEST_COMPRESSION = 1100
 """Deflate packs at best 1032 bytes into one; a dataset that claims more is not a real one."""
@@ -35,11 +39,18 @@ class _UnfitError(Exception):
     """What is wrong with the file, in words; becomes a FileError."""
 
 
-def read_result(path: str | os.PathLike[str]) -> Contents:
-    """Read a whole result file.
+def read_result(path: str | os.PathLike[str], *, rows: bool = True) -> Contents:
+    """Read a whole result file, or all but what makes it large.
 
     Links to other files are not followed, and nothing larger than what the file can hold is
     allocated.
+
+    Parameters
+    ----------
+    path : path
+    rows : bool
+        Whether the arrays of several dimensions are read; without them `data` lacks their
+        values, and the checksum of a file above 1 GiB is left unchecked.
 
     Returns
     -------
@@ -55,26 +66,46 @@ def read_result(path: str | os.PathLike[str]) -> Contents:
     """
     name = os.fspath(path)
     try:
-        if not stat.S_ISREG(Path(name).stat().st_mode):
+        found = Path(name).stat()
+        if not stat.S_ISREG(found.st_mode):
             raise FileError(f"{name}: is not a regular file; give the name of a result file")
-        if checksum_fits(Path(name)) is False:
+        soon = rows or found.st_size <= SOON_HASHED
+        if soon and checksum_fits(Path(name)) is False:
             raise FileError(f"{name}: is damaged (its checksum does not fit); run the sweep again")
+        if soon and not heaps_end(name):
+            raise FileError(f"{name}: is damaged where its texts are kept; run the sweep again")
     except (OSError, ValueError) as error:
         raise FileError(
             f"{name}: cannot be read: {reason(error)}; give the name of a result file"
         ) from error
     try:
         with h5py.File(name, "r") as file:
-            return _read(file)
+            return _read(file, rows)
     except _UnfitError as error:
-        raise FileError(f"{name}: {error}") from error
+        raise FileError(f"{name}: {printable(str(error))}") from error
     except Exception as error:
         # Damage surfaces in h5py as nearly any kind of exception.
         what = "is damaged" if h5py.is_hdf5(name) else "is not an HDF5 file, or is cut off"
-        raise FileError(f"{name}: {what} ({reason(error)}); run the sweep again") from error
+        why = printable(reason(error))
+        raise FileError(f"{name}: {what} ({why}); run the sweep again") from error
 
 
-def _read(file: h5py.File) -> Contents:
+def printable(text: str) -> str:
+    """Return a text of a file without the control characters that act on a terminal."""
+    return "".join(c if c.isprintable() else "\N{REPLACEMENT CHARACTER}" for c in text)
+
+
+def own_datasets(file: h5py.File) -> Iterator[h5py.Dataset]:
+    """Give the datasets of a result file that lie in it and are no larger than it can hold."""
+    names = list(file)
+    with suppress(_UnfitError):
+        names += [f"{PARAMETERS}/{name}" for name in _hard_linked(file, PARAMETERS)]
+    for name in names:
+        with suppress(_UnfitError):
+            yield _dataset(file, name)
+
+
+def _read(file: h5py.File, rows: bool) -> Contents:
     metadata = _scalars(file)
     _check_schema(metadata)
     axis = str(metadata.get("axis", ""))
@@ -91,8 +122,9 @@ def _read(file: h5py.File) -> Contents:
             continue
         dims = _dims(file, dataset, sizes)
         if name != HARMONIC:
-            data[name] = _values(dataset)
-            variables.append(_variable(dataset, dims, data[name], on_lanes=axis in dims))
+            if rows or len(dims) == 1:
+                data[name] = _values(dataset)
+            variables.append(_variable(dataset, dims, data.get(name), on_lanes=axis in dims))
     _check_variables(axis, variables, data)
     return variables, data, _read_parameters(file, axis, sizes), metadata
 
@@ -133,6 +165,7 @@ def _check_variables(
         crossings="crossings_per_period" in found,
         spectrum="lyapunov_spectrum" in found,
         check_meanings=["same"] if "motion_changed" in found else [],
+        motion_meanings=["periodic"] if "motion" in found else [],
     )
     for due in expected:
         got = found.get(due.name)
@@ -143,8 +176,9 @@ def _check_variables(
                 f"holds {due.name} as {got.dtype} over ({', '.join(got.dims)}), which should be "
                 f"{due.dtype} over ({', '.join(due.dims)}); run the sweep again"
             )
-    if data["status"].max() >= max(1, len(found["status"].flags)):
-        raise _UnfitError("holds a status without a meaning; run the sweep again")
+    for name in {"status", "motion"} & found.keys():
+        if data[name].max() >= max(1, len(found[name].flags)):
+            raise _UnfitError(f"holds a {name} without a meaning; run the sweep again")
 
 
 def _read_parameters(file: h5py.File, axis: str, sizes: dict[str, int]) -> dict[str, Parameter]:
@@ -187,6 +221,10 @@ def _dataset(file: h5py.File, name: str) -> h5py.Dataset:
     chunk = int(np.prod(dataset.chunks or (1,), dtype=object)) * dataset.dtype.itemsize
     size = int(np.prod(dataset.shape, dtype=object)) * dataset.dtype.itemsize
     packed = _HIGHEST_COMPRESSION if filters else 1
+    # Chunks that nobody has written cost no bytes, but each of them costs time.
+    pieces = dataset.id.get_num_chunks() if dataset.chunks else 0
+    if dataset.chunks and size > pieces * chunk:
+        packed = 0
     if filters - known or chunk > _LARGEST_CHUNK or not 0 < size <= packed * stored:
         raise _UnfitError(
             f"declares {size} bytes for {name} that it does not hold in a known way; "
@@ -234,7 +272,7 @@ def _dtype(dataset: h5py.Dataset) -> str:
 
 
 def _variable(
-    dataset: h5py.Dataset, dims: tuple[str, ...], values: NDArray[Any], *, on_lanes: bool
+    dataset: h5py.Dataset, dims: tuple[str, ...], values: NDArray[Any] | None, *, on_lanes: bool
 ) -> Variable:
     notes = _scalars(dataset)
     return Variable(
@@ -244,7 +282,7 @@ def _variable(
         **_wording(notes),
         fill_value=notes.get("_FillValue"),
         flags=tuple(str(notes.get("flag_meanings", "")).split()),
-        values=None if on_lanes else tuple(values.tolist()),
+        values=None if on_lanes or values is None else tuple(values.tolist()),
     )
 
 

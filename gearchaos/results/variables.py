@@ -92,6 +92,7 @@ def sweep_variables(
     crossings: bool = False,
     spectrum: bool = False,
     check_meanings: Sequence[str] = (),
+    motion_meanings: Sequence[str] = (),
 ) -> list[Variable]:
     """List the variables of a sweep in the order of the file.
 
@@ -115,6 +116,8 @@ def sweep_variables(
         Whether all Lyapunov exponents are computed.
     check_meanings : sequence of str
         Meanings of ``motion_changed`` where lanes are computed twice to measure their error.
+    motion_meanings : sequence of str
+        Meanings of ``motion`` where lanes are labelled.
     several_starts : bool
         Whether each parameter value has several lanes that differ in their start.
     status_meanings : sequence of str
@@ -146,6 +149,15 @@ def sweep_variables(
         variables += [
             Variable(name, (lane,), "float64", "1", text, r"$\lambda_1$", nan),
             Variable(error, (lane,), "float64", "1", error_text, r"$s_{\lambda_1}$", nan),
+        ]
+    if motion_meanings:
+        text = "smallest distance after which the motion returns, of all states, scaled"
+        kind, meanings = "kind of motion", tuple(motion_meanings)
+        period = "mesh periods after which the motion repeats, 0 where it is not periodic"
+        variables += [
+            Variable("motion", (lane,), "uint8", "1", kind, flags=meanings),
+            Variable("period", (lane,), "int32", "1", period, "$n$"),
+            Variable("return_distance", (lane,), "float64", "1", text, "", nan),
         ]
     if spectrum:
         numbers = tuple(range(1, len(states) + 1))

@@ -36,6 +36,7 @@ def make_result(axis: str = "pitch_error", **metadata: Any) -> Result:
         crossings=True,
         spectrum=True,
         check_meanings=["not_checked", "same", "changed"],
+        motion_meanings=["periodic", "chaotic"],
     )
     random = np.random.default_rng(1)
     data: dict[str, Any] = {
@@ -46,6 +47,7 @@ def make_result(axis: str = "pitch_error", **metadata: Any) -> Result:
     data["start"] = np.arange(LANES) % 3
     data["unsplit_steps"] = np.zeros(LANES)
     data["motion_changed"] = np.arange(LANES) % 3
+    data["motion"] = data["period"] = np.arange(LANES) % 2
     data["status"] = (np.arange(LANES) == 7).astype(np.uint8)
     data["diverged_period"] = np.where(data["status"], 12, -1)
     data["section_delta_5"][7] = data["lyapunov_exponent"][7] = np.nan
@@ -198,7 +200,7 @@ def test_every_dataset_follows_the_rules_of_the_format(path: Path) -> None:
         assert (file.attrs["schema"], file.attrs["schema_version"]) == ("gearchaos-sweep", "1.0")
         datasets: list[h5py.Dataset] = []
         file.visititems(lambda _, item: datasets.append(item) if hasattr(item, "shape") else None)
-        assert len(datasets) == 26
+        assert len(datasets) == 29
         for dataset in datasets:
             assert {"units", "long_name"} <= set(dataset.attrs)
             assert h5py.check_string_dtype(dataset.dtype) or dataset.dtype.str in {

@@ -1,0 +1,98 @@
+"""Labels of integrated lanes: what their records tell, and Newton's method where they settle."""
+
+from __future__ import annotations
+
+import numpy as np
+from gearchaos_kernels import STATE_ROWS, Outcome, Plan, Status
+from numpy.typing import NDArray
+
+from gearchaos.engine.sweep_lanes import SweepLanes
+from gearchaos.motion.label import (
+    MOST_POINTS,
+    NEAR,
+    PERIODIC,
+    Labels,
+    Record,
+    label,
+    settling_periods,
+)
+from gearchaos.motion.orbits import polish
+from gearchaos.motion.period import coordinate_scale, return_distances
+from gearchaos.motion.spectrum import sum_of_exponents
+
+Numbers = NDArray[np.intp]
+
+
+def labelling_plan(sweep: SweepLanes) -> Plan:
+    """Return the plan of a sweep, with all states of enough mesh periods to label the motion."""
+    enough = min(MOST_POINTS, sweep.plan.recorded_periods)
+    return sweep.plan._replace(
+        section_states=tuple(sweep.states),
+        section_points=max(sweep.plan.section_points, enough),
+    )
+
+
+def labels_of(sweep: SweepLanes, lanes: Numbers, outcome: Outcome) -> Labels:
+    """Label lanes that were integrated with `labelling_plan`.
+
+    Parameters
+    ----------
+    sweep : SweepLanes
+    lanes : ndarray of int, shape (lanes,)
+        Their numbers in the sweep.
+    outcome : Outcome
+        Of these lanes.
+    """
+    record = Record(
+        outcome.section[:, -MOST_POINTS:],
+        outcome.growth,
+        outcome.status != Status.OK,
+        _admits_tori(sweep, lanes),
+    )
+    labels = label(record)
+    _settle(sweep, lanes, outcome, labels, settling_periods(record, labels))
+    return labels
+
+
+def _admits_tori(sweep: SweepLanes, lanes: Numbers) -> NDArray[np.bool_]:
+    """Whether quasi-periodic motion can exist at all.
+
+    With two states and damping the period map contracts every area by the same factor; a closed
+    curve that it maps onto itself would enclose an area that stays the same.
+    """
+    if len(sweep.states) > 2:
+        return np.ones(lanes.size, dtype=np.bool_)
+    return sum_of_exponents(sweep.scene, sweep.model_of(lanes)) >= 0.0
+
+
+def _settle(
+    sweep: SweepLanes,
+    lanes: Numbers,
+    outcome: Outcome,
+    labels: Labels,
+    period: NDArray[np.int32],
+) -> None:
+    """Give the lanes that have come close to a stable orbit its period, in place."""
+    columns = [STATE_ROWS[name] for name in sweep.states]
+    searched = period > 0
+    for n in range(1, int(period.max(initial=0)) + 1):
+        tried = np.flatnonzero(searched & (period % n == 0))
+        if not tried.size:
+            continue
+        orbits = polish(
+            sweep.scene,
+            sweep.model_of(lanes[tried]),
+            *sweep.harmonics(),
+            outcome.end_state[tried],
+            np.full(tried.size, n, dtype=np.int32),
+            sweep.plan.steps_per_period,
+            rederived=sweep.config.formulation == "rederived",
+        )
+        apart = np.abs(orbits.points - outcome.end_state[tried])[:, columns]
+        close = np.max(apart / coordinate_scale(outcome.section[tried]), axis=1) <= NEAR
+        stable = np.abs(orbits.multipliers[:, 0]) < 1.0
+        settled = tried[orbits.converged & close & stable]
+        searched[settled] = False
+        labels.motion[settled] = PERIODIC
+        labels.period[settled] = n
+        labels.return_distance[settled] = return_distances(outcome.section[settled])[:, n - 1]

@@ -1,0 +1,187 @@
+"""What kind of motion a lane has come to: periodic, quasi-periodic, chaotic, or not to be told."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gearchaos.motion.lyapunov import largest_exponent
+from gearchaos.motion.period import POINTS_NEEDED, period_of, return_distances
+
+Floats = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+PERIODIC, QUASI_PERIODIC, CHAOTIC, UNRESOLVED, DIVERGED = range(5)
+MEANINGS = ("periodic", "quasi_periodic", "chaotic", "unresolved", "diverged")
+"""Meanings of the values of ``motion``."""
+
+MOST_POINTS = 512
+"""Section points with which a motion is labelled: the last ones."""
+
+STANDARD_ERRORS = 3.0
+"""An exponent within so many of its standard errors is not told from zero."""
+
+CHAOTIC_GROWTH = 2.0
+"""Logarithm of the growth over the record beyond which a disturbance counts as growing."""
+
+NEUTRAL_GROWTH = 1.0
+"""Logarithm of growth or decay over the record up to which a disturbance counts as neutral."""
+
+AGREEMENT = 0.05
+"""Largest difference of the weighted averages of two halves of a quasi-periodic record."""
+
+NEAR = 0.01
+"""Return distance below which a motion that has not returned may be settling on an orbit."""
+
+LATEST = 16
+"""Section points at the end of a chaotic record that may have settled."""
+
+
+class Record(NamedTuple):
+    """What is known of some lanes after their transient.
+
+    ``section`` (lanes, points, states): all states of the scene, once a mesh period; ``growth``
+    (lanes, periods): logarithm of the tangent vector's growth over each period, or None;
+    ``diverged`` (lanes,); ``torus`` (lanes,): whether the scene admits quasi-periodic motion.
+    """
+
+    section: Floats
+    growth: Floats | None
+    diverged: Mask
+    torus: Mask
+
+
+class Labels(NamedTuple):
+    """Labels of some lanes.
+
+    ``motion`` (lanes,) of `MEANINGS`; ``period`` (lanes,) in mesh periods, 0 where the motion is
+    not periodic; ``return_distance`` (lanes,): that of the period, or else the smallest one.
+    """
+
+    motion: NDArray[np.uint8]
+    period: NDArray[np.int32]
+    return_distance: Floats
+
+
+def label(record: Record) -> Labels:
+    """Label the motion at the end of every lane; docs/numerics.md gives the rule and its reasons.
+
+    In this order: *diverged*; *periodic* with the smallest period whose return distance is within
+    the tolerance, see `motion_period`; *chaotic* where the largest exponent is positive by three
+    standard errors, a disturbance grows by a factor exp(2) over the record, and its later half
+    goes on at this pace; *quasi-periodic* where the scene admits it, the exponent is zero within
+    its error, and the weighted averages of both halves agree, see `halves_differ_by`;
+    *unresolved* otherwise.
+    """
+    distances = return_distances(record.section)
+    period = period_of(distances)
+    period[record.diverged] = 0
+    motion = np.full(period.shape, UNRESOLVED, dtype=np.uint8)
+    motion[period > 0] = PERIODIC
+    motion[record.diverged] = DIVERGED
+    rest = np.flatnonzero(motion == UNRESOLVED)
+    if record.growth is not None and rest.size:
+        motion[rest] = _aperiodic(record.section[rest], record.growth[rest], record.torus[rest])
+    smallest = np.min(np.where(np.isnan(distances), np.inf, distances), axis=1)
+    own = distances[np.arange(period.size), np.maximum(period, 1) - 1]
+    distance = np.where(period > 0, own, np.where(np.isfinite(smallest), smallest, np.nan))
+    distance[record.diverged] = np.nan
+    return Labels(motion, period, distance)
+
+
+def settling_periods(record: Record, labels: Labels) -> NDArray[np.int32]:
+    """Return the period of the orbit on which a lane may still be settling, 0 for none.
+
+    A lane settles where its return distance after some period is small and smaller than in the
+    middle of the record, and the exponent of the later half, if known, is negative. Looked at are
+    the periods of unresolved lanes, and in periodic ones those that divide the period: close to a
+    period doubling a motion approaches its orbit from alternating sides, and returns after twice
+    the period long before it does after one. A chaotic lane may settle at the very end of its
+    record: there the return of the last 16 points counts alone. Whether there is such an orbit, of
+    the period or a divisor of it, and whether it is stable is for Newton's method to tell.
+
+    Returns
+    -------
+    ndarray of int, shape (lanes,)
+        Smaller than the label's period in periodic lanes.
+    """
+    found = np.zeros(labels.motion.shape, dtype=np.int32)
+    chaotic = np.flatnonzero(labels.motion == CHAOTIC)
+    if chaotic.size:
+        latest = return_distances(record.section[chaotic, -LATEST:])
+        latest = np.where(np.isnan(latest), np.inf, latest)
+        nearest = np.argmin(latest, axis=1)
+        settling = latest[np.arange(chaotic.size), nearest] <= NEAR
+        found[chaotic[settling]] = nearest[settling] + 1
+    lanes = np.flatnonzero((labels.motion == UNRESOLVED) | (labels.period > 1))
+    if not lanes.size:
+        return found
+    section = record.section[lanes]
+    now = return_distances(section)
+    before = return_distances(section[:, : section.shape[1] // 2])
+    periods = np.arange(1, now.shape[1] + 1)
+    own = labels.period[lanes, np.newaxis]
+    looked_at = (own == 0) | ((own > periods) & (own % periods == 0))
+    now[~(looked_at & (now < before))] = np.inf
+    nearest = np.argmin(now, axis=1)
+    settling = now[np.arange(lanes.size), nearest] <= NEAR
+    if record.growth is not None:
+        later = record.growth[lanes, record.growth.shape[1] // 2 :]
+        exponent, _ = largest_exponent(later, np.ones(lanes.size))
+        settling &= exponent < 0.0
+    found[lanes[settling]] = periods[nearest[settling]]
+    return found
+
+
+def halves_differ_by(section: Floats) -> Floats:
+    """Return how far the averages of the two halves of every section lie apart.
+
+    Averaged are every coordinate, centred and scaled to variance 1, and its square, with the
+    weight exp(-1/(t(1-t))) over each half. On a quasi-periodic motion these averages converge
+    faster than any power of the number of points, on a chaotic one like its square root, and on a
+    transient not at all (Das, Sander, Yorke 2017).
+
+    Parameters
+    ----------
+    section : ndarray, shape (lanes, points, states)
+
+    Returns
+    -------
+    ndarray, shape (lanes,)
+        Largest difference of all averages; NaN with fewer than two points.
+    """
+    half = section.shape[1] // 2
+    if half == 0:
+        return np.full(section.shape[0], np.nan)
+    size = np.max(np.abs(section), axis=1, keepdims=True)
+    section = section / np.maximum(size, np.finfo(np.float64).tiny)
+    centred = section - np.mean(section, axis=1, keepdims=True)
+    deviation = np.std(section, axis=1, keepdims=True)
+    # A coordinate at rest has nothing that could differ.
+    scaled = centred / np.where(deviation > 0.0, deviation, 1.0)
+    time = (np.arange(half) + 0.5) / half
+    weights = np.exp(-1.0 / (time * (1.0 - time)))[:, np.newaxis]
+    weights /= np.sum(weights)
+    differences = [
+        np.sum(weights * (values[:, :half] - values[:, -half:]), axis=1)
+        for values in (scaled, scaled**2)
+    ]
+    largest: Floats = np.max(np.abs(differences), axis=(0, 2))
+    return largest
+
+
+def _aperiodic(section: Floats, growth: Floats, torus: Mask) -> NDArray[np.uint8]:
+    """Tell chaotic, quasi-periodic and unresolved lanes that do not return."""
+    periods = growth.shape[1]
+    one = np.ones(growth.shape[0])
+    exponent, error = largest_exponent(growth, one)
+    later, _ = largest_exponent(growth[:, periods // 2 :], one)
+    pace = CHAOTIC_GROWTH / periods
+    chaotic = (exponent > STANDARD_ERRORS * error) & (exponent > pace) & (later > pace)
+    neutral = np.abs(exponent) <= np.minimum(STANDARD_ERRORS * error, NEUTRAL_GROWTH / periods)
+    enough = section.shape[1] >= 2 * POINTS_NEEDED
+    quasi_periodic = enough & torus & neutral & (halves_differ_by(section) <= AGREEMENT)
+    motion = np.where(chaotic, CHAOTIC, np.where(quasi_periodic, QUASI_PERIODIC, UNRESOLVED))
+    return motion.astype(np.uint8)

@@ -1,0 +1,189 @@
+"""The command that lists the stages of a sweep: ``python -m gearchaos.stages RESULT.h5``."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import sys
+from collections.abc import Sequence
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+from gearchaos.command_line import OK, run_command, version_text
+from gearchaos.errors import ConfigurationError
+
+if TYPE_CHECKING:
+    from gearchaos.engine.stage_refinement import Boundary
+    from gearchaos.motion.stage_table import Stage
+    from gearchaos.results.result import Result
+
+NAME = "gearchaos stages"
+
+DESCRIPTION = """\
+List the stages of a sweep: stretches of the swept parameter in which the motion keeps its label."""
+
+EPILOG = """\
+The table goes to stdout, everything else to stderr. Exit codes: 0 done, 2 the command line asks
+for what cannot be, 4 the file cannot be read, is damaged or holds no labels."""
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the command and return its exit code."""
+    return run_command(NAME, partial(_run, argv))
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog=NAME, description=DESCRIPTION, epilog=EPILOG, allow_abbrev=False
+    )
+    add = parser.add_argument
+    add("result", metavar="RESULT.h5", help="result file of a sweep")
+    add(
+        "--narrowest",
+        type=_width,
+        default=0.0,
+        metavar="WIDTH",
+        help="put narrower stages into what surrounds them, and count them",
+    )
+    add(
+        "--refine",
+        type=_width,
+        metavar="WIDTH",
+        help="bisect every boundary to this width, and tell how the orbit beside it is lost; lanes "
+        "are computed again with the configuration in the file",
+    )
+    add("--start", type=int, default=0, metavar="N", help="start to list (default: 0)")
+    add("--json", action="store_true", help="print JSON instead of a table")
+    add("--threads", type=int, metavar="N", help="threads for --refine (default: all cores)")
+    add("-q", "--quiet", action="store_true", help="say nothing on stderr unless something fails")
+    add("--version", action="version", version=version_text())
+    return parser
+
+
+def _width(text: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not (math.isfinite(value) and value > 0.0):
+        raise argparse.ArgumentTypeError(f"{text!r} is not a positive number")
+    return value
+
+
+def _run(argv: Sequence[str] | None) -> int:
+    options = _parser().parse_args(argv)
+    from gearchaos.motion.stage_table import labelled_lanes, stage_table
+    from gearchaos.results.result import open_result
+
+    result = open_result(options.result)
+    lanes = labelled_lanes(result, options.start, name=options.result)
+    stages = stage_table(lanes, options.narrowest)
+    boundaries = None
+    if options.refine is not None:
+        boundaries = _refined(result, stages, options)
+        stages = refined_stages(stages, boundaries)
+    if options.json:
+        print(json.dumps(_facts(result, stages, boundaries), indent=1, allow_nan=False))
+    else:
+        print("\n".join(table(result.axis, stages)))
+        if boundaries:
+            print("\n".join(["", *boundary_list(boundaries)]))
+    return OK
+
+
+def _refined(result: Result, stages: list[Stage], options: argparse.Namespace) -> list[Boundary]:
+    # Only here: reading a file needs no compiler.
+    from gearchaos.engine.running import COMPILING
+    from gearchaos.engine.stage_refinement import refinable, refined_boundaries
+    from gearchaos.progress import notice
+
+    if options.start != 0:
+        raise ConfigurationError(f"--start {options.start}: only start 0 can be refined")
+    config = refinable(result, options.result)
+    with notice(COMPILING, options.quiet):
+        return refined_boundaries(config, result, stages, options.refine, options.threads)
+
+
+def refined_stages(stages: list[Stage], boundaries: Sequence[Boundary]) -> list[Stage]:
+    """Return the stages with their ends at the refined boundaries."""
+    starts = [stages[0].start, *(boundary.above for boundary in boundaries)]
+    ends = [*(boundary.below for boundary in boundaries), stages[-1].end]
+    return [
+        stage._replace(start=start, end=end)
+        for stage, start, end in zip(stages, starts, ends, strict=True)
+    ]
+
+
+def table(axis: str, stages: Sequence[Stage]) -> list[str]:
+    """Word the stages as lines of a table, no longer than 80 characters."""
+    lines = [
+        f"stages over {axis}",
+        f"{'from':>10}  {'to':>10}  {'motion':15}{'lanes':>6}  {'exponent':>20}  narrower",
+    ]
+    for stage in stages:
+        exponent = f"{stage.lowest_exponent:.4f} to {stage.highest_exponent:.4f}"
+        lines.append(
+            f"{stage.start:10.6g}  {stage.end:10.6g}  {stage.label:15}{stage.lanes:6d}"
+            f"  {'' if math.isnan(stage.lowest_exponent) else exponent:>20}"
+            f"  {f'with {stage.narrower}' if stage.narrower else ''}".rstrip()
+        )
+    return lines
+
+
+def boundary_list(boundaries: Sequence[Boundary]) -> list[str]:
+    """Word the refined boundaries, each with what the orbit beside it does."""
+    lines = []
+    for boundary in boundaries:
+        between = f"{boundary.label_below} | {boundary.label_above}"
+        lines.append(f"{boundary.below:.8g} to {boundary.above:.8g}: {between}")
+        if boundary.loss:
+            lines.append(f"    {boundary.loss}")
+        if not math.isnan(abs(boundary.multiplier)):
+            real, imaginary = boundary.multiplier.real, abs(boundary.multiplier.imag)
+            pair = f" +- {imaginary:.4f}i" if imaginary else ""
+            lines.append(f"    multiplier {real:.4f}{pair}")
+    return lines
+
+
+def _facts(
+    result: Result, stages: Sequence[Stage], boundaries: Sequence[Boundary] | None
+) -> dict[str, Any]:
+    facts: dict[str, Any] = {
+        "parameter": result.axis,
+        "stages": [
+            {
+                "from": stage.start,
+                "to": stage.end,
+                "motion": stage.label,
+                "period": stage.period,
+                "lanes": stage.lanes,
+                "narrower_stages": stage.narrower,
+                "lowest_exponent": _number(stage.lowest_exponent),
+                "highest_exponent": _number(stage.highest_exponent),
+            }
+            for stage in stages
+        ],
+    }
+    if boundaries is not None:
+        facts["boundaries"] = [
+            {
+                "below": boundary.below,
+                "above": boundary.above,
+                "motion_below": boundary.label_below,
+                "motion_above": boundary.label_above,
+                "loss_of_stability": boundary.loss or None,
+                "multiplier_real": _number(boundary.multiplier.real),
+                "multiplier_imaginary": _number(boundary.multiplier.imag),
+            }
+            for boundary in boundaries
+        ]
+    return facts
+
+
+def _number(value: float) -> float | None:
+    return value if math.isfinite(value) else None
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,73 @@
+"""The lanes of Pan 2021 are labelled as what they are, and nothing else in a result changes."""
+
+import numpy as np
+import pytest
+
+from gearchaos.engine.simulation import Simulation
+from gearchaos.motion.label import CHAOTIC, DIVERGED, MEANINGS, PERIODIC
+
+from .short_sweeps import RANDOM, assert_same, computed, listing, simulation
+
+LONG = (
+    "integration.steps_per_period=200",
+    "integration.transient_periods=500",
+    "integration.recorded_periods=500",
+)
+
+
+def lanes_at(*values: float, overrides: tuple[str, ...] = ()) -> Simulation:
+    return simulation(f"sweep={{parameter='pitch_error', values={[*values]}}}", *LONG, *overrides)
+
+
+def test_the_motions_of_figure_7_are_labelled():
+    arrays = computed(lanes_at(5.86, 10.75, 12.47, 12.97, 13.4), 5)
+    assert arrays["motion"].tolist() == [PERIODIC, PERIODIC, CHAOTIC, PERIODIC, CHAOTIC]
+    assert arrays["period"].tolist() == [1, 2, 0, 3, 0]
+    assert (arrays["return_distance"][[0, 1, 3]] < 1e-9).all()
+    assert (arrays["return_distance"][[2, 4]] > 1e-2).all()
+
+
+def test_a_lane_that_settles_slowly_is_labelled_by_the_stable_orbit_it_comes_close_to():
+    # Just before the period doubling and just behind it; after ten times as long it has arrived.
+    arrays = computed(lanes_at(10.26, 10.27), 2)
+    assert ((arrays["return_distance"] > 1e-5) & (arrays["return_distance"] < 1e-2)).all()
+    longer = ("integration.transient_periods=8000",)
+    patient = computed(lanes_at(10.26, 10.27, overrides=longer), 2)
+    assert (patient["return_distance"] < 1e-9).all()
+    for found in (arrays, patient):
+        assert found["motion"].tolist() == [PERIODIC, PERIODIC]
+        assert found["period"].tolist() == [1, 2]
+
+
+def test_the_label_looks_at_states_that_are_not_kept():
+    section = "outputs.section=[]"
+    arrays = computed(lanes_at(5.86, 12.97, overrides=(section, "outputs.lyapunov=false")), 2)
+    assert not [name for name in arrays if name.startswith(("section", "lyapunov"))]
+    assert arrays["period"].tolist() == [1, 3]
+
+
+@pytest.mark.parametrize("overrides", [(), RANDOM, ("start.carry=downwards",)])
+def test_labels_change_nothing_else_of_a_result(overrides):
+    # Without an odd lane out: labels come on top.
+    with_labels = computed(simulation(*overrides))
+    without = computed(simulation(*overrides, "outputs.motion=false"))
+    labels = {"motion", "period", "return_distance"}
+    assert with_labels.keys() - without.keys() == labels
+    assert_same({n: a for n, a in with_labels.items() if n not in labels}, without)
+
+
+def test_a_diverged_lane_is_labelled_as_diverged(tmp_path):
+    arrays = computed(listing(tmp_path, "load", [-1e150, 0.2, 0.3]))
+    assert arrays["motion"].tolist()[0] == DIVERGED
+    assert DIVERGED not in arrays["motion"].tolist()[1:]
+    assert np.isnan(arrays["return_distance"][0])
+
+
+def test_the_meanings_of_the_labels_are_in_the_result():
+    (motion,) = [v for v in simulation().variables if v.name == "motion"]
+    assert motion.flags == MEANINGS
+    assert motion.flags[PERIODIC] == "periodic"
+
+
+def test_the_memory_of_a_block_counts_what_the_labels_need():
+    assert simulation().block_memory(2) > simulation("outputs.motion=false").block_memory(2)
