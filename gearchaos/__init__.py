@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from gearchaos.command_line import software_version
     from gearchaos.configuration import Configuration, load_config
+    from gearchaos.engine.response_run import respond
     from gearchaos.engine.running import run
     from gearchaos.errors import ConfigurationError, FileError, GearchaosError
     from gearchaos.results.result import Result, open_result
@@ -25,6 +26,7 @@ __all__ = [
     "Result",
     "load_config",
     "open_result",
+    "respond",
     "run",
     "software_version",
 ]
@@ -39,6 +41,7 @@ _HOMES = {
     "Result": "gearchaos.results.result",
     "load_config": "gearchaos.configuration",
     "open_result": "gearchaos.results.result",
+    "respond": "gearchaos.engine.response_run",
     "run": "gearchaos.engine.running",
     "software_version": "gearchaos.command_line",
 }

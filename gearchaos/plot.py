@@ -6,22 +6,25 @@ import argparse
 import math
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from gearchaos.command_line import OK, run_command, version_text
 from gearchaos.errors import ConfigurationError, FileError
 
 if TYPE_CHECKING:
+    from gearchaos.figures.page import Page
     from gearchaos.results.result import Result
 
 NAME = "gearchaos plot"
 RESULT_ENDINGS = (".h5", ".hdf5", ".nc")
 
 DESCRIPTION = """\
-Draw the bifurcation diagram over the Lyapunov chart of a result file, as PNG and PDF beside it."""
+Draw a result file as PNG and PDF beside it: of a sweep the bifurcation diagram over the Lyapunov
+chart, of a response one page for each lane, with time history, phase portrait, Poincare section
+and amplitude spectrum."""
 
 EPILOG = """\
 A figure that this command drew before is replaced, so that it can be run again and again; any
@@ -40,29 +43,85 @@ def _run(argv: Sequence[str] | None) -> int:
     # Matplotlib is imported only now: --help and --version answer at once, and an interrupt is
     # caught. It would refuse to be imported where the environment names an unknown backend.
     os.environ["MPLBACKEND"] = "agg"
-    from gearchaos.figures import bifurcation_page, save_figure
+    from gearchaos.figures import save_figure
+    from gearchaos.figures.response_lane import is_response
     from gearchaos.results.result import open_result
 
-    targets = _targets(options)
-    _check_targets(targets, options.result, options.overwrite)
     result = open_result(options.result)
-    figure = bifurcation_page(
-        result,
-        options.variable,
-        between=(options.low, options.high),
-        full_range=options.full_range,
-        width_mm=options.width,
-        height_mm=options.height,
-    )
+    sheets = (_response_sheets if is_response(result) else _sweep_sheets)(result, options)
+    targets = [_targets(options, sheet.name, len(sheets) == 1) for sheet in sheets]
+    _check_targets([path for paths in targets for path in paths], options.result, options.overwrite)
     title = str(result.metadata.get("title", "")) or options.result.stem
-    for target in targets:
-        save_figure(figure, target, title=title, dpi=options.dpi)
-        print(target, flush=True)
+    for sheet, paths in zip(sheets, targets, strict=True):
+        figure = sheet.draw()
+        for path in paths:
+            save_figure(figure, path, title=title, dpi=options.dpi)
+            print(path, flush=True)
     if not options.quiet:
         width, height = (25.4 * inches for inches in figure.get_size_inches())
         size = f"{width:.0f} mm x {height:.0f} mm at {options.dpi} dpi"
         print(f"{NAME}: {_lanes_in_words(result)}, {size}", file=sys.stderr)
     return OK
+
+
+class _Sheet(NamedTuple):
+    """One page: what its name says beside that of the result, and how it is drawn."""
+
+    name: str
+    draw: Callable[[], Page]
+
+
+def _sweep_sheets(result: Result, options: argparse.Namespace) -> list[_Sheet]:
+    from gearchaos.figures import bifurcation_page
+    from gearchaos.figures.bifurcation import DEFAULT_VARIABLE
+    from gearchaos.figures.style import SINGLE_COLUMN_MM
+
+    # A detail does not take the place of the whole.
+    name = ""
+    if options.variable not in (None, DEFAULT_VARIABLE):
+        name += f"_{options.variable}"
+    if options.low is not None:
+        name += f"_from_{options.low:g}"
+    if options.high is not None:
+        name += f"_to_{options.high:g}"
+    draw = partial(
+        bifurcation_page,
+        result,
+        options.variable,
+        between=(options.low, options.high),
+        full_range=options.full_range,
+        width_mm=options.width or SINGLE_COLUMN_MM,
+        height_mm=options.height,
+    )
+    return [_Sheet(name, draw)]
+
+
+def _response_sheets(result: Result, options: argparse.Namespace) -> list[_Sheet]:
+    from gearchaos.figures.lanes import select_lanes
+    from gearchaos.figures.response_lane import COORDINATE
+    from gearchaos.figures.response_page import lane_in_a_name, response_page
+    from gearchaos.figures.style import DOUBLE_COLUMN_MM
+
+    if options.full_range:
+        raise ConfigurationError(
+            f"--full-range: {options.result} is a response; it belongs to the diagram of a sweep"
+        )
+    _, chosen, diverged = select_lanes(result, (options.low, options.high))
+    lanes = (chosen & ~diverged).nonzero()[0].tolist()
+    if not lanes:
+        raise ConfigurationError(f"{options.result}: nothing to draw: every lane diverged")
+    coordinate = "" if options.variable in (None, COORDINATE) else f"_{options.variable}"
+    draw = partial(
+        response_page,
+        result,
+        coordinate=options.variable,
+        width_mm=options.width or DOUBLE_COLUMN_MM,
+        height_mm=options.height,
+    )
+    return [
+        _Sheet(f"_{lane_in_a_name(result, lane)}{coordinate}", partial(draw, lane))
+        for lane in lanes
+    ]
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -73,7 +132,7 @@ def _parser() -> argparse.ArgumentParser:
         allow_abbrev=False,
     )
     add = parser.add_argument
-    add("result", type=Path, metavar="RESULT.h5", help="result file of a sweep")
+    add("result", type=Path, metavar="RESULT.h5", help="result file of a sweep or a response")
     add(
         "-o",
         "--output",
@@ -81,16 +140,20 @@ def _parser() -> argparse.ArgumentParser:
         help="folder for the figures, their name without its ending, or one file .png or .pdf",
     )
     add("--format", metavar="FORMATS", help="png, pdf or both (default: png,pdf)")
-    add("--variable", metavar="NAME", help="section variable (default: section_delta_5)")
+    add(
+        "--variable",
+        metavar="NAME",
+        help="section variable of a sweep (default: section_delta_5), coordinate of a response "
+        "(default: delta_5)",
+    )
     add("--from", dest="low", type=_number, metavar="VALUE", help="lowest parameter to show")
     add("--to", dest="high", type=_number, metavar="VALUE", help="highest parameter to show")
     add("--full-range", action="store_true", help="show every lane, however few lie far out")
     add(
         "--width",
         type=_width,
-        default=85.0,
         metavar="MM",
-        help="width of the page (default: 85, one column of a journal; two: 180)",
+        help="width of the page (default: 85, one column of a journal; a response: 180, two)",
     )
     add("--height", type=_height, metavar="MM", help="height of the page (default: by the width)")
     add("--dpi", type=_dpi, default=300, help="pixels per inch (default: 300)")
@@ -100,7 +163,7 @@ def _parser() -> argparse.ArgumentParser:
     return parser
 
 
-def _targets(options: argparse.Namespace) -> list[Path]:
+def _targets(options: argparse.Namespace, name: str, alone: bool) -> list[Path]:
     from gearchaos.figures.files import FORMATS
 
     formats = FORMATS
@@ -111,36 +174,26 @@ def _targets(options: argparse.Namespace) -> list[Path]:
             raise ConfigurationError(
                 f"--format: {', '.join(unknown)} is none of {', '.join(FORMATS)}"
             )
-    name = _default_name(options)
+    path: Path = options.result
+    stem = path.stem if path.suffix.lower() in RESULT_ENDINGS else path.name
     if options.output is None:
-        return [options.result.parent / f"{name}.{kind}" for kind in formats]
+        return [path.parent / f"{stem}{name}.{kind}" for kind in formats]
     output = Path(options.output)
     if output.is_dir() or options.output.endswith(("/", "\\")):
-        return [output / f"{name}.{kind}" for kind in formats]
+        return [output / f"{stem}{name}.{kind}" for kind in formats]
     ending = output.suffix.lower().removeprefix(".")
-    if ending in FORMATS:
-        if options.format is not None and formats != (ending,):
-            raise ConfigurationError(
-                f"--output {output} is one {ending} file, but --format asks for "
-                f"{','.join(formats)}; leave the ending off"
-            )
+    if ending not in FORMATS:
+        base = output.name if alone else f"{output.name}{name}"
+        return [output.with_name(f"{base}.{kind}") for kind in formats]
+    if options.format is not None and formats != (ending,):
+        other = f"--format asks for {','.join(formats)}"
+    elif not alone:
+        other = "there are several pages to draw"
+    else:
         return [output]
-    return [output.with_name(f"{output.name}.{kind}") for kind in formats]
-
-
-def _default_name(options: argparse.Namespace) -> str:
-    """Name what is drawn, so that a detail does not take the place of the whole."""
-    from gearchaos.figures.bifurcation import DEFAULT_VARIABLE
-
-    path: Path = options.result
-    name = path.stem if path.suffix.lower() in RESULT_ENDINGS else path.name
-    if options.variable not in (None, DEFAULT_VARIABLE):
-        name += f"_{options.variable}"
-    if options.low is not None:
-        name += f"_from_{options.low:g}"
-    if options.high is not None:
-        name += f"_to_{options.high:g}"
-    return name
+    raise ConfigurationError(
+        f"--output {output} is one {ending} file, but {other}; leave the ending off"
+    )
 
 
 def _check_targets(targets: Sequence[Path], result: Path, overwrite: bool) -> None:

@@ -4,12 +4,24 @@ from gearchaos.figures.bifurcation import BifurcationArtists, bifurcation
 from gearchaos.figures.files import save_figure
 from gearchaos.figures.lyapunov import LyapunovArtists, lyapunov
 from gearchaos.figures.page import bifurcation_page
+from gearchaos.figures.response import (
+    amplitude_spectrum,
+    phase_portrait,
+    poincare_section,
+    time_history,
+)
+from gearchaos.figures.response_page import response_page
 
 __all__ = [
     "BifurcationArtists",
     "LyapunovArtists",
+    "amplitude_spectrum",
     "bifurcation",
     "bifurcation_page",
     "lyapunov",
+    "phase_portrait",
+    "poincare_section",
+    "response_page",
     "save_figure",
+    "time_history",
 ]

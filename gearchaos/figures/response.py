@@ -1,0 +1,248 @@
+"""One lane of a response: time history, phase portrait, Poincare section, amplitude spectrum."""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection
+from matplotlib.lines import Line2D
+from matplotlib.ticker import MaxNLocator
+
+from gearchaos.errors import ConfigurationError
+from gearchaos.figures.labels import axis_label, plain
+from gearchaos.figures.lanes import Between, Floats
+from gearchaos.figures.response_lane import (
+    COORDINATE,
+    motion_of,
+    repeats_after,
+    samples_per_period,
+)
+from gearchaos.figures.style import DIVERGED, EXPONENT, POINTS, SMALL_FONT_PT
+from gearchaos.motion.amplitude_spectrum import spectral_lines
+from gearchaos.results.response_variables import TIME, acceleration_of
+from gearchaos.results.result import Result
+
+HIGHEST_ORDER = 8.0
+DECADES = 5
+"""Decades that a logarithmic spectrum shows, up to that of its highest line."""
+
+_LINE_LENGTH = 26
+_MARGIN = 0.06
+_MANY_LINES = 64
+_SMALLEST_SHARE = 0.2
+"""A section takes at least this share of the phase portrait: points that coincide stay one."""
+
+
+def time_history(
+    axes: Axes,
+    result: Result,
+    lane: int,
+    variable: str = COORDINATE,
+    *,
+    between: Between = (None, None),
+) -> Line2D:
+    """Draw a variable against time in mesh periods.
+
+    Parameters
+    ----------
+    axes : matplotlib.axes.Axes
+    result : Result
+        A response.
+    lane : int
+        Number of the lane, from 0.
+    variable : str
+        A variable over time, such as ``"delta_5_acceleration"`` or ``"mesh_force_tangential"``.
+    between : (float or None, float or None)
+        Mesh periods to show; None: as far as the record goes.
+
+    Returns
+    -------
+    Line2D
+
+    Raises
+    ------
+    ConfigurationError
+        If the result is no response, or has no such lane or variable, or the lane diverged.
+    """
+    values = motion_of(result, lane, variable)
+    time = result[TIME]
+    low = time[0] if between[0] is None else between[0]
+    high = time[-1] if between[1] is None else between[1]
+    shown = (time >= low) & (time <= high)
+    if np.count_nonzero(shown) < 2:
+        raise ConfigurationError(
+            f"nothing between {low:g} and {high:g} mesh periods; the record has {time[-1]:g}"
+        )
+    (line,) = axes.plot(time[shown], values[shown], color=POINTS, linewidth=0.6)
+    axes.set_xlim(low, high)
+    axes.set_xlabel(axis_label(result, TIME))
+    _label_upwards(axes, result, variable)
+    return line
+
+
+def phase_portrait(
+    axes: Axes, result: Result, lane: int, coordinate: str = COORDINATE
+) -> tuple[Line2D, Line2D]:
+    """Draw velocity against displacement, with the points at the beginning of each mesh period.
+
+    Parameters
+    ----------
+    axes : matplotlib.axes.Axes
+    result : Result
+        A response.
+    lane : int
+        Number of the lane, from 0.
+    coordinate : str
+        Such as ``"delta_5"``.
+
+    Returns
+    -------
+    curve, points : Line2D
+
+    Raises
+    ------
+    ConfigurationError
+        As `time_history`.
+    """
+    displacement, velocity = _plane(result, lane, coordinate)
+    (curve,) = axes.plot(displacement, velocity, color=POINTS, linewidth=0.4)
+    steps = samples_per_period(result)
+    points = _points(axes, displacement[::steps], velocity[::steps], markersize=2.4)
+    _label_plane(axes, result, coordinate)
+    return curve, points
+
+
+def poincare_section(axes: Axes, result: Result, lane: int, coordinate: str = COORDINATE) -> Line2D:
+    """Draw the states at the beginning of all recorded mesh periods.
+
+    Parameters are those of `phase_portrait`. The axes reach over at least a fifth of the phase
+    portrait, so that the points of a periodic motion coincide.
+
+    Returns
+    -------
+    Line2D
+
+    Raises
+    ------
+    ConfigurationError
+        As `time_history`.
+    """
+    displacement, velocity = _plane(result, lane, coordinate)
+    x, y = (result[f"section_{name}"][lane] for name in (coordinate, f"{coordinate}_rate"))
+    limits = _limits(x, displacement), _limits(y, velocity)
+    places = np.round(
+        [(v - low) / (high - low) for v, (low, high) in zip((x, y), limits, strict=True)], 3
+    )
+    # Few points are seen as such only if they are large.
+    markersize = np.clip(40.0 / np.unique(places, axis=1).shape[1], 1.5, 3.5)
+    points = _points(axes, x, y, float(markersize))
+    axes.set_xlim(limits[0])
+    axes.set_ylim(limits[1])
+    _label_plane(axes, result, coordinate)
+    return points
+
+
+def amplitude_spectrum(
+    axes: Axes,
+    result: Result,
+    lane: int,
+    variable: str | None = None,
+    *,
+    highest: float = HIGHEST_ORDER,
+    window: str = "rectangular",
+    logarithmic: bool = False,
+) -> LineCollection:
+    """Draw the single-sided amplitude spectrum; a sine of amplitude A is a line of height A.
+
+    A motion that repeats is transformed over as many of its periods as the record holds, so that
+    all its lines are those of the transform; any other one over the whole record.
+
+    Parameters
+    ----------
+    axes : matplotlib.axes.Axes
+    result : Result
+        A response.
+    lane : int
+        Number of the lane, from 0.
+    variable : str, optional
+        A variable over time; default ``"delta_5_acceleration"``.
+    highest : float
+        Multiple of the mesh frequency up to which lines are shown.
+    window : str
+        ``"rectangular"``, exact for a motion that repeats, or ``"hann"``.
+    logarithmic : bool
+        Show five decades up to that of the highest line, instead of a linear scale.
+
+    Returns
+    -------
+    LineCollection
+        One segment per line, from the bottom of the axes to its height.
+
+    Raises
+    ------
+    ConfigurationError
+        As `time_history`.
+    """
+    variable = acceleration_of(COORDINATE) if variable is None else variable
+    values, steps = motion_of(result, lane, variable), samples_per_period(result)
+    period = repeats_after(result, lane) or 1
+    periods = values.size // (steps * period) * period or values.size // steps
+    record = values[-1 - periods * steps : -1]
+    order, amplitude = spectral_lines(record, steps, window)
+    shown = order <= highest
+    order, amplitude = order[shown], amplitude[shown]
+    top, floor = (1.0 + _MARGIN) * float(amplitude.max()) or 1.0, 0.0
+    if logarithmic:
+        top = 10.0 ** np.ceil(np.log10(top))
+        floor = top * 10.0**-DECADES
+        axes.set_yscale("log")
+    seen = amplitude > floor
+    width = 0.5 if np.count_nonzero(amplitude > 1e-3 * top) > _MANY_LINES else 1.0
+    lines = axes.vlines(order[seen], floor, amplitude[seen], color=EXPONENT, linewidth=width)
+    axes.set_ylim(floor, top)
+    spare = 0.02 * highest
+    axes.set_xlim(-spare, highest + spare)
+    axes.set_xlabel("Frequency over mesh frequency")
+    axes.xaxis.set_major_locator(MaxNLocator(9, integer=True))
+    symbol = result.attributes(variable).get("symbol") or plain(variable)
+    axes.set_ylabel(f"Amplitude of {symbol}")
+    axes.set_title(
+        f"{window.capitalize()} window, {periods} mesh period{'s' if periods > 1 else ''}",
+        loc="right",
+        fontsize=SMALL_FONT_PT,
+        fontweight="normal",
+    )
+    return lines
+
+
+def _plane(result: Result, lane: int, coordinate: str) -> tuple[Floats, Floats]:
+    return motion_of(result, lane, coordinate), motion_of(result, lane, f"{coordinate}_rate")
+
+
+def _points(axes: Axes, x: Floats, y: Floats, markersize: float) -> Line2D:
+    (points,) = axes.plot(
+        x,
+        y,
+        linestyle="none",
+        marker="o",
+        markersize=markersize,
+        markeredgewidth=0.0,
+        color=DIVERGED,
+        zorder=3,
+    )
+    return points
+
+
+def _limits(section: Floats, curve: Floats) -> tuple[float, float]:
+    reach = (0.5 + _MARGIN) * max(np.ptp(section), _SMALLEST_SHARE * np.ptp(curve)) or 1.0
+    middle = (section.min() + section.max()) / 2.0
+    return float(middle - reach), float(middle + reach)
+
+
+def _label_plane(axes: Axes, result: Result, coordinate: str) -> None:
+    axes.set_xlabel(axis_label(result, coordinate))
+    _label_upwards(axes, result, f"{coordinate}_rate")
+
+
+def _label_upwards(axes: Axes, result: Result, variable: str) -> None:
+    axes.set_ylabel(axis_label(result, variable, _LINE_LENGTH), linespacing=1.2)

@@ -1,0 +1,74 @@
+"""What the figures of a response are drawn from: the motion of one lane, and when it repeats."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from gearchaos.errors import ConfigurationError
+from gearchaos.figures.bifurcation import section_variables
+from gearchaos.figures.lanes import Floats
+from gearchaos.motion.period import motion_period
+from gearchaos.results.response_variables import TIME, acceleration_of
+from gearchaos.results.result import Result
+
+COORDINATE = "delta_5"
+"""The coordinate that is drawn unless another is asked for: the torsion."""
+
+
+def is_response(result: Result) -> bool:
+    """Whether a result holds the motion of its lanes in time."""
+    return bool(response_variables_of(result))
+
+
+def response_variables_of(result: Result) -> tuple[str, ...]:
+    """Return the variables that run over time as numbers: all but the contact states."""
+    return tuple(
+        name
+        for name in result.names
+        if result.dims(name)[1:] == (TIME,) and not result.variables[name].flags
+    )
+
+
+def coordinates_of(result: Result) -> tuple[str, ...]:
+    """Return the coordinates whose motion a response holds, `delta_5` first."""
+    names = response_variables_of(result)
+    return tuple(name for name in names if acceleration_of(name) in names)
+
+
+def repeats_after(result: Result, lane: int) -> int:
+    """Return after how many mesh periods the motion of a lane repeats, 0 for none up to 16."""
+    section = np.stack([result[name][lane] for name in section_variables(result)], axis=1)
+    return int(motion_period(section[np.newaxis])[0])
+
+
+def samples_per_period(result: Result) -> int:
+    """Return how many samples of a response make a mesh period."""
+    return int(np.searchsorted(result[TIME], 1.0))
+
+
+def motion_of(result: Result, lane: int, variable: str) -> Floats:
+    """Return a variable of one lane over time.
+
+    Raises
+    ------
+    ConfigurationError
+        If the result is no response, or has no such lane or variable, or the lane diverged.
+    """
+    names = response_variables_of(result)
+    if not names:
+        raise ConfigurationError(
+            "the result holds no motion in time; compute one with python -m gearchaos.response"
+        )
+    if variable not in names:
+        raise ConfigurationError(
+            f"no variable {variable!r} over time in the result; it has {', '.join(names)}"
+        )
+    lanes = result[result.axis].size
+    if not 0 <= lane < lanes:
+        raise ConfigurationError(f"no lane {lane} in the result; it has 0 to {lanes - 1}")
+    values = np.asarray(result[variable][lane], dtype=np.float64)
+    if not np.isfinite(values).all():
+        raise ConfigurationError(
+            f"{result.axis} = {result[result.axis][lane]:g}: the lane diverged, it has no motion"
+        )
+    return values

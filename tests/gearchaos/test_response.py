@@ -1,0 +1,242 @@
+"""The time response: what it keeps of a motion, its file, and the command that computes it."""
+
+import shutil
+import subprocess
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from gearchaos import ConfigurationError, Result, load_config, open_result, respond
+from gearchaos.engine.response_run import ResponseRun
+from gearchaos.response import main
+
+from .commands import run_module, same_data
+
+FULL = Path(__file__).resolve().parents[2] / "sweeps" / "pan2021_full.toml"
+STEPS, PERIODS, RECORDED = 192, 3, 6
+SHORT = (
+    f"integration.steps_per_period={STEPS}",
+    "integration.transient_periods=150",
+    f"integration.recorded_periods={RECORDED}",
+    "outputs.section_points=2",
+)
+COORDINATES = ("delta_5", "delta_1", "delta_2", "delta_3", "delta_4")
+STATES = tuple(name for c in COORDINATES for name in (c, f"{c}_rate"))
+
+
+def at(*values: float) -> tuple[str, ...]:
+    return (*SHORT, f'sweep={{ parameter = "pitch_error", values = {list(values)} }}')
+
+
+@pytest.fixture(scope="module")
+def result() -> Result:
+    """Give a motion in permanent contact, and one that hammers between both flanks."""
+    return respond(load_config(FULL, at(0.2, 12.97)), PERIODS)
+
+
+def test_the_record_has_every_step_of_the_last_periods(result):
+    time = result["time"]
+    assert time.size == PERIODS * STEPS + 1
+    assert (time[0], time[1], time[-1]) == (0.0, 1.0 / STEPS, PERIODS)
+    assert result.dims("delta_5") == ("pitch_error", "time")
+    np.testing.assert_allclose(result["mesh_period"], 1.0 / 0.1394, rtol=1e-12)
+
+
+def test_the_sections_are_those_of_all_recorded_periods_and_meet_the_record(result):
+    for name in STATES:
+        assert result[f"section_{name}"].shape == (2, RECORDED)
+        once_a_period = result[name][:, ::STEPS]
+        np.testing.assert_array_equal(once_a_period, result[f"section_{name}"][:, -PERIODS - 1 :])
+    last = np.stack([result[name][:, -1] for name in STATES], axis=1)
+    np.testing.assert_array_equal(last, result["end_state"])
+
+
+@pytest.mark.parametrize("coordinate", COORDINATES)
+def test_accelerations_are_the_derivative_of_the_velocities(result, coordinate):
+    """Differences of order 4: exact to (omega h)^4 / 30 for the fastest wave, the bearing's."""
+    rate, acceleration = (result[f"{coordinate}_{kind}"] for kind in ("rate", "acceleration"))
+    step = result["mesh_period"][:, np.newaxis] / STEPS
+    differences = 8.0 * (rate[:, 3:-1] - rate[:, 1:-3]) - (rate[:, 4:] - rate[:, :-4])
+    off = np.abs(differences / (12.0 * step) - acceleration[:, 2:-2])
+    contact = 3 * result["contact_tangential"] + result["contact_axial"]
+    windows = np.lib.stride_tricks.sliding_window_view(contact, 5, axis=1)
+    steady = np.all(windows == windows[:, :, :1], axis=2)
+    assert 0.7 < np.mean(steady) < 1.0
+    fastest = np.sqrt(result.parameters["transverse_stiffness_p"].value) * step[0, 0]
+    assert np.max(off[steady]) < 2.0 * fastest**4 / 30.0 * np.max(np.abs(acceleration))
+
+
+def test_over_a_period_the_mesh_force_carries_the_load(result):
+    """The mean of eq. 13, row delta_5: cos(beta_b) N_y = f_n, for a motion of period 1."""
+    load = result.parameters["load"].value
+    angle = np.radians(result.parameters["base_helix_angle_deg"].value)
+    force = result["mesh_force_tangential"][0, :STEPS]
+    assert np.mean(force) == pytest.approx(load / np.cos(angle), rel=1e-7)
+    assert np.ptp(force) > 0.01
+
+
+def test_only_the_lane_that_hammers_loses_contact_and_reaches_the_back_flank(result):
+    driving = result["contact_tangential"][0]
+    assert set(driving.tolist()) == {1}
+    assert set(result["contact_tangential"][1].tolist()) == {0, 1, 2}
+    assert result.attributes("contact_axial")["flag_meanings"] == "apart driving_flank back_flank"
+
+
+def test_the_response_is_the_sweep_with_its_motion(result):
+    """Labels, exponents, sections and end states are those of the same lanes in a sweep."""
+    run = ResponseRun(load_config(FULL, at(0.2, 12.97)), 1)
+    shorter = run.result()
+    assert run.lanes == 2
+    assert set(shorter.names) == set(result.names)
+    for name in set(result.names) - {"time"}:
+        if "time" not in result.dims(name):
+            np.testing.assert_array_equal(shorter[name], result[name])
+        else:
+            np.testing.assert_array_equal(shorter[name], result[name][:, -STEPS - 1 :])
+
+
+def test_a_carried_sweep_keeps_the_motion_of_every_lane(result):
+    carried = respond(load_config(FULL, (*at(0.2, 12.97), "start.carry=upwards")), PERIODS)
+    np.testing.assert_array_equal(carried["delta_5"][0], result["delta_5"][0])
+    assert np.isfinite(carried["delta_5"][1]).all()
+
+
+def test_a_lane_that_diverged_has_no_motion():
+    diverging = respond(load_config(FULL, (*at(0.2), "groups.load=1e150")), PERIODS)
+    assert diverging["status"].tolist() == [1]
+    assert np.isnan(diverging["delta_5"]).all()
+    assert np.isnan(diverging["mesh_force_axial"]).all()
+    assert (diverging["contact_tangential"] == 255).all()
+
+
+def test_the_axial_motion_is_there_where_a_sweep_would_leave_it_out():
+    config = load_config(FULL, (*at(0.2), "outputs.lyapunov=false", 'outputs.section=["delta_5"]'))
+    assert "axial" not in config.needed_effects
+    run = ResponseRun(config, 1)
+    assert run.states == STATES
+    assert {"delta_3_acceleration", "mesh_force_axial"} <= {v.name for v in run.variables}
+
+
+@pytest.mark.parametrize("periods", [0, -1, RECORDED + 1])
+def test_more_periods_than_are_recorded_are_refused(periods):
+    config = load_config(FULL, at(1.0))
+    with pytest.raises(
+        ConfigurationError, match=r"periods = .*recorded_periods = 6; ask for fewer"
+    ):
+        respond(config, periods)
+
+
+def test_a_response_that_no_memory_holds_is_refused_before_it_is_computed():
+    config = load_config(FULL, (*at(1.0), "integration.recorded_periods=10_000_000"))
+    with pytest.raises(ConfigurationError, match=r"10000000 mesh periods.*more than 4.00GB"):
+        respond(config, 10_000_000)
+
+
+@pytest.fixture(scope="module")
+def path(result: Result, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("response") / "response.h5"
+    result.save(path)
+    return path
+
+
+def test_what_is_read_is_what_was_saved(result, path, tmp_path):
+    again = open_result(path)
+    assert same_data(again, result)
+    assert again.metadata["kind"] == "response"
+    assert again.metadata["configuration"] == FULL.read_text()
+    for name in result:
+        assert again.dims(name) == result.dims(name)
+        np.testing.assert_equal(again.attributes(name), result.attributes(name))
+    again.save(tmp_path / "again.h5")
+    assert same_data(open_result(tmp_path / "again.h5"), result)
+
+
+@pytest.mark.parametrize("engine", ["netcdf4", "h5netcdf"])
+def test_xarray_reads_time_as_a_coordinate(engine: Any, path, result):
+    with xr.open_dataset(path, engine=engine, mask_and_scale=False) as dataset:
+        assert {"pitch_error", "time"} <= set(dataset.coords)
+        for name in result:
+            assert dataset[name].dims == result.dims(name)
+            np.testing.assert_array_equal(dataset[name].values, result[name])
+        middle = dataset["delta_5"].sel(time=1.5, pitch_error=12.97)
+        assert middle.item() == result["delta_5"][1, 3 * STEPS // 2]
+
+
+def test_h5dump_shows_the_contact(path):
+    if shutil.which("h5dump") is None:
+        pytest.skip("h5dump is not installed")
+    command = ["h5dump", "-A", "-d", "/contact_axial", str(path)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert '"apart driving_flank back_flank"' in done.stdout
+
+
+def command(*arguments: str) -> list[str]:
+    settings = [part for override in SHORT for part in ("--set", override)]
+    return [str(FULL), "--periods", str(PERIODS), *settings, *arguments]
+
+
+@pytest.mark.slow
+def test_the_command_computes_the_values_asked_for(tmp_path, result):
+    asked = command("--pitch-error", "12.97", "--pitch-error", "0.2")
+    ended = run_module("gearchaos.response", *asked, cwd=tmp_path)
+    assert (ended.code, ended.out) == (0, "pan2021_full_response.h5\n")
+    summary = "2 lanes over pitch_error, 3 mesh periods of 192 steps, 0 diverged\n"
+    assert ended.err.endswith(f"gearchaos response: {summary}")
+    assert same_data(open_result(tmp_path / "pan2021_full_response.h5"), result)
+
+
+def test_at_takes_values_of_the_parameter_that_is_swept(tmp_path, capsys):
+    output = str(tmp_path / "load.h5")
+    swept = ("--set", 'sweep={ parameter = "load", from = 0.1, to = 0.3, count = 3 }')
+    fixed = ("--set", "groups.pitch_error=0.5")
+    assert main(command("--at", "0.2", *swept, *fixed, "-q", "-o", output)) == 0
+    assert capsys.readouterr() == (f"{output}\n", "")
+    found = open_result(output)
+    assert found["load"].tolist() == [0.2]
+    assert main(command("--at", "0.2", *swept, *fixed, "-o", output)) == 4
+    assert "--overwrite" in capsys.readouterr().err
+    assert same_data(open_result(output), found)
+
+
+def test_diverged_lanes_are_kept_and_told(tmp_path, capsys):
+    output = str(tmp_path / "diverged.h5")
+    asked = command("--pitch-error", "1", "--set", "groups.load=1e150", "-o", output)
+    assert main(asked) == 3
+    out, err = capsys.readouterr()
+    assert out == f"{output}\n"
+    assert "1 of 1 lanes diverged" in err
+    assert open_result(output)["diverged_period"][0] >= 0
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ([], "one of the arguments --pitch-error --at is required"),
+        (["--at", "1", "--pitch-error", "1"], "not allowed with"),
+        (["--at", "5,86"], "invalid float value: '5,86'"),
+        (["--pitch-error", "nan"], "must be a finite number"),
+        (["--pitch-error", "1", "--periods", "7"], "integration.recorded_periods = 6"),
+        (["--pitch-error", "1", "--threads", "0"], "threads = 0"),
+        (["--pitch-error", "1", "--set", 'scene.effects=["backlash"]'], "an effect that is off"),
+    ],
+)
+def test_what_cannot_be_computed_is_a_usage_error(tmp_path, arguments, message, capsys):
+    output = tmp_path / "none.h5"
+    assert main(command(*arguments, "-o", str(output))) == 2
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert message in err
+    assert not output.exists()
+
+
+def test_the_configuration_is_never_replaced(tmp_path, capsys):
+    config = tmp_path / "gears.toml"
+    shutil.copy(FULL, config)
+    asked = [str(config), "--pitch-error", "1", "--overwrite", "-o", str(config)]
+    assert main(asked) == 4
+    assert "is the configuration itself" in capsys.readouterr().err
+    assert config.read_text() == FULL.read_text()
