@@ -1,4 +1,4 @@
-"""The console script: ``gearchaos sweep``, ``gearchaos plot``."""
+"""The console script: ``gearchaos sweep``, ``gearchaos plot`` and the other commands."""
 
 from __future__ import annotations
 
@@ -11,7 +11,12 @@ from gearchaos.command_line import OK, USAGE, version_text
 COMMANDS = {
     "sweep": "compute a sweep from a configuration file",
     "plot": "draw a result file",
+    "stages": "list the stages of a sweep, and refine their boundaries",
+    "response": "compute a motion at every step of some mesh periods",
+    "reproduce": "compute, draw and compare everything that a paper shows",
+    "info": "tell what a result file holds, and verify it",
     "accuracy": "measure what accuracy costs on some lanes of a sweep",
+    "merge": "join what several jobs have computed of one sweep",
     "configuration": "print the JSON Schema of a configuration file",
 }
 _HOMES = {"configuration": "gearchaos.configuration.__main__"}

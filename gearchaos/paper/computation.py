@@ -1,0 +1,106 @@
+"""Everything that the gallery shows, computed from two configurations."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from gearchaos.configuration import Configuration
+from gearchaos.engine.response_run import respond
+from gearchaos.engine.running import run
+from gearchaos.paper.hop import STEP, Hop, find_hop
+from gearchaos.paper.published import published
+from gearchaos.results.result import Result
+
+KEPT_PERIODS = 64
+"""Mesh periods of a response: lines of a spectrum 1/64 of the mesh frequency apart."""
+
+Notify = Callable[[str], None]
+
+
+@dataclass(frozen=True, eq=False)
+class Reproduction:
+    """What was computed to answer the paper.
+
+    Attributes
+    ----------
+    config : Configuration
+        Of the torsional diagram, figure 7.
+    sweep : Result
+        Figure 7.
+    hop : Hop or None
+        The hop in figure 7, with the interval in which two motions coexist.
+    response : Result
+        All effects, at rest at the start: without pitch error and at those of figures 5, 6, 14
+        and 15 and of Table 3.
+    motions, motions_from_contact : Result
+        The pitch errors of figures 8 to 13, at rest at the start and from the contact flank.
+    """
+
+    config: Configuration
+    sweep: Result
+    hop: Hop | None
+    response: Result
+    motions: Result
+    motions_from_contact: Result
+
+
+def compute(
+    config: Configuration,
+    full: Configuration,
+    *,
+    hop_step: float = STEP,
+    periods: int = KEPT_PERIODS,
+    threads: int | None = None,
+    notify: Notify = lambda _: None,
+) -> Reproduction:
+    """Compute the gallery.
+
+    Parameters
+    ----------
+    config, full : Configuration
+        ``pan2021.toml`` and ``pan2021_full.toml``; coarser ones give a coarser gallery sooner.
+    hop_step : float
+        Step of the carried sweeps between which the hop lies.
+    periods : int
+        Mesh periods of which every step is kept.
+    threads : int, optional
+        Threads to use; by default all that there are.
+    notify : callable
+        Told what comes next.
+    """
+    printed = published()
+    notify(f"figure 7: {config.sweep.span[2]} pitch errors")
+    sweep = run(config, threads)
+    notify("the hop of figure 7: both motions, upwards and downwards")
+    hop = find_hop(config, step=hop_step, threads=threads)
+    notify("figures 5, 6, 14 and 15: accelerations of all coordinates")
+    response = respond(_at(full, [0.0, *printed.increments.pitch_errors]), periods, threads)
+    notify("figures 8 to 13: motions at six pitch errors")
+    shown = _at(config, [motion.pitch_error for motion in printed.motions])
+    motions, from_contact = (
+        respond(shown.replace("start", {"kind": kind}), periods, threads)
+        for kind in ("rest", "contact")
+    )
+    return Reproduction(config, sweep, hop, response, motions, from_contact)
+
+
+def _at(config: Configuration, pitch_errors: list[float]) -> Configuration:
+    return config.replace("sweep", {"parameter": "pitch_error", "values": pitch_errors})
+
+
+def lane_of(result: Result, pitch_error: float) -> int:
+    """Return the number of the lane next to a pitch error."""
+    return int(np.argmin(np.abs(result[result.axis] - pitch_error)))
+
+
+def largest_acceleration(result: Result, pitch_error: float, coordinate: str = "delta_5") -> float:
+    """Return the largest acceleration of a coordinate over a response.
+
+    Signed, not in magnitude: so read, the growth between the pitch errors of figure 14 is as even
+    as the paper prints it.
+    """
+    values = result[f"{coordinate}_acceleration"][lane_of(result, pitch_error)]
+    return float(np.max(values))

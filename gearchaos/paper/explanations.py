@@ -1,0 +1,126 @@
+"""What the report explains in sentences, from what was computed: stages, hop, increments."""
+
+from __future__ import annotations
+
+from collections import Counter
+from itertools import pairwise
+
+import numpy as np
+
+from gearchaos.motion.stability_loss import StabilityLoss
+from gearchaos.paper.comparison import signed
+from gearchaos.paper.computation import Reproduction, lane_of
+from gearchaos.paper.hop_figure import STARTS
+from gearchaos.paper.published import Published
+from gearchaos.paper.stages import motions_between
+
+
+def short(value: float) -> str:
+    """Write a number in four digits, with a true minus sign."""
+    return f"{value:.4g}".replace("-", "−")
+
+
+def stages_in_words(printed: Published, found: Reproduction) -> str:
+    """Tell what lies in the stages that do not agree, and in the last one."""
+    texts = []
+    for stage in printed.stages:
+        if stage.printed or stage is printed.stages[-1]:
+            counts = Counter(motions_between(found.sweep, stage.first, stage.last))
+            worded = ", ".join(f"{count} {label}" for label, count in counts.most_common(6))
+            texts.append(
+                f'In the paper\'s stage "{stage.words}", {stage.first:g} to {stage.last:g} e(τ), '
+                f"the {counts.total()} lanes of the sweep are: {worded}."
+            )
+    if "quasi-periodic" not in motions_between(
+        found.sweep, *found.sweep[found.sweep.axis][[0, -1]]
+    ):
+        texts.append(
+            "A motion is called quasi-periodic if its largest exponent is zero within its error "
+            "and its averages converge as those on a torus do. None was found: between period 2 "
+            "and chaos lie motions of longer periods."
+        )
+    texts.append(
+        "Towards the end of the sweep chaos is transient: lanes escape to a coexisting motion of "
+        "period 1 and much larger amplitude."
+    )
+    return " ".join(texts)
+
+
+def hop_in_words(printed: Published, found: Reproduction) -> str:
+    """Tell where two motions coexist, where starts change over, and what the exponents are."""
+    hop, paper = found.hop, printed.numbers["hop"].value
+    if hop is None:
+        return "Sweeps upwards and downwards agree everywhere: no hop was found."
+    theirs = printed.numbers["hop_exponent_before"].value
+    starts = [
+        f"a start {'on the ' if kind == 'contact' else ''}{STARTS[kind]} changes between "
+        f"{change.before:.3f} and {change.after:.3f}"
+        + (f" (and {change.returns} times back)" if change.returns else "")
+        for kind, change in hop.changes.items()
+    ]
+    upper, lower = (
+        float(sweep["crossings_per_period"][lane_of(sweep, paper)])
+        for sweep in (hop.upwards, hop.downwards)
+    )
+    rest = hop.changes.get("rest")
+    texts = [
+        "The hop is not a bifurcation at one pitch error. Two motions of period 1 coexist from "
+        f"*P* = {hop.first:.4f}, where the sweep downwards loses the one "
+        f"({_ending(hop.losses[0])}), to *P* = {hop.last:.4f}, where the sweep upwards loses the "
+        f"other ({_ending(hop.losses[1])}). At {paper:g} e(τ) the motion of the upward sweep "
+        f"crosses {upper:g} clearance boundaries per period, "
+        f"that of the downward sweep {lower:g}{_parting(upper, lower)}. Which of the two "
+        "a computation shows depends on its start state, "
+        "which the paper does not give: "
+        f"{'; '.join(starts)}. The paper's {paper:g} lies {_position(hop.share(paper))}. That a "
+        "start at rest puts the hop near it is why it was chosen.",
+    ]
+    if rest is not None:
+        values = found.sweep[found.sweep.axis]
+        exponents = found.sweep["lyapunov_exponent"][values <= rest.before]
+        texts.append(
+            f"From the Floquet multipliers of the two orbits the largest exponent is "
+            f"{signed(rest.exponents[0], 5)} before the hop and "
+            f"{signed(rest.exponents[1], 5)} after it, where the paper prints "
+            f"{signed(theirs, 4)}. While the teeth stay in contact the model is linear, "
+            "so the pitch error is a mere forcing and does not enter the exponent: over all lanes "
+            f"before the hop it varies by {np.ptp(exponents):.0e}. With these groups no pitch "
+            "error before the hop can have the printed exponent."
+        )
+    return "\n\n".join(texts)
+
+
+def _ending(loss: StabilityLoss) -> str:
+    return loss.name.lower().replace("_", " ")
+
+
+def _parting(upper: float, lower: float) -> str:
+    parts = upper == 0.0 < lower
+    return ": on the one the teeth never part, on the other they do" if parts else ""
+
+
+def _position(share: float) -> str:
+    if 0.0 <= share <= 1.0:
+        return f"inside the interval, at {share:.0%} of it"
+    return "outside of the interval"
+
+
+def increments_in_words(printed: Published, found: Reproduction) -> str:
+    """Tell why the increments of figure 14 are even, and of what they are."""
+    response, steps = found.response, printed.increments.pitch_errors
+    groups = found.response.parameters
+    omega, amplitude = (
+        float(groups[name].value) for name in ("mesh_frequency", "pitch_error_amplitude")
+    )
+    magnitude = [
+        float(np.max(np.abs(response["delta_5_acceleration"][lane_of(response, p)]))) for p in steps
+    ]
+    grown = ", ".join(short(b - a) for a, b in pairwise(magnitude))
+    return (
+        "**Why the increments are even.** The largest torsional acceleration at 3 e(τ) and more "
+        "falls into the time in which the teeth are apart. There δ<sub>5</sub>″ = f<sub>n</sub> + "
+        "Ω² *P* e<sub>r</sub> sin Ωτ, but for damping: two e(τ) more add 2 Ω² e<sub>r</sub> = "
+        f"{short(2.0 * omega**2 * amplitude)}, whatever the motion. The first increment spans the "
+        'hop. This holds for the largest *signed* acceleration, as which "amplitude" is read; the '
+        f"largest magnitudes grow by {grown}, not at all as printed."
+    )

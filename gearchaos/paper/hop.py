@@ -1,0 +1,226 @@
+"""The hop of figure 7: two motions that coexist, where they do, and which one a start comes to.
+
+A pair that settles on one of two coexisting motions hops where its start passes from the basin of
+one into that of the other. The ends of the interval in which both exist belong to the pair; the
+place of a hop between them belongs to the start state as much as to the pair.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+from gearchaos_kernels import STATE_ROWS
+from numpy.typing import NDArray
+
+from gearchaos.configuration import Configuration
+from gearchaos.configuration.sweep_values import groups_at
+from gearchaos.engine.lanes import model
+from gearchaos.engine.running import run
+from gearchaos.engine.simulation import Simulation
+from gearchaos.motion.orbits import orbit_exponent, polish
+from gearchaos.motion.stability_loss import StabilityLoss, follow, loss_of_stability
+from gearchaos.results.result import Result
+
+Floats = NDArray[np.float64]
+
+LOW, HIGH = 0.5, 2.0
+"""Pitch errors between which both motions are followed, in multiples of e(tau)."""
+
+STEP = 0.01
+"""Step of the carried sweeps."""
+
+FINENESS = 10
+"""Parts of a step between which the place of a hop is told."""
+
+WIDTH = 1e-4
+"""Width to which the ends of the interval are bisected."""
+
+FOLLOWING_PERIODS = 100
+"""Mesh periods of a carried sweep per value: its motion changes little from one to the next."""
+
+APART = 1e-3
+"""Distance of the section points, relative to the larger one, from which on motions differ."""
+
+
+@dataclass(frozen=True)
+class Change:
+    """Where a kind of start changes from one motion to the other.
+
+    Attributes
+    ----------
+    before, after : float
+        Last pitch error on the motion of the upward sweep, first one on the other.
+    returns : int
+        How often the start comes back to the first motion at higher pitch errors.
+    exponents : tuple of float
+        Largest Lyapunov exponents before and after, from the Floquet multipliers of the two
+        periodic orbits.
+    """
+
+    before: float
+    after: float
+    returns: int
+    exponents: tuple[float, float]
+
+
+@dataclass(frozen=True, eq=False)
+class Hop:
+    """Two coexisting motions, and where they take over from each other.
+
+    Attributes
+    ----------
+    upwards, downwards : Result
+        Carried sweeps; between the ends of the interval they are on different motions.
+    first, last : float
+        Ends of the interval of pitch errors in which both exist.
+    losses : tuple of StabilityLoss
+        How the motion of the downward sweep ends at `first`, that of the upward one at `last`.
+    changes : dict of str to Change
+        By the kind of the start.
+    """
+
+    upwards: Result
+    downwards: Result
+    first: float
+    last: float
+    losses: tuple[StabilityLoss, StabilityLoss]
+    changes: dict[str, Change]
+
+    def share(self, pitch_error: float) -> float:
+        """Return where a pitch error lies in the interval, 0 at its first and 1 at its last."""
+        return (pitch_error - self.first) / (self.last - self.first)
+
+
+def find_hop(
+    config: Configuration,
+    starts: tuple[str, ...] = ("rest", "contact"),
+    step: float = STEP,
+    threads: int | None = None,
+) -> Hop | None:
+    """Follow both motions, bisect the ends of their interval, and find where starts change over.
+
+    Parameters
+    ----------
+    config : Configuration
+        A sweep over ``pitch_error``.
+    starts : tuple of str
+        Kinds of start states whose hop is looked for.
+    step : float
+        Step of the carried sweeps.
+    threads : int, optional
+        Threads to use; by default all that there are.
+
+    Returns
+    -------
+    Hop or None
+        None where the sweeps upwards and downwards agree everywhere.
+    """
+    config = config.replace("outputs", {"section": config.scene.states, "section_points": 1})
+    config = config.replace("outputs.lyapunov", False).replace("outputs.motion", False)
+    config = config.replace("integration.recorded_periods", 1)
+    periods = min(FOLLOWING_PERIODS, config.integration.transient_periods)
+    carried = _over(config, LOW, HIGH, round((HIGH - LOW) / step) + 1)
+    carried = carried.replace("integration.transient_periods", periods)
+    upwards, downwards = (
+        run(carried.replace("start.carry", direction), threads)
+        for direction in ("upwards", "downwards")
+    )
+    both = np.flatnonzero(_apart(upwards, downwards))
+    if not both.size:
+        return None
+    first, falls = _end(config, downwards, int(both[0]), -step)
+    last, rises = _end(config, upwards, int(both[-1]), step)
+    fine = step / FINENESS
+    low, high = math.ceil(first / fine), math.floor(last / fine)
+    changes = {}
+    for kind in starts:
+        begun = config.replace("start", {"kind": kind})
+        within = _over(begun, low * fine, high * fine, high - low + 1)
+        change = _change(run(within, threads), within, upwards, downwards)
+        if change is not None:
+            changes[kind] = change
+    return Hop(upwards, downwards, first, last, (falls, rises), changes)
+
+
+def _over(config: Configuration, low: float, high: float, count: int) -> Configuration:
+    sweep = {"parameter": "pitch_error", "from": low, "to": high, "count": count}
+    return config.replace("sweep", sweep)
+
+
+def _section(result: Result) -> Floats:
+    """Section points of all lanes, shape (lanes, states)."""
+    names = [name for name in result.names if name.startswith("section_delta")]
+    return np.stack([result[name][:, -1] for name in names], axis=1)
+
+
+def _apart(one: Result, other: Result) -> NDArray[np.bool_]:
+    a, b = _section(one), _section(other)
+    size = np.maximum(np.abs(a), np.abs(b)).max(axis=1)
+    apart: NDArray[np.bool_] = np.abs(a - b).max(axis=1) > APART * size
+    return apart
+
+
+def _end(
+    config: Configuration, sweep: Result, lane: int, step: float
+) -> tuple[float, StabilityLoss]:
+    """Follow the period-1 orbit of a carried sweep beyond its last value, to where it ends."""
+    value = float(sweep[sweep.axis][lane])
+    simulation = Simulation(config)
+    followed = follow(
+        simulation.scene,
+        lambda values: model(groups_at(config, values), values.size),
+        *simulation.harmonics(),
+        _states(sweep, lane),
+        np.ones(1, dtype=np.int32),
+        np.array([value]),
+        np.array([value + step]),
+        WIDTH,
+        simulation.plan.steps_per_period,
+        rederived=config.formulation == "rederived",
+    )
+    loss = loss_of_stability(followed.stable.multipliers, followed.beyond.multipliers)
+    end = float(followed.stable_value[0])
+    return (end if np.isfinite(end) else value), StabilityLoss(int(loss.kind[0]))
+
+
+def _states(result: Result, lanes: int | slice) -> Floats:
+    """End states of some lanes, shape (lanes, 10), as the kernels take them."""
+    chosen = np.atleast_2d(result["end_state"][lanes])
+    states = np.zeros((chosen.shape[0], len(STATE_ROWS)))
+    states[:, [STATE_ROWS[str(name)] for name in result["state"]]] = chosen
+    return states
+
+
+def _change(found: Result, config: Configuration, first: Result, second: Result) -> Change | None:
+    near = partial(_distance, found)
+    on_first = near(first) < near(second)
+    changes = np.flatnonzero(on_first[:-1] & ~on_first[1:])
+    if not changes.size:
+        return None
+    lanes = slice(int(changes[0]), int(changes[0]) + 2)
+    before, after = found[found.axis][lanes].tolist()
+    simulation = Simulation(config)
+    numbers = np.arange(lanes.start, lanes.stop)
+    period = np.ones(2, dtype=np.int32)
+    orbits = polish(
+        simulation.scene,
+        simulation.model_of(numbers),
+        *simulation.harmonics(),
+        _states(found, lanes),
+        period,
+        simulation.plan.steps_per_period,
+        rederived=config.formulation == "rederived",
+    )
+    exponents = orbit_exponent(orbits.multipliers, period, simulation.periods_of(numbers))
+    return Change(before, after, changes.size - 1, (float(exponents[0]), float(exponents[1])))
+
+
+def _distance(found: Result, sweep: Result) -> Floats:
+    """Distance of each lane from the motion of a carried sweep, interpolated between its values."""
+    values, known = found[found.axis], _section(sweep)
+    there = [np.interp(values, sweep[sweep.axis], column) for column in known.T]
+    distance: Floats = np.abs(_section(found) - np.column_stack(there)).max(axis=1)
+    return distance

@@ -1,0 +1,72 @@
+"""Not a figure of the paper: both motions of the hop, and where starts change over."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from gearchaos.figures.page import Page
+from gearchaos.figures.style import EXPONENT, POINTS, REFERENCE
+from gearchaos.paper.computation import Reproduction
+from gearchaos.paper.hop import HIGH, LOW
+from gearchaos.paper.panels import WITH_ERROR, few_ticks, page
+from gearchaos.paper.published import Published
+
+STARTS = {"rest": "at rest", "contact": "contact flank"}
+
+
+def hop_page(printed: Published, found: Reproduction) -> Page:
+    """Draw the section of the two coexisting motions over the pitch error."""
+    hop = found.hop
+    with page(66.0) as figure:
+        axes = figure.subplots()
+        if hop is None:
+            axes.text(0.5, 0.5, "no coexisting motions found", ha="center")
+            return figure
+        for sweep, color, marker, label in (
+            (hop.upwards, POINTS, "^", "swept upwards"),
+            (hop.downwards, EXPONENT, "v", "swept downwards"),
+        ):
+            axes.plot(
+                sweep[sweep.axis],
+                sweep["section_delta_5"][:, -1],
+                marker,
+                color=color,
+                markersize=1.8,
+                markeredgewidth=0.0,
+                label=label,
+            )
+        axes.axvspan(hop.first, hop.last, color=REFERENCE, alpha=0.12, linewidth=0.0)
+        middle = float(np.mean(axes.get_ylim()))
+        places = {STARTS[kind]: change.after for kind, change in hop.changes.items()}
+        places["Pan 2021"] = printed.numbers["hop"].value
+        for text, place in places.items():
+            own = text != "Pan 2021"
+            axes.axvline(
+                place, color=POINTS if own else WITH_ERROR, lw=0.7, dashes=(4, 2) if own else ()
+            )
+            axes.annotate(
+                f"{text}: {place:.2f}",
+                (place, middle),
+                (-2 if text == STARTS["rest"] else 2, 0),
+                textcoords="offset points",
+                rotation=90,
+                ha="right" if text == STARTS["rest"] else "left",
+                va="center",
+                fontsize=7,
+                color=POINTS if own else WITH_ERROR,
+            )
+        axes.set_xlim(LOW, HIGH)
+        axes.set_xlabel("Multiple of the pitch error, $P$")
+        axes.set_ylabel(r"$\delta_5$ at the section (dimensionless)")
+        few_ticks(axes, 8, 6)
+        axes.legend(
+            frameon=False,
+            loc="lower right",
+            bbox_to_anchor=(1.0, 1.0),
+            ncols=2,
+            markerscale=2.0,
+            borderpad=0.0,
+            borderaxespad=0.3,
+            handletextpad=0.2,
+        )
+    return figure

@@ -1,0 +1,124 @@
+"""What Pan 2021 prints, read from `published.toml`."""
+
+from __future__ import annotations
+
+import tomllib
+from dataclasses import dataclass
+from functools import cache
+from importlib.resources import files
+from typing import Any
+
+CITATION = (
+    "Pan, Li, Wang: *Influence of Pitch Error on Vibration, Bifurcation, and Chaos "
+    "Characteristics of the Helical Gear Pair System*, 2021"
+)
+
+
+@dataclass(frozen=True)
+class Number:
+    """One printed number: its unit (``"1"`` where dimensionless), its place, its rule."""
+
+    key: str
+    quantity: str
+    value: float
+    unit: str
+    where: str
+    rule: str
+
+
+@dataclass(frozen=True)
+class Stage:
+    """A span of pitch errors (multiples of e(tau)) with one motion, from figure 7."""
+
+    motion: str
+    first: float
+    last: float
+    printed: str = ""
+
+    @property
+    def words(self) -> str:
+        """The motion as the paper calls it."""
+        return self.printed or self.motion
+
+
+@dataclass(frozen=True)
+class ShownMotion:
+    """The motion at one pitch error, which a figure of its own shows."""
+
+    figure: int
+    pitch_error: float
+    motion: str
+    printed: str = ""
+
+    @property
+    def words(self) -> str:
+        """The motion as the paper calls it."""
+        return self.printed or self.motion
+
+
+@dataclass(frozen=True)
+class Harmonics:
+    """Table 2: harmonics 1, 2, ... of the mesh stiffness, in N/(um mm)."""
+
+    where: str
+    rule: str
+    cosine: tuple[float, ...]
+    sine: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class ContactLines:
+    """Shortest and longest total contact line (in full lines) and the parts of the period."""
+
+    where: str
+    shortest: float
+    longest: float
+    parts: tuple[float, float, float, float]
+
+    @property
+    def half_height(self) -> float:
+        """Half of the stiffness variation relative to its mean, with equal rise and fall."""
+        return (self.longest - self.shortest) / (self.longest + self.shortest)
+
+
+@dataclass(frozen=True)
+class Increments:
+    """Growth of the torsional acceleration between neighbours of ``pitch_errors``."""
+
+    where: str
+    rule: str
+    pitch_errors: tuple[float, ...]
+    values: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class Published:
+    """All that the paper prints; ``driving_speed_rpm`` is what other numbers are derived from."""
+
+    driving_speed_rpm: float
+    numbers: dict[str, Number]
+    contact_lines: ContactLines
+    harmonics: Harmonics
+    increments: Increments
+    stages: tuple[Stage, ...]
+    motions: tuple[ShownMotion, ...]
+
+
+@cache
+def published() -> Published:
+    """Read the printed numbers."""
+    text = files("gearchaos.paper").joinpath("published.toml").read_text(encoding="utf-8")
+    tables = tomllib.loads(text)
+    return Published(
+        driving_speed_rpm=tables["given"]["driving_speed_rpm"],
+        numbers={row["key"]: Number(**row) for row in tables["number"]},
+        contact_lines=ContactLines(**_frozen(tables["contact_lines"])),
+        harmonics=Harmonics(**_frozen(tables["harmonics"])),
+        increments=Increments(**_frozen(tables["increments"])),
+        stages=tuple(Stage(**row) for row in tables["stage"]),
+        motions=tuple(ShownMotion(**row) for row in tables["motion"]),
+    )
+
+
+def _frozen(table: dict[str, Any]) -> dict[str, Any]:
+    return {key: tuple(entry) if isinstance(entry, list) else entry for key, entry in table.items()}
