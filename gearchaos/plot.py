@@ -84,12 +84,15 @@ def _sweep_sheets(result: Result, options: argparse.Namespace) -> list[_Sheet]:
         name += f"_from_{options.low:g}"
     if options.high is not None:
         name += f"_to_{options.high:g}"
+    if options.stages:
+        name += "_stages"
     draw = partial(
         bifurcation_page,
         result,
         options.variable,
         between=(options.low, options.high),
         full_range=options.full_range,
+        stages=options.stages,
         width_mm=options.width or SINGLE_COLUMN_MM,
         height_mm=options.height,
     )
@@ -102,10 +105,12 @@ def _response_sheets(result: Result, options: argparse.Namespace) -> list[_Sheet
     from gearchaos.figures.response_page import lane_in_a_name, response_page
     from gearchaos.figures.style import DOUBLE_COLUMN_MM
 
-    if options.full_range:
-        raise ConfigurationError(
-            f"--full-range: {options.result} is a response; it belongs to the diagram of a sweep"
-        )
+    for option in ("full_range", "stages"):
+        if getattr(options, option):
+            raise ConfigurationError(
+                f"--{option.replace('_', '-')}: {options.result} is a response; it belongs to the "
+                "diagram of a sweep"
+            )
     _, chosen, diverged = select_lanes(result, (options.low, options.high))
     lanes = (chosen & ~diverged).nonzero()[0].tolist()
     if not lanes:
@@ -148,6 +153,7 @@ def _parser() -> argparse.ArgumentParser:
     )
     add("--from", dest="low", type=_number, metavar="VALUE", help="lowest parameter to show")
     add("--to", dest="high", type=_number, metavar="VALUE", help="highest parameter to show")
+    add("--stages", action="store_true", help="shade the stages behind the diagram of a sweep")
     add("--full-range", action="store_true", help="show every lane, however few lie far out")
     add(
         "--width",

@@ -3,24 +3,22 @@
 from __future__ import annotations
 
 import argparse
-import math
 import os
 import shlex
 import sys
 import time
 from collections.abc import Sequence
-from datetime import timedelta
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from gearchaos.command_line import OK, run_command, version_text
-from gearchaos.errors import FileError
+from gearchaos.errors import ConfigurationError, FileError, GearchaosError
 
 if TYPE_CHECKING:
-    from gearchaos.engine.error_check import Tally
-    from gearchaos.engine.simulation import Bounds, Simulation
-    from gearchaos.results.shards import ShardStore
+    from gearchaos.configuration import Configuration
+    from gearchaos.engine.parts import Part
+    from gearchaos.engine.simulation import Simulation
 
 NAME = "gearchaos sweep"
 TOO_MANY_DIVERGED = 3
@@ -55,6 +53,16 @@ def _parser() -> argparse.ArgumentParser:
     add("--resume", action="store_true", help="go on from the finished blocks of a stopped sweep")
     add("--threads", type=int, metavar="N", help="threads to use (default: all cores)")
     add(
+        "--dask",
+        metavar="ADDRESS",
+        help="compute on the dask cluster of this scheduler, or on local:N processes",
+    )
+    add(
+        "--shard",
+        metavar="i/N",
+        help="compute the i-th of N parts only; python -m gearchaos.merge joins them",
+    )
+    add(
         "--set",
         action="append",
         default=[],
@@ -74,9 +82,13 @@ def _run(argv: Sequence[str] | None) -> int:
     from gearchaos.configuration import load_config
 
     config = load_config(options.config, options.set)
+    from gearchaos.engine.parts import Part
     from gearchaos.engine.running import choose_threads
     from gearchaos.engine.simulation import Simulation
+    from gearchaos.finishing import complete_already, prepare
 
+    part = None if options.shard is None else Part.from_text(options.shard)
+    _check_sharing(options, config)
     choose_threads(options.threads)
     simulation = Simulation(config)
     # A text, not a Path, which would drop the slash that tells a folder from a file.
@@ -84,145 +96,88 @@ def _run(argv: Sequence[str] | None) -> int:
     if os.path.exists(output) and os.path.samefile(output, options.config):
         raise FileError(f"{output}: is the configuration itself; choose another --output")
     if options.dry_run:
-        _describe(simulation, output, options.quiet)
+        from gearchaos.dry_run import describe
+
+        prepare(simulation, options.quiet)
+        describe(simulation, output)
         return OK
-    return _compute(simulation, output, options, arguments)
+    if options.resume and not options.overwrite and os.path.isfile(output):
+        code = complete_already(NAME, simulation, output, options.quiet)
+        if code is not None:
+            return code
+    return _compute(simulation, output, part, options, arguments)
+
+
+def _check_sharing(options: argparse.Namespace, config: Configuration) -> None:
+    """Refuse what --dask and --shard cannot do."""
+    for flag in ("dask", "shard"):
+        if getattr(options, flag) is not None and config.start.carry != "none":
+            raise ConfigurationError(
+                f'--{flag}: with start.carry = "{config.start.carry}" one value is computed after '
+                f'the other; set start.carry = "none" or leave out --{flag}'
+            )
+    if options.dask is None:
+        return
+    if options.threads is not None and not options.dask.startswith("local:"):
+        raise ConfigurationError(
+            f"--threads {options.threads}: the workers of a cluster use the cores that they have; "
+            "start them with the variable NUMBA_NUM_THREADS to use fewer"
+        )
+    try:
+        import distributed  # noqa: F401
+    except ImportError:
+        raise ConfigurationError(
+            "--dask: dask.distributed is not installed; pip install gearchaos[dask]"
+        ) from None
 
 
 def _compute(
-    simulation: Simulation, output: str, options: argparse.Namespace, arguments: list[str]
+    simulation: Simulation,
+    output: str,
+    part: Part | None,
+    options: argparse.Namespace,
+    arguments: list[str],
 ) -> int:
-    from gearchaos_kernels import current_threads
-
     from gearchaos.engine.running import metadata
+    from gearchaos.engine.store_filling import fill, open_store
+    from gearchaos.finishing import ending, prepare
     from gearchaos.progress import say
     from gearchaos.results.atomic_file import check_output
-    from gearchaos.results.shards import ShardStore
 
+    quiet = options.quiet
     check_output(output, options.overwrite)
     began = time.monotonic()
-    _prepare(simulation, options.quiet)
-    with ShardStore(
-        output,
-        simulation.variables,
-        simulation.lanes,
-        simulation.config.resolved_toml(),
-        axis=simulation.axis,
-        resume=options.resume,
-    ) as store:
-        found = store.finished()
-        for problem in found.problems:
-            print(f"{NAME}: {problem}; it is computed again", file=sys.stderr)
-        missing = store.missing(found.bounds, simulation.block_lanes(current_threads()))
+    # Workers compile for themselves: this may be another kind of machine.
+    prepare(simulation, quiet, compile_now=options.dask is None)
+    with open_store(simulation, output, resume=options.resume, part=part) as store:
         try:
-            tally = _fill(simulation, store, found.bounds, missing, options.quiet)
+            tally, performed_by = fill(simulation, store, options.dask, quiet)
             seconds = time.monotonic() - began
-            store.merge(
-                simulation.parameters, metadata(simulation, seconds), overwrite=options.overwrite
-            )
-        except (KeyboardInterrupt, FileError) as fault:
+            if part is None:
+                store.merge(
+                    simulation.parameters,
+                    {**metadata(simulation, seconds), **performed_by},
+                    overwrite=options.overwrite,
+                )
+        except (KeyboardInterrupt, GearchaosError) as fault:
             kept = sum(last - first for first, last in store.finished().bounds)
-            fault.add_note(f"{kept} of {simulation.lanes} lanes are kept")
+            fault.add_note(f"{kept} of {store.own_lanes} lanes are kept")
             fault.add_note(f"go on with: {_resuming(arguments)}")
             raise
-    print(output, flush=True)
-    say(f"{simulation.lanes} lanes, {tally.diverged} diverged, {seconds:.1f} s", options.quiet)
+    print(output if part is None else store.folder, flush=True)
+    say(f"{store.own_lanes} lanes, {tally.diverged} diverged, {seconds:.1f} s", quiet)
     if tally.errors:
-        say(tally.errors, options.quiet)
-    diverged = tally.diverged
-    allowed = simulation.config.outputs.allowed_diverged_share
-    if diverged > allowed * simulation.lanes:
-        print(
-            f"{NAME}: {diverged} of {simulation.lanes} lanes diverged, more than "
-            f"outputs.allowed_diverged_share = {allowed:g} allows; the file marks them: "
-            "raise integration.steps_per_period, or check the load and the start state",
-            file=sys.stderr,
-        )
-        return TOO_MANY_DIVERGED
-    return OK
-
-
-def _prepare(simulation: Simulation, quiet: bool) -> None:
-    """Compile the kernel, choose the steps where a tolerance is wanted, and say what was found."""
-    from gearchaos.engine.running import COMPILING
-    from gearchaos.progress import notice, say
-
-    with notice(COMPILING, quiet):
-        simulation.compile()
-    simulation.choose_steps()
-    for note in simulation.notes:
-        say(note, quiet)
-
-
-def _fill(
-    simulation: Simulation,
-    store: ShardStore,
-    finished: Sequence[Bounds],
-    missing: Sequence[Bounds],
-    quiet: bool,
-) -> Tally:
-    """Compute the missing blocks into the store and add up all of them."""
-    from gearchaos.engine.error_check import Tally
-    from gearchaos.engine.simulation import compute_all
-    from gearchaos.progress import Progress
-
-    readers = {bounds: partial(store.read, *bounds) for bounds in finished}
-    tally = Tally()
-    for read in readers.values():
-        tally.add(read())
-    order = simulation.in_order([*finished, *missing])
-    done = sum(last - first for first, last in finished)
-    with Progress(simulation.lanes, done, quiet) as progress:
-        for (first, last), arrays in compute_all(simulation, order, readers):
-            store.write(first, last, arrays)
-            tally.add(arrays)
-            progress.advance(last - first)
-    return tally
+        say(tally.errors, quiet)
+    if part is not None:
+        merging = shlex.join([sys.orig_argv[0], "-m", "gearchaos.merge", output])
+        say(f"this was part {options.shard}; once all are there: {merging}", quiet)
+        return OK
+    return ending(NAME, simulation, tally.diverged)
 
 
 def _resuming(arguments: list[str]) -> str:
     again = [argument for argument in arguments if argument != "--resume"]
     return shlex.join([sys.orig_argv[0], "-m", "gearchaos.sweep", *again, "--resume"])
-
-
-def _describe(simulation: Simulation, output: str, quiet: bool) -> None:
-    """Say what a run would compute and how long it would take, judged by a few real lanes."""
-    import numpy as np
-    from gearchaos_kernels import current_threads
-    from tqdm import tqdm
-
-    from gearchaos.engine.running import pilot_rate
-
-    _prepare(simulation, quiet)
-    seconds = simulation.steps / pilot_rate(simulation)
-    duration = f"{seconds:.1f} s" if seconds < 100 else str(timedelta(seconds=round(seconds)))
-    config = simulation.config
-    sizes = {v.name: len(v.values) for v in simulation.variables if v.values is not None}
-    bytes_kept = simulation.lanes * sum(
-        np.dtype(v.dtype).itemsize * math.prod(sizes[dim] for dim in v.dims[1:])
-        for v in simulation.variables
-        if v.dims[0] == simulation.axis
-    )
-    starts = f", {simulation.starts} starts each" if simulation.starts > 1 else ""
-    values, threads = simulation.values, current_threads()
-    memory = simulation.block_memory(threads)
-    for key, value in {
-        "output": f"{output}{' (exists)' if os.path.exists(output) else ''}",
-        "effects": ", ".join(config.scene.effects) or "none",
-        "states": f"{len(simulation.states)}{_left_out(simulation)}",
-        "lanes": f"{simulation.lanes} ({values.size} values of {config.sweep.parameter} from "
-        f"{values[0]:g} to {values[-1]:g}{starts})",
-        "steps": f"{simulation.steps:.3g} ({simulation.plan.steps_per_period} per period)",
-        "file": f"about {tqdm.format_sizeof(bytes_kept, 'B')} before compression",
-        "memory": f"about {tqdm.format_sizeof(memory, 'B')} for a block of lanes",
-        "time": f"about {duration} with {threads} thread{'s' if threads > 1 else ''}",
-    }.items():
-        print(f"{key + ':':10}{value}", file=sys.stderr)
-
-
-def _left_out(simulation: Simulation) -> str:
-    unused = [name for name in simulation.config.scene.effects if name not in simulation.effects]
-    return f" (nothing that is kept needs {', '.join(unused)})" if unused else ""
 
 
 if __name__ == "__main__":

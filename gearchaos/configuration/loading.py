@@ -9,7 +9,8 @@ from pathlib import Path
 from gearchaos.configuration.models import Configuration
 from gearchaos.errors import ConfigurationError, FileError
 
-LARGEST_FILE = 10 * 1024 * 1024
+LARGEST_FILE = 4 * 1024 * 1024
+"""Bytes: room for several hundred thousand swept values, and read in seconds whatever it holds."""
 
 
 def load_config(path: str | os.PathLike[str], overrides: Iterable[str] = ()) -> Configuration:
@@ -48,7 +49,8 @@ def _text(source: str) -> str:
         raise FileError(f"{source!r}: cannot be read: {reason}") from None
     if len(content) > LARGEST_FILE:
         raise ConfigurationError(
-            f"{source}: larger than {LARGEST_FILE // 1024**2} MB; is it a configuration?"
+            f"{source}: larger than {LARGEST_FILE // 1024**2} MB, so hardly a configuration; "
+            "give many swept values as sweep.from, sweep.to and sweep.count"
         )
     try:
         # utf-8-sig: some editors begin a file with a byte order mark.

@@ -14,7 +14,8 @@ from gearchaos.configuration.keys import Key, suggestion
 from gearchaos.configuration.toml_text import quoted_key
 
 ABSENT: Final = object()
-_MOST_SHOWN = 100
+MOST_SHOWN = 100
+"""Faults that are worded; a file with more of them is hardly a configuration."""
 
 _RULES = {
     "missing": "is missing",
@@ -70,11 +71,20 @@ class Fault:
         return f"{source}: {self.key}{value}: {self.rule}{remedy}"
 
 
-def texts(faults: Iterable[Fault], source: str) -> list[str]:
-    """Return the faults as lines, each once, the first hundred of them."""
+def texts(faults: Iterable[Fault], source: str, more: int = 0) -> list[str]:
+    """Return the faults as lines, each once, the first hundred of them.
+
+    Parameters
+    ----------
+    faults : iterable of Fault
+    source : str
+        What the lines call the configuration.
+    more : int
+        Faults beside these that nobody has worded.
+    """
     lines = list(dict.fromkeys(fault.text(source) for fault in faults))
-    rest = len(lines) - _MOST_SHOWN
-    return lines if rest <= 0 else [*lines[:_MOST_SHOWN], f"{source}: and {rest} more faults"]
+    rest = max(0, len(lines) - MOST_SHOWN) + more
+    return lines if rest == 0 else [*lines[:MOST_SHOWN], f"{source}: and {rest} more faults"]
 
 
 def shown(value: object) -> str:

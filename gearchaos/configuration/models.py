@@ -9,7 +9,7 @@ from typing import Any, Literal, Self
 from pydantic import PrivateAttr, TypeAdapter, ValidationError, ValidationInfo, model_validator
 
 from gearchaos.configuration.keys import Key, keys_of
-from gearchaos.configuration.messages import Fault, fault_of, texts
+from gearchaos.configuration.messages import MOST_SHOWN, Fault, fault_of, texts
 from gearchaos.configuration.physical_tables import Bearings, Mesh, Operation, Pair, PitchError
 from gearchaos.configuration.rules import RULES
 from gearchaos.configuration.run_tables import (
@@ -117,13 +117,13 @@ class Configuration(Table):
         try:
             config = cls.model_validate(dict(tables), context={"source": source})
         except ValidationError as error:
-            own = [
-                fault_of(details, tables, configuration_keys())
-                for details in error.errors(include_url=False)
-            ]
+            found = error.errors(include_url=False)
+            # A long list of nonsense can hold a million faults.
+            own = [fault_of(one, tables, configuration_keys()) for one in found[:MOST_SHOWN]]
             readable, unreadable = _readable_tables(tables)
             shared = _broken_rules(cls.model_construct(**readable), unreadable)
-            raise ConfigurationError(texts([*own, *shared], source)) from None
+            more = len(found) - len(own)
+            raise ConfigurationError(texts([*own, *shared], source, more)) from None
         config._source = source
         return config
 

@@ -12,6 +12,9 @@ from gearchaos.errors import ConfigurationError
 
 _DEEPEST = 8
 _BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
+_PART = r"""(?:[A-Za-z0-9_-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+"""
+_ENDLESS_KEY = re.compile(rf"(?<![A-Za-z0-9_-])(?:{_PART}\.[ \t]*+){{64}}")
+"""A key of so many parts that is no key of ours: tomllib takes the square of their number."""
 
 
 def quoted_key(name: str) -> str:
@@ -28,7 +31,7 @@ def tables_from_toml(text: str, source: str) -> dict[str, Any]:
         With the line and the column where the text stops being TOML.
     """
     try:
-        return tomllib.loads(text)
+        return _parsed(text)
     except RecursionError:
         raise ConfigurationError(
             f"{source}: nested too deeply to be a configuration; tables go three levels deep"
@@ -104,6 +107,15 @@ def with_value(tables: Mapping[str, Any], names: list[str], value: Any) -> dict[
     return result
 
 
+def flat_tables(tables: Mapping[str, Any], path: str = "") -> dict[str, Any]:
+    """Return the values of nested tables by their dotted paths."""
+    flat: dict[str, Any] = {}
+    for name, value in tables.items():
+        here = f"{path}{quoted_key(name)}"
+        flat |= flat_tables(value, f"{here}.") if isinstance(value, Mapping) else {here: value}
+    return flat
+
+
 def toml_text(tables: Mapping[str, Any]) -> str:
     """Write nested tables of texts, numbers, truth values and lists as TOML."""
     return "\n".join(_lines(tables, ())) + "\n"
@@ -142,9 +154,15 @@ def _string(text: str) -> str:
     return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
 
 
+def _parsed(text: str) -> dict[str, Any]:
+    if _ENDLESS_KEY.search(text):
+        raise RecursionError
+    return tomllib.loads(text)
+
+
 def _value(text: str) -> Any:
     try:
-        parsed = tomllib.loads(f"value = {text}")
+        parsed = _parsed(f"value = {text}")
     except (ValueError, RecursionError):
         return text.strip()
     # A line break in the text could have smuggled in further keys.

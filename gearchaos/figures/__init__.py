@@ -11,6 +11,7 @@ from gearchaos.figures.response import (
     time_history,
 )
 from gearchaos.figures.response_page import response_page
+from gearchaos.figures.stages import shade_stages
 
 __all__ = [
     "BifurcationArtists",
@@ -23,5 +24,6 @@ __all__ = [
     "poincare_section",
     "response_page",
     "save_figure",
+    "shade_stages",
     "time_history",
 ]

@@ -15,6 +15,7 @@ from gearchaos.figures.bifurcation import bifurcation, section_variables
 from gearchaos.figures.lanes import Between, legend_above
 from gearchaos.figures.lyapunov import VARIABLE as LYAPUNOV_VARIABLE
 from gearchaos.figures.lyapunov import lyapunov
+from gearchaos.figures.stages import shade_stages
 from gearchaos.figures.style import MM_PER_INCH, SINGLE_COLUMN_MM, STYLE, page_height_mm
 from gearchaos.results.result import Result
 
@@ -39,6 +40,7 @@ def bifurcation_page(
     *,
     between: Between = (None, None),
     full_range: bool = False,
+    stages: bool = False,
     width_mm: float = SINGLE_COLUMN_MM,
     height_mm: float | None = None,
 ) -> Page:
@@ -55,6 +57,8 @@ def bifurcation_page(
         The part of the parameter range to show.
     full_range : bool
         Let the vertical axes reach every lane, however few lie far out.
+    stages : bool
+        Shade the stages behind both panels.
     width_mm, height_mm : float
         Size of the page; 85 mm is one column of a journal and 180 mm two. The default height
         follows from the width and the number of panels.
@@ -69,6 +73,8 @@ def bifurcation_page(
     ------
     ConfigurationError
         If the result has nothing to draw, no such variable or no lane in the range.
+    FileError
+        If stages are wanted and the result has no labels of the motion.
     """
     # A variable that was asked for and is not there is an error, not a page without it.
     has_section = variable is not None or bool(section_variables(result))
@@ -105,6 +111,9 @@ def bifurcation_page(
         for axes, intervals in zip(reversed(stack), MOST_INTERVALS, strict=False):
             axes.yaxis.set_major_locator(MaxNLocator(intervals, steps=[1, 2, 5, 10]))
             axes.yaxis.label.set_linespacing(1.0)
+        if stages:
+            for axes in stack:
+                shade_stages(axes, result, legend=axes is stack[0])
         figure.align_ylabels(stack)
         # Ticks are made at the first drawing, in the style of that moment.
         figure.draw_without_rendering()

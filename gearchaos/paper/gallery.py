@@ -6,12 +6,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 
-import matplotlib as mpl
-
 from gearchaos.figures import bifurcation_page
 from gearchaos.figures.page import Page
-from gearchaos.figures.stages import shade_stages
-from gearchaos.figures.style import STYLE
 from gearchaos.paper.computation import Reproduction
 from gearchaos.paper.hop_figure import hop_page
 from gearchaos.paper.mesh_figures import mesh_stiffness_page, pitch_error_page
@@ -38,12 +34,7 @@ class Picture:
 def staged_page(printed: Published, found: Reproduction) -> Page:
     """Draw bifurcation diagram and Lyapunov chart with the stages behind them (figure 7)."""
     del printed
-    figure = bifurcation_page(found.sweep)
-    with mpl.rc_context(STYLE):
-        for number, axes in enumerate(figure.axes):
-            shade_stages(axes, found.sweep, legend=number == 0)
-        figure.draw_without_rendering()
-    return figure
+    return bifurcation_page(found.sweep, stages=True)
 
 
 def pictures() -> tuple[Picture, ...]:

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import hashlib
-import json
 import os
 import re
-import tomllib
-from collections.abc import Iterator, Mapping, Sequence
+from bisect import bisect_right
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 from types import TracebackType
@@ -16,15 +14,17 @@ from typing import Any, NamedTuple, Self
 from numpy.typing import NDArray
 
 from gearchaos.errors import FileError
-from gearchaos.results.atomic_file import PARTIAL, reason, replacing
+from gearchaos.results.atomic_file import PARTIAL
+from gearchaos.results.manifest import MANIFEST, Manifest, folder_of
 from gearchaos.results.result_file import Metadata, Parameter, write_result
-from gearchaos.results.shard_file import SHARD_SCHEMA_VERSION, ShardFormat
+from gearchaos.results.shard_file import ShardFormat
 from gearchaos.results.store_lock import LOCK, StoreLock
 from gearchaos.results.variables import Variable
 
-STORE_SCHEMA = "gearchaos-shards"
-_MANIFEST = "manifest.json"
 _NAME = re.compile(r"(\d{12})-(\d{12})\.shard")
+_PART = re.compile(LOCK + r"-(\d+)-of-(\d+)")
+
+Bounds = tuple[int, int]
 
 
 class Finished(NamedTuple):
@@ -38,7 +38,7 @@ class Finished(NamedTuple):
         One sentence for each shard that is bad and has to be computed again.
     """
 
-    bounds: list[tuple[int, int]]
+    bounds: list[Bounds]
     problems: list[str]
 
 
@@ -61,13 +61,20 @@ class ShardStore:
         The resolved configuration in TOML. Shards of another one are refused.
     axis : str
         Name of the dimension of the lanes.
+    text : str
+        The configuration as it was written, for the result file.
     resume : bool
         Whether there may be shards of an earlier run, to be continued.
+    part : str, optional
+        Name of the part of the blocks that this process computes, such as ``2-of-8``. Others may
+        compute other parts in the same folder meanwhile.
+    blocks : sequence of (first, last), optional
+        The blocks of this part, by lane; by default all lanes are one's own.
 
     Raises
     ------
     FileError
-        If there are shards and `resume` is not set, if they belong to another configuration
+        If there are own shards and `resume` is not set, if they belong to another configuration
         (the message names the keys that differ), if another sweep is writing to the same output,
         or if the folder cannot be made.
     """
@@ -80,10 +87,13 @@ class ShardStore:
         configuration: str,
         *,
         axis: str,
+        text: str = "",
         resume: bool = False,
+        part: str | None = None,
+        blocks: Sequence[Bounds] | None = None,
     ) -> None:
         self.output = Path(output)
-        self.folder = Path(os.path.realpath(output) + ".shards")
+        self.folder = folder_of(output)
         self.variables = list(variables)
         self.lanes = lanes
         self.axis = axis
@@ -93,17 +103,11 @@ class ShardStore:
             for v in variables
             if v.dims[0] == axis
         )
-        self._manifest: dict[str, Any] = {
-            "schema": STORE_SCHEMA,
-            "schema_version": SHARD_SCHEMA_VERSION,
-            "lanes": lanes,
-            "variables": columns,
-            "configuration": configuration,
-        }
-        text = json.dumps(self._manifest, sort_keys=True)
-        fingerprint = hashlib.sha256(text.encode()).hexdigest()
-        self._format = ShardFormat(fingerprint, lanes, columns)
-        self._lock = StoreLock(self.folder, self.output)
+        self._manifest = Manifest(lanes, columns, configuration, text)
+        self._format = ShardFormat(self._manifest.fingerprint, lanes, columns)
+        self._blocks = [(0, lanes)] if blocks is None else list(blocks)
+        self._part = part
+        self._lock = StoreLock(self.folder, self.output, part)
         try:
             self._open(resume)
         except BaseException:
@@ -123,34 +127,47 @@ class ShardStore:
 
     def close(self) -> None:
         """Let go of the lock; finished blocks stay."""
-        if self._lock.held and not self._names():
-            self._remove()
+        if not self._names() and self._lock.alone():
+            self.remove()
         self._lock.release()
 
-    def finished(self) -> Finished:
-        """Verify the shards that are there: schema, configuration, bounds, checksum."""
-        bounds: list[tuple[int, int]] = []
+    def finished(
+        self, visit: Callable[[Mapping[str, NDArray[Any]]], None] | None = None
+    ) -> Finished:
+        """Verify one's own shards that are there: schema, configuration, bounds, checksum.
+
+        Parameters
+        ----------
+        visit : callable, optional
+            Called with the arrays of each shard that is sound.
+        """
+        bounds: list[Bounds] = []
         problems: list[str] = []
-        for name in self._names():
-            first, last = (int(number) for number in name.removesuffix(".shard").split("-"))
+        for first, last in self._own_shards():
             try:
                 if bounds and first < bounds[-1][1]:
-                    raise FileError(f"{self.folder / name}: overlaps the shard before it")
-                self.read(first, last)
+                    path = self._path(first, last)
+                    raise FileError(f"{path}: overlaps the shard before it")
+                arrays = self.read(first, last)
             except FileError as error:
                 problems += error.problems
             else:
                 bounds.append((first, last))
+                if visit is not None:
+                    visit(arrays)
         return Finished(bounds, problems)
 
-    def missing(self, bounds: Sequence[tuple[int, int]], block: int) -> list[tuple[int, int]]:
-        """List blocks of at most so many lanes that cover what the given bounds leave out."""
-        gaps = []
-        done = 0
-        for first, last in [*sorted(bounds), (self.lanes, self.lanes)]:
-            gaps += [(start, min(start + block, first)) for start in range(done, first, block)]
-            done = max(done, last)
-        return gaps
+    def missing(self, bounds: Sequence[Bounds], block: int) -> list[Bounds]:
+        """List blocks of at most so many lanes that cover what the given bounds leave out.
+
+        The blocks of a part are small enough as they are; lanes of other parts do not miss.
+        """
+        return [
+            (start, min(start + block, last))
+            for own in self._blocks
+            for first, last in uncovered(own, sorted(bounds))
+            for start in range(first, last, block)
+        ]
 
     def write(self, first: int, last: int, arrays: Mapping[str, NDArray[Any]]) -> None:
         """Keep the lanes first to last - 1 of every variable that runs over the lanes.
@@ -180,8 +197,16 @@ class ShardStore:
         metadata: Metadata,
         *,
         overwrite: bool = False,
+        found: Finished | None = None,
     ) -> Path:
         """Make the result file of all blocks, one block in memory at a time, and tidy up.
+
+        Parameters
+        ----------
+        parameters, metadata, overwrite
+            As for `write_result`.
+        found : Finished, optional
+            What `finished` has just given; by default it is asked.
 
         Returns
         -------
@@ -193,11 +218,9 @@ class ShardStore:
         FileError
             If blocks are missing or the file cannot be written; the shards stay.
         """
-        bounds, problems = self.finished()
+        bounds, problems = found or self.finished()
         if gaps := self.missing(bounds, self.lanes):
-            first, last = gaps[0]
-            here = f"{self.folder}: lanes {first} to {last - 1} are missing; use --resume"
-            raise FileError([*problems, here])
+            raise FileError([*problems, f"{self.folder}: {lanes_text(gaps)} missing; use --resume"])
         write_result(
             self.output,
             self.variables,
@@ -208,53 +231,64 @@ class ShardStore:
             overwrite=overwrite,
             scratch=self.folder,
         )
-        self._remove()
+        self.remove()
         return self.output
 
+    @property
+    def own_lanes(self) -> int:
+        """Lanes of one's own blocks."""
+        return sum(last - first for first, last in self._blocks)
+
+    @property
+    def parts(self) -> list[tuple[int, int]]:
+        """Number and total of the parts that have ever been begun here."""
+        found = (_PART.fullmatch(path.name) for path in self._entries())
+        return sorted((int(match[1]), int(match[2])) for match in found if match)
+
     def _open(self, resume: bool) -> None:
-        names = self._names()
-        path = self.folder / _MANIFEST
-        if names and not resume:
+        own = list(self._own_shards())
+        if own and not resume:
             raise FileError(
-                f"{self.folder}: holds {len(names)} finished blocks of an earlier run; continue "
+                f"{self.folder}: holds {len(own)} finished blocks of an earlier run; continue "
                 "it with --resume, or delete this folder"
             )
-        if names:
-            self._compare(path)
+        if self._part is not None:
+            # Whoever comes first writes it; all others must mean the same sweep.
+            self._manifest.write_if_new(self.folder)
+            self._manifest.compare(self.folder)
+            return
+        if own:
+            self._manifest.compare(self.folder)
+        # Those of other parts may be about to get their names.
         for partial in self.folder.glob(f".*{PARTIAL}"):
             partial.unlink(missing_ok=True)
-        if not names:
-            with replacing(path, overwrite=True) as partial:
-                partial.write_text(json.dumps(self._manifest, indent=1), encoding="utf-8")
+        if not own:
+            self._manifest.write(self.folder)
 
-    def _compare(self, path: Path) -> None:
-        try:
-            earlier = json.loads(path.read_text(encoding="utf-8"))
-            keys = differing_keys(earlier["configuration"], self._manifest["configuration"])
-        except (OSError, ValueError, LookupError, TypeError, AttributeError, RecursionError) as e:
-            raise FileError(
-                f"{path}: is damaged or missing ({reason(e)}); delete the folder to start again"
-            ) from e
-        own = json.loads(json.dumps(self._manifest))
-        keys = keys or [key for key in own if own[key] != earlier.get(key)]
-        if keys:
-            raise FileError(
-                f"{self.folder}: holds blocks of another configuration, which differs in "
-                f"{', '.join(keys)}; restore these values, delete the folder or choose another "
-                "--output"
-            )
-
-    def _remove(self) -> None:
+    def remove(self) -> None:
+        """Remove the shards, and the folder if nothing else is in it."""
         # Only what the store has made: the folder may hold files of the user.
-        for name in [*self._names(), _MANIFEST, LOCK]:
+        parts = [path.name for path in self._entries() if _PART.fullmatch(path.name)]
+        for name in [*self._names(), MANIFEST, *parts, LOCK]:
             with suppress(OSError):
                 (self.folder / name).unlink()
         with suppress(OSError):
             self.folder.rmdir()
 
+    def _own_shards(self) -> Iterator[Bounds]:
+        for name in self._names():
+            first, last = (int(number) for number in name.removesuffix(".shard").split("-"))
+            if self._part is None or list(uncovered((first, last), self._blocks)) != [
+                (first, last)
+            ]:
+                yield first, last
+
     def _names(self) -> list[str]:
+        return sorted(path.name for path in self._entries() if _NAME.fullmatch(path.name))
+
+    def _entries(self) -> list[Path]:
         try:
-            return sorted(p.name for p in self.folder.iterdir() if _NAME.fullmatch(p.name))
+            return list(self.folder.iterdir())
         except OSError:
             return []
 
@@ -262,19 +296,22 @@ class ShardStore:
         return self.folder / f"{first:012d}-{last:012d}.shard"
 
 
-def differing_keys(one: str, other: str) -> list[str]:
-    """List the dotted keys in which two TOML texts differ, with both values."""
-    first, second = (dict(_flat(tomllib.loads(text))) for text in (one, other))
-    return [
-        f"{key} ({first.get(key, 'absent')}, now {second.get(key, 'absent')})"
-        for key in {**first, **second}
-        if key not in first or key not in second or repr(first[key]) != repr(second[key])
-    ]
+def uncovered(block: Bounds, finished: Sequence[Bounds]) -> Iterator[Bounds]:
+    """Give what finished blocks, sorted and without overlap, leave out of a block."""
+    first, last = block
+    index = bisect_right(finished, first, key=lambda bounds: bounds[1])
+    while index < len(finished) and finished[index][0] < last:
+        begin, end = finished[index]
+        if first < begin:
+            yield first, begin
+        first = end
+        index += 1
+    if first < last:
+        yield first, last
 
 
-def _flat(table: Mapping[str, Any], path: str = "") -> Iterator[tuple[str, Any]]:
-    for key, value in table.items():
-        if isinstance(value, dict):
-            yield from _flat(value, f"{path}{key}.")
-        else:
-            yield f"{path}{key}", value
+def lanes_text(gaps: Sequence[Bounds], most: int = 3) -> str:
+    """Word which lanes there are not: "lanes 0 to 255, 512 to 767 and 4 more blocks are"."""
+    names = ", ".join(f"{first} to {last - 1}" for first, last in gaps[:most])
+    more = f" and {len(gaps) - most} more ranges" if len(gaps) > most else ""
+    return f"lanes {names}{more} are"

@@ -287,7 +287,7 @@ def test_what_is_not_utf_8_is_located_by_its_line(tmp_path):
 def test_a_huge_file_is_refused(tmp_path):
     path = tmp_path / "huge.toml"
     path.write_bytes(b"#" * (10 * 1024 * 1024 + 1))
-    with pytest.raises(ConfigurationError, match="larger than 10 MB"):
+    with pytest.raises(ConfigurationError, match="larger than 4 MB"):
         load_config(path)
 
 

@@ -32,6 +32,7 @@ def test_the_import_contracts_of_the_project_are_kept(capsys, monkeypatch):
         "import gearchaos.results.result",
         "import gearchaos.figures",
         "import gearchaos.plot",
+        "import gearchaos.info",
         "from gearchaos import open_result, load_config, GearchaosError",
     ],
 )

@@ -13,8 +13,9 @@ import numpy as np
 import pytest
 
 from gearchaos.errors import FileError
+from gearchaos.results.manifest import differing_keys
 from gearchaos.results.result import Parameter, Result, open_result
-from gearchaos.results.shards import ShardStore, differing_keys
+from gearchaos.results.shards import ShardStore
 from gearchaos.results.variables import sweep_variables
 
 LANES = 100
@@ -167,7 +168,10 @@ def test_types_and_nans_are_told_apart_where_they_matter() -> None:
     assert differing_keys("a = nan", "a = nan") == []
 
 
-@pytest.mark.parametrize("content", ["", "{", "[]", '{"configuration": 3}', "[" * 100_000])
+@pytest.mark.parametrize(
+    "content",
+    ["", "{", "[]", '{"schema_version": "1.0", "configuration": 3}', "[" * 100_000],
+)
 def test_a_damaged_manifest_is_named(content: str, output: Path) -> None:
     with open_store(output) as store:
         fill(store)
@@ -176,6 +180,16 @@ def test_a_damaged_manifest_is_named(content: str, output: Path) -> None:
     with pytest.raises(FileError, match=r"manifest.json: is damaged or missing"):
         open_store(output, resume=True)
     assert len(list(manifest.parent.glob("*.shard"))) == len(BLOCKS)
+
+
+def test_blocks_of_a_newer_format_are_refused_in_a_clear_sentence(output: Path) -> None:
+    with open_store(output) as store:
+        fill(store)
+    manifest = output.with_name("sweep.h5.shards") / "manifest.json"
+    newer = manifest.read_text(encoding="utf-8").replace('"1.0"', '"2.0"')
+    manifest.write_text(newer, encoding="utf-8")
+    with pytest.raises(FileError, match=r"has version '2\.0' .* reads 1\.x; finish it with"):
+        open_store(output, resume=True)
 
 
 def test_bad_shards_are_named_and_left_out(output: Path, tmp_path: Path) -> None:

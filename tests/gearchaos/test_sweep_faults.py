@@ -163,6 +163,18 @@ def test_a_full_disk_costs_neither_the_old_result_nor_the_finished_lanes(tmp_pat
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="limits of file sizes differ elsewhere")
+def test_a_disk_that_fills_up_in_the_middle_costs_the_blocks_that_do_not_fit(tmp_path):
+    several = ("--set", "sweep.count=1000", "--threads", "1")
+    assert sweep(tmp_path, *several, "--shard", "1/2", "--quiet").code == 0
+    ended = sweep(tmp_path, *several, "--resume", preexec_fn=lambda: _limit_file_size(20_000))
+    assert (ended.code, ended.out) == (4, "")
+    assert ".shard: cannot be written: File too large" in ended.err
+    assert "gearchaos sweep: 512 of 1000 lanes are kept\n" in ended.err
+    assert names_in(tmp_path) == ["gears.h5.shards", "gears.toml"]
+    assert sweep(tmp_path, *several, "--resume", "--quiet") == (0, "gears.h5\n", "")
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="limits of file sizes differ elsewhere")
 def test_a_disk_that_was_full_from_the_start_leaves_nothing_behind(tmp_path):
     sweep(tmp_path, "--dry-run")
     ended = sweep(tmp_path, preexec_fn=lambda: _limit_file_size(100))

@@ -1,7 +1,10 @@
 """A sweep that is stopped half-way: what is kept, what is said, and how it goes on."""
 
+import os
+import random
 import re
 import shlex
+import shutil
 import signal
 import subprocess
 import sys
@@ -10,6 +13,9 @@ import time
 import pytest
 
 import gearchaos
+from gearchaos.errors import FileError
+from gearchaos.results.manifest import folder_of
+from gearchaos.results.store_lock import StoreLock
 
 from .commands import names_in, same_data, small_config, sweep
 
@@ -133,3 +139,98 @@ def test_two_sweeps_do_not_write_to_the_same_output(tmp_path):
         first.terminate()
     assert first.returncode == 143
     assert names_in(tmp_path) == [SHARDS, "gears.toml"]
+
+
+def is_locked(output):
+    try:
+        StoreLock(folder_of(output), output).release()
+    except FileError:
+        return True
+    return False
+
+
+@pytest.mark.slow
+def test_twenty_kills_at_random_moments_cost_no_bit(tmp_path, undisturbed):
+    small_config(tmp_path)
+    moments = random.Random(20)
+    command = [sys.executable, "-m", "gearchaos.sweep", "gears.toml", *LONG, "--resume", "--quiet"]
+    ended = []
+    for _ in range(20):
+        with subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.DEVNULL) as process:
+            # Not the import of packages, but what a sweep does, is to be met.
+            while process.poll() is None and not is_locked(tmp_path / "gears.h5"):
+                time.sleep(0.005)
+            time.sleep(moments.uniform(0.0, 0.15))
+            process.kill()
+        ended.append(process.returncode)
+    assert ended.count(-signal.SIGKILL) > 10, ended
+    assert sweep(tmp_path, *LONG, "--resume", "--quiet") == (0, "gears.h5\n", "")
+    assert names_in(tmp_path) == ["gears.h5", "gears.toml"]
+    assert same_data(gearchaos.open_result(tmp_path / "gears.h5"), undisturbed)
+
+
+def test_damaged_foreign_and_ill_dated_blocks_are_told_and_computed_again(tmp_path, undisturbed):
+    (tmp_path / "other").mkdir()
+    all_blocks = (*LONG, "--shard", "1/1", "--quiet")
+    assert sweep(tmp_path, *all_blocks).code == 0
+    other = (*all_blocks[2:], "--set", "integration.transient_periods=1", "--threads", "1")
+    assert sweep(tmp_path / "other", *other).code == 0
+    cut, foreign, flipped, sound = sorted((tmp_path / SHARDS).glob("*.shard"))
+    cut.write_bytes(cut.read_bytes()[:1000])
+    foreign.write_bytes((tmp_path / "other" / SHARDS / foreign.name).read_bytes())
+    content = bytearray(flipped.read_bytes())
+    content[len(content) // 2] ^= 0x10
+    flipped.write_bytes(content)
+    # The clock has been set back since.
+    tomorrow = time.time() + 86_400
+    for path in (tmp_path / SHARDS).iterdir():
+        os.utime(path, (tomorrow, tomorrow))
+    resumed = sweep(tmp_path, *LONG, "--resume")
+    assert resumed.code == 0
+    for path, problem in (
+        (cut, "has 1000 bytes"),
+        (foreign, "another sweep"),
+        (flipped, "checksum"),
+    ):
+        assert re.search(f"{path.name}: .*{problem}.*; it is computed again\n", resumed.err)
+    assert sound.name not in resumed.err
+    assert same_data(gearchaos.open_result(tmp_path / "gears.h5"), undisturbed)
+
+
+def test_an_output_folder_that_is_removed_meanwhile_is_code_4(tmp_path):
+    small_config(tmp_path)
+    (tmp_path / "results").mkdir()
+    command = [sys.executable, "-m", "gearchaos.sweep", "gears.toml", *LONG]
+    command += ["--output", "results/gears.h5"]
+    with subprocess.Popen(command, cwd=tmp_path, stderr=subprocess.PIPE, text=True) as process:
+        while process.poll() is None and not list((tmp_path / "results" / SHARDS).glob("*.shard")):
+            time.sleep(0.005)
+        while (tmp_path / "results").exists():
+            shutil.rmtree(tmp_path / "results", ignore_errors=True)
+        _, err = process.communicate(timeout=60)
+    assert process.returncode == 4
+    assert "Traceback" not in err
+    assert "cannot be written: No such file or directory; create the folder first" in err
+
+
+def test_resuming_a_complete_sweep_succeeds_and_says_so(tmp_path):
+    assert sweep(tmp_path, "--quiet").code == 0
+    before = (tmp_path / "gears.h5").read_bytes()
+    # What a process leaves that is killed while it tidies up.
+    assert sweep(tmp_path, "--shard", "1/1", "--output", "again.h5").code == 0
+    (tmp_path / "again.h5.shards").rename(tmp_path / SHARDS)
+    for arguments in ([], ["--shard", "1/2"]):
+        again = sweep(tmp_path, "--resume", *arguments)
+        assert (again.code, again.out) == (0, "gears.h5\n")
+        assert "complete already: 40 lanes, 0 diverged" in again.err
+        assert names_in(tmp_path) == ["gears.h5", "gears.toml"]
+    assert (tmp_path / "gears.h5").read_bytes() == before
+
+
+def test_resuming_into_the_result_of_another_configuration_is_refused_with_the_key(tmp_path):
+    assert sweep(tmp_path, "--quiet").code == 0
+    before = (tmp_path / "gears.h5").read_bytes()
+    other = sweep(tmp_path, "--resume", "--set", "groups.damping_ratio=0.06")
+    assert other.code == 4
+    assert "which differs in groups.damping_ratio (0.05, now 0.06); restore" in other.err
+    assert (tmp_path / "gears.h5").read_bytes() == before

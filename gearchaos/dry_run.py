@@ -1,0 +1,48 @@
+"""What ``--dry-run`` tells: what a sweep would compute, and how long that would take."""
+
+from __future__ import annotations
+
+import math
+import os
+import sys
+from datetime import timedelta
+
+import numpy as np
+from gearchaos_kernels import current_threads
+from tqdm import tqdm
+
+from gearchaos.engine.running import pilot_rate
+from gearchaos.engine.simulation import Simulation
+
+
+def describe(simulation: Simulation, output: str) -> None:
+    """Say what a run would compute and how long it would take, judged by a few real lanes."""
+    seconds = simulation.steps / pilot_rate(simulation)
+    duration = f"{seconds:.1f} s" if seconds < 100 else str(timedelta(seconds=round(seconds)))
+    config = simulation.config
+    sizes = {v.name: len(v.values) for v in simulation.variables if v.values is not None}
+    bytes_kept = simulation.lanes * sum(
+        np.dtype(v.dtype).itemsize * math.prod(sizes[dim] for dim in v.dims[1:])
+        for v in simulation.variables
+        if v.dims[0] == simulation.axis
+    )
+    starts = f", {simulation.starts} starts each" if simulation.starts > 1 else ""
+    values, threads = simulation.values, current_threads()
+    memory = simulation.block_memory(threads)
+    for key, value in {
+        "output": f"{output}{' (exists)' if os.path.exists(output) else ''}",
+        "effects": ", ".join(config.scene.effects) or "none",
+        "states": f"{len(simulation.states)}{_left_out(simulation)}",
+        "lanes": f"{simulation.lanes} ({values.size} values of {config.sweep.parameter} from "
+        f"{values[0]:g} to {values[-1]:g}{starts})",
+        "steps": f"{simulation.steps:.3g} ({simulation.plan.steps_per_period} per period)",
+        "file": f"about {tqdm.format_sizeof(bytes_kept, 'B')} before compression",
+        "memory": f"about {tqdm.format_sizeof(memory, 'B')} for a block of lanes",
+        "time": f"about {duration} with {threads} thread{'s' if threads > 1 else ''}",
+    }.items():
+        sys.stderr.write(f"{key + ':':10}{value}\n")
+
+
+def _left_out(simulation: Simulation) -> str:
+    unused = [name for name in simulation.config.scene.effects if name not in simulation.effects]
+    return f" (nothing that is kept needs {', '.join(unused)})" if unused else ""

@@ -1,0 +1,224 @@
+"""Blocks of lanes computed by the workers of a dask.distributed cluster."""
+
+from __future__ import annotations
+
+import logging
+import re
+from concurrent.futures import CancelledError, Future
+from contextlib import ExitStack
+from functools import lru_cache
+from importlib.util import find_spec
+from threading import Lock
+from types import TracebackType
+from typing import Any, NamedTuple, Self
+
+import distributed
+from gearchaos_kernels import current_threads, most_threads, use_threads
+from gearchaos_kernels.compilation import CACHE_FOLDER, source_hash
+
+from gearchaos.command_line import software_version
+from gearchaos.configuration import Configuration
+from gearchaos.engine.executors import ExecutionError
+from gearchaos.engine.simulation import Arrays, Bounds, Simulation
+from gearchaos.errors import ConfigurationError
+from gearchaos.progress import say
+from gearchaos.results.store_lock import waiting_lock
+
+# Its constructors carry no annotations.
+_Client: Any = distributed.Client
+_LocalCluster: Any = distributed.LocalCluster
+
+BLOCKS_PER_WORKER = 2
+"""One that is computed, and one that waits, so that a worker need not wait."""
+
+# Ctrl-C in a terminal reaches the workers too: they finish the blocks that they have.
+_IGNORE_INTERRUPTS = "import signal; signal.signal(signal.SIGINT, signal.SIG_IGN)"
+
+
+class Recipe(NamedTuple):
+    """All that a worker must know to compute blocks of a sweep.
+
+    Attributes
+    ----------
+    configuration : str
+        The resolved configuration in TOML.
+    steps_per_period : int
+        Where a tolerance was given it is chosen once, not on every worker.
+    software : tuple of str
+        Versions that decide the numbers; see `software`.
+    """
+
+    configuration: str
+    steps_per_period: int
+    software: tuple[str, str]
+
+
+class DaskExecutor:
+    """Hands blocks to the workers of a cluster; blocks of a lost worker are run again.
+
+    Parameters
+    ----------
+    simulation : Simulation
+        Not carried; its number of steps has been chosen.
+    address : str
+        Of a scheduler, such as ``tcp://node7:8786``, or ``local:N`` for N processes here.
+    quiet : bool
+        Whether to say nothing on stderr.
+
+    Raises
+    ------
+    ConfigurationError
+        If a local cluster of no workers is asked for.
+    ExecutionError
+        If there is no scheduler at the address.
+    """
+
+    def __init__(self, simulation: Simulation, address: str, quiet: bool = False) -> None:
+        self._address = address
+        self._recipe = Recipe(
+            simulation.config.resolved_toml(), simulation.plan.steps_per_period, software()
+        )
+        for name in ("distributed", "distributed.client"):
+            # What goes wrong comes as an exception.
+            logging.getLogger(name).setLevel(logging.CRITICAL)
+        with ExitStack() as stack:
+            self._client: Any = stack.enter_context(_connected(stack, address))
+            if not self.workers:
+                say(f"{address}: waits for the first worker to join", quiet)
+                self._client.wait_for_workers(1)
+            self._require_software()
+            self._executor = self._client.get_executor(pure=False)
+            self._closing = stack.pop_all()
+        say(f"{self.workers} dask worker{'s' if self.workers > 1 else ''} at {address}", quiet)
+
+    @property
+    def workers(self) -> int:
+        """How many workers there are now."""
+        try:
+            return len(self._client.nthreads())
+        except OSError as error:
+            raise self._worded(error) from None
+
+    @property
+    def width(self) -> int:
+        """How many blocks to hand out at a time."""
+        return BLOCKS_PER_WORKER * max(1, self.workers)
+
+    def submit(self, block: Bounds) -> Future[Arrays]:
+        """Hand a block to the cluster and return the future of its arrays."""
+        future: Future[Arrays] = Future()
+        # Which of them runs is known to the workers only: all that are handed out are finished.
+        future.set_running_or_notify_cancel()
+
+        def pass_on(inner: Future[Arrays]) -> None:
+            try:
+                future.set_result(inner.result())
+            except BaseException as error:
+                future.set_exception(self._worded(error))
+
+        self._executor.submit(compute_block, self._recipe, block).add_done_callback(pass_on)
+        return future
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        self._closing.close()
+
+    def _require_software(self) -> None:
+        # Blocks cannot even be sent to a worker without it; versions are compared with the blocks.
+        try:
+            self._client.run(find_spec, __name__)
+        except ImportError as error:
+            raise self._worded(error) from None
+
+    def _worded(self, error: BaseException) -> BaseException:
+        if isinstance(error, CancelledError | OSError):
+            return ExecutionError(f"{self._address}: the connection to the scheduler was lost")
+        if isinstance(error, distributed.KilledWorker):
+            return ExecutionError(
+                f"{self._address}: one block was lost with {error.allowed_failures + 1} workers "
+                "in turn; see their logs, and give them more memory if it is that"
+            )
+        if isinstance(error, ImportError):
+            return ExecutionError(
+                f"{self._address}: a worker lacks the software ({error}); install there what is "
+                f"here, gearchaos {software_version()}"
+            )
+        return error
+
+
+def software() -> tuple[str, str]:
+    """Return the versions that decide the numbers: of gearchaos, and a hash of the kernels."""
+    return software_version(), source_hash()
+
+
+def compute_block(recipe: Recipe, block: Bounds) -> dict[str, Any]:
+    """Compute a block; this runs on a worker.
+
+    Raises
+    ------
+    ExecutionError
+        If the software of the worker is not that of the client.
+    """
+    if software() != recipe.software:
+        here, wanted = (
+            f"{version} (kernels {kernels})" for version, kernels in (software(), recipe.software)
+        )
+        raise ExecutionError(
+            f"the worker {distributed.get_worker().address} has gearchaos {here}, this process "
+            f"{wanted}: install the same on both"
+        )
+    # A worker of several task threads is one of as many cores: its blocks take turns.
+    with _ONE_AT_A_TIME:
+        tasks = distributed.get_worker().state.nthreads
+        use_threads(min(tasks, most_threads()) if tasks > 1 else most_threads())
+        return _simulation(recipe).compute(*block)
+
+
+_ONE_AT_A_TIME = Lock()
+
+
+@lru_cache(maxsize=1)
+def _simulation(recipe: Recipe) -> Simulation:
+    simulation = Simulation(Configuration.from_toml(recipe.configuration, "<client>"))
+    simulation.plan = simulation.plan._replace(steps_per_period=recipe.steps_per_period)
+    # The first process of a node compiles; the others wait, and load what it has compiled.
+    with waiting_lock(CACHE_FOLDER / "compiling.lock"):
+        simulation.compile()
+    return simulation
+
+
+def _connected(stack: ExitStack, address: str) -> Any:
+    local = re.fullmatch(r"local:(.*)", address)
+    if local is None:
+        try:
+            return _Client(address)
+        except (OSError, ValueError) as error:
+            raise ExecutionError(
+                f"{address}: no dask scheduler answers ({error}); start one with `dask scheduler` "
+                "or give its address"
+            ) from None
+    if not local[1].isdecimal() or not 1 <= int(local[1]) <= most_threads():
+        raise ConfigurationError(
+            f"--dask {address}: must be local:N with N from 1 to {most_threads()} workers, or the "
+            "address of a scheduler"
+        )
+    workers = int(local[1])
+    cluster = _LocalCluster(
+        n_workers=workers,
+        threads_per_worker=1,
+        processes=True,
+        dashboard_address="127.0.0.1:0",
+        memory_limit=0,
+        silence_logs=logging.CRITICAL,
+        env={"NUMBA_NUM_THREADS": str(max(1, current_threads() // workers))},
+        preload=[_IGNORE_INTERRUPTS],
+    )
+    stack.enter_context(cluster)
+    return _Client(cluster)

@@ -1,0 +1,137 @@
+"""Where blocks of lanes are computed: ``submit(block)`` gives a future, and one loop waits for it.
+
+A `BlockExecutor` is used as those of `concurrent.futures` are. The loop neither knows nor cares
+whether a block is computed in this process or on a cluster.
+"""
+
+from __future__ import annotations
+
+import signal
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
+from contextlib import suppress
+from types import TracebackType
+from typing import Protocol, Self
+
+from gearchaos_kernels import current_threads, use_threads
+
+from gearchaos.engine.simulation import Arrays, Bounds, Simulation, compute_all
+from gearchaos.errors import FileError, GearchaosError
+
+
+class ExecutionError(GearchaosError):
+    """Blocks cannot be computed where they should be."""
+
+    exit_code = FileError.exit_code
+
+
+class BlockExecutor(Protocol):
+    """Computes blocks of lanes; leaving its context ends what it has started."""
+
+    @property
+    def width(self) -> int:
+        """How many blocks to hand out at a time, so that nobody waits for the next one."""
+
+    def submit(self, block: Bounds) -> Future[Arrays]:
+        """Begin a block and return the future of its arrays; `cancel` succeeds until it runs."""
+
+    def __enter__(self) -> Self: ...
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None: ...
+
+
+class LocalExecutor:
+    """Computes in this process, one block at a time: all threads work within a block.
+
+    The thread of its own leaves the main one free to write what is finished, and an interrupt,
+    which the main thread receives, does not cost the block that is running.
+
+    Parameters
+    ----------
+    simulation : Simulation
+    order : sequence of (first, last)
+        All blocks in the order of computation, the finished ones among them.
+    finished : mapping
+        Bounds of finished blocks with a way to read them; a carried sweep goes on from them.
+    """
+
+    width = 2
+
+    def __init__(
+        self,
+        simulation: Simulation,
+        order: Sequence[Bounds],
+        finished: Mapping[Bounds, Callable[[], Arrays]],
+    ) -> None:
+        self._simulation = simulation
+        # A carried block needs what the one before it yielded: they come in this order only.
+        self._carried = compute_all(simulation, order, finished) if simulation.carried else None
+        self._pool = ThreadPoolExecutor(
+            max_workers=1, initializer=use_threads, initargs=(current_threads(),)
+        )
+
+    def submit(self, block: Bounds) -> Future[Arrays]:
+        """Begin a block once those before it are done, and return the future of its arrays."""
+        return self._pool.submit(self._compute, block)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        self._pool.shutdown(cancel_futures=True)
+
+    def _compute(self, block: Bounds) -> Arrays:
+        if self._carried is None:
+            return self._simulation.compute(*block)
+        computed, arrays = next(self._carried)
+        assert computed == block, "a carried sweep is computed in its own order"
+        return arrays
+
+
+def compute_blocks(
+    executor: BlockExecutor, blocks: Sequence[Bounds], keep: Callable[[Bounds, Arrays], None]
+) -> None:
+    """Have blocks computed and keep each as soon as it is there.
+
+    An interrupt lets the blocks that are running end and keeps them; a second one ends the
+    process at once.
+
+    Parameters
+    ----------
+    executor : BlockExecutor
+    blocks : sequence of (first, last)
+        In the order in which they are handed out.
+    keep : callable
+        ``keep(block, arrays)``; called in this thread, and again for a block at which it was
+        interrupted.
+    """
+    waiting = list(reversed(blocks))
+    futures: dict[Future[Arrays], Bounds] = {}
+    try:
+        while waiting or futures:
+            while waiting and len(futures) < executor.width:
+                block = waiting.pop()
+                futures[executor.submit(block)] = block
+            for future in wait(futures, return_when=FIRST_COMPLETED).done:
+                keep(futures[future], future.result())
+                del futures[future]
+    except KeyboardInterrupt:
+        signal.signal(signal.SIGINT, signal.SIG_DFL)
+        for future in futures:
+            future.cancel()
+        for future, block in futures.items():
+            if not future.cancelled():
+                # What cannot be computed or kept is missing afterwards, and counted as such.
+                with suppress(GearchaosError):
+                    keep(block, future.result())
+        raise

@@ -1,0 +1,94 @@
+"""The blocks that a store lacks, computed into it."""
+
+from __future__ import annotations
+
+from functools import partial
+
+from gearchaos_kernels import current_threads
+
+from gearchaos.engine.error_check import Tally
+from gearchaos.engine.executors import BlockExecutor, LocalExecutor, compute_blocks
+from gearchaos.engine.parts import Part, shared_block_lanes
+from gearchaos.engine.simulation import Arrays, Bounds, Simulation
+from gearchaos.progress import Progress, say
+from gearchaos.results.shards import ShardStore
+
+
+def open_store(
+    simulation: Simulation, output: str, *, resume: bool, part: Part | None = None
+) -> ShardStore:
+    """Open the store of a sweep whose number of steps has been chosen, see `ShardStore`.
+
+    Parameters
+    ----------
+    simulation : Simulation
+    output : str
+        The result file to be.
+    resume : bool
+        Whether there may be blocks of an earlier run.
+    part : Part, optional
+        The part of the blocks that this process computes; by default all.
+    """
+    return ShardStore(
+        output,
+        simulation.variables,
+        simulation.lanes,
+        simulation.config.resolved_toml(),
+        axis=simulation.axis,
+        text=simulation.config.text,
+        resume=resume,
+        part=part and part.name,
+        blocks=part and part.blocks(simulation.lanes),
+    )
+
+
+def fill(
+    simulation: Simulation, store: ShardStore, cluster: str | None, quiet: bool
+) -> tuple[Tally, dict[str, int]]:
+    """Compute the blocks that are missing, and keep each of them as soon as it is there.
+
+    Parameters
+    ----------
+    simulation : Simulation
+        Compiled, unless a cluster computes; its number of steps has been chosen.
+    store : ShardStore
+        With what is finished already.
+    cluster : str or None
+        Where dask workers are, see `DaskExecutor`; None computes in this process.
+    quiet : bool
+        Whether to show no progress.
+
+    Returns
+    -------
+    tally : Tally
+        Of all own blocks, the finished ones too.
+    performed_by : dict
+        What the result file says about who has computed.
+    """
+    tally = Tally()
+    finished, problems = store.finished(tally.add)
+    for problem in problems:
+        say(f"{problem}; it is computed again")
+    done = sum(last - first for first, last in finished)
+    if cluster is None:
+        size = simulation.block_lanes(current_threads())
+        missing = simulation.in_order(store.missing(finished, size))
+        readers = {block: partial(store.read, *block) for block in finished}
+        order = simulation.in_order([*finished, *missing])
+        executor: BlockExecutor = LocalExecutor(simulation, order, readers)
+        performed_by = {"threads": current_threads()}
+    else:
+        from gearchaos.engine.dask_executor import DaskExecutor
+
+        executor = DaskExecutor(simulation, cluster, quiet)
+        missing = store.missing(finished, shared_block_lanes(simulation.lanes, executor.workers))
+        performed_by = {"threads": 1, "workers": executor.workers}
+    with executor, Progress(store.own_lanes, done, quiet) as progress:
+
+        def keep(block: Bounds, arrays: Arrays) -> None:
+            store.write(*block, arrays)
+            tally.add(arrays)
+            progress.advance(block[1] - block[0])
+
+        compute_blocks(executor, missing, keep)
+    return tally, performed_by

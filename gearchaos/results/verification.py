@@ -1,0 +1,78 @@
+"""Every checksum of a result file, tried: that of the file and those of its arrays' chunks."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from pathlib import Path
+
+import h5py
+
+from gearchaos.errors import FileError
+from gearchaos.results.checksum_line import checksum_fits
+from gearchaos.results.global_heap import heaps_end
+from gearchaos.results.result_file import PARAMETERS
+from gearchaos.results.result_reader import own_datasets, read_result
+
+
+def verify(path: str | os.PathLike[str]) -> list[str]:
+    """Read all of a result file, piece by piece, and compare it with its checksums and format.
+
+    Returns
+    -------
+    list of str
+        What was checked and found sound, one phrase each.
+
+    Raises
+    ------
+    FileError
+        If anything is damaged or contradicts the format; the sentences name the arrays and rows.
+    """
+    try:
+        variables, _, parameters, metadata = read_result(path, rows=False)
+    except FileError as error:
+        raise FileError([*error.problems, *damaged_pieces(path)]) from error
+    fits = checksum_fits(Path(path))
+    problems = list(damaged_pieces(path))
+    if fits is False:
+        problems.insert(0, f"{path}: is damaged (its checksum does not fit); run the sweep again")
+    if problems:
+        raise FileError(problems)
+    with h5py.File(path, "r") as file:
+        summed = sum(
+            dataset.id.get_num_chunks() for dataset in own_datasets(file) if dataset.fletcher32
+        )
+    line = (
+        "there is no checksum of the file: another program than gearchaos has written to it"
+        if fits is None
+        else "the checksum of the file fits"
+    )
+    return [
+        line,
+        f"{summed} chunks of numbers fit their checksums",
+        f"format {metadata['schema']} {metadata['schema_version']}: {len(variables)} variables and "
+        f"{len(parameters)} {PARAMETERS} have their types, dimensions and sizes",
+    ]
+
+
+def damaged_pieces(path: str | os.PathLike[str]) -> Iterator[str]:
+    """Name the arrays, and the rows of them, that cannot be read; one sentence each."""
+    if not Path(path).is_file() or not h5py.is_hdf5(path) or not heaps_end(path):
+        return
+    try:
+        with h5py.File(path, "r") as file:
+            for dataset in own_datasets(file):
+                for rows in _unreadable(dataset):
+                    yield f"{path}: is damaged in {dataset.name.lstrip('/')}{rows}"
+    except Exception:
+        # Where the damage has reached the structure, the reader has said so already.
+        return
+
+
+def _unreadable(dataset: h5py.Dataset) -> Iterator[str]:
+    pieces = dataset.iter_chunks() if dataset.chunks else [()]
+    for piece in pieces:
+        try:
+            dataset[piece]
+        except OSError:
+            yield f", rows {piece[0].start} to {piece[0].stop - 1}" if piece else ""

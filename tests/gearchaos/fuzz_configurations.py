@@ -1,0 +1,158 @@
+"""Configuration files with a fault in them, each made again by its number."""
+
+import random
+import re
+from collections.abc import Callable
+from pathlib import Path
+
+from .commands import SMALL
+
+Random = random.Random
+
+WORDS = (
+    "[", "]", "{", "}", "=", ".", ",", "#", '"', "'", '"""', "\\", "\n", "\r", "\0", "\x1b[31m",
+    "nan", "-inf", "1e999", "-0", "0x", "1979-05-27", "true", "[[pair]]", "[sweep]", "\ufeff", "é",
+    "\U0001f600", "\u202e", "count = 3\n", "__class__", "../../etc/passwd", "${HOME}", "%s",
+)  # fmt: skip
+NUMBERS = (
+    "0", "-1", "1e308", "-1e308", "5e-324", "1e-300", "nan", "inf", "-inf", "9223372036854775808",
+    "1" + "0" * 400, "1" + "0" * 5000, "0x" + "f" * 6000, "1_000_000_000", "1e400", "0.1e-999",
+)  # fmt: skip
+
+
+def configuration(number: int) -> tuple[str, bytes]:
+    """Return what was done to a configuration file, and the file."""
+    source = random.Random(f"configuration {number}")
+    kind = list(KINDS)[number % len(KINDS)]
+    return kind, KINDS[kind](source)
+
+
+def large_configuration(path: Path) -> None:
+    """Write a configuration of 100 MB."""
+    with path.open("w", encoding="utf-8") as file:
+        file.write(SMALL)
+        for _ in range(100):
+            file.write("# a comment\n" * (1_000_000 // 12))
+
+
+def _bytes_changed(source: Random) -> bytes:
+    content = bytearray(SMALL.encode())
+    for _ in range(source.choice((1, 2, 5, 50))):
+        content[source.randrange(len(content))] = source.randrange(256)
+    return bytes(content)
+
+
+def _cut(source: Random) -> bytes:
+    return SMALL.encode()[: source.randrange(len(SMALL))]
+
+
+def _words_inserted(source: Random) -> bytes:
+    text = SMALL
+    for _ in range(source.choice((1, 2, 8))):
+        place = source.randrange(len(text))
+        text = text[:place] + source.choice(WORDS) + text[place:]
+    return text.encode()
+
+
+def _lines_shuffled(source: Random) -> bytes:
+    lines = SMALL.splitlines(keepends=True)
+    for _ in range(source.choice((1, 3, 10))):
+        one, other = source.randrange(len(lines)), source.randrange(len(lines))
+        how = source.randrange(3)
+        if how == 0:
+            lines[one], lines[other] = lines[other], lines[one]
+        elif how == 1:
+            lines[one] = ""
+        else:
+            lines.insert(one, lines[other])
+    return "".join(lines).encode()
+
+
+def _numbers_replaced(source: Random) -> bytes:
+    places = list(re.finditer(r"(?<![\w.])-?\d+(?:\.\d+)?(?:e-?\d+)?", SMALL))
+    text = SMALL
+    for place in sorted(source.sample(places, source.choice((1, 2))), key=lambda m: -m.start()):
+        text = text[: place.start()] + source.choice(NUMBERS) + text[place.end() :]
+    return text.encode()
+
+
+def _values_exchanged(source: Random) -> bytes:
+    lines = SMALL.splitlines()
+    keys = [index for index, line in enumerate(lines) if "=" in line]
+    one, other = source.sample(keys, 2)
+    name, _, _ = lines[one].partition("=")
+    _, _, value = lines[other].partition("=")
+    lines[one] = f"{name}={value}"
+    return "\n".join(lines).encode()
+
+
+def _random_toml(source: Random) -> bytes:
+    return "\n".join(_line(source) for _ in range(source.randrange(1, 30))).encode()
+
+
+def _line(source: Random) -> str:
+    name = source.choice(("pair", "sweep", "scene", "effects", "x", "a.b", '"q r"', "start.state"))
+    if source.random() < 0.3:
+        return source.choice((f"[{name}]", f"[[{name}]]"))
+    return f"{name} = {_value(source, 0)}"
+
+
+def _value(source: Random, depth: int) -> str:
+    if depth < 4 and source.random() < 0.4:
+        inner = [_value(source, depth + 1) for _ in range(source.randrange(4))]
+        if source.random() < 0.5:
+            return f"[{', '.join(inner)}]"
+        return f"{{{', '.join(f'k{index} = {value}' for index, value in enumerate(inner))}}}"
+    return source.choice((*NUMBERS[:8], '"text"', "'x'", "true", "1979-05-27T07:32:00Z", "[]"))
+
+
+def _nested_deeply(source: Random) -> bytes:
+    depth = source.choice((50, 100, 300, 1000, 5000, 100_000))
+    opening, inner, closing = source.choice(
+        (("[", "1", "]"), ("{a = ", "1", "}"), ("a.", "b = 1", ""), ('"a".', "b = 1", ""))
+    )
+    key = "" if closing == "" else source.choice(("x = ", "title = ", "[sweep]\nvalues = "))
+    if source.random() < 0.3:
+        closing = ""
+    return (SMALL + f"\n{key}{opening * depth}{inner}{closing * depth}\n").encode()
+
+
+def _many_keys(source: Random) -> bytes:
+    number = source.choice((100, 3000, 20_000))
+    form = source.choice(("key{}=1\n", "[t{}]\n", "[pair.t{}]\n", "values.a{}=[]\n"))
+    return (SMALL + "".join(form.format(index) for index in range(number))).encode()
+
+
+def _long_values(source: Random) -> bytes:
+    entry = source.choice(("1.0,", "true,", '"x",', "[],", "{},", "1e400,", "'delta_5',"))
+    key = source.choice(("values", "teeth", "effects", "section", "cosine_N_per_um_mm"))
+    rows = ",".join([entry.rstrip(",")] * source.choice((10, 1000, 30_000)))
+    return re.sub(rf"(?m)^{key} = .*$|^count = 40$", f"{key} = [{rows}]", SMALL, count=1).encode()
+
+
+def _encoded_otherwise(source: Random) -> bytes:
+    text = SMALL.replace("a small sweep", "ein kleiner Läüf \U0001f600")
+    encoding = source.choice(
+        ("utf-16", "utf-32", "utf-16-le", "cp037", "utf-7", "latin-1", "cp1252")
+    )
+    return text.encode(encoding, "replace")
+
+
+def _random_bytes(source: Random) -> bytes:
+    return source.randbytes(source.choice((0, 1, 10, 1000, 100_000)))
+
+
+KINDS: dict[str, Callable[[Random], bytes]] = {
+    "bytes changed": _bytes_changed,
+    "cut": _cut,
+    "words inserted": _words_inserted,
+    "lines shuffled": _lines_shuffled,
+    "numbers replaced": _numbers_replaced,
+    "values exchanged": _values_exchanged,
+    "random TOML": _random_toml,
+    "nested deeply": _nested_deeply,
+    "many keys": _many_keys,
+    "long values": _long_values,
+    "encoded otherwise": _encoded_otherwise,
+    "random bytes": _random_bytes,
+}

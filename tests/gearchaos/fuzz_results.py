@@ -1,0 +1,323 @@
+"""Result files that are none, each made again by its number."""
+
+import os
+import random
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+
+from gearchaos.results.checksum_line import append_checksum
+from gearchaos.results.result import Parameter, Result
+from gearchaos.results.variables import STATE_WORDING, step_choice_variables, sweep_variables
+
+from .commands import SMALL
+
+Random = random.Random
+
+CHECKSUM_LINE = 82
+LANES, POINTS = 20, 5
+
+
+def good_result(path: Path) -> None:
+    """Write a sound result file with every kind of variable that a sweep has."""
+    states = list(STATE_WORDING)[:2]
+    choice = dict.fromkeys(("section_error", "exponent_error", "changed_share"), (1e-3, 1e-7))
+    variables = sweep_variables(
+        "load",
+        units="1",
+        long_name="static load",
+        symbol="$f_n$",
+        states=states,
+        section=["delta_5"],
+        section_points=POINTS,
+        lyapunov=True,
+        several_starts=False,
+        status_meanings=["ok", "diverged"],
+        crossings=True,
+        spectrum=True,
+        check_meanings=["not_checked", "same", "changed"],
+        motion_meanings=["periodic", "quasi_periodic", "chaotic", "unresolved", "diverged"],
+    )
+    variables += step_choice_variables([50, 100], choice)
+    sizes = {"section_point": POINTS, "state": 2, "exponent": 2}
+    numbers = np.random.default_rng(5)
+    data = {}
+    for variable in variables:
+        if variable.values is None:
+            shape = (LANES, *(sizes[dim] for dim in variable.dims[1:]))
+            data[variable.name] = (
+                numbers.normal(size=shape)
+                if variable.dtype == "float64"
+                else numbers.integers(0, max(1, len(variable.flags)), size=shape)
+            )
+    data["load"] = np.linspace(0.0, 1.0, LANES)
+    parameters = {
+        "load": Parameter(data["load"], "swept"),
+        "damping_ratio": Parameter(0.1, "given"),
+        "stiffness_cosine": Parameter(np.array([0.1, 0.2]), "derived"),
+    }
+    metadata: dict[str, str | int | float] = {
+        "title": "a small result",
+        "effects": "backlash",
+        "threads": 2,
+        "wall_time_seconds": 0.5,
+        "configuration": SMALL,
+        "configuration_resolved": SMALL,
+    }
+    Result("load", variables, data, parameters, metadata).save(path)
+
+
+def damaged_result(number: int, good: bytes, path: Path) -> str:
+    """Write a file that is a sound result no more, or hardly; say what was done to it.
+
+    Parameters
+    ----------
+    number : int
+        Decides what is done.
+    good : bytes
+        A sound result file.
+    path : Path
+        File to be written. Files that it may point to lie in the same folder.
+    """
+    source = random.Random(f"result {number}")
+    kind = list(KINDS)[number % len(KINDS)]
+    KINDS[kind](source, good, path)
+    return kind
+
+
+def _cut(source: Random, good: bytes, path: Path) -> None:
+    path.write_bytes(good[: source.randrange(len(good))])
+
+
+def _cut_under_a_new_checksum(source: Random, good: bytes, path: Path) -> None:
+    _cut(source, good, path)
+    append_checksum(path)
+
+
+def _flipped(source: Random, good: bytes, path: Path) -> None:
+    path.write_bytes(_changed(source, good))
+
+
+def _flipped_without_the_checksum(source: Random, good: bytes, path: Path) -> None:
+    path.write_bytes(_changed(source, good[:-CHECKSUM_LINE]))
+
+
+def _flipped_under_a_new_checksum(source: Random, good: bytes, path: Path) -> None:
+    _flipped_without_the_checksum(source, good, path)
+    append_checksum(path)
+
+
+def _changed(source: Random, content: bytes) -> bytes:
+    changed = bytearray(content)
+    how = source.randrange(4)
+    place = source.randrange(len(changed))
+    size = source.choice((1, 4, 8, 64, 1000))
+    if how == 0:
+        changed[place] ^= 1 << source.randrange(8)
+    elif how == 1:
+        changed[place : place + size] = source.randbytes(min(size, len(changed) - place))
+    elif how == 2:
+        end = min(place + size, len(changed))
+        changed[place:end] = bytes([source.choice((0, 0xFF))]) * (end - place)
+    else:
+        other = source.randrange(len(changed))
+        changed[place : place + size] = changed[other : other + size]
+    return bytes(changed)
+
+
+def _edited(source: Random, good: bytes, path: Path) -> None:
+    path.write_bytes(good)
+    with h5py.File(path, "r+", track_order=True) as file:
+        names = [*file, *(f"parameters/{name}" for name in file["parameters"])]
+        for _ in range(source.choice((1, 1, 2))):
+            name = source.choice(names)
+            # HDF5 refuses some of this; whatever has been done by then stays.
+            with suppress(Exception):
+                source.choice(EDITS)(source, file, name)
+    if source.random() < 0.5:
+        append_checksum(path)
+
+
+def _exchange(source: Random, file: h5py.File, name: str) -> None:
+    old = file[name]
+    shape = getattr(old, "shape", ())
+    scales = [dim[0] if len(dim) else None for dim in old.dims] if shape else []
+    notes = dict(old.attrs)
+    del file[name]
+    shape = source.choice((shape, shape, (), shape[::-1], (*shape, 2), (3,), (0,)))
+    new = file.create_dataset(name, data=_array(source, shape))
+    for index, scale in enumerate(scales[: len(shape)]):
+        if scale is not None and scale.name is not None and scale.name != f"/{name}":
+            new.dims[index].attach_scale(scale)
+    for key in ("units", "long_name", "symbol", "origin", "flag_meanings"):
+        if key in notes:
+            new.attrs[key] = notes[key]
+
+
+def _array(source: Random, shape: tuple[int, ...]) -> Any:
+    kind = source.choice(ARRAYS)
+    if kind == "text":
+        return np.full(shape, "x\x1b[31m", dtype=h5py.string_dtype())
+    if kind == "bytes":
+        return np.full(shape, b"\xff\xfe", dtype="S2")
+    if kind == "compound":
+        return np.zeros(shape, dtype=[("a", "f8"), ("b", "i4")])
+    if kind == "extreme":
+        return np.full(shape, source.choice((np.nan, np.inf, -np.inf, 1e308, -1e308, 5e-324)))
+    if kind == "enumeration":
+        return np.zeros(shape, dtype=h5py.enum_dtype({"a": 0, "b": 1}, basetype="u1"))
+    if kind == "references":
+        return np.full(shape, h5py.Reference(), dtype=h5py.ref_dtype)
+    if kind == "opaque":
+        return np.zeros(shape, dtype="V7")
+    return np.full(shape, source.choice((0, 1, 3)), dtype=kind)
+
+
+ARRAYS = (
+    "f8", "i4", "u1", "f4", "f2", "i8", "u8", ">f8", ">i4", "c16", "?", "text", "bytes", "compound",
+    "extreme", "enumeration", "references", "opaque",
+)  # fmt: skip
+
+
+def _describe(source: Random, file: h5py.File, name: str) -> None:
+    item = source.choice((file, file[name]))
+    keys = [*item.attrs, "title", "units", "symbol", "_FillValue", "flag_meanings", "CLASS", "NAME"]
+    key = source.choice(keys)
+    if key in item.attrs and source.random() < 0.2:
+        del item.attrs[key]
+        return
+    value = source.choice(
+        (
+            "", "x" * 20_000, "\x1b[2J\x07\n\r", "\u202egnp.exe", "$\\frac{1$", "$" * 7, "a " * 99,
+            r"$\input{/etc/passwd}$", "%s%n{0}", 7, -1, 2.5, float("nan"), 10**18, file[name].ref,
+            np.arange(3), np.zeros(0), b"\xff\xfe", "2.0", "1.9", h5py.Empty("f8"),
+        )
+    )  # fmt: skip
+    item.attrs[key] = value
+
+
+def _delete(_: Random, file: h5py.File, name: str) -> None:
+    del file[name]
+
+
+def _link(source: Random, file: h5py.File, name: str) -> None:
+    old = file[name]
+    del file[name]
+    file[name] = source.choice(
+        (
+            h5py.ExternalLink("good.h5", f"/{name}"),
+            h5py.ExternalLink("pipe", f"/{name}"),
+            h5py.SoftLink("/load"),
+            h5py.SoftLink(f"/{name}"),
+            h5py.SoftLink("/nowhere"),
+            file["/"],
+            file["parameters"] if "parameters" in file else file["/"],
+            file.get("status", old),
+        )
+    )
+
+
+def _kept_elsewhere(source: Random, file: h5py.File, name: str) -> None:
+    shape = getattr(file[name], "shape", None) or (LANES,)
+    del file[name]
+    elsewhere = source.choice(("good.h5", "pipe", "/etc/passwd"))
+    if source.random() < 0.5:
+        options = {"external": [(elsewhere, 0, h5py.h5f.UNLIMITED)]}
+        file.create_dataset(name, shape=shape, dtype="f8", **options)
+        return
+    limits = (None,) * len(shape) if source.random() < 0.5 else shape
+    layout = h5py.VirtualLayout(shape=shape, dtype="f8", maxshape=limits)
+    layout[...] = h5py.VirtualSource(elsewhere, name, shape=shape, maxshape=limits)
+    file.create_virtual_dataset(name, layout)
+
+
+def _declare_too_much(source: Random, file: h5py.File, name: str) -> None:
+    del file[name]
+    options = source.choice(
+        (
+            {"shape": (10**12, 100), "chunks": (1000, 100), "compression": "gzip"},
+            {"shape": (10**15,), "chunks": (1,)},
+            {"shape": (10**6,), "chunks": (1,), "compression": "gzip"},
+            {"shape": (10**9,)},
+            {"shape": (LANES,), "chunks": (LANES,), "compression": "lzf"},
+            {"shape": (LANES,), "chunks": (LANES,), "scaleoffset": 0},
+            {"shape": (1,) * 32},
+            {"shape": (LANES,), "maxshape": (None,), "chunks": (10**7,)},
+        )
+    )
+    dataset = file.create_dataset(name, dtype="i4", **options)
+    if dataset.size < 1000:
+        dataset[...] = 1
+
+
+def _exchange_scales(source: Random, file: h5py.File, name: str) -> None:
+    dataset = file[name]
+    scales = [file[other] for other in file if other in ("load", "state", "section_point", name)]
+    if isinstance(dataset, h5py.Dataset) and dataset.ndim and not dataset.is_scale and scales:
+        dim = source.choice(list(dataset.dims))
+        for old in list(dim.values()):
+            if source.random() < 0.7:
+                dim.detach_scale(old)
+        scale = source.choice(scales)
+        if scale != dataset:
+            dim.attach_scale(scale)
+    else:
+        file[name].attrs["DIMENSION_LIST"] = source.choice((1, "x", file.ref))
+
+
+def _add(source: Random, file: h5py.File, name: str) -> None:
+    other = source.choice(
+        ("x", "a\nb\x1b[31m", "\u202e", "x" * 3000, "motion", "period", "delta_5")
+    )
+    if other not in file:
+        file.create_dataset(other, data=_array(source, source.choice(((), (LANES,), (3, 3)))))
+        file[name].attrs["axis"] = other
+
+
+EDITS: tuple[Callable[[Random, h5py.File, str], None], ...] = (
+    _exchange, _exchange, _exchange, _describe, _describe, _describe, _delete, _link,
+    _kept_elsewhere, _declare_too_much, _exchange_scales, _add,
+)  # fmt: skip
+
+
+def _another_hdf5_file(source: Random, _: bytes, path: Path) -> None:
+    with h5py.File(path, "w", userblock_size=source.choice((0, 512))) as file:
+        if source.random() < 0.7:
+            file.attrs["schema"] = source.choice(("gearchaos-sweep", "other", 3))
+            file.attrs["schema_version"] = source.choice(("1.0", "2.0", "", 1.0))
+            file.attrs["axis"] = source.choice(("load", "state", "", "/", "..", "parameters"))
+        for name in ("load", "state", "status", "parameters", "x/y"):
+            if source.random() < 0.6:
+                file.create_dataset(name, data=_array(source, source.choice(((), (4,), (2, 3)))))
+        if source.random() < 0.5:
+            file.require_group("z")["loop"] = file["/"]
+
+
+def _no_hdf5_file(source: Random, good: bytes, path: Path) -> None:
+    beginning = source.choice(
+        (b"", b"CDF\1", b"\x89HDF\r\n\x1a\n", b"\x89PNG\r\n", b"PK\3\4", b"# x\n")
+    )
+    path.write_bytes(beginning + source.randbytes(source.choice((0, 1, 100, len(good)))))
+
+
+def _no_file(source: Random, _: bytes, path: Path) -> None:
+    source.choice((lambda: None, path.mkdir, lambda: os.mkfifo(path)))()
+
+
+KINDS: dict[str, Callable[[Random, bytes, Path], None]] = {
+    "cut": _cut,
+    "cut, new checksum": _cut_under_a_new_checksum,
+    "bytes changed": _flipped,
+    "bytes changed, no checksum": _flipped_without_the_checksum,
+    "bytes changed, new checksum": _flipped_under_a_new_checksum,
+    "edited": _edited,
+    "edited once more": _edited,
+    "edited again": _edited,
+    "another HDF5 file": _another_hdf5_file,
+    "no HDF5 file": _no_hdf5_file,
+    "no file": _no_file,
+}

@@ -1,0 +1,63 @@
+"""A process that runs commands one after the other and reports how each of them ended.
+
+It reads one JSON list a line, the command and its arguments, and answers with one JSON object a
+line. Whoever started it sees by its silence that a command hangs, and by its end that one crashed.
+"""
+
+import contextlib
+import importlib
+import io
+import json
+import os
+import resource
+import sys
+import traceback
+from collections.abc import Callable
+
+MEMORY = 6 << 30
+
+
+def main() -> None:
+    """Serve until the input ends."""
+    resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
+    answers = os.fdopen(os.dup(sys.stdout.fileno()), "w", encoding="utf-8")
+    for line in sys.stdin:
+        command, *arguments = json.loads(line)
+        print(json.dumps(run(command, arguments)), file=answers, flush=True)
+
+
+def run(command: str, arguments: list[str]) -> dict[str, object]:
+    """Run one command in this process: its exit code, what it wrote, and an escaped exception."""
+    out, err = io.StringIO(), io.StringIO()
+    code, escaped = None, ""
+    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
+        try:
+            code = _main(command)(arguments)
+        except BaseException:
+            escaped = traceback.format_exc()
+    return {
+        "code": code,
+        "out": out.getvalue()[:1000],
+        "err": err.getvalue(),
+        "escaped": escaped[-3_000:],
+    }
+
+
+def _main(command: str) -> Callable[[list[str]], int]:
+    if command != "load_config":
+        return importlib.import_module(f"gearchaos.{command}").main
+    from gearchaos import load_config
+    from gearchaos.command_line import OK, run_command
+
+    def main(arguments: list[str]) -> int:
+        def body() -> int:
+            load_config(*arguments)
+            return OK
+
+        return run_command("gearchaos load_config", body)
+
+    return main
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,206 @@
+"""Blocks computed by dask workers: real schedulers and processes, some of which are killed."""
+
+import json
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+from contextlib import contextmanager
+
+import psutil
+import pytest
+
+import gearchaos
+
+from .commands import names_in, same_data, small_config, sweep
+
+pytest.importorskip("distributed")
+
+SHARDS = "gears.h5.shards"
+# Six blocks of lanes that take a second or so each.
+LONG = ("--set", "sweep.count=1500", "--set", "integration.transient_periods=700")
+SCHEDULER = "from distributed.cli.dask_scheduler import main; main()"
+WORKER = "from distributed.cli.dask_worker import main; main()"
+
+
+@pytest.fixture(scope="module")
+def undisturbed(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("undisturbed")
+    assert sweep(folder, *LONG, "--quiet").code == 0
+    return gearchaos.open_result(folder / "gears.h5")
+
+
+@contextmanager
+def python(code, *arguments, cwd, **options):
+    """Run a Python program for as long as the context lasts."""
+    with subprocess.Popen(
+        [sys.executable, "-c", code, *arguments],
+        cwd=cwd,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+        **options,
+    ) as process:
+        try:
+            yield process
+        finally:
+            process.kill()
+
+
+@contextmanager
+def scheduler(folder):
+    """Run a scheduler and yield its address."""
+    file = folder / "scheduler.json"
+    flags = ("--scheduler-file", str(file), "--host", "127.0.0.1", "--port", "0", "--no-dashboard")
+    with python(SCHEDULER, *flags, cwd=folder) as process:
+        while process.poll() is None and not file.exists():
+            time.sleep(0.05)
+        yield json.loads(file.read_text())["address"]
+
+
+def worker(address, folder, before=""):
+    """Run a worker, without a nanny that would start it again once it is killed."""
+    environment = {**os.environ, "NUMBA_NUM_THREADS": "1"}
+    flags = ("--no-nanny", "--nthreads", "1", "--no-dashboard")
+    return python(f"{before}\n{WORKER}", address, *flags, cwd=folder, env=environment)
+
+
+@contextmanager
+def begun(folder, *arguments):
+    """Start the long sweep and yield its process once a block is finished."""
+    small_config(folder)
+    with subprocess.Popen(
+        [sys.executable, "-m", "gearchaos.sweep", "gears.toml", *LONG, *arguments],
+        cwd=folder,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        env={**os.environ, "DASK_DISTRIBUTED__COMM__TIMEOUTS__CONNECT": "3s"},
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
+    ) as process:
+        while process.poll() is None and not list((folder / SHARDS).glob("*.shard")):
+            time.sleep(0.005)
+        yield process
+
+
+@pytest.mark.slow
+def test_the_blocks_of_a_killed_worker_are_run_again(tmp_path, undisturbed):
+    cluster = tmp_path / "cluster"
+    cluster.mkdir()
+    with (
+        scheduler(cluster) as address,
+        worker(address, cluster) as victim,
+        worker(address, cluster),
+        begun(tmp_path, "--dask", address) as process,
+    ):
+        victim.kill()
+        out, err = process.communicate(timeout=60)
+    assert (process.returncode, out) == (0, "gears.h5\n"), err
+    assert "Traceback" not in err
+    assert "1500 of 1500 lanes" in err
+    assert names_in(tmp_path) == ["cluster", "gears.h5", "gears.toml"]
+    result = gearchaos.open_result(tmp_path / "gears.h5")
+    assert same_data(result, undisturbed)
+    assert result.metadata["workers"] in (1, 2)
+
+
+@pytest.mark.slow
+def test_an_interrupt_keeps_what_local_workers_have_and_any_machine_goes_on(tmp_path, undisturbed):
+    with begun(tmp_path, "--dask", "local:2") as process:
+        # Ctrl-C in a terminal reaches everybody.
+        workers = psutil.Process(process.pid).children(recursive=True)
+        for each in (process, *workers):
+            each.send_signal(signal.SIGINT)
+        out, err = process.communicate(timeout=60)
+    assert (process.returncode, out) == (130, ""), err
+    assert "Traceback" not in err
+    assert 0 < int(re.search(r"(\d+) of 1500 lanes are kept", err)[1]) < 1500
+    _, alive = psutil.wait_procs(workers, timeout=10)
+    assert alive == []
+    assert names_in(tmp_path) == [SHARDS, "gears.toml"]
+    assert sweep(tmp_path, *LONG, "--resume", "--quiet") == (0, "gears.h5\n", "")
+    assert same_data(gearchaos.open_result(tmp_path / "gears.h5"), undisturbed)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("before", "message"),
+    [
+        (
+            "import gearchaos.command_line as c; c.software_version = lambda: '0.0.9'",
+            r"the worker tcp://\S+ has gearchaos 0\.0\.9 \(kernels \w+\), this process "
+            r"\S+ \(kernels \w+\): install the same",
+        ),
+        ("import sys; sys.modules['gearchaos'] = None", "a worker lacks the software"),
+    ],
+    ids=["other version", "none"],
+)
+def test_a_worker_with_other_software_is_refused(tmp_path, before, message):
+    with scheduler(tmp_path) as address, worker(address, tmp_path, before):
+        ended = sweep(tmp_path, "--dask", address)
+    assert (ended.code, ended.out) == (4, "")
+    assert re.search(message, ended.err)
+    assert SHARDS not in names_in(tmp_path)
+
+
+@pytest.mark.slow
+def test_a_scheduler_that_goes_away_costs_nothing_that_is_finished(tmp_path):
+    cluster = tmp_path / "cluster"
+    cluster.mkdir()
+    with begun_and_lost(cluster, tmp_path) as process:
+        out, err = process.communicate(timeout=60)
+    assert (process.returncode, out) == (4, ""), err
+    assert "Traceback" not in err
+    assert "the connection to the scheduler was lost" in err
+    assert "lanes are kept" in err
+
+
+@contextmanager
+def begun_and_lost(cluster, folder):
+    with (
+        scheduler(cluster) as address,
+        worker(address, cluster),
+        begun(folder, "--dask", address) as process,
+    ):
+        for each in psutil.Process().children():
+            if "dask_scheduler" in " ".join(each.cmdline()):
+                each.kill()
+        yield process
+
+
+def test_a_scheduler_that_does_not_answer_is_code_4(tmp_path):
+    environment = {**os.environ, "DASK_DISTRIBUTED__COMM__TIMEOUTS__CONNECT": "1s"}
+    for address in ("tcp://127.0.0.1:9", "nonsense://x"):
+        ended = sweep(tmp_path, "--dask", address, env=environment)
+        assert (ended.code, ended.out) == (4, "")
+        assert f"error: {address}: no dask scheduler answers" in ended.err
+        assert names_in(tmp_path) == ["gears.toml"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--dask", "local:0"], "--dask local:0: must be local:N with N from 1 to"),
+        (["--dask", "local:two"], "--dask local:two: must be local:N"),
+        (
+            ["--dask", "local:1", "--set", "start.carry=upwards"],
+            '--dask: with start.carry = "upwards" one value is computed after the other',
+        ),
+        (["--dask", "tcp://node:1", "--threads", "1"], "--threads 1: the workers of a cluster use"),
+    ],
+)
+def test_what_a_cluster_cannot_do_is_code_2(tmp_path, arguments, message):
+    ended = sweep(tmp_path, *arguments)
+    assert (ended.code, ended.out) == (2, "")
+    assert message in ended.err
+    assert names_in(tmp_path) == ["gears.toml"]
+
+
+def test_without_the_extra_the_message_names_it(tmp_path):
+    small_config(tmp_path)
+    code = "import sys; sys.modules['distributed'] = None; from gearchaos.sweep import main; "
+    command = [sys.executable, "-c", f"{code}sys.exit(main())", "gears.toml", "--dask", "local:1"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert "pip install gearchaos[dask]" in done.stderr

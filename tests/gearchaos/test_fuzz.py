@@ -1,0 +1,81 @@
+"""Bad input by the hundred: no traceback, no hang, no lost file, a message and code 2 or 4."""
+
+from collections import Counter
+from pathlib import Path
+
+import h5py
+import pytest
+
+from .fuzz_cases import Case, Watch, configuration_cases, result_cases
+from .fuzz_results import LANES, damaged_result, good_result
+
+
+@pytest.fixture(scope="module")
+def endings(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("fuzz")
+    with Watch(folder) as watch:
+        return [*_some_cases(folder, watch)]
+
+
+def _some_cases(folder: Path, watch: Watch):
+    yield from watch.run(configuration_cases(range(100_000, 100_144), folder))
+    yield from watch.run(result_cases(range(100_000, 100_099), folder))
+
+
+@pytest.mark.slow
+def test_bad_input_ends_in_a_message_and_code_2_or_4(endings):
+    assert [(case[:3], ending.fault) for case, ending in endings if ending.fault] == []
+
+
+@pytest.mark.slow
+def test_most_of_the_bad_input_is_noticed(endings):
+    codes = Counter((case.command, ending.code) for case, ending in endings)
+    assert codes["load_config", 2] > 90
+    assert codes["info", 4] > 25
+    assert codes["plot", 4] > 10
+
+
+def test_a_case_is_made_again_by_its_number(tmp_path):
+    good_result(tmp_path / "good.h5")
+    good = (tmp_path / "good.h5").read_bytes()
+    for number in range(4):
+        contents = []
+        for name in ("one.h5", "other.h5"):
+            damaged_result(number, good, tmp_path / name)
+            contents.append((tmp_path / name).read_bytes())
+        assert contents[0] == contents[1]
+
+
+def external_link(file):
+    file["status"] = h5py.ExternalLink("good.h5", "/status")
+
+
+def external_storage(file):
+    file.create_dataset("status", (LANES,), "u1", external=[("elsewhere.bin", 0, LANES)])
+
+
+def virtual_dataset(file):
+    layout = h5py.VirtualLayout((LANES,), "u1")
+    layout[...] = h5py.VirtualSource("good.h5", "status", (LANES,))
+    file.create_virtual_dataset("status", layout)
+
+
+@pytest.mark.parametrize("elsewhere", [external_link, external_storage, virtual_dataset])
+def test_numbers_kept_in_another_file_are_not_fetched(elsewhere, tmp_path):
+    # What is pointed to would do: a reader that followed it would accept the file.
+    good_result(tmp_path / "good.h5")
+    (tmp_path / "elsewhere.bin").write_bytes(bytes(LANES))
+    path = tmp_path / "pointing.h5"
+    path.write_bytes((tmp_path / "good.h5").read_bytes())
+    with h5py.File(path, "r+") as file:
+        notes = dict(file["status"].attrs)
+        del file["status"]
+        elsewhere(file)
+        if elsewhere is not external_link:
+            file["status"].dims[0].attach_scale(file["load"])
+            file["status"].attrs["flag_meanings"] = notes["flag_meanings"]
+    with Watch(tmp_path) as watch:
+        cases = [Case("", 0, command, [str(path)], path) for command in ("info", "plot", "stages")]
+        for _, ending in watch.run(cases):
+            assert (ending.code, ending.fault) == (4, "")
+            assert "status" in ending.said

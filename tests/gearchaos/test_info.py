@@ -1,0 +1,119 @@
+"""What the info command says about a result file."""
+
+import json
+import re
+
+import h5py
+import pytest
+
+from gearchaos.results.checksum_line import append_checksum
+from gearchaos.results.overview import overview
+from gearchaos.results.result import open_result
+
+from .commands import run_module
+from .fuzz_results import CHECKSUM_LINE, LANES, good_result
+
+
+@pytest.fixture
+def good(tmp_path):
+    path = tmp_path / "good.h5"
+    good_result(path)
+    return path
+
+
+def info(path, *arguments):
+    return run_module("gearchaos.info", path.name, *arguments, cwd=path.parent)
+
+
+def without_checksum(path):
+    path.write_bytes(path.read_bytes()[:-CHECKSUM_LINE])
+
+
+def test_the_page_says_what_was_computed_in_80_columns(good):
+    ended = info(good)
+    assert (ended.code, ended.err) == (0, "")
+    assert max(map(len, ended.out.splitlines())) <= 80
+    for words in ("a small result", f"load (static load), {LANES} values, 0 to 1", "damping_ratio"):
+        assert words in ended.out
+    assert re.search(r"section_error +\S+ \(median\)", ended.out)
+    assert "section_delta_5 (load: 20, section_point: 5) float64" in ended.out
+
+
+def test_json_holds_the_numbers_of_the_file(good):
+    ended = info(good, "--json", "--verify", "-q")
+    assert (ended.code, ended.err) == (0, "")
+    facts = json.loads(ended.out, parse_constant=pytest.fail)
+    result = open_result(good)
+    assert facts["lanes"] == LANES
+    assert facts["swept"]["greatest"] == result["load"].max()
+    assert facts["parameters"]["stiffness_cosine"]["value"] == [0.1, 0.2]
+    assert facts["counts"]["status"]["diverged"] == (result["status"] == 1).sum()
+    assert facts["variables"].keys() == set(result.names)
+    assert [list(result[name].shape) for name in result] == [
+        facts["variables"][name]["shape"] for name in result
+    ]
+    assert len(facts["verified"]) == 3
+
+
+def test_what_is_not_finite_becomes_null(good):
+    without_checksum(good)
+    with h5py.File(good, "r+") as file:
+        file["section_error"][...] = float("nan")
+        file["parameters/damping_ratio"][...] = float("inf")
+    facts = overview(good)
+    assert facts["errors"]["section_error"] == {"lanes": 0, "median": None, "greatest": None}
+    assert facts["parameters"]["damping_ratio"]["value"] is None
+
+
+def test_what_bears_a_known_name_but_is_something_else_is_left_out(good):
+    without_checksum(good)
+    with h5py.File(good, "r+") as file:
+        scale = file["candidate_steps"]
+        del file["candidate_section_error"]
+        file["candidate_section_error"] = ["a", "b"]
+        file["candidate_section_error"].dims[0].attach_scale(scale)
+    assert overview(good)["step_choice"].keys() == {"steps", "exponent_error", "changed_share"}
+    assert info(good).code == 0
+
+
+def test_rows_that_are_damaged_are_named(good):
+    with h5py.File(good) as file:
+        chunk = file["section_delta_5"].id.get_chunk_info(0)
+    content = bytearray(good.read_bytes())
+    content[chunk.byte_offset + 5] ^= 1
+    good.write_bytes(content)
+    ended = info(good, "--verify")
+    assert (ended.code, ended.out) == (4, "")
+    assert "its checksum does not fit" in ended.err
+    assert "is damaged in section_delta_5, rows 0 to 19" in ended.err
+    # Neither does it pass without, or under a new, checksum of the whole.
+    good.write_bytes(content[:-CHECKSUM_LINE])
+    assert "damaged in section_delta_5, rows 0 to 19" in info(good, "--verify").err
+    append_checksum(good)
+    assert info(good, "--verify").code == 4
+
+
+def test_a_newer_format_is_refused_in_a_sentence(good):
+    without_checksum(good)
+    with h5py.File(good, "r+") as file:
+        file.attrs["schema_version"] = "2.0"
+    ended = info(good)
+    assert ended.code == 4
+    assert "has version '2.0' of the file format, of which this gearchaos reads 1.x" in ended.err
+
+
+def test_control_characters_do_not_reach_the_terminal(good):
+    without_checksum(good)
+    with h5py.File(good, "r+") as file:
+        file.attrs["title"] = "\x1b[2Jtitle\x07"
+    ended = info(good)
+    assert ended.code == 0
+    assert "\x1b" not in ended.out
+    assert "\N{REPLACEMENT CHARACTER}[2Jtitle" in ended.out
+
+
+def test_reading_leaves_the_file_as_it_was(good, tmp_path):
+    before = good.read_bytes()
+    assert info(good, "--verify").code == 0
+    assert good.read_bytes() == before
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["good.h5"]

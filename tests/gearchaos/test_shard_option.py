@@ -1,0 +1,114 @@
+"""Several jobs share a sweep: each computes its part of the blocks beside one output."""
+
+import numpy as np
+import pytest
+
+import gearchaos
+from gearchaos.engine.parts import Part, shared_blocks
+from gearchaos.errors import ConfigurationError
+from gearchaos.results.manifest import folder_of
+from gearchaos.results.store_lock import StoreLock
+
+from .commands import names_in, run_module, same_data, sweep
+
+SHARDS = "gears.h5.shards"
+# Four blocks of lanes.
+COUNT = ("--set", "sweep.count=1000", "--quiet")
+
+
+@pytest.mark.parametrize("lanes", [1, 255, 256, 1000, 123_456, 1_000_000])
+@pytest.mark.parametrize("parts", [1, 2, 7, 1000])
+def test_the_parts_cover_a_sweep_once_and_evenly(lanes, parts):
+    blocks = [Part(number, parts).blocks(lanes) for number in range(1, parts + 1)]
+    together = sorted(bounds for own in blocks for bounds in own)
+    assert together == shared_blocks(lanes, parts)
+    edges = [0, *(last for _, last in together)]
+    assert [first for first, _ in together] == edges[:-1]
+    assert edges[-1] == lanes
+    assert max(np.diff(edges)) <= 4096
+    sizes = [sum(last - first for first, last in own) for own in blocks]
+    assert max(sizes) - min(sizes) <= max(np.diff(edges))
+
+
+def test_a_million_lanes_are_few_files():
+    assert len(shared_blocks(1_000_000, 1)) == 245
+
+
+@pytest.mark.parametrize("text", ["0/4", "5/4", "4", "1/0", "-1/4", "1/4/2", "one/4", "", "٣/٤"])
+def test_what_is_no_part_is_refused(text):
+    with pytest.raises(ConfigurationError, match="must be i/N with i from 1 to N"):
+        Part.from_text(text)
+
+
+def test_parts_computed_with_other_threads_join_to_the_undisturbed_result(tmp_path):
+    for number, threads in ((2, "2"), (3, "1"), (1, "1")):
+        shard = f"{number}/3"
+        ended = sweep(tmp_path, *COUNT, "--shard", shard, "--threads", threads)
+        if ended.code == 2:
+            pytest.skip("a single core")
+        assert ended == (0, f"{tmp_path / SHARDS}\n", "")
+        assert names_in(tmp_path) == [SHARDS, "gears.toml"]
+    assert run_module("gearchaos.merge", "gears.h5", "-q", cwd=tmp_path) == (0, "gears.h5\n", "")
+    assert names_in(tmp_path) == ["gears.h5", "gears.toml"]
+    assert sweep(tmp_path, *COUNT, "--output", "one.h5").code == 0
+    one, joined = (gearchaos.open_result(tmp_path / name) for name in ("one.h5", "gears.h5"))
+    assert same_data(joined, one)
+    assert joined.names == one.names
+    differing = {k for k in one.metadata if joined.metadata.get(k) != one.metadata[k]}
+    assert differing <= {"created", "threads", "wall_time_seconds"}
+
+
+def test_a_part_says_what_is_next_and_is_not_computed_twice(tmp_path):
+    told = ("--set", "sweep.count=1000", "--shard", "2/2")
+    first = sweep(tmp_path, *told)
+    assert first.code == 0
+    assert "488 lanes, 0 diverged" in first.err
+    assert "this was part 2/2; once all are there: " in first.err
+    assert first.err.endswith("-m gearchaos.merge gears.h5\n")
+    refused = sweep(tmp_path, *told)
+    assert refused.code == 4
+    assert "holds 2 finished blocks of an earlier run; continue it with --resume" in refused.err
+    block = max((tmp_path / SHARDS).glob("*.shard"))
+    block.write_bytes(block.read_bytes()[:-1])
+    again = sweep(tmp_path, *told, "--resume")
+    assert again.code == 0
+    assert f"{block.name}: has " in again.err
+    assert "488 of 488 lanes" in again.err
+    kept = sweep(tmp_path, *told, "--resume")
+    assert kept.code == 0
+    assert "lanes/s" not in kept.err  # Nothing was left to be computed.
+    # A sweep of all parts takes over what there is.
+    assert sweep(tmp_path, *COUNT, "--resume") == (0, "gears.h5\n", "")
+    assert names_in(tmp_path) == ["gears.h5", "gears.toml"]
+
+
+def test_parts_of_another_configuration_are_refused_with_the_key(tmp_path):
+    assert sweep(tmp_path, *COUNT, "--shard", "1/2").code == 0
+    other = sweep(tmp_path, *COUNT, "--shard", "2/2", "--set", "groups.damping_ratio=0.06")
+    assert other.code == 4
+    assert "which differs in groups.damping_ratio (0.05, now 0.06)" in other.err
+
+
+def test_different_parts_may_run_at_once_the_same_part_and_the_whole_may_not(tmp_path):
+    output = tmp_path / "gears.h5"
+    other = StoreLock(folder_of(output), output, "1-of-4")
+    try:
+        assert sweep(tmp_path, *COUNT, "--shard", "4/4").code == 0
+        before = names_in(tmp_path / SHARDS)
+        for arguments in (["--shard", "1/4"], []):
+            refused = sweep(tmp_path, *COUNT, *arguments, "--resume")
+            assert refused.code == 4
+            assert "gears.h5: another sweep is writing to it; wait for its end" in refused.err
+        merged = run_module("gearchaos.merge", "gears.h5", cwd=tmp_path)
+        assert merged.code == 4
+        assert "gears.h5: another sweep is writing to it" in merged.err
+        assert names_in(tmp_path / SHARDS) == before
+    finally:
+        other.release()
+
+
+def test_a_carried_sweep_cannot_be_shared(tmp_path):
+    ended = sweep(tmp_path, "--shard", "1/2", "--set", "start.carry=upwards")
+    assert (ended.code, ended.out) == (2, "")
+    assert '--shard: with start.carry = "upwards"' in ended.err
+    assert names_in(tmp_path) == ["gears.toml"]

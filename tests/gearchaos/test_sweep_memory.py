@@ -1,0 +1,50 @@
+"""The memory of a sweep is that of a block and of the parameters of its lanes."""
+
+import json
+import subprocess
+import sys
+
+import pytest
+
+from .commands import small_config
+
+PEAK = """
+import resource, sys
+from gearchaos.sweep import main
+code = main(sys.argv[1:])
+print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024)
+sys.exit(code)
+"""
+# 64 section points, but next to nothing to compute.
+WIDE = {
+    "scene.effects": ["pitch_error"],
+    "integration.steps_per_period": 10,
+    "integration.transient_periods": 0,
+    "integration.recorded_periods": 64,
+    "outputs.section": ["delta_5"],
+    "outputs.section_points": 64,
+    "outputs.lyapunov": False,
+    "outputs.motion": False,
+}
+
+
+def peak(folder, lanes):
+    """Run the sweep command and return its peak memory in bytes."""
+    small_config(folder)
+    settings = {**WIDE, "sweep.count": lanes}
+    flags = [w for k, v in settings.items() for w in ("--set", f"{k}={json.dumps(v)}")]
+    command = [sys.executable, "-c", PEAK, "gears.toml", *flags, "--quiet", "--overwrite"]
+    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=True)
+    return int(done.stdout.splitlines()[-1])
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(sys.platform != "linux", reason="the unit of the peak differs elsewhere")
+def test_more_lanes_take_no_more_memory_than_their_parameters(tmp_path):
+    few, many = 20_000, 80_000
+    peak(tmp_path, 100)  # The kernel is in the cache from now on.
+    growth = peak(tmp_path, many) - peak(tmp_path, few)
+    results = (many - few) * 64 * 8
+    assert growth < results
+    # What a million lanes would need at this rate, with the interpreter and its packages.
+    assert growth * 1_000_000 / (many - few) < 800e6
