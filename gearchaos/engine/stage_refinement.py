@@ -30,6 +30,10 @@ Floats = NDArray[np.float64]
 MOST_ROUNDS = 60
 """Bisections after which two different numbers are neighbours."""
 
+FOLLOWED_WIDTH = 1.0 / 1024.0
+"""Share of its way to which the end of an orbit is located: next to a fold a multiplier nears +1
+like the root of the distance, so that a coarse end tells nothing."""
+
 _TELLING = (
     StabilityLoss.PERIOD_DOUBLING,
     StabilityLoss.NEIMARK_SACKER,
@@ -222,7 +226,7 @@ def _followed(sweep: SweepLanes, edge: _Edges, last: Floats) -> Losses:
         edge.period,
         first,
         np.clip(last, lowest, highest),
-        float(np.min(np.abs(last - first))) / 64.0,
+        float(np.min(np.abs(last - first))) * FOLLOWED_WIDTH,
         sweep.plan.steps_per_period,
         rederived=sweep.config.formulation == "rederived",
     )
