@@ -110,10 +110,11 @@ def write_result(
             for variable in everything:
                 _attach_scales(file, variable.name, variable.dims)
             _write_parameters(file, axis, parameters)
+            # Kept open: HDF5 packs a chunk anew each time its dataset is closed.
+            over_lanes = {v.name: file[v.name] for v in everything if v.dims[0] == axis}
             for first, last, arrays in blocks:
-                for variable in everything:
-                    if variable.dims[0] == axis:
-                        file[variable.name][first:last] = arrays[variable.name]
+                for name, dataset in over_lanes.items():
+                    dataset[first:last] = arrays[name]
                 sink.check()
         append_checksum(partial)
 
