@@ -83,8 +83,9 @@ def assert_is_the_first_fall(curve: np.polynomial.Polynomial) -> None:
     assert lowest(curve, found, 1.0) <= nearly
 
 
+# The squares of smaller numbers underflow; no gap and no rate of a motion is that small.
 number = st.one_of(
-    st.floats(-10.0, 10.0),
+    st.floats(-10.0, 10.0).map(lambda x: 0.0 if abs(x) < 1e-150 else x),
     st.sampled_from([0.0, -0.0, 1.0, -1.0, 1e-17, -1e-17, 1e-9, -1e-9, 1e-100]),
 )
 value = number.map(abs)
