@@ -58,7 +58,8 @@ def _run(argv: Sequence[str] | None) -> int:
         _write(json.dumps(finite(facts), indent=1, allow_nan=False))
         return OK
     stages = [
-        f"{stage['label']}: {stage['start']:.6g} to {stage['end']:.6g}, {stage['lanes']} lanes"
+        f"{stage['label']}: {stage['start']:.6g} to {stage['end']:.6g}, "
+        f"{stage['lanes']} lane{'s' if stage['lanes'] != 1 else ''}"
         for stage in _stages(options.result, summary)
     ]
     _write(overview_page(summary, _settings(summary["metadata"]), stages, verified))
@@ -78,29 +79,35 @@ def _stages(path: str, summary: Mapping[str, Any]) -> list[dict[str, Any]]:
 
 def _settings(metadata: Mapping[str, Any]) -> dict[str, list[str]]:
     """Sort the keys of the configuration by where their values come from."""
+    from gearchaos.configuration import Configuration
     from gearchaos.configuration.messages import shown
     from gearchaos.configuration.toml_text import flat_tables, tables_from_toml
     from gearchaos.errors import ConfigurationError
 
+    text = str(metadata.get("configuration", ""))
     try:
-        written, resolved = (
-            flat_tables(tables_from_toml(str(metadata.get(name, "")), name))
-            for name in ("configuration", "configuration_resolved")
+        written, by_itself, resolved = (
+            flat_tables(tables_from_toml(toml, "configuration"))
+            for toml in (
+                text,
+                Configuration.from_toml(text, "configuration").resolved_toml(),
+                str(metadata.get("configuration_resolved", "")),
+            )
         )
     except ConfigurationError:  # Not ours to judge here: the numbers are there all the same.
         return {}
     origins: dict[str, list[str]] = {
         "as written": [],
-        "set on the command line": [],
+        "set for this run": [],
         "by default": [],
     }
     for key, value in resolved.items():
         origin = (
-            "by default"
-            if key not in written
+            "set for this run"
+            if by_itself.get(key) != value
             else "as written"
-            if written[key] == value
-            else "set on the command line"
+            if key in written
+            else "by default"
         )
         origins[origin].append(f"{key} = {shown(value)}")
     return {origin: keys for origin, keys in origins.items() if keys}
