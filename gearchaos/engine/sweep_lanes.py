@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -17,11 +18,14 @@ from gearchaos.errors import ConfigurationError
 from gearchaos.motion.difference import Motion
 from gearchaos.motion.lyapunov import largest_exponent
 from gearchaos.motion.period import POINTS_NEEDED
-from gearchaos.physics.stability import stability_limit
+from gearchaos.physics.stability import joined_limit, stability_limit
 from gearchaos.results.variables import Variable, axis_name, step_choice_variables
 
 Floats = NDArray[np.float64]
 Numbers = NDArray[np.intp]
+
+LANES_AT_ONCE = 2**14
+"""Lanes whose stability is looked at together."""
 
 
 class SweepLanes:
@@ -183,12 +187,17 @@ class SweepLanes:
     def _keep_stable(self) -> None:
         """Refuse or raise a number of steps with which the method itself would blow up."""
         steps = self.plan.steps_per_period
-        harmonics = self.harmonics()
-        limit = stability_limit(
-            self.scene, model(self.groups, self.values.size), *harmonics, steps=steps
-        )
-        if limit is None:
+        limits = []
+        # In parts: only the swept group is known for all lanes at once.
+        for first in range(0, self.values.size, LANES_AT_ONCE):
+            numbers = np.arange(first, min(first + LANES_AT_ONCE, self.values.size))
+            part = model(select(self.groups, numbers), numbers.size)
+            limit = stability_limit(self.scene, part, *self.harmonics(), steps=steps)
+            if limit is not None:
+                limits.append(replace(limit, lanes=limit.lanes + first))
+        if not limits:
             return
+        limit = joined_limit(limits)
         fault = limit.fault(steps, self.config.sweep.parameter, self.values)
         if self.config.integration.unstable == "refuse":
             raise ConfigurationError(fault.text(self.config.source))

@@ -7,7 +7,8 @@ the computed motion grows where the true one decays.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from gearchaos_kernels import Model, Scene
@@ -68,6 +69,16 @@ class StabilityLimit:
             f'raise it to {self.steps} or more, or set integration.unstable = "raise"',
             configured,
         )
+
+
+def joined_limit(limits: Sequence[StabilityLimit]) -> StabilityLimit:
+    """Join the limits of parts of a sweep, whose lanes are numbered as in the whole."""
+    strictest = max(limits, key=lambda limit: limit.steps)
+    return replace(
+        strictest,
+        lanes=np.concatenate([limit.lanes for limit in limits]),
+        fewest=np.concatenate([limit.fewest for limit in limits]),
+    )
 
 
 def stability_limit(

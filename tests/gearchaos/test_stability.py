@@ -1,6 +1,7 @@
 """The fewest stable steps: known limits, and limits found by integrating on either side of them."""
 
 import itertools
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from gearchaos.physics.mesh_stiffness import FourierStiffness
 from gearchaos.physics.stability import (
     MOST_STEPS,
     fewest_stable_steps,
+    joined_limit,
     stability_limit,
     sufficient_steps,
 )
@@ -201,3 +203,25 @@ def test_groups_beyond_all_measure_ask_for_more_steps_than_there_are(name):
 def test_a_state_at_rest_without_load_stays_there_with_any_number_of_steps():
     outcome = run(pan2021(0.0, load=0.0), LINEAR, state(), steps=2, periods=50)
     assert np.all(outcome.end_state == 0.0)
+
+
+def test_limits_of_parts_join_to_that_of_the_whole():
+    model = oscillator(np.array([1.0, 40.0, 0.0, 90.0, 60.0]))
+    whole = stability_limit(TORSION, model, NO_HARMONICS, NO_HARMONICS, 1000)
+    parts = [
+        replace(limit, lanes=limit.lanes + first)
+        for first, last in ((0, 2), (2, 3), (3, 5))
+        if (
+            limit := stability_limit(
+                TORSION,
+                Model(*(group[first:last] for group in model)),
+                NO_HARMONICS,
+                NO_HARMONICS,
+                1000,
+            )
+        )
+    ]
+    together = joined_limit(parts)
+    assert together.lanes.tolist() == whole.lanes.tolist()
+    assert together.fewest.tolist() == whole.fewest.tolist()
+    assert (together.steps, together.eigenvalue) == (whole.steps, whole.eigenvalue)
