@@ -8,12 +8,15 @@ from numpy.typing import NDArray
 
 from gearchaos.engine.sweep_lanes import SweepLanes
 from gearchaos.motion.label import (
+    DIVERGED,
     MOST_POINTS,
     NEAR,
     PERIODIC,
+    UNRESOLVED,
     Labels,
     Record,
     label,
+    may_rotate_slowly,
     settling_periods,
 )
 from gearchaos.motion.orbits import polish
@@ -21,6 +24,9 @@ from gearchaos.motion.period import coordinate_scale, return_distances
 from gearchaos.motion.spectrum import sum_of_exponents
 
 Numbers = NDArray[np.intp]
+
+LONGER = 4
+"""How many times the record a lane that may rotate slowly goes on, to be looked at once more."""
 
 
 def labelling_plan(sweep: SweepLanes) -> Plan:
@@ -43,15 +49,44 @@ def labels_of(sweep: SweepLanes, lanes: Numbers, outcome: Outcome) -> Labels:
     outcome : Outcome
         Of these lanes.
     """
-    record = Record(
-        outcome.section[:, -MOST_POINTS:],
+    record = _record(sweep, lanes, outcome)
+    labels = label(record)
+    _settle(sweep, lanes, outcome, labels, settling_periods(record, labels))
+    slow = np.flatnonzero((labels.motion == UNRESOLVED) & may_rotate_slowly(record))
+    # In parts whose longer records take no more memory than those of all lanes.
+    for part in np.array_split(slow, LONGER):
+        if part.size:
+            _look_again(sweep, lanes, outcome, labels, part)
+    return labels
+
+
+def _record(
+    sweep: SweepLanes, lanes: Numbers, outcome: Outcome, most_points: int = MOST_POINTS
+) -> Record:
+    return Record(
+        outcome.section[:, -most_points:],
         outcome.growth,
         outcome.status != Status.OK,
         _admits_tori(sweep, lanes),
     )
-    labels = label(record)
-    _settle(sweep, lanes, outcome, labels, settling_periods(record, labels))
-    return labels
+
+
+def _look_again(
+    sweep: SweepLanes, lanes: Numbers, outcome: Outcome, labels: Labels, part: Numbers
+) -> None:
+    """Label some lanes by a longer record that begins where theirs ended, in place."""
+    plan = labelling_plan(sweep)
+    longer = plan._replace(
+        transient_periods=0,
+        recorded_periods=LONGER * plan.recorded_periods,
+        section_points=LONGER * min(MOST_POINTS, plan.recorded_periods),
+    )
+    again = sweep.integrate(lanes[part], outcome.end_state[part], longer)
+    found = label(_record(sweep, lanes[part], again, longer.section_points))
+    sound = found.motion != DIVERGED
+    labels.motion[part[sound]] = found.motion[sound]
+    labels.period[part[sound]] = found.period[sound]
+    labels.return_distance[part[sound]] = found.return_distance[sound]
 
 
 def _admits_tori(sweep: SweepLanes, lanes: Numbers) -> NDArray[np.bool_]:

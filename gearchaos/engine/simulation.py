@@ -110,6 +110,8 @@ class Simulation(SweepLanes):
         numbers = plan.section_points * len(plan.section_states) + 4 * len(STATE_ROWS)
         if self.plan.tangent:
             numbers += self.plan.recorded_periods
+            # Lanes that a first record leaves unresolved are looked at again in parts of this size.
+            numbers *= 2 if self.config.outputs.motion else 1
         return 8 * self.block_lanes(threads) * numbers
 
     def block_lanes(self, threads: int) -> int:

@@ -135,6 +135,25 @@ def settling_periods(record: Record, labels: Labels) -> NDArray[np.int32]:
     return found
 
 
+def may_rotate_slowly(record: Record) -> Mask:
+    """Whether a lane may be on a torus that a longer record would show.
+
+    Next to a resonance one turn may take more than a hundred periods. Then the halves of a record
+    differ, and its exponent is further from zero than that of many turns.
+
+    Returns
+    -------
+    ndarray of bool, shape (lanes,)
+        Where the scene admits tori, and a disturbance changes by less than exp(2) over the record.
+    """
+    if record.growth is None:
+        return np.zeros(record.torus.shape, dtype=np.bool_)
+    lanes, periods = record.growth.shape
+    exponent, _ = largest_exponent(record.growth, np.ones(lanes))
+    neutral: Mask = np.abs(exponent) * periods <= CHAOTIC_GROWTH
+    return record.torus & neutral
+
+
 def halves_differ_by(section: Floats) -> Floats:
     """Return how far the averages of the two halves of every section lie apart.
 

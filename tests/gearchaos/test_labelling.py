@@ -3,10 +3,20 @@
 import numpy as np
 import pytest
 
+from gearchaos.configuration import load_config
 from gearchaos.engine.simulation import Simulation
-from gearchaos.motion.label import CHAOTIC, DIVERGED, MEANINGS, PERIODIC
+from gearchaos.motion.label import (
+    CHAOTIC,
+    DIVERGED,
+    MEANINGS,
+    PERIODIC,
+    QUASI_PERIODIC,
+    UNRESOLVED,
+    Record,
+    label,
+)
 
-from .short_sweeps import RANDOM, assert_same, computed, listing, simulation
+from .short_sweeps import PAN2021, RANDOM, assert_same, computed, listing, simulation
 
 LONG = (
     "integration.steps_per_period=200",
@@ -37,6 +47,29 @@ def test_a_lane_that_settles_slowly_is_labelled_by_the_stable_orbit_it_comes_clo
     for found in (arrays, patient):
         assert found["motion"].tolist() == [PERIODIC, PERIODIC]
         assert found["period"].tolist() == [1, 2]
+
+
+SLOW_TORI = (
+    "sweep={parameter='mesh_frequency', values=[1.121, 1.15, 1.424]}",
+    "groups.pitch_error=2.3",
+    "groups.damping_ratio=0.0013",
+    "groups.transverse_stiffness_p=0.112",
+    "groups.transverse_stiffness_g=0.033",
+    "groups.transverse_damping_p=0.00087",
+    "groups.transverse_damping_g=0.00148",
+    "integration.transient_periods=4000",
+)
+
+
+def test_a_rotation_slower_than_its_record_is_resolved_by_a_longer_one():
+    sweep = Simulation(load_config(PAN2021.with_name("mesh_frequency.toml"), SLOW_TORI))
+    lanes = np.arange(3)
+    outcome = sweep.integrate(lanes, sweep.start_of(lanes), sweep.recording)
+    record = Record(outcome.section, outcome.growth, lanes < 0, lanes >= 0)
+    assert label(record).motion.tolist() == [UNRESOLVED, QUASI_PERIODIC, UNRESOLVED]
+    arrays = computed(sweep, 3)
+    assert arrays["motion"].tolist() == [QUASI_PERIODIC] * 3
+    assert_same(arrays, computed(sweep, 1))
 
 
 def test_the_label_looks_at_states_that_are_not_kept():

@@ -13,6 +13,7 @@ from gearchaos.motion.label import (
     Record,
     halves_differ_by,
     label,
+    may_rotate_slowly,
     settling_periods,
 )
 from gearchaos.motion.period import LONGEST_PERIOD, TOLERANCE, return_distances
@@ -189,3 +190,19 @@ def test_a_record_too_short_for_anything_is_unresolved_without_a_distance():
     labels = label(record(np.ones((2, 2)), np.zeros(2)))
     assert labels.motion.tolist() == [UNRESOLVED]
     assert np.isnan(labels.return_distance).all()
+
+
+def test_a_turn_as_long_as_the_record_is_for_a_longer_one_to_tell():
+    slow = GOLDEN / POINTS
+    assert labelled(circle(slow))[0] == UNRESOLVED
+    assert may_rotate_slowly(record(circle(slow))).all()
+    assert labelled(circle(slow, 40 * POINTS))[0] == QUASI_PERIODIC
+
+
+@pytest.mark.parametrize(("growth", "slow"), [(1.9, True), (-1.9, True), (2.1, False), (-9, False)])
+def test_a_slow_rotation_neither_gains_nor_loses_a_disturbance(growth, slow):
+    each = np.full(POINTS, growth / POINTS)
+    section = circle(GOLDEN / POINTS)
+    assert may_rotate_slowly(record(section, each)).tolist() == [slow]
+    assert not may_rotate_slowly(record(section, each, torus=False)).any()
+    assert not may_rotate_slowly(record(section)._replace(growth=None)).any()
