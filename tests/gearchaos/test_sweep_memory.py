@@ -47,4 +47,4 @@ def test_more_lanes_take_no_more_memory_than_their_parameters(tmp_path):
     results = (many - few) * 64 * 8
     assert growth < results
     # What a million lanes would need at this rate, with the interpreter and its packages.
-    assert growth * 1_000_000 / (many - few) < 800e6
+    assert growth * 1_000_000 / (many - few) < 400e6
