@@ -13,7 +13,12 @@ import math
 import numpy as np
 
 from gearchaos_kernels.compilation import CACHE_LINE, align_stack, block, scalar
-from gearchaos_kernels.contact import Branches, branch_at, may_leave
+from gearchaos_kernels.contact import (
+    branches_at,
+    may_leave,
+    read_branches,
+    write_branches,
+)
 from gearchaos_kernels.forcing import forcing_at, phase_on_grid
 from gearchaos_kernels.lane import (
     BEFORE,
@@ -103,6 +108,14 @@ def integrate_block(
         for row in range(coefficients.shape[1]):
             memory[(COEFFICIENT + row) * STRIDE + slot] = coefficients[lane, row]
         memory[GROWTH * STRIDE + slot] = 0.0
+        if resolved is not None:
+            lane = read_lane(memory, slot)
+            y = read(memory, POSITION, slot, transverse, axial)
+            begin = forcing_at(
+                lane, phase_on_grid(table, 0), pitch_error, phase, stiffness_variation, axial
+            )
+            branches = branches_at(y, lane, begin, transverse, axial)
+            write_branches(memory, slot, branches)
 
     # A scaling interval belongs to a lane, whatever its neighbours need.
     shortest_interval = steps_between_scalings[first]
@@ -119,7 +132,7 @@ def integrate_block(
             begin_phase = phase_on_grid(table, 2 * number)
             middle_phase = phase_on_grid(table, 2 * number + 1)
             end_phase = phase_on_grid(table, 2 * number + 2)
-            suspects = 0
+            suspects = False
             for slot in range(LANES):
                 lane = read_lane(memory, slot)
                 y = read(memory, POSITION, slot, transverse, axial)
@@ -146,11 +159,12 @@ def integrate_block(
                         axial,
                     )
                 else:
+                    branches = read_branches(memory, slot, axial)
                     y_end, w_end, slopes, suspect = step_on_branches(
-                        y, w, lane, begin, middle, end, transverse, axial
+                        y, w, lane, begin, middle, end, branches, transverse, axial
                     )
-                    suspects += suspect
-                    memory[SUSPECT * STRIDE + slot] = suspect
+                    suspects |= suspect
+                    memory[SUSPECT * STRIDE + slot] = 1.0 if suspect else 0.0
                     write(memory, BEFORE + POSITION, slot, y, transverse, axial)
                     write(memory, BEFORE + RATE, slot, w, transverse, axial)
                 write(memory, POSITION, slot, y_end, transverse, axial)
@@ -172,7 +186,7 @@ def integrate_block(
                     write(memory, TANGENT_POSITION, slot, dy, transverse, axial)
                     write(memory, TANGENT_RATE, slot, dw, transverse, axial)
             if resolved is not None:
-                if suspects > 0:
+                if suspects:
                     for slot in range(lanes):
                         if memory[SUSPECT * STRIDE + slot] == 0.0:
                             continue
@@ -247,27 +261,23 @@ def aligned_memory():
 
 
 @scalar
-def step_on_branches(y, w, lane, begin, middle, end, transverse, axial):
+def step_on_branches(y, w, lane, begin, middle, end, branches, transverse, axial):
     """Advance one lane on the contact branches on which it is, and tell if it may leave them."""
-    b = lane.half_backlash
-    gap0 = tangential_gap(y, lane, begin, transverse)
-    gap0_z = 0.0
-    if axial is not None:
-        gap0_z = axial_gap(y, gap0, lane, begin)
-    branches = Branches(branch_at(gap0, b), branch_at(gap0_z, b))
     y_end, w_end, slopes = step(
         y, w, 1.0, lane, begin, middle, end, branches, None, transverse, axial
     )
+    gap0 = tangential_gap(y, lane, begin, transverse)
     gap1 = tangential_gap(y_end, lane, end, transverse)
     rate0 = tangential_gap_rate(w, lane, begin, transverse)
     rate1 = tangential_gap_rate(w_end, lane, end, transverse)
-    suspect = may_leave(gap0, rate0, gap1, rate1, b)
+    suspect = may_leave(gap0, rate0, gap1, rate1, branches.tangential)
     if axial is not None:
+        gap0_z = axial_gap(y, gap0, lane, begin)
         gap1_z = axial_gap(y_end, gap1, lane, end)
         rate0_z = axial_gap_rate(w, rate0, 1.0, lane, begin)
         rate1_z = axial_gap_rate(w_end, rate1, 1.0, lane, end)
-        suspect = suspect | may_leave(gap0_z, rate0_z, gap1_z, rate1_z, b)
-    return y_end, w_end, slopes, 1 if suspect else 0
+        suspect = suspect | may_leave(gap0_z, rate0_z, gap1_z, rate1_z, branches.axial)
+    return y_end, w_end, slopes, suspect
 
 
 @scalar

@@ -11,21 +11,25 @@ import math
 from typing import NamedTuple
 
 from gearchaos_kernels.compilation import scalar
+from gearchaos_kernels.lane import BRANCH, STRIDE
+from gearchaos_kernels.motion import axial_gap, tangential_gap
 
 NEVER = 2.0
 """Fraction of a step returned where the step does not leave its branch: beyond its end."""
 
-_REACH = 4.0 / 27.0
+_THIRD = 1.0 / 3.0
 _ITERATIONS = 60
 _LAST_CORRECTION = 1e-6
 """Newton's method squares the error: after so small a correction it is far below the cubic's."""
 
 
 class Branch(NamedTuple):
-    """One linear piece of the clearance function."""
+    """One linear piece of the clearance function, and the gaps between which it holds."""
 
     engaged: float
     offset: float
+    floor: float
+    ceiling: float
 
 
 class Branches(NamedTuple):
@@ -38,42 +42,84 @@ class Branches(NamedTuple):
 @scalar
 def branch_at(gap, half_backlash):
     """Return the piece on which a gap lies."""
-    engaged = 1.0 if abs(gap) >= half_backlash else 0.0
-    return Branch(engaged, engaged * math.copysign(half_backlash, gap))
+    if half_backlash == 0.0:
+        return Branch(1.0, 0.0, -math.inf, math.inf)
+    if gap >= half_backlash:
+        return Branch(1.0, half_backlash, half_backlash, math.inf)
+    if gap <= -half_backlash:
+        return Branch(1.0, -half_backlash, -math.inf, -half_backlash)
+    return Branch(0.0, 0.0, -half_backlash, half_backlash)
+
+
+@scalar
+def branches_at(position, lane, forcing, transverse, axial):
+    """Return the pieces on which both gaps of a lane lie."""
+    gap = tangential_gap(position, lane, forcing, transverse)
+    tangential = branch_at(gap, lane.half_backlash)
+    if axial is None:
+        return Branches(tangential, tangential)
+    return Branches(
+        tangential, branch_at(axial_gap(position, gap, lane, forcing), lane.half_backlash)
+    )
 
 
 @scalar
 def next_branch(branch, gap, half_backlash):
     """Return the piece that follows where a gap leaves one."""
     if branch.engaged != 0.0:
-        return Branch(0.0, 0.0)
-    return Branch(1.0, math.copysign(half_backlash, gap))
+        return branch_at(0.0, half_backlash)
+    return branch_at(math.copysign(half_backlash, gap), half_backlash)
 
 
 @scalar
-def may_leave(gap0, rate0, gap1, rate1, half_backlash):
+def read_branches(block, lane, axial):
+    """Return the active pieces of a lane; without axial pair the second one repeats the first."""
+    first = BRANCH * STRIDE + lane
+    tangential = Branch(
+        block[first],
+        block[first + STRIDE],
+        block[first + 2 * STRIDE],
+        block[first + 3 * STRIDE],
+    )
+    if axial is None:
+        return Branches(tangential, tangential)
+    return Branches(
+        tangential,
+        Branch(
+            block[first + 4 * STRIDE],
+            block[first + 5 * STRIDE],
+            block[first + 6 * STRIDE],
+            block[first + 7 * STRIDE],
+        ),
+    )
+
+
+@scalar
+def write_branches(block, lane, branches):
+    """Store the active pieces of a lane."""
+    first = BRANCH * STRIDE + lane
+    block[first] = branches.tangential.engaged
+    block[first + STRIDE] = branches.tangential.offset
+    block[first + 2 * STRIDE] = branches.tangential.floor
+    block[first + 3 * STRIDE] = branches.tangential.ceiling
+    block[first + 4 * STRIDE] = branches.axial.engaged
+    block[first + 5 * STRIDE] = branches.axial.offset
+    block[first + 6 * STRIDE] = branches.axial.floor
+    block[first + 7 * STRIDE] = branches.axial.ceiling
+
+
+@scalar
+def may_leave(gap0, rate0, gap1, rate1, branch):
     """Tell whether a step may leave its branch, be it for a moment only.
 
-    Rates are per step. A gap that ends on the branch on which it began was outside in between only
-    if it turned around. A cubic does not turn if its rates have the sign of its change and are at
-    most three times as large (Fritsch and Carlson 1980), and one that turns overshoots its ends by
-    4/27 of the rates at most.
+    Rates are per step. The cubic through both ends lies between the smallest and the largest of its
+    Bezier points; a step that begins on a branch, and whose other points lie there, stays there.
     """
-    outside0 = abs(gap0) - half_backlash
-    outside1 = abs(gap1) - half_backlash
-    nearest = min(abs(outside0), abs(outside1))
-    change = gap1 - gap0
-    turns = (
-        (rate0 * change <= 0.0)
-        | (rate1 * change <= 0.0)
-        | (abs(rate0) > 3.0 * abs(change))
-        | (abs(rate1) > 3.0 * abs(change))
-    )
-    return (
-        ((outside0 >= 0.0) != (outside1 >= 0.0))
-        | ((gap0 * gap1 < 0.0) & (outside0 >= 0.0))
-        | (turns & (nearest < _REACH * (abs(rate0) + abs(rate1))))
-    )
+    point1 = gap0 + _THIRD * rate0
+    point2 = gap1 - _THIRD * rate1
+    lowest = min(min(point1, point2), gap1)
+    highest = max(max(point1, point2), gap1)
+    return (lowest < branch.floor) | (highest > branch.ceiling)
 
 
 @scalar
@@ -116,27 +162,30 @@ def first_fall(d0, r0, d1, r1):
     """Return where a cubic, given by values and slopes at 0 and 1, first falls below zero."""
     # A step that begins where the last one ended at the boundary begins on the right side of it.
     d0 = max(d0, 0.0)
+    if d1 >= 0.0 and d0 + _THIRD * r0 >= 0.0 and d1 - _THIRD * r1 >= 0.0:
+        return NEVER
     c2 = 3.0 * (d1 - d0) - 2.0 * r0 - r1
     c3 = 2.0 * (d0 - d1) + r0 + r1
     high = 1.0
     value_high = d1
     low = 0.0
-    discriminant = c2 * c2 - 3.0 * c3 * r0
-    if discriminant > 0.0:
-        root = math.sqrt(discriminant)
-        # Of the two forms of each turning point, the one in which nothing cancels.
-        lowest = (root - c2) / (3.0 * c3) if c2 < 0.0 else -r0 / (c2 + root)
-        if 0.0 < lowest < 1.0:
-            value = d0 + lowest * (r0 + lowest * (c2 + lowest * c3))
-            if value < 0.0:
-                high = lowest
-                value_high = value
-        if d0 == 0.0 and r0 >= 0.0:
-            highest = (c2 + root) / (-3.0 * c3) if c2 > 0.0 else -r0 / (c2 - root)
-            if 0.0 < highest < high:
-                low = highest
-    if value_high >= 0.0:
-        return NEVER
+    if d1 >= 0.0 or may_turn(r0, r1, d1 - d0):
+        discriminant = c2 * c2 - 3.0 * c3 * r0
+        if discriminant > 0.0:
+            root = math.sqrt(discriminant)
+            # Of the two forms of each turning point, the one in which nothing cancels.
+            lowest = (root - c2) / (3.0 * c3) if c2 < 0.0 else -r0 / (c2 + root)
+            if 0.0 < lowest < 1.0:
+                value = d0 + lowest * (r0 + lowest * (c2 + lowest * c3))
+                if value < 0.0:
+                    high = lowest
+                    value_high = value
+            if d0 == 0.0 and r0 >= 0.0:
+                highest = (c2 + root) / (-3.0 * c3) if c2 > 0.0 else -r0 / (c2 - root)
+                if 0.0 < highest < high:
+                    low = highest
+        if value_high >= 0.0:
+            return NEVER
     if d0 == 0.0 and low == 0.0:
         return 0.0
     value_low = d0 + low * (r0 + low * (c2 + low * c3))
@@ -155,3 +204,13 @@ def first_fall(d0, r0, d1, r1):
             return following
         at = following
     return at
+
+
+@scalar
+def may_turn(r0, r1, change):
+    """Tell whether a cubic with slopes r0 and r1 at its ends may turn around in between.
+
+    It does not if both have the sign of its change and are at most three times as large (Fritsch
+    and Carlson 1980).
+    """
+    return not min(r0 * (3.0 * change - r0), r1 * (3.0 * change - r1)) > 0.0

@@ -87,7 +87,10 @@ class Lane(NamedTuple):
     sin_phase: Number
 
 
-SUSPECT = COEFFICIENT + len(Lane._fields)
+BRANCH = COEFFICIENT + len(Lane._fields)
+"""First row of the active contact branches, in the order of `contact.Branches`."""
+
+SUSPECT = BRANCH + 8
 """Row that marks the lanes whose step may have left a contact branch."""
 
 GROWTH = SUSPECT + 1

@@ -13,9 +13,11 @@ from gearchaos_kernels.compilation import scalar
 from gearchaos_kernels.contact import (
     NEVER,
     Branches,
-    branch_at,
+    branches_at,
     leaving_fraction,
     next_branch,
+    read_branches,
+    write_branches,
 )
 from gearchaos_kernels.forcing import forcing_at, phase_on_grid, phase_within
 from gearchaos_kernels.lane import (
@@ -92,7 +94,7 @@ def split_step(
     )
     gap = tangential_gap(y, lane, begin, transverse)
     gap_z = axial_gap(y, gap, lane, begin)
-    branches = Branches(branch_at(gap, b), branch_at(gap_z, b))
+    branches = read_branches(memory, slot, axial)
     done = 0.0
     crossings = 0
     slowest = math.inf
@@ -175,4 +177,6 @@ def split_step(
             dy_end, dw_end = tangent_step(dy, dw, left, lane, slopes, transverse, axial)
             write(memory, TANGENT_POSITION, slot, dy_end, transverse, axial)
             write(memory, TANGENT_RATE, slot, dw_end, transverse, axial)
+    if crossings > 0:
+        write_branches(memory, slot, branches_at(y_end, lane, end, transverse, axial))
     return crossings, slowest, 1 if first <= 1.0 else 0

@@ -205,7 +205,7 @@ def test_a_step_that_leaves_its_branch_is_suspected(gap0, rate0, gap1, rate1):
     branch = branch_at(gap0, HALF_BACKLASH)
     curve = cubic(gap0, rate0, gap1, rate1)
     leaves = leaving_fraction(gap0, rate0, gap1, rate1, branch, HALF_BACKLASH) <= 1.0
-    if not leaves or may_leave(gap0, rate0, gap1, rate1, HALF_BACKLASH):
+    if not leaves or may_leave(gap0, rate0, gap1, rate1, branch):
         return
     # Only what rounding sees outside is missed.
     nearly = 10.0 * ROUNDING * (size_of(curve) + HALF_BACKLASH)
@@ -217,21 +217,22 @@ def test_a_step_that_leaves_its_branch_is_suspected(gap0, rate0, gap1, rate1):
 def test_a_dip_with_one_turn_is_always_suspected(above0, rate0, above1, rate1):
     gap0, gap1 = HALF_BACKLASH + above0, HALF_BACKLASH + above1
     curve = cubic(gap0, rate0, gap1, rate1)
-    dips = distance_inside(curve, branch_at(gap0, HALF_BACKLASH)).min() < -1e-12
-    assert not dips or may_leave(gap0, rate0, gap1, rate1, HALF_BACKLASH)
+    branch = branch_at(gap0, HALF_BACKLASH)
+    dips = distance_inside(curve, branch).min() < -1e-12
+    assert not dips or may_leave(gap0, rate0, gap1, rate1, branch)
 
 
 @pytest.mark.parametrize("rate1", [5.0, 10.0, 30.0])
 def test_a_dip_that_begins_at_rest_at_the_boundary_is_suspected(rate1):
     b = HALF_BACKLASH
     assert leaving_fraction(b, 0.0, b, rate1, branch_at(b, b), b) == 0.0
-    assert may_leave(b, 0.0, b, rate1, b)
-    assert may_leave(-b, 0.0, -b, -rate1, b)
+    assert may_leave(b, 0.0, b, rate1, branch_at(b, b))
+    assert may_leave(-b, 0.0, -b, -rate1, branch_at(-b, b))
 
 
 @pytest.mark.parametrize("gap", [HALF_BACKLASH, -HALF_BACKLASH, 2.0, 0.0, 0.3])
 def test_a_gap_at_rest_is_not_suspected(gap):
-    assert not may_leave(gap, 0.0, gap, 0.0, HALF_BACKLASH)
+    assert not may_leave(gap, 0.0, gap, 0.0, branch_at(gap, HALF_BACKLASH))
 
 
 @pytest.mark.parametrize("far", [3.0, -3.0])
@@ -239,7 +240,7 @@ def test_a_gap_far_from_the_boundary_is_not_suspected_whatever_it_does(far):
     # Most steps are of this kind: they must not come to the scalar path.
     for rate0 in (-2.0, 0.0, 2.0):
         for rate1 in (-2.0, 0.0, 2.0):
-            assert not may_leave(far, rate0, far, rate1, HALF_BACKLASH)
+            assert not may_leave(far, rate0, far, rate1, branch_at(far, HALF_BACKLASH))
 
 
 @PROPERTY
@@ -252,25 +253,28 @@ def test_the_branches_are_the_pieces_of_the_clearance_function(gap):
 
 def test_from_a_flank_a_gap_comes_between_the_flanks_and_from_there_to_the_flank_it_meets():
     b = HALF_BACKLASH
-    free = Branch(0.0, 0.0)
-    assert next_branch(Branch(1.0, b), b, b) == free
-    assert next_branch(Branch(1.0, -b), -b, b) == free
-    assert next_branch(free, b, b) == Branch(1.0, b)
-    assert next_branch(free, -b, b) == Branch(1.0, -b)
+    free = branch_at(0.0, b)
+    assert next_branch(branch_at(b, b), b, b) == free
+    assert next_branch(branch_at(-b, b), -b, b) == free
+    assert next_branch(free, b, b) == branch_at(b, b)
+    assert next_branch(free, -b, b) == branch_at(-b, b)
 
 
 def test_neighbouring_branches_meet_at_the_boundary():
     for b in (HALF_BACKLASH, 1e-9, 1e9):
         for side in (b, -b):
             engaged = branch_at(side, b)
-            assert engaged == Branch(1.0, side)
+            assert engaged[:2] == (1.0, side)
             assert engaged.engaged * side - engaged.offset == 0.0
-            assert branch_at(math.nextafter(side, 0.0), b) == Branch(0.0, 0.0)
+            assert engaged.floor <= side <= engaged.ceiling
+            assert branch_at(math.nextafter(side, 0.0), b) == Branch(0.0, 0.0, -b, b)
 
 
 def test_without_clearance_there_is_no_branch_to_leave():
     for gap0, gap1 in ((1.0, -1.0), (-1.0, 1.0), (0.0, 0.0)):
-        assert leaving_fraction(gap0, -2.0, gap1, -2.0, branch_at(gap0, 0.0), 0.0) == NEVER
+        branch = branch_at(gap0, 0.0)
+        assert leaving_fraction(gap0, -2.0, gap1, -2.0, branch, 0.0) == NEVER
+        assert not may_leave(gap0, -2.0, gap1, -2.0, branch)
 
 
 @pytest.mark.parametrize("lost", [math.nan, math.inf, -math.inf])
