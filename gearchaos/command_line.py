@@ -4,17 +4,15 @@ from __future__ import annotations
 
 import os
 import platform
-import signal
 import sys
-import threading
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from importlib.metadata import PackageNotFoundError, version
 from io import TextIOWrapper
-from types import FrameType
 from typing import TextIO
 
+from gearchaos import interrupts
 from gearchaos.errors import FileError, GearchaosError
+from gearchaos.interrupts import Termination
 
 OK = 0
 USAGE = 2
@@ -22,10 +20,6 @@ CANNOT_READ_OR_WRITE = FileError.exit_code
 INTERRUPTED = 130
 CLOSED_PIPE = 141
 TERMINATED = 143
-
-
-class Termination(KeyboardInterrupt):
-    """SIGTERM, with which batch systems end a job: the command stops as after Ctrl-C."""
 
 
 def software_version() -> str:
@@ -41,7 +35,7 @@ def version_text() -> str:
     return f"gearchaos {software_version()} (Python {platform.python_version()}, {sys.platform})"
 
 
-def run_command(name: str, body: Callable[[], int]) -> int:
+def run_command(name: str, body: Callable[[], int], *, writes: bool = True) -> int:
     """Run a command's body and turn every fault a user can cause into lines on stderr.
 
     Parameters
@@ -50,6 +44,9 @@ def run_command(name: str, body: Callable[[], int]) -> int:
         What the lines begin with, such as "gearchaos plot".
     body : callable
         The command. Returns its exit code; raises GearchaosError for what it cannot do.
+    writes : bool
+        Whether an interrupt finds anything to put in order: then the command asks for it at moments
+        of its own choice, see `interrupts`.
 
     Returns
     -------
@@ -63,8 +60,9 @@ def run_command(name: str, body: Callable[[], int]) -> int:
         # Paths that are not Unicode go out byte for byte, as they came in.
         sys.stdout.reconfigure(errors="surrogateescape")
     try:
-        with _termination_interrupts():
+        with interrupts.noted() if writes else interrupts.deadly():
             code = _code_of(body)
+            interrupts.check()
         if sys.stdout is not None:
             sys.stdout.flush()
         return code
@@ -86,24 +84,6 @@ def _code_of(body: Callable[[], int]) -> int:
         return body()
     except SystemExit as leaving:
         return leaving.code if isinstance(leaving.code, int) else OK
-
-
-@contextmanager
-def _termination_interrupts() -> Iterator[None]:
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    before = signal.signal(signal.SIGTERM, _terminate)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGTERM, before or signal.SIG_DFL)
-
-
-def _terminate(number: int, _frame: FrameType | None) -> None:
-    # A second one ends the process at once.
-    signal.signal(number, signal.SIG_DFL)
-    raise Termination
 
 
 def _report(name: str, fault: BaseException, texts: list[str], code: int) -> int:

@@ -24,7 +24,7 @@ the command line asks for what cannot be, 4 the file cannot be read, is damaged 
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command and return its exit code."""
-    return run_command(NAME, partial(_run, argv))
+    return run_command(NAME, partial(_run, argv), writes=False)
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -115,7 +115,7 @@ def _settings(metadata: Mapping[str, Any]) -> dict[str, list[str]]:
 
 def _write(text: str) -> None:
     # Where the terminal knows few characters, a title must not become a traceback.
-    encoding = sys.stdout.encoding or "utf-8"
+    encoding = getattr(sys.stdout, "encoding", None) or "utf-8"
     print(text.encode(encoding, "replace").decode(encoding))
 
 

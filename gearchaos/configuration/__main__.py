@@ -24,7 +24,7 @@ def main(arguments: list[str] | None = None) -> int:
         print(key_tables() if options.keys else json.dumps(json_schema(), indent=2))
         return OK
 
-    return run_command("gearchaos configuration", body)
+    return run_command("gearchaos configuration", body, writes=False)
 
 
 if __name__ == "__main__":

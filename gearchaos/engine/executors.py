@@ -6,7 +6,6 @@ whether a block is computed in this process or on a cluster.
 
 from __future__ import annotations
 
-import signal
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from contextlib import suppress
@@ -17,6 +16,7 @@ from gearchaos_kernels import current_threads, use_threads
 
 from gearchaos.engine.simulation import Arrays, Bounds, Simulation, compute_all
 from gearchaos.errors import FileError, GearchaosError
+from gearchaos.interrupts import check
 
 
 class ExecutionError(GearchaosError):
@@ -103,8 +103,7 @@ def compute_blocks(
 ) -> None:
     """Have blocks computed and keep each as soon as it is there.
 
-    An interrupt lets the blocks that are running end and keeps them; a second one ends the
-    process at once.
+    An interrupt lets the blocks that are running end and keeps them.
 
     Parameters
     ----------
@@ -112,8 +111,7 @@ def compute_blocks(
     blocks : sequence of (first, last)
         In the order in which they are handed out.
     keep : callable
-        ``keep(block, arrays)``; called in this thread, and again for a block at which it was
-        interrupted.
+        ``keep(block, arrays)``; called in this thread.
     """
     waiting = list(reversed(blocks))
     futures: dict[Future[Arrays], Bounds] = {}
@@ -125,8 +123,8 @@ def compute_blocks(
             for future in wait(futures, return_when=FIRST_COMPLETED).done:
                 keep(futures[future], future.result())
                 del futures[future]
+            check()
     except KeyboardInterrupt:
-        signal.signal(signal.SIGINT, signal.SIG_DFL)
         for future in futures:
             future.cancel()
         for future, block in futures.items():

@@ -15,6 +15,7 @@ from gearchaos.configuration.run_tables import states_of
 from gearchaos.engine.lanes import model, select, start_states
 from gearchaos.engine.step_choice import PILOT_LANES, PILOT_PERIODS, Candidate, choose_steps
 from gearchaos.errors import ConfigurationError
+from gearchaos.interrupts import check
 from gearchaos.motion.difference import Motion
 from gearchaos.motion.lyapunov import largest_exponent
 from gearchaos.motion.period import POINTS_NEEDED
@@ -106,6 +107,7 @@ class SweepLanes:
 
     def integrate(self, lanes: Numbers, start: Floats, plan: Plan | None = None) -> Outcome:
         """Integrate some lanes as the sweep does, or by another plan."""
+        check()
         return integrate(
             self.scene,
             self.model_of(lanes),

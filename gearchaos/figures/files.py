@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 from gearchaos.command_line import software_version
 from gearchaos.errors import ConfigurationError
 from gearchaos.figures.style import STYLE
+from gearchaos.interrupts import check
 from gearchaos.results.atomic_file import replacing
 
 FORMATS: tuple[str, ...] = ("png", "pdf")
@@ -57,6 +58,7 @@ def save_figure(
     if kind == "pdf":
         metadata = {"Title": title, "Creator": software, "CreationDate": None}
         dpi *= PDF_FINENESS
+    check()
     with replacing(path, overwrite=overwrite) as partial, mpl.rc_context(STYLE):
         figure.savefig(partial, format=kind, dpi=dpi, metadata=metadata)
 

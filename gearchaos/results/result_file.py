@@ -11,6 +11,7 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
+from gearchaos.interrupts import check
 from gearchaos.results.atomic_file import replacing
 from gearchaos.results.checksum_line import append_checksum
 from gearchaos.results.sink import Sink
@@ -116,6 +117,7 @@ def write_result(
                 for name, dataset in over_lanes.items():
                     dataset[first:last] = arrays[name]
                 sink.check()
+                check()
         append_checksum(partial)
 
 

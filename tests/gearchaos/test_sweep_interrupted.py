@@ -19,7 +19,7 @@ from gearchaos.results.store_lock import StoreLock
 
 from .commands import names_in, same_data, small_config, sweep
 
-# Eight blocks of lanes that take a second or so together.
+# Four blocks of lanes that take seconds together.
 LONG = (
     "--threads",
     "1",
@@ -69,7 +69,9 @@ def test_the_command_printed_after_an_interrupt_gives_the_undisturbed_result(
 ):
     ended, err = stop_half_way(tmp_path, number, "--resume")
     assert ended == code
-    stopped, kept, how = [line for line in err.splitlines() if "kernel of this scene" not in line]
+    said = [line for line in err.splitlines() if line and "kernel of this scene" not in line]
+    ending, stopped, kept, how = said
+    assert ending == "gearchaos: ending what is running; interrupt again to stop at once"
     assert stopped == f"gearchaos sweep: {word}"
     lanes = int(re.fullmatch(r"gearchaos sweep: (\d+) of 1000 lanes are kept", kept)[1])
     assert 0 < lanes < 1000
@@ -150,23 +152,41 @@ def is_locked(output):
 
 
 @pytest.mark.slow
-def test_twenty_kills_at_random_moments_cost_no_bit(tmp_path, undisturbed):
+def test_twenty_kills_at_random_moments_cost_no_bit(tmp_path):
+    # Thirty-two blocks, of which every attempt finishes a few; the last ones meet the merging.
+    wide = ("--threads", "1", "--set", "sweep.count=8000", "--quiet")
+    (tmp_path / "undisturbed").mkdir()
+    assert sweep(tmp_path / "undisturbed", *wide).code == 0
     small_config(tmp_path)
     moments = random.Random(20)
-    command = [sys.executable, "-m", "gearchaos.sweep", "gears.toml", *LONG, "--resume", "--quiet"]
-    ended = []
+    command = [sys.executable, "-m", "gearchaos.sweep", "gears.toml", *wide, "--resume"]
+    finished = []
     for _ in range(20):
         with subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.DEVNULL) as process:
             # Not the import of packages, but what a sweep does, is to be met.
             while process.poll() is None and not is_locked(tmp_path / "gears.h5"):
                 time.sleep(0.005)
-            time.sleep(moments.uniform(0.0, 0.15))
+            before = blocks_in(tmp_path)
+            enough = min(before + moments.randint(0, 6), 32)
+            while process.poll() is None and blocks_in(tmp_path) < enough:
+                time.sleep(0.001)
+            time.sleep(moments.uniform(0.0, 0.03))
             process.kill()
-        ended.append(process.returncode)
-    assert ended.count(-signal.SIGKILL) > 10, ended
-    assert sweep(tmp_path, *LONG, "--resume", "--quiet") == (0, "gears.h5\n", "")
-    assert names_in(tmp_path) == ["gears.h5", "gears.toml"]
+        assert process.returncode == -signal.SIGKILL
+        finished.append(blocks_in(tmp_path))
+        # What was there before is there still.
+        assert finished[-1] >= before
+        assert not (tmp_path / "gears.h5").exists()
+    assert len({count for count in finished if 0 < count < 32}) > 5, finished
+    assert finished.count(32) > 1, finished
+    assert sweep(tmp_path, *wide, "--resume") == (0, "gears.h5\n", "")
+    assert names_in(tmp_path) == ["gears.h5", "gears.toml", "undisturbed"]
+    undisturbed = gearchaos.open_result(tmp_path / "undisturbed" / "gears.h5")
     assert same_data(gearchaos.open_result(tmp_path / "gears.h5"), undisturbed)
+
+
+def blocks_in(folder):
+    return len(list((folder / SHARDS).glob("*.shard")))
 
 
 def test_damaged_foreign_and_ill_dated_blocks_are_told_and_computed_again(tmp_path, undisturbed):
