@@ -7,11 +7,14 @@ from gearchaos_kernels import STATE_ROWS, Outcome, Plan, Status
 from numpy.typing import NDArray
 
 from gearchaos.engine.sweep_lanes import SweepLanes
+from gearchaos.motion.bands import dealt_parts_differ_by
 from gearchaos.motion.label import (
+    CHAOTIC,
     DIVERGED,
     MOST_POINTS,
-    NEAR,
     PERIODIC,
+    QUASI_PERIODIC,
+    SETTLING,
     UNRESOLVED,
     Labels,
     Record,
@@ -26,7 +29,10 @@ from gearchaos.motion.spectrum import sum_of_exponents
 Numbers = NDArray[np.intp]
 
 LONGER = 4
-"""How many times the record a lane that may rotate slowly goes on, to be looked at once more."""
+"""How many times the record a lane that may be on a torus goes on, to be looked at once more."""
+
+WHOLE = 0.25
+"""Largest difference of the parts of a curve, see `dealt_parts_differ_by`."""
 
 
 def labelling_plan(sweep: SweepLanes) -> Plan:
@@ -52,11 +58,12 @@ def labels_of(sweep: SweepLanes, lanes: Numbers, outcome: Outcome) -> Labels:
     record = _record(sweep, lanes, outcome)
     labels = label(record)
     _settle(sweep, lanes, outcome, labels, settling_periods(record, labels))
-    slow = np.flatnonzero((labels.motion == UNRESOLVED) & may_rotate_slowly(record))
+    rotating = labels.motion == QUASI_PERIODIC
+    rotating |= (labels.motion == UNRESOLVED) & may_rotate_slowly(record)
     # In parts whose longer records take no more memory than those of all lanes.
-    for part in np.array_split(slow, LONGER):
+    for part in np.array_split(np.flatnonzero(rotating), LONGER):
         if part.size:
-            _look_again(sweep, lanes, outcome, labels, part)
+            labels.motion[part] = _second_look(sweep, lanes[part], outcome, part, labels)
     return labels
 
 
@@ -71,22 +78,24 @@ def _record(
     )
 
 
-def _look_again(
-    sweep: SweepLanes, lanes: Numbers, outcome: Outcome, labels: Labels, part: Numbers
-) -> None:
-    """Label some lanes by a longer record that begins where theirs ended, in place."""
+def _second_look(
+    sweep: SweepLanes, lanes: Numbers, outcome: Outcome, part: Numbers, labels: Labels
+) -> NDArray[np.uint8]:
+    """Tell by a longer record, which begins where theirs ended, whether lanes are on a torus."""
     plan = labelling_plan(sweep)
     longer = plan._replace(
         transient_periods=0,
         recorded_periods=LONGER * plan.recorded_periods,
         section_points=LONGER * min(MOST_POINTS, plan.recorded_periods),
     )
-    again = sweep.integrate(lanes[part], outcome.end_state[part], longer)
-    found = label(_record(sweep, lanes[part], again, longer.section_points))
-    sound = found.motion != DIVERGED
-    labels.motion[part[sound]] = found.motion[sound]
-    labels.period[part[sound]] = found.period[sound]
-    labels.return_distance[part[sound]] = found.return_distance[sound]
+    again = sweep.integrate(lanes, outcome.end_state[part], longer)
+    found = label(_record(sweep, lanes, again, longer.section_points)).motion
+    seen = (labels.motion[part] == QUASI_PERIODIC) | (found == QUASI_PERIODIC)
+    contradicted = np.isin(found, (PERIODIC, CHAOTIC, DIVERGED))
+    torus = seen & ~contradicted & (dealt_parts_differ_by(again.section) <= WHOLE)
+    motion = np.where(torus, QUASI_PERIODIC, UNRESOLVED)
+    motion[found == CHAOTIC] = CHAOTIC
+    return motion.astype(np.uint8)
 
 
 def _admits_tori(sweep: SweepLanes, lanes: Numbers) -> NDArray[np.bool_]:
@@ -124,7 +133,7 @@ def _settle(
             rederived=sweep.config.formulation == "rederived",
         )
         apart = np.abs(orbits.points - outcome.end_state[tried])[:, columns]
-        close = np.max(apart / coordinate_scale(outcome.section[tried]), axis=1) <= NEAR
+        close = np.max(apart / coordinate_scale(outcome.section[tried]), axis=1) <= SETTLING
         stable = np.abs(orbits.multipliers[:, 0]) < 1.0
         settled = tried[orbits.converged & close & stable]
         searched[settled] = False

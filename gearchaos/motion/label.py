@@ -33,7 +33,10 @@ AGREEMENT = 0.05
 """Largest difference of the weighted averages of two halves of a quasi-periodic record."""
 
 NEAR = 0.01
-"""Return distance below which a motion that has not returned may be settling on an orbit."""
+"""Return distance below which a motion that was chaotic may be settling on an orbit."""
+
+SETTLING = 0.1
+"""Return distance below which a motion that comes ever closer may be settling on an orbit."""
 
 LATEST = 16
 """Section points at the end of a chaotic record that may have settled."""
@@ -126,7 +129,7 @@ def settling_periods(record: Record, labels: Labels) -> NDArray[np.int32]:
     looked_at = (own == 0) | ((own > periods) & (own % periods == 0))
     now[~(looked_at & (now < before))] = np.inf
     nearest = np.argmin(now, axis=1)
-    settling = now[np.arange(lanes.size), nearest] <= NEAR
+    settling = now[np.arange(lanes.size), nearest] <= SETTLING
     if record.growth is not None:
         later = record.growth[lanes, record.growth.shape[1] // 2 :]
         exponent, _ = largest_exponent(later, np.ones(lanes.size))

@@ -1,0 +1,61 @@
+"""Whether a section winds around closed curves, or hops between bands in a fixed order.
+
+A period of more than 16, and the infinite one at the end of a cascade of period doublings, have
+averages that converge like those on a torus, and exponents near zero. But every 2nd point of a
+doubled orbit, or every 3rd of a tripled one, stays on one side; on a curve with an irrational
+rotation every n-th point goes everywhere.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gearchaos.motion.period import LONGEST_PERIOD
+
+Floats = NDArray[np.float64]
+
+PARTS = (2, 3, 5, 7)
+"""Into how many parts the points of a curve are dealt; what the windows of chaos are made of."""
+
+FEWEST = 16
+"""Points that every part must have."""
+
+
+def dealt_parts_differ_by(section: Floats) -> Floats:
+    """Return how far the averages of every 2nd, 3rd, 5th and 7th point of a curve lie apart.
+
+    A torus may cut the section in up to 16 curves, which are visited in turn. For each number of
+    curves the points of each are dealt into parts; averages over parts are weighted by
+    exp(-1/(t(1-t))) and differ by so many standard deviations of their curve. The number of curves
+    with the smallest difference counts.
+
+    Parameters
+    ----------
+    section : ndarray, shape (lanes, points, states)
+
+    Returns
+    -------
+    ndarray, shape (lanes,)
+        Infinite with too few points to tell.
+    """
+    lanes, points, states = section.shape
+    smallest = np.full(lanes, np.inf)
+    for curves in range(1, LONGEST_PERIOD + 1):
+        if points < FEWEST * curves * max(PARTS):
+            break
+        largest = np.zeros(lanes)
+        for parts in PARTS:
+            turns = points // (curves * parts)
+            dealt = section[:, -turns * curves * parts :]
+            dealt = dealt.reshape(lanes, turns, parts, curves, states)
+            deviation = np.std(dealt, axis=(1, 2))
+            time = (np.arange(turns) + 0.5) / turns
+            weights = np.exp(-1.0 / (time * (1.0 - time)))
+            averages = np.einsum("t,ltpcs->lpcs", weights / np.sum(weights), dealt)
+            apart = np.ptp(averages, axis=1)
+            # A coordinate at rest has no parts that could differ.
+            apart /= np.where(deviation > 0.0, deviation, 1.0)
+            largest = np.maximum(largest, np.max(apart, axis=(1, 2)))
+        smallest = np.minimum(smallest, largest)
+    return smallest
