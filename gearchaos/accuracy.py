@@ -108,8 +108,17 @@ def _run(argv: Sequence[str] | None) -> int:
             f"{config.source}: outputs.section: a section is needed to measure errors on; keep a "
             'state, such as "delta_5"'
         )
+    for steps in options.steps:
+        # Each is refused as a sweep would refuse it.
+        stable = config.replace("integration.unstable", "refuse")
+        Simulation(stable.replace("integration.steps_per_period", steps))
     settings = measure(Simulation(config), options.steps, options.lanes, options.quiet)
     print("\n".join(table(settings)))
+    if not any(setting.error > 0.0 for setting in settings):
+        raise ConfigurationError(
+            f"{config.source}: none of the lanes that were tried moves periodically, so that no "
+            "error can be measured; try more with --lanes, or others with --set"
+        )
     for error in WANTED:
         print(recommendation(settings, error))
     page = work_precision_page(

@@ -87,9 +87,9 @@ def _run(argv: Sequence[str] | None) -> int:
             found=found,
         )
     print(output, flush=True)
-    told = [f"{simulation.lanes} lanes, {tally.diverged} diverged", tally.errors]
+    told = [f"{simulation.lanes} lanes, {tally.diverged} diverged", *tally.remarks]
     if not options.quiet:
-        print(*(f"{NAME}: {text}" for text in told if text), sep="\n", file=sys.stderr)
+        print(*(f"{NAME}: {text}" for text in told), sep="\n", file=sys.stderr)
     return ending(NAME, simulation, tally.diverged)
 
 

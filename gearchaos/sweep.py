@@ -166,8 +166,8 @@ def _compute(
             raise
     print(output if part is None else store.folder, flush=True)
     say(f"{store.own_lanes} lanes, {tally.diverged} diverged, {seconds:.1f} s", quiet)
-    if tally.errors:
-        say(tally.errors, quiet)
+    for remark in tally.remarks:
+        say(remark, quiet)
     if part is not None:
         merging = shlex.join([sys.orig_argv[0], "-m", "gearchaos.merge", output])
         say(f"this was part {options.shard}; once all are there: {merging}", quiet)

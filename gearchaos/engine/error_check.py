@@ -52,6 +52,8 @@ class Tally:
 
     def __init__(self) -> None:
         self.diverged = 0
+        self._unsplit_lanes = 0
+        self._unsplit_steps = 0
         self._section: list[NDArray[np.float64]] = []
         self._exponent: list[NDArray[np.float64]] = []
         self._motion: list[NDArray[np.uint8]] = []
@@ -59,11 +61,26 @@ class Tally:
     def add(self, arrays: Mapping[str, NDArray[Any]]) -> None:
         """Count the lanes of one block."""
         self.diverged += int(np.count_nonzero(arrays["status"]))
+        if "unsplit_steps" in arrays:
+            self._unsplit_lanes += int(np.count_nonzero(arrays["unsplit_steps"]))
+            self._unsplit_steps += int(np.sum(arrays["unsplit_steps"]))
         if "motion_changed" in arrays:
             periodic = np.isfinite(arrays["section_error"])
             self._section.append(arrays["section_error"][periodic])
             self._exponent.append(arrays["exponent_error"][periodic])
             self._motion.append(arrays["motion_changed"])
+
+    @property
+    def remarks(self) -> list[str]:
+        """What a user should know of the lanes, a line each."""
+        remarks = [self.errors] if self.errors else []
+        if self._unsplit_steps:
+            remarks.append(
+                f"{self._unsplit_steps} steps of {self._unsplit_lanes} lanes crossed contact "
+                "boundaries too often to be split at each (unsplit_steps in the file); raise "
+                "integration.steps_per_period"
+            )
+        return remarks
 
     @property
     def errors(self) -> str:

@@ -24,13 +24,15 @@ class Candidate(NamedTuple):
     """A number of steps per period and what was measured for it against a grid four times finer.
 
     ``section_error``, ``exponent_error``: not exceeded by 95 % of the lanes that move periodically
-    on all three grids; ``changed_share``: share of the lanes that move in another way.
+    on all three grids, the ``periodic_share`` of them; ``changed_share``: share of the lanes that
+    move in another way.
     """
 
     steps: int
     section_error: float
     exponent_error: float
     changed_share: float
+    periodic_share: float
 
     @property
     def error(self) -> float:
@@ -96,4 +98,5 @@ def _candidate(steps: int, motions: dict[int, Motion]) -> Candidate:
         bound(coarse.section_error[periodic]),
         bound(coarse.exponent_error[periodic]),
         float(np.mean(coarse.changed)),
+        float(np.mean(periodic)),
     )

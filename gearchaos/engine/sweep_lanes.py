@@ -181,9 +181,11 @@ class SweepLanes:
             steps, dict(zip(Candidate._fields[1:], measured, strict=True))
         )
         self.plan = self.plan._replace(steps_per_period=candidates[-1].steps)
+        best = candidates[-1]
         self.notes.append(
-            f"{candidates[-1].steps} steps per period: on {lanes} lanes the error is "
-            f"{candidates[-1].error:.1e}, wanted is {tolerance:g}"
+            f"{best.steps} steps per period: on the {best.periodic_share * lanes:.0f} of {lanes} "
+            f"lanes that move periodically the error is {best.error:.1e}, wanted is {tolerance:g}; "
+            f"{best.changed_share * lanes:.0f} move in another way with finer steps"
         )
 
     def _keep_stable(self) -> None:

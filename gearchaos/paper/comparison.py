@@ -170,8 +170,9 @@ class Comparison:
             )
 
     def _boundaries(self) -> Iterator[Row]:
-        for (before, _), (after, span) in pairwise(self._pairs()):
-            mine = NAN if span is None else span[0]
+        for (before, ended), (after, begun) in pairwise(self._pairs()):
+            # A boundary has two sides.
+            mine = NAN if ended is None or begun is None else begun[0]
             yield _row(
                 f"{before.words} → {after.words}",
                 "figure 7",

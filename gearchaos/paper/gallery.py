@@ -67,8 +67,8 @@ def pictures() -> tuple[Picture, ...]:
             "figure_06",
             "Figure 6",
             "Single-sided amplitude spectra of the accelerations of figure 5, dimensionless, "
-            "rectangular window over whole mesh periods; the lines of the two are drawn beside "
-            "each other.",
+            "rectangular window over whole mesh periods; the lines of the two are drawn 0.07 to "
+            "the left and to the right of their frequency.",
             spectra_page,
         ),
         Picture(
@@ -92,6 +92,7 @@ def pictures() -> tuple[Picture, ...]:
                 f"Figure {motion.figure}",
                 f"Torsional motion at *P* = {motion.pitch_error:g}, dimensionless: time history "
                 "(a), phase portrait with one point per mesh period (b), Poincaré section (c). "
+                "At rest at the start, or on the contact flank where the figure says so. "
                 f"In the paper: {motion.words}.",
                 partial(motion_page, shown=motion),
             )

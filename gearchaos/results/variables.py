@@ -214,13 +214,14 @@ def step_choice_variables(
     steps : sequence of int
         Numbers of steps per period that were tried; the last one was taken.
     measured : mapping of str to sequence of float
-        ``section_error``, ``exponent_error``, ``changed_share`` of each.
+        ``section_error``, ``exponent_error``, ``changed_share`` and ``periodic_share`` of each.
     """
     name = "candidate_steps"
     wording = {
         "section_error": "error of the section of periodic lanes against four times as many steps",
         "exponent_error": "error of their exponent against four times as many steps",
         "changed_share": "share of lanes that move in another way with four times as many steps",
+        "periodic_share": "share of lanes that move periodically: errors are measured on these",
     }
     text = "steps per period that were tried before the sweep; the last number was taken"
     return [

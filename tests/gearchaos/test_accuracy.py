@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 
 import gearchaos
-from gearchaos.accuracy import Setting, measure, recommendation
+from gearchaos.accuracy import TRUTH_STEPS, Setting, measure, recommendation
 from gearchaos.engine.simulation import Simulation
 
+from ..kernels.reference import SOLUTIONS
 from .commands import names_in, run_module
 from .short_sweeps import PAN2021
 
@@ -81,3 +82,42 @@ def test_the_cheapest_setting_that_is_good_enough_is_recommended():
     assert "100 plain" in recommendation(settings, 1e-4)
     assert "100 resolved" in recommendation(settings, 1e-6)
     assert "none of these" in recommendation(settings, 1e-8)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "cause"),
+    [
+        (("--steps", "10,50"), "RK4 is unstable below 16 steps per period"),
+        (
+            ("--steps", "50,100", "--set", "sweep.from=13.3", "--set", "sweep.to=13.5"),
+            "none of the lanes that were tried moves periodically",
+        ),
+    ],
+)
+def test_settings_on_which_no_error_can_be_measured_are_named(tmp_path, arguments, cause):
+    few = ("--lanes", "8", *arguments)
+    ended = run_module("gearchaos.accuracy", str(PAN2021), *few, cwd=tmp_path)
+    assert ended.code == 2
+    assert cause in ended.err
+    assert "Traceback" not in ended.err
+    assert names_in(tmp_path) == []
+
+
+def test_the_truth_is_that_of_the_stored_orbits():
+    stored = {
+        orbit["pitch_error"]: orbit
+        for orbit in SOLUTIONS["periodic_orbits"]
+        if orbit["scene"] == "no_axial" and orbit["pitch_error"] in (5.86, 10.75)
+    }
+    values = f"sweep={{parameter='pitch_error', values={[*stored]}}}"
+    sweep = Simulation(gearchaos.load_config(PAN2021, [values]))
+    _, motion = sweep.pilot(2, TRUTH_STEPS)
+    truth = motion(TRUTH_STEPS, True)
+    for lane, orbit in enumerate(stored.values()):
+        # The mean over 150 periods is off by up to 1e-6.
+        assert truth.exponent[lane] == pytest.approx(orbit["largest_exponent"], abs=1e-6)
+        expected = np.array([state[0] for state in orbit["section_points"]])
+        apart = np.abs(truth.section[lane, :, :1] - expected)
+        # The configuration gives its groups with six digits.
+        assert apart.min(axis=1).max() < 1e-7
+        assert apart.min(axis=0).max() < 1e-7

@@ -74,7 +74,7 @@ def test_the_choice_follows_from_the_configuration_alone():
         sweep.choose_steps()
         measured = [v.values for v in sweep.variables if v.name.startswith("candidate")]
         chosen.append((sweep.plan, measured))
-    assert len(chosen[0][1]) == 4
+    assert len(chosen[0][1]) == 5
     assert chosen[0] == chosen[1]
 
 
