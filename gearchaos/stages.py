@@ -15,7 +15,8 @@ from gearchaos.errors import ConfigurationError
 
 if TYPE_CHECKING:
     from gearchaos.engine.stage_refinement import Boundary
-    from gearchaos.motion.stage_table import Stage
+    from gearchaos.motion.jumps import Jump
+    from gearchaos.motion.stage_table import LabelledLanes, Stage
     from gearchaos.results.result import Result
 
 NAME = "gearchaos stages"
@@ -73,6 +74,7 @@ def _width(text: str) -> float:
 
 def _run(argv: Sequence[str] | None) -> int:
     options = _parser().parse_args(argv)
+    from gearchaos.motion.jumps import jumps
     from gearchaos.motion.stage_table import labelled_lanes, stage_table
     from gearchaos.results.result import open_result
 
@@ -83,10 +85,13 @@ def _run(argv: Sequence[str] | None) -> int:
     if options.refine is not None:
         boundaries = _refined(result, stages, options)
         stages = refined_stages(stages, boundaries)
+    found = jumps(result, options.start)
     if options.json:
-        print(json.dumps(_facts(result, stages, boundaries), indent=1, allow_nan=False))
+        facts = _facts(result, stages, boundaries)
+        facts["jumps"] = [jump._asdict() for jump in found]
+        print(json.dumps(facts, indent=1, allow_nan=False))
     else:
-        print("\n".join(table(result.axis, stages)))
+        print("\n".join([*table(result.axis, stages), *remarks(found, lanes)]))
         if boundaries:
             print("\n".join(["", *boundary_list(boundaries)]))
     return OK
@@ -129,6 +134,21 @@ def table(axis: str, stages: Sequence[Stage]) -> list[str]:
             f"  {f'with {stage.narrower}' if stage.narrower else ''}".rstrip()
         )
     return lines
+
+
+def remarks(found: Sequence[Jump], lanes: LabelledLanes) -> list[str]:
+    """Word what the table does not show: jumps within a stage, and chaos that came to rest."""
+    lines = [
+        f"{jump.below:.6g} to {jump.above:.6g}: jumps to another motion of {jump.label}"
+        for jump in found
+    ]
+    late = int(((lanes.period > 0) & (lanes.exponent > 0.0)).sum())
+    if late:
+        lines.append(
+            f"{late} periodic lanes came to rest within their record, the chaos before it\n"
+            "included in their exponent; integration.transient_periods leaves it out"
+        )
+    return ["", *lines] if lines else []
 
 
 def boundary_list(boundaries: Sequence[Boundary]) -> list[str]:

@@ -9,6 +9,7 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
+from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
 
 from gearchaos.figures.page import Page
 from gearchaos.figures.style import EXPONENT, MM_PER_INCH, POSITIVE, SINGLE_COLUMN_MM, STYLE
@@ -56,6 +57,10 @@ def work_precision(axes: Axes, modes: Mapping[str, Points]) -> list[Line2D]:
             )
     axes.set_xscale("log")
     axes.set_yscale("log")
+    # Times rarely span a decade, within which nothing would be labelled, or everything.
+    axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    axes.xaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
+    axes.xaxis.set_minor_formatter(NullFormatter())
     axes.margins(0.12)
     axes.set_xlabel("Time (s)")
     axes.set_ylabel("Error of section and exponent")

@@ -1,0 +1,73 @@
+"""Jumps between two motions of the same period: what labels alone do not show."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gearchaos.motion.period import section_distance
+from gearchaos.motion.stage_table import labelled_lanes
+from gearchaos.results.result import Result
+
+Floats = NDArray[np.float64]
+
+STEEPEST = 5.0
+"""Neighbouring lanes lie this many times farther apart than those beside them where they jump."""
+
+SMALLEST = 0.02
+"""Smallest jump, relative to the size of the section over the sweep."""
+
+
+class Jump(NamedTuple):
+    """Two neighbouring values with the same label and motions far apart."""
+
+    below: float
+    above: float
+    label: str
+
+
+def jumps(result: Result, start: int = 0) -> list[Jump]:
+    """Find where a sweep jumps from one motion to another of the same period.
+
+    On one branch the points of the section move little from lane to lane, and steadily so: towards
+    a fold, where they move fastest, each step is less than three times the one before.
+
+    Parameters
+    ----------
+    result : Result
+        With labels; without a section nothing is found.
+    start : int
+        Number of the start, where every value has several.
+    """
+    lanes = labelled_lanes(result, start)
+    names = [name for name in result if name.startswith("section_") and result[name].ndim == 2]
+    if not names or lanes.values.size < 3:
+        return []
+    mine = result["start"] == start if "start" in result else np.ones(lanes.values.size, dtype=bool)
+    sections = np.stack([result[name][mine] for name in names], axis=2)
+    size = np.nanmax(np.abs(sections), axis=(0, 1))
+    found = jumps_at(lanes.period, sections / np.where(size > 0.0, size, 1.0))
+    return [
+        Jump(float(lanes.values[at]), float(lanes.values[at + 1]), str(lanes.labels[at]))
+        for at in found
+    ]
+
+
+def jumps_at(period: NDArray[np.int32], section: Floats) -> NDArray[np.intp]:
+    """Return the lanes whose upper neighbour has the same period and moves on another branch.
+
+    Parameters
+    ----------
+    period : ndarray of int, shape (lanes,)
+        0 where the motion is not periodic.
+    section : ndarray, shape (lanes, points, states)
+        Relative to the size of each state over the sweep.
+    """
+    enough = (period[1:] > 0) & (period[1:] <= section.shape[1])
+    common = np.where(enough & (period[1:] == period[:-1]), period[1:], 0).astype(np.int32)
+    apart = section_distance(section[:-1], section[1:], common)
+    # Where one side is missing, or another stage begins there, the other side must do.
+    beside = np.fmax(np.concatenate([[np.nan], apart[:-1]]), np.concatenate([apart[1:], [np.nan]]))
+    return np.flatnonzero((apart > SMALLEST) & (apart > STEEPEST * beside))

@@ -1,0 +1,72 @@
+"""A jump between two branches is found, and a branch that only bends is not one."""
+
+import json
+
+import numpy as np
+import pytest
+
+import gearchaos
+from gearchaos.motion.jumps import jumps, jumps_at
+
+from .commands import run_module
+from .short_sweeps import PAN2021
+
+VALUES = np.linspace(0.0, 1.0, 41)
+
+
+def section(*points: np.ndarray, times: int = 3) -> np.ndarray:
+    """One state of lanes that visit these points in turn."""
+    return np.tile(np.stack(points, axis=1), (1, times))[:, :, np.newaxis]
+
+
+def test_a_step_on_a_smooth_branch_is_a_jump():
+    branch = np.sin(VALUES) + 0.3 * (VALUES > 0.5)
+    assert jumps_at(np.full(41, 1), section(branch)).tolist() == [20]
+    # Two points of a period 2 may come in either order.
+    other = np.cos(VALUES)
+    swapped = np.where(VALUES > 0.25, branch, other), np.where(VALUES > 0.25, other, branch)
+    assert jumps_at(np.full(41, 2), section(*swapped)).tolist() == [20]
+
+
+@pytest.mark.parametrize(
+    "branch",
+    [
+        VALUES**2,
+        np.sqrt(VALUES - VALUES[0]),  # Beginning at a fold.
+        np.sqrt(1.0 - VALUES),  # Ending at one.
+        np.tanh(30.0 * (VALUES - 0.51)),  # Steep, but resolved.
+        np.zeros(41),
+        1e-3 * np.random.default_rng(1).normal(size=41),
+    ],
+)
+def test_a_branch_that_bends_does_not_jump(branch):
+    assert jumps_at(np.full(41, 1), section(branch)).size == 0
+
+
+def test_only_motions_of_the_same_period_are_compared():
+    branch = np.where(VALUES > 0.5, 1.0, 0.0)
+    period = np.where(VALUES > 0.5, 2, 1)
+    assert jumps_at(period, section(branch)).size == 0
+    assert jumps_at(np.zeros(41, int), section(branch)).size == 0
+    # A period that the section does not hold.
+    assert jumps_at(np.full(41, 4), section(branch)).size == 0
+
+
+@pytest.fixture(scope="module")
+def hop():
+    return gearchaos.run(
+        gearchaos.load_config(PAN2021, ["sweep.from=0.94", "sweep.to=1.12", "sweep.count=19"])
+    )
+
+
+def test_the_hop_of_figure_7_is_a_jump_within_period_1(hop, tmp_path):
+    (jump,) = jumps(hop)
+    assert (jump.below, jump.above) == pytest.approx((1.04, 1.05))
+    hop.save(tmp_path / "hop.h5")
+    told = run_module("gearchaos.stages", "hop.h5", cwd=tmp_path)
+    assert told.out.splitlines()[3:] == [
+        "",
+        "1.04 to 1.05: jumps to another motion of period 1",
+    ]
+    facts = json.loads(run_module("gearchaos.stages", "hop.h5", "--json", cwd=tmp_path).out)
+    assert facts["jumps"] == [{"below": jump.below, "above": jump.above, "label": "period 1"}]
