@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from gearchaos.command_line import run_command, version_text
-from gearchaos.errors import FileError
+from gearchaos.errors import ConfigurationError, FileError
 
 if TYPE_CHECKING:
     from gearchaos.configuration import Configuration
@@ -119,7 +119,18 @@ def _configuration(options: argparse.Namespace) -> Configuration:
         parameter = load_config(options.config, options.set).sweep.parameter
     # Repeating a value is no mistake worth a message.
     sweep = {"parameter": parameter, "values": sorted(set(values))}
-    return load_config(options.config, [*options.set, f"sweep={toml_literal(sweep)}"])
+    try:
+        return load_config(options.config, [*options.set, f"sweep={toml_literal(sweep)}"])
+    except ConfigurationError as error:
+        swept = load_config(options.config, options.set).sweep.parameter
+        if parameter == swept:
+            raise
+        key = swept if "." in swept else f"groups.{swept}"
+        hint = (
+            f"--pitch-error takes the place of the sweep over {swept}: give one value of it with "
+            f"--set {key}=VALUE, or several with --at"
+        )
+        raise ConfigurationError([*error.problems, hint]) from error
 
 
 if __name__ == "__main__":

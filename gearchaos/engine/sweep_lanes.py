@@ -28,6 +28,9 @@ Numbers = NDArray[np.intp]
 LANES_AT_ONCE = 2**14
 """Lanes whose stability is looked at together."""
 
+PHASES = 1001
+"""Mesh phases at which the sign of the mesh stiffness is looked at."""
+
 
 class SweepLanes:
     """The lanes of one configured sweep.
@@ -66,6 +69,7 @@ class SweepLanes:
         self.notes: list[str] = []
         """What a user should know before the sweep begins."""
         self._keep_stable()
+        self._look_at_stiffness()
 
     @property
     def axis(self) -> str:
@@ -187,6 +191,21 @@ class SweepLanes:
             f"lanes that move periodically the error is {best.error:.1e}, wanted is {tolerance:g}; "
             f"{best.changed_share * lanes:.0f} move in another way with finer steps"
         )
+
+    def _look_at_stiffness(self) -> None:
+        """Note where the variation of the mesh stiffness exceeds its mean."""
+        if not self.scene.stiffness_variation:
+            return
+        cosine, sine = self.harmonics()
+        angle = np.outer(np.linspace(0.0, 2.0 * np.pi, PHASES), np.arange(1, cosine.size + 1))
+        variation = np.cos(angle) @ cosine + np.sin(angle) @ sine
+        scale = np.float64(self.groups.stiffness_variation_scale)
+        lowest = 1.0 + np.min(np.outer([np.min(scale), np.max(scale)], variation))
+        if lowest < 0.0:
+            self.notes.append(
+                f"the mesh stiffness falls to {lowest:.2g} of its mean within a mesh period, below "
+                "zero; groups.stiffness_variation_scale is too large for these harmonics"
+            )
 
     def _keep_stable(self) -> None:
         """Refuse or raise a number of steps with which the method itself would blow up."""

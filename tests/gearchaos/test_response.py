@@ -233,6 +233,17 @@ def test_what_cannot_be_computed_is_a_usage_error(tmp_path, arguments, message, 
     assert not output.exists()
 
 
+def test_a_pitch_error_in_a_sweep_over_something_else_needs_a_value_of_that(tmp_path, capsys):
+    output = tmp_path / "spur.h5"
+    asked = [str(FULL.with_name("spur_pair.toml")), "--pitch-error", "1", "-o", str(output)]
+    assert main(asked) == 2
+    assert (
+        "--pitch-error takes the place of the sweep over mesh_frequency: give one value of it with "
+        "--set groups.mesh_frequency=VALUE, or several with --at\n"
+    ) in capsys.readouterr().err
+    assert not output.exists()
+
+
 def test_the_configuration_is_never_replaced(tmp_path, capsys):
     config = tmp_path / "gears.toml"
     shutil.copy(FULL, config)

@@ -66,3 +66,11 @@ def test_all_exponents_come_with_the_sum_that_the_damping_gives():
     assert arrays["lyapunov_spectrum"].shape == (3, len(sweep.states))
     total = arrays["lyapunov_spectrum"].sum(axis=1)
     assert np.allclose(total, arrays["lyapunov_sum"], rtol=0.0, atol=1e-6)
+
+
+def test_a_mesh_stiffness_below_zero_is_noted():
+    assert simulation().notes == []
+    (note,) = simulation("groups.stiffness_variation_scale=9").notes
+    assert "the mesh stiffness falls to -0.034 of its mean" in note
+    without = 'scene.effects=["pitch_error", "backlash"]'
+    assert simulation(without).notes == []
