@@ -95,9 +95,14 @@ def response_page(
             for axis in (axes.xaxis, axes.yaxis):
                 axis.set_major_locator(MaxNLocator(6, steps=[1, 2, 5, 10]))
                 axis.set_minor_locator(AutoMinorLocator())
-        history.set_title(
-            lane_in_words(result, lane), loc="right", fontsize=SMALL_FONT_PT, fontweight="normal"
-        )
+        points = result[f"section_{coordinate}"].shape[1]
+        # A lane may have come to rest on its orbit within the longer of the two.
+        for axes, words in (
+            (history, lane_in_words(result, lane)),
+            (portrait, f"last {round(float(last))} mesh periods"),
+            (section, f"last {points} mesh periods"),
+        ):
+            axes.set_title(words, loc="right", fontsize=SMALL_FONT_PT, fontweight="normal")
         figure.align_ylabels(panels)
         # Ticks are made at the first drawing, in the style of that moment.
         figure.draw_without_rendering()
