@@ -67,17 +67,19 @@ def _pan(lanes: int):
     return model(groups, lanes), groups.stiffness_cosine, groups.stiffness_sine
 
 
-def engine(scene: Scene, tangent: bool, resolved: bool, threads: int) -> Callable[[], int]:
+def engine(
+    scene: Scene, tangent: bool, resolved: bool, threads: int, steps: int = STEPS
+) -> Callable[[], int]:
     """Return work that integrates the sweep of Pan 2021 and tells how many steps that took."""
     lanes = LANES * threads
     data = _pan(lanes)
     # The end state is written in full, so that no effect can be optimised away.
-    plan = Plan(STEPS, 0, PERIODS, 1, ("delta_5",), tangent, resolved)
+    plan = Plan(steps, 0, PERIODS, 1, ("delta_5",), tangent, resolved)
 
     def work() -> int:
         use_threads(threads)
         integrate(scene, *data, np.zeros((lanes, 10)), plan)
-        return lanes * PERIODS * STEPS
+        return lanes * PERIODS * steps
 
     return work
 
