@@ -10,6 +10,17 @@ from gearchaos.engine.lanes import model, select, start_states
 from gearchaos.engine.simulation import Simulation, compute_all
 
 PAN2021 = Path(__file__).resolve().parents[2] / "sweeps" / "pan2021.toml"
+SPEEDS = PAN2021.with_name("mesh_frequency.toml")
+SOFT_BEARINGS = (
+    "groups.pitch_error=2.3",
+    "groups.damping_ratio=0.0013",
+    "groups.transverse_stiffness_p=0.112",
+    "groups.transverse_stiffness_g=0.033",
+    "groups.transverse_damping_p=0.00087",
+    "groups.transverse_damping_g=0.00148",
+    "integration.transient_periods=4000",
+)
+"""A pair with many tori over its speeds, which are slow to settle."""
 SHORT = (
     "integration.steps_per_period=96",
     "integration.transient_periods=6",

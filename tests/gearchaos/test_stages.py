@@ -10,7 +10,7 @@ import gearchaos
 from gearchaos.results.result import Result
 
 from .commands import run_module
-from .short_sweeps import PAN2021
+from .short_sweeps import PAN2021, SOFT_BEARINGS, SPEEDS
 
 WHERE = (
     "sweep.from=9.8",
@@ -79,6 +79,20 @@ def test_boundaries_are_refined_and_the_period_doubling_is_told(folder):
     assert doubling["multiplier_real"] == pytest.approx(-1.0, abs=0.02)
     assert facts["stages"][0]["to"] == doubling["below"]
     assert facts["stages"][1]["from"] == doubling["above"]
+
+
+def test_a_torus_is_born_in_a_neimark_sacker_bifurcation(tmp_path):
+    born = ("sweep={parameter='mesh_frequency', values=[1.015, 1.02]}", *SOFT_BEARINGS)
+    config = gearchaos.load_config(SPEEDS, born)
+    gearchaos.run(config).save(tmp_path / "born.h5")
+    ended = stages(tmp_path, "born.h5", "--refine", "0.0005", "--json")
+    facts = json.loads(ended.out)
+    assert [stage["motion"] for stage in facts["stages"]] == ["period 1", "quasi-periodic"]
+    (boundary,) = facts["boundaries"]
+    assert boundary["loss_of_stability"].startswith("Neimark-Sacker")
+    multiplier = complex(boundary["multiplier_real"], boundary["multiplier_imaginary"])
+    assert abs(multiplier) == pytest.approx(1.0, abs=1e-3)
+    assert abs(multiplier.imag) > 0.5
 
 
 def changed(result: Result, **metadata: str) -> Result:
