@@ -13,6 +13,7 @@ from gearchaos.paper.computation import Reproduction, lane_of
 from gearchaos.paper.hop_figure import STARTS
 from gearchaos.paper.published import Published
 from gearchaos.paper.stages import motions_between
+from gearchaos.results.result import Result
 
 
 def short(value: float) -> str:
@@ -39,10 +40,13 @@ def stages_in_words(printed: Published, found: Reproduction) -> str:
             "and its averages converge as those on a torus do. None was found: between period 2 "
             "and chaos lie motions of longer periods."
         )
-    texts.append(
-        "Towards the end of the sweep chaos is transient: lanes escape to a coexisting motion of "
-        "period 1 and much larger amplitude."
-    )
+    last = printed.stages[-1]
+    escaped = motions_between(found.sweep, last.first, last.last).count("period 1")
+    if escaped:
+        texts.append(
+            f"Towards the end of the sweep chaos is transient: {escaped} lanes have escaped to a "
+            "coexisting motion of period 1."
+        )
     return " ".join(texts)
 
 
@@ -116,11 +120,21 @@ def increments_in_words(printed: Published, found: Reproduction) -> str:
         float(np.max(np.abs(response["delta_5_acceleration"][lane_of(response, p)]))) for p in steps
     ]
     grown = ", ".join(short(b - a) for a, b in pairwise(magnitude))
+    apart = [p for p in steps if _largest_while_apart(response, lane_of(response, p))]
+    if len(apart) < 2:
+        return f"The largest magnitudes of the torsional acceleration grow by {grown}."
     return (
-        "**Why the increments are even.** The largest torsional acceleration at 3 e(τ) and more "
-        "falls into the time in which the teeth are apart. There δ<sub>5</sub>″ = f<sub>n</sub> + "
-        "Ω² *P* e<sub>r</sub> sin Ωτ, but for damping: two e(τ) more add 2 Ω² e<sub>r</sub> = "
-        f"{short(2.0 * omega**2 * amplitude)}, whatever the motion. The first increment spans the "
+        f"**Why the increments are even.** The largest torsional acceleration at {apart[0]:g} e(τ) "
+        "and more falls into the time in which the teeth are apart. There δ<sub>5</sub>″ = "
+        "f<sub>n</sub> + Ω² *P* e<sub>r</sub> sin Ωτ, but for damping: two e(τ) more add 2 Ω² "
+        f"e<sub>r</sub> = {short(2.0 * omega**2 * amplitude)}, whatever the motion. The first "
+        "increment spans the "
         'hop. This holds for the largest *signed* acceleration, as which "amplitude" is read; the '
         f"largest magnitudes grow by {grown}, not at all as printed."
     )
+
+
+def _largest_while_apart(response: Result, lane: int) -> bool:
+    at = int(np.argmax(response["delta_5_acceleration"][lane]))
+    meanings = response.variables["contact_tangential"].flags
+    return meanings[int(response["contact_tangential"][lane][at])] == "apart"
