@@ -170,6 +170,8 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def _targets(options: argparse.Namespace, name: str, alone: bool) -> list[Path]:
+    from matplotlib.backend_bases import FigureCanvasBase
+
     from gearchaos.figures.files import FORMATS
 
     formats = FORMATS
@@ -188,6 +190,10 @@ def _targets(options: argparse.Namespace, name: str, alone: bool) -> list[Path]:
     if output.is_dir() or options.output.endswith(("/", "\\")):
         return [output / f"{stem}{name}.{kind}" for kind in formats]
     ending = output.suffix.lower().removeprefix(".")
+    if ending in FigureCanvasBase.filetypes and ending not in FORMATS:
+        raise ConfigurationError(
+            f"--output {options.output}: a figure is written as {' or '.join(FORMATS)}"
+        )
     if ending not in FORMATS:
         base = output.name if alone else f"{output.name}{name}"
         return [output.with_name(f"{base}.{kind}") for kind in formats]

@@ -193,6 +193,7 @@ def test_a_file_that_is_no_result_is_named_and_nothing_is_written(result_file, k
         (["--dpi", "99.5"], "not a whole number"),
         (["--format", "png,gif"], "'gif' is none of png, pdf"),
         (["--output", "fig.png", "--format", "pdf"], "leave the ending off"),
+        (["--output", "fig.svg"], "--output fig.svg: a figure is written as png or pdf"),
         (["--colour"], "unrecognized arguments"),
     ],
 )
