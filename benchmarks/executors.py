@@ -26,7 +26,7 @@ from gearchaos.engine.store_filling import open_store
 
 SWEEP = Path(__file__).parent.parent / "sweeps" / "pan2021.toml"
 SHORT = ["integration.transient_periods=50", "integration.recorded_periods=100"]
-LANES = 16384
+LANES = 8192
 SIZES = (64, 256, 1024, 4096)
 
 

@@ -153,7 +153,12 @@ def _parser() -> argparse.ArgumentParser:
     )
     add("--from", dest="low", type=_number, metavar="VALUE", help="lowest parameter to show")
     add("--to", dest="high", type=_number, metavar="VALUE", help="highest parameter to show")
-    add("--stages", action="store_true", help="shade the stages behind the diagram of a sweep")
+    add(
+        "--stages",
+        action="store_true",
+        help="shade the stages behind the diagram of a sweep; those narrower than a 150th of the "
+        "axis go into what surrounds them",
+    )
     add("--full-range", action="store_true", help="show every lane, however few lie far out")
     add(
         "--width",
