@@ -182,7 +182,7 @@ def told(lanes: Simulation, start: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         plan.steps_per_period,
         rederived=lanes.config.formulation == "rederived",
     )
-    stable = orbits.converged & (np.abs(orbits.multipliers[:, 0]) < 1.0)
+    stable = orbits.stable
     growth, error = _growth(outcome.growth[:, -LONGER * recorded :])
     arrived = _distance(start[:, columns], outcome.section[:, -LONGEST:]) < ARRIVED
     truths = np.full(lanes.lanes, NOT_TOLD, dtype="U20")

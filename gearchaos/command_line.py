@@ -16,6 +16,7 @@ from gearchaos.interrupts import Termination
 
 OK = 0
 USAGE = 2
+TOO_MANY_DIVERGED = 3
 CANNOT_READ_OR_WRITE = FileError.exit_code
 INTERRUPTED = 130
 CLOSED_PIPE = 141

@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from contextlib import suppress
 
-from gearchaos.command_line import OK
+from gearchaos.command_line import OK, TOO_MANY_DIVERGED
 from gearchaos.engine.running import COMPILING
 from gearchaos.engine.simulation import Simulation
 from gearchaos.engine.store_filling import open_store
@@ -13,7 +13,6 @@ from gearchaos.errors import FileError
 from gearchaos.progress import notice, say
 from gearchaos.results.completed import completed
 from gearchaos.results.manifest import differing_keys, folder_of
-from gearchaos.sweep import TOO_MANY_DIVERGED
 
 
 def prepare(simulation: Simulation, quiet: bool, compile_now: bool = True) -> None:

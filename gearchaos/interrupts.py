@@ -10,7 +10,7 @@ from __future__ import annotations
 import os
 import signal
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from types import FrameType
 
@@ -59,14 +59,16 @@ def _take_note(number: int, _frame: FrameType | None) -> None:
 
 
 @contextmanager
-def _handled_by(handler: signal.Handlers | object) -> Iterator[None]:
+def _handled_by(
+    handler: signal.Handlers | Callable[[int, FrameType | None], None],
+) -> Iterator[None]:
     if threading.current_thread() is not threading.main_thread():
         yield
         return
     # What runs in the background may have been told to ignore Ctrl-C.
     before = {n: signal.getsignal(n) for n in _SIGNALS if signal.getsignal(n) != signal.SIG_IGN}
     for number in before:
-        signal.signal(number, handler)  # type: ignore[arg-type]
+        signal.signal(number, handler)
     try:
         yield
     finally:

@@ -21,7 +21,6 @@ if TYPE_CHECKING:
     from gearchaos.engine.simulation import Simulation
 
 NAME = "gearchaos sweep"
-TOO_MANY_DIVERGED = 3
 
 DESCRIPTION = "Compute the sweep that a TOML file describes and write it to an HDF5 file."
 

@@ -9,7 +9,6 @@ from contextlib import ExitStack
 from functools import lru_cache
 from importlib.util import find_spec
 from threading import Lock
-from types import TracebackType
 from typing import Any, NamedTuple, Self
 
 import distributed
@@ -122,12 +121,7 @@ class DaskExecutor:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self._closing.close()
 
     def _require_software(self) -> None:

@@ -58,10 +58,9 @@ def labels_of(sweep: SweepLanes, lanes: Numbers, outcome: Outcome) -> Labels:
     record = _record(sweep, lanes, outcome)
     labels = label(record)
     _settle(sweep, lanes, outcome, labels, settling_periods(record, labels))
-    rotating = labels.motion == QUASI_PERIODIC
-    rotating |= (labels.motion == UNRESOLVED) & may_rotate_slowly(record)
+    rotating = np.flatnonzero((labels.motion == QUASI_PERIODIC) | may_rotate_slowly(record, labels))
     # In parts whose longer records take no more memory than those of all lanes.
-    for part in np.array_split(np.flatnonzero(rotating), LONGER):
+    for part in np.array_split(rotating, LONGER):
         if part.size:
             labels.motion[part] = _second_look(sweep, lanes[part], outcome, part, labels)
     return labels
@@ -134,8 +133,7 @@ def _settle(
         )
         apart = np.abs(orbits.points - outcome.end_state[tried])[:, columns]
         close = np.max(apart / coordinate_scale(outcome.section[tried]), axis=1) <= SETTLING
-        stable = np.abs(orbits.multipliers[:, 0]) < 1.0
-        settled = tried[orbits.converged & close & stable]
+        settled = tried[close & orbits.stable]
         searched[settled] = False
         labels.motion[settled] = PERIODIC
         labels.period[settled] = n

@@ -19,6 +19,7 @@ from gearchaos.interrupts import check
 from gearchaos.motion.difference import Motion
 from gearchaos.motion.lyapunov import largest_exponent
 from gearchaos.motion.period import POINTS_NEEDED
+from gearchaos.physics.mesh_stiffness import FourierStiffness
 from gearchaos.physics.stability import joined_limit, stability_limit
 from gearchaos.results.variables import Variable, axis_name, step_choice_variables
 
@@ -196,9 +197,7 @@ class SweepLanes:
         """Note where the variation of the mesh stiffness exceeds its mean."""
         if not self.scene.stiffness_variation:
             return
-        cosine, sine = self.harmonics()
-        angle = np.outer(np.linspace(0.0, 2.0 * np.pi, PHASES), np.arange(1, cosine.size + 1))
-        variation = np.cos(angle) @ cosine + np.sin(angle) @ sine
+        variation = FourierStiffness(*self.harmonics()).table(PHASES) - 1.0
         scale = np.float64(self.groups.stiffness_variation_scale)
         lowest = 1.0 + np.min(np.outer([np.min(scale), np.max(scale)], variation))
         if lowest < 0.0:

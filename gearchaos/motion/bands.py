@@ -50,12 +50,18 @@ def dealt_parts_differ_by(section: Floats) -> Floats:
             dealt = section[:, -turns * curves * parts :]
             dealt = dealt.reshape(lanes, turns, parts, curves, states)
             deviation = np.std(dealt, axis=(1, 2))
-            time = (np.arange(turns) + 0.5) / turns
-            weights = np.exp(-1.0 / (time * (1.0 - time)))
-            averages = np.einsum("t,ltpcs->lpcs", weights / np.sum(weights), dealt)
+            averages = np.einsum("t,ltpcs->lpcs", smooth_weights(turns), dealt)
             apart = np.ptp(averages, axis=1)
             # A coordinate at rest has no parts that could differ.
             apart /= np.where(deviation > 0.0, deviation, 1.0)
             largest = np.maximum(largest, np.max(apart, axis=(1, 2)))
         smallest = np.minimum(smallest, largest)
     return smallest
+
+
+def smooth_weights(points: int) -> Floats:
+    """Return the weights exp(-1/(t(1-t))) of an average over so many points, of sum 1."""
+    time = (np.arange(points) + 0.5) / points
+    weights = np.exp(-1.0 / (time * (1.0 - time)))
+    normalised: Floats = weights / np.sum(weights)
+    return normalised

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gearchaos.motion.period import section_distance
-from gearchaos.motion.stage_table import labelled_lanes
+from gearchaos.motion.stage_table import labelled_lanes, lanes_of_start
 from gearchaos.results.result import Result
 
 Floats = NDArray[np.float64]
@@ -45,7 +45,7 @@ def jumps(result: Result, start: int = 0) -> list[Jump]:
     names = [name for name in result if name.startswith("section_") and result[name].ndim == 2]
     if not names or lanes.values.size < 3:
         return []
-    mine = result["start"] == start if "start" in result else np.ones(lanes.values.size, dtype=bool)
+    mine = lanes_of_start(result, start)
     sections = np.stack([result[name][mine] for name in names], axis=2)
     size = np.nanmax(np.abs(sections), axis=(0, 1))
     found = jumps_at(lanes.period, sections / np.where(size > 0.0, size, 1.0))

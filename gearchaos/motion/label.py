@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from gearchaos.motion.bands import smooth_weights
 from gearchaos.motion.lyapunov import largest_exponent
 from gearchaos.motion.period import POINTS_NEEDED, period_of, return_distances
 
@@ -138,8 +139,8 @@ def settling_periods(record: Record, labels: Labels) -> NDArray[np.int32]:
     return found
 
 
-def may_rotate_slowly(record: Record) -> Mask:
-    """Whether a lane may be on a torus that a longer record would show.
+def may_rotate_slowly(record: Record, labels: Labels) -> Mask:
+    """Whether an unresolved lane may be on a torus that a longer record would show.
 
     Next to a resonance one turn may take more than a hundred periods. Then the halves of a record
     differ, and its exponent is further from zero than that of many turns.
@@ -149,12 +150,12 @@ def may_rotate_slowly(record: Record) -> Mask:
     ndarray of bool, shape (lanes,)
         Where the scene admits tori, and a disturbance changes by less than exp(2) over the record.
     """
-    if record.growth is None:
-        return np.zeros(record.torus.shape, dtype=np.bool_)
-    lanes, periods = record.growth.shape
-    exponent, _ = largest_exponent(record.growth, np.ones(lanes))
-    neutral: Mask = np.abs(exponent) * periods <= CHAOTIC_GROWTH
-    return record.torus & neutral
+    found = np.zeros(record.torus.shape, dtype=np.bool_)
+    lanes = np.flatnonzero((labels.motion == UNRESOLVED) & record.torus)
+    if record.growth is not None and lanes.size:
+        exponent, _ = largest_exponent(record.growth[lanes], np.ones(lanes.size))
+        found[lanes] = np.abs(exponent) * record.growth.shape[1] <= CHAOTIC_GROWTH
+    return found
 
 
 def halves_differ_by(section: Floats) -> Floats:
@@ -183,9 +184,7 @@ def halves_differ_by(section: Floats) -> Floats:
     deviation = np.std(section, axis=1, keepdims=True)
     # A coordinate at rest has nothing that could differ.
     scaled = centred / np.where(deviation > 0.0, deviation, 1.0)
-    time = (np.arange(half) + 0.5) / half
-    weights = np.exp(-1.0 / (time * (1.0 - time)))[:, np.newaxis]
-    weights /= np.sum(weights)
+    weights = smooth_weights(half)[:, np.newaxis]
     differences = [
         np.sum(weights * (values[:, :half] - values[:, -half:]), axis=1)
         for values in (scaled, scaled**2)

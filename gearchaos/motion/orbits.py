@@ -38,6 +38,12 @@ class Orbits(NamedTuple):
     residual: Floats
     converged: NDArray[np.bool_]
 
+    @property
+    def stable(self) -> NDArray[np.bool_]:
+        """Whether there is an orbit, and all its multipliers lie inside the unit circle."""
+        inside: NDArray[np.bool_] = np.abs(self.multipliers[:, 0]) < 1.0
+        return inside
+
 
 class _Map(NamedTuple):
     """The map over a number of mesh periods, for some lanes."""

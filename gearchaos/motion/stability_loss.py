@@ -180,7 +180,7 @@ def follow(
     smallest = width / np.maximum(np.abs(last - first), width)
     stable = orbits(share, guess, period > 0)
     slope = np.zeros_like(stable.points)
-    going = _is_stable(stable)
+    going = stable.stable
     beyond, end = stable, np.zeros_like(first)
     unstable_from = np.full_like(first, np.inf)
     for _ in range(MOST_ORBITS):
@@ -189,7 +189,7 @@ def follow(
         trial = np.minimum(share + step, 1.0)
         ahead = np.where(going, trial - share, 1.0)[:, np.newaxis]
         found = orbits(trial, stable.points + ahead * slope, going)
-        kept = going & _is_stable(found)
+        kept = going & found.stable
         unstable, missing = going & found.converged & ~kept, going & ~found.converged
         unstable_from[unstable] = trial[unstable]
         # Newton's method may fail for a step too long; a smaller one then goes on past the place.
@@ -208,11 +208,6 @@ def follow(
         np.where(exists, first + end * (last - first), np.nan),
         beyond,
     )
-
-
-def _is_stable(orbits: Orbits) -> NDArray[np.bool_]:
-    stable: NDArray[np.bool_] = np.abs(orbits.multipliers[:, 0]) < 1.0
-    return stable
 
 
 def _chosen(lanes: NDArray[np.bool_], one: Orbits, other: Orbits) -> Orbits:

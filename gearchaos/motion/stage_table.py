@@ -76,11 +76,11 @@ def labelled_lanes(result: Result, start: int = 0, *, name: str = "the result") 
         raise FileError(
             f"{name}: holds no labels of the motion; run the sweep again with outputs.motion = true"
         )
-    numbers = result["start"] if "start" in result else np.zeros(result[result.axis].size, int)
-    mine = numbers == start
+    mine = lanes_of_start(result, start)
     if not mine.any():
+        highest = result["start"].max() if "start" in result else 0
         raise ConfigurationError(
-            f"{name}: start {start}: there is none; give one from 0 to {numbers.max()}"
+            f"{name}: start {start}: there is none; give one from 0 to {highest}"
         )
     meanings = result.variables["motion"].flags
     period = result["period"][mine]
@@ -95,6 +95,12 @@ def labelled_lanes(result: Result, start: int = 0, *, name: str = "the result") 
         period,
         result[EXPONENT][mine] if known else np.full(period.shape, np.nan),
     )
+
+
+def lanes_of_start(result: Result, start: int) -> NDArray[np.bool_]:
+    """Return which lanes have this start; where every value has one, its number is 0."""
+    numbers = result["start"] if "start" in result else np.zeros(result[result.axis].size, int)
+    return np.asarray(numbers == start)
 
 
 def label_text(meaning: str, period: int) -> str:

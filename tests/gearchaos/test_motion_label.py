@@ -192,10 +192,14 @@ def test_a_record_too_short_for_anything_is_unresolved_without_a_distance():
     assert np.isnan(labels.return_distance).all()
 
 
+def slowly(one: Record) -> np.ndarray:
+    return may_rotate_slowly(one, label(one))
+
+
 def test_a_turn_as_long_as_the_record_is_for_a_longer_one_to_tell():
     slow = GOLDEN / POINTS
     assert labelled(circle(slow))[0] == UNRESOLVED
-    assert may_rotate_slowly(record(circle(slow))).all()
+    assert slowly(record(circle(slow))).all()
     assert labelled(circle(slow, 40 * POINTS))[0] == QUASI_PERIODIC
 
 
@@ -203,6 +207,6 @@ def test_a_turn_as_long_as_the_record_is_for_a_longer_one_to_tell():
 def test_a_slow_rotation_neither_gains_nor_loses_a_disturbance(growth, slow):
     each = np.full(POINTS, growth / POINTS)
     section = circle(GOLDEN / POINTS)
-    assert may_rotate_slowly(record(section, each)).tolist() == [slow]
-    assert not may_rotate_slowly(record(section, each, torus=False)).any()
-    assert not may_rotate_slowly(record(section)._replace(growth=None)).any()
+    assert slowly(record(section, each)).tolist() == [slow]
+    assert not slowly(record(section, each, torus=False)).any()
+    assert not slowly(record(section)._replace(growth=None)).any()
