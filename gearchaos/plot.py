@@ -73,8 +73,8 @@ class _Sheet(NamedTuple):
 
 def _sweep_sheets(result: Result, options: argparse.Namespace) -> list[_Sheet]:
     from gearchaos.figures import bifurcation_page
-    from gearchaos.figures.bifurcation import DEFAULT_VARIABLE
     from gearchaos.figures.style import SINGLE_COLUMN_MM
+    from gearchaos.results.result import DEFAULT_VARIABLE
 
     # A detail does not take the place of the whole.
     name = ""

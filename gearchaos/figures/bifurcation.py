@@ -23,10 +23,7 @@ from gearchaos.figures.lanes import (
     select_lanes,
 )
 from gearchaos.figures.style import POINTS
-from gearchaos.results.result import Result
-
-SECTION = "section_"
-DEFAULT_VARIABLE = "section_delta_5"
+from gearchaos.results.result import Result, section_variables
 
 
 @dataclass(frozen=True)
@@ -48,14 +45,6 @@ class BifurcationArtists:
     diverged: Line2D | None
     off_scale: list[Line2D]
     legend: Legend | None
-
-
-def section_variables(result: Result) -> tuple[str, ...]:
-    """Return the section variables of a result, `section_delta_5` first where there is one."""
-    names = [
-        name for name in result.names if name.startswith(SECTION) and len(result.dims(name)) == 2
-    ]
-    return tuple(sorted(names, key=lambda name: name != DEFAULT_VARIABLE))
 
 
 def bifurcation(

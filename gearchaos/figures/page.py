@@ -11,13 +11,13 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from gearchaos.errors import ConfigurationError
-from gearchaos.figures.bifurcation import bifurcation, section_variables
+from gearchaos.figures.bifurcation import bifurcation
 from gearchaos.figures.lanes import Between, legend_above
 from gearchaos.figures.lyapunov import VARIABLE as LYAPUNOV_VARIABLE
 from gearchaos.figures.lyapunov import lyapunov
 from gearchaos.figures.stages import shade_stages
 from gearchaos.figures.style import MM_PER_INCH, SINGLE_COLUMN_MM, STYLE, page_height_mm
-from gearchaos.results.result import Result
+from gearchaos.results.result import Result, section_variables
 
 HEIGHT_RATIOS = (1.6, 1.0)
 NOTEBOOK_DPI = 200

@@ -5,11 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from gearchaos.errors import ConfigurationError
-from gearchaos.figures.bifurcation import section_variables
 from gearchaos.figures.lanes import Floats
 from gearchaos.motion.period import motion_period
 from gearchaos.results.response_variables import TIME, acceleration_of
-from gearchaos.results.result import Result
+from gearchaos.results.result import Result, section_variables
 
 COORDINATE = "delta_5"
 """The coordinate that is drawn unless another is asked for: the torsion."""

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from gearchaos.motion.period import section_distance
 from gearchaos.motion.stage_table import labelled_lanes, lanes_of_start
-from gearchaos.results.result import Result
+from gearchaos.results.result import Result, section_variables
 
 Floats = NDArray[np.float64]
 
@@ -42,7 +42,7 @@ def jumps(result: Result, start: int = 0) -> list[Jump]:
         Number of the start, where every value has several.
     """
     lanes = labelled_lanes(result, start)
-    names = [name for name in result if name.startswith("section_") and result[name].ndim == 2]
+    names = section_variables(result)
     if not names or lanes.values.size < 3:
         return []
     mine = lanes_of_start(result, start)

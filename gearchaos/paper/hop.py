@@ -22,7 +22,7 @@ from gearchaos.engine.running import run
 from gearchaos.engine.simulation import Simulation
 from gearchaos.motion.orbits import orbit_exponent, polish
 from gearchaos.motion.stability_loss import StabilityLoss, follow, loss_of_stability
-from gearchaos.results.result import Result
+from gearchaos.results.result import Result, section_variables
 
 Floats = NDArray[np.float64]
 
@@ -152,8 +152,7 @@ def _over(config: Configuration, low: float, high: float, count: int) -> Configu
 
 def _section(result: Result) -> Floats:
     """Section points of all lanes, shape (lanes, states)."""
-    names = [name for name in result.names if name.startswith("section_delta")]
-    return np.stack([result[name][:, -1] for name in names], axis=1)
+    return np.stack([result[name][:, -1] for name in section_variables(result)], axis=1)
 
 
 def _apart(one: Result, other: Result) -> NDArray[np.bool_]:

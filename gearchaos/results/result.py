@@ -14,7 +14,10 @@ from gearchaos.results.result_file import OWN_METADATA, Parameter, write_result
 from gearchaos.results.result_reader import read_result
 from gearchaos.results.variables import Variable, axis_name
 
-__all__ = ["Parameter", "Result", "open_result"]
+__all__ = ["Parameter", "Result", "open_result", "section_variables"]
+
+SECTION = "section_"
+DEFAULT_VARIABLE = "section_delta_5"
 
 
 class Result:
@@ -135,6 +138,14 @@ class Result:
         if name not in self._data:
             raise KeyError(f"no variable {name!r} in this result; there are {', '.join(self)}")
         return name
+
+
+def section_variables(result: Result) -> tuple[str, ...]:
+    """Return the section variables of a result, `section_delta_5` first where there is one."""
+    names = [
+        name for name in result.names if name.startswith(SECTION) and len(result.dims(name)) == 2
+    ]
+    return tuple(sorted(names, key=lambda name: name != DEFAULT_VARIABLE))
 
 
 def open_result(path: str | os.PathLike[str]) -> Result:
