@@ -24,9 +24,9 @@ from gearchaos_kernels import STATE_ROWS
 from machine import machine_facts, print_machine
 
 import gearchaos
+from gearchaos.dynamics.orbits import polish
 from gearchaos.engine.simulation import Simulation
-from gearchaos.motion.label import MEANINGS
-from gearchaos.motion.orbits import polish
+from gearchaos.records.label import MEANINGS
 
 SWEEPS = Path(__file__).parent.parent / "sweeps"
 LONGER = 10

@@ -22,7 +22,7 @@ from matplotlib.ticker import NullLocator
 
 import gearchaos
 from gearchaos.figures.style import EXPONENT, POSITIVE, STYLE
-from gearchaos.motion.period import motion_period
+from gearchaos.records.period import motion_period
 from gearchaos.results.result import Result
 
 SWEEP = Path(__file__).parent.parent / "sweeps" / "pan2021.toml"

@@ -160,8 +160,8 @@ def measure(
     import numpy as np
 
     from gearchaos.engine.running import COMPILING
-    from gearchaos.motion.difference import bound, difference
     from gearchaos.progress import notice
+    from gearchaos.records.difference import bound, difference
 
     with notice(COMPILING, quiet):
         _, motion = simulation.pilot(lanes, TRUTH_STEPS)

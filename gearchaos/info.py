@@ -68,8 +68,8 @@ def _run(argv: Sequence[str] | None) -> int:
 
 def _stages(path: str, summary: Mapping[str, Any]) -> list[dict[str, Any]]:
     """List the stages of the sweep where its motion is labelled."""
-    from gearchaos.motion.stage_table import LABELS, labelled_lanes, stage_table
     from gearchaos.results.result import open_result
+    from gearchaos.results.stage_table import LABELS, labelled_lanes, stage_table
 
     if not all(name in summary["variables"] for name in LABELS):
         return []

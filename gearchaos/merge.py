@@ -12,7 +12,7 @@ from gearchaos.command_line import OK, run_command, version_text
 from gearchaos.errors import FileError
 
 if TYPE_CHECKING:
-    from gearchaos.results.shards import Finished, ShardStore
+    from gearchaos.results.block_store import Finished, ShardStore
 
 NAME = "gearchaos merge"
 MOST_NAMED = 10
@@ -95,8 +95,8 @@ def _run(argv: Sequence[str] | None) -> int:
 
 def _require_all(store: ShardStore, found: Finished) -> None:
     """Name the parts of which blocks are missing, as far as it is known how many there are."""
-    from gearchaos.engine.parts import shared_blocks
-    from gearchaos.results.shards import lanes_text, uncovered
+    from gearchaos.engine.sharding import shared_blocks
+    from gearchaos.results.block_store import lanes_text, uncovered
 
     gaps = store.missing(found.bounds, store.lanes)
     if not gaps:

@@ -15,9 +15,9 @@ from gearchaos.errors import ConfigurationError
 
 if TYPE_CHECKING:
     from gearchaos.engine.stage_refinement import Boundary
-    from gearchaos.motion.jumps import Jump
-    from gearchaos.motion.stage_table import LabelledLanes, Stage
+    from gearchaos.results.jumps import Jump
     from gearchaos.results.result import Result
+    from gearchaos.results.stage_table import LabelledLanes, Stage
 
 NAME = "gearchaos stages"
 
@@ -74,9 +74,9 @@ def _width(text: str) -> float:
 
 def _run(argv: Sequence[str] | None) -> int:
     options = _parser().parse_args(argv)
-    from gearchaos.motion.jumps import jumps
-    from gearchaos.motion.stage_table import labelled_lanes, stage_table
+    from gearchaos.results.jumps import jumps
     from gearchaos.results.result import open_result
+    from gearchaos.results.stage_table import labelled_lanes, stage_table
 
     result = open_result(options.result)
     lanes = labelled_lanes(result, options.start, name=options.result)

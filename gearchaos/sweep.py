@@ -17,7 +17,7 @@ from gearchaos.errors import ConfigurationError, FileError, GearchaosError
 
 if TYPE_CHECKING:
     from gearchaos.configuration import Configuration
-    from gearchaos.engine.parts import Part
+    from gearchaos.engine.sharding import Part
     from gearchaos.engine.simulation import Simulation
 
 NAME = "gearchaos sweep"
@@ -81,8 +81,8 @@ def _run(argv: Sequence[str] | None) -> int:
     from gearchaos.configuration import load_config
 
     config = load_config(options.config, options.set)
-    from gearchaos.engine.parts import Part
     from gearchaos.engine.running import choose_threads
+    from gearchaos.engine.sharding import Part
     from gearchaos.engine.simulation import Simulation
     from gearchaos.finishing import complete_already, prepare
 

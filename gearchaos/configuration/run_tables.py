@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias, get_args
 from pydantic import Field, create_model
 
 from gearchaos.configuration.table import Numbers, Table, key
-from gearchaos.physics.group_table import GROUP_TABLE, GroupRow
+from gearchaos.gear.group_table import GROUP_TABLE, GroupRow
 
 Effect: TypeAlias = Literal["pitch_error", "stiffness_variation", "backlash", "transverse", "axial"]
 EFFECTS: tuple[str, ...] = get_args(Effect)

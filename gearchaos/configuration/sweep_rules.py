@@ -22,8 +22,8 @@ from gearchaos.configuration.sweep_values import (
     swept_values,
 )
 from gearchaos.errors import ConfigurationError
-from gearchaos.physics.group_table import GROUP_TABLE, GROUPS_BY_NAME, GroupRow
-from gearchaos.physics.groups import Groups
+from gearchaos.gear.group_table import GROUP_TABLE, GROUPS_BY_NAME, GroupRow
+from gearchaos.gear.groups import Groups
 
 if TYPE_CHECKING:
     from gearchaos.configuration.models import Configuration

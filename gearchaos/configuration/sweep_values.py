@@ -10,8 +10,8 @@ import numpy.typing as npt
 
 from gearchaos.configuration.keys import keys_of
 from gearchaos.configuration.physical_tables import PHYSICAL_TABLES
-from gearchaos.physics.group_table import GROUPS_BY_NAME
-from gearchaos.physics.groups import Groups, derive_groups, resolve_groups
+from gearchaos.gear.group_table import GROUPS_BY_NAME
+from gearchaos.gear.groups import Groups, derive_groups, resolve_groups
 
 if TYPE_CHECKING:
     from gearchaos.configuration.models import Configuration

@@ -6,9 +6,11 @@ import numpy as np
 from gearchaos_kernels import STATE_ROWS, Outcome, Plan, Status
 from numpy.typing import NDArray
 
+from gearchaos.dynamics.exponents import sum_of_exponents
+from gearchaos.dynamics.orbits import polish
 from gearchaos.engine.sweep_lanes import SweepLanes
-from gearchaos.motion.bands import dealt_parts_differ_by
-from gearchaos.motion.label import (
+from gearchaos.records.bands import dealt_parts_differ_by
+from gearchaos.records.label import (
     CHAOTIC,
     DIVERGED,
     MOST_POINTS,
@@ -22,9 +24,7 @@ from gearchaos.motion.label import (
     may_rotate_slowly,
     settling_periods,
 )
-from gearchaos.motion.orbits import polish
-from gearchaos.motion.period import coordinate_scale, return_distances
-from gearchaos.motion.spectrum import sum_of_exponents
+from gearchaos.records.period import coordinate_scale, return_distances
 
 Numbers = NDArray[np.intp]
 

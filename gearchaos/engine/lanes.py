@@ -9,7 +9,7 @@ from gearchaos_kernels import STATE_ROWS, Model
 from numpy.typing import NDArray
 
 from gearchaos.configuration import Configuration
-from gearchaos.physics.groups import GROUP_TABLE, Groups
+from gearchaos.gear.groups import GROUP_TABLE, Groups
 
 Floats = NDArray[np.float64]
 

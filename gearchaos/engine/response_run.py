@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 from tqdm import tqdm
 
 from gearchaos.configuration import Configuration
+from gearchaos.dynamics.mesh_forces import CONTACTS, accelerations, excitation, mesh_forces
 from gearchaos.engine.running import choose_threads, metadata
 from gearchaos.engine.simulation import Simulation
 from gearchaos.errors import ConfigurationError
-from gearchaos.physics.mesh_forces import CONTACTS, accelerations, excitation, mesh_forces
 from gearchaos.results.response_variables import (
     MESH_PERIOD,
     NO_CONTACT_STATE,

@@ -18,14 +18,14 @@ from gearchaos_kernels import (
 from numpy.typing import NDArray
 
 from gearchaos.configuration.sweep_values import SWEEPABLE_GROUPS, SWEEPABLE_KEYS
+from gearchaos.dynamics.exponents import exponents, sum_of_exponents
 from gearchaos.engine.error_check import MEANINGS, check_arrays, checked_lanes
 from gearchaos.engine.labelling import labelling_plan, labels_of
 from gearchaos.engine.sweep_lanes import SweepLanes
-from gearchaos.motion.difference import Motion, difference
-from gearchaos.motion.label import MEANINGS as MOTION_MEANINGS
-from gearchaos.motion.lyapunov import largest_exponent
-from gearchaos.motion.spectrum import exponents, sum_of_exponents
-from gearchaos.physics.group_table import GROUP_TABLE
+from gearchaos.gear.group_table import GROUP_TABLE
+from gearchaos.records.difference import Motion, difference
+from gearchaos.records.label import MEANINGS as MOTION_MEANINGS
+from gearchaos.records.lyapunov import largest_exponent
 from gearchaos.results.result import Parameter
 from gearchaos.results.variables import Variable, sweep_variables
 

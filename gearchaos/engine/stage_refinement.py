@@ -11,19 +11,19 @@ from numpy.typing import NDArray
 
 from gearchaos.configuration import Configuration
 from gearchaos.configuration.sweep_values import groups_at
-from gearchaos.engine.lanes import model
-from gearchaos.engine.running import run
-from gearchaos.engine.sweep_lanes import SweepLanes
-from gearchaos.errors import ConfigurationError, FileError
-from gearchaos.motion.stability_loss import (
+from gearchaos.dynamics.following import (
     STABILITY_LOSS_TEXTS,
     Losses,
     StabilityLoss,
     follow,
     loss_of_stability,
 )
-from gearchaos.motion.stage_table import Stage, labelled_lanes
+from gearchaos.engine.lanes import model
+from gearchaos.engine.running import run
+from gearchaos.engine.sweep_lanes import SweepLanes
+from gearchaos.errors import ConfigurationError, FileError
 from gearchaos.results.result import Result
+from gearchaos.results.stage_table import Stage, labelled_lanes
 
 Floats = NDArray[np.float64]
 

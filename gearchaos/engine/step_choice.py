@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from gearchaos.errors import ConfigurationError
-from gearchaos.motion.difference import Motion, bound, difference
+from gearchaos.records.difference import Motion, bound, difference
 
 PILOT_LANES = 48
 """Lanes on which the error is measured, spread evenly over the sweep."""

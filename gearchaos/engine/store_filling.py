@@ -8,10 +8,10 @@ from gearchaos_kernels import current_threads
 
 from gearchaos.engine.error_check import Tally
 from gearchaos.engine.executors import BlockExecutor, LocalExecutor, compute_blocks
-from gearchaos.engine.parts import Part, shared_block_lanes
+from gearchaos.engine.sharding import Part, shared_block_lanes
 from gearchaos.engine.simulation import Arrays, Bounds, Simulation
 from gearchaos.progress import Progress, say
-from gearchaos.results.shards import ShardStore
+from gearchaos.results.block_store import ShardStore
 
 
 def open_store(

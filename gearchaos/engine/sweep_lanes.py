@@ -12,15 +12,15 @@ from numpy.typing import NDArray
 
 from gearchaos.configuration import Configuration, lane_groups
 from gearchaos.configuration.run_tables import states_of
+from gearchaos.dynamics.stability import joined_limit, stability_limit
 from gearchaos.engine.lanes import model, select, start_states
 from gearchaos.engine.step_choice import PILOT_LANES, PILOT_PERIODS, Candidate, choose_steps
 from gearchaos.errors import ConfigurationError
+from gearchaos.gear.mesh_stiffness import FourierStiffness
 from gearchaos.interrupts import check
-from gearchaos.motion.difference import Motion
-from gearchaos.motion.lyapunov import largest_exponent
-from gearchaos.motion.period import POINTS_NEEDED
-from gearchaos.physics.mesh_stiffness import FourierStiffness
-from gearchaos.physics.stability import joined_limit, stability_limit
+from gearchaos.records.difference import Motion
+from gearchaos.records.lyapunov import largest_exponent
+from gearchaos.records.period import POINTS_NEEDED
 from gearchaos.results.variables import Variable, axis_name, step_choice_variables
 
 Floats = NDArray[np.float64]

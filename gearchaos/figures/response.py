@@ -18,7 +18,7 @@ from gearchaos.figures.response_lane import (
     samples_per_period,
 )
 from gearchaos.figures.style import DIVERGED, EXPONENT, POINTS, SMALL_FONT_PT
-from gearchaos.motion.amplitude_spectrum import spectral_lines
+from gearchaos.records.amplitude_spectrum import spectral_lines
 from gearchaos.results.response_variables import TIME, acceleration_of
 from gearchaos.results.result import Result
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from gearchaos.errors import ConfigurationError
 from gearchaos.figures.lanes import Floats
-from gearchaos.motion.period import motion_period
+from gearchaos.records.period import motion_period
 from gearchaos.results.response_variables import TIME, acceleration_of
 from gearchaos.results.result import Result, section_variables
 

@@ -10,8 +10,8 @@ from matplotlib.legend import Legend
 from matplotlib.patches import Patch, Rectangle
 
 from gearchaos.figures.style import SMALL_FONT_PT
-from gearchaos.motion.stage_table import Stage, labelled_lanes, stage_table
 from gearchaos.results.result import Result
+from gearchaos.results.stage_table import Stage, labelled_lanes, stage_table
 
 # Blues that darken with the period; the others differ from them in hue, and all are light enough
 # for black points to stand out.

@@ -7,7 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from gearchaos.motion.stability_loss import StabilityLoss
+from gearchaos.dynamics.following import StabilityLoss
 from gearchaos.paper.comparison import signed
 from gearchaos.paper.computation import Reproduction, lane_of
 from gearchaos.paper.hop_figure import STARTS

@@ -17,11 +17,11 @@ from numpy.typing import NDArray
 
 from gearchaos.configuration import Configuration
 from gearchaos.configuration.sweep_values import groups_at
+from gearchaos.dynamics.following import StabilityLoss, follow, loss_of_stability
+from gearchaos.dynamics.orbits import orbit_exponent, polish
 from gearchaos.engine.lanes import model
 from gearchaos.engine.running import run
 from gearchaos.engine.simulation import Simulation
-from gearchaos.motion.orbits import orbit_exponent, polish
-from gearchaos.motion.stability_loss import StabilityLoss, follow, loss_of_stability
 from gearchaos.results.result import Result, section_variables
 
 Floats = NDArray[np.float64]

@@ -7,12 +7,12 @@ import numpy as np
 from gearchaos.configuration.sweep_values import lane_groups
 from gearchaos.figures.page import Page
 from gearchaos.figures.style import EXPONENT, POINTS, POSITIVE, REFERENCE
+from gearchaos.gear import pitch_error
+from gearchaos.gear.mesh_stiffness import FloatArray
 from gearchaos.paper.computation import Reproduction
 from gearchaos.paper.our_numbers import contact_line_stiffness, printed_series
 from gearchaos.paper.panels import few_ticks, page
 from gearchaos.paper.published import Published
-from gearchaos.physics import pitch_error
-from gearchaos.physics.mesh_stiffness import FloatArray
 
 POINTS_OF_A_CURVE = 1000
 CYCLE_LABEL = r"Mesh cycle, $\Omega\tau/2\pi$"

@@ -13,7 +13,6 @@ from gearchaos.figures.page import Page
 from gearchaos.figures.response import phase_portrait, poincare_section, time_history
 from gearchaos.figures.response_lane import coordinates_of, samples_per_period
 from gearchaos.figures.style import FONT_PT, POINTS
-from gearchaos.motion.amplitude_spectrum import spectral_lines
 from gearchaos.paper.computation import Reproduction, lane_of, largest_acceleration
 from gearchaos.paper.panels import (
     SHOWN_PERIODS,
@@ -28,6 +27,7 @@ from gearchaos.paper.panels import (
 )
 from gearchaos.paper.published import Published, ShownMotion
 from gearchaos.paper.stages import motion_at
+from gearchaos.records.amplitude_spectrum import spectral_lines
 from gearchaos.results.response_variables import TIME, acceleration_of
 from gearchaos.results.result import Result
 

@@ -9,12 +9,12 @@ from types import MappingProxyType
 import numpy as np
 
 from gearchaos.figures.response_lane import samples_per_period
-from gearchaos.motion.amplitude_spectrum import spectral_lines
+from gearchaos.gear.derivation import derive_groups
+from gearchaos.gear.geometry import HelicalPair
+from gearchaos.gear.mesh_stiffness import FourierStiffness, TrapezoidalStiffness
 from gearchaos.paper.computation import Reproduction, lane_of, largest_acceleration
 from gearchaos.paper.published import Published
-from gearchaos.physics.derivation import derive_groups
-from gearchaos.physics.geometry import HelicalPair
-from gearchaos.physics.mesh_stiffness import FourierStiffness, TrapezoidalStiffness
+from gearchaos.records.amplitude_spectrum import spectral_lines
 
 NAN = float("nan")
 _METRES_PER_MM = 1e-3

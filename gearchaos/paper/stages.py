@@ -7,10 +7,10 @@ from itertools import pairwise
 
 import numpy as np
 
-from gearchaos.motion.stage_table import LabelledLanes, labelled_lanes
 from gearchaos.paper.published import Stage
 from gearchaos.paper.verdict import RULES
 from gearchaos.results.result import Result
+from gearchaos.results.stage_table import LabelledLanes, labelled_lanes
 
 Span = tuple[float, float]
 

@@ -12,7 +12,7 @@ from typing import Any
 from gearchaos.configuration.toml_text import flat_tables
 from gearchaos.errors import FileError
 from gearchaos.results.atomic_file import reason, replacing
-from gearchaos.results.shard_file import SHARD_SCHEMA_VERSION
+from gearchaos.results.block_file import SHARD_SCHEMA_VERSION
 
 STORE_SCHEMA = "gearchaos-shards"
 MANIFEST = "manifest.json"

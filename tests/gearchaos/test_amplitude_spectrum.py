@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from gearchaos.motion.amplitude_spectrum import WINDOWS, spectral_lines
+from gearchaos.records.amplitude_spectrum import WINDOWS, spectral_lines
 
 STEPS, PERIODS = 20, 12
 TIME = np.arange(PERIODS * STEPS) / STEPS

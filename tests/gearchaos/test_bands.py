@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from gearchaos.motion.bands import dealt_parts_differ_by
-from gearchaos.motion.period import LONGEST_PERIOD
+from gearchaos.records.bands import dealt_parts_differ_by
+from gearchaos.records.period import LONGEST_PERIOD
 
 POINTS = 2000
 GOLDEN = (np.sqrt(5.0) - 1.0) / 2.0

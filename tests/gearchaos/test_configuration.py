@@ -22,7 +22,7 @@ from gearchaos.configuration import (
 from gearchaos.configuration.models import configuration_keys
 from gearchaos.configuration.schema import json_schema, key_tables
 from gearchaos.errors import ConfigurationError
-from gearchaos.physics.group_table import GROUP_TABLE
+from gearchaos.gear.group_table import GROUP_TABLE
 from gearchaos.results.variables import STATE_WORDING
 
 ROOT = Path(__file__).resolve().parents[2]

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from gearchaos.physics.geometry import HelicalPair
+from gearchaos.gear.geometry import HelicalPair
 
 
 def pan_2021_pair(**changes):

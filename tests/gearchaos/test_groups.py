@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from gearchaos.errors import ConfigurationError
-from gearchaos.physics.groups import (
+from gearchaos.gear.groups import (
     GROUP_TABLE,
     GROUPS_BY_NAME,
     Groups,

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from gearchaos_kernels import STATE_ROWS, Model, Scene
 
-from gearchaos.physics.jacobian import COORDINATES, coordinates, jacobian
+from gearchaos.dynamics.jacobian import COORDINATES, coordinates, jacobian
 
 from ..kernels.twin import Twin
 from .random_pairs import EVERY_SCENE, name_of, random_pairs

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import gearchaos
-from gearchaos.motion.jumps import jumps, jumps_at
+from gearchaos.results.jumps import jumps, jumps_at
 
 from .commands import run_module
 from .short_sweeps import PAN2021

@@ -5,7 +5,7 @@ import pytest
 
 from gearchaos.configuration import load_config
 from gearchaos.engine.simulation import Simulation
-from gearchaos.motion.label import (
+from gearchaos.records.label import (
     CHAOTIC,
     DIVERGED,
     MEANINGS,

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from gearchaos.motion.lyapunov import largest_exponent
+from gearchaos.records.lyapunov import largest_exponent
 
 PERIOD = 7.1736
 GOLDEN = (np.sqrt(5.0) - 1.0) / 2.0

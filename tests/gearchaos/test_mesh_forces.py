@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from gearchaos_kernels import STATE_ROWS, Scene
 
-from gearchaos.physics.mesh_forces import (
+from gearchaos.dynamics.mesh_forces import (
     APART,
     BACK_FLANK,
     DRIVING_FLANK,

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from gearchaos.motion.label import (
+from gearchaos.records.label import (
     AGREEMENT,
     CHAOTIC,
     DIVERGED,
@@ -16,7 +16,7 @@ from gearchaos.motion.label import (
     may_rotate_slowly,
     settling_periods,
 )
-from gearchaos.motion.period import LONGEST_PERIOD, TOLERANCE, return_distances
+from gearchaos.records.period import LONGEST_PERIOD, TOLERANCE, return_distances
 
 GOLDEN = (np.sqrt(5.0) - 1.0) / 2.0
 POINTS = 500

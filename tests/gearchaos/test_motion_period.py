@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from gearchaos.motion.period import LONGEST_PERIOD, motion_period, section_distance
+from gearchaos.records.period import LONGEST_PERIOD, motion_period, section_distance
 
 RANDOM = np.random.default_rng(7)
 

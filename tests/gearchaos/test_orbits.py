@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from gearchaos_kernels import STATE_ROWS, Plan, integrate
 
-from gearchaos.motion.orbits import CLOSED, Orbits, orbit_exponent, polish
-from gearchaos.motion.period import motion_period
-from gearchaos.motion.spectrum import sum_of_exponents
-from gearchaos.physics.jacobian import jacobian
+from gearchaos.dynamics.exponents import sum_of_exponents
+from gearchaos.dynamics.jacobian import jacobian
+from gearchaos.dynamics.orbits import CLOSED, Orbits, orbit_exponent, polish
+from gearchaos.records.period import motion_period
 
 from ..kernels.reference import (
     COSINE,

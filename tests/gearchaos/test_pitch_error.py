@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from gearchaos.physics import pitch_error
+from gearchaos.gear import pitch_error
 
 OMEGA = 0.87588
 SINE = {"mesh_frequency": OMEGA, "amplitude": 0.022749, "phase": 0.4, "multiple": 5.86}

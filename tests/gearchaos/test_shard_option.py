@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import gearchaos
-from gearchaos.engine.parts import Part, shared_blocks
+from gearchaos.engine.sharding import Part, shared_blocks
 from gearchaos.errors import ConfigurationError
 from gearchaos.results.manifest import folder_of
 from gearchaos.results.store_lock import StoreLock

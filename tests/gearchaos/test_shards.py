@@ -13,9 +13,9 @@ import numpy as np
 import pytest
 
 from gearchaos.errors import FileError
+from gearchaos.results.block_store import ShardStore
 from gearchaos.results.manifest import differing_keys
 from gearchaos.results.result import Parameter, Result, open_result
-from gearchaos.results.shards import ShardStore
 from gearchaos.results.variables import sweep_variables
 
 LANES = 100
@@ -358,7 +358,7 @@ def test_merging_takes_the_memory_of_a_block(output: Path) -> None:
     program = """
 import numpy as np
 from test_shards import CONFIGURATION, POINTS
-from gearchaos.results.shards import ShardStore
+from gearchaos.results.block_store import ShardStore
 from gearchaos.results.variables import sweep_variables
 points, size, count = 500, 250, 80
 variables = sweep_variables(

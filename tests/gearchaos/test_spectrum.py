@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from gearchaos_kernels import Plan, Scene, integrate
 
-from gearchaos.motion.lyapunov import largest_exponent
-from gearchaos.motion.spectrum import exponents, period_jacobian, sum_of_exponents
-from gearchaos.physics.jacobian import jacobian
-from gearchaos.physics.stable_region import amplification
+from gearchaos.dynamics.exponents import exponents, period_jacobian, sum_of_exponents
+from gearchaos.dynamics.jacobian import jacobian
+from gearchaos.dynamics.stable_region import amplification
+from gearchaos.records.lyapunov import largest_exponent
 
 from ..kernels.reference import (
     COSINE,

@@ -7,16 +7,16 @@ import numpy as np
 import pytest
 from gearchaos_kernels import Model, Scene, Status
 
-from gearchaos.physics.jacobian import jacobian
-from gearchaos.physics.mesh_stiffness import FourierStiffness
-from gearchaos.physics.stability import (
+from gearchaos.dynamics.jacobian import jacobian
+from gearchaos.dynamics.stability import (
     MOST_STEPS,
     fewest_stable_steps,
     joined_limit,
     stability_limit,
     sufficient_steps,
 )
-from gearchaos.physics.stable_region import steps_per_time
+from gearchaos.dynamics.stable_region import steps_per_time
+from gearchaos.gear.mesh_stiffness import FourierStiffness
 
 from ..kernels.reference import COSINE, FULL, LINEAR, PERIOD, SINE, lanes_of, pan2021, run, state
 from .random_pairs import EVERY_SCENE, name_of, random_pairs

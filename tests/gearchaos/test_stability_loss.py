@@ -4,14 +4,14 @@ import numpy as np
 import pytest
 from gearchaos_kernels import STATE_ROWS, Plan, integrate
 
-from gearchaos.motion.period import motion_period
-from gearchaos.motion.stability_loss import (
+from gearchaos.dynamics.following import (
     STABILITY_LOSS_TEXTS,
     Followed,
     StabilityLoss,
     follow,
     loss_of_stability,
 )
+from gearchaos.records.period import motion_period
 
 from ..kernels.reference import COSINE, NO_AXIAL, SINE, pan2021
 

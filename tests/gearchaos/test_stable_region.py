@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from gearchaos.physics.stable_region import SHORTEST_RAY, amplification, steps_per_time
+from gearchaos.dynamics.stable_region import SHORTEST_RAY, amplification, steps_per_time
 
 
 @pytest.mark.parametrize("angle", np.linspace(0.5 * np.pi, np.pi, 46))

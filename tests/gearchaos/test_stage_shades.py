@@ -7,7 +7,7 @@ from matplotlib.figure import Figure
 
 from gearchaos.errors import FileError
 from gearchaos.figures.stages import SHADES, shade_stages
-from gearchaos.motion.label import MEANINGS
+from gearchaos.records.label import MEANINGS
 from gearchaos.results.result import Result
 from gearchaos.results.variables import sweep_variables
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from gearchaos.motion.stage_table import LabelledLanes, Stage, label_text, stage_table
+from gearchaos.results.stage_table import LabelledLanes, Stage, label_text, stage_table
 
 
 def lanes(labels: str, values: list[float] | None = None) -> LabelledLanes:

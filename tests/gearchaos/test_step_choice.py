@@ -6,7 +6,7 @@ import pytest
 import gearchaos
 from gearchaos.engine.step_choice import choose_steps
 from gearchaos.errors import ConfigurationError
-from gearchaos.motion.difference import Motion
+from gearchaos.records.difference import Motion
 
 from .short_sweeps import simulation
 

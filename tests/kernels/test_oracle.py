@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from gearchaos_kernels import Model, Scene
 
-from gearchaos.motion.lyapunov import largest_exponent
+from gearchaos.records.lyapunov import largest_exponent
 
 from .reference import (
     LINEAR,

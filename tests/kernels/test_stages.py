@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from gearchaos.motion.lyapunov import largest_exponent
+from gearchaos.records.lyapunov import largest_exponent
 
 from .reference import NO_AXIAL, PERIOD, pan2021, run, state
 

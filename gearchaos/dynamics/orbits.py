@@ -8,8 +8,8 @@ import numpy as np
 from gearchaos_kernels import STATE_ROWS, Model, Plan, Scene, integrate
 from numpy.typing import NDArray
 
-from gearchaos.motion.period import TOLERANCE, coordinate_scale
-from gearchaos.motion.spectrum import period_jacobian, state_columns
+from gearchaos.dynamics.exponents import period_jacobian, state_columns
+from gearchaos.records.period import TOLERANCE, coordinate_scale
 
 Floats = NDArray[np.float64]
 

@@ -9,8 +9,8 @@ from typing import Any, Literal, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from gearchaos.physics.derivation import derive_groups
-from gearchaos.physics.group_table import GROUP_TABLE, GROUPS_BY_NAME, GroupRow
+from gearchaos.gear.derivation import derive_groups
+from gearchaos.gear.group_table import GROUP_TABLE, GROUPS_BY_NAME, GroupRow
 
 __all__ = [
     "GROUPS_BY_NAME",

@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 
 from gearchaos.errors import FileError
 from gearchaos.results.atomic_file import PARTIAL
+from gearchaos.results.block_file import ShardFormat
 from gearchaos.results.manifest import MANIFEST, Manifest, folder_of
 from gearchaos.results.result_file import Metadata, Parameter, write_result
-from gearchaos.results.shard_file import ShardFormat
 from gearchaos.results.store_lock import LOCK, StoreLock
 from gearchaos.results.variables import Variable
 

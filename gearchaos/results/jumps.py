@@ -7,9 +7,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gearchaos.motion.period import section_distance
-from gearchaos.motion.stage_table import labelled_lanes, lanes_of_start
+from gearchaos.records.period import section_distance
 from gearchaos.results.result import Result, section_variables
+from gearchaos.results.stage_table import labelled_lanes, lanes_of_start
 
 Floats = NDArray[np.float64]
 

@@ -13,8 +13,8 @@ import numpy as np
 import numpy.typing as npt
 
 from gearchaos.errors import ConfigurationError
-from gearchaos.physics.geometry import STEEL_DENSITY, HelicalPair
-from gearchaos.physics.mesh_stiffness import FourierStiffness, TrapezoidalStiffness
+from gearchaos.gear.geometry import STEEL_DENSITY, HelicalPair
+from gearchaos.gear.mesh_stiffness import FourierStiffness, TrapezoidalStiffness
 
 Value: TypeAlias = float | npt.NDArray[np.float64]
 

@@ -14,8 +14,8 @@ from gearchaos_kernels import STATE_ROWS, Model, Plan, Scene, integrate
 from numpy.typing import NDArray
 
 from gearchaos.configuration.run_tables import states_of
-from gearchaos.motion.lyapunov import largest_exponent
-from gearchaos.physics.jacobian import jacobian
+from gearchaos.dynamics.jacobian import jacobian
+from gearchaos.records.lyapunov import largest_exponent
 
 Floats = NDArray[np.float64]
 

@@ -7,9 +7,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gearchaos.motion.bands import smooth_weights
-from gearchaos.motion.lyapunov import largest_exponent
-from gearchaos.motion.period import POINTS_NEEDED, period_of, return_distances
+from gearchaos.records.bands import smooth_weights
+from gearchaos.records.lyapunov import largest_exponent
+from gearchaos.records.period import POINTS_NEEDED, period_of, return_distances
 
 Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]

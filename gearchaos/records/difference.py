@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gearchaos.motion.period import motion_period, section_distance
+from gearchaos.records.period import motion_period, section_distance
 
 Floats = NDArray[np.float64]
 

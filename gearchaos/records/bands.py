@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from gearchaos.motion.period import LONGEST_PERIOD
+from gearchaos.records.period import LONGEST_PERIOD
 
 Floats = NDArray[np.float64]
 

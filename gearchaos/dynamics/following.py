@@ -15,7 +15,7 @@ import numpy as np
 from gearchaos_kernels import Model, Scene
 from numpy.typing import NDArray
 
-from gearchaos.motion.orbits import Orbits, polish
+from gearchaos.dynamics.orbits import Orbits, polish
 
 Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]

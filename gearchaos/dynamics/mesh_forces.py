@@ -11,8 +11,8 @@ import numpy as np
 from gearchaos_kernels import STATE_ROWS, Model, Scene
 from numpy.typing import NDArray
 
-from gearchaos.physics import pitch_error
-from gearchaos.physics.mesh_stiffness import FourierStiffness
+from gearchaos.gear import pitch_error
+from gearchaos.gear.mesh_stiffness import FourierStiffness
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.uint8]

@@ -15,8 +15,8 @@ from gearchaos_kernels import Model, Scene
 from numpy.typing import NDArray
 
 from gearchaos.configuration.messages import Fault
-from gearchaos.physics.jacobian import COORDINATES, coordinates, jacobian
-from gearchaos.physics.stable_region import ROUNDING, SHORTEST_RAY, steps_per_time
+from gearchaos.dynamics.jacobian import COORDINATES, coordinates, jacobian
+from gearchaos.dynamics.stable_region import ROUNDING, SHORTEST_RAY, steps_per_time
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]

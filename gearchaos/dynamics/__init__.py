@@ -1,0 +1,1 @@
+"""What one asks of a system: orbits, loss of stability, exponents, mesh forces."""
