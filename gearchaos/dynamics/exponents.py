@@ -1,4 +1,4 @@
-"""All Lyapunov exponents of a scene, and the Jacobian of its map over mesh periods.
+"""All Lyapunov exponents of a system, and the Jacobian of its map over mesh periods.
 
 The kernels carry one tangent vector per lane. Here every lane is repeated once per state, each copy
 with a tangent vector of its own; the copies see the same motion bit for bit. Lengths and angles of
@@ -10,44 +10,33 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from gearchaos_kernels import STATE_ROWS, Model, Plan, Scene, integrate
+from gearchaos_kernels import Plan, System, integrate, jacobian
 from numpy.typing import NDArray
 
-from gearchaos.configuration.run_tables import states_of
-from gearchaos.dynamics.jacobian import jacobian
 from gearchaos.records.lyapunov import largest_exponent
 
 Floats = NDArray[np.float64]
 
-SMALLEST_PART = 1e-8
+SMALLEST_RESOLVED = 1e-8
 """Share of a tangent vector that must be left when those before it are taken out."""
 
 
-class Spectrum(NamedTuple):
+class Exponents(NamedTuple):
     """Lyapunov exponents and their standard errors, shape (lanes, states), largest first."""
 
-    exponents: Floats
+    values: Floats
     standard_errors: Floats
 
 
 class _Carried(NamedTuple):
-    """End states (lanes, 10), unit tangent vectors as columns, logarithms of their growth."""
+    """End states (lanes, states), unit tangent vectors as columns, logarithms of their growth."""
 
     end_state: Floats
     vectors: Floats
     growth: Floats
 
 
-def exponents(
-    scene: Scene,
-    model: Model,
-    stiffness_cosine: Floats,
-    stiffness_sine: Floats,
-    start: Floats,
-    plan: Plan,
-    *,
-    rederived: bool = False,
-) -> Spectrum:
+def exponents(system: System, start: Floats, plan: Plan) -> Exponents:
     """Compute all Lyapunov exponents of every lane, per unit of tau.
 
     An orthonormal frame of tangent vectors is carried along and made orthonormal again after every
@@ -57,41 +46,41 @@ def exponents(
 
     Parameters
     ----------
-    scene, model, stiffness_cosine, stiffness_sine, start, rederived
-        As for `gearchaos_kernels.integrate`.
+    system : System
+    start : ndarray, shape (lanes, states)
+        At tau = 0.
     plan : Plan
         Steps and periods; what it says of the section and of the tangent is ignored.
 
     Returns
     -------
-    Spectrum
+    Exponents
         Not a number in lanes that diverged, and from the first exponent on that the numbers do not
         resolve: two directions whose exponents times the mesh period differ by more than about 18
         are parallel in double precision after one period. `sum_of_exponents` is an exact check.
     """
     once = plan._replace(transient_periods=0, recorded_periods=1)
-    lanes, states = start.shape[0], len(state_columns(scene))
+    lanes, states = start.shape
     logarithms = np.full((lanes, states, plan.recorded_periods), np.nan)
     frame = np.broadcast_to(_first_frame(states), (lanes, states, states))
     state = start
     for period in range(-plan.transient_periods, plan.recorded_periods):
-        state, vectors, growth = _carry(
-            scene, model, stiffness_cosine, stiffness_sine, state, frame, once, rederived
-        )
+        state, vectors, growth = _carry(system, state, frame, once)
         frame, triangle = np.linalg.qr(vectors)
-        part = np.abs(np.diagonal(triangle, axis1=1, axis2=2))
-        resolved = np.logical_and.accumulate(part > SMALLEST_PART, axis=1)
+        left = np.abs(np.diagonal(triangle, axis1=1, axis2=2))
+        resolved = np.logical_and.accumulate(left > SMALLEST_RESOLVED, axis=1)
         if period >= 0:
-            logarithms[:, :, period] = growth[:, :, 0] + np.log(np.where(resolved, part, np.nan))
-    mesh_period = np.repeat(2.0 * np.pi / model.mesh_frequency, states)
-    mean, error = largest_exponent(logarithms.reshape(lanes * states, -1), mesh_period)
+            logarithms[:, :, period] = growth[:, :, 0] + np.log(np.where(resolved, left, np.nan))
+    mean, error = largest_exponent(
+        logarithms.reshape(lanes * states, -1), np.repeat(system.mesh_period, states)
+    )
     mean, error = mean.reshape(lanes, states), error.reshape(lanes, states)
     descending = np.argsort(-mean, axis=1, kind="stable")
-    return Spectrum(*(np.take_along_axis(values, descending, axis=1) for values in (mean, error)))
+    return Exponents(*(np.take_along_axis(found, descending, axis=1) for found in (mean, error)))
 
 
-def sum_of_exponents(scene: Scene, model: Model) -> Floats:
-    """Return the sum of all Lyapunov exponents of every lane, per unit of tau.
+def sum_of_exponents(system: System) -> Floats:
+    """Return the sum of all Lyapunov exponents of every lane, per unit of tau, shape (lanes,).
 
     It is the trace of the Jacobian of eq. 13. The damping is constant and also acts where the teeth
     are apart, so that the trace depends neither on contact nor on stiffness, load or pitch error::
@@ -100,49 +89,22 @@ def sum_of_exponents(scene: Scene, model: Model) -> Floats:
         -2 (eta_11 + eta_21 + eta_12 + eta_22)
 
     in the full scene.
-
-    Parameters
-    ----------
-    scene : Scene
-    model : Model
-        Dimensionless groups, arrays of shape (lanes,).
-
-    Returns
-    -------
-    ndarray, shape (lanes,)
     """
-    apart = np.zeros_like(model.load)
-    trace: Floats = np.trace(jacobian(scene, model, apart, apart), axis1=1, axis2=2)
+    apart = np.zeros(system.lanes)
+    trace: Floats = np.trace(jacobian(system, apart, apart), axis1=1, axis2=2)
     return trace
 
 
-def period_jacobian(
-    scene: Scene,
-    model: Model,
-    stiffness_cosine: Floats,
-    stiffness_sine: Floats,
-    start: Floats,
-    plan: Plan,
-    *,
-    rederived: bool = False,
-) -> Floats:
+def period_jacobian(system: System, start: Floats, plan: Plan) -> Floats:
     """Return the Jacobian of the map over the recorded mesh periods, taken after the transient.
 
     On a periodic orbit over its own number of periods this is the monodromy matrix, whose
-    eigenvalues are the Floquet multipliers.
-
-    Parameters
-    ----------
-    scene, model, stiffness_cosine, stiffness_sine, start, rederived
-        As for `gearchaos_kernels.integrate`.
-    plan : Plan
-        Steps and periods; what it says of the section and of the tangent is ignored.
+    eigenvalues are the Floquet multipliers. Parameters are those of `exponents`.
 
     Returns
     -------
     ndarray, shape (lanes, states, states)
-        Column j is the derivative with respect to state j of the scene, in the order
-        delta_5, its rate, delta_1, ...; not a number in lanes that diverged.
+        Column j is the derivative with respect to state j; not a number in lanes that diverged.
     """
     if plan.transient_periods:
         before = plan._replace(
@@ -151,62 +113,29 @@ def period_jacobian(
             section_points=0,
             tangent=False,
         )
-        start = integrate(
-            scene, model, stiffness_cosine, stiffness_sine, start, before, rederived=rederived
-        ).end_state
-    states = len(state_columns(scene))
-    frame = np.broadcast_to(np.eye(states), (start.shape[0], states, states))
-    carried = _carry(
-        scene,
-        model,
-        stiffness_cosine,
-        stiffness_sine,
-        start,
-        frame,
-        plan._replace(transient_periods=0),
-        rederived,
-    )
+        start = integrate(system, start, before).end_state
+    lanes, states = start.shape
+    frame = np.broadcast_to(np.eye(states), (lanes, states, states))
+    carried = _carry(system, start, frame, plan._replace(transient_periods=0))
     lengths: Floats = np.exp(np.sum(carried.growth, axis=2))
     return carried.vectors * lengths[:, np.newaxis, :]
 
 
-def _carry(
-    scene: Scene,
-    model: Model,
-    stiffness_cosine: Floats,
-    stiffness_sine: Floats,
-    start: Floats,
-    frame: Floats,
-    plan: Plan,
-    rederived: bool,
-) -> _Carried:
+def _carry(system: System, start: Floats, frame: Floats, plan: Plan) -> _Carried:
     """Integrate every lane once for every column of its frame (lanes, states, states)."""
     lanes, states, _ = frame.shape
-    columns = state_columns(scene)
-    tangents = np.zeros((lanes * states, len(STATE_ROWS)))
-    tangents[:, columns] = frame.transpose(0, 2, 1).reshape(-1, states)
     outcome = integrate(
-        scene,
-        Model(*(np.repeat(group, states) for group in model)),
-        stiffness_cosine,
-        stiffness_sine,
+        system.repeated(states),
         np.repeat(start, states, axis=0),
-        plan._replace(section_points=0, section_states=(), tangent=True),
-        rederived=rederived,
-        tangent_start=tangents,
+        plan._replace(section_points=0, tangent=True),
+        tangent_start=frame.transpose(0, 2, 1).reshape(-1, states),
     )
     assert outcome.growth is not None
-    vectors = outcome.end_tangent[:, columns].reshape(lanes, states, states)
     return _Carried(
         outcome.end_state[::states],
-        vectors.transpose(0, 2, 1),
+        outcome.end_tangent.reshape(lanes, states, states).transpose(0, 2, 1),
         outcome.growth.reshape(lanes, states, -1),
     )
-
-
-def state_columns(scene: Scene) -> list[int]:
-    """Return the columns of the kernels' arrays in the order of the scene's states."""
-    return [STATE_ROWS[name] for name in states_of([e for e in Scene._fields if getattr(scene, e)])]
 
 
 def _first_frame(states: int) -> Floats:

@@ -12,7 +12,7 @@ from enum import IntEnum
 from typing import NamedTuple
 
 import numpy as np
-from gearchaos_kernels import Model, Scene
+from gearchaos_kernels import System
 from numpy.typing import NDArray
 
 from gearchaos.dynamics.orbits import Orbits, polish
@@ -121,18 +121,13 @@ def loss_of_stability(stable: Complex, beyond: Complex) -> Losses:
 
 
 def follow(
-    scene: Scene,
-    model_at: Callable[[Floats], Model],
-    stiffness_cosine: Floats,
-    stiffness_sine: Floats,
+    system_at: Callable[[Floats], System],
     guess: Floats,
     period: NDArray[np.int32],
     first: Floats,
     last: Floats,
     width: float,
     steps_per_period: int,
-    *,
-    rederived: bool = False,
 ) -> Followed:
     """Follow the orbit of every lane along a parameter to where it loses stability.
 
@@ -142,14 +137,12 @@ def follow(
 
     Parameters
     ----------
-    scene, stiffness_cosine, stiffness_sine, rederived
-        As for `gearchaos_kernels.integrate`.
-    model_at : callable
-        Returns the groups of all lanes for a value of the parameter in each, shape (lanes,).
-    guess : ndarray, shape (lanes, 10)
+    system_at : callable
+        Returns the system of all lanes for a value of the parameter in each, shape (lanes,).
+    guess : ndarray, shape (lanes, states)
         States close to the orbits at the first values, as for `polish`.
     period : ndarray of int, shape (lanes,)
-        In mesh periods.
+        In mesh periods; 0 where there is no orbit to follow.
     first, last : ndarray, shape (lanes,)
         Values of the parameter at both ends of the way, in either order.
     width : float
@@ -157,23 +150,11 @@ def follow(
         +1 like the root of the distance: with too large a width it is not yet `NEAR_FOLD`.
     steps_per_period : int
         Resolved steps per mesh period.
-
-    Returns
-    -------
-    Followed
     """
 
     def orbits(share: Floats, guess: Floats, followed: NDArray[np.bool_]) -> Orbits:
-        return polish(
-            scene,
-            model_at(first + share * (last - first)),
-            stiffness_cosine,
-            stiffness_sine,
-            guess,
-            np.where(followed, period, np.int32(0)),
-            steps_per_period,
-            rederived=rederived,
-        )
+        system = system_at(first + share * (last - first))
+        return polish(system, guess, np.where(followed, period, np.int32(0)), steps_per_period)
 
     share = np.zeros_like(first)
     step = np.full_like(first, LONGEST_STEP)

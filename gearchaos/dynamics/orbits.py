@@ -5,10 +5,10 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from gearchaos_kernels import STATE_ROWS, Model, Plan, Scene, integrate
+from gearchaos_kernels import Plan, System, integrate
 from numpy.typing import NDArray
 
-from gearchaos.dynamics.exponents import period_jacobian, state_columns
+from gearchaos.dynamics.exponents import period_jacobian
 from gearchaos.records.period import TOLERANCE, coordinate_scale
 
 Floats = NDArray[np.float64]
@@ -27,10 +27,10 @@ _SHARES = (1.0, 0.5, 0.25)
 class Orbits(NamedTuple):
     """Periodic orbits of some lanes.
 
-    ``points`` (lanes, 10): the state at tau = 0, columns as in `STATE_ROWS`; ``multipliers``
-    (lanes, states), complex: the Floquet multipliers, largest modulus first; both are not a number
-    where no orbit was found. ``residual`` (lanes,): largest distance after one period of the orbit,
-    relative to the scale of each coordinate; ``converged`` (lanes,).
+    ``points`` (lanes, states): the state at tau = 0; ``multipliers`` (lanes, states), complex: the
+    Floquet multipliers, largest modulus first; both are not a number where no orbit was found.
+    ``residual`` (lanes,): largest distance after one period of the orbit, relative to the scale of
+    each coordinate; ``converged`` (lanes,).
     """
 
     points: Floats
@@ -45,41 +45,8 @@ class Orbits(NamedTuple):
         return inside
 
 
-class _Map(NamedTuple):
-    """The map over a number of mesh periods, for some lanes."""
-
-    scene: Scene
-    model: Model
-    stiffness_cosine: Floats
-    stiffness_sine: Floats
-    plan: Plan
-    rederived: bool
-
-    def of(self, lanes: NDArray[np.intp]) -> _Map:
-        return self._replace(model=Model(*(group[lanes] for group in self.model)))
-
-    def section(self, start: Floats) -> Floats:
-        """Return the states after each mesh period, shape (lanes, periods, 10)."""
-        return integrate(*self._arguments(start), rederived=self.rederived).section
-
-    def jacobian(self, start: Floats) -> Floats:
-        return period_jacobian(*self._arguments(start), rederived=self.rederived)
-
-    def _arguments(self, start: Floats) -> tuple[Scene, Model, Floats, Floats, Floats, Plan]:
-        scene, model, cosine, sine, plan, _ = self
-        return scene, model, cosine, sine, start, plan
-
-
 def polish(
-    scene: Scene,
-    model: Model,
-    stiffness_cosine: Floats,
-    stiffness_sine: Floats,
-    guess: Floats,
-    period: NDArray[np.int32],
-    steps_per_period: int,
-    *,
-    rederived: bool = False,
+    system: System, guess: Floats, period: NDArray[np.int32], steps_per_period: int
 ) -> Orbits:
     """Find the periodic orbit next to the guess of every lane.
 
@@ -90,10 +57,9 @@ def polish(
 
     Parameters
     ----------
-    scene, model, stiffness_cosine, stiffness_sine, rederived
-        As for `gearchaos_kernels.integrate`.
-    guess : ndarray, shape (lanes, 10)
-        States of eq. 13 at tau = 0, columns as in `STATE_ROWS`.
+    system : System
+    guess : ndarray, shape (lanes, states)
+        States of eq. 13 at tau = 0.
     period : ndarray of int, shape (lanes,)
         In mesh periods; 0 where there is no orbit to look for.
     steps_per_period : int
@@ -106,54 +72,46 @@ def polish(
         of the neighbourhood of the guess, where the orbit found repeats after a divisor of
         ``period`` already, and where the period is 0.
     """
-    lanes, columns = guess.shape[0], state_columns(scene)
     found = Orbits(
         points=np.full(guess.shape, np.nan),
-        multipliers=np.full((lanes, len(columns)), np.nan, dtype=np.complex128),
-        residual=np.full(lanes, np.nan),
-        converged=np.zeros(lanes, dtype=np.bool_),
+        multipliers=np.full(guess.shape, np.nan, dtype=np.complex128),
+        residual=np.full(guess.shape[0], np.nan),
+        converged=np.zeros(guess.shape[0], dtype=np.bool_),
     )
-    # With a tangent, so that map and Jacobian are compiled once and agree bit for bit.
-    plan = Plan(steps_per_period, 0, 0, 0, tuple(STATE_ROWS), tangent=True)
-    for n in np.unique(period[period > 0]):
+    for n in np.unique(period[period > 0]).tolist():
         chosen = np.flatnonzero(period == n)
-        plan = plan._replace(recorded_periods=int(n), section_points=int(n))
-        every = _Map(scene, model, stiffness_cosine, stiffness_sine, plan, rederived)
-        group = _polish(every.of(chosen), guess[chosen], columns)
-        for whole, part in zip(found, group, strict=True):
-            whole[chosen] = part
+        # With a tangent, so that map and Jacobian are compiled once and agree bit for bit.
+        plan = Plan(steps_per_period, 0, n, section_points=n, tangent=True)
+        for whole, some in zip(
+            found, _polish(system.of(chosen), guess[chosen], plan), strict=True
+        ):
+            whole[chosen] = some
     return found
 
 
 def orbit_exponent(
     multipliers: NDArray[np.complex128], period: NDArray[np.int32], mesh_period: Floats
 ) -> Floats:
-    """Return the largest Lyapunov exponent of periodic orbits, per unit of tau.
+    """Return the largest Lyapunov exponent of periodic orbits, per unit of tau, shape (lanes,).
 
     Parameters
     ----------
     multipliers : ndarray, shape (lanes, states)
-        As in `Orbits`.
+        As in `Orbits`; where they are not a number the exponent is not either.
     period : ndarray of int, shape (lanes,)
-        Period of the orbit in mesh periods; 0 only where the multipliers are not a number.
+        Period of the orbit in mesh periods; 0 only where there is no orbit.
     mesh_period : ndarray, shape (lanes,)
         In units of tau.
-
-    Returns
-    -------
-    ndarray, shape (lanes,)
-        Not a number where the multipliers are not.
     """
     exponent: Floats = np.log(np.abs(multipliers[:, 0])) / (np.maximum(period, 1) * mesh_period)
     return exponent
 
 
-def _polish(system: _Map, guess: Floats, columns: list[int]) -> Orbits:
+def _polish(system: System, guess: Floats, plan: Plan) -> Orbits:
     """Polish lanes of one period."""
     lanes = np.arange(guess.shape[0])
-    points = np.zeros_like(guess)
-    points[:, columns] = guess[:, columns]
-    start, section = points.copy(), system.section(points)
+    start, points = guess, guess.copy()
+    section = integrate(system, points, plan).section
     scale = coordinate_scale(section)
     residual = _distance(section[:, -1], points, scale)
     searching = np.isfinite(residual)
@@ -163,13 +121,12 @@ def _polish(system: _Map, guess: Floats, columns: list[int]) -> Orbits:
         if not rest.size:
             break
         step = np.zeros_like(points)
-        step[rest[:, np.newaxis], columns] = _newton_step(
-            system.of(rest).jacobian(points[rest]),
-            (section[rest, -1] - points[rest])[:, columns],
+        step[rest] = _newton_step(
+            period_jacobian(system.of(rest), points[rest], plan), section[rest, -1] - points[rest]
         )
         for share in _SHARES:
             trial = points[rest] + share * step[rest]
-            passed = system.of(rest).section(trial)
+            passed = integrate(system.of(rest), trial, plan).section
             distance = _distance(passed[:, -1], trial, scale[rest])
             # Half of what the tangent promises: beyond a fold the distance falls, but not to 0.
             better = distance < (1.0 - share / 2.0) * residual[rest]
@@ -184,9 +141,9 @@ def _polish(system: _Map, guess: Floats, columns: list[int]) -> Orbits:
     converged = (residual <= CLOSED) & ~_repeats_earlier(section, points, scale)
     closed = lanes[converged]
     points[~converged] = np.nan
-    multipliers = np.full((lanes.size, len(columns)), np.nan, dtype=np.complex128)
+    multipliers = np.full(points.shape, np.nan, dtype=np.complex128)
     if closed.size:
-        multipliers[closed] = _multipliers(system.of(closed).jacobian(points[closed]))
+        multipliers[closed] = _multipliers(period_jacobian(system.of(closed), points[closed], plan))
     return Orbits(points, multipliers, residual, converged)
 
 

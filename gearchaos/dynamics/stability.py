@@ -7,15 +7,12 @@ the computed motion grows where the true one decays.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
-from gearchaos_kernels import Model, Scene
+from gearchaos_kernels import Groups, System, jacobian
 from numpy.typing import NDArray
 
-from gearchaos.configuration.messages import Fault
-from gearchaos.dynamics.jacobian import COORDINATES, coordinates, jacobian
 from gearchaos.dynamics.stable_region import ROUNDING, SHORTEST_RAY, steps_per_time
 
 Floats = NDArray[np.float64]
@@ -24,8 +21,16 @@ Integers = NDArray[np.int64]
 MOST_STEPS = 2**53
 """Stands for every number of steps beyond it."""
 
+OWNERS = {
+    "delta_5": "torsion",
+    "delta_1": "transverse bearing of the driving gear",
+    "delta_2": "transverse bearing of the driven gear",
+    "delta_3": "axial bearing of the driving gear",
+    "delta_4": "axial bearing of the driven gear",
+}
+"""What moves in each coordinate."""
+
 _BEYOND_MEASURE = 1e150
-_LANES_AT_ONCE = 2**14
 _POINTS_PER_WAVE = 64
 
 
@@ -55,153 +60,108 @@ class StabilityLimit:
         """Fewest steps per period with which all lanes are stable."""
         return int(np.max(self.fewest))
 
-    def fault(self, configured: int, axis: str, values: Floats) -> Fault:
-        """Word the limit, given the configured steps and the swept parameter of every lane."""
-        low, high = np.min(values[self.lanes]), np.max(values[self.lanes])
-        where = f"= {low:.6g}" if low == high else f"from {low:.6g} to {high:.6g}"
-        imaginary = abs(self.eigenvalue.imag)
-        pair = f" ± {imaginary:.3g}i" if imaginary > 0.0 else ""
-        return Fault(
-            "integration.steps_per_period",
-            f"RK4 is unstable below {self.steps} steps per period for {self.lanes.size} of "
-            f"{values.size} lanes ({axis} {where}), because of the eigenvalue "
-            f"{self.eigenvalue.real:.3g}{pair} of the {self.owner}",
-            f'raise it to {self.steps} or more, or set integration.unstable = "raise"',
-            configured,
-        )
 
-
-def joined_limit(limits: Sequence[StabilityLimit]) -> StabilityLimit:
-    """Join the limits of parts of a sweep, whose lanes are numbered as in the whole."""
-    strictest = max(limits, key=lambda limit: limit.steps)
-    return replace(
-        strictest,
-        lanes=np.concatenate([limit.lanes for limit in limits]),
-        fewest=np.concatenate([limit.fewest for limit in limits]),
-    )
-
-
-def stability_limit(
-    scene: Scene, model: Model, stiffness_cosine: Floats, stiffness_sine: Floats, steps: int
-) -> StabilityLimit | None:
+def stability_limit(system: System, steps: int) -> StabilityLimit | None:
     """Find the lanes in which so many steps per period are unstable; None if there are none.
 
-    Eigenvalues are computed only where `sufficient_steps` leaves a doubt. The other parameters are
-    those of `fewest_stable_steps`.
+    Eigenvalues are computed only where `sufficient_steps` leaves a doubt.
     """
-    sufficient = sufficient_steps(scene, model, stiffness_cosine, stiffness_sine)
-    doubtful = np.flatnonzero(sufficient > steps)
-    part = _lanes(model, doubtful)
-    fewest = fewest_stable_steps(scene, part, stiffness_cosine, stiffness_sine)
+    doubtful = np.flatnonzero(sufficient_steps(system) > steps)
+    if doubtful.size == 0:
+        return None
+    some = system.of(doubtful)
+    fewest = fewest_stable_steps(some)
     unstable = np.flatnonzero(fewest > steps)
     if unstable.size == 0:
         return None
-    worst = _lanes(part, unstable[[np.argmax(fewest[unstable])]])
-    stiffnesses = _stiffnesses(scene, worst, stiffness_cosine, stiffness_sine)
-    eigenvalue, owner = _strictest_mode(scene, worst, stiffnesses)
+    eigenvalue, owner = _strictest_mode(some.of(unstable[[np.argmax(fewest[unstable])]]))
     return StabilityLimit(doubtful[unstable], fewest[unstable], eigenvalue, owner)
 
 
-def fewest_stable_steps(
-    scene: Scene, model: Model, stiffness_cosine: Floats, stiffness_sine: Floats
-) -> Integers:
+def fewest_stable_steps(system: System) -> Integers:
     """Return the fewest steps per period with which every lane is stable on every branch.
 
     The branches are those with and without contact in either direction, with the mesh stiffness
-    held at its smallest and at its largest value. A motion that stays on one branch for part of the
+    held at its smallest and at its largest value. A motion that stays on one branch for some of the
     time only may survive with fewer steps. Eigenvalues whose real part is positive grow by
     themselves and set no limit.
-
-    Parameters
-    ----------
-    scene : Scene
-    model : Model
-        Dimensionless groups, arrays of shape (lanes,).
-    stiffness_cosine, stiffness_sine : ndarray, shape (harmonics,)
-        Mesh stiffness relative to its mean (eq. 19).
 
     Returns
     -------
     ndarray, shape (lanes,)
         Whole numbers of at least 1. Every larger number of steps is stable too.
     """
-    stiffnesses = _stiffnesses(scene, model, stiffness_cosine, stiffness_sine)
-    demand = np.zeros(model.load.size)
-    for begin in range(0, demand.size, _LANES_AT_ONCE):
-        chosen = slice(begin, begin + _LANES_AT_ONCE)
-        part = _lanes(model, chosen)
-        for stiffness in stiffnesses[:, chosen]:
-            for block in _diagonal_blocks(scene, part, stiffness):
-                demand[chosen] = np.maximum(demand[chosen], _demand(block))
-    return _per_period(demand, model)
+    system = _measurable(system)
+    demand = np.zeros(system.lanes)
+    for stiffness in _stiffnesses(system):
+        for block in _diagonal_blocks(system, stiffness):
+            demand = np.maximum(demand, _demand(block))
+    return _per_period(demand, system)
 
 
-def sufficient_steps(
-    scene: Scene, model: Model, stiffness_cosine: Floats, stiffness_sine: Floats
-) -> Integers:
+def sufficient_steps(system: System) -> Integers:
     """Return a number of steps per period that is surely stable, without any eigenvalue.
 
     In coordinates weighted by the square roots of the masses, stiffness K and damping C of the
     tangential and of the axial motion are symmetric. A mode u of unit length then satisfies
     lambda^2 + lambda u*Cu + u*Ku = 0, hence abs(lambda) <= c/2 + sqrt(c^2/4 + k) with the norms c
     and k of C and K, themselves at most the largest bearing plus the mesh. The step reaches as
-    far as the shortest of all rays. Parameters as for `fewest_stable_steps`.
+    far as the shortest of all rays.
 
     Returns
     -------
     ndarray, shape (lanes,)
     """
-    model = _lanes(model, slice(None))
-    mesh_stiffness = np.max(
-        np.abs(_stiffnesses(scene, model, stiffness_cosine, stiffness_sine)), axis=0
-    )
-    masses = model.mass_ratio_p + model.mass_ratio_g
-    directions = [(np.cos(model.base_helix_angle), 1.0 + scene.transverse * masses)]
-    k = c = np.zeros_like(model.load)
-    if scene.transverse:
-        k = np.maximum(model.transverse_stiffness_p, model.transverse_stiffness_g)
-        c = 2.0 * np.maximum(model.transverse_damping_p, model.transverse_damping_g)
-    if scene.axial:
-        directions.append((np.sin(model.base_helix_angle), masses))
-        k = np.maximum.reduce([k, model.axial_stiffness_p, model.axial_stiffness_g])
-        c = np.maximum.reduce([c, 2.0 * model.axial_damping_p, 2.0 * model.axial_damping_g])
-    feels = np.max([np.abs(projection) * moved for projection, moved in directions], axis=0)
-    k = k + mesh_stiffness * feels
-    half = 0.5 * c + model.damping_ratio * feels
+    system = _measurable(system)
+    effects, groups = system.effects, system.groups
+    masses = groups.mass_ratio_p + groups.mass_ratio_g
+    directions = [(np.cos(groups.base_helix_angle), 1.0 + effects.transverse * masses)]
+    k = c = np.zeros(system.lanes)
+    if effects.transverse:
+        k = np.maximum(groups.transverse_stiffness_p, groups.transverse_stiffness_g)
+        c = 2.0 * np.maximum(groups.transverse_damping_p, groups.transverse_damping_g)
+    if effects.axial:
+        directions.append((np.sin(groups.base_helix_angle), masses))
+        k = np.maximum.reduce([k, groups.axial_stiffness_p, groups.axial_stiffness_g])
+        c = np.maximum.reduce([c, 2.0 * groups.axial_damping_p, 2.0 * groups.axial_damping_g])
+    # By so much the mesh accelerates the approach of the teeth, per unit of its force.
+    share = np.max([np.abs(projection) * moved for projection, moved in directions], axis=0)
+    k = k + np.max(np.abs(_stiffnesses(system)), axis=0) * share
+    half = 0.5 * c + groups.damping_ratio * share
     largest = half + np.hypot(half, np.sqrt(k))
-    return _per_period(largest / SHORTEST_RAY, model)
+    return _per_period(largest / SHORTEST_RAY, system)
 
 
-def _lanes(model: Model, chosen: slice | NDArray[np.intp]) -> Model:
-    """Return some lanes, with groups that no computation could hold cut short of overflow."""
-    return Model(*(np.clip(group[chosen], -_BEYOND_MEASURE, _BEYOND_MEASURE) for group in model))
+def _measurable(system: System) -> System:
+    """Return the system with groups that no computation could hold cut short of overflow."""
+    clipped = (np.clip(group, -_BEYOND_MEASURE, _BEYOND_MEASURE) for group in system.groups)
+    return system._replace(groups=Groups(*clipped))
 
 
-def _stiffnesses(
-    scene: Scene, model: Model, stiffness_cosine: Floats, stiffness_sine: Floats
-) -> Floats:
+def _stiffnesses(system: System) -> Floats:
     """kappa f' on the branches, shape (stiffnesses, lanes): no contact and the extremes of it."""
-    values = [np.ones_like(model.load)]
-    if scene.stiffness_variation:
-        harmonics = np.concatenate([[0.0], stiffness_cosine + 1j * stiffness_sine])
+    values = [np.ones(system.lanes)]
+    if system.effects.stiffness_variation:
+        waves = system.stiffness_cosine + 1j * system.stiffness_sine
+        harmonics = np.concatenate([[0.0], waves])
         variation = np.fft.fft(harmonics, _POINTS_PER_WAVE * harmonics.size).real
-        extremes = np.min(variation), np.max(variation)
-        values = [1.0 + model.stiffness_variation_scale * extreme for extreme in extremes]
-    if scene.backlash:
-        values.append(np.zeros_like(model.load))
+        scale = system.groups.stiffness_variation_scale
+        values = [1.0 + scale * extreme for extreme in (np.min(variation), np.max(variation))]
+    if system.effects.backlash:
+        values.append(np.zeros(system.lanes))
     return np.stack(values)
 
 
-def _diagonal_blocks(scene: Scene, model: Model, stiffness: Floats) -> list[Floats]:
+def _diagonal_blocks(system: System, stiffness: Floats) -> list[Floats]:
     """Jacobians of the tangential and of the axial motion at one stiffness of the mesh.
 
     The axial motion acts on nothing else, so that the eigenvalues of any branch are those of its
     tangential block together with those of its axial one.
     """
-    whole = jacobian(scene, model, stiffness, stiffness)
-    first = 6 if scene.transverse else 2
+    whole = jacobian(system, stiffness, stiffness)
+    first = 6 if system.effects.transverse else 2
     blocks = [whole[:, :first, :first], whole[:, first:, first:]]
-    return blocks[: 1 + scene.axial]
+    return blocks[: 1 + system.effects.axial]
 
 
 def _demand(block: Floats) -> Floats:
@@ -226,24 +186,25 @@ def _distinct(rows: Floats) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     return order[begins], kind
 
 
-def _per_period(demand: Floats, model: Model) -> Integers:
+def _per_period(demand: Floats, system: System) -> Integers:
     with np.errstate(over="ignore"):
-        steps = np.ceil(demand * (1.0 - ROUNDING) * (2.0 * np.pi / model.mesh_frequency))
+        steps = np.ceil(demand * (1.0 - ROUNDING) * system.mesh_period)
     return np.clip(steps, 1.0, MOST_STEPS).astype(np.int64)
 
 
-def _strictest_mode(scene: Scene, model: Model, stiffnesses: Floats) -> tuple[complex, str]:
+def _strictest_mode(system: System) -> tuple[complex, str]:
     """Return the eigenvalue of one lane that asks for the most steps, and what moves with it."""
-    kept = coordinates(scene)
+    system = _measurable(system)
     most, strictest, owner = -1.0, 0j, ""
-    for stiffness in stiffnesses:
+    for stiffness in _stiffnesses(system):
         first = 0
-        for block in _diagonal_blocks(scene, model, stiffness):
+        for block in _diagonal_blocks(system, stiffness):
             values, vectors = np.linalg.eig(block[0].astype(np.complex128))
             demand = steps_per_time(values)
             mode = np.argmax(demand)
             if demand[mode] > most:
                 most, strictest = demand[mode], complex(values[mode])
-                owner = COORDINATES[kept[first + np.argmax(np.abs(vectors[1::2, mode]))]]
-            first += values.size // 2
+                moving = first + 2 * int(np.argmax(np.abs(vectors[1::2, mode])))
+                owner = OWNERS[system.states[moving]]
+            first += values.size
     return strictest, owner

@@ -9,11 +9,13 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from contextlib import suppress
+from functools import partial
+from types import MappingProxyType
 from typing import Protocol, Self
 
 from gearchaos_kernels import current_threads, use_threads
 
-from gearchaos.engine.simulation import Arrays, Bounds, Simulation, compute_all
+from gearchaos.engine.simulation import Arrays, Bounds, Simulation
 from gearchaos.errors import FileError, GearchaosError
 from gearchaos.interrupts import check
 
@@ -48,10 +50,8 @@ class LocalExecutor:
     Parameters
     ----------
     simulation : Simulation
-    order : sequence of (first, last)
-        All blocks in the order of computation, the finished ones among them.
-    finished : mapping
-        Bounds of finished blocks with a way to read them; a carried sweep goes on from them.
+    finished : mapping, optional
+        Blocks that are finished, with a way to read them; a carried sweep goes on from them.
     """
 
     width = 2
@@ -59,12 +59,11 @@ class LocalExecutor:
     def __init__(
         self,
         simulation: Simulation,
-        order: Sequence[Bounds],
-        finished: Mapping[Bounds, Callable[[], Arrays]],
+        finished: Mapping[Bounds, Callable[[], Arrays]] = MappingProxyType({}),
     ) -> None:
         self._simulation = simulation
-        # A carried block needs what the one before it yielded: they come in this order only.
-        self._carried = compute_all(simulation, order, finished) if simulation.carried else None
+        # A carried block needs what the one before it yielded: it is handed out after that one.
+        self._before = dict(finished) if simulation.carried else {}
         self._pool = ThreadPoolExecutor(
             max_workers=1, initializer=use_threads, initargs=(current_threads(),)
         )
@@ -80,10 +79,15 @@ class LocalExecutor:
         self._pool.shutdown(cancel_futures=True)
 
     def _compute(self, block: Bounds) -> Arrays:
-        if self._carried is None:
-            return self._simulation.compute(*block)
-        computed, arrays = next(self._carried)
-        assert computed == block, "a carried sweep is computed in its own order"
+        simulation, carried = self._simulation, None
+        if simulation.carried:
+            first, last = block
+            for before, read in self._before.items():
+                if before[0] == last if simulation.downwards else before[1] == first:
+                    carried = read()["end_state"]
+        arrays = simulation.compute(*block, carried)
+        if simulation.carried:
+            self._before[block] = partial(dict, end_state=arrays["end_state"])
         return arrays
 
 

@@ -1,108 +1,121 @@
-"""From a configuration to what the kernels take: the groups and the start state of every lane."""
+"""The lanes of a configured sweep: their axes, and the system and the start of any of them."""
 
 from __future__ import annotations
 
-from typing import Any
+import math
 
 import numpy as np
-from gearchaos_kernels import STATE_ROWS, Model
+from gearchaos_kernels import System
 from numpy.typing import NDArray
 
-from gearchaos.configuration import Configuration
-from gearchaos.gear.groups import GROUP_TABLE, Groups
+from gearchaos.configuration import Configuration, axis_values, swept_values
+from gearchaos.configuration.run_tables import states_of
+from gearchaos.configuration.sweep_values import SWEEPABLE_GROUPS, SWEEPABLE_KEYS, groups_at
+from gearchaos.dynamics.systems import system_of
+from gearchaos.engine.starts import start_states
+from gearchaos.gear.group_table import GROUP_TABLE
+from gearchaos.results.result_file import HARMONIC, Parameter
+from gearchaos.results.variables import Axis, axis_name, start_axis
 
 Floats = NDArray[np.float64]
-
-_DRAWS_PER_LANE = 12
-"""Random numbers set aside per lane: a multiple of the four that one Philox counter yields."""
-
-_PHILOX_WIDTH = 4
+Numbers = NDArray[np.intp]
 
 
-def select(groups: Groups, values: NDArray[np.intp]) -> Groups:
-    """Return the groups at some values of the sweep; what all lanes share stays a number."""
-    chosen: dict[str, Any] = {}
-    for row in GROUP_TABLE:
-        value = getattr(groups, row.name)
-        varies = isinstance(value, np.ndarray) and not row.is_list
-        chosen[row.name] = value[values] if varies else value
-    return Groups(**chosen, origin=groups.origin)
+class Lanes:
+    """The product of all axes as a flat list, the last axis running fastest.
 
-
-def model(groups: Groups, lanes: int) -> Model:
-    """Return the kernels' model of some lanes.
-
-    Parameters
-    ----------
-    groups : Groups
-        Numbers, or arrays of shape (lanes,).
-    lanes : int
-        Number of lanes.
-    """
-
-    def filled(value: float | Floats | None, absent: float = 0.0) -> Floats:
-        return np.broadcast_to(np.float64(absent) if value is None else value, lanes).astype(float)
-
-    multiple = filled(groups.pitch_error)
-    return Model(
-        mesh_frequency=filled(groups.mesh_frequency),
-        load=filled(groups.load),
-        damping_ratio=filled(groups.damping_ratio),
-        base_helix_angle=np.radians(filled(groups.base_helix_angle_deg)),
-        half_backlash=filled(groups.half_backlash),
-        # "5.86 e(tau)" multiplies mean and amplitude of one pitch error alike (eq. 14).
-        error_mean=multiple * filled(groups.pitch_error_mean),
-        error_amplitude=multiple * filled(groups.pitch_error_amplitude),
-        error_phase=np.radians(filled(groups.pitch_error_phase_deg)),
-        stiffness_variation_scale=filled(groups.stiffness_variation_scale),
-        mass_ratio_p=filled(groups.mass_ratio_p, absent=1.0),
-        mass_ratio_g=filled(groups.mass_ratio_g, absent=1.0),
-        transverse_stiffness_p=filled(groups.transverse_stiffness_p),
-        transverse_damping_p=filled(groups.transverse_damping_p),
-        transverse_stiffness_g=filled(groups.transverse_stiffness_g),
-        transverse_damping_g=filled(groups.transverse_damping_g),
-        axial_stiffness_p=filled(groups.axial_stiffness_p),
-        axial_damping_p=filled(groups.axial_damping_p),
-        axial_stiffness_g=filled(groups.axial_stiffness_g),
-        axial_damping_g=filled(groups.axial_damping_g),
-    )
-
-
-def start_states(config: Configuration, model: Model, numbers: NDArray[np.intp]) -> Floats:
-    """Return the start states of some lanes, shape (lanes, 10), columns of `STATE_ROWS`.
+    A lane's result depends on its number in this list and nothing else.
 
     Parameters
     ----------
     config : Configuration
-        Its table ``start`` decides.
-    model : Model
-        Of these lanes.
-    numbers : ndarray of int, shape (lanes,)
-        Their numbers in the whole sweep, ascending: the random state of a lane depends on its
-        number and the seed alone.
+
+    Attributes
+    ----------
+    axes : list of Axis
+        One for each dimension: the second swept parameter, the first one, the start.
+    effects : tuple of str
+        Effects that act on what is kept.
+    states : tuple of str
+        States of the scene that these effects leave.
+    starts : int
+        Lanes of one value, or pair of values.
     """
-    lanes = model.load.size
-    start = np.zeros((lanes, len(STATE_ROWS)))
-    columns = [STATE_ROWS[name] for name in config.scene.states]
-    kind = config.start.kind
-    if kind == "given":
-        for name, value in config.start.state.items():
-            start[:, STATE_ROWS[name]] = value
-    elif kind == "contact":
-        start[:, STATE_ROWS["delta_5"]] = _contact(config, model)
-    elif kind == "random":
-        first = int(numbers[0])
-        generator = np.random.Philox(config.start.seed)
-        generator.advance(first * (_DRAWS_PER_LANE // _PHILOX_WIDTH))
-        shape = (int(numbers[-1]) - first + 1, _DRAWS_PER_LANE)
-        draws = np.random.Generator(generator).uniform(-1.0, 1.0, shape)[numbers - first]
-        start[:, columns] = config.start.spread * draws[:, : len(columns)]
-    return start
+
+    def __init__(self, config: Configuration) -> None:
+        self.config = config
+        self._values = axis_values(config)
+        self.axes = [_axis(parameter, values) for parameter, values in self._values.items()]
+        self.starts = config.start.count
+        if self.starts > 1:
+            self.axes.append(start_axis(self.starts))
+        self.effects = config.needed_effects
+        self.states = states_of(self.effects)
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Lengths of the axes."""
+        return tuple(len(axis.values) for axis in self.axes)
+
+    def __len__(self) -> int:
+        return math.prod(self.shape)
+
+    @property
+    def carried_along(self) -> int:
+        """Lanes of one line along the first swept parameter, along which a state may be carried."""
+        return self.starts * swept_values(self.config.sweep).size
+
+    def values_of(self, lanes: Numbers) -> dict[str, Floats]:
+        """Return the value of each swept parameter in some lanes."""
+        index = np.unravel_index(lanes, self.shape)
+        found = zip(self._values.items(), index, strict=False)
+        return {parameter: values[at] for (parameter, values), at in found}
+
+    def system_of(self, lanes: Numbers) -> System:
+        """Return the system of some lanes."""
+        return system_of(self.config, self.values_of(lanes), self.effects)
+
+    def start_of(self, lanes: Numbers) -> Floats:
+        """Return the configured start states of some lanes, shape (lanes, states)."""
+        return start_states(self.config, self.system_of(lanes), lanes)
+
+    def spread(self, count: int) -> Numbers:
+        """Return the numbers of at most so many lanes, spread evenly over all."""
+        chosen = np.linspace(0, len(self) - 1, min(count, len(self)))
+        return np.unique(chosen.round().astype(np.intp))
+
+    @property
+    def parameters(self) -> dict[str, Parameter]:
+        """The groups of the model with their origin; those that no effect needs are left out."""
+        names = [axis_name(parameter) for parameter in self._values]
+        sizes = [values.size for values in self._values.values()]
+        others = [[n for n in range(len(names)) if n != own] for own in range(len(names))]
+        swept = zip(self._values.items(), others, strict=True)
+        groups = groups_at(self.config, {p: np.expand_dims(v, axes) for (p, v), axes in swept})
+        parameters = {}
+        for row in GROUP_TABLE:
+            value = getattr(groups, row.name)
+            if value is None or not row.needed_by(self.effects):
+                continue
+            origin: str = groups.origin[row.name]
+            dims: tuple[str, ...] = (HARMONIC,) if row.is_list else ()
+            if np.ndim(value) > 0 and not row.is_list:
+                origin = "swept"
+                along = [n for n, size in enumerate(np.shape(value)) if size > 1]
+                # Of an axis with one value nothing tells whether the group depends on it.
+                along = along or list(range(len(names)))
+                dims = tuple(names[n] for n in along)
+                value = np.broadcast_to(np.squeeze(value), [sizes[n] for n in along])
+            parameters[row.name] = Parameter(
+                value, origin, row.units, row.long_name, row.mathtext, dims
+            )
+        return parameters
 
 
-def _contact(config: Configuration, model: Model) -> Floats:
-    """Clearance taken up towards the load, and the deflection f_n of a mesh of stiffness 1."""
-    clearance = np.zeros_like(model.load)
-    if "backlash" in config.scene.effects:
-        clearance = model.half_backlash * np.cos(model.base_helix_angle)
-    return np.copysign(clearance, model.load) + model.load
+def _axis(parameter: str, values: Floats) -> Axis:
+    name = axis_name(parameter)
+    if parameter in SWEEPABLE_GROUPS:
+        row = SWEEPABLE_GROUPS[parameter]
+        return Axis(name, row.units, row.long_name, row.mathtext, values)
+    key = SWEEPABLE_KEYS[parameter]
+    return Axis(name, key.units or "1", key.wording, "", values)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -11,11 +11,13 @@ from gearchaos_kernels import current_threads, most_threads, use_threads
 
 from gearchaos.configuration import Configuration
 from gearchaos.engine.error_check import Tally
+from gearchaos.engine.executors import LocalExecutor, compute_blocks
 from gearchaos.engine.provenance import provenance
-from gearchaos.engine.simulation import Simulation, compute_all
+from gearchaos.engine.simulation import Arrays, Bounds, Simulation
 from gearchaos.errors import ConfigurationError
 from gearchaos.progress import Progress, notice, say
 from gearchaos.results.result import Result
+from gearchaos.results.variables import Variable, axis_name
 
 PILOT_SECONDS = 0.2
 COMPILING = "gearchaos: preparing the kernel of this scene; the first time this takes some seconds"
@@ -51,27 +53,51 @@ def run(config: Configuration, threads: int | None = None, progress: bool = Fals
     for note in simulation.notes:
         say(note, quiet=not progress)
     began = time.monotonic()
-    size = simulation.block_lanes(current_threads())
-    edges = range(0, simulation.lanes, size)
-    bounds = simulation.in_order((first, min(first + size, simulation.lanes)) for first in edges)
-    parts = {}
+    blocks: dict[int, Arrays] = {}
     tally = Tally()
-    with Progress(simulation.lanes, quiet=not progress) as bar:
-        for (first, last), arrays in compute_all(simulation, bounds):
-            parts[first] = arrays
+    lanes = len(simulation.lanes)
+    with LocalExecutor(simulation) as executor, Progress(lanes, quiet=not progress) as bar:
+
+        def keep(block: Bounds, arrays: Arrays) -> None:
+            blocks[block[0]] = arrays
             tally.add(arrays)
-            bar.advance(last - first)
+            bar.advance(block[1] - block[0])
+
+        compute_blocks(executor, simulation.blocks(simulation.block_lanes(current_threads())), keep)
     if tally.errors:
         say(tally.errors, quiet=not progress)
-    in_order = [parts[first] for first in sorted(parts)]
-    data = {name: np.concatenate([part[name] for part in in_order]) for name in in_order[0]}
-    return Result(
-        simulation.axis,
-        simulation.variables,
-        data,
-        simulation.parameters,
+    return result_of(
+        simulation,
+        [blocks[first] for first in sorted(blocks)],
         metadata(simulation, time.monotonic() - began),
     )
+
+
+def result_of(
+    simulation: Simulation,
+    blocks: Sequence[Arrays],
+    facts: Mapping[str, Any],
+    more: Sequence[Variable] = (),
+) -> Result:
+    """Join blocks in the order of their lanes to a result.
+
+    Parameters
+    ----------
+    simulation : Simulation
+    blocks : sequence of mapping of str to ndarray
+    facts : mapping
+        What the result says about itself.
+    more : sequence of Variable
+        What the blocks hold beside the variables of the sweep.
+    """
+    shape = simulation.lanes.shape
+    data = {}
+    for name in blocks[0]:
+        flat = np.concatenate([arrays[name] for arrays in blocks])
+        data[name] = flat.reshape(*shape, *flat.shape[1:])
+    axes = [axis.name for axis in simulation.lanes.axes]
+    variables = [*simulation.variables, *more]
+    return Result(axes, variables, data, simulation.lanes.parameters, facts)
 
 
 def pilot_rate(simulation: Simulation) -> float:
@@ -82,9 +108,9 @@ def pilot_rate(simulation: Simulation) -> float:
     simulation : Simulation
         Compiled; a few mesh periods of its first block are integrated.
     """
-    lanes = min(simulation.lanes, simulation.block_lanes(current_threads()))
+    lanes = min(len(simulation.lanes), simulation.block_lanes(current_threads()))
     if simulation.carried:  # One value after the other.
-        lanes = simulation.starts
+        lanes = simulation.lanes.starts
     periods = 1
     while True:
         began = time.perf_counter()
@@ -123,7 +149,7 @@ def metadata(simulation: Simulation, seconds: float) -> Mapping[str, Any]:
     """
     config = simulation.config
     return {
-        "axis": simulation.axis,
+        "axis": axis_name(config.sweep.parameter),
         "title": config.title,
         "formulation": config.formulation,
         "effects": " ".join(config.scene.effects),

@@ -15,19 +15,19 @@ from gearchaos.records.period import LONGEST_PERIOD
 
 Floats = NDArray[np.float64]
 
-PARTS = (2, 3, 5, 7)
-"""Into how many parts the points of a curve are dealt; what the windows of chaos are made of."""
+STRIDES = (2, 3, 5, 7)
+"""Every so many points of a curve are averaged; what the windows of chaos are made of."""
 
 FEWEST = 16
-"""Points that every part must have."""
+"""Points that every subsequence must have."""
 
 
-def dealt_parts_differ_by(section: Floats) -> Floats:
+def subsequence_spread(section: Floats) -> Floats:
     """Return how far the averages of every 2nd, 3rd, 5th and 7th point of a curve lie apart.
 
     A torus may cut the section in up to 16 curves, which are visited in turn. For each number of
-    curves the points of each are dealt into parts; averages over parts are weighted by
-    exp(-1/(t(1-t))) and differ by so many standard deviations of their curve. The number of curves
+    curves and each stride the points of a curve fall into subsequences; their averages are weighted
+    by exp(-1/(t(1-t))) and differ by so many standard deviations of the curve. The number of curves
     with the smallest difference counts.
 
     Parameters
@@ -42,17 +42,17 @@ def dealt_parts_differ_by(section: Floats) -> Floats:
     lanes, points, states = section.shape
     smallest = np.full(lanes, np.inf)
     for curves in range(1, LONGEST_PERIOD + 1):
-        if points < FEWEST * curves * max(PARTS):
+        if points < FEWEST * curves * max(STRIDES):
             break
         largest = np.zeros(lanes)
-        for parts in PARTS:
-            turns = points // (curves * parts)
-            dealt = section[:, -turns * curves * parts :]
-            dealt = dealt.reshape(lanes, turns, parts, curves, states)
+        for stride in STRIDES:
+            turns = points // (curves * stride)
+            dealt = section[:, -turns * curves * stride :]
+            dealt = dealt.reshape(lanes, turns, stride, curves, states)
             deviation = np.std(dealt, axis=(1, 2))
             averages = np.einsum("t,ltpcs->lpcs", smooth_weights(turns), dealt)
             apart = np.ptp(averages, axis=1)
-            # A coordinate at rest has no parts that could differ.
+            # A coordinate at rest has nothing that could differ.
             apart /= np.where(deviation > 0.0, deviation, 1.0)
             largest = np.maximum(largest, np.max(apart, axis=(1, 2)))
         smallest = np.minimum(smallest, largest)

@@ -17,7 +17,7 @@ MOST = 0.95
 _ANOTHER_ORBIT = 0.1
 
 
-class Motion(NamedTuple):
+class Solution(NamedTuple):
     """What one grid gives for some lanes.
 
     ``section`` (lanes, points, states), ``exponent`` (lanes,) or None where it was not computed,
@@ -45,8 +45,8 @@ class Difference(NamedTuple):
     changed: NDArray[np.bool_]
 
 
-def difference(one: Motion, other: Motion) -> Difference:
-    """Compare two motions lane by lane.
+def difference(one: Solution, other: Solution) -> Difference:
+    """Compare two solutions lane by lane.
 
     A lane moves in another way if its period is another one, if it diverged in one of the two
     only, or if the orbits of equal period lie further apart than a tenth of their size: then

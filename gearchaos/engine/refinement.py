@@ -6,11 +6,9 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from gearchaos_kernels import STATE_ROWS
 from numpy.typing import NDArray
 
-from gearchaos.configuration import Configuration
-from gearchaos.configuration.sweep_values import groups_at
+from gearchaos.configuration import Configuration, swept_values
 from gearchaos.dynamics.following import (
     STABILITY_LOSS_TEXTS,
     Losses,
@@ -18,11 +16,11 @@ from gearchaos.dynamics.following import (
     follow,
     loss_of_stability,
 )
-from gearchaos.engine.lanes import model
+from gearchaos.dynamics.systems import system_of
 from gearchaos.engine.running import run
-from gearchaos.engine.sweep_lanes import SweepLanes
 from gearchaos.errors import ConfigurationError, FileError
 from gearchaos.results.result import Result
+from gearchaos.results.variables import axis_name
 from gearchaos.results.stage_table import Stage, labelled_lanes
 
 Floats = NDArray[np.float64]
@@ -61,7 +59,7 @@ class Boundary(NamedTuple):
 
 
 class _Edges(NamedTuple):
-    """Lanes: their value, label, period and end state (lanes, 10)."""
+    """Lanes: their value, label, period and end state (lanes, states)."""
 
     values: Floats
     labels: NDArray[np.str_]
@@ -113,12 +111,16 @@ def refinable(result: Result, name: str) -> Configuration:
             "refine a sweep that starts otherwise"
         )
     steps = int(result.metadata.get("steps_per_period", config.integration.steps_per_period))
+    parameters = (sweep.parameter for sweep in config.sweeps.values())
+    fixed = {p: result.fixed[axis_name(p)] for p in parameters if axis_name(p) in result.fixed}
+    if fixed:
+        config = config.at(fixed)
     for key, value in {
         # The steps that were taken, not those from which they were chosen or raised.
         "integration.steps_per_period": steps,
         "integration.tolerance": None,
         "integration.error_check": 0.0,
-        "outputs.spectrum": False,
+        "outputs.exponents": False,
         "outputs.motion": True,
     }.items():
         config = config.replace(key, value)
@@ -187,19 +189,16 @@ def refined_boundaries(
 
 def _edges(result: Result) -> _Edges:
     lanes = labelled_lanes(result)
-    states = np.zeros((lanes.values.size, len(STATE_ROWS)))
-    states[:, [STATE_ROWS[name] for name in result["state"]]] = result["end_state"]
-    return _Edges(lanes.values, lanes.labels, lanes.period, states)
+    return _Edges(lanes.values, lanes.labels, lanes.period, result["end_state"])
 
 
 def _losses(
     config: Configuration, below: _Edges, above: _Edges, spacing: Floats
 ) -> list[tuple[str, complex]]:
     """Follow the orbits below a boundary upwards, and those above it downwards."""
-    sweep = SweepLanes(config)
     # Close to a bifurcation the label changes a little before or after it: one lane further.
-    upwards = _followed(sweep, below, above.values + spacing)
-    downwards = _followed(sweep, above, below.values - spacing)
+    upwards = _followed(config, below, above.values + spacing)
+    downwards = _followed(config, above, below.values - spacing)
     told = []
     for number in range(spacing.size):
         sides = [
@@ -215,19 +214,16 @@ def _losses(
     return told
 
 
-def _followed(sweep: SweepLanes, edge: _Edges, last: Floats) -> Losses:
-    first = edge.values
-    lowest, highest = sweep.values[0], sweep.values[-1]
+def _followed(config: Configuration, edge: _Edges, last: Floats) -> Losses:
+    first, parameter = edge.values, config.sweep.parameter
+    lowest, highest = swept_values(config.sweep)[[0, -1]]
     followed = follow(
-        sweep.scene,
-        lambda values: model(groups_at(sweep.config, values), values.size),
-        *sweep.harmonics(),
+        lambda values: system_of(config, {parameter: values}, config.needed_effects),
         edge.states,
         edge.period,
         first,
         np.clip(last, lowest, highest),
         float(np.min(np.abs(last - first))) * FOLLOWED_WIDTH,
-        sweep.plan.steps_per_period,
-        rederived=sweep.config.formulation == "rederived",
+        config.integration.steps_per_period,
     )
     return loss_of_stability(followed.stable.multipliers, followed.beyond.multipliers)

@@ -1,0 +1,56 @@
+"""From a configuration and values of its parameters to the system that the kernels integrate."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+
+import numpy as np
+from gearchaos_kernels import Effects, Groups, System
+from numpy.typing import NDArray
+
+from gearchaos.configuration import Configuration
+from gearchaos.configuration.sweep_values import groups_at
+
+Floats = NDArray[np.float64]
+
+
+def system_of(
+    config: Configuration, values: Mapping[str, Floats], effects: Collection[str] | None = None
+) -> System:
+    """Return the system of some lanes.
+
+    Parameters
+    ----------
+    config : Configuration
+    values : mapping of str to ndarray, shape (lanes,)
+        Value of each swept parameter in every lane.
+    effects : collection of str, optional
+        Effects that exist; by default those of the scene.
+    """
+    found = groups_at(config, values)
+    lanes = np.broadcast_shapes(*(np.shape(value) for value in values.values()))
+
+    def filled(name: str, absent: float = 0.0) -> Floats:
+        value = getattr(found, name)
+        return np.broadcast_to(absent if value is None else value, lanes).astype(np.float64)
+
+    multiple = filled("pitch_error")
+    # "5.86 e(tau)" multiplies mean and amplitude of one pitch error alike (eq. 14).
+    groups = {
+        "base_helix_angle": np.radians(filled("base_helix_angle_deg")),
+        "error_mean": multiple * filled("pitch_error_mean"),
+        "error_amplitude": multiple * filled("pitch_error_amplitude"),
+        "error_phase": np.radians(filled("pitch_error_phase_deg")),
+        "mass_ratio_p": filled("mass_ratio_p", absent=1.0),
+        "mass_ratio_g": filled("mass_ratio_g", absent=1.0),
+    }
+    groups |= {name: filled(name) for name in Groups._fields if name not in groups}
+    acting = config.scene.effects if effects is None else effects
+    cosine, sine = found.stiffness_cosine, found.stiffness_sine
+    return System(
+        Effects(**{effect: effect in acting for effect in Effects._fields}),
+        Groups(**groups),
+        np.zeros(0) if cosine is None else cosine,
+        np.zeros(0) if sine is None else sine,
+        rederived=config.formulation == "rederived",
+    )

@@ -1,0 +1,164 @@
+"""The time response: the motion at every step, after the transient."""
+
+from __future__ import annotations
+
+import time
+from typing import Any
+
+import numpy as np
+from gearchaos_kernels import Outcome, Status, System, mesh_motion
+from numpy.typing import NDArray
+from tqdm import tqdm
+
+from gearchaos.configuration import Configuration
+from gearchaos.engine.running import choose_threads, metadata, result_of
+from gearchaos.engine.simulation import Simulation
+from gearchaos.errors import ConfigurationError
+from gearchaos.results.response_variables import (
+    DEFAULT_PERIODS,
+    MESH_PERIOD,
+    NO_CONTACT_STATE,
+    acceleration_of,
+    response_variables,
+)
+from gearchaos.results.result import Result
+
+LARGEST_RESPONSE = 4 * 2**30
+"""Bytes that a response may take in memory."""
+
+
+def respond(
+    config: Configuration, periods: int = DEFAULT_PERIODS, threads: int | None = None
+) -> Result:
+    """Compute the motion at every step of the last mesh periods, for every value of the sweep.
+
+    Parameters
+    ----------
+    config : Configuration
+        From `load_config`; transient, recorded periods, start and scene are as configured.
+    periods : int
+        Mesh periods at the end of the recorded ones.
+    threads : int, optional
+        Threads to use; by default all that there are.
+
+    Returns
+    -------
+    Result
+        The variables of a sweep, and the motion along ``time``; its sections hold all states of
+        the scene in all recorded periods.
+
+    Raises
+    ------
+    ConfigurationError
+        If fewer periods are recorded, the motion does not fit into memory or there are not so many
+        threads.
+    """
+    choose_threads(threads)
+    simulation = prepared(config, periods)
+    simulation.choose_steps()
+    return compute_response(simulation, periods, config.text)
+
+
+def prepared(config: Configuration, periods: int) -> Simulation:
+    """Return the simulation of a response, of which the step may still be chosen.
+
+    Raises
+    ------
+    ConfigurationError
+        If fewer periods are recorded.
+    """
+    recorded = config.integration.recorded_periods
+    if not 1 <= periods <= recorded:
+        raise ConfigurationError(
+            f"{config.source}: periods = {periods}: must be between 1 and "
+            f"integration.recorded_periods = {recorded}; ask for fewer or record more"
+        )
+    # A scene whose axial pair acts on nothing that a sweep keeps is computed as a whole here.
+    whole = config.replace("outputs.section", config.scene.states)
+    return Simulation(whole.replace("outputs.section_points", recorded))
+
+
+def compile_response(simulation: Simulation) -> None:
+    """Compile the kernel that keeps the motion of this scene, or load it from the cache."""
+    plan = simulation.plan._replace(
+        transient_periods=0, recorded_periods=1, section_points=0, history_periods=1
+    )
+    lanes = np.arange(simulation.lanes.starts)
+    _, outcome = simulation.integrate(lanes, plan)
+    _motion(simulation.lanes.system_of(lanes), outcome, plan.steps_per_period)
+
+
+def compute_response(simulation: Simulation, periods: int, text: str) -> Result:
+    """Compute all lanes.
+
+    Parameters
+    ----------
+    simulation : Simulation
+        From `prepared`.
+    periods : int
+        Mesh periods at the end of the recorded ones that are kept.
+    text : str
+        The configuration as it was written.
+
+    Raises
+    ------
+    ConfigurationError
+        If the motion does not fit into memory.
+    """
+    _check_size(simulation, periods)
+    began = time.monotonic()
+    lanes = np.arange(len(simulation.lanes))
+    plan = simulation.recording._replace(history_periods=periods)
+    start, outcome = simulation.integrate(lanes, plan)
+    system = simulation.lanes.system_of(lanes)
+    arrays = {
+        **simulation.arrays(lanes, start, outcome),
+        MESH_PERIOD: system.mesh_period,
+        **_motion(system, outcome, plan.steps_per_period),
+    }
+    variables = response_variables(
+        simulation.lanes.axes,
+        states=system.states,
+        periods=periods,
+        steps_per_period=plan.steps_per_period,
+        axial=system.effects.axial,
+    )
+    facts = {
+        **metadata(simulation, time.monotonic() - began),
+        "kind": "response",
+        "response_periods": periods,
+        "configuration": text,
+    }
+    return result_of(simulation, [arrays], facts, variables)
+
+
+def _check_size(simulation: Simulation, periods: int) -> None:
+    plan, states, lanes = simulation.plan, len(simulation.lanes.states), len(simulation.lanes)
+    samples = periods * plan.steps_per_period + 1
+    size = 8 * lanes * states * (3 * samples + plan.section_points)
+    if size > LARGEST_RESPONSE:
+        most, wanted = (tqdm.format_sizeof(s, "B", 1024) for s in (LARGEST_RESPONSE, size))
+        raise ConfigurationError(
+            f"{simulation.config.source}: the response of {lanes} lanes over {periods} "
+            f"mesh periods of {plan.steps_per_period} steps takes {wanted}, more than "
+            f"{most}; ask for fewer periods or values"
+        )
+
+
+def _motion(system: System, outcome: Outcome, steps_per_period: int) -> dict[str, NDArray[Any]]:
+    assert outcome.history is not None
+    found = mesh_motion(system, outcome.history, steps_per_period)
+    motion: dict[str, NDArray[Any]] = {
+        name: outcome.history[..., column].copy() for column, name in enumerate(system.states)
+    }
+    for column, name in enumerate(system.states[::2]):
+        motion[acceleration_of(name)] = found.accelerations[..., column].copy()
+    motion["mesh_force_tangential"] = found.force_tangential
+    motion["contact_tangential"] = found.contact_tangential
+    if system.effects.axial:
+        motion["mesh_force_axial"] = found.force_axial
+        motion["contact_axial"] = found.contact_axial
+    for values in motion.values():
+        nothing = NO_CONTACT_STATE if values.dtype == np.uint8 else np.nan
+        values[outcome.status != Status.OK] = nothing
+    return motion

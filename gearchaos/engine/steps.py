@@ -1,0 +1,216 @@
+"""The number of steps per mesh period of a sweep: stable in every lane, and fine enough."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+from gearchaos_kernels import Outcome, Plan, Status, System, integrate
+from numpy.typing import NDArray
+
+from gearchaos.configuration.messages import Fault
+from gearchaos.dynamics.stability import StabilityLimit, stability_limit
+from gearchaos.engine.lanes import Lanes
+from gearchaos.errors import ConfigurationError
+from gearchaos.interrupts import check
+from gearchaos.records.difference import Solution, bound, difference
+from gearchaos.records.lyapunov import largest_exponent
+from gearchaos.records.period import POINTS_NEEDED
+
+LANES_AT_ONCE = 2**14
+"""Lanes whose stability is looked at together."""
+
+PILOT_LANES = 48
+"""Lanes on which the error is measured, spread evenly over the sweep."""
+
+PILOT_PERIODS = 150
+"""Mesh periods in which a lane settles on its grid, and as many that are compared."""
+
+MOST_STEPS = 25_600
+"""Finest grid of the search."""
+
+
+class Candidate(NamedTuple):
+    """A number of steps per period and what was measured for it against a grid four times finer.
+
+    ``section_error``, ``exponent_error``: not exceeded by 95 % of the lanes that move periodically
+    on all three grids, the ``periodic_share`` of them; ``changed_share``: share of the lanes that
+    move in another way.
+    """
+
+    steps: int
+    section_error: float
+    exponent_error: float
+    changed_share: float
+    periodic_share: float
+
+    @property
+    def error(self) -> float:
+        """The larger of the two errors; NaN counts as no error only where nothing is periodic."""
+        return float(np.nanmax([self.section_error, self.exponent_error, 0.0]))
+
+
+def stable_steps(lanes: Lanes, steps: int) -> tuple[int, str]:
+    """Return a number of steps with which the method does not blow up, and what to say of it.
+
+    Raises
+    ------
+    ConfigurationError
+        If so many steps are unstable in some lanes and may not be raised.
+    """
+    limits = list(_limits(lanes, steps))
+    if not limits:
+        return steps, ""
+    worst = max(limits, key=lambda limit: limit.steps)
+    unstable = np.concatenate([limit.lanes for limit in limits])
+    if lanes.config.integration.unstable == "refuse":
+        raise ConfigurationError(_fault(lanes, worst, unstable, steps).text(lanes.config.source))
+    return worst.steps, (
+        f"integration.steps_per_period raised from {steps} to {worst.steps}, the stability limit "
+        f"of {unstable.size * lanes.starts} of {len(lanes)} lanes"
+    )
+
+
+def _limits(lanes: Lanes, steps: int) -> Iterator[StabilityLimit]:
+    # The starts of one value share its system.
+    every = np.arange(0, len(lanes), lanes.starts)
+    for first in range(0, every.size, LANES_AT_ONCE):
+        some = every[first : first + LANES_AT_ONCE]
+        limit = stability_limit(lanes.system_of(some), steps)
+        if limit is not None:
+            yield replace(limit, lanes=some[limit.lanes])
+
+
+def _fault(lanes: Lanes, worst: StabilityLimit, unstable: NDArray[np.intp], steps: int) -> Fault:
+    places = []
+    for parameter, values in lanes.values_of(unstable).items():
+        low, high = np.min(values), np.max(values)
+        places.append(
+            f"{parameter} " + (f"= {low:.6g}" if low == high else f"from {low:.6g} to {high:.6g}")
+        )
+    imaginary = abs(worst.eigenvalue.imag)
+    pair = f" ± {imaginary:.3g}i" if imaginary > 0.0 else ""
+    return Fault(
+        "integration.steps_per_period",
+        f"RK4 is unstable below {worst.steps} steps per period for {unstable.size * lanes.starts} "
+        f"of {len(lanes)} lanes ({', '.join(places)}), because of the eigenvalue "
+        f"{worst.eigenvalue.real:.3g}{pair} of the {worst.owner}",
+        f'raise it to {worst.steps} or more, or set integration.unstable = "raise"',
+        steps,
+    )
+
+
+def solution_of(outcome: Outcome, system: System, kept: Sequence[str]) -> Solution:
+    """Return of integrated lanes what tells two grids apart, by the section of the kept states."""
+    exponent = None
+    if outcome.growth is not None:
+        exponent, _ = largest_exponent(outcome.growth, system.mesh_period)
+    columns = [system.states.index(name) for name in kept]
+    return Solution(outcome.section[..., columns], exponent, outcome.status != Status.OK)
+
+
+def pilot(
+    lanes: Lanes, plan: Plan, count: int, finest: int
+) -> tuple[int, Callable[[int, bool], Solution]]:
+    """Prepare to integrate some lanes of a sweep on several grids, to compare them.
+
+    Parameters
+    ----------
+    lanes : Lanes
+    plan : Plan
+        Of the sweep.
+    count : int
+        Lanes wanted, spread evenly over the sweep.
+    finest : int
+        Steps per period of the transient that all grids go on from, so that a lane comes to
+        the same one of several coexisting motions on each of them.
+
+    Returns
+    -------
+    count : int
+        Number of lanes that there are.
+    solution : callable
+        ``solution(steps, resolved)`` settles on that grid and returns the `Solution`.
+    """
+    numbers = lanes.spread(count)
+    system = lanes.system_of(numbers)
+    settling = Plan(finest, plan.transient_periods, 0, section_points=0)
+    check()
+    common = integrate(system, lanes.start_of(numbers), settling).end_state
+
+    def solution(steps: int, resolved: bool) -> Solution:
+        check()
+        grid = plan._replace(
+            steps_per_period=steps,
+            transient_periods=PILOT_PERIODS,
+            recorded_periods=PILOT_PERIODS,
+            section_points=min(POINTS_NEEDED, PILOT_PERIODS),
+            resolved=resolved,
+        )
+        return solution_of(integrate(system, common, grid), system, lanes.config.outputs.section)
+
+    return numbers.size, solution
+
+
+def choose_steps(
+    solution: Callable[[int], Solution], coarsest: int, tolerance: float, source: str
+) -> list[Candidate]:
+    """Double the steps until the error is small enough; the last candidate is the one to take.
+
+    Parameters
+    ----------
+    solution : callable
+        Integrates the pilot lanes with so many steps per period, from one common state.
+    coarsest : int
+        First number of steps tried.
+    tolerance : float
+        Largest error of section and exponent.
+    source : str
+        What a message calls the configuration.
+
+    Raises
+    ------
+    ConfigurationError
+        If the tolerance is not reached, with what was reached, or if no lane moves periodically.
+    """
+    found: dict[int, Solution] = {}
+    candidates: list[Candidate] = []
+    steps = coarsest
+    while 4 * steps <= MOST_STEPS:
+        for grid in (steps, 2 * steps, 4 * steps):
+            if grid not in found:
+                found[grid] = solution(grid)
+        candidates.append(_candidate(steps, found))
+        if np.isnan(candidates[-1].section_error):
+            raise ConfigurationError(
+                f"{source}: integration.tolerance = {tolerance:g}: none of the lanes that were "
+                "tried moves periodically, so that no error can be measured; give "
+                "integration.steps_per_period alone"
+            )
+        if candidates[-1].error <= tolerance:
+            return candidates
+        steps *= 2
+    reached = (
+        f"{candidates[-1].error:.1e} with {candidates[-1].steps} steps per period"
+        if candidates
+        else "nothing, integration.steps_per_period is too large to begin with"
+    )
+    raise ConfigurationError(
+        f"{source}: integration.tolerance = {tolerance:g}: is not reached, but {reached}; ask for "
+        "less" + ("" if candidates else " steps")
+    )
+
+
+def _candidate(steps: int, found: dict[int, Solution]) -> Candidate:
+    coarse = difference(found[steps], found[4 * steps])
+    middle = difference(found[2 * steps], found[4 * steps])
+    periodic = (coarse.period > 0) & (middle.period > 0)
+    return Candidate(
+        steps,
+        bound(coarse.section_error[periodic]),
+        bound(coarse.exponent_error[periodic]),
+        float(np.mean(coarse.changed)),
+        float(np.mean(periodic)),
+    )

@@ -1,0 +1,368 @@
+"""One gear pair at one point of operation, and what a dynamicist asks of it.
+
+>>> import gearchaos
+>>> system = gearchaos.System("sweeps/pan2021.toml", pitch_error=10.75)
+>>> system.orbit(period=2).multipliers
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from typing import NamedTuple, Self
+
+import gearchaos_kernels as kernels
+import numpy as np
+from gearchaos_kernels import Plan, Status
+from numpy.typing import NDArray
+
+from gearchaos.configuration import Configuration, load_config
+from gearchaos.configuration.sweep_values import SWEEPABLE_GROUPS, SWEEPABLE_KEYS
+from gearchaos.dynamics.exponents import exponents, sum_of_exponents
+from gearchaos.dynamics.following import (
+    STABILITY_LOSS_TEXTS,
+    StabilityLoss,
+    follow,
+    loss_of_stability,
+)
+from gearchaos.dynamics.orbits import Orbits, orbit_exponent, polish
+from gearchaos.dynamics.stability import fewest_stable_steps
+from gearchaos.dynamics.systems import system_of
+from gearchaos.engine.response import DEFAULT_PERIODS, respond
+from gearchaos.engine.starts import start_states
+from gearchaos.errors import ConfigurationError
+from gearchaos.records.amplitude_spectrum import SpectralLines, spectral_lines
+from gearchaos.results.result import Result
+from gearchaos.results.variables import axis_name
+
+Floats = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+
+class Trajectory(NamedTuple):
+    """A motion: ``time`` (samples,) in mesh periods, ``states`` (samples, states) of eq. 13."""
+
+    time: Floats
+    states: Floats
+
+
+class Orbit(NamedTuple):
+    """A periodic orbit.
+
+    ``period`` in mesh periods; ``point`` (states,) at mesh phase 0; ``multipliers`` (states,): the
+    Floquet multipliers, largest modulus first; ``exponent``: the largest Lyapunov exponent per unit
+    of tau; ``residual``: distance after one period, relative to the scale of each coordinate.
+    """
+
+    period: int
+    point: Floats
+    multipliers: Complex
+    exponent: float
+    residual: float
+
+    @property
+    def stable(self) -> bool:
+        """Whether all multipliers lie inside the unit circle."""
+        return bool(abs(self.multipliers[0]) < 1.0)
+
+
+class Branch(NamedTuple):
+    """How far an orbit goes along a parameter.
+
+    ``value``, ``orbit``: the last value at which it is stable, and the orbit there; ``beyond``: the
+    first value at which it is unstable or not found, the end of the way if it stays stable;
+    ``loss``, ``text``: how it loses stability; ``multiplier``: the one that tells.
+    """
+
+    value: float
+    orbit: Orbit
+    beyond: float
+    loss: StabilityLoss
+    text: str
+    multiplier: complex
+
+
+class LyapunovExponents(NamedTuple):
+    """All exponents per unit of tau, largest first, their standard errors, and their exact sum."""
+
+    values: Floats
+    standard_errors: Floats
+    exact_sum: float
+
+
+class System:
+    """A gear pair with all its parameters fixed.
+
+    Parameters
+    ----------
+    config : Configuration or path
+        Scene, start and integration; what it sweeps is fixed here.
+    at : mapping of str to float, optional
+        Parameters by their paths, such as ``{"operation.speed_rpm": 12000.0}``.
+    **groups : float
+        Dimensionless groups by their names, such as ``pitch_error=10.75``.
+
+    Attributes
+    ----------
+    state : ndarray, shape (states,)
+        Where motions start unless another state is given: as the configuration says, or where the
+        lane of a result ended.
+
+    Raises
+    ------
+    ConfigurationError
+        If a swept parameter is left open, or a parameter is unknown or out of its range.
+    """
+
+    def __init__(
+        self,
+        config: Configuration | str | os.PathLike[str],
+        at: Mapping[str, float] | None = None,
+        **groups: float,
+    ) -> None:
+        if not isinstance(config, Configuration):
+            config = load_config(config)
+        values = {name: float(value) for name, value in {**(at or {}), **groups}.items()}
+        for name in values:
+            if name not in SWEEPABLE_GROUPS and name not in SWEEPABLE_KEYS:
+                raise ConfigurationError(
+                    f"{config.source}: {name}: is no parameter of a system; the groups are "
+                    f"{', '.join(SWEEPABLE_GROUPS)}, the physical keys {', '.join(SWEEPABLE_KEYS)}"
+                )
+        for sweep in config.sweeps.values():
+            if sweep.parameter not in values and sweep.count != 1:
+                raise ConfigurationError(
+                    f"{config.source}: {sweep.parameter}: is swept, and a system has one value of "
+                    f"it; give {sweep.parameter}, such as System(config, at="
+                    f'{{"{sweep.parameter}": ...}})'
+                )
+        self.config = config.at(values)
+        self._record = self._at({})
+        self.state = start_states(self.config, self._record, np.zeros(1, dtype=np.intp))[0]
+
+    @classmethod
+    def of_lane(cls, result: Result, **coordinates: float) -> Self:
+        """Return the system of one lane of a result; it starts where the lane ended.
+
+        Parameters
+        ----------
+        result : Result
+            Of a sweep or a response, with its configuration.
+        **coordinates : float
+            One for each axis of the result, by its name; the nearest lane is taken.
+
+        Raises
+        ------
+        ConfigurationError
+            If a coordinate is missing or of no axis.
+        """
+        missing = [axis for axis in result.axes if axis not in coordinates]
+        if missing:
+            raise ConfigurationError(f"give a value of {', '.join(missing)}, an axis of the result")
+        lane = result.sel(method="nearest", **coordinates)
+        text = str(lane.metadata["configuration_resolved"])
+        config = Configuration.from_toml(text, "configuration of the result")
+        config = config.replace("integration.tolerance", None)
+        config = config.replace(
+            "integration.steps_per_period", int(lane.metadata["steps_per_period"])
+        )
+        parameters = (sweep.parameter for sweep in config.sweeps.values())
+        system = cls(config, {p: lane.fixed[axis_name(p)] for p in parameters})
+        ended = dict(zip(lane["state"].tolist(), lane["end_state"], strict=True))
+        system.state = np.array([ended.get(name, 0.0) for name in system.states])
+        return system
+
+    @property
+    def states(self) -> tuple[str, ...]:
+        """Names of the states."""
+        return self._record.states
+
+    @property
+    def groups(self) -> dict[str, float]:
+        """The dimensionless groups as the kernels take them, angles in rad."""
+        return {name: float(value[0]) for name, value in self._record.groups._asdict().items()}
+
+    @property
+    def mesh_period(self) -> float:
+        """2 pi / Omega in units of tau."""
+        return float(self._record.mesh_period[0])
+
+    def __repr__(self) -> str:
+        effects = ", ".join(self.config.scene.effects) or "no effects"
+        return f"<System {self.config.title!r}: {len(self.states)} states, {effects}>"
+
+    def integrate(
+        self, periods: int, transient: int = 0, start: Floats | None = None
+    ) -> Trajectory:
+        """Integrate the motion and keep every step.
+
+        Parameters
+        ----------
+        periods : int
+            Mesh periods that are kept.
+        transient : int
+            Mesh periods before them.
+        start : ndarray, shape (states,), optional
+            At mesh phase 0; by default `state`.
+
+        Raises
+        ------
+        ConfigurationError
+            If the motion leaves the range of numbers.
+        """
+        plan = self._plan._replace(
+            transient_periods=transient, recorded_periods=periods, history_periods=periods
+        )
+        outcome = kernels.integrate(self._record, self._start(start), plan)
+        if outcome.status[0] != Status.OK or outcome.history is None:
+            raise ConfigurationError(
+                f"{self.config.source}: the motion {kernels.STATUS_TEXTS[Status.DIVERGED]} in mesh "
+                f"period {outcome.diverged_period[0]}; raise integration.steps_per_period or check "
+                "the load and the start state"
+            )
+        states = outcome.history[0]
+        return Trajectory(np.arange(states.shape[0]) / plan.steps_per_period, states)
+
+    def response(self, periods: int = DEFAULT_PERIODS) -> Result:
+        """Compute the motion after the configured transient, with accelerations and mesh forces.
+
+        The lane starts at `state`; see `gearchaos.respond` for what the result holds.
+        """
+        state = dict(zip(self.states, self.state.tolist(), strict=True))
+        start = {"kind": "given", "state": state}
+        return respond(self.config.replace("start", start), periods)
+
+    def orbit(self, period: int = 1, guess: Floats | None = None) -> Orbit:
+        """Find the periodic orbit that a motion settles on, or the one next to a guess.
+
+        Parameters
+        ----------
+        period : int
+            In mesh periods.
+        guess : ndarray, shape (states,), optional
+            A state close to the orbit at mesh phase 0; by default the state after the configured
+            transient.
+
+        Raises
+        ------
+        ConfigurationError
+            If there is no orbit of this period next to the guess.
+        """
+        if guess is None:
+            transient = max(self.config.integration.transient_periods, 1)
+            guess = self.integrate(1, transient=transient - 1).states[-1]
+        found = polish(
+            self._record, np.atleast_2d(guess), np.array([period], np.int32), self._steps
+        )
+        if not found.converged[0]:
+            raise ConfigurationError(
+                f"{self.config.source}: no orbit of {period} mesh periods next to the guess; give "
+                "another period or guess, or a longer integration.transient_periods"
+            )
+        return self._orbit(found, period)
+
+    def follow(
+        self, orbit: Orbit, parameter: str, first: float, last: float, width: float = 1e-4
+    ) -> Branch:
+        """Follow an orbit along a parameter to where it loses stability.
+
+        Parameters
+        ----------
+        orbit : Orbit
+            At the first value.
+        parameter : str
+            A group by its name, or a physical key by its path.
+        first, last : float
+            Values of the parameter at both ends of the way, in either order.
+        width : float
+            Wanted distance of the last stable value and the one beyond it.
+        """
+        period = np.array([orbit.period], np.int32)
+        followed = follow(
+            lambda values: self._at({parameter: values}),
+            np.atleast_2d(orbit.point),
+            period,
+            np.array([float(first)]),
+            np.array([float(last)]),
+            width,
+            self._steps,
+        )
+        losses = loss_of_stability(followed.stable.multipliers, followed.beyond.multipliers)
+        loss = StabilityLoss(int(losses.kind[0]))
+        return Branch(
+            float(followed.stable_value[0]),
+            self._orbit(followed.stable, orbit.period),
+            float(followed.beyond_value[0]),
+            loss,
+            STABILITY_LOSS_TEXTS[loss],
+            complex(losses.multiplier[0]),
+        )
+
+    def exponents(self, start: Floats | None = None) -> LyapunovExponents:
+        """Compute all Lyapunov exponents over the configured record, after its transient."""
+        found = exponents(self._record, self._start(start), self._plan)
+        return LyapunovExponents(
+            found.values[0], found.standard_errors[0], float(sum_of_exponents(self._record)[0])
+        )
+
+    def spectrum(self, state: str = "delta_5", periods: int = 64) -> SpectralLines:
+        """Return the amplitude spectrum of a state after the configured transient.
+
+        Parameters
+        ----------
+        state : str
+            One of `states`.
+        periods : int
+            Mesh periods of the record: lines are one over so many mesh frequencies apart.
+        """
+        motion = self.integrate(periods, transient=self.config.integration.transient_periods)
+        values = motion.states[:-1, self.states.index(state)]
+        return spectral_lines(values, self._steps)
+
+    def stability_limit(self) -> int:
+        """Return the fewest steps per mesh period with which the integration is stable."""
+        return int(fewest_stable_steps(self._record)[0])
+
+    def mesh_motion(self, motion: Trajectory) -> kernels.MeshMotion:
+        """Return mesh forces, contact and accelerations along a motion from `integrate` (eq. 13).
+
+        Every array has the shape (samples,), accelerations (samples, coordinates).
+        """
+        found = kernels.mesh_motion(self._record, motion.states[np.newaxis], self._steps)
+        return kernels.MeshMotion(*(array[0] for array in found))
+
+    @property
+    def _steps(self) -> int:
+        return self.config.integration.steps_per_period
+
+    @property
+    def _plan(self) -> Plan:
+        integration = self.config.integration
+        return Plan(
+            integration.steps_per_period,
+            integration.transient_periods,
+            integration.recorded_periods,
+            section_points=0,
+            resolved=integration.crossings == "resolved",
+        )
+
+    def _at(self, values: Mapping[str, Floats]) -> kernels.System:
+        fixed = self.config.sweep
+        assert fixed.from_ is not None, "the configuration of a system sweeps one value"
+        own = {fixed.parameter: np.array([fixed.from_])}
+        return system_of(self.config, {**own, **values})
+
+    def _start(self, start: Floats | None) -> Floats:
+        return np.atleast_2d(self.state if start is None else np.asarray(start, dtype=np.float64))
+
+    def _orbit(self, found: Orbits, period: int) -> Orbit:
+        exponent = orbit_exponent(
+            found.multipliers, np.array([period], np.int32), self._record.mesh_period
+        )
+        return Orbit(
+            period,
+            found.points[0],
+            found.multipliers[0],
+            float(exponent[0]),
+            float(found.residual[0]),
+        )
