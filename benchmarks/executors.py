@@ -2,7 +2,7 @@
 
     python benchmarks/executors.py [--rounds 3] [--output executors.json]
 
-The same sweep is computed into a store of shards by each executor with each size of blocks. All
+The same sweep is computed into a store of blocks by each executor with each size of blocks. All
 executors have the same cores: one worker has all threads, two have half of them each. Rounds visit
 every contestant in turn; times are medians, ratios medians of the ratios within a round to the
 fastest size of blocks in this process. Starting the workers is not counted, and told apart.
@@ -42,7 +42,7 @@ def main() -> None:
     simulation.compile()
     began = time.perf_counter()
     with (
-        LocalExecutor(simulation, [], {}) as here,
+        LocalExecutor(simulation) as here,
         DaskExecutor(simulation, "local:1", quiet=True) as one,
         DaskExecutor(simulation, "local:2", quiet=True) as two,
     ):
@@ -64,15 +64,12 @@ def main() -> None:
 
 
 def seconds_of(simulation: Simulation, executor: BlockExecutor, size: int) -> float:
-    """Compute the sweep in blocks of so many lanes, to the last shard on the disk."""
-    blocks = [
-        (first, min(first + size, simulation.lanes)) for first in range(0, simulation.lanes, size)
-    ]
+    """Compute the sweep in blocks of so many lanes, to the last block on the disk."""
     with tempfile.TemporaryDirectory() as folder:
         output = str(Path(folder) / "sweep.h5")
         with open_store(simulation, output, resume=False) as store:
             began = time.perf_counter()
-            compute_blocks(executor, blocks, lambda block, arrays: store.write(*block, arrays))
+            compute_blocks(executor, simulation.blocks(size), lambda block, arrays: store.write(*block, arrays))
             return time.perf_counter() - began
 
 

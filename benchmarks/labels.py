@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from gearchaos_kernels import STATE_ROWS
+from gearchaos_kernels import integrate
 from machine import machine_facts, print_machine
 
 import gearchaos
@@ -111,7 +111,7 @@ def main() -> None:
         sets[name] = judged(gearchaos.load_config(SWEEPS / f"{file}.toml", overrides))
         counts = {row: int(np.sum(sets[name].truths == row)) for row in ROWS}
         print(f"{name}: " + ", ".join(f"{n} {row}" for row, n in counts.items() if n))
-    whole = Judged(*(np.concatenate(parts) for parts in zip(*sets.values(), strict=True)))
+    whole = Judged(*(np.concatenate(columns) for columns in zip(*sets.values(), strict=True)))
     matrix = confusion(whole)
     _print(matrix)
     scores = {
@@ -147,10 +147,8 @@ def judged(config: gearchaos.Configuration) -> Judged:
     """Label the lanes of a sweep and tell their motion in another way."""
     result = gearchaos.run(config)
     steps = FINER * config.integration.steps_per_period
-    lanes = Simulation(config.replace("integration.steps_per_period", steps))
-    start = np.zeros((lanes.lanes, len(STATE_ROWS)))
-    start[:, [STATE_ROWS[name] for name in result["state"]]] = result["end_state"]
-    truths, true_periods = told(lanes, start)
+    simulation = Simulation(config.replace("integration.steps_per_period", steps))
+    truths, true_periods = told(simulation, result["end_state"])
     return Judged(
         result[result.axis],
         np.array(MEANINGS)[result["motion"]],
@@ -160,32 +158,21 @@ def judged(config: gearchaos.Configuration) -> Judged:
     )
 
 
-def told(lanes: Simulation, start: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def told(simulation: Simulation, start: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Tell the motion of every lane from a long run at fine steps."""
-    numbers = np.arange(lanes.lanes)
-    columns = [STATE_ROWS[name] for name in lanes.states]
-    recorded = lanes.plan.recorded_periods
-    plan = lanes.plan._replace(
+    numbers = np.arange(len(simulation.lanes))
+    system, recorded = simulation.lanes.system_of(numbers), simulation.plan.recorded_periods
+    plan = simulation.plan._replace(
         transient_periods=0,
-        recorded_periods=LONGER * (lanes.plan.transient_periods + recorded),
+        recorded_periods=LONGER * (simulation.plan.transient_periods + recorded),
         section_points=POINTS,
-        section_states=tuple(lanes.states),
     )
-    outcome = lanes.integrate(numbers, start, plan)
+    outcome = integrate(system, start, plan)
     period = _recurrence(outcome.section)
-    orbits = polish(
-        lanes.scene,
-        lanes.model_of(numbers),
-        *lanes.harmonics(),
-        outcome.end_state,
-        period,
-        plan.steps_per_period,
-        rederived=lanes.config.formulation == "rederived",
-    )
-    stable = orbits.stable
+    stable = polish(system, outcome.end_state, period, plan.steps_per_period).stable
     growth, error = _growth(outcome.growth[:, -LONGER * recorded :])
-    arrived = _distance(start[:, columns], outcome.section[:, -LONGEST:]) < ARRIVED
-    truths = np.full(lanes.lanes, NOT_TOLD, dtype="U20")
+    arrived = _distance(start, outcome.section[:, -LONGEST:]) < ARRIVED
+    truths = np.full(numbers.size, NOT_TOLD, dtype="U20")
     for lane in numbers:
         if stable[lane]:
             truths[lane] = "periodic" if period[lane] <= 16 else LONG_PERIOD

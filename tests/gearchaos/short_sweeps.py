@@ -3,11 +3,11 @@
 from pathlib import Path
 
 import numpy as np
-from gearchaos_kernels import STATE_ROWS, Scene, integrate
+from gearchaos_kernels import integrate
 
 from gearchaos.configuration import load_config
-from gearchaos.engine.lanes import model, select, start_states
-from gearchaos.engine.simulation import Simulation, compute_all
+from gearchaos.engine.executors import LocalExecutor, compute_blocks
+from gearchaos.engine.simulation import Simulation
 
 PAN2021 = Path(__file__).resolve().parents[2] / "sweeps" / "pan2021.toml"
 SPEEDS = PAN2021.with_name("mesh_frequency.toml")
@@ -28,8 +28,6 @@ SHORT = (
     "outputs.section_points=8",
     "sweep.count=13",
 )
-STATES = ("delta_5", "delta_5_rate", "delta_1", "delta_1_rate", "delta_2", "delta_2_rate")
-COLUMNS = [STATE_ROWS[name] for name in STATES]
 RANDOM = ("start.kind=random", "start.seed=5", "start.count=3", "start.spread=0.7")
 
 
@@ -39,19 +37,25 @@ def simulation(*overrides: str) -> Simulation:
 
 def blocks(sweep: Simulation, values: int) -> list[tuple[int, int]]:
     """Return the bounds of blocks of so many swept values, in the order of computation."""
-    size = values * sweep.starts
-    bounds = ((first, min(first + size, sweep.lanes)) for first in range(0, sweep.lanes, size))
-    return sweep.in_order(bounds)
+    return sweep.blocks(values * sweep.lanes.starts)
 
 
 def computed(sweep: Simulation, values: int = 13) -> dict[str, np.ndarray]:
     """Compute a whole sweep in blocks and join their arrays in the order of the lanes."""
-    return joined(dict(compute_all(sweep, blocks(sweep, values))))
+    return joined(computed_blocks(sweep, blocks(sweep, values)))
 
 
-def joined(parts: dict) -> dict[str, np.ndarray]:
-    in_order = [parts[bounds] for bounds in sorted(parts)]
-    return {name: np.concatenate([part[name] for part in in_order]) for name in in_order[0]}
+def computed_blocks(sweep: Simulation, bounds: list, finished: dict | None = None) -> dict:
+    """Compute some blocks, given those that are finished, by their bounds."""
+    kept: dict = {}
+    with LocalExecutor(sweep, finished or {}) as executor:
+        compute_blocks(executor, bounds, kept.__setitem__)
+    return kept
+
+
+def joined(found: dict) -> dict[str, np.ndarray]:
+    in_order = [found[bounds] for bounds in sorted(found)]
+    return {name: np.concatenate([block[name] for block in in_order]) for name in in_order[0]}
 
 
 def assert_same(one: dict[str, np.ndarray], other: dict[str, np.ndarray]) -> None:
@@ -61,22 +65,18 @@ def assert_same(one: dict[str, np.ndarray], other: dict[str, np.ndarray]) -> Non
 
 
 def starts_of(sweep: Simulation, first: int = 0, last: int | None = None) -> np.ndarray:
-    numbers = np.arange(first, sweep.lanes if last is None else last)
-    lane_model = model(select(sweep.groups, numbers // sweep.starts), numbers.size)
-    return start_states(sweep.config, lane_model, numbers)
+    return sweep.lanes.start_of(np.arange(first, len(sweep.lanes) if last is None else last))
 
 
-def kernel(sweep: Simulation, value: int, start: np.ndarray) -> np.ndarray:
-    """Integrate one value of the sweep by hand and return its end state."""
-    outcome = integrate(
-        Scene(axial=False),
-        model(select(sweep.groups, np.array([value])), 1),
-        np.asarray(sweep.groups.stiffness_cosine),
-        np.asarray(sweep.groups.stiffness_sine),
-        start[np.newaxis],
-        sweep.plan,
-    )
-    return outcome.end_state[0]
+def kernel(sweep: Simulation, lane: int, start: np.ndarray) -> np.ndarray:
+    """Integrate one lane of the sweep by hand and return its end state."""
+    system = sweep.lanes.system_of(np.array([lane]))
+    return integrate(system, start[np.newaxis], sweep.plan).end_state[0]
+
+
+def values_of(sweep: Simulation) -> np.ndarray:
+    """Return the value of the swept parameter in every lane."""
+    return sweep.lanes.values_of(np.arange(len(sweep.lanes)))[sweep.config.sweep.parameter]
 
 
 def listing(folder: Path, parameter: str, values: list[float], *overrides: str) -> Simulation:

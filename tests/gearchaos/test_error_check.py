@@ -28,8 +28,8 @@ def test_the_share_of_lanes_is_checked_spread_evenly(share, count):
 
 def test_which_lanes_are_checked_does_not_depend_on_blocks():
     whole = checked_lanes(0, 100, 0.3)
-    parts = [7 * n + checked_lanes(7 * n, min(7 * n + 7, 100), 0.3) for n in range(15)]
-    assert np.array_equal(np.concatenate(parts), whole)
+    blocks = [7 * n + checked_lanes(7 * n, min(7 * n + 7, 100), 0.3) for n in range(15)]
+    assert np.array_equal(np.concatenate(blocks), whole)
 
 
 @pytest.mark.parametrize("carry", ["none", "upwards", "downwards"])

@@ -63,7 +63,7 @@ SLOW_TORI = "sweep={parameter='mesh_frequency', values=[1.121, 1.15, 1.424]}"
 def test_a_rotation_slower_than_its_record_is_resolved_by_a_longer_one():
     sweep = Simulation(load_config(SPEEDS, (SLOW_TORI, *SOFT_BEARINGS)))
     lanes = np.arange(3)
-    outcome = sweep.integrate(lanes, sweep.start_of(lanes), sweep.recording)
+    _, outcome = sweep.integrate(lanes, sweep.recording)
     record = Record(outcome.section, outcome.growth, lanes < 0, lanes >= 0)
     assert label(record).motion.tolist() == [UNRESOLVED, QUASI_PERIODIC, UNRESOLVED]
     arrays = computed(sweep, 3)

@@ -10,7 +10,6 @@ import pytest
 import xarray as xr
 
 from gearchaos import ConfigurationError, Result, load_config, open_result, respond
-from gearchaos.engine.response_run import ResponseRun
 from gearchaos.response import main
 
 from .commands import run_module, same_data
@@ -87,9 +86,7 @@ def test_only_the_lane_that_hammers_loses_contact_and_reaches_the_back_flank(res
 
 def test_the_response_is_the_sweep_with_its_motion(result):
     """Labels, exponents, sections and end states are those of the same lanes in a sweep."""
-    run = ResponseRun(load_config(FULL, at(0.2, 12.97)), 1)
-    shorter = run.result()
-    assert run.lanes == 2
+    shorter = respond(load_config(FULL, at(0.2, 12.97)), 1)
     assert set(shorter.names) == set(result.names)
     for name in set(result.names) - {"time"}:
         if "time" not in result.dims(name):
@@ -115,9 +112,9 @@ def test_a_lane_that_diverged_has_no_motion():
 def test_the_axial_motion_is_there_where_a_sweep_would_leave_it_out():
     config = load_config(FULL, (*at(0.2), "outputs.lyapunov=false", 'outputs.section=["delta_5"]'))
     assert "axial" not in config.needed_effects
-    run = ResponseRun(config, 1)
-    assert run.states == STATES
-    assert {"delta_3_acceleration", "mesh_force_axial"} <= {v.name for v in run.variables}
+    found = respond(config, 1)
+    assert tuple(found["state"]) == STATES
+    assert {"delta_3_acceleration", "mesh_force_axial"} <= set(found.names)
 
 
 @pytest.mark.parametrize("periods", [0, -1, RECORDED + 1])

@@ -73,11 +73,11 @@ def test_random_starts_depend_on_the_seed_and_on_nothing_else(config):
     assert same_data(one, gearchaos.run(config(*random)))
     other = gearchaos.run(config(*random, "start.seed=1"))
     assert not (one["end_state"] == other["end_state"]).any()
-    # The four starts of each value follow one another.
-    assert np.array_equal(one["start"], np.tile(np.arange(4), 40))
-    assert one["pitch_error"] == pytest.approx(np.repeat(np.linspace(0.0, 5.0, 40), 4))
+    assert one.axes == ("pitch_error", "start")
+    assert one["start"].tolist() == [0, 1, 2, 3]
+    assert one["pitch_error"] == pytest.approx(np.linspace(0.0, 5.0, 40))
     longer = gearchaos.run(config(*random, "sweep={parameter='pitch_error', values=[0.0, 9.0]}"))
-    assert np.array_equal(longer["end_state"][:4], one["end_state"][:4])
+    assert np.array_equal(longer["end_state"][0], one["end_state"][0])
 
 
 def test_a_carried_sweep_begins_where_its_neighbour_ended(config):

@@ -3,9 +3,15 @@
 import numpy as np
 import pytest
 
-from gearchaos.engine.simulation import compute_all
-
-from .short_sweeps import RANDOM, assert_same, blocks, computed, joined, simulation
+from .short_sweeps import (
+    RANDOM,
+    assert_same,
+    blocks,
+    computed,
+    computed_blocks,
+    joined,
+    simulation,
+)
 
 
 @pytest.mark.parametrize("overrides", [(), ("start.kind=contact",), RANDOM])
@@ -18,7 +24,7 @@ def test_a_sweep_does_not_depend_on_the_size_of_its_blocks(overrides, values):
 def test_blocks_need_not_hold_whole_values_where_nothing_is_carried():
     sweep = simulation(*RANDOM)
     odd = [(first, min(first + 7, 39)) for first in range(0, 39, 7)]
-    assert_same(joined(dict(compute_all(sweep, odd))), computed(sweep))
+    assert_same(joined(computed_blocks(sweep, odd)), computed(sweep))
 
 
 @pytest.mark.parametrize("threads", [1, 3, 64])
@@ -43,9 +49,9 @@ def test_blocks_are_computed_the_way_of_the_carrying():
 def test_finished_blocks_are_not_computed_again():
     sweep = simulation()
     bounds = blocks(sweep, 4)
-    everything = dict(compute_all(sweep, bounds))
-    rest = dict(compute_all(sweep, bounds, {bounds[1]: lambda: everything[bounds[1]]}))
-    assert sorted(rest) == sorted({*bounds} - {bounds[1]})
+    everything = computed_blocks(sweep, bounds)
+    finished = {bounds[1]: lambda: everything[bounds[1]]}
+    rest = computed_blocks(sweep, [block for block in bounds if block != bounds[1]], finished)
     for block, arrays in rest.items():
         assert_same(arrays, everything[block])
 
@@ -54,17 +60,17 @@ def test_every_array_of_a_block_is_a_variable_of_the_sweep():
     sweep = simulation(*RANDOM)
     arrays = sweep.compute(3, 10)
     assert {name: array.shape[0] for name, array in arrays.items()} == dict.fromkeys(arrays, 7)
-    lanes = {variable.name for variable in sweep.variables if variable.dims[0] == sweep.axis}
-    assert {*arrays} == lanes
+    axes = tuple(axis.name for axis in sweep.lanes.axes)
+    assert {*arrays} == {v.name for v in sweep.variables if v.dims[: len(axes)] == axes}
     without = simulation("outputs.lyapunov=false").compute(0, 2)
     assert not [name for name in without if "lyapunov" in name]
 
 
 def test_all_exponents_come_with_the_sum_that_the_damping_gives():
-    sweep = simulation("outputs.spectrum=true", "integration.steps_per_period=800")
+    sweep = simulation("outputs.exponents=true", "integration.steps_per_period=800")
     arrays = sweep.compute(0, 3)
-    assert arrays["lyapunov_spectrum"].shape == (3, len(sweep.states))
-    total = arrays["lyapunov_spectrum"].sum(axis=1)
+    assert arrays["lyapunov_exponents"].shape == (3, len(sweep.lanes.states))
+    total = arrays["lyapunov_exponents"].sum(axis=1)
     assert np.allclose(total, arrays["lyapunov_sum"], rtol=0.0, atol=1e-6)
 
 
@@ -74,3 +80,44 @@ def test_a_mesh_stiffness_below_zero_is_noted():
     assert "the mesh stiffness falls to -0.034 of its mean" in note
     without = 'scene.effects=["pitch_error", "backlash"]'
     assert simulation(without).notes == []
+
+
+TWO = ('second_sweep={parameter="mesh_frequency", values=[0.8, 0.9, 1.0]}', "sweep.count=4")
+
+
+@pytest.mark.parametrize("overrides", [(), RANDOM, ("start.carry=downwards", *RANDOM)])
+def test_a_line_of_two_parameters_is_the_sweep_of_that_line_bit_for_bit(overrides):
+    both = simulation(*TWO, *overrides)
+    assert both.lanes.shape[:2] == (3, 4)
+    whole = computed(both, 5)
+    line = len(both.lanes) // 3
+    for number, frequency in enumerate((0.8, 0.9, 1.0)):
+        one = simulation(TWO[1], f"groups.mesh_frequency={frequency}", *overrides)
+        if "random" in str(overrides):
+            # The draws of a lane follow its number, which is another one here.
+            starts = both.lanes.start_of(np.arange(number * line, (number + 1) * line))
+            one.lanes.start_of = lambda lanes, starts=starts: starts[lanes].copy()
+        mine = {name: array[number * line : (number + 1) * line] for name, array in whole.items()}
+        assert_same(mine, computed(one))
+
+
+def test_two_parameters_give_every_lane_its_own_pair_of_values():
+    sweep = simulation(*TWO, *RANDOM)
+    lanes = np.arange(len(sweep.lanes))
+    values = sweep.lanes.values_of(lanes)
+    assert sweep.lanes.shape == (3, 4, 3)
+    assert values["mesh_frequency"].reshape(3, 4, 3)[:, 0, 0].tolist() == [0.8, 0.9, 1.0]
+    assert values["pitch_error"].reshape(3, 4, 3)[1, :, 2].tolist() == [0.0, 5.0, 10.0, 15.0]
+    system = sweep.lanes.system_of(lanes)
+    assert np.array_equal(system.groups.mesh_frequency, values["mesh_frequency"])
+    assert len(np.unique(system.groups.error_amplitude)) == 4
+
+
+def test_parameters_run_along_the_axes_on_which_they_depend():
+    speeds = 'second_sweep={parameter="half_backlash", values=[0.8, 0.9]}'
+    parameters = simulation(speeds).lanes.parameters
+    assert parameters["half_backlash"].dims == ("half_backlash",)
+    assert parameters["pitch_error"].dims == ("pitch_error",)
+    assert parameters["pitch_error"].value.shape == (13,)
+    assert parameters["load"].dims == ()
+    assert parameters["stiffness_sine"].dims == ("harmonic",)

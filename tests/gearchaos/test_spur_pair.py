@@ -11,7 +11,7 @@ from scipy.optimize import brentq
 from gearchaos.configuration import load_config
 from gearchaos.engine.simulation import Simulation
 
-from .short_sweeps import computed
+from .short_sweeps import computed, values_of
 
 SPUR_PAIR = Path(__file__).resolve().parents[2] / "sweeps" / "spur_pair.toml"
 CONSTANT_STIFFNESS = ("groups.stiffness_variation_scale=0.0", "groups.pitch_error_amplitude=0.05")
@@ -64,12 +64,12 @@ def simulation(*overrides):
 
 
 def oscillator(sweep):
-    groups = sweep.groups
+    groups = {name: found.value for name, found in sweep.lanes.parameters.items()}
     return Oscillator(
-        zeta=groups.damping_ratio,
-        load=groups.load,
-        forcing=groups.pitch_error * groups.pitch_error_amplitude,
-        variation=[groups.stiffness_variation_scale * k for k in groups.stiffness_cosine],
+        zeta=groups["damping_ratio"],
+        load=groups["load"],
+        forcing=groups["pitch_error"] * groups["pitch_error_amplitude"],
+        variation=[groups["stiffness_variation_scale"] * k for k in groups["stiffness_cosine"]],
     )
 
 
@@ -93,7 +93,7 @@ def branches(*overrides):
         simulation(*RUN_UP, f"start.carry={direction}", *overrides)
         for direction in ("upwards", "downwards")
     )
-    return Branches(oscillator(up), up.values, computed(up, 111), computed(down, 111))
+    return Branches(oscillator(up), values_of(up), computed(up, 111), computed(down, 111))
 
 
 @pytest.fixture(scope="module")
@@ -121,7 +121,7 @@ def test_the_model_is_the_classical_equation():
     )
     ends = computed(sweep)["end_state"]
     pair = oscillator(sweep)
-    for frequency, end in zip(sweep.values, ends, strict=True):
+    for frequency, end in zip(values_of(sweep), ends, strict=True):
         x, expected = pair.run([1.0 + pair.load, 0.0], frequency, periods)
         assert x.min() < -1.0 < 1.0 < x.max()
         assert end == pytest.approx(expected, abs=1e-8)
@@ -132,10 +132,10 @@ def test_response_is_linear_while_the_teeth_stay_together():
     sweep = simulation(*RUN_UP, *CONSTANT_STIFFNESS, "groups.load=0.51")
     pair, arrays = oscillator(sweep), computed(sweep, 111)
     assert not arrays["crossings_per_period"].any()
-    response = pair.linear_response(sweep.values)
+    response = pair.linear_response(values_of(sweep))
     # The section lies at phase 0, where x shows the real part and x' the imaginary one.
     x, rate = arrays["end_state"].T
-    found = x - (1.0 + pair.load) - 1j * rate / sweep.values
+    found = x - (1.0 + pair.load) - 1j * rate / values_of(sweep)
     assert np.abs(found - response).max() < 1e-6
     assert arrays["lyapunov_exponent"] == pytest.approx(-pair.zeta, abs=1e-3)
 
@@ -217,7 +217,7 @@ def test_harmonic_balance_finds_the_branch_that_loses_contact(constant, frequenc
 
 def test_harmonics_of_the_stiffness_drive_resonances_at_fractions_of_the_first():
     sweep = simulation(*SETTLED, "sweep.from=0.25", "sweep.to=0.6", "sweep.count=71")
-    lost = sweep.values[computed(sweep, 71)["crossings_per_period"] > 0.0]
+    lost = values_of(sweep)[computed(sweep, 71)["crossings_per_period"] > 0.0]
     third, half = lost[lost < 0.4], lost[lost > 0.4]
     assert [third.min(), third.max()] == pytest.approx([0.325, 0.34])
     assert [half.min(), half.max()] == pytest.approx([0.465, 0.525])
@@ -234,7 +234,7 @@ def test_at_twice_the_resonance_the_stiffness_drives_a_motion_of_two_periods():
     )
     arrays = computed(sweep)
     # To first order, the principal parametric resonance grows at k_1/4 - zeta.
-    growth = 0.1 * sweep.values / 4.0 - sweep.groups.damping_ratio
+    growth = 0.1 * values_of(sweep) / 4.0 - sweep.lanes.parameters["damping_ratio"].value
     assert arrays["lyapunov_exponent"][:3] == pytest.approx(growth[:3], abs=1e-4)
     assert not arrays["crossings_per_period"][:3].any()
     assert growth[3] > 0.0 > arrays["lyapunov_exponent"][3]

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 import gearchaos
-from gearchaos.engine.step_choice import choose_steps
+from gearchaos.engine.steps import choose_steps
 from gearchaos.errors import ConfigurationError
-from gearchaos.records.difference import Motion
+from gearchaos.records.difference import Solution
 
 from .short_sweeps import simulation
 
@@ -18,12 +18,12 @@ SHORT = (
 )
 
 
-def method_of_order_four(steps: int) -> Motion:
+def method_of_order_four(steps: int) -> Solution:
     """Lanes of period 1 whose section and exponent have the error 100 steps^-4."""
     error = 100.0 * steps**-4.0
     lanes = np.linspace(0.5, 1.5, 20)
     section = np.repeat((lanes + error)[:, np.newaxis, np.newaxis], 48, axis=1)
-    return Motion(section, -0.01 + error * np.ones(20), np.zeros(20, dtype=bool))
+    return Solution(section, -0.01 + error * np.ones(20), np.zeros(20, dtype=bool))
 
 
 @pytest.mark.parametrize("tolerance", [1e-4, 1e-6, 1e-8])
@@ -42,8 +42,8 @@ def test_a_tolerance_out_of_reach_is_refused_with_what_was_reached():
 
 
 def test_where_nothing_is_periodic_no_error_is_claimed():
-    def noise(steps: int) -> Motion:
-        return Motion(
+    def noise(steps: int) -> Solution:
+        return Solution(
             np.random.default_rng(steps).uniform(size=(20, 48, 1)), None, np.zeros(20, dtype=bool)
         )
 

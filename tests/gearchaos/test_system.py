@@ -1,0 +1,149 @@
+"""One system at one point: what a dynamicist asks of it, against exact truths and stored orbits."""
+
+from pathlib import Path
+
+import gearchaos_kernels as kernels
+import numpy as np
+import pytest
+
+import gearchaos
+from gearchaos.configuration import STATES
+from gearchaos.dynamics.following import StabilityLoss
+
+from ..kernels.reference import SOLUTIONS
+
+PAN2021 = Path(__file__).resolve().parents[2] / "sweeps" / "pan2021.toml"
+ORBITS = [orbit for orbit in SOLUTIONS["periodic_orbits"] if orbit["scene"] == "no_axial"]
+LINEAR = ('scene.effects=["pitch_error", "transverse"]', "integration.recorded_periods=60")
+
+
+@pytest.fixture(scope="module")
+def doubled() -> gearchaos.System:
+    return gearchaos.System(PAN2021, pitch_error=10.75)
+
+
+@pytest.fixture(scope="module")
+def linear() -> gearchaos.System:
+    return gearchaos.System(gearchaos.load_config(PAN2021, LINEAR), pitch_error=2.0)
+
+
+def test_the_states_have_one_order_in_configuration_and_kernels():
+    assert kernels.STATES == STATES
+
+
+@pytest.mark.parametrize("stored", ORBITS, ids=lambda orbit: f"{orbit['pitch_error']}")
+def test_orbits_and_multipliers_are_the_stored_ones(stored):
+    system = gearchaos.System(PAN2021, pitch_error=stored["pitch_error"])
+    orbit = system.orbit(stored["period"], guess=stored["section_points"][0])
+    wanted = np.array([complex(*pair) for pair in stored["floquet_multipliers"]])
+    # 200 steps of order 4; docs/numerics.md lists 4e-4 and 4e-7 for the four stored orbits.
+    apart = np.abs(orbit.multipliers[:, np.newaxis] - wanted).min(axis=0).max()
+    assert apart < 4e-4
+    assert orbit.exponent == pytest.approx(stored["largest_exponent"], abs=4e-7)
+    assert orbit.stable
+    assert orbit.residual < 1e-12
+
+
+def test_a_motion_settles_on_the_orbit_that_is_asked_for(doubled):
+    orbit = doubled.orbit(period=2)
+    motion = doubled.integrate(2, start=orbit.point)
+    assert motion.time[[0, -1]].tolist() == [0.0, 2.0]
+    assert np.abs(motion.states[-1] - orbit.point).max() < 1e-10
+    with pytest.raises(gearchaos.ConfigurationError, match="no orbit of 3 mesh periods"):
+        doubled.orbit(period=3)
+
+
+def test_an_orbit_is_followed_to_where_its_period_doubles(doubled):
+    branch = doubled.follow(doubled.orbit(period=2), "pitch_error", 10.75, 11.6)
+    assert branch.loss is StabilityLoss.PERIOD_DOUBLING
+    # docs/numerics.md: 11.4255 with 200 steps.
+    assert branch.value == pytest.approx(11.4255, abs=2e-4)
+    assert branch.value < branch.beyond < branch.value + 2e-4
+    assert branch.multiplier.real < -0.99
+    assert branch.orbit.stable
+
+
+def test_an_orbit_is_followed_along_a_physical_key_as_along_its_group():
+    config = gearchaos.load_config(PAN2021)
+    tables = config.tables()
+    tables["operation"] = {"torque_Nm": 40.0}
+    tables["mesh"]["length_scale_um"] = 50.0
+    del tables["groups"]["load"]
+    system = gearchaos.System(gearchaos.Configuration.from_tables(tables), pitch_error=1.0)
+    orbit = system.orbit()
+    by_key = system.follow(orbit, "operation.torque_Nm", 40.0, 44.0)
+    load = system.groups["load"]
+    by_group = system.follow(orbit, "load", load, 1.1 * load)
+    assert by_key.loss == by_group.loss
+    assert by_key.orbit.point == pytest.approx(by_group.orbit.point, rel=1e-9)
+
+
+def test_exponents_of_a_linear_system_add_up_to_what_its_damping_says(linear):
+    found = linear.exponents()
+    assert found.values.sum() == pytest.approx(found.exact_sum, abs=1e-4)
+    assert np.all(np.diff(found.values) <= 0.0)
+    assert linear.orbit().exponent == pytest.approx(found.values[0], abs=1e-5)
+
+
+def test_a_linear_system_answers_a_sine_with_a_sine(linear):
+    lines = linear.spectrum("delta_5", periods=8)
+    highest = np.argsort(lines.amplitude)[-2:]
+    assert sorted(lines.order[highest]) == [0.0, 1.0]
+    others = np.delete(lines.amplitude, highest)
+    assert others.max() < 1e-6 * lines.amplitude[highest].min()
+
+
+def test_the_mean_mesh_force_of_an_orbit_carries_the_load(doubled):
+    orbit = doubled.orbit(period=2)
+    found = doubled.mesh_motion(doubled.integrate(2, start=orbit.point))
+    force = np.cos(doubled.groups["base_helix_angle"]) * found.force_tangential[:-1]
+    # Sums over a period of a function with kinks converge like the square of the step.
+    assert force.mean() == pytest.approx(doubled.groups["load"], rel=1e-3)
+    assert set(found.contact_tangential.tolist()) == {0, 1}
+    assert found.accelerations.shape == (401, 3)
+
+
+def test_the_stability_limit_is_that_of_the_stiffest_bearing(doubled):
+    assert doubled.stability_limit() == 16
+
+
+def test_a_response_goes_on_from_the_state_of_the_system(doubled):
+    orbit = doubled.orbit(period=2)
+    doubled.state = orbit.point
+    response = doubled.response(periods=2)
+    assert response["start_state"][0] == pytest.approx(orbit.point)
+    assert np.abs(response["end_state"][0] - orbit.point).max() < 1e-6
+
+
+@pytest.mark.parametrize("overrides", [(), ("start.kind=random", "start.count=2")])
+def test_the_system_of_a_lane_starts_where_the_lane_ended(overrides):
+    short = ("integration.transient_periods=20", "sweep.count=5", *overrides)
+    result = gearchaos.run(gearchaos.load_config(PAN2021, short))
+    last = dict.fromkeys(result.axes[1:], 1)
+    system = gearchaos.System.of_lane(result, pitch_error=7.4, **last)
+    lane = result.sel(pitch_error=7.5, **last)
+    assert np.array_equal(system.state, lane["end_state"])
+    amplitude = result.parameters["pitch_error_amplitude"].value
+    assert system.groups["error_amplitude"] == 7.5 * amplitude
+    with pytest.raises(gearchaos.ConfigurationError, match="give a value of pitch_error"):
+        gearchaos.System.of_lane(result)
+
+
+@pytest.mark.parametrize(
+    ("values", "message"),
+    [
+        ({}, "pitch_error: is swept, and a system has one value of it"),
+        ({"pitch_eror": 1.0}, "pitch_eror: is no parameter of a system; the groups are"),
+        ({"pitch_error": 1.0, "half_backlash": -1.0}, "half_backlash"),
+        ({"pitch_error": float("nan")}, "finite"),
+    ],
+)
+def test_a_system_that_cannot_be_is_refused_in_words(values, message):
+    with pytest.raises(gearchaos.ConfigurationError, match=message):
+        gearchaos.System(PAN2021, **values)
+
+
+def test_a_motion_that_leaves_the_numbers_is_told():
+    system = gearchaos.System(PAN2021, pitch_error=1.0, load=1e150)
+    with pytest.raises(gearchaos.ConfigurationError, match="left the range of numbers"):
+        system.integrate(5)
