@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import datetime
+import difflib
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 from pydantic_core import ErrorDetails
 
-from gearchaos.configuration.keys import Key, suggestion
+from gearchaos.configuration.keys import Key
 from gearchaos.configuration.toml_text import quoted_key
 
 ABSENT: Final = object()
@@ -31,7 +31,7 @@ _RULES = {
     "union_tag_invalid": "must be one of {expected_tags}",
     "union_tag_not_found": "is missing",
 }
-_KINDS = {
+_EXPECTED = {
     "float_type": "a number",
     "int_type": "a whole number",
     "bool_type": "true or false",
@@ -41,10 +41,17 @@ _KINDS = {
     "model_type": "a table",
     "model_attributes_type": "a table",
 }
+_FOUND = {
+    bool: "true or false",
+    str: "a text",
+    float: "a number with a decimal point",
+    int: "a number",
+    dict: "a table",
+    list: "a list",
+}
 
 
-@dataclass(frozen=True)
-class Fault:
+class Fault(NamedTuple):
     """One fault.
 
     Attributes
@@ -94,9 +101,7 @@ def shown(value: object) -> str:
     if isinstance(value, Mapping):
         return "{...}"
     if isinstance(value, (list, tuple)):
-        entries = [
-            "[...]" if isinstance(entry, (list, tuple)) else shown(entry) for entry in value[:5]
-        ]
+        entries = ["[...]" if isinstance(one, (list, tuple)) else shown(one) for one in value[:5]]
         return f"[{', '.join([*entries, '...'] if len(value) > len(entries) else entries)}]"
     if isinstance(value, str):
         text = repr(value[:60])[1:-1]
@@ -106,6 +111,16 @@ def shown(value: object) -> str:
     if isinstance(value, (datetime.date, datetime.time)):
         return value.isoformat()
     return repr(value)
+
+
+def suggestion(word: str, words: Iterable[str]) -> str:
+    """Return ``did you mean `x`?`` for the nearest word, or an empty text."""
+    by_lower = {candidate.lower(): candidate for candidate in words}
+    start = word[:100].lower()
+    close = difflib.get_close_matches(start, by_lower, n=1) or [
+        candidate for candidate in by_lower if len(start) > 2 and candidate.startswith(start)
+    ]
+    return f"did you mean `{by_lower[close[0]]}`?" if close else ""
 
 
 def fault_of(error: ErrorDetails, tables: Mapping[str, Any], keys: Mapping[str, Key]) -> Fault:
@@ -120,51 +135,36 @@ def fault_of(error: ErrorDetails, tables: Mapping[str, Any], keys: Mapping[str, 
     keys : mapping of str to Key
         Every key by its path.
     """
+    kind, value, rule = error["type"], error["input"], _rule(error)
     names = _names(error["loc"], tables)
-    kind = error["type"]
     if kind.startswith("union_tag"):
         names.append("shape")
-    path = ".".join(name for name in names if isinstance(name, str))
-    key = keys.get(path)
-    remedy = key.remedy if key is not None else ""
-    value = ABSENT if kind in ("missing", "union_tag_not_found") else error["input"]
-    if kind == "union_tag_invalid":
-        value = error["input"]["shape"]
-    if error["loc"][-1] == "[key]":
+        value = value["shape"] if kind == "union_tag_invalid" else ABSENT
+    elif kind == "missing":
         value = ABSENT
+    path = ".".join(name for name in names if isinstance(name, str))
+    remedy = keys[path].remedy if path in keys else ""
     if kind == "extra_forbidden":
         remedy = _elsewhere(str(names[-1]), ".".join(map(str, names[:-1])), keys)
-    elif kind in ("literal_error", "union_tag_invalid") and isinstance(error["input"], str | dict):
-        remedy = (
-            suggestion(
-                str(names[-1] if value is ABSENT else value), re.findall(r"'([^']*)'", _rule(error))
-            )
-            or remedy
-        )
-    elif kind == "float_type" and isinstance(value, str) and _is_number(value):
+    elif isinstance(value, str) and kind in ("literal_error", "union_tag_invalid"):
+        remedy = suggestion(value, re.findall(r"'([^']*)'", rule)) or remedy
+    elif isinstance(value, str) and kind == "float_type" and _is_number(value):
         remedy = f"write it without the quotes: {value.strip()}"
-    return Fault(_dotted(names), _rule(error), remedy, value)
+    if error["loc"][-1] == "[key]":
+        value = ABSENT
+    dotted = "".join(
+        f"[{name}]" if isinstance(name, int) else f".{quoted_key(name)}" for name in names
+    )
+    return Fault(dotted.lstrip("."), rule, remedy, value)
 
 
 def _rule(error: ErrorDetails) -> str:
-    if error["type"] in _KINDS:
-        value = error["input"]
-        if isinstance(value, int) and error["type"] == "float_type" and not isinstance(value, bool):
-            return "must be a number that fits into 64 bits"
-        return f"must be {_KINDS[error['type']]}, not {_kind(value)}"
-    rule = _RULES.get(error["type"])
-    return error["msg"] if rule is None else rule.format(**error.get("ctx", {}))
-
-
-def _kind(value: object) -> str:
-    kinds = {
-        bool: "true or false",
-        str: "a text",
-        float: "a number with a decimal point",
-        int: "a number",
-    }
-    kinds |= {dict: "a table", list: "a list"}
-    return kinds.get(type(value), "a date or time")
+    kind, value = error["type"], error["input"]
+    if kind not in _EXPECTED:
+        return _RULES[kind].format(**error.get("ctx", {})) if kind in _RULES else error["msg"]
+    if kind == "float_type" and type(value) is int:
+        return "must be a number that fits into 64 bits"
+    return f"must be {_EXPECTED[kind]}, not {_FOUND.get(type(value), 'a date or time')}"
 
 
 def _is_number(text: str) -> bool:
@@ -178,44 +178,23 @@ def _is_number(text: str) -> bool:
 def _names(location: Sequence[int | str], tables: Mapping[str, Any]) -> list[int | str]:
     # pydantic puts the tag of a union ("fourier") and "[key]" into the location of an error.
     names: list[int | str] = []
-    node: object = tables
+    node: Any = tables
     for position, name in enumerate(location):
-        inner = _entry(node, name)
-        if inner is not ABSENT:
-            node = inner
+        known = range(len(node)) if isinstance(node, (list, tuple)) else node
+        if isinstance(known, (Mapping, range)) and name in known:
+            node = node[name]
         elif position < len(location) - 1 or name == "[key]":
             continue
         names.append(name)
     return names
 
 
-def _entry(node: object, name: int | str) -> object:
-    if isinstance(node, Mapping):
-        return node.get(name, ABSENT)
-    if isinstance(node, (list, tuple)) and isinstance(name, int) and name < len(node):
-        return node[name]
-    return ABSENT
-
-
-def _dotted(names: Sequence[int | str]) -> str:
-    path = ""
-    for name in names:
-        path += f"[{name}]" if isinstance(name, int) else f".{quoted_key(name)}"
-    return path.lstrip(".")
-
-
 def _elsewhere(name: str, table: str, keys: Mapping[str, Key]) -> str:
-    prefix = f"{table}." if table else ""
-    here = [
-        path.removeprefix(prefix)
-        for path in keys
-        if path.startswith(prefix) and "." not in path.removeprefix(prefix)
-    ]
-    near = suggestion(name, here)
-    homes = [path for path in keys if path.rpartition(".")[2] == name]
-    if near:
+    here = [path.rpartition(".")[2] for path in keys if path.rpartition(".")[0] == table]
+    if near := suggestion(name, here):
         return near
-    if homes:
-        return f"it belongs elsewhere: `{homes[0]}`"
+    for path in keys:
+        if path.rpartition(".")[2] == name:
+            return f"it belongs elsewhere: `{path}`"
     place = f"[{table}]" if table else "the top level"
     return f"the keys of {place} are {', '.join(here)}"

@@ -9,14 +9,17 @@ from typing import Annotated, Literal, TypeAlias
 
 from pydantic import Field
 
-from gearchaos.configuration.table import (
+from gearchaos.configuration.keys import (
     NotNegativePair,
     Numbers,
     PositivePair,
     Table,
     TeethPair,
     key,
+    keys_of,
 )
+from gearchaos.gear.geometry import STEEL_DENSITY
+from gearchaos.gear.mesh_stiffness import DEFAULT_HARMONICS
 
 _SHAPE = '"fourier" takes the coefficients, "trapezoid" takes rise, top, fall, bottom, half_height'
 
@@ -41,8 +44,8 @@ class Pair(Table):
     density_kg_m3: float = key(
         "density of the gears, taken as solid discs on the reference circle",
         units="kg/m3",
-        default=7850.0,
-        example=7850.0,
+        default=STEEL_DENSITY,
+        example=STEEL_DENSITY,
         gt=0,
     )
     masses_kg: PositivePair | None = key(
@@ -120,13 +123,8 @@ class TrapezoidStiffness(Table):
         lt=1,
     )
     harmonics: int = key(
-        "number of harmonics kept of the trapezoid", default=6, example=6, ge=1, le=1000
+        "number of harmonics kept of the trapezoid", default=DEFAULT_HARMONICS, ge=1, le=1000
     )
-
-    @property
-    def shares(self) -> tuple[float | None, ...]:
-        """Shares of the mesh period: rise, top, fall, bottom."""
-        return (self.rise, self.top, self.fall, self.bottom)
 
 
 Stiffness: TypeAlias = Annotated[
@@ -200,3 +198,11 @@ PHYSICAL_TABLES: dict[str, type[Table]] = {
     "bearings": Bearings,
 }
 """The physical tables by name."""
+
+PHYSICAL_KEYS = {
+    key.path: key
+    for name, table in PHYSICAL_TABLES.items()
+    for key in keys_of(table, name)
+    if not key.tables
+}
+"""Every value of the physical tables by its path."""

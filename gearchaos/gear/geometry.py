@@ -45,7 +45,7 @@ class HelicalPair:
     teeth: PairOfValues
     normal_module: Value
     normal_pressure_angle: Value
-    helix_angle: Value = 0.0
+    helix_angle: Value
     face_width: Value
     density: Value = STEEL_DENSITY
     given_masses: PairOfValues | None = None

@@ -16,7 +16,10 @@ import numpy.typing as npt
 
 FloatArray: TypeAlias = npt.NDArray[np.float64]
 
-MINIMUM_HARMONICS_OF_A_FIT = 3
+DEFAULT_HARMONICS = 6
+"""Harmonics of a trapezoid where their number is not given, as in Pan 2021, Table 2."""
+
+_FEWEST_OF_A_FIT = 3
 
 
 @dataclass(frozen=True)
@@ -119,7 +122,7 @@ class TrapezoidalStiffness:
         mean_of_shape = self.top - self.bottom
         return 1.0 + self.scale * self.half_height * (shape - mean_of_shape)
 
-    def to_fourier(self, harmonics: int) -> FourierStiffness:
+    def to_fourier(self, harmonics: int = DEFAULT_HARMONICS) -> FourierStiffness:
         """Return the exact Fourier coefficients of this shape (Pan 2021, eq. 19).
 
         The derivative of the shape is one box over the rise and one over the fall, whose
@@ -191,13 +194,11 @@ class FourierStiffness:
             If there are fewer than three harmonics or the first one is zero.
         """
         target = self.coefficients()
-        if target.size < MINIMUM_HARMONICS_OF_A_FIT:
+        if target.size < _FEWEST_OF_A_FIT or target[0] == 0.0:
             raise ValueError(
-                f"a trapezoid needs at least {MINIMUM_HARMONICS_OF_A_FIT} harmonics to fit, "
-                f"not {target.size}"
+                f"a trapezoid is fitted to at least {_FEWEST_OF_A_FIT} harmonics, the first of "
+                f"which is not 0, not to {target}"
             )
-        if target[0] == 0.0:
-            raise ValueError("a trapezoid cannot be fitted to a series without first harmonic")
         n = np.arange(1, target.size + 1)
         middle_of_top = -np.angle(target[0]) / (2.0 * np.pi)
         centred = (target * np.exp(2j * np.pi * n * middle_of_top)).real
@@ -214,14 +215,9 @@ class FourierStiffness:
         )
 
 
-def _centred_harmonics(n: FloatArray, rise: FloatArray, width: FloatArray) -> FloatArray:
-    """Cosine harmonics of a trapezoid of half-height one about the middle of its top."""
-    return 4.0 / (np.pi * n) * np.sinc(n * rise) * np.sin(np.pi * n * width)
-
-
 def _fit_centred_trapezoid(target: FloatArray) -> tuple[float, float, float]:
     """Rise, width (top + rise) and half-height whose cosine harmonics are nearest to target."""
-    n = np.arange(1.0, target.size + 1.0)
+    n = np.arange(1.0, target.size + 1.0)[:, None, None]
     steps = np.linspace(-1.0, 1.0, 33)
     rise, width, reach = 0.25, 0.5, 0.5
     half_height = 0.0
@@ -229,7 +225,8 @@ def _fit_centred_trapezoid(target: FloatArray) -> tuple[float, float, float]:
     while reach > 1e-15:
         rises = np.clip(rise + reach * steps, 0.0, 0.5)[:, None]
         widths = np.clip(width + reach * steps[None, :], rises, 1.0 - rises)
-        shapes = _centred_harmonics(n[:, None, None], rises[None], widths[None])
+        # Of half-height one, about the middle of the top.
+        shapes = 4.0 / (np.pi * n) * np.sinc(n * rises) * np.sin(np.pi * n * widths)
         heights = np.maximum(
             np.einsum("n,nrw->rw", target, shapes) / (np.square(shapes).sum(axis=0) + 1e-300), 0.0
         )
