@@ -35,13 +35,16 @@ _Teeth: TypeAlias = Annotated[int, Field(ge=1, le=100_000)]
 _NotNegative: TypeAlias = Annotated[float, Field(ge=0)]
 _Positive: TypeAlias = Annotated[float, Field(gt=0)]
 Numbers: TypeAlias = Annotated[tuple[float, ...], _AS_LIST]
+Harmonics: TypeAlias = Annotated[
+    tuple[float, ...], Field(strict=False, min_length=1, max_length=1000)
+]
 PositivePair: TypeAlias = Annotated[tuple[_Positive, _Positive], _AS_LIST]
 NotNegativePair: TypeAlias = Annotated[tuple[_NotNegative, _NotNegative], _AS_LIST]
 TeethPair: TypeAlias = Annotated[tuple[_Teeth, _Teeth], _AS_LIST]
 
 
 def key(
-    description: str, *, units: str = "", default: Any = ..., example: Any = None, **rules: Any
+    description: str, units: str = "", example: Any = None, *, default: Any = ..., **rules: Any
 ) -> Any:
     """Declare a key: what it is, its unit, its default and the rules its value obeys.
 
@@ -51,10 +54,10 @@ def key(
         The meaning, without the unit.
     units : str
         Empty where there is none; ``"1"`` for a dimensionless number.
-    default : object
-        ``...`` makes the key required.
     example : object
         A value to show where a fault is reported.
+    default : object
+        ``...`` makes the key required.
     **rules
         Constraints and settings of `pydantic.Field`, such as ``gt=0``.
     """

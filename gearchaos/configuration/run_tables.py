@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias, get_args
 
 from pydantic import Field, create_model
 
-from gearchaos.configuration.keys import Numbers, Table, key
+from gearchaos.configuration.keys import Harmonics, Numbers, Table, key
 from gearchaos.gear.group_table import GROUP_TABLE, GroupRow
 
 MOST_LANES = 100_000_000
@@ -52,10 +52,9 @@ def _group_field(row: GroupRow) -> tuple[Any, Any]:
     units = "" if row.units == "1" else row.units
     description = f"{row.long_name} ({row.symbol})"
     if row.is_list:
-        field = key(description, units=units, default=None, min_length=1, max_length=1000)
-        return Numbers | None, field
+        return Harmonics | None, key(description, units, default=None)
     bounds = {name: bound for name, bound in row.valid._asdict().items() if bound is not None}
-    return float | None, key(description, units=units, default=None, **bounds)
+    return float | None, key(description, units, default=None, **bounds)
 
 
 if TYPE_CHECKING:
@@ -93,12 +92,12 @@ class Start(Table):
     )
     state: dict[State, float] = key(
         'start values by state for kind = "given"; those not named are 0',
-        default={},
         example={"delta_5": 1.0},
+        default={},
     )
     spread: float = key(
         'for kind = "random": every state is uniform between minus and plus this',
-        units="1",
+        "1",
         default=1.0,
         gt=0,
     )
@@ -120,15 +119,15 @@ class Sweep(Table):
         "a group by its name, or a physical key by its path such as operation.speed_rpm",
         example="pitch_error",
     )
-    from_: float | None = key("first value", default=None, example=0.0, alias="from")
-    to: float | None = key("last value", default=None, example=15.0)
+    from_: float | None = key("first value", example=0.0, default=None, alias="from")
+    to: float | None = key("last value", example=15.0, default=None)
     count: int | None = key(
-        "number of values, evenly spaced", default=None, example=1501, ge=1, le=_MOST_VALUES
+        "number of values, evenly spaced", example=1501, default=None, ge=1, le=_MOST_VALUES
     )
     values: Numbers | None = key(
         "the values themselves, instead of from, to and count",
-        default=None,
         example=[1.0, 2.0],
+        default=None,
         min_length=1,
     )
 
@@ -143,7 +142,7 @@ class Sweep(Table):
     @property
     def size(self) -> int:
         """Number of values."""
-        return self.span[2] if self.values is None else len(self.values)
+        return (self.count or 0) if self.values is None else len(self.values)
 
 
 class Integration(Table):
@@ -153,13 +152,13 @@ class Integration(Table):
     tolerance: float | None = key(
         "largest error of section and exponent; the steps are then doubled, from steps_per_period "
         "on, until lanes of the sweep that are tried beforehand reach it",
-        default=None,
         example=1e-6,
+        default=None,
         gt=0,
     )
     error_check: float = key(
         "share of the lanes that are computed again with half the step, to measure their error",
-        units="1",
+        "1",
         default=0.0,
         ge=0,
         le=1,
@@ -185,7 +184,7 @@ class Outputs(Table):
     """What is kept of every lane."""
 
     section: Annotated[tuple[State, ...], Field(strict=False)] = key(
-        "states recorded once per mesh period", default=("delta_5",), example=["delta_5"]
+        "states recorded once per mesh period", example=["delta_5"], default=("delta_5",)
     )
     section_points: int = key("last mesh periods of the section that are kept", default=100, ge=1)
     lyapunov: bool = key("whether the largest Lyapunov exponent is computed", default=True)
@@ -198,7 +197,7 @@ class Outputs(Table):
     )
     allowed_diverged_share: float = key(
         "share of diverged lanes above which the command reports failure",
-        units="1",
+        "1",
         default=0.0,
         ge=0,
         le=1,
