@@ -59,7 +59,7 @@ def key(
     default : object
         ``...`` makes the key required.
     **rules
-        Constraints and settings of `pydantic.Field`, such as ``gt=0``.
+        Constraints of `pydantic.Field`, such as ``gt=0``.
     """
     return Field(
         default,
@@ -72,17 +72,7 @@ def key(
 
 @dataclass(frozen=True)
 class Key:
-    """One key: where it stands and what the models say about it.
-
-    Attributes
-    ----------
-    path : str
-        Dotted path, such as ``pair.teeth``.
-    field : FieldInfo
-        The declaration.
-    tables : tuple of model classes
-        The tables that may stand here; empty for a value.
-    """
+    """One key: its dotted path, its declaration, the tables that may stand there, if any."""
 
     path: str
     field: FieldInfo
@@ -107,11 +97,8 @@ class Key:
     @property
     def valid(self) -> Range:
         """The range of a number."""
-        bounds = [
-            {name: getattr(rule, name) for name in Range._fields if hasattr(rule, name)}
-            for rule in self.field.metadata
-        ]
-        return Range(**{name: bound for found in bounds for name, bound in found.items()})
+        rules = [(rule, name) for rule in self.field.metadata for name in Range._fields]
+        return Range(**{name: getattr(rule, name) for rule, name in rules if hasattr(rule, name)})
 
     @property
     def remedy(self) -> str:

@@ -13,8 +13,8 @@ from gearchaos.configuration.run_tables import Sweep
 from gearchaos.configuration.sweep_values import SWEEPABLE_KEYS, FloatArray, groups_at
 from gearchaos.errors import ConfigurationError
 from gearchaos.gear.derivation import derive_groups
-from gearchaos.gear.group_table import GROUP_TABLE, GROUPS_BY_NAME, GroupRow
-from gearchaos.gear.groups import Groups
+from gearchaos.gear.group_table import GROUPS_BY_NAME, GroupRow
+from gearchaos.gear.groups import HARMONICS, Groups
 
 if TYPE_CHECKING:
     from gearchaos.configuration.models import Configuration
@@ -44,9 +44,8 @@ def lane_faults(config: Configuration) -> Iterator[Fault]:
     yield from _out_of_range(groups)
     yield from _decoupled(config, groups)
     for axis, (table, sweep) in enumerate(reversed(sweeps.items())):
-        if missing or sweep.parameter not in SWEEPABLE_KEYS:
-            continue
-        if not _moved(config, groups, axis, sweep.size):
+        derives = not missing and sweep.parameter in SWEEPABLE_KEYS
+        if derives and not _moved(config, groups, axis, sweep.size):
             yield _without_effect(config, table, some[sweep.parameter])
 
 
@@ -74,21 +73,20 @@ def _refused(config: Configuration, some: Mapping[str, FloatArray]) -> list[str]
 
 
 def _moved(config: Configuration, groups: Groups, axis: int, count: int) -> bool:
-    for row in GROUP_TABLE:
-        value = groups.values.get(row.name)
-        if row.is_list or np.ndim(value) == 0 or not row.needed_by(config.scene.effects):
-            continue
-        along = np.moveaxis(np.asarray(value), axis, 0)
-        if len(along) > 1 and (count == 1 or not np.allclose(along, along[:1], 1e-12, 0.0)):
-            return True
+    """Whether a sweep of so many values, along this axis, changes a group that the scene needs."""
+    for name, value in groups.values.items():
+        row = GROUPS_BY_NAME[name]
+        if not row.is_list and np.ndim(value) > 0 and row.needed_by(config.scene.effects):
+            along = np.moveaxis(np.asarray(value), axis, 0)
+            if len(along) > 1 and (count == 1 or not np.allclose(along, along[:1], 1e-12, 0.0)):
+                return True
     return False
 
 
 def _without_effect(config: Configuration, table: str, values: FloatArray) -> Fault:
     parameter = config.sweeps[table].parameter
     swept = {sweep.parameter: f"{name}.parameter" for name, sweep in config.sweeps.items()}
-    harmonics = [row.name for row in GROUP_TABLE if row.is_list]
-    derived = derive_groups({**config.physical(), parameter: values}, without=harmonics)
+    derived = derive_groups({**config.physical(), parameter: values}, without=HARMONICS)
     names = [name for name, value in derived.items() if np.ndim(value) > 0]
     winners = [name for name in names if name in swept]
     given = [name for name in names if name in config.groups.given()]
@@ -130,16 +128,13 @@ def _is_present(config: Configuration, entry: str) -> bool:
 
 
 def _out_of_range(groups: Groups) -> Iterator[Fault]:
-    for row in GROUP_TABLE:
-        value = groups.values.get(row.name)
-        if groups.origin.get(row.name) == "derived" and not row.valid.admits(value):
+    for name, value in groups.values.items():
+        row = GROUPS_BY_NAME[name]
+        if groups.origin[name] == "derived" and not row.valid.admits(value):
             worst = next(entry for entry in np.ravel(value) if not row.valid.admits(entry))
-            yield Fault(
-                f"groups.{row.name}",
-                f"derived from {', '.join(row.derived_from)}, must be {row.valid.rule}",
-                "check the magnitudes of those keys",
-                float(worst),
-            )
+            rule = f"derived from {', '.join(row.derived_from)}, must be {row.valid.rule}"
+            remedy = "check the magnitudes of those keys"
+            yield Fault(f"groups.{name}", rule, remedy, float(worst))
 
 
 def _decoupled(config: Configuration, groups: Groups) -> Iterator[Fault]:

@@ -6,14 +6,13 @@ import datetime
 import difflib
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any, Final, NamedTuple
+from typing import Any, NamedTuple
 
 from pydantic_core import ErrorDetails
 
 from gearchaos.configuration.keys import Key
 from gearchaos.configuration.toml_text import quoted_key
 
-ABSENT: Final = object()
 MOST_SHOWN = 100
 """Faults that are worded; a file with more of them is hardly a configuration."""
 
@@ -50,45 +49,26 @@ _FOUND = {
     list: "a list",
 }
 
+_NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?")
+
 
 class Fault(NamedTuple):
-    """One fault.
-
-    Attributes
-    ----------
-    key : str
-        Dotted path of the key.
-    rule : str
-        What the value violates.
-    remedy : str
-        What to do instead.
-    value : object
-        The value; `ABSENT` where there is none.
-    """
+    """One fault: dotted path of the key, rule that is broken, what to do instead, value if any."""
 
     key: str
     rule: str
     remedy: str = ""
-    value: object = ABSENT
+    value: object = None
 
     def text(self, source: str) -> str:
         """Return the fault as one line that begins with the name of the file."""
-        value = "" if self.value is ABSENT else f" = {shown(self.value)}"
+        value = "" if self.value is None else f" = {shown(self.value)}"
         remedy = f"; {self.remedy}" if self.remedy else ""
         return f"{source}: {self.key}{value}: {self.rule}{remedy}"
 
 
 def texts(faults: Iterable[Fault], source: str, more: int = 0) -> list[str]:
-    """Return the faults as lines, each once, the first hundred of them.
-
-    Parameters
-    ----------
-    faults : iterable of Fault
-    source : str
-        What the lines call the configuration.
-    more : int
-        Faults beside these that nobody has worded.
-    """
+    """Return the faults as lines, each once, the first hundred; ``more`` have not been worded."""
     lines = list(dict.fromkeys(fault.text(source) for fault in faults))
     rest = max(0, len(lines) - MOST_SHOWN) + more
     return lines if rest == 0 else [*lines[:MOST_SHOWN], f"{source}: and {rest} more faults"]
@@ -139,19 +119,17 @@ def fault_of(error: ErrorDetails, tables: Mapping[str, Any], keys: Mapping[str, 
     names = _names(error["loc"], tables)
     if kind.startswith("union_tag"):
         names.append("shape")
-        value = value["shape"] if kind == "union_tag_invalid" else ABSENT
-    elif kind == "missing":
-        value = ABSENT
+        value = value.get("shape")
     path = ".".join(name for name in names if isinstance(name, str))
     remedy = keys[path].remedy if path in keys else ""
     if kind == "extra_forbidden":
         remedy = _elsewhere(str(names[-1]), ".".join(map(str, names[:-1])), keys)
     elif isinstance(value, str) and kind in ("literal_error", "union_tag_invalid"):
         remedy = suggestion(value, re.findall(r"'([^']*)'", rule)) or remedy
-    elif isinstance(value, str) and kind == "float_type" and _is_number(value):
+    elif isinstance(value, str) and kind == "float_type" and _NUMBER.fullmatch(value.strip()):
         remedy = f"write it without the quotes: {value.strip()}"
-    if error["loc"][-1] == "[key]":
-        value = ABSENT
+    if kind == "missing" or error["loc"][-1] == "[key]":
+        value = None
     dotted = "".join(
         f"[{name}]" if isinstance(name, int) else f".{quoted_key(name)}" for name in names
     )
@@ -165,14 +143,6 @@ def _rule(error: ErrorDetails) -> str:
     if kind == "float_type" and type(value) is int:
         return "must be a number that fits into 64 bits"
     return f"must be {_EXPECTED[kind]}, not {_FOUND.get(type(value), 'a date or time')}"
-
-
-def _is_number(text: str) -> bool:
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return True
 
 
 def _names(location: Sequence[int | str], tables: Mapping[str, Any]) -> list[int | str]:

@@ -8,7 +8,6 @@ from typing import Any, Literal, Self
 
 from pydantic import PrivateAttr, TypeAdapter, ValidationError, ValidationInfo, model_validator
 
-from gearchaos.configuration import sweep_rules
 from gearchaos.configuration.keys import Key, Table, key, keys_of
 from gearchaos.configuration.lane_rules import lane_faults
 from gearchaos.configuration.messages import MOST_SHOWN, Fault, fault_of, texts
@@ -31,6 +30,7 @@ from gearchaos.configuration.run_tables import (
     Sweep,
     states_of,
 )
+from gearchaos.configuration.sweep_rules import unknown_parameter
 from gearchaos.configuration.sweep_values import SWEEPABLE_GROUPS
 from gearchaos.configuration.toml_text import (
     flat_tables,
@@ -95,8 +95,8 @@ class Configuration(Table):
         The axial pair is driven one way: without an axial state in the section and without the
         exponent of the whole system, nothing that is kept depends on it.
         """
-        axial_states = set(states_of({"axial"})) - set(states_of(()))
-        if self.outputs.lyapunov or not axial_states.isdisjoint(self.outputs.section):
+        without_axial = states_of({"transverse"})
+        if self.outputs.lyapunov or not set(self.outputs.section).issubset(without_axial):
             return self.scene.effects
         return tuple(effect for effect in self.scene.effects if effect != "axial")
 
@@ -104,15 +104,9 @@ class Configuration(Table):
     def from_toml(
         cls, text: str, source: str = "<text>", overrides: Iterable[str] = ()
     ) -> Configuration:
-        """Make a configuration from TOML text.
+        """Make a configuration from TOML text, which messages call ``source``.
 
-        Parameters
-        ----------
-        text : str
-        source : str
-            What messages call the text.
-        overrides : iterable of str
-            Such as ``"integration.steps_per_period=100"``.
+        ``overrides`` are those of `load_config`.
 
         Raises
         ------
@@ -147,14 +141,9 @@ class Configuration(Table):
         return config
 
     def replace(self, path: str, value: Any) -> Configuration:
-        """Return a copy in which one key, at its dotted path, has another value.
+        """Return a copy in which one key, or table, at its dotted path has another value.
 
-        Parameters
-        ----------
-        path : str
-            Such as ``"integration.steps_per_period"``, or a whole table such as ``"sweep"``.
-        value : object
-            The new value; a mapping for a table; None removes the key.
+        A value of a table is a mapping; None removes the key.
 
         Raises
         ------
@@ -181,19 +170,17 @@ class Configuration(Table):
         ConfigurationError
             If a parameter cannot be swept, or the changed configuration breaks a rule.
         """
-        unknown = [
-            one for name in values for one in sweep_rules.unknown_parameter("parameter", name)
-        ]
+        unknown = [fault for name in values for fault in unknown_parameter("parameter", name)]
         if unknown:
             raise ConfigurationError(texts(unknown, self.source))
         tables = self.tables()
         for parameter, value in values.items():
             path = f"groups.{parameter}" if parameter in SWEEPABLE_GROUPS else parameter
             tables = with_value(tables, path.split("."), float(value))
-            for name, sweep in self.sweeps.items():
-                if sweep.parameter == parameter:
-                    alone = {"parameter": parameter, "values": [float(value)]}
-                    tables = with_value(tables, [name], alone if name == "sweep" else None)
+            if parameter == self.sweep.parameter:
+                tables["sweep"] = {"parameter": parameter, "values": [float(value)]}
+            elif self.second_sweep is not None and parameter == self.second_sweep.parameter:
+                del tables["second_sweep"]
         return type(self).from_tables(tables, self.source)
 
     def physical(self) -> dict[str, Any]:

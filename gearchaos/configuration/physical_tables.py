@@ -98,10 +98,7 @@ class Mesh(Table):
         "mean mesh stiffness per unit face width", "N/(um mm)", 13.3548, gt=0
     )
     length_scale_um: float | None = _optional(
-        "length that one unit of displacement stands for; without it the half backlash",
-        "um",
-        50.0,
-        gt=0,
+        "length that one unit of displacement stands for, else the half backlash", "um", 50.0, gt=0
     )
     half_backlash_um: float | None = _optional("half the backlash", "um", 50.0, ge=0)
     damping_ratio: float | None = _optional("mesh damping ratio", "1", 0.1, ge=0)

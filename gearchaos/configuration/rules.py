@@ -7,8 +7,7 @@ from collections import Counter
 from collections.abc import Callable, Collection, Iterator
 from typing import TYPE_CHECKING, TypeAlias
 
-from gearchaos.configuration.messages import ABSENT, Fault
-from gearchaos.configuration.physical_tables import TrapezoidStiffness
+from gearchaos.configuration.messages import Fault
 from gearchaos.configuration.run_tables import Start
 
 if TYPE_CHECKING:
@@ -32,68 +31,53 @@ def reads(*tables: str) -> Callable[[Rule], Rule]:
 
 @reads("mesh")
 def _one_damping(config: Configuration) -> Iterator[Fault]:
+    ratio, damping = "mesh.damping_ratio", "mesh.damping_N_s_per_m"
     swept = [sweep.parameter for sweep in config.sweeps.values()]
-    ratio, damping = ("mesh.damping_ratio", "mesh.damping_N_s_per_m")
-    values = config.physical()
-    if all(path in swept or values[path] is not None for path in (ratio, damping)):
-        given = f"{ratio} = {values[ratio]} is given" if ratio not in swept else f"{ratio} is swept"
-        shown = ABSENT if values[damping] is None else values[damping]
-        yield Fault(damping, f"{given} as well", "keep one of the two", shown)
+    given = config.physical()
+    if all(path in swept or given[path] is not None for path in (ratio, damping)):
+        rule = f"{ratio} is swept" if ratio in swept else f"{ratio} = {given[ratio]} is given"
+        yield Fault(damping, f"{rule} as well", "keep one of the two", given[damping])
 
 
 @reads("mesh")
 def _length_scale_is_known(config: Configuration) -> Iterator[Fault]:
-    mesh = config.mesh
-    swept = {sweep.parameter: f"{name}.parameter" for name, sweep in config.sweeps.items()}
-    if mesh is None or mesh.length_scale_um is not None or "mesh.length_scale_um" in swept:
+    scale, backlash = "mesh.length_scale_um", "mesh.half_backlash_um"
+    swept = {sweep.parameter: f"{table}.parameter" for table, sweep in config.sweeps.items()}
+    given = config.physical()
+    if given[scale] is not None or scale in swept:
         return
-    if mesh.half_backlash_um == 0:
-        yield Fault(
-            "mesh.half_backlash_um",
-            "cannot be the length scale when it is 0",
-            "give mesh.length_scale_um",
-            mesh.half_backlash_um,
-        )
-    if "mesh.half_backlash_um" in swept:
-        yield Fault(
-            swept["mesh.half_backlash_um"],
-            "is also the length scale, so that sweeping it would change the unit of every length",
-            "give mesh.length_scale_um",
-            "mesh.half_backlash_um",
-        )
+    if given[backlash] == 0:
+        yield Fault(backlash, "cannot be the length scale when it is 0", f"give {scale}", 0.0)
+    if config.mesh and backlash in swept:
+        rule = "is also the length scale, so that sweeping it would change the unit of every length"
+        yield Fault(swept[backlash], rule, f"give {scale}", backlash)
 
 
 @reads("mesh")
 def _shares_fill_the_period(config: Configuration) -> Iterator[Fault]:
-    stiffness = config.mesh.stiffness if config.mesh else None
-    if not isinstance(stiffness, TrapezoidStiffness):
+    shares = _shares(config)
+    if shares is None:
         return
-    shares = _shares(stiffness)
     if 0 < len(shares) < 4:
-        yield Fault(
-            "mesh.stiffness",
-            f"gives {len(shares)} of the four shares rise, top, fall, bottom",
-            "give all four, or none to take them from the contact ratio of [pair]",
-        )
+        rule = f"gives {len(shares)} of the four shares rise, top, fall, bottom"
+        remedy = "give all four, or none to take them from the contact ratio of [pair]"
+        yield Fault("mesh.stiffness", rule, remedy)
     elif shares and not math.isclose(sum(shares), 1.0, abs_tol=1e-9):
-        yield Fault(
-            "mesh.stiffness",
-            f"rise + top + fall + bottom = {sum(shares):.12g}, must be 1",
-            "the four are shares of one mesh period",
-        )
-    if (stiffness.half_height is None) == bool(shares):
+        rule = f"rise + top + fall + bottom = {sum(shares):.12g}, must be 1"
+        yield Fault("mesh.stiffness", rule, "the four are shares of one mesh period")
+    half_height = config.physical()["mesh.stiffness.half_height"]
+    if (half_height is None) == bool(shares):
         yield Fault(
             "mesh.stiffness.half_height",
             "must be given with the four shares, and only with them",
             "without both the contact ratio of [pair] decides",
-            ABSENT if stiffness.half_height is None else stiffness.half_height,
+            half_height,
         )
 
 
 @reads("mesh", "pair")
 def _contact_ratio_is_known(config: Configuration) -> Iterator[Fault]:
-    stiffness = config.mesh.stiffness if config.mesh else None
-    if config.pair is None and isinstance(stiffness, TrapezoidStiffness) and not _shares(stiffness):
+    if config.pair is None and _shares(config) == []:
         yield Fault(
             "mesh.stiffness",
             "a trapezoid without shares takes its shape from the contact ratio of [pair]",
@@ -101,8 +85,12 @@ def _contact_ratio_is_known(config: Configuration) -> Iterator[Fault]:
         )
 
 
-def _shares(stiffness: TrapezoidStiffness) -> list[float]:
-    shares = (stiffness.rise, stiffness.top, stiffness.fall, stiffness.bottom)
+def _shares(config: Configuration) -> list[float] | None:
+    """Return the shares that are given of a trapezoid; None where there is no trapezoid."""
+    given = config.physical()
+    if given["mesh.stiffness.shape"] != "trapezoid":
+        return None
+    shares = (given[f"mesh.stiffness.{name}"] for name in ("rise", "top", "fall", "bottom"))
     return [share for share in shares if share is not None]
 
 
@@ -184,7 +172,6 @@ def _errors_are_measured_on_a_section(config: Configuration) -> Iterator[Fault]:
         return
     for name in ("tolerance", "error_check"):
         if value := getattr(config.integration, name):
+            rule = "needs a section to measure errors on"
             remedy = 'keep a state in outputs.section, such as "delta_5"'
-            yield Fault(
-                f"integration.{name}", "needs a section to measure errors on", remedy, value
-            )
+            yield Fault(f"integration.{name}", rule, remedy, value)

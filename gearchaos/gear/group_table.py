@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable
 from dataclasses import dataclass
 from types import MappingProxyType
@@ -56,8 +57,8 @@ class GroupRow:
     ----------
     name : str
         Key in ``[groups]``, attribute of `Groups`, name in the result file.
-    symbol, mathtext : str
-        The symbol as plain text and as matplotlib mathtext.
+    mathtext : str
+        The symbol as matplotlib mathtext.
     long_name, units : str
         For people and for files; ``"1"`` is dimensionless.
     valid : Range
@@ -72,7 +73,6 @@ class GroupRow:
     """
 
     name: str
-    symbol: str
     mathtext: str
     long_name: str
     valid: Range = ANY_NUMBER
@@ -82,21 +82,23 @@ class GroupRow:
     derived_from: tuple[str, ...] = ()
     is_list: bool = False
 
+    @property
+    def symbol(self) -> str:
+        """The symbol as plain text, such as ``k_11``."""
+        return re.sub(r"\\(var)?|[${}]", "", self.mathtext)
+
     def needed_by(self, effects: Iterable[str]) -> bool:
         """Whether a scene with these effects needs the group."""
         return not self.effects or not self.effects.isdisjoint(effects)
 
 
 def _bearing_rows(direction: str, digit: int) -> Iterable[GroupRow]:
+    kinds = (("stiffness", "k", "N_per_m"), ("damping", r"\eta", "N_s_per_m"))
     for gear, number, words in _GEARS:
-        for kind, symbol, mathtext, unit in (
-            ("stiffness", "k", "k", "N_per_m"),
-            ("damping", "eta", r"\eta", "N_s_per_m"),
-        ):
+        for kind, letter, unit in kinds:
             yield GroupRow(
                 f"{direction}_{kind}_{gear}",
-                f"{symbol}_{number}{digit}",
-                f"${mathtext}_{{{number}{digit}}}$",
+                f"${letter}_{{{number}{digit}}}$",
                 f"{direction} bearing {kind} of the {words} gear",
                 Range(ge=0.0),
                 effects=frozenset({direction}),
@@ -110,22 +112,16 @@ _STIFFNESS = frozenset({"stiffness_variation"})
 GROUP_TABLE: tuple[GroupRow, ...] = (
     GroupRow(
         "mesh_frequency",
-        "Omega",
         r"$\Omega$",
         "angular mesh frequency",
         Range(gt=0.0),
         derived_from=(*_OMEGA_H, "operation.speed_rpm"),
     ),
     GroupRow(
-        "load",
-        "f_n",
-        "$f_n$",
-        "static load",
-        derived_from=(*_OMEGA_H, "operation.torque_Nm", *_LENGTH),
+        "load", "$f_n$", "static load", derived_from=(*_OMEGA_H, "operation.torque_Nm", *_LENGTH)
     ),
     GroupRow(
         "damping_ratio",
-        "xi",
         r"$\xi$",
         "mesh damping ratio",
         Range(ge=0.0),
@@ -133,7 +129,6 @@ GROUP_TABLE: tuple[GroupRow, ...] = (
     ),
     GroupRow(
         "base_helix_angle_deg",
-        "beta_b",
         r"$\beta_b$",
         "base helix angle",
         Range(ge=0.0, lt=90.0),
@@ -142,17 +137,15 @@ GROUP_TABLE: tuple[GroupRow, ...] = (
     ),
     GroupRow(
         "half_backlash",
-        "b",
         "$b$",
         "half backlash",
         Range(ge=0.0),
         effects=frozenset({"backlash"}),
         derived_from=("mesh.half_backlash_um",),
     ),
-    GroupRow("pitch_error", "P", "$P$", "multiple of the pitch error", default=1.0, effects=_ERROR),
+    GroupRow("pitch_error", "$P$", "multiple of the pitch error", default=1.0, effects=_ERROR),
     GroupRow(
         "pitch_error_amplitude",
-        "e_r",
         "$e_r$",
         "amplitude of one pitch error",
         effects=_ERROR,
@@ -160,7 +153,6 @@ GROUP_TABLE: tuple[GroupRow, ...] = (
     ),
     GroupRow(
         "pitch_error_mean",
-        "e_0",
         "$e_0$",
         "mean of one pitch error",
         default=0.0,
@@ -169,7 +161,6 @@ GROUP_TABLE: tuple[GroupRow, ...] = (
     ),
     GroupRow(
         "pitch_error_phase_deg",
-        "phi",
         r"$\varphi$",
         "phase of the pitch error",
         units="degree",
@@ -179,7 +170,6 @@ GROUP_TABLE: tuple[GroupRow, ...] = (
     ),
     GroupRow(
         "stiffness_variation_scale",
-        "s",
         "$s$",
         "scale on the mesh stiffness variation",
         default=1.0,
@@ -188,7 +178,6 @@ GROUP_TABLE: tuple[GroupRow, ...] = (
     *(
         GroupRow(
             f"stiffness_{kind}",
-            f"{letter}_n/k_m",
             f"${letter}_n/k_m$",
             f"{kind} harmonics of the mesh stiffness relative to its mean",
             effects=_STIFFNESS,
@@ -200,7 +189,6 @@ GROUP_TABLE: tuple[GroupRow, ...] = (
     *(
         GroupRow(
             f"mass_ratio_{gear}",
-            f"m_e/m_{gear}",
             f"$m_e/m_{gear}$",
             f"equivalent mass over the mass of the {words} gear",
             Range(gt=0.0),

@@ -8,12 +8,14 @@ from typing import Any, Literal, TypeAlias
 
 import numpy as np
 
-from gearchaos.gear.derivation import Value, derive_groups
+from gearchaos.gear.derivation import derive_groups
+from gearchaos.gear.geometry import Value
 from gearchaos.gear.group_table import GROUP_TABLE, GROUPS_BY_NAME, GroupRow
 
 Origin: TypeAlias = Literal["given", "derived", "default"]
 
-_HARMONICS = ("stiffness_cosine", "stiffness_sine")
+HARMONICS = tuple(row.name for row in GROUP_TABLE if row.is_list)
+"""The two lists of harmonics of the mesh stiffness."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,7 +58,7 @@ def resolve_groups(physical: Mapping[str, Any], given: Mapping[str, Any]) -> Gro
     physical : mapping
         As `derive_groups` takes it.
     given : mapping
-        Group name to a number, an array over lanes, or a list of harmonics; None is not given.
+        Group name to a number, an array over lanes, or a list of harmonics.
 
     Raises
     ------
@@ -65,8 +67,8 @@ def resolve_groups(physical: Mapping[str, Any], given: Mapping[str, Any]) -> Gro
     KeyError
         If a given name is not a group.
     """
-    direct = {GROUPS_BY_NAME[name].name: v for name, v in given.items() if v is not None}
-    without = {*direct, *(_HARMONICS if not direct.keys().isdisjoint(_HARMONICS) else ())}
+    direct = {GROUPS_BY_NAME[name].name: value for name, value in given.items()}
+    without = {*direct, *(() if direct.keys().isdisjoint(HARMONICS) else HARMONICS)}
     sources: dict[Origin, Mapping[str, Any]] = {
         "default": {row.name: row.default for row in GROUP_TABLE if row.default is not None},
         "derived": derive_groups(physical, without),
@@ -77,9 +79,9 @@ def resolve_groups(physical: Mapping[str, Any], given: Mapping[str, Any]) -> Gro
     for source, groups in sources.items():
         values |= groups
         origin |= dict.fromkeys(groups, source)
-    if not values.keys().isdisjoint(_HARMONICS):
-        harmonics = max(len(values.get(name, ())) for name in _HARMONICS)
-        for name in _HARMONICS:
+    if not values.keys().isdisjoint(HARMONICS):
+        harmonics = max(len(values.get(name, ())) for name in HARMONICS)
+        for name in HARMONICS:
             known = values.get(name, ())
             values[name] = [*known, *[0.0] * (harmonics - len(known))]
             origin.setdefault(name, "default")

@@ -153,9 +153,7 @@ def test_a_given_group_wins_over_a_derived_one_and_a_derived_one_over_the_defaul
 def test_groups_alone_need_no_physical_data():
     nothing = dict.fromkeys(PHYSICAL)
     assert derive_groups(nothing) == {}
-    groups = resolve_groups(
-        nothing, {"mesh_frequency": 0.876, "load": 0.268, "damping_ratio": None}
-    )
+    groups = resolve_groups(nothing, {"mesh_frequency": 0.876, "load": 0.268})
     assert [row.name for row in groups.missing(())] == ["damping_ratio", "base_helix_angle_deg"]
     assert groups.origin == {
         "mesh_frequency": "given",
