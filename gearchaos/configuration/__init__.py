@@ -3,6 +3,14 @@
 from gearchaos.configuration.loading import load_config
 from gearchaos.configuration.models import Configuration
 from gearchaos.configuration.run_tables import EFFECTS, STATES
-from gearchaos.configuration.sweep_values import lane_groups, swept_values
+from gearchaos.configuration.sweep_values import axis_values, groups_at, swept_values
 
-__all__ = ["EFFECTS", "STATES", "Configuration", "lane_groups", "load_config", "swept_values"]
+__all__ = [
+    "EFFECTS",
+    "STATES",
+    "Configuration",
+    "axis_values",
+    "groups_at",
+    "load_config",
+    "swept_values",
+]

@@ -1,39 +1,82 @@
-"""Every key a configuration can have, by its dotted path, as the models declare it."""
+"""Tables of a configuration and their keys: how they are declared, and what is declared of them."""
 
 from __future__ import annotations
 
-import difflib
-import math
-import operator
 import types
 import typing
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Annotated, Any, Union
+from typing import Annotated, Any, TypeAlias, Union
 
-from pydantic import BaseModel
+from pydantic import BaseModel, ConfigDict, Field
 from pydantic.fields import FieldInfo
 
 from gearchaos.configuration.toml_text import toml_literal
+from gearchaos.gear.group_table import Range
+
+
+class Table(BaseModel):
+    """One table of the file: no conversions, no unknown keys, finite numbers only, immutable."""
+
+    model_config = ConfigDict(
+        strict=True,
+        extra="forbid",
+        frozen=True,
+        allow_inf_nan=False,
+        validate_default=True,
+        serialize_by_alias=True,
+        protected_namespaces=(),
+    )
+
+
+# TOML has lists, the models hold tuples; strictness about the entries is not affected.
+_AS_LIST = Field(strict=False)
+_Teeth: TypeAlias = Annotated[int, Field(ge=1, le=100_000)]
+_NotNegative: TypeAlias = Annotated[float, Field(ge=0)]
+_Positive: TypeAlias = Annotated[float, Field(gt=0)]
+Numbers: TypeAlias = Annotated[tuple[float, ...], _AS_LIST]
+Harmonics: TypeAlias = Annotated[
+    tuple[float, ...], Field(strict=False, min_length=1, max_length=1000)
+]
+PositivePair: TypeAlias = Annotated[tuple[_Positive, _Positive], _AS_LIST]
+NotNegativePair: TypeAlias = Annotated[tuple[_NotNegative, _NotNegative], _AS_LIST]
+TeethPair: TypeAlias = Annotated[tuple[_Teeth, _Teeth], _AS_LIST]
+
+
+def key(
+    description: str, units: str = "", example: Any = None, *, default: Any = ..., **rules: Any
+) -> Any:
+    """Declare a key: what it is, its unit, its default and the rules its value obeys.
+
+    Parameters
+    ----------
+    description : str
+        The meaning, without the unit.
+    units : str
+        Empty where there is none; ``"1"`` for a dimensionless number.
+    example : object
+        A value to show where a fault is reported.
+    default : object
+        ``...`` makes the key required.
+    **rules
+        Constraints of `pydantic.Field`, such as ``gt=0``.
+    """
+    return Field(
+        default,
+        description=f"{description}, in {units}" if units not in ("", "1") else description,
+        examples=None if example is None else [example],
+        json_schema_extra={"units": units} if units else None,
+        **rules,
+    )
 
 
 @dataclass(frozen=True)
 class Key:
-    """One key: where it stands and what the models say about it.
-
-    Attributes
-    ----------
-    path : str
-        Dotted path, such as ``pair.teeth``.
-    field : FieldInfo
-        The declaration.
-    tables : tuple of model classes
-        The tables that may stand here; empty for a value.
-    """
+    """One key: its dotted path, its declaration, the tables that may stand there, if any."""
 
     path: str
     field: FieldInfo
-    tables: tuple[type[BaseModel], ...]
+    tables: tuple[type[Table], ...]
 
     @property
     def units(self) -> str:
@@ -52,26 +95,10 @@ class Key:
         return float in (self.field.annotation, *typing.get_args(self.field.annotation))
 
     @property
-    def bounds(self) -> str:
-        """The range of the value in words, such as ``> 0 and < 90``; empty where unbounded."""
-        signs = {"gt": ">", "ge": ">=", "lt": "<", "le": "<="}
-        found = [
-            f"{sign} {getattr(rule, name):.12g}"
-            for rule in self.field.metadata
-            for name, sign in signs.items()
-            if getattr(rule, name, None) is not None
-        ]
-        return " and ".join(found)
-
-    def admits(self, value: float) -> bool:
-        """Whether a number is finite and lies in the range."""
-        holds = {"gt": operator.gt, "ge": operator.ge, "lt": operator.lt, "le": operator.le}
-        return math.isfinite(value) and all(
-            test(value, getattr(rule, name))
-            for rule in self.field.metadata
-            for name, test in holds.items()
-            if getattr(rule, name, None) is not None
-        )
+    def valid(self) -> Range:
+        """The range of a number."""
+        rules = [(rule, name) for rule in self.field.metadata for name in Range._fields]
+        return Range(**{name: getattr(rule, name) for rule, name in rules if hasattr(rule, name)})
 
     @property
     def remedy(self) -> str:
@@ -80,29 +107,19 @@ class Key:
         return f"expected: {self.field.description}{example}"
 
 
-def keys_of(model: type[BaseModel], path: str = "") -> Iterator[Key]:
+def keys_of(model: type[Table], path: str = "") -> Iterator[Key]:
     """List the keys of a model and of the tables inside it, in the order of declaration."""
     for name, field in model.model_fields.items():
         here = f"{path}.{field.alias or name}".lstrip(".")
-        tables = tuple(_models(field.annotation))
+        tables = tuple(_tables(field.annotation))
         yield Key(here, field, tables)
         for table in tables:
             yield from keys_of(table, here)
 
 
-def _models(annotation: Any) -> Iterator[type[BaseModel]]:
-    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+def _tables(annotation: Any) -> Iterator[type[Table]]:
+    if isinstance(annotation, type) and issubclass(annotation, Table):
         yield annotation
     elif typing.get_origin(annotation) in (Union, types.UnionType, Annotated):
         for part in typing.get_args(annotation):
-            yield from _models(part)
-
-
-def suggestion(word: str, words: Iterable[str]) -> str:
-    """Return ``did you mean `x`?`` for the nearest word, or an empty text."""
-    by_lower = {candidate.lower(): candidate for candidate in words}
-    start = word[:100].lower()
-    close = difflib.get_close_matches(start, by_lower, n=1) or [
-        candidate for candidate in by_lower if len(start) > 2 and candidate.startswith(start)
-    ]
-    return f"did you mean `{by_lower[close[0]]}`?" if close else ""
+            yield from _tables(part)

@@ -20,8 +20,7 @@ def load_config(path: str | os.PathLike[str], overrides: Iterable[str] = ()) -> 
     ----------
     path : path
     overrides : iterable of str
-        ``key.path=value`` with the value as TOML writes it, such as
-        ``"integration.steps_per_period=100"``; what is not TOML is taken as text.
+        Such as ``"integration.steps_per_period=100"``; what is not TOML is taken as text.
 
     Raises
     ------

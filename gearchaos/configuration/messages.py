@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import datetime
+import difflib
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any, Final
+from typing import Any, NamedTuple
 
 from pydantic_core import ErrorDetails
 
-from gearchaos.configuration.keys import Key, suggestion
+from gearchaos.configuration.keys import Key
 from gearchaos.configuration.toml_text import quoted_key
 
-ABSENT: Final = object()
 MOST_SHOWN = 100
 """Faults that are worded; a file with more of them is hardly a configuration."""
 
@@ -31,7 +30,7 @@ _RULES = {
     "union_tag_invalid": "must be one of {expected_tags}",
     "union_tag_not_found": "is missing",
 }
-_KINDS = {
+_EXPECTED = {
     "float_type": "a number",
     "int_type": "a whole number",
     "bool_type": "true or false",
@@ -41,47 +40,35 @@ _KINDS = {
     "model_type": "a table",
     "model_attributes_type": "a table",
 }
+_FOUND = {
+    bool: "true or false",
+    str: "a text",
+    float: "a number with a decimal point",
+    int: "a number",
+    dict: "a table",
+    list: "a list",
+}
+
+_NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?")
 
 
-@dataclass(frozen=True)
-class Fault:
-    """One fault.
-
-    Attributes
-    ----------
-    key : str
-        Dotted path of the key.
-    rule : str
-        What the value violates.
-    remedy : str
-        What to do instead.
-    value : object
-        The value; `ABSENT` where there is none.
-    """
+class Fault(NamedTuple):
+    """One fault: dotted path of the key, rule that is broken, what to do instead, value if any."""
 
     key: str
     rule: str
     remedy: str = ""
-    value: object = ABSENT
+    value: object = None
 
     def text(self, source: str) -> str:
         """Return the fault as one line that begins with the name of the file."""
-        value = "" if self.value is ABSENT else f" = {shown(self.value)}"
+        value = "" if self.value is None else f" = {shown(self.value)}"
         remedy = f"; {self.remedy}" if self.remedy else ""
         return f"{source}: {self.key}{value}: {self.rule}{remedy}"
 
 
 def texts(faults: Iterable[Fault], source: str, more: int = 0) -> list[str]:
-    """Return the faults as lines, each once, the first hundred of them.
-
-    Parameters
-    ----------
-    faults : iterable of Fault
-    source : str
-        What the lines call the configuration.
-    more : int
-        Faults beside these that nobody has worded.
-    """
+    """Return the faults as lines, each once, the first hundred; ``more`` have not been worded."""
     lines = list(dict.fromkeys(fault.text(source) for fault in faults))
     rest = max(0, len(lines) - MOST_SHOWN) + more
     return lines if rest == 0 else [*lines[:MOST_SHOWN], f"{source}: and {rest} more faults"]
@@ -94,9 +81,7 @@ def shown(value: object) -> str:
     if isinstance(value, Mapping):
         return "{...}"
     if isinstance(value, (list, tuple)):
-        entries = [
-            "[...]" if isinstance(entry, (list, tuple)) else shown(entry) for entry in value[:5]
-        ]
+        entries = ["[...]" if isinstance(one, (list, tuple)) else shown(one) for one in value[:5]]
         return f"[{', '.join([*entries, '...'] if len(value) > len(entries) else entries)}]"
     if isinstance(value, str):
         text = repr(value[:60])[1:-1]
@@ -106,6 +91,16 @@ def shown(value: object) -> str:
     if isinstance(value, (datetime.date, datetime.time)):
         return value.isoformat()
     return repr(value)
+
+
+def suggestion(word: str, words: Iterable[str]) -> str:
+    """Return ``did you mean `x`?`` for the nearest word, or an empty text."""
+    by_lower = {candidate.lower(): candidate for candidate in words}
+    start = word[:100].lower()
+    close = difflib.get_close_matches(start, by_lower, n=1) or [
+        candidate for candidate in by_lower if len(start) > 2 and candidate.startswith(start)
+    ]
+    return f"did you mean `{by_lower[close[0]]}`?" if close else ""
 
 
 def fault_of(error: ErrorDetails, tables: Mapping[str, Any], keys: Mapping[str, Key]) -> Fault:
@@ -120,102 +115,56 @@ def fault_of(error: ErrorDetails, tables: Mapping[str, Any], keys: Mapping[str, 
     keys : mapping of str to Key
         Every key by its path.
     """
+    kind, value, rule = error["type"], error["input"], _rule(error)
     names = _names(error["loc"], tables)
-    kind = error["type"]
     if kind.startswith("union_tag"):
         names.append("shape")
+        value = value.get("shape")
     path = ".".join(name for name in names if isinstance(name, str))
-    key = keys.get(path)
-    remedy = key.remedy if key is not None else ""
-    value = ABSENT if kind in ("missing", "union_tag_not_found") else error["input"]
-    if kind == "union_tag_invalid":
-        value = error["input"]["shape"]
-    if error["loc"][-1] == "[key]":
-        value = ABSENT
+    remedy = keys[path].remedy if path in keys else ""
     if kind == "extra_forbidden":
         remedy = _elsewhere(str(names[-1]), ".".join(map(str, names[:-1])), keys)
-    elif kind in ("literal_error", "union_tag_invalid") and isinstance(error["input"], str | dict):
-        remedy = (
-            suggestion(
-                str(names[-1] if value is ABSENT else value), re.findall(r"'([^']*)'", _rule(error))
-            )
-            or remedy
-        )
-    elif kind == "float_type" and isinstance(value, str) and _is_number(value):
+    elif isinstance(value, str) and kind in ("literal_error", "union_tag_invalid"):
+        remedy = suggestion(value, re.findall(r"'([^']*)'", rule)) or remedy
+    elif isinstance(value, str) and kind == "float_type" and _NUMBER.fullmatch(value.strip()):
         remedy = f"write it without the quotes: {value.strip()}"
-    return Fault(_dotted(names), _rule(error), remedy, value)
+    if kind == "missing" or error["loc"][-1] == "[key]":
+        value = None
+    dotted = "".join(
+        f"[{name}]" if isinstance(name, int) else f".{quoted_key(name)}" for name in names
+    )
+    return Fault(dotted.lstrip("."), rule, remedy, value)
 
 
 def _rule(error: ErrorDetails) -> str:
-    if error["type"] in _KINDS:
-        value = error["input"]
-        if isinstance(value, int) and error["type"] == "float_type" and not isinstance(value, bool):
-            return "must be a number that fits into 64 bits"
-        return f"must be {_KINDS[error['type']]}, not {_kind(value)}"
-    rule = _RULES.get(error["type"])
-    return error["msg"] if rule is None else rule.format(**error.get("ctx", {}))
-
-
-def _kind(value: object) -> str:
-    kinds = {
-        bool: "true or false",
-        str: "a text",
-        float: "a number with a decimal point",
-        int: "a number",
-    }
-    kinds |= {dict: "a table", list: "a list"}
-    return kinds.get(type(value), "a date or time")
-
-
-def _is_number(text: str) -> bool:
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return True
+    kind, value = error["type"], error["input"]
+    if kind not in _EXPECTED:
+        return _RULES[kind].format(**error.get("ctx", {})) if kind in _RULES else error["msg"]
+    if kind == "float_type" and type(value) is int:
+        return "must be a number that fits into 64 bits"
+    return f"must be {_EXPECTED[kind]}, not {_FOUND.get(type(value), 'a date or time')}"
 
 
 def _names(location: Sequence[int | str], tables: Mapping[str, Any]) -> list[int | str]:
     # pydantic puts the tag of a union ("fourier") and "[key]" into the location of an error.
     names: list[int | str] = []
-    node: object = tables
+    node: Any = tables
     for position, name in enumerate(location):
-        inner = _entry(node, name)
-        if inner is not ABSENT:
-            node = inner
+        known = range(len(node)) if isinstance(node, (list, tuple)) else node
+        if isinstance(known, (Mapping, range)) and name in known:
+            node = node[name]
         elif position < len(location) - 1 or name == "[key]":
             continue
         names.append(name)
     return names
 
 
-def _entry(node: object, name: int | str) -> object:
-    if isinstance(node, Mapping):
-        return node.get(name, ABSENT)
-    if isinstance(node, (list, tuple)) and isinstance(name, int) and name < len(node):
-        return node[name]
-    return ABSENT
-
-
-def _dotted(names: Sequence[int | str]) -> str:
-    path = ""
-    for name in names:
-        path += f"[{name}]" if isinstance(name, int) else f".{quoted_key(name)}"
-    return path.lstrip(".")
-
-
 def _elsewhere(name: str, table: str, keys: Mapping[str, Key]) -> str:
-    prefix = f"{table}." if table else ""
-    here = [
-        path.removeprefix(prefix)
-        for path in keys
-        if path.startswith(prefix) and "." not in path.removeprefix(prefix)
-    ]
-    near = suggestion(name, here)
-    homes = [path for path in keys if path.rpartition(".")[2] == name]
-    if near:
+    here = [path.rpartition(".")[2] for path in keys if path.rpartition(".")[0] == table]
+    if near := suggestion(name, here):
         return near
-    if homes:
-        return f"it belongs elsewhere: `{homes[0]}`"
+    for path in keys:
+        if path.rpartition(".")[2] == name:
+            return f"it belongs elsewhere: `{path}`"
     place = f"[{table}]" if table else "the top level"
     return f"the keys of {place} are {', '.join(here)}"

@@ -2,15 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from functools import cache
 from typing import Any, Literal, Self
 
 from pydantic import PrivateAttr, TypeAdapter, ValidationError, ValidationInfo, model_validator
 
-from gearchaos.configuration.keys import Key, keys_of
+from gearchaos.configuration.keys import Key, Table, key, keys_of
+from gearchaos.configuration.lane_rules import lane_faults
 from gearchaos.configuration.messages import MOST_SHOWN, Fault, fault_of, texts
-from gearchaos.configuration.physical_tables import Bearings, Mesh, Operation, Pair, PitchError
+from gearchaos.configuration.physical_tables import (
+    PHYSICAL_KEYS,
+    PHYSICAL_TABLES,
+    Bearings,
+    Mesh,
+    Operation,
+    Pair,
+    PitchError,
+)
 from gearchaos.configuration.rules import RULES
 from gearchaos.configuration.run_tables import (
     GivenGroups,
@@ -21,9 +30,10 @@ from gearchaos.configuration.run_tables import (
     Sweep,
     states_of,
 )
-from gearchaos.configuration.sweep_rules import LANE_RULES, SWEEP_RULES
-from gearchaos.configuration.table import Table, key
+from gearchaos.configuration.sweep_rules import unknown_parameter
+from gearchaos.configuration.sweep_values import SWEEPABLE_GROUPS
 from gearchaos.configuration.toml_text import (
+    flat_tables,
     tables_from_toml,
     toml_text,
     with_overrides,
@@ -33,7 +43,7 @@ from gearchaos.errors import ConfigurationError
 
 
 class Configuration(Table):
-    """A gear pair, the effects that exist, the sweep, and what is kept of it.
+    """A gear pair, the effects that exist, the sweeps, and what is kept of them.
 
     A Configuration that exists is sound: every rule has been checked, also those between tables.
     It cannot be changed; `replace` gives a changed copy.
@@ -53,6 +63,9 @@ class Configuration(Table):
     scene: Scene = key("which effects exist")
     start: Start = key("the state in which the lanes start", default=Start())
     sweep: Sweep = key("the swept parameter and its values")
+    second_sweep: Sweep | None = key(
+        "a second swept parameter: every value of it with every one of [sweep]", default=None
+    )
     integration: Integration = key("the fixed grid of the integration", default=Integration())
     outputs: Outputs = key("what is kept of every lane", default=Outputs())
 
@@ -70,14 +83,20 @@ class Configuration(Table):
         return self.resolved_toml() if self._text is None else self._text
 
     @property
+    def sweeps(self) -> dict[str, Sweep]:
+        """The sweeps that are there by the name of their table."""
+        tables = {name: self.__dict__.get(name) for name in ("sweep", "second_sweep")}
+        return {name: sweep for name, sweep in tables.items() if sweep is not None}
+
+    @property
     def needed_effects(self) -> tuple[str, ...]:
         """The effects of the scene that act on what is kept.
 
         The axial pair is driven one way: without an axial state in the section and without the
         exponent of the whole system, nothing that is kept depends on it.
         """
-        axial_states = set(states_of({"axial"})) - set(states_of(()))
-        if self.outputs.lyapunov or not axial_states.isdisjoint(self.outputs.section):
+        without_axial = states_of({"transverse"})
+        if self.outputs.lyapunov or not set(self.outputs.section).issubset(without_axial):
             return self.scene.effects
         return tuple(effect for effect in self.scene.effects if effect != "axial")
 
@@ -85,15 +104,9 @@ class Configuration(Table):
     def from_toml(
         cls, text: str, source: str = "<text>", overrides: Iterable[str] = ()
     ) -> Configuration:
-        """Make a configuration from TOML text.
+        """Make a configuration from TOML text, which messages call ``source``.
 
-        Parameters
-        ----------
-        text : str
-        source : str
-            What messages call the text.
-        overrides : iterable of str
-            Such as ``"integration.steps_per_period=100"``.
+        ``overrides`` are those of `load_config`.
 
         Raises
         ------
@@ -120,22 +133,17 @@ class Configuration(Table):
             found = error.errors(include_url=False)
             # A long list of nonsense can hold a million faults.
             own = [fault_of(one, tables, configuration_keys()) for one in found[:MOST_SHOWN]]
-            readable, unreadable = _readable_tables(tables)
-            shared = _broken_rules(cls.model_construct(**readable), unreadable)
+            unreadable = {str(one["loc"][0]) for one in found}
+            shared = _broken_rules(_readable(tables, unreadable), unreadable)
             more = len(found) - len(own)
             raise ConfigurationError(texts([*own, *shared], source, more)) from None
         config._source = source
         return config
 
     def replace(self, path: str, value: Any) -> Configuration:
-        """Return a copy in which one key, at its dotted path, has another value.
+        """Return a copy in which one key, or table, at its dotted path has another value.
 
-        Parameters
-        ----------
-        path : str
-            Such as ``"integration.steps_per_period"``, or a whole table such as ``"sweep"``.
-        value : object
-            The new value; a mapping for a table; None removes the key.
+        A value of a table is a mapping; None removes the key.
 
         Raises
         ------
@@ -148,6 +156,38 @@ class Configuration(Table):
             raise ConfigurationError(f"{self.source}: {error.args[0]} is not a table") from None
         return type(self).from_tables(tables, self.source)
 
+    def at(self, values: Mapping[str, float]) -> Configuration:
+        """Return a copy in which parameters are fixed at values.
+
+        Parameters
+        ----------
+        values : mapping of str to float
+            By parameter, as `Sweep.parameter` names it and in its unit. Where [sweep] swept it,
+            that becomes a sweep of this one value; where [second_sweep] did, that goes.
+
+        Raises
+        ------
+        ConfigurationError
+            If a parameter cannot be swept, or the changed configuration breaks a rule.
+        """
+        unknown = [fault for name in values for fault in unknown_parameter("parameter", name)]
+        if unknown:
+            raise ConfigurationError(texts(unknown, self.source))
+        tables = self.tables()
+        for parameter, value in values.items():
+            path = f"groups.{parameter}" if parameter in SWEEPABLE_GROUPS else parameter
+            tables = with_value(tables, path.split("."), float(value))
+            if parameter == self.sweep.parameter:
+                tables["sweep"] = {"parameter": parameter, "values": [float(value)]}
+            elif self.second_sweep is not None and parameter == self.second_sweep.parameter:
+                del tables["second_sweep"]
+        return type(self).from_tables(tables, self.source)
+
+    def physical(self) -> dict[str, Any]:
+        """Return every key of the physical tables by its path, with its value or None."""
+        known = self.model_dump(include=set(PHYSICAL_TABLES), exclude_none=True)
+        return dict.fromkeys(PHYSICAL_KEYS) | flat_tables(known)
+
     def tables(self) -> dict[str, Any]:
         """Return the nested mappings of everything that is known, defaults included."""
         return self.model_dump(exclude_none=True)
@@ -158,7 +198,7 @@ class Configuration(Table):
 
     @model_validator(mode="after")
     def _obeys_the_rules(self, info: ValidationInfo) -> Self:
-        faults = list(_broken_rules(self, frozenset()))
+        faults = list(_broken_rules(self, set()))
         if faults:
             raise ConfigurationError(texts(faults, (info.context or {}).get("source", "<python>")))
         return self
@@ -176,27 +216,22 @@ def configuration_keys() -> dict[str, Key]:
     return {key.path: key for key in keys_of(Configuration)}
 
 
-def _broken_rules(config: Configuration, unreadable: frozenset[str]) -> Iterator[Fault]:
+def _broken_rules(config: Configuration, unreadable: Collection[str]) -> Iterator[Fault]:
     suspect = set(unreadable)
-    for tables, rule in (*RULES, *SWEEP_RULES):
+    for tables, broken in RULES:
         if tables.isdisjoint(unreadable):
-            for fault in rule(config):
+            for fault in broken(config):
                 suspect.add(fault.key.partition(".")[0])
                 yield fault
-    for tables, rule in LANE_RULES:
-        if tables.isdisjoint(suspect):
-            yield from rule(config)
+    if suspect.isdisjoint({"sweep", "second_sweep", "scene", "groups", *PHYSICAL_TABLES}):
+        yield from lane_faults(config)
 
 
-def _readable_tables(tables: Mapping[str, Any]) -> tuple[dict[str, Any], frozenset[str]]:
-    readable, unreadable = {}, set()
+def _readable(tables: Mapping[str, Any], unreadable: Collection[str]) -> Configuration:
+    """Make a configuration of the tables without a fault of their own, unchecked."""
+    readable = {}
     for name, field in Configuration.model_fields.items():
-        if name in tables:
+        if name in tables and name not in unreadable:
             annotation: Any = field.annotation
-            try:
-                readable[name] = TypeAdapter(annotation).validate_python(tables[name])
-            except ValidationError:
-                unreadable.add(name)
-        elif field.is_required():
-            unreadable.add(name)
-    return readable, frozenset(unreadable)
+            readable[name] = TypeAdapter(annotation).validate_python(tables[name])
+    return Configuration.model_construct(**readable)

@@ -1,4 +1,4 @@
-"""The tables that say what is computed: groups given directly, scene, start, sweep, outputs."""
+"""The tables that say what is computed: groups given directly, scene, start, sweeps, outputs."""
 
 from __future__ import annotations
 
@@ -7,8 +7,13 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias, get_args
 
 from pydantic import Field, create_model
 
-from gearchaos.configuration.table import Numbers, Table, key
+from gearchaos.configuration.keys import Harmonics, Numbers, Table, key
 from gearchaos.gear.group_table import GROUP_TABLE, GroupRow
+
+MOST_LANES = 100_000_000
+"""Lanes of one run: what a file and a machine can still hold."""
+_MOST_VALUES = 10_000_000
+_MOST_STARTS = 1_000_000
 
 Effect: TypeAlias = Literal["pitch_error", "stiffness_variation", "backlash", "transverse", "axial"]
 EFFECTS: tuple[str, ...] = get_args(Effect)
@@ -29,7 +34,7 @@ STATES: tuple[str, ...] = get_args(State)
 
 
 def states_of(effects: Collection[str]) -> tuple[str, ...]:
-    """Return the states of a scene with these effects, in the order of the kernels."""
+    """Return the states of a scene with these effects, in the order of `STATES`."""
     transverse = STATES[2:6] if "transverse" in effects else ()
     axial = STATES[6:] if "axial" in effects else ()
     return STATES[:2] + transverse + axial
@@ -47,14 +52,9 @@ def _group_field(row: GroupRow) -> tuple[Any, Any]:
     units = "" if row.units == "1" else row.units
     description = f"{row.long_name} ({row.symbol})"
     if row.is_list:
-        field = key(description, units=units, default=None, min_length=1, max_length=1000)
-        return Numbers | None, field
-    bounds = {
-        ("gt" if row.excludes_minimum else "ge"): row.minimum,
-        ("lt" if row.excludes_maximum else "le"): row.maximum,
-    }
-    rules = {rule: bound for rule, bound in bounds.items() if bound is not None}
-    return float | None, key(description, units=units, default=None, **rules)
+        return Harmonics | None, key(description, units, default=None)
+    bounds = {name: bound for name, bound in row.valid._asdict().items() if bound is not None}
+    return float | None, key(description, units, default=None, **bounds)
 
 
 if TYPE_CHECKING:
@@ -80,7 +80,7 @@ class Scene(Table):
 
     @property
     def states(self) -> tuple[str, ...]:
-        """States of the scene in the order of the kernels: 2, 6 or 10."""
+        """States of the scene, 2, 6 or 10, in the order of `STATES`."""
         return states_of(self.effects)
 
 
@@ -92,41 +92,42 @@ class Start(Table):
     )
     state: dict[State, float] = key(
         'start values by state for kind = "given"; those not named are 0',
-        default={},
         example={"delta_5": 1.0},
+        default={},
     )
     spread: float = key(
         'for kind = "random": every state is uniform between minus and plus this',
-        units="1",
+        "1",
         default=1.0,
         gt=0,
     )
     seed: int = key('for kind = "random": seed', default=0, ge=0, le=2**32 - 1)
     count: int = key(
-        'for kind = "random": starts per parameter value', default=1, ge=1, le=1_000_000
+        'for kind = "random": starts per parameter value', default=1, ge=1, le=_MOST_STARTS
     )
     carry: Literal["none", "upwards", "downwards"] = key(
-        "whether each value starts from the end state of the one before it, and in which direction",
+        "whether each value of [sweep] starts from the end state of the one before it, and in "
+        "which direction",
         default="none",
     )
 
 
 class Sweep(Table):
-    """The swept parameter and its values, from/to/count or a list."""
+    """A swept parameter and its values, from/to/count or a list."""
 
     parameter: str = key(
         "a group by its name, or a physical key by its path such as operation.speed_rpm",
         example="pitch_error",
     )
-    from_: float | None = key("first value", default=None, example=0.0, alias="from")
-    to: float | None = key("last value", default=None, example=15.0)
+    from_: float | None = key("first value", example=0.0, default=None, alias="from")
+    to: float | None = key("last value", example=15.0, default=None)
     count: int | None = key(
-        "number of values, evenly spaced", default=None, example=1501, ge=1, le=10_000_000
+        "number of values, evenly spaced", example=1501, default=None, ge=1, le=_MOST_VALUES
     )
     values: Numbers | None = key(
         "the values themselves, instead of from, to and count",
-        default=None,
         example=[1.0, 2.0],
+        default=None,
         min_length=1,
     )
 
@@ -138,6 +139,11 @@ class Sweep(Table):
         last = self.from_ if self.to is None or self.count == 1 else self.to
         return self.from_, last, self.count
 
+    @property
+    def size(self) -> int:
+        """Number of values."""
+        return (self.count or 0) if self.values is None else len(self.values)
+
 
 class Integration(Table):
     """Runge-Kutta of order 4 on a fixed grid over the mesh period."""
@@ -146,13 +152,13 @@ class Integration(Table):
     tolerance: float | None = key(
         "largest error of section and exponent; the steps are then doubled, from steps_per_period "
         "on, until lanes of the sweep that are tried beforehand reach it",
-        default=None,
         example=1e-6,
+        default=None,
         gt=0,
     )
     error_check: float = key(
         "share of the lanes that are computed again with half the step, to measure their error",
-        units="1",
+        "1",
         default=0.0,
         ge=0,
         le=1,
@@ -178,7 +184,7 @@ class Outputs(Table):
     """What is kept of every lane."""
 
     section: Annotated[tuple[State, ...], Field(strict=False)] = key(
-        "states recorded once per mesh period", default=("delta_5",), example=["delta_5"]
+        "states recorded once per mesh period", example=["delta_5"], default=("delta_5",)
     )
     section_points: int = key("last mesh periods of the section that are kept", default=100, ge=1)
     lyapunov: bool = key("whether the largest Lyapunov exponent is computed", default=True)
@@ -186,12 +192,12 @@ class Outputs(Table):
         "whether the motion is labelled: its kind, its period, and the distance of its return",
         default=True,
     )
-    spectrum: bool = key(
+    exponents: bool = key(
         "whether all Lyapunov exponents are computed, at about ten times the cost", default=False
     )
     allowed_diverged_share: float = key(
         "share of diverged lanes above which the command reports failure",
-        units="1",
+        "1",
         default=0.0,
         ge=0,
         le=1,

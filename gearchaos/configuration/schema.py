@@ -47,9 +47,14 @@ def _table(name: str, keys: list[Key]) -> str:
     title = f"### `[{name}]`" if name else "### Top level"
     lines = [title, "", "| key | unit | range | default | meaning |", "|---|---|---|---|---|"]
     for key in keys:
-        words = (key.field.description or "").removesuffix(f", in {key.units}")
         unit = "" if key.units == "1" else key.units
-        cells = [f"`{key.path.rpartition('.')[2]}`", unit, key.bounds, _default(key), words]
+        cells = [
+            f"`{key.path.rpartition('.')[2]}`",
+            unit,
+            key.valid.bounds,
+            _default(key),
+            key.wording,
+        ]
         lines.append(f"| {' | '.join(cells)} |")
     return "\n".join(lines)
 

@@ -1,17 +1,18 @@
-"""The swept values, and the dimensionless groups that every lane gets from them."""
+"""The swept values, and the dimensionless groups that follow from them."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 
-from gearchaos.configuration.keys import keys_of
-from gearchaos.configuration.physical_tables import PHYSICAL_TABLES
+from gearchaos.configuration.physical_tables import PHYSICAL_KEYS
+from gearchaos.configuration.run_tables import Sweep
 from gearchaos.gear.group_table import GROUPS_BY_NAME
-from gearchaos.gear.groups import Groups, derive_groups, resolve_groups
+from gearchaos.gear.groups import Groups, resolve_groups
 
 if TYPE_CHECKING:
     from gearchaos.configuration.models import Configuration
@@ -19,24 +20,18 @@ if TYPE_CHECKING:
 FloatArray: TypeAlias = npt.NDArray[np.float64]
 
 SWEEPABLE_KEYS = MappingProxyType(
-    {
-        key.path: key
-        for name, table in PHYSICAL_TABLES.items()
-        for key in keys_of(table, name)
-        if key.is_number and key.path.count(".") == 1
-    }
+    {path: key for path, key in PHYSICAL_KEYS.items() if key.is_number and path.count(".") == 1}
 )
 """Physical keys that a sweep may vary, by path: the single numbers of the physical tables."""
 
 SWEEPABLE_GROUPS = MappingProxyType(
-    {name: row for name, row in GROUPS_BY_NAME.items() if row.sweepable}
+    {name: row for name, row in GROUPS_BY_NAME.items() if not row.is_list}
 )
 """Groups that a sweep may vary, by name."""
 
 
-def swept_values(config: Configuration) -> FloatArray:
-    """Return the values of the swept parameter, shape (lanes,), in its own unit, ascending."""
-    sweep = config.sweep
+def swept_values(sweep: Sweep) -> FloatArray:
+    """Return the values of a sweep, shape (values,), in the unit of its parameter, ascending."""
     if sweep.values is not None:
         return np.sort(np.asarray(sweep.values, dtype=np.float64))
     first, last, count = sweep.span
@@ -47,54 +42,46 @@ def swept_values(config: Configuration) -> FloatArray:
     return values
 
 
-def lane_groups(config: Configuration) -> tuple[FloatArray, Groups]:
-    """Return the swept values and the groups of the lanes.
+def axis_values(config: Configuration) -> dict[str, FloatArray]:
+    """Return the swept values by parameter, in the order of the axes: [second_sweep] first.
 
-    Returns
-    -------
-    values : ndarray, shape (lanes,)
-        Of the swept parameter, in its own unit, ascending.
-    groups : Groups
-        Arrays of shape (lanes,) where the swept parameter acts, floats elsewhere.
+    Each has the shape (values,); a parameter is in its own unit.
     """
-    values = swept_values(config)
-    return values, groups_at(config, values)
+    sweeps = reversed(config.sweeps.values())
+    return {sweep.parameter: swept_values(sweep) for sweep in sweeps}
 
 
-def groups_at(config: Configuration, values: FloatArray) -> Groups:
-    """Resolve the groups for given values of the swept parameter.
+def groups_at(config: Configuration, values: Mapping[str, npt.ArrayLike]) -> Groups:
+    """Resolve the groups for given values of parameters.
 
     Parameters
     ----------
     config : Configuration
-    values : ndarray, shape (lanes,)
-        Of the swept parameter, in its own unit. a group replaces the one in the file; a physical
-        quantity takes part in the derivation of every group that is not given.
+    values : mapping of str to array_like
+        By parameter, in its own unit, of shapes that broadcast against each other. A group
+        replaces the one in the file; a physical quantity takes part in the derivation of every
+        group that is not given. What is not in it is as the file gives it.
+
+    Returns
+    -------
+    Groups
+        Each in the broadcast shape of the values on which it depends; a float where on none.
 
     Raises
     ------
     ConfigurationError
         If the harmonics of the mesh stiffness would differ between lanes.
+    KeyError
+        If a parameter cannot be swept.
     """
-    if config.mesh and "stiffness_variation" not in config.scene.effects:
-        # Lanes share one table of harmonics; a scene without it may sweep what they depend on.
-        mesh = config.mesh.model_copy(update={"stiffness": None})
-        config = config.model_copy(update={"mesh": mesh})
-    parameter = config.sweep.parameter
+    physical: dict[str, Any] = config.physical()
     given: dict[str, Any] = dict(config.groups.given())
-    if parameter in SWEEPABLE_GROUPS:
-        return resolve_groups(config, {**given, parameter: values})
-    return resolve_groups(_with_lanes(config, parameter, values), given)
-
-
-def groups_moved_by(config: Configuration, path: str, values: FloatArray) -> list[str]:
-    """Names of the groups, given or not, that a swept physical quantity would change."""
-    harmonics = ("stiffness_cosine", "stiffness_sine")
-    derived = derive_groups(_with_lanes(config, path, values), without=harmonics)
-    return [name for name, value in derived.items() if np.ndim(value) > 0]
-
-
-def _with_lanes(config: Configuration, path: str, values: FloatArray) -> Configuration:
-    table, name = path.split(".")
-    model = getattr(config, table) or PHYSICAL_TABLES[table].model_construct()
-    return config.model_copy(update={table: model.model_copy(update={name: values})})
+    if "stiffness_variation" not in config.scene.effects:
+        # Lanes share one table of harmonics; a scene without it may sweep what they depend on.
+        physical["mesh.stiffness.shape"] = None
+    for parameter, value in values.items():
+        if parameter in SWEEPABLE_GROUPS:
+            given[parameter] = value
+        else:
+            physical[SWEEPABLE_KEYS[parameter].path] = np.asarray(value, dtype=np.float64)
+    return resolve_groups(physical, given)

@@ -31,7 +31,9 @@ def tables_from_toml(text: str, source: str) -> dict[str, Any]:
         With the line and the column where the text stops being TOML.
     """
     try:
-        return _parsed(text)
+        if _ENDLESS_KEY.search(text):
+            raise RecursionError
+        return tomllib.loads(text)
     except RecursionError:
         raise ConfigurationError(
             f"{source}: nested too deeply to be a configuration; tables go three levels deep"
@@ -49,15 +51,8 @@ def with_overrides(
 ) -> dict[str, Any]:
     """Return the tables with ``key.path=value`` overrides applied, later ones over earlier ones.
 
-    Parameters
-    ----------
-    tables : mapping
-        What the file says.
-    overrides : iterable of str
-        The value is read as TOML; what is not TOML is taken as text, so that ``start.kind=rest``
-        needs no quotes.
-    source : str
-        Name of the file, for messages.
+    A value is read as TOML; what is not TOML is taken as text, so that ``start.kind=rest`` needs
+    no quotes. ``source`` is the name of the file, for messages.
 
     Raises
     ------
@@ -154,16 +149,10 @@ def _string(text: str) -> str:
     return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
 
 
-def _parsed(text: str) -> dict[str, Any]:
-    if _ENDLESS_KEY.search(text):
-        raise RecursionError
-    return tomllib.loads(text)
-
-
 def _value(text: str) -> Any:
     try:
-        parsed = _parsed(f"value = {text}")
-    except (ValueError, RecursionError):
+        parsed = tables_from_toml(f"value = {text}", "override")
+    except ConfigurationError:
         return text.strip()
     # A line break in the text could have smuggled in further keys.
     return parsed["value"] if parsed.keys() == {"value"} else text

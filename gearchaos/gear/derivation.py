@@ -5,36 +5,30 @@ Scales: length b', time 1 / omega_h with omega_h = sqrt(k_m / m_e).
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Mapping
+from contextlib import suppress
 from functools import cached_property
-from typing import Any, TypeAlias
+from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from gearchaos.errors import ConfigurationError
-from gearchaos.gear.geometry import STEEL_DENSITY, HelicalPair
+from gearchaos.gear.geometry import HelicalPair, Value
 from gearchaos.gear.mesh_stiffness import FourierStiffness, TrapezoidalStiffness
-
-Value: TypeAlias = float | npt.NDArray[np.float64]
-
-DEFAULT_HARMONICS = 6
-"""Harmonics of a trapezoid where their number is not given, as in Pan 2021, Table 2."""
 
 _MICROMETRE = 1e-6
 _MILLIMETRE = 1e-3
 _N_PER_UM_MM = 1e9  # stiffness per unit face width: 1 N/(um mm) = 1e9 N/m^2
 
 
-def derive_groups(physical: Any, without: Collection[str] = ()) -> dict[str, Value]:
+def derive_groups(physical: Mapping[str, Any], without: Collection[str] = ()) -> dict[str, Value]:
     """Compute every group for which the physical data suffice.
 
     Parameters
     ----------
-    physical : object
-        With the tables ``pair``, ``operation``, ``mesh``, ``pitch_error`` and ``bearings`` of the
-        configuration as attributes. A table or a key that is None or not there is not known;
-        a number may be an array over lanes, which broadcasts.
+    physical : mapping
+        Every key of the physical tables of a configuration by its path, such as ``pair.teeth``,
+        with its value; None is not known. A number may be an array over lanes, which broadcasts.
     without : collection of str
         Names of groups that are not wanted.
 
@@ -47,16 +41,15 @@ def derive_groups(physical: Any, without: Collection[str] = ()) -> dict[str, Val
     ------
     ConfigurationError
         If the stiffness harmonics would differ between lanes.
+    KeyError
+        If the mapping lacks a path.
     """
-    quantities = _PhysicalQuantities(physical)
+    quantities = _Quantities(physical)
     groups: dict[str, Value] = {}
     for name, derivation in _DERIVATIONS.items():
-        if name in without:
-            continue
-        try:
-            groups[name] = derivation(quantities)
-        except _UnknownError:
-            continue
+        if name not in without:
+            with suppress(_UnknownError):
+                groups[name] = derivation(quantities)
     return groups
 
 
@@ -64,118 +57,97 @@ class _UnknownError(Exception):
     """A physical quantity that a derivation needs is not known."""
 
 
-class _PhysicalQuantities:
-    """The physical tables of a configuration in SI units, and what follows from them."""
+class _Quantities:
+    """Physical data in SI units, and what follows from them."""
 
-    def __init__(self, tables: Any) -> None:
-        self._tables = tables
+    def __init__(self, physical: Mapping[str, Any]) -> None:
+        self.physical = physical
 
-    def find(self, path: str) -> Any:
-        """Value at a dotted path, None where absent."""
-        node = self._tables
-        for name in path.split("."):
-            node = getattr(node, name, None)
-        return node
-
-    def read(self, path: str) -> Any:
-        """Value at a dotted path that has to be known."""
-        value = self.find(path)
+    def __getitem__(self, path: str) -> Any:
+        value = self.physical[path]
         if value is None:
             raise _UnknownError(path)
         return value
 
     @cached_property
     def pair(self) -> HelicalPair:
-        helix_angle_deg = self.find("pair.helix_angle_deg")
-        density = self.find("pair.density_kg_m3")
         return HelicalPair(
-            teeth=self.read("pair.teeth"),
-            normal_module=self.read("pair.normal_module_mm") * _MILLIMETRE,
-            normal_pressure_angle=np.radians(self.read("pair.normal_pressure_angle_deg")),
-            helix_angle=np.radians(0.0 if helix_angle_deg is None else helix_angle_deg),
-            face_width=self.read("pair.face_width_mm") * _MILLIMETRE,
-            density=STEEL_DENSITY if density is None else density,
-            given_masses=self.find("pair.masses_kg"),
-            given_inertias=self.find("pair.inertias_kg_m2"),
+            teeth=self["pair.teeth"],
+            normal_module=self["pair.normal_module_mm"] * _MILLIMETRE,
+            normal_pressure_angle=np.radians(self["pair.normal_pressure_angle_deg"]),
+            helix_angle=np.radians(self["pair.helix_angle_deg"]),
+            face_width=self["pair.face_width_mm"] * _MILLIMETRE,
+            density=self["pair.density_kg_m3"],
+            given_masses=self.physical["pair.masses_kg"],
+            given_inertias=self.physical["pair.inertias_kg_m2"],
         )
 
-    @property
+    @cached_property
     def mean_stiffness(self) -> Any:
         """k_m in N/m: mean mesh stiffness per unit face width times the face width."""
-        per_width = self.read("mesh.mean_stiffness_N_per_um_mm") * _N_PER_UM_MM
+        per_width = self["mesh.mean_stiffness_N_per_um_mm"] * _N_PER_UM_MM
         return per_width * self.pair.face_width
 
-    @property
+    @cached_property
     def scaling_frequency(self) -> Any:
         """omega_h = sqrt(k_m / m_e) in rad/s."""
         return np.sqrt(self.mean_stiffness / self.pair.equivalent_mass)
 
-    @property
+    @cached_property
     def length_scale(self) -> Any:
         """Length scale b' in m: the one given, else the half backlash."""
-        length_scale = self.find("mesh.length_scale_um")
-        if length_scale is None:
-            length_scale = self.read("mesh.half_backlash_um")
-        return length_scale * _MICROMETRE
+        given = self.physical["mesh.length_scale_um"]
+        return (self["mesh.half_backlash_um"] if given is None else given) * _MICROMETRE
 
     def over_length_scale(self, path: str) -> Any:
         """Length given in um, over b'."""
-        return self.read(path) * _MICROMETRE / self.length_scale
+        return self[path] * _MICROMETRE / self.length_scale
 
-    @property
     def mesh_frequency(self) -> Any:
         """Omega = 2 pi f / omega_h; the paper's omega (eq. 9) is f / omega_h, in cycles."""
-        mesh_frequency_hz = self.read("operation.speed_rpm") / 60.0 * self.pair.teeth[0]
+        mesh_frequency_hz = self["operation.speed_rpm"] / 60.0 * self.pair.teeth[0]
         return 2.0 * np.pi * mesh_frequency_hz / self.scaling_frequency
 
-    @property
     def load(self) -> Any:
         """f_n = T_p / (m_e b' r_bp omega_h^2) (Pan 2021, eq. 13)."""
-        force = self.read("operation.torque_Nm") / self.pair.base_radii[0]
+        force = self["operation.torque_Nm"] / self.pair.base_radii[0]
         return force / (self.mean_stiffness * self.length_scale)
 
-    @property
     def damping_ratio(self) -> Any:
         """The mesh damping ratio xi, or that of c_m = 2 xi sqrt(k_m m_e) (Pan 2021, eq. 20)."""
-        ratio = self.find("mesh.damping_ratio")
-        if ratio is not None:
-            return ratio
-        damping = self.read("mesh.damping_N_s_per_m")
+        if self.physical["mesh.damping_ratio"] is not None:
+            return self.physical["mesh.damping_ratio"]
+        damping = self["mesh.damping_N_s_per_m"]
         return damping / (2.0 * np.sqrt(self.mean_stiffness * self.pair.equivalent_mass))
 
     def bearing_stiffness(self, direction: str, gear: int) -> Any:
         """Bearing stiffness k / (m omega_h^2) (Pan 2021, eq. 13, without its stray factor 2)."""
-        stiffness = self.read(f"bearings.{direction}_stiffness_N_per_m")[gear]
+        stiffness = self[f"bearings.{direction}_stiffness_N_per_m"][gear]
         return stiffness / (self.pair.masses[gear] * self.scaling_frequency**2)
 
     def bearing_damping(self, direction: str, gear: int) -> Any:
         """Bearing damping c / (2 m omega_h) (Pan 2021, eq. 13)."""
-        damping = self.read(f"bearings.{direction}_damping_N_s_per_m")[gear]
+        damping = self[f"bearings.{direction}_damping_N_s_per_m"][gear]
         return damping / (2.0 * self.pair.masses[gear] * self.scaling_frequency)
 
     @cached_property
     def mesh_stiffness(self) -> FourierStiffness:
         """The stiffness harmonics relative to the mean (Pan 2021, eqs 15-19)."""
-        if self.read("mesh.stiffness.shape") == "fourier":
-            mean = _common_to_lanes(self.read("mesh.mean_stiffness_N_per_um_mm"))
+        if self["mesh.stiffness.shape"] == "fourier":
+            mean = _common_to_lanes(self["mesh.mean_stiffness_N_per_um_mm"])
             return FourierStiffness(
-                cosine=np.divide(self.find("mesh.stiffness.cosine_N_per_um_mm") or (), mean),
-                sine=np.divide(self.find("mesh.stiffness.sine_N_per_um_mm") or (), mean),
+                cosine=np.divide(self["mesh.stiffness.cosine_N_per_um_mm"], mean),
+                sine=np.divide(self["mesh.stiffness.sine_N_per_um_mm"], mean),
             )
-        return self._trapezoid().to_fourier(
-            self.find("mesh.stiffness.harmonics") or DEFAULT_HARMONICS
-        )
-
-    def _trapezoid(self) -> TrapezoidalStiffness:
-        names = ("rise", "top", "fall", "bottom")
-        if all(self.find(f"mesh.stiffness.{name}") is None for name in names):
-            return TrapezoidalStiffness.from_contact_ratios(
+        if self.physical["mesh.stiffness.rise"] is None:
+            trapezoid = TrapezoidalStiffness.from_contact_ratios(
                 _common_to_lanes(self.pair.transverse_contact_ratio),
                 _common_to_lanes(self.pair.overlap_contact_ratio),
             )
-        return TrapezoidalStiffness(
-            *(self.read(f"mesh.stiffness.{name}") for name in (*names, "half_height"))
-        )
+        else:
+            parts = ("rise", "top", "fall", "bottom", "half_height")
+            trapezoid = TrapezoidalStiffness(*(self[f"mesh.stiffness.{part}"] for part in parts))
+        return trapezoid.to_fourier(self["mesh.stiffness.harmonics"])
 
 
 def _common_to_lanes(value: Any) -> float:
@@ -189,15 +161,15 @@ def _common_to_lanes(value: Any) -> float:
     return float(values[0])
 
 
-_DERIVATIONS: dict[str, Callable[[_PhysicalQuantities], Any]] = {
-    "mesh_frequency": lambda q: q.mesh_frequency,
-    "load": lambda q: q.load,
-    "damping_ratio": lambda q: q.damping_ratio,
+_DERIVATIONS: dict[str, Callable[[_Quantities], Any]] = {
+    "mesh_frequency": _Quantities.mesh_frequency,
+    "load": _Quantities.load,
+    "damping_ratio": _Quantities.damping_ratio,
     "base_helix_angle_deg": lambda q: np.degrees(q.pair.base_helix_angle),
     "half_backlash": lambda q: q.over_length_scale("mesh.half_backlash_um"),
     "pitch_error_amplitude": lambda q: q.over_length_scale("pitch_error.amplitude_um"),
     "pitch_error_mean": lambda q: q.over_length_scale("pitch_error.mean_um"),
-    "pitch_error_phase_deg": lambda q: q.read("pitch_error.phase_deg"),
+    "pitch_error_phase_deg": lambda q: q["pitch_error.phase_deg"],
     "stiffness_cosine": lambda q: q.mesh_stiffness.coefficients().real,
     "stiffness_sine": lambda q: -q.mesh_stiffness.coefficients().imag,
     "mass_ratio_p": lambda q: q.pair.equivalent_mass / q.pair.masses[0],

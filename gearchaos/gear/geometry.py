@@ -26,26 +26,20 @@ class HelicalPair:
     ----------
     teeth : pair of values
         Numbers of teeth z.
-    normal_module : float or ndarray
-        m_n, in m.
-    normal_pressure_angle : float or ndarray
-        alpha_n, in rad.
-    helix_angle : float or ndarray
-        beta on the reference circle, in rad.
-    face_width : float or ndarray
-        B, in m.
+    normal_module, face_width : float or ndarray
+        m_n and B, in m.
+    normal_pressure_angle, helix_angle : float or ndarray
+        alpha_n, and beta on the reference circle, in rad.
     density : float or ndarray
         Density of the solid discs on the reference circles, in kg/m^3.
-    given_masses : pair of values, optional
-        In kg; they replace the masses of the solid discs.
-    given_inertias : pair of values, optional
-        In kg m^2; they replace the inertias of the discs.
+    given_masses, given_inertias : pair of values, optional
+        In kg and kg m^2; they replace those of the solid discs.
     """
 
     teeth: PairOfValues
     normal_module: Value
     normal_pressure_angle: Value
-    helix_angle: Value = 0.0
+    helix_angle: Value
     face_width: Value
     density: Value = STEEL_DENSITY
     given_masses: PairOfValues | None = None

@@ -3,73 +3,50 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any, Literal, TypeAlias
 
 import numpy as np
-import numpy.typing as npt
 
 from gearchaos.gear.derivation import derive_groups
+from gearchaos.gear.geometry import Value
 from gearchaos.gear.group_table import GROUP_TABLE, GROUPS_BY_NAME, GroupRow
 
-__all__ = [
-    "GROUPS_BY_NAME",
-    "GROUP_TABLE",
-    "GroupRow",
-    "Groups",
-    "derive_groups",
-    "resolve_groups",
-]
-
-FloatArray: TypeAlias = npt.NDArray[np.float64]
-Value: TypeAlias = float | FloatArray
 Origin: TypeAlias = Literal["given", "derived", "default"]
 
-_HARMONICS = ("stiffness_cosine", "stiffness_sine")
+HARMONICS = tuple(row.name for row in GROUP_TABLE if row.is_list)
+"""The two lists of harmonics of the mesh stiffness."""
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
+@dataclass(frozen=True, eq=False)
 class Groups:
-    """The dimensionless groups, each a float, an array over lanes, or None where unknown.
+    """The dimensionless groups of the rows of `GROUP_TABLE`, each also an attribute by its name.
 
-    Names, symbols, ranges and defaults are the rows of `GROUP_TABLE`. The stiffness harmonics
-    are arrays of shape (harmonics,), common to all lanes. `origin` tells of every known group
-    whether it was given, derived or taken by default.
+    Attributes
+    ----------
+    values : mapping of str to float or ndarray
+        Every group that is known: a number, or an array over lanes; the stiffness harmonics are
+        arrays of shape (harmonics,), common to all lanes. The attribute of a group that is not
+        known is None.
+    origin : mapping of str to str
+        Whether each of them was given, derived or taken by default.
     """
 
-    mesh_frequency: Value | None = None
-    load: Value | None = None
-    damping_ratio: Value | None = None
-    base_helix_angle_deg: Value | None = None
-    half_backlash: Value | None = None
-    pitch_error: Value | None = None
-    pitch_error_amplitude: Value | None = None
-    pitch_error_mean: Value | None = None
-    pitch_error_phase_deg: Value | None = None
-    stiffness_variation_scale: Value | None = None
-    stiffness_cosine: FloatArray | None = None
-    stiffness_sine: FloatArray | None = None
-    mass_ratio_p: Value | None = None
-    mass_ratio_g: Value | None = None
-    transverse_stiffness_p: Value | None = None
-    transverse_damping_p: Value | None = None
-    transverse_stiffness_g: Value | None = None
-    transverse_damping_g: Value | None = None
-    axial_stiffness_p: Value | None = None
-    axial_damping_p: Value | None = None
-    axial_stiffness_g: Value | None = None
-    axial_damping_g: Value | None = None
-    origin: dict[str, Origin] = field(default_factory=dict)
+    values: Mapping[str, Value]
+    origin: Mapping[str, Origin]
+
+    def __getattr__(self, name: str) -> Any:
+        if name not in GROUPS_BY_NAME:
+            raise AttributeError(f"{name!r} is not a group")
+        return self.values.get(name)
 
     def missing(self, effects: Iterable[str]) -> list[GroupRow]:
         """Rows of the groups that a scene with these effects needs and that are unknown."""
         active = frozenset(effects)
-        return [
-            row for row in GROUP_TABLE if row.needed_by(active) and getattr(self, row.name) is None
-        ]
+        return [row for row in GROUP_TABLE if row.needed_by(active) and row.name not in self.values]
 
 
-def resolve_groups(physical: Any, given: Mapping[str, Any]) -> Groups:
+def resolve_groups(physical: Mapping[str, Any], given: Mapping[str, Any]) -> Groups:
     """Combine groups given directly with those that follow from physical data.
 
     A group given directly wins over a derived one, a derived one over the default. The
@@ -78,10 +55,10 @@ def resolve_groups(physical: Any, given: Mapping[str, Any]) -> Groups:
 
     Parameters
     ----------
-    physical : object
-        The physical tables, see `derive_groups`.
+    physical : mapping
+        As `derive_groups` takes it.
     given : mapping
-        Group name to a number, an array over lanes, or a list of harmonics; None is not given.
+        Group name to a number, an array over lanes, or a list of harmonics.
 
     Raises
     ------
@@ -90,35 +67,30 @@ def resolve_groups(physical: Any, given: Mapping[str, Any]) -> Groups:
     KeyError
         If a given name is not a group.
     """
-    direct = {name: _as_value(value) for name, value in given.items() if value is not None}
-    unknown_names = direct.keys() - GROUPS_BY_NAME.keys()
-    if unknown_names:
-        raise KeyError(f"not groups: {', '.join(sorted(unknown_names))}")
-    without = {*direct, *(_HARMONICS if not direct.keys().isdisjoint(_HARMONICS) else ())}
-    derived = {name: _as_value(value) for name, value in derive_groups(physical, without).items()}
-    defaults = {row.name: row.default for row in GROUP_TABLE if row.default is not None}
-    origin: dict[str, Origin] = {
-        **dict.fromkeys(defaults, "default"),
-        **dict.fromkeys(derived, "derived"),
-        **dict.fromkeys(direct, "given"),
+    direct = {GROUPS_BY_NAME[name].name: value for name, value in given.items()}
+    without = {*direct, *(() if direct.keys().isdisjoint(HARMONICS) else HARMONICS)}
+    sources: dict[Origin, Mapping[str, Any]] = {
+        "default": {row.name: row.default for row in GROUP_TABLE if row.default is not None},
+        "derived": derive_groups(physical, without),
+        "given": direct,
     }
-    values: dict[str, Any] = {**defaults, **derived, **direct}
-    _complete_harmonics(values, origin)
-    in_table_order = {row.name: origin[row.name] for row in GROUP_TABLE if row.name in origin}
-    return Groups(**values, origin=in_table_order)
+    values: dict[str, Any] = {}
+    origin: dict[str, Origin] = {}
+    for source, groups in sources.items():
+        values |= groups
+        origin |= dict.fromkeys(groups, source)
+    if not values.keys().isdisjoint(HARMONICS):
+        harmonics = max(len(values.get(name, ())) for name in HARMONICS)
+        for name in HARMONICS:
+            known = values.get(name, ())
+            values[name] = [*known, *[0.0] * (harmonics - len(known))]
+            origin.setdefault(name, "default")
+    names = [row.name for row in GROUP_TABLE if row.name in values]
+    return Groups(
+        {name: _as_value(values[name]) for name in names}, {name: origin[name] for name in names}
+    )
 
 
 def _as_value(value: Any) -> Value:
     array = np.asarray(value, dtype=np.float64)
     return float(array) if array.ndim == 0 else array
-
-
-def _complete_harmonics(values: dict[str, Any], origin: dict[str, Origin]) -> None:
-    known = [name for name in _HARMONICS if name in values]
-    if not known:
-        return
-    harmonics = max(values[name].size for name in known)
-    for name in _HARMONICS:
-        coefficients = values.get(name, np.zeros(0))
-        values[name] = np.pad(coefficients, (0, harmonics - coefficients.size))
-        origin.setdefault(name, "default")

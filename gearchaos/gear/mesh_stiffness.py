@@ -16,23 +16,22 @@ import numpy.typing as npt
 
 FloatArray: TypeAlias = npt.NDArray[np.float64]
 
-MINIMUM_HARMONICS_OF_A_FIT = 3
+DEFAULT_HARMONICS = 6
+"""Harmonics of a trapezoid where their number is not given, as in Pan 2021, Table 2."""
+
+_FEWEST_OF_A_FIT = 3
 
 
 @dataclass(frozen=True)
 class TrapezoidalStiffness:
     """Stiffness that rises linearly, stays, falls, stays (Pan 2021, eqs 15-18).
 
-    The fractions of the mesh period add up to one. A rise of zero is a jump.
-
     Parameters
     ----------
     rise, top, fall, bottom : float
-        Fractions of the mesh period.
+        Fractions of the mesh period, which add up to one. A rise of zero is a jump.
     half_height : float
         Half of the difference between top and bottom, relative to k_m.
-    scale : float
-        Factor on the variation about the mean.
     start : float
         Phase at which the rise begins, in mesh periods.
 
@@ -47,21 +46,19 @@ class TrapezoidalStiffness:
     fall: float
     bottom: float
     half_height: float
-    scale: float = 1.0
     start: float = 0.0
 
     def __post_init__(self) -> None:
         """Refuse fractions that do not make up a mesh period."""
         fractions = (self.rise, self.top, self.fall, self.bottom)
-        if not all(fraction >= 0.0 for fraction in fractions):
-            raise ValueError(f"fractions of the mesh period must be >= 0, not {fractions}")
-        if not math.isclose(math.fsum(fractions), 1.0, abs_tol=1e-9):
-            raise ValueError(f"fractions of the mesh period must add up to 1, not {fractions}")
+        one = math.isclose(math.fsum(fractions), 1.0, abs_tol=1e-9)
+        if not one or not all(fraction >= 0.0 for fraction in fractions):
+            raise ValueError(
+                f"fractions of the mesh period must be >= 0 and add up to 1, not {fractions}"
+            )
 
     @classmethod
-    def from_contact_ratios(
-        cls, transverse: float, overlap: float, *, scale: float = 1.0
-    ) -> TrapezoidalStiffness:
+    def from_contact_ratios(cls, transverse: float, overlap: float) -> TrapezoidalStiffness:
         """Stiffness proportional to the total length of a helical pair's contact lines.
 
         Measured along the path of contact in base pitches, a tooth's contact line spans a window
@@ -79,8 +76,6 @@ class TrapezoidalStiffness:
             eps_alpha > 0.
         overlap : float
             eps_beta >= 0; zero is a spur pair, whose contact length jumps.
-        scale : float
-            Factor on the variation about the mean.
 
         Raises
         ------
@@ -99,27 +94,17 @@ class TrapezoidalStiffness:
         else:
             # Limit of the line above: the contact jumps by the whole width, unless u is zero.
             half_height = 1.0 / (2.0 * transverse) if u > 0.0 else 0.0
-        return cls(
-            rise=slope_time,
-            top=abs(u - v),
-            fall=slope_time,
-            bottom=abs(1.0 - u - v),
-            half_height=half_height,
-            scale=scale,
-        )
+        return cls(slope_time, abs(u - v), slope_time, abs(1.0 - u - v), half_height)
 
     def table(self, points: int) -> FloatArray:
-        """Return kappa at phases 0, 1/points, ..., as an array of shape (points,).
-
-        At a jump the value is the one after the jump.
-        """
+        """Return kappa at phases 0, 1/points, ..., shape (points,); after the jump at a jump."""
         ends_of_parts = np.cumsum([0.0, self.rise, self.top, self.fall])
         phases = (np.arange(points) / points - self.start) % 1.0
         shape = np.interp(phases, [*ends_of_parts, 1.0], [-1.0, 1.0, 1.0, -1.0, -1.0])
         mean_of_shape = self.top - self.bottom
-        return 1.0 + self.scale * self.half_height * (shape - mean_of_shape)
+        return 1.0 + self.half_height * (shape - mean_of_shape)
 
-    def to_fourier(self, harmonics: int) -> FourierStiffness:
+    def to_fourier(self, harmonics: int = DEFAULT_HARMONICS) -> FourierStiffness:
         """Return the exact Fourier coefficients of this shape (Pan 2021, eq. 19).
 
         The derivative of the shape is one box over the rise and one over the fall, whose
@@ -132,9 +117,7 @@ class TrapezoidalStiffness:
         down = np.exp(-2j * np.pi * n * middle_of_fall) * np.sinc(n * self.fall)
         coefficients = 2.0 * self.half_height * (up - down) / (1j * np.pi * n)
         return FourierStiffness(
-            cosine=tuple(coefficients.real.tolist()),
-            sine=tuple((-coefficients.imag).tolist()),
-            scale=self.scale,
+            tuple(coefficients.real.tolist()), tuple((-coefficients.imag).tolist())
         )
 
 
@@ -142,48 +125,44 @@ class TrapezoidalStiffness:
 class FourierStiffness:
     """Stiffness as a Fourier series about its mean (Pan 2021, eq. 19).
 
-    kappa = 1 + scale * sum over n of (cosine[n-1] cos n phi + sine[n-1] sin n phi), with phi the
-    phase of the mesh in rad.
+    kappa = 1 + sum over n of (cosine[n-1] cos n phi + sine[n-1] sin n phi), with phi the phase of
+    the mesh in rad.
 
     Parameters
     ----------
     cosine, sine : sequence of float, shape (harmonics,)
         Harmonics n = 1, 2, ... relative to k_m; the shorter one continues with zeros.
-    scale : float
-        Factor on the variation about the mean.
     """
 
     cosine: Sequence[float] | FloatArray = ()
     sine: Sequence[float] | FloatArray = ()
-    scale: float = 1.0
 
     def coefficients(self) -> npt.NDArray[np.complex128]:
-        """Return cosine - i sine, the coefficients of exp(i n phi), without the scale.
+        """Return cosine - i sine, the coefficients of exp(i n phi), shape (harmonics,).
 
-        Shape (harmonics,); kappa = 1 + scale * Re(sum of coefficient * exp(i n phi)).
+        kappa = 1 + Re(sum of coefficient * exp(i n phi)).
         """
-        harmonics = max(len(self.cosine), len(self.sine))
-        result = np.zeros(harmonics, dtype=np.complex128)
+        result = np.zeros(max(len(self.cosine), len(self.sine)), dtype=np.complex128)
         result.real[: len(self.cosine)] = self.cosine
         result.imag[: len(self.sine)] = -np.asarray(self.sine, dtype=np.float64)
         return result
 
     def table(self, points: int) -> FloatArray:
-        """Return kappa at phases 0, 1/points, ..., as an array of shape (points,)."""
+        """Return kappa at phases 0, 1/points, ..., shape (points,)."""
         coefficients = self.coefficients()
         n = np.arange(1, coefficients.size + 1)
         # Whole numbers modulo points keep the phase exact for high harmonics.
         turns = np.outer(np.arange(points), n) % points / points
         variation: FloatArray = (np.exp(2j * np.pi * turns) @ coefficients).real
-        return 1.0 + self.scale * variation
+        return 1.0 + variation
 
     def to_trapezoid(self) -> TrapezoidalStiffness:
         """Return the trapezoid with equal rise and fall that fits the harmonics best.
 
         Contact lines of equal teeth always rise as long as they fall. The phase of the first
-        harmonic places the middle of the top; rise and distance between the middles of rise
-        and fall minimise the squared distance of all harmonics, on a grid that is refined
-        around its best point; the half-height follows linearly.
+        harmonic places the middle of the top; rise and width (the distance between the middles
+        of rise and fall) minimise the squared distance of all harmonics, on a grid that is
+        refined around its best point; the half-height follows linearly.
 
         Raises
         ------
@@ -191,51 +170,29 @@ class FourierStiffness:
             If there are fewer than three harmonics or the first one is zero.
         """
         target = self.coefficients()
-        if target.size < MINIMUM_HARMONICS_OF_A_FIT:
+        if target.size < _FEWEST_OF_A_FIT or target[0] == 0.0:
             raise ValueError(
-                f"a trapezoid needs at least {MINIMUM_HARMONICS_OF_A_FIT} harmonics to fit, "
-                f"not {target.size}"
+                f"a trapezoid is fitted to at least {_FEWEST_OF_A_FIT} harmonics, the first of "
+                f"which is not 0, not to {target}"
             )
-        if target[0] == 0.0:
-            raise ValueError("a trapezoid cannot be fitted to a series without first harmonic")
-        n = np.arange(1, target.size + 1)
+        n = np.arange(1.0, target.size + 1.0)
         middle_of_top = -np.angle(target[0]) / (2.0 * np.pi)
         centred = (target * np.exp(2j * np.pi * n * middle_of_top)).real
-
-        rise, width, half_height = _fit_centred_trapezoid(centred)
-        return TrapezoidalStiffness(
-            rise=rise,
-            top=width - rise,
-            fall=rise,
-            bottom=max(0.0, 1.0 - width - rise),
-            half_height=half_height,
-            scale=self.scale,
-            start=float((middle_of_top - (width + rise) / 2.0) % 1.0),
-        )
-
-
-def _centred_harmonics(n: FloatArray, rise: FloatArray, width: FloatArray) -> FloatArray:
-    """Cosine harmonics of a trapezoid of half-height one about the middle of its top."""
-    return 4.0 / (np.pi * n) * np.sinc(n * rise) * np.sin(np.pi * n * width)
-
-
-def _fit_centred_trapezoid(target: FloatArray) -> tuple[float, float, float]:
-    """Rise, width (top + rise) and half-height whose cosine harmonics are nearest to target."""
-    n = np.arange(1.0, target.size + 1.0)
-    steps = np.linspace(-1.0, 1.0, 33)
-    rise, width, reach = 0.25, 0.5, 0.5
-    half_height = 0.0
-    # Shrinking slowly lets the grid follow the valley of a nearly triangular trapezoid.
-    while reach > 1e-15:
-        rises = np.clip(rise + reach * steps, 0.0, 0.5)[:, None]
-        widths = np.clip(width + reach * steps[None, :], rises, 1.0 - rises)
-        shapes = _centred_harmonics(n[:, None, None], rises[None], widths[None])
-        heights = np.maximum(
-            np.einsum("n,nrw->rw", target, shapes) / (np.square(shapes).sum(axis=0) + 1e-300), 0.0
-        )
-        residuals = np.square(target[:, None, None] - heights * shapes).sum(axis=0)
-        best = np.unravel_index(np.argmin(residuals), residuals.shape)
-        rise = float(rises[best[0], 0])
-        width, half_height = float(widths[best]), float(heights[best])
-        reach *= 0.7
-    return rise, width, half_height
+        n, centred = n[:, None, None], centred[:, None, None]
+        steps = np.linspace(-1.0, 1.0, 33)
+        rise, width, half_height, reach = 0.25, 0.5, 0.0, 0.5
+        # Shrinking slowly lets the grid follow the valley of a nearly triangular trapezoid.
+        while reach > 1e-15:
+            rises = np.clip(rise + reach * steps, 0.0, 0.5)[:, None]
+            widths = np.clip(width + reach * steps[None, :], rises, 1.0 - rises)
+            # Cosine harmonics of half-height one about the middle of the top.
+            shapes = 4.0 / (np.pi * n) * np.sinc(n * rises) * np.sin(np.pi * n * widths)
+            fitted = (centred * shapes).sum(axis=0) / (np.square(shapes).sum(axis=0) + 1e-300)
+            heights = np.maximum(fitted, 0.0)
+            residuals = np.square(centred - heights * shapes).sum(axis=0)
+            best = np.unravel_index(np.argmin(residuals), residuals.shape)
+            rise, width = float(rises[best[0], 0]), float(widths[best])
+            half_height = float(heights[best])
+            reach *= 0.7
+        bottom, start = max(0.0, 1.0 - width - rise), (middle_of_top - (width + rise) / 2.0) % 1.0
+        return TrapezoidalStiffness(rise, width - rise, rise, bottom, half_height, float(start))

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from gearchaos.configuration.sweep_values import lane_groups
+from gearchaos.configuration import groups_at
 from gearchaos.figures.page import Page
 from gearchaos.figures.style import EXPONENT, POINTS, POSITIVE, REFERENCE
-from gearchaos.gear import pitch_error
 from gearchaos.gear.mesh_stiffness import FloatArray
 from gearchaos.paper.computation import Reproduction
 from gearchaos.paper.our_numbers import contact_line_stiffness, printed_series
@@ -21,11 +20,10 @@ CYCLE_LABEL = r"Mesh cycle, $\Omega\tau/2\pi$"
 def pitch_error_page(printed: Published, found: Reproduction) -> Page:
     """Draw one pitch error over one mesh cycle, with its two components (figure 3)."""
     del printed
-    _, groups = lane_groups(found.config)
+    groups = groups_at(found.config, {})
     amplitude, angle = groups.pitch_error_amplitude, groups.base_helix_angle_deg
-    assert amplitude is not None and angle is not None
     cycle = np.linspace(0.0, 1.0, POINTS_OF_A_CURVE + 1)
-    error = pitch_error.error(cycle, mesh_frequency=2.0 * np.pi, amplitude=amplitude)
+    error = amplitude * np.sin(2.0 * np.pi * cycle)  # eq. 14
     with page(58.0) as figure:
         axes = figure.subplots()
         axes.axhline(0.0, color=REFERENCE, linewidth=0.5)
@@ -48,9 +46,7 @@ def pitch_error_page(printed: Published, found: Reproduction) -> Page:
 def mesh_stiffness_page(printed: Published, found: Reproduction) -> Page:
     """Draw the mesh stiffness of the contact lines and its Fourier fit (figure 4)."""
     mean = printed.numbers["mean_stiffness"].value
-    _, groups = lane_groups(found.config)
-    scale = groups.stiffness_variation_scale
-    assert isinstance(scale, float)
+    scale = groups_at(found.config, {}).stiffness_variation_scale
     cycle = np.arange(POINTS_OF_A_CURVE + 1) / POINTS_OF_A_CURVE
 
     def closed(table: FloatArray) -> FloatArray:

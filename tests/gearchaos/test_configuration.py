@@ -15,7 +15,8 @@ from gearchaos.configuration import (
     EFFECTS,
     STATES,
     Configuration,
-    lane_groups,
+    axis_values,
+    groups_at,
     load_config,
     swept_values,
 )
@@ -24,6 +25,13 @@ from gearchaos.configuration.schema import json_schema, key_tables
 from gearchaos.errors import ConfigurationError
 from gearchaos.gear.group_table import GROUP_TABLE
 from gearchaos.results.variables import STATE_WORDING
+
+
+def lane_groups(config):
+    """Swept values and groups of a sweep of one parameter."""
+    values = swept_values(config.sweep)
+    return values, groups_at(config, {config.sweep.parameter: values})
+
 
 ROOT = Path(__file__).resolve().parents[2]
 SWEEPS = sorted((ROOT / "sweeps").glob("*.toml"))
@@ -149,13 +157,13 @@ def test_swept_values_come_in_ascending_order():
 
 def test_a_span_has_its_ends_and_one_rounding_per_value():
     config = load_config(PAN2021, ["sweep.from=0.1", "sweep.to=0.7", "sweep.count=7"])
-    assert swept_values(config).tolist() == [0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7]
+    assert swept_values(config.sweep).tolist() == [0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7]
 
 
 def test_a_span_of_one_value_needs_no_end():
     table = {"parameter": "load", "from": 0.2, "count": 1}
     config = Configuration.from_toml(SMALLEST).replace("sweep", table)
-    assert swept_values(config).tolist() == [0.2]
+    assert swept_values(config.sweep).tolist() == [0.2]
 
 
 def test_a_swept_physical_quantity_moves_every_group_derived_from_it():

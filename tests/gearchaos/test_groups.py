@@ -1,83 +1,98 @@
 """The dimensionless groups, derived, given and by default."""
 
-from dataclasses import fields
-from types import SimpleNamespace
+import pickle
 
 import numpy as np
 import pytest
 
+from gearchaos.configuration.physical_tables import PHYSICAL_KEYS
 from gearchaos.errors import ConfigurationError
-from gearchaos.gear.groups import (
-    GROUP_TABLE,
-    GROUPS_BY_NAME,
-    Groups,
-    derive_groups,
-    resolve_groups,
-)
+from gearchaos.gear.derivation import derive_groups
+from gearchaos.gear.geometry import STEEL_DENSITY
+from gearchaos.gear.group_table import GROUP_TABLE, GROUPS_BY_NAME
+from gearchaos.gear.groups import resolve_groups
+from gearchaos.gear.mesh_stiffness import DEFAULT_HARMONICS
 
 MEAN_STIFFNESS = 13.3548 * 15 * 1e6  # N/m
 EQUIVALENT_MASS = 0.095448  # kg, to the digits of the geometry's own test
 ALL_EFFECTS = ("pitch_error", "stiffness_variation", "backlash", "transverse", "axial")
 
 
+PHYSICAL = {
+    "pair.teeth": (21, 38),
+    "pair.normal_module_mm": 2.166,
+    "pair.normal_pressure_angle_deg": 20.0,
+    "pair.helix_angle_deg": 20.0,
+    "pair.face_width_mm": 15.0,
+    "pair.density_kg_m3": STEEL_DENSITY,
+    "pair.masses_kg": None,
+    "pair.inertias_kg_m2": None,
+    "operation.speed_rpm": 2000.0,
+    "operation.torque_Nm": 50.0,
+    "mesh.mean_stiffness_N_per_um_mm": 13.3548,
+    "mesh.length_scale_um": None,
+    "mesh.half_backlash_um": 25.0,
+    "mesh.damping_ratio": 0.1,
+    "mesh.damping_N_s_per_m": None,
+    "mesh.stiffness.shape": "fourier",
+    "mesh.stiffness.cosine_N_per_um_mm": (-1.202, 0.0, -0.1339),
+    "mesh.stiffness.sine_N_per_um_mm": (1.203, 0.0, -0.1335),
+    "mesh.stiffness.rise": None,
+    "mesh.stiffness.top": None,
+    "mesh.stiffness.fall": None,
+    "mesh.stiffness.bottom": None,
+    "mesh.stiffness.half_height": None,
+    "mesh.stiffness.harmonics": None,
+    "pitch_error.amplitude_um": 11.0,
+    "pitch_error.mean_um": 2.0,
+    "pitch_error.phase_deg": 30.0,
+    "bearings.transverse_stiffness_N_per_m": (1e8, 2e8),
+    "bearings.transverse_damping_N_s_per_m": (100.0, 300.0),
+    "bearings.axial_stiffness_N_per_m": (3e7, 4e7),
+    "bearings.axial_damping_N_s_per_m": (50.0, 60.0),
+}
+"""A Pan 2021 pair with invented load, backlash and bearings."""
+
+
 def physical(**changes):
-    """Tables of a Pan 2021 pair with invented load, backlash and bearings."""
-    tables = {
-        "pair": SimpleNamespace(
-            teeth=(21, 38),
-            normal_module_mm=2.166,
-            normal_pressure_angle_deg=20.0,
-            helix_angle_deg=20.0,
-            face_width_mm=15.0,
-            density_kg_m3=7850.0,
-            masses_kg=None,
-            inertias_kg_m2=None,
-        ),
-        "operation": SimpleNamespace(speed_rpm=2000.0, torque_Nm=50.0),
-        "mesh": SimpleNamespace(
-            mean_stiffness_N_per_um_mm=13.3548,
-            length_scale_um=None,
-            half_backlash_um=25.0,
-            damping_ratio=0.1,
-            damping_N_s_per_m=None,
-            stiffness=SimpleNamespace(
-                shape="fourier",
-                cosine_N_per_um_mm=(-1.202, 0.0, -0.1339),
-                sine_N_per_um_mm=(1.203, 0.0, -0.1335),
-            ),
-        ),
-        "pitch_error": SimpleNamespace(amplitude_um=11.0, mean_um=2.0, phase_deg=30.0),
-        "bearings": SimpleNamespace(
-            transverse_stiffness_N_per_m=(1e8, 2e8),
-            transverse_damping_N_s_per_m=(100.0, 300.0),
-            axial_stiffness_N_per_m=(3e7, 4e7),
-            axial_damping_N_s_per_m=(50.0, 60.0),
-        ),
-    }
-    for path, value in changes.items():
-        table, _, key = path.partition("__")
-        if key:
-            setattr(tables[table], key, value)
-        else:
-            tables[table] = value
-    return SimpleNamespace(**tables)
+    """Return the physical data with changes, a dot written as two underscores."""
+    by_path = {path.replace("__", "."): value for path, value in changes.items()}
+    assert by_path.keys() <= PHYSICAL.keys()
+    return PHYSICAL | by_path
 
 
 def trapezoid(**parts):
-    names = ("rise", "top", "fall", "bottom", "half_height", "harmonics")
-    return SimpleNamespace(shape="trapezoid", **(dict.fromkeys(names) | parts))
+    parts = {"shape": "trapezoid", "harmonics": DEFAULT_HARMONICS, **parts}
+    return {f"mesh__stiffness__{name}": value for name, value in parts.items()}
 
 
-def test_the_table_and_the_groups_name_the_same_things():
-    assert [row.name for row in GROUP_TABLE] == [f.name for f in fields(Groups)][:-1]
+def test_groups_are_known_by_the_names_of_the_table_and_no_others():
     assert len(GROUPS_BY_NAME) == len(GROUP_TABLE)
+    groups = resolve_groups(physical(), {"load": 0.3})
+    assert groups.load == 0.3
+    assert list(groups.values) == list(groups.origin) == list(GROUPS_BY_NAME)
+    assert resolve_groups(dict.fromkeys(PHYSICAL), {}).load is None
+    with pytest.raises(AttributeError, match="'laod' is not a group"):
+        _ = groups.laod
+    copy = pickle.loads(pickle.dumps(groups))
+    assert copy.origin == groups.origin
+
+
+def test_a_path_that_the_physical_data_lack_is_an_error():
+    lacking = {path: value for path, value in PHYSICAL.items() if path != "pair.density_kg_m3"}
+    with pytest.raises(KeyError, match=r"pair\.density_kg_m3"):
+        derive_groups(lacking)
+
+
+def test_the_physical_data_have_the_paths_of_the_configuration():
+    assert list(PHYSICAL_KEYS) == list(PHYSICAL)
 
 
 def test_complete_physical_data_give_every_group_without_a_default_of_its_own():
     derived = derive_groups(physical())
     free = {"pitch_error", "stiffness_variation_scale"}
     assert derived.keys() == {row.name for row in GROUP_TABLE} - free
-    assert all(GROUPS_BY_NAME[name].admits(value) for name, value in derived.items())
+    assert all(GROUPS_BY_NAME[name].valid.admits(value) for name, value in derived.items())
 
 
 def test_derived_groups_follow_their_definitions():
@@ -136,11 +151,9 @@ def test_a_given_group_wins_over_a_derived_one_and_a_derived_one_over_the_defaul
 
 
 def test_groups_alone_need_no_physical_data():
-    nothing = physical(pair=None, operation=None, mesh=None, pitch_error=None, bearings=None)
+    nothing = dict.fromkeys(PHYSICAL)
     assert derive_groups(nothing) == {}
-    groups = resolve_groups(
-        nothing, {"mesh_frequency": 0.876, "load": 0.268, "damping_ratio": None}
-    )
+    groups = resolve_groups(nothing, {"mesh_frequency": 0.876, "load": 0.268})
     assert [row.name for row in groups.missing(())] == ["damping_ratio", "base_helix_angle_deg"]
     assert groups.origin == {
         "mesh_frequency": "given",
@@ -161,7 +174,7 @@ def test_groups_alone_need_no_physical_data():
             "mesh__half_backlash_um",
             {"half_backlash", "load", "pitch_error_amplitude", "pitch_error_mean"},
         ),
-        ("mesh__stiffness", {"stiffness_cosine", "stiffness_sine"}),
+        ("mesh__stiffness__shape", {"stiffness_cosine", "stiffness_sine"}),
         ("bearings__axial_damping_N_s_per_m", {"axial_damping_p", "axial_damping_g"}),
     ],
 )
@@ -171,24 +184,17 @@ def test_a_missing_quantity_loses_exactly_the_groups_that_need_it(absent, lost):
     )
 
 
-def test_catalogue_defaults_are_a_spur_pair_of_steel():
-    spur = physical(pair__helix_angle_deg=None, pair__density_kg_m3=None)
-    explicit = physical(pair__helix_angle_deg=0.0, pair__density_kg_m3=7850.0)
-    assert derive_groups(spur)["base_helix_angle_deg"] == 0.0
-    assert derive_groups(spur)["load"] == derive_groups(explicit)["load"]
-
-
 def test_pan_2021_trapezoid_gives_the_harmonics_of_table_2():
     parts = dict.fromkeys(("rise", "top", "fall", "bottom"), 0.25)
     shape = trapezoid(**parts, half_height=1 / 9, harmonics=6)
-    groups = resolve_groups(physical(mesh__stiffness=shape), {})
+    groups = resolve_groups(physical(**shape), {})
     assert groups.stiffness_cosine.shape == groups.stiffness_sine.shape == (6,)
     assert groups.stiffness_cosine[0] * 13.3548 == pytest.approx(-1.202, abs=1e-3)
     assert groups.stiffness_sine[0] * 13.3548 == pytest.approx(1.203, abs=1e-3)
 
 
 def test_trapezoid_without_fractions_comes_from_the_contact_ratios_of_the_pair():
-    groups = resolve_groups(physical(mesh__stiffness=trapezoid()), {})
+    groups = resolve_groups(physical(**trapezoid()), {})
     # The exact contact ratios are 1.5050 and 0.7539, near the 1.5 and 0.75 behind Table 2.
     assert groups.stiffness_cosine.size == 6
     assert groups.stiffness_cosine[0] * 13.3548 == pytest.approx(-1.202, rel=0.05)
@@ -214,7 +220,7 @@ def test_swept_physical_quantity_gives_one_value_per_lane():
 
 def test_stiffness_shape_that_differs_between_lanes_is_refused_with_a_remedy():
     angles = np.array([15.0, 20.0, 25.0])
-    tables = physical(mesh__stiffness=trapezoid(), pair__helix_angle_deg=angles)
+    tables = physical(**trapezoid(), pair__helix_angle_deg=angles)
     with pytest.raises(
         ConfigurationError, match=r"stiffness_cosine and stiffness_sine in \[groups]"
     ):
@@ -243,10 +249,10 @@ def test_a_name_that_is_no_group_is_refused():
 )
 def test_valid_ranges(name, valid, invalid, rule):
     row = GROUPS_BY_NAME[name]
-    assert row.admits(valid)
-    assert not row.admits(invalid)
-    assert not row.admits([valid, invalid])
-    assert row.rule == rule
+    assert row.valid.admits(valid)
+    assert not row.valid.admits(invalid)
+    assert not row.valid.admits([valid, invalid])
+    assert row.valid.rule == rule
 
 
 def test_a_scene_needs_the_groups_of_its_effects_only():

@@ -15,7 +15,7 @@ PAN_2021 = TrapezoidalStiffness(0.25, 0.25, 0.25, 0.25, half_height=1 / 9)
 SHAPES = [
     PAN_2021,
     TrapezoidalStiffness(0.1, 0.3, 0.1, 0.5, 0.2),
-    TrapezoidalStiffness(0.1, 0.45, 0.25, 0.2, 0.3, scale=2 / 3, start=0.7),
+    TrapezoidalStiffness(0.1, 0.45, 0.25, 0.2, 0.3, start=0.7),
     TrapezoidalStiffness(0.5, 0.0, 0.5, 0.0, 0.05, start=0.2),
 ]
 
@@ -108,8 +108,8 @@ def test_fourier_coefficients_are_the_integrals_over_the_mesh_period(shape):
     for n in range(1, 6):
         cosine = 2 * np.mean(values * np.cos(n * angle))
         sine = 2 * np.mean(values * np.sin(n * angle))
-        assert series.scale * series.cosine[n - 1] == pytest.approx(cosine, abs=1e-8)
-        assert series.scale * series.sine[n - 1] == pytest.approx(sine, abs=1e-8)
+        assert series.cosine[n - 1] == pytest.approx(cosine, abs=1e-8)
+        assert series.sine[n - 1] == pytest.approx(sine, abs=1e-8)
 
 
 def closed_table(shape, points):
@@ -121,14 +121,14 @@ def closed_table(shape, points):
     "shape",
     [
         PAN_2021,
-        TrapezoidalStiffness(0.1, 0.3, 0.1, 0.5, 0.2, scale=2 / 3, start=0.3),
+        TrapezoidalStiffness(0.1, 0.3, 0.1, 0.5, 0.2, start=0.3),
         TrapezoidalStiffness(0.3, 0.35, 0.3, 0.05, 0.2, start=0.9),
         TrapezoidalStiffness.from_contact_ratios(1.505, 0.7539),
     ],
 )
 def test_fit_recovers_every_trapezoid_of_contact_lines_from_its_harmonics(shape):
     fitted = shape.to_fourier(8).to_trapezoid()
-    for name in ("rise", "top", "fall", "bottom", "half_height", "scale"):
+    for name in ("rise", "top", "fall", "bottom", "half_height"):
         assert getattr(fitted, name) == pytest.approx(getattr(shape, name), abs=1e-7)
     assert abs((fitted.start - shape.start + 0.5) % 1.0 - 0.5) < 1e-7
 
@@ -146,18 +146,11 @@ def test_mean_of_kappa_over_a_mesh_period_is_one(stiffness):
     assert stiffness.table(1000).mean() == pytest.approx(1.0, abs=1e-12)
 
 
-def test_scale_multiplies_the_variation_and_survives_conversion():
-    scaled = TrapezoidalStiffness(0.25, 0.25, 0.25, 0.25, half_height=1 / 9, scale=2 / 3)
-    assert scaled.table(40) - 1 == pytest.approx((PAN_2021.table(40) - 1) * 2 / 3)
-    assert scaled.to_fourier(6).cosine == PAN_2021.to_fourier(6).cosine
-    assert scaled.to_fourier(6).scale == 2 / 3
-
-
 def test_table_evaluates_the_series_of_eq_19():
     points = 7
     phase = 2 * np.pi * np.arange(points) / points
-    series = FourierStiffness(cosine=(0.1, 0.02), sine=(-0.3,), scale=0.5)
-    expected = 1 + 0.5 * (0.1 * np.cos(phase) + 0.02 * np.cos(2 * phase) - 0.3 * np.sin(phase))
+    series = FourierStiffness(cosine=(0.1, 0.02), sine=(-0.3,))
+    expected = 1 + 0.1 * np.cos(phase) + 0.02 * np.cos(2 * phase) - 0.3 * np.sin(phase)
     assert series.table(points) == pytest.approx(expected, abs=1e-15)
 
 

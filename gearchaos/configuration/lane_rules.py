@@ -1,0 +1,148 @@
+"""Rules of what the lanes get: every group is known, in range, and moved by the sweeps."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from gearchaos.configuration.messages import Fault
+from gearchaos.configuration.run_tables import Sweep
+from gearchaos.configuration.sweep_values import SWEEPABLE_KEYS, FloatArray, groups_at
+from gearchaos.errors import ConfigurationError
+from gearchaos.gear.derivation import derive_groups
+from gearchaos.gear.group_table import GROUPS_BY_NAME, GroupRow
+from gearchaos.gear.groups import HARMONICS, Groups
+
+if TYPE_CHECKING:
+    from gearchaos.configuration.models import Configuration
+
+
+def lane_faults(config: Configuration) -> Iterator[Fault]:
+    """Yield what is wrong with the groups of the lanes, where every table by itself is sound."""
+    sweeps = config.sweeps
+    # The groups are smooth in every parameter: both ends of a sweep and a value between them
+    # stand for millions of lanes. The axes are in the order of `axis_values`.
+    by_parameter = {one.parameter: _some_values(one) for one in reversed(sweeps.values())}
+    some = dict(zip(by_parameter, np.ix_(*by_parameter.values()), strict=True))
+    try:
+        with np.errstate(all="ignore"):
+            groups = groups_at(config, some)
+    except ConfigurationError as error:
+        for table in _refused(config, some):
+            key = f"{table}.parameter"
+            yield from (Fault(key, text, "", sweeps[table].parameter) for text in error.problems)
+        return
+    except (ArithmeticError, ValueError) as error:
+        remedy = "check the magnitudes in [pair], [mesh], [operation], [pitch_error], [bearings]"
+        yield Fault("groups", f"cannot be derived from the physical tables ({error})", remedy)
+        return
+    missing = groups.missing(config.scene.effects)
+    yield from (_missing(config, row) for row in missing)
+    yield from _out_of_range(groups)
+    yield from _decoupled(config, groups)
+    for axis, (table, sweep) in enumerate(reversed(sweeps.items())):
+        derives = not missing and sweep.parameter in SWEEPABLE_KEYS
+        if derives and not _moved(config, groups, axis, sweep.size):
+            yield _without_effect(config, table, some[sweep.parameter])
+
+
+def _some_values(sweep: Sweep) -> FloatArray:
+    """Return the ends of a sweep and a value between them; a value that is alone comes twice."""
+    if sweep.values is None:
+        first, last, count = sweep.span
+        values = np.linspace(first, last, min(count, 3))
+    else:
+        values = np.sort(sweep.values)
+    some = values[[0, values.size // 2, -1]]
+    return np.unique(some) if values.size > 1 else some[:2]
+
+
+def _refused(config: Configuration, some: Mapping[str, FloatArray]) -> list[str]:
+    """Name the sweeps that already alone would make the stiffness differ between lanes."""
+    tables = []
+    for table, sweep in config.sweeps.items():
+        try:
+            with np.errstate(all="ignore"):
+                groups_at(config, {sweep.parameter: some[sweep.parameter]})
+        except ConfigurationError:
+            tables.append(table)
+    return tables or list(config.sweeps)
+
+
+def _moved(config: Configuration, groups: Groups, axis: int, count: int) -> bool:
+    """Whether a sweep of so many values, along this axis, changes a group that the scene needs."""
+    for name, value in groups.values.items():
+        row = GROUPS_BY_NAME[name]
+        if not row.is_list and np.ndim(value) > 0 and row.needed_by(config.scene.effects):
+            along = np.moveaxis(np.asarray(value), axis, 0)
+            if len(along) > 1 and (count == 1 or not np.allclose(along, along[:1], 1e-12, 0.0)):
+                return True
+    return False
+
+
+def _without_effect(config: Configuration, table: str, values: FloatArray) -> Fault:
+    parameter = config.sweeps[table].parameter
+    swept = {sweep.parameter: f"{name}.parameter" for name, sweep in config.sweeps.items()}
+    derived = derive_groups({**config.physical(), parameter: values}, without=HARMONICS)
+    names = [name for name, value in derived.items() if np.ndim(value) > 0]
+    winners = [name for name in names if name in swept]
+    given = [name for name in names if name in config.groups.given()]
+    off = [name for name in names if not GROUPS_BY_NAME[name].needed_by(config.scene.effects)]
+    rule = "changes nothing in this scene"
+    if winners:
+        rule += f": {swept[winners[0]]} sweeps {winners[0]}, and a group wins over a derived one"
+        remedy = f"sweep one of the two, {parameter} or {winners[0]}, beside another parameter"
+    elif given:
+        remedy = f"remove {', '.join(given)} from [groups], where a group wins over a derived one"
+    elif off:
+        effects = sorted(set().union(*(GROUPS_BY_NAME[name].effects for name in off)))
+        remedy = f"add {' or '.join(effects)} to scene.effects: it acts on {', '.join(off)} only"
+    else:
+        remedy = "no group follows from it with the tables given; sweep a group instead"
+    return Fault(f"{table}.parameter", rule, remedy, parameter)
+
+
+def _missing(config: Configuration, row: GroupRow) -> Fault:
+    effects = [f'"{name}"' for name in config.scene.effects if name in row.effects]
+    because = f" for {' and '.join(effects)}" if effects else ""
+    lacking = [entry for entry in row.derived_from if not _is_present(config, entry)]
+    otherwise = f", or derive it by giving {', '.join(lacking)} as well" if lacking else ""
+    return Fault(
+        f"groups.{row.name}",
+        f"the {row.long_name} ({row.symbol}) is needed{because} and neither given nor derivable",
+        f"give {row.name} in [groups]{otherwise}",
+    )
+
+
+def _is_present(config: Configuration, entry: str) -> bool:
+    """Whether one of the keys, or the table, that an entry of `derived_from` names is there."""
+    given = [path for path, value in config.physical().items() if value is not None]
+    swept = [sweep.parameter for sweep in config.sweeps.values()]
+    return any(
+        word in swept or any(f"{path}.".startswith(f"{word}.") for path in given)
+        for word in re.findall(r"[A-Za-z_][\w.]+", entry)
+    )
+
+
+def _out_of_range(groups: Groups) -> Iterator[Fault]:
+    for name, value in groups.values.items():
+        row = GROUPS_BY_NAME[name]
+        if groups.origin[name] == "derived" and not row.valid.admits(value):
+            worst = next(entry for entry in np.ravel(value) if not row.valid.admits(entry))
+            rule = f"derived from {', '.join(row.derived_from)}, must be {row.valid.rule}"
+            remedy = "check the magnitudes of those keys"
+            yield Fault(f"groups.{name}", rule, remedy, float(worst))
+
+
+def _decoupled(config: Configuration, groups: Groups) -> Iterator[Fault]:
+    angle = groups.base_helix_angle_deg
+    if "axial" in config.scene.effects and angle is not None and np.all(np.equal(angle, 0.0)):
+        yield Fault(
+            "scene.effects",
+            '"axial" needs a helix angle: in a spur pair nothing drives the axial motion',
+            'drop "axial", or give pair.helix_angle_deg or groups.base_helix_angle_deg',
+            config.scene.effects,
+        )
