@@ -184,8 +184,9 @@ def _harmonics(parameters: Mapping[str, Parameter]) -> list[Variable]:
 def _create(file: h5py.File, variable: Variable, shape: tuple[int, ...]) -> None:
     options: dict[str, Any] = {"track_order": True}
     if variable.dtype == "str":
-        words = np.array([_plain(str(v)) for v in np.ravel(variable.values)], dtype=object)
-        options |= {"data": words.reshape(shape), "dtype": _STRING}
+        assert variable.values is not None
+        words = [_plain(str(word)) for word in variable.values.flat]
+        options |= {"data": np.reshape(words, shape).astype(object), "dtype": _STRING}
     else:
         chunks = _chunks(shape, np.dtype(variable.dtype).itemsize)
         options |= {"dtype": variable.dtype, "fillvalue": variable.fill_value, "chunks": chunks}
