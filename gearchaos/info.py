@@ -44,7 +44,7 @@ def _run(argv: Sequence[str] | None) -> int:
     options = _parser().parse_args(argv)
     # Imported only now: --help and --version answer at once, and an interrupt is caught.
     from gearchaos.progress import notice
-    from gearchaos.results.overview import finite, overview
+    from gearchaos.results.overview import overview
     from gearchaos.results.overview_page import overview_page
     from gearchaos.results.verification import verify
 
@@ -54,27 +54,10 @@ def _run(argv: Sequence[str] | None) -> int:
             verified = verify(options.result)
     summary = overview(options.result)
     if options.json:
-        facts = {**summary, "stages": _stages(options.result, summary), "verified": verified}
-        _write(json.dumps(finite(facts), indent=1, allow_nan=False))
-        return OK
-    stages = [
-        f"{stage['label']}: {stage['start']:.6g} to {stage['end']:.6g}, "
-        f"{stage['lanes']} lane{'s' if stage['lanes'] != 1 else ''}"
-        for stage in _stages(options.result, summary)
-    ]
-    _write(overview_page(summary, _settings(summary["metadata"]), stages, verified))
+        _write(json.dumps({**summary, "verified": verified}, indent=1, allow_nan=False))
+    else:
+        _write(overview_page(summary, _settings(summary["metadata"]), verified))
     return OK
-
-
-def _stages(path: str, summary: Mapping[str, Any]) -> list[dict[str, Any]]:
-    """List the stages of the sweep where its motion is labelled."""
-    from gearchaos.results.result import open_result
-    from gearchaos.results.stage_table import LABELS, labelled_lanes, stage_table
-
-    if not all(name in summary["variables"] for name in LABELS):
-        return []
-    stages = stage_table(labelled_lanes(open_result(path), name=path))
-    return [{**stage._asdict(), "lanes": stage.lanes} for stage in stages]
 
 
 def _settings(metadata: Mapping[str, Any]) -> dict[str, list[str]]:

@@ -54,7 +54,14 @@ def _parser() -> argparse.ArgumentParser:
         help="bisect every boundary to this width, and tell how the orbit beside it is lost; lanes "
         "are computed again with the configuration in the file",
     )
-    add("--start", type=int, default=0, metavar="N", help="start to list (default: 0)")
+    add(
+        "--at",
+        action="append",
+        default=[],
+        metavar="NAME=VALUE",
+        help="where to fix an axis of a result that has several, at the nearest of its values; may "
+        "be repeated (default: the first value of each but the first swept parameter)",
+    )
     add("--json", action="store_true", help="print JSON instead of a table")
     add("--threads", type=int, metavar="N", help="threads for --refine (default: all cores)")
     add("-q", "--quiet", action="store_true", help="say nothing on stderr unless something fails")
@@ -76,25 +83,56 @@ def _run(argv: Sequence[str] | None) -> int:
     options = _parser().parse_args(argv)
     from gearchaos.results.jumps import jumps
     from gearchaos.results.result import open_result
-    from gearchaos.results.stage_table import labelled_lanes, stage_table
+    from gearchaos.results.stage_table import (
+        labelled_lanes,
+        one_axis,
+        slice_facts,
+        slice_lines,
+        stage_table,
+    )
 
-    result = open_result(options.result)
-    lanes = labelled_lanes(result, options.start, name=options.result)
+    whole = open_result(options.result)
+    result = one_axis(whole, **_coordinates(options.at, whole))
+    where = slice_facts(whole, result)
+    lanes = labelled_lanes(result, name=options.result)
     stages = stage_table(lanes, options.narrowest)
     boundaries = None
     if options.refine is not None:
         boundaries = _refined(result, stages, options)
         stages = refined_stages(stages, boundaries)
-    found = jumps(result, options.start)
+    found = jumps(result)
     if options.json:
-        facts = _facts(result, stages, boundaries)
+        facts = {"parameter": result.axis, "slice": where, **_facts(stages, boundaries)}
         facts["jumps"] = [jump._asdict() for jump in found]
         print(json.dumps(facts, indent=1, allow_nan=False))
     else:
-        print("\n".join([*table(result.axis, stages), *remarks(found, lanes)]))
-        if boundaries:
-            print("\n".join(["", *boundary_list(boundaries)]))
+        print("\n".join(table(result.axis, stages, slice_lines(where))))
+        for lines in (remarks(found, lanes), boundary_list(boundaries or ())):
+            if lines:
+                print("\n".join(["", *lines]))
     return OK
+
+
+def _coordinates(texts: Sequence[str], result: Result) -> dict[str, float]:
+    """Read where axes are to be fixed: ``NAME=VALUE``, or a value where there is one other axis."""
+    from gearchaos.results.variables import axis_name
+
+    others = [name for name in result.axes if name != result.axis]
+    coordinates: dict[str, float] = {}
+    for text in texts:
+        key, _, value = text.rpartition("=")
+        name = axis_name(key.strip()) or (others[0] if len(others) == 1 else "")
+        try:
+            number = float(value)
+        except ValueError:
+            number = math.nan
+        if not name or name in coordinates or not math.isfinite(number):
+            raise ConfigurationError(
+                f"--at {text}: must be NAME=VALUE with a number, each of the axes "
+                f"{', '.join(result.axes)} once"
+            )
+        coordinates[name] = number
+    return coordinates
 
 
 def _refined(result: Result, stages: list[Stage], options: argparse.Namespace) -> list[Boundary]:
@@ -103,8 +141,6 @@ def _refined(result: Result, stages: list[Stage], options: argparse.Namespace) -
     from gearchaos.engine.stage_refinement import refinable, refined_boundaries
     from gearchaos.progress import notice
 
-    if options.start != 0:
-        raise ConfigurationError(f"--start {options.start}: only start 0 can be refined")
     config = refinable(result, options.result)
     with notice(COMPILING, options.quiet):
         return refined_boundaries(config, result, stages, options.refine, options.threads)
@@ -120,10 +156,11 @@ def refined_stages(stages: list[Stage], boundaries: Sequence[Boundary]) -> list[
     ]
 
 
-def table(axis: str, stages: Sequence[Stage]) -> list[str]:
-    """Word the stages as lines of a table, no longer than 80 characters."""
+def table(axis: str, stages: Sequence[Stage], where: Sequence[str] = ()) -> list[str]:
+    """Word the stages of a slice as lines of a table, no longer than 80 characters."""
     lines = [
         f"stages over {axis}",
+        *where,
         f"{'from':>10}  {'to':>10}  {'motion':15}{'lanes':>6}  {'exponent':>20}  narrower",
     ]
     for stage in stages:
@@ -148,7 +185,7 @@ def remarks(found: Sequence[Jump], lanes: LabelledLanes) -> list[str]:
             f"{late} periodic lanes came to rest within their record, the chaos before it\n"
             "included in their exponent; integration.transient_periods leaves it out"
         )
-    return ["", *lines] if lines else []
+    return lines
 
 
 def boundary_list(boundaries: Sequence[Boundary]) -> list[str]:
@@ -166,11 +203,8 @@ def boundary_list(boundaries: Sequence[Boundary]) -> list[str]:
     return lines
 
 
-def _facts(
-    result: Result, stages: Sequence[Stage], boundaries: Sequence[Boundary] | None
-) -> dict[str, Any]:
+def _facts(stages: Sequence[Stage], boundaries: Sequence[Boundary] | None) -> dict[str, Any]:
     facts: dict[str, Any] = {
-        "parameter": result.axis,
         "stages": [
             {
                 "from": stage.start,

@@ -7,7 +7,7 @@ import stat
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import h5py
 import numpy as np
@@ -18,7 +18,19 @@ from gearchaos.results.atomic_file import reason
 from gearchaos.results.checksum_line import checksum_fits
 from gearchaos.results.global_heap import heaps_end
 from gearchaos.results.result_file import ORIGINS, PARAMETERS, SCHEMA, SCHEMA_VERSION, Parameter
-from gearchaos.results.variables import HARMONIC, SECTION_POINT, STATE, Variable, sweep_variables
+from gearchaos.results.variables import (
+    ALL_EXPONENTS,
+    HARMONIC,
+    LARGEST_EXPONENT,
+    SECTION,
+    SECTION_POINT,
+    START,
+    STATE,
+    STATUS,
+    Axis,
+    Variable,
+    sweep_variables,
+)
 
 Contents = tuple[
     list[Variable],
@@ -49,8 +61,8 @@ def read_result(path: str | os.PathLike[str], *, rows: bool = True) -> Contents:
     ----------
     path : path
     rows : bool
-        Whether the arrays of several dimensions are read; without them `data` lacks their
-        values, and the checksum of a file above 1 GiB is left unchecked.
+        Whether variables with dimensions beside the axes are read; without them `data` lacks
+        their values, and the checksum of a file above 1 GiB is left unchecked.
 
     Returns
     -------
@@ -62,7 +74,7 @@ def read_result(path: str | os.PathLike[str], *, rows: bool = True) -> Contents:
     Raises
     ------
     FileError
-        If the file is missing, damaged, of another kind or of a newer major format version.
+        If the file is missing, damaged, of another kind or of another major format version.
     """
     name = os.fspath(path)
     try:
@@ -90,6 +102,52 @@ def read_result(path: str | os.PathLike[str], *, rows: bool = True) -> Contents:
         raise FileError(f"{name}: {what} ({why}); run the sweep again") from error
 
 
+class Completed(NamedTuple):
+    """What a finished sweep has computed.
+
+    Attributes
+    ----------
+    configuration : str
+        The resolved configuration in TOML.
+    lanes : int
+        Lanes of the sweep.
+    diverged : int
+        Those of them that diverged.
+    """
+
+    configuration: str
+    lanes: int
+    diverged: int
+
+
+def completed(path: str | os.PathLike[str]) -> Completed | None:
+    """Look into a result file; None if there is none, or if it is not as it was written."""
+    with suppress(OSError, ValueError, FileError):
+        if checksum_fits(Path(path)):
+            _, data, _, metadata = read_result(path, rows=False)
+            status, text = data[STATUS], str(metadata.get("configuration_resolved", ""))
+            return Completed(text, status.size, int(np.count_nonzero(status)))
+    return None
+
+
+def fixed_coordinates(metadata: Mapping[str, Any]) -> dict[str, float]:
+    """Read the root attribute ``fixed``, such as ``start=1.0``: where a slice was taken.
+
+    Raises
+    ------
+    ValueError
+        If it is no list of coordinates.
+    """
+    pairs = (entry.rpartition("=") for entry in str(metadata.get("fixed", "")).split())
+    return {name: float(value) for name, _, value in pairs}
+
+
+def is_coordinate(values: NDArray[Any]) -> bool:
+    """Tell whether values are those of an axis: numbers that ascend, none of them twice."""
+    numbers = values.ndim == 1 and values.size > 0 and values.dtype.kind in "if"
+    return numbers and bool(np.isfinite(values).all() and (np.diff(values) > 0).all())
+
+
 def printable(text: str) -> str:
     """Return a text of a file without the control characters that act on a terminal."""
     return "".join(c if c.isprintable() else "\N{REPLACEMENT CHARACTER}" for c in text)
@@ -108,7 +166,7 @@ def own_datasets(file: h5py.File) -> Iterator[h5py.Dataset]:
 def _read(file: h5py.File, rows: bool) -> Contents:
     metadata = _scalars(file)
     _check_schema(metadata)
-    axis = str(metadata.get("axis", ""))
+    axes = tuple(str(metadata.get("axes", "")).split())
     variables: list[Variable] = []
     data: dict[str, NDArray[Any]] = {}
     sizes: dict[str, int] = {}
@@ -122,11 +180,14 @@ def _read(file: h5py.File, rows: bool) -> Contents:
             continue
         dims = _dims(file, dataset, sizes)
         if name != HARMONIC:
-            if rows or len(dims) == 1:
+            if rows or len(dims) == 1 or set(dims) <= set(axes):
                 data[name] = _values(dataset)
-            variables.append(_variable(dataset, dims, data.get(name), on_lanes=axis in dims))
-    _check_variables(axis, variables, data)
-    return variables, data, _read_parameters(file, axis, sizes), metadata
+            variables.append(_variable(dataset, dims))
+    _check_variables(axes, {variable.name: variable for variable in variables}, data)
+    with suppress(ValueError):
+        fixed_coordinates(metadata)
+        return variables, data, _read_parameters(file, axes, sizes), metadata
+    raise _UnfitError("holds an attribute fixed without coordinates; run the sweep again")
 
 
 def _check_schema(metadata: Mapping[str, Any]) -> None:
@@ -139,31 +200,28 @@ def _check_schema(metadata: Mapping[str, Any]) -> None:
     if version.split(".")[0] != own:
         raise _UnfitError(
             f"has version {version!r} of the file format, of which this gearchaos reads {own}.x; "
-            "use a gearchaos that knows it"
+            "run the sweep again, or use the gearchaos that wrote it"
         )
 
 
 def _check_variables(
-    axis: str, variables: list[Variable], data: Mapping[str, NDArray[Any]]
+    axes: tuple[str, ...], found: Mapping[str, Variable], data: Mapping[str, NDArray[Any]]
 ) -> None:
     """Compare what a sweep must yield with what there is; more than that is welcome."""
+    if not axes or len(set(axes)) < len(axes):
+        raise _UnfitError("does not name its axes, each once; run the sweep again")
     if STATE not in data:
         raise _UnfitError(f"lacks the variable {STATE}; run the sweep again")
-    found = {variable.name: variable for variable in variables}
-    prefix = "section_"
+    types = {name: np.dtype("i4" if name == START else "f8") for name in axes}
     expected = sweep_variables(
-        axis,
-        units="1",
-        long_name="",
-        symbol="",
+        [Axis(name, "", "", "", np.zeros(1, dtype)) for name, dtype in types.items()],
         states=tuple(data[STATE].ravel()),
-        section=[n.removeprefix(prefix) for n in found if n.startswith(prefix + "delta_")],
+        section=[n.removeprefix(SECTION) for n in found if n.startswith(f"{SECTION}delta_")],
         section_points=np.size(data.get(SECTION_POINT, ())),
-        lyapunov="lyapunov_exponent" in found,
-        several_starts="start" in found,
+        lyapunov=LARGEST_EXPONENT in found,
         status_meanings=(),
         crossings="crossings_per_period" in found,
-        spectrum="lyapunov_spectrum" in found,
+        exponents=ALL_EXPONENTS in found,
         check_meanings=["same"] if "motion_changed" in found else [],
         motion_meanings=["periodic"] if "motion" in found else [],
     )
@@ -176,12 +234,19 @@ def _check_variables(
                 f"holds {due.name} as {got.dtype} over ({', '.join(got.dims)}), which should be "
                 f"{due.dtype} over ({', '.join(due.dims)}); run the sweep again"
             )
-    for name in {"status", "motion"} & found.keys():
+    for name in axes:
+        if not is_coordinate(data[name]):
+            raise _UnfitError(
+                f"holds values of {name} that do not ascend, each once; run the sweep again"
+            )
+    for name in {STATUS, "motion"} & found.keys():
         if data[name].max() >= max(1, len(found[name].flags)):
             raise _UnfitError(f"holds a {name} without a meaning; run the sweep again")
 
 
-def _read_parameters(file: h5py.File, axis: str, sizes: dict[str, int]) -> dict[str, Parameter]:
+def _read_parameters(
+    file: h5py.File, axes: tuple[str, ...], sizes: dict[str, int]
+) -> dict[str, Parameter]:
     if not isinstance(_hard_linked(file, PARAMETERS), h5py.Group):
         raise _UnfitError(f"lacks the group {PARAMETERS}; run the sweep again")
     parameters = {}
@@ -191,14 +256,12 @@ def _read_parameters(file: h5py.File, axis: str, sizes: dict[str, int]) -> dict[
         dims = _dims(file, dataset, sizes) if dataset.shape else ()
         origin = str(notes.get("origin"))
         number = _DTYPES.get(dataset.dtype.str[1:]) == "float64"
-        if not number or dims not in ((), (axis,), (HARMONIC,)) or origin not in ORIGINS:
+        of_the_model = dims == (HARMONIC,) or dims == tuple(a for a in axes if a in dims)
+        if not number or not of_the_model or origin not in ORIGINS:
             raise _UnfitError(f"holds a parameter {name} that is none; run the sweep again")
         values = dataset[()]
-        parameters[name] = Parameter(
-            values if dims else float(values),
-            origin,
-            **_wording(notes),
-        )
+        value = values if dims else float(values)
+        parameters[name] = Parameter(value, origin, **_wording(notes), dims=dims)
     return parameters
 
 
@@ -271,9 +334,7 @@ def _dtype(dataset: h5py.Dataset) -> str:
         ) from None
 
 
-def _variable(
-    dataset: h5py.Dataset, dims: tuple[str, ...], values: NDArray[Any] | None, *, on_lanes: bool
-) -> Variable:
+def _variable(dataset: h5py.Dataset, dims: tuple[str, ...]) -> Variable:
     notes = _scalars(dataset)
     return Variable(
         dataset.name.lstrip("/"),
@@ -282,7 +343,6 @@ def _variable(
         **_wording(notes),
         fill_value=notes.get("_FillValue"),
         flags=tuple(str(notes.get("flag_meanings", "")).split()),
-        values=None if on_lanes or values is None else tuple(values.tolist()),
     )
 
 

@@ -45,7 +45,7 @@ def test_json_holds_the_numbers_of_the_file(good):
     facts = json.loads(ended.out, parse_constant=pytest.fail)
     result = open_result(good)
     assert facts["lanes"] == LANES
-    assert facts["swept"]["greatest"] == result["load"].max()
+    assert facts["axes"]["load"]["greatest"] == result["load"].max()
     assert facts["parameters"]["stiffness_cosine"]["value"] == [0.1, 0.2]
     assert facts["counts"]["status"]["diverged"] == (result["status"] == 1).sum()
     assert facts["variables"].keys() == set(result.names)
@@ -96,10 +96,10 @@ def test_rows_that_are_damaged_are_named(good):
 def test_a_newer_format_is_refused_in_a_sentence(good):
     without_checksum(good)
     with h5py.File(good, "r+") as file:
-        file.attrs["schema_version"] = "2.0"
+        file.attrs["schema_version"] = "3.0"
     ended = info(good)
     assert ended.code == 4
-    assert "has version '2.0' of the file format, of which this gearchaos reads 1.x" in ended.err
+    assert "has version '3.0' of the file format, of which this gearchaos reads 2.x" in ended.err
 
 
 def test_control_characters_do_not_reach_the_terminal(good):
