@@ -16,8 +16,7 @@ import numpy as np
 from gearchaos_kernels import Plan, Status
 from numpy.typing import NDArray
 
-from gearchaos.configuration import Configuration, load_config
-from gearchaos.configuration.sweep_values import SWEEPABLE_GROUPS, SWEEPABLE_KEYS
+from gearchaos.configuration import Configuration, axis_values, load_config, swept_values
 from gearchaos.dynamics.exponents import exponents, sum_of_exponents
 from gearchaos.dynamics.following import (
     STABILITY_LOSS_TEXTS,
@@ -28,10 +27,11 @@ from gearchaos.dynamics.following import (
 from gearchaos.dynamics.orbits import Orbits, orbit_exponent, polish
 from gearchaos.dynamics.stability import fewest_stable_steps
 from gearchaos.dynamics.systems import system_of
-from gearchaos.engine.response import DEFAULT_PERIODS, respond
+from gearchaos.engine.response import respond
 from gearchaos.engine.starts import start_states
 from gearchaos.errors import ConfigurationError
 from gearchaos.records.amplitude_spectrum import SpectralLines, spectral_lines
+from gearchaos.results.response_variables import DEFAULT_PERIODS
 from gearchaos.results.result import Result
 from gearchaos.results.variables import axis_name
 
@@ -123,14 +123,8 @@ class System:
         if not isinstance(config, Configuration):
             config = load_config(config)
         values = {name: float(value) for name, value in {**(at or {}), **groups}.items()}
-        for name in values:
-            if name not in SWEEPABLE_GROUPS and name not in SWEEPABLE_KEYS:
-                raise ConfigurationError(
-                    f"{config.source}: {name}: is no parameter of a system; the groups are "
-                    f"{', '.join(SWEEPABLE_GROUPS)}, the physical keys {', '.join(SWEEPABLE_KEYS)}"
-                )
         for sweep in config.sweeps.values():
-            if sweep.parameter not in values and sweep.count != 1:
+            if sweep.parameter not in values and swept_values(sweep).size > 1:
                 raise ConfigurationError(
                     f"{config.source}: {sweep.parameter}: is swept, and a system has one value of "
                     f"it; give {sweep.parameter}, such as System(config, at="
@@ -347,10 +341,7 @@ class System:
         )
 
     def _at(self, values: Mapping[str, Floats]) -> kernels.System:
-        fixed = self.config.sweep
-        assert fixed.from_ is not None, "the configuration of a system sweeps one value"
-        own = {fixed.parameter: np.array([fixed.from_])}
-        return system_of(self.config, {**own, **values})
+        return system_of(self.config, {**axis_values(self.config), **values})
 
     def _start(self, start: Floats | None) -> Floats:
         return np.atleast_2d(self.state if start is None else np.asarray(start, dtype=np.float64))

@@ -17,7 +17,7 @@ from gearchaos.engine.simulation import Arrays, Bounds, Simulation
 from gearchaos.errors import ConfigurationError
 from gearchaos.progress import Progress, notice, say
 from gearchaos.results.result import Result
-from gearchaos.results.variables import Variable, axis_name
+from gearchaos.results.variables import Variable
 
 PILOT_SECONDS = 0.2
 COMPILING = "gearchaos: preparing the kernel of this scene; the first time this takes some seconds"
@@ -90,11 +90,7 @@ def result_of(
     more : sequence of Variable
         What the blocks hold beside the variables of the sweep.
     """
-    shape = simulation.lanes.shape
-    data = {}
-    for name in blocks[0]:
-        flat = np.concatenate([arrays[name] for arrays in blocks])
-        data[name] = flat.reshape(*shape, *flat.shape[1:])
+    data = {name: np.concatenate([arrays[name] for arrays in blocks]) for name in blocks[0]}
     axes = [axis.name for axis in simulation.lanes.axes]
     variables = [*simulation.variables, *more]
     return Result(axes, variables, data, simulation.lanes.parameters, facts)
@@ -149,7 +145,7 @@ def metadata(simulation: Simulation, seconds: float) -> Mapping[str, Any]:
     """
     config = simulation.config
     return {
-        "axis": axis_name(config.sweep.parameter),
+        "axes": " ".join(axis.name for axis in simulation.lanes.axes),
         "title": config.title,
         "formulation": config.formulation,
         "effects": " ".join(config.scene.effects),

@@ -10,6 +10,12 @@ from gearchaos.results.variables import STATE_WORDING, Axis, Variable
 
 TIME = "time"
 MESH_PERIOD = "mesh_period"
+DEFAULT_PERIODS = 32
+"""Mesh periods of a response where their number is not given."""
+
+CONTACTS = ("apart", "driving_flank", "back_flank")
+"""Meanings of the contact states 0, 1 and 2."""
+
 NO_CONTACT_STATE = 255
 """Contact state of a lane that diverged."""
 
@@ -21,7 +27,6 @@ def response_variables(
     periods: int,
     steps_per_period: int,
     axial: bool,
-    contacts: Sequence[str],
 ) -> list[Variable]:
     """List the variables that a response adds to those of a sweep, in the order of the file.
 
@@ -35,8 +40,6 @@ def response_variables(
         Mesh periods of the record, and steps of each.
     axial : bool
         Whether the scene has axial motion, and so an axial mesh force.
-    contacts : sequence of str
-        Meanings of the contact states 0, 1, ...
     """
     lane = tuple(axis.name for axis in axes)
     instants = np.arange(periods * steps_per_period + 1) / steps_per_period
@@ -58,10 +61,10 @@ def response_variables(
             variables.append(motion(acceleration_of(state.removesuffix("_rate")), text, symbol))
     for direction, symbol in (("tangential", "$N_y$"), ("axial", "$N_z$"))[: 2 if axial else 1]:
         name, text = f"contact_{direction}", f"contact in the {direction} direction"
-        dims, flags = (*lane, TIME), tuple(contacts)
+        dims = (*lane, TIME)
         variables += [
             motion(f"mesh_force_{direction}", f"{direction} mesh force", symbol),
-            Variable(name, dims, "uint8", "1", text, "", NO_CONTACT_STATE, flags),
+            Variable(name, dims, "uint8", "1", text, "", NO_CONTACT_STATE, CONTACTS),
         ]
     return variables
 
