@@ -7,10 +7,9 @@ import json
 import math
 import sys
 from collections.abc import Sequence
-from functools import partial
 from typing import TYPE_CHECKING, Any
 
-from gearchaos.command_line import OK, run_command, version_text
+from gearchaos.command_line import OK, Command
 from gearchaos.errors import ConfigurationError
 
 if TYPE_CHECKING:
@@ -18,8 +17,6 @@ if TYPE_CHECKING:
     from gearchaos.results.jumps import Jump
     from gearchaos.results.result import Result
     from gearchaos.results.stage_table import LabelledLanes, Stage
-
-NAME = "gearchaos stages"
 
 DESCRIPTION = """\
 List the stages of a sweep: stretches of the swept parameter in which the motion keeps its label."""
@@ -29,15 +26,7 @@ The table goes to stdout, everything else to stderr. Exit codes: 0 done, 2 the c
 for what cannot be, 4 the file cannot be read, is damaged or holds no labels."""
 
 
-def main(argv: Sequence[str] | None = None) -> int:
-    """Run the command and return its exit code."""
-    return run_command(NAME, partial(_run, argv))
-
-
-def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
-        prog=NAME, description=DESCRIPTION, epilog=EPILOG, allow_abbrev=False
-    )
+def _arguments(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument
     add("result", metavar="RESULT.h5", help="result file of a sweep")
     add(
@@ -56,10 +45,6 @@ def _parser() -> argparse.ArgumentParser:
     )
     add("--start", type=int, default=0, metavar="N", help="start to list (default: 0)")
     add("--json", action="store_true", help="print JSON instead of a table")
-    add("--threads", type=int, metavar="N", help="threads for --refine (default: all cores)")
-    add("-q", "--quiet", action="store_true", help="say nothing on stderr unless something fails")
-    add("--version", action="version", version=version_text())
-    return parser
 
 
 def _width(text: str) -> float:
@@ -72,8 +57,7 @@ def _width(text: str) -> float:
     return value
 
 
-def _run(argv: Sequence[str] | None) -> int:
-    options = _parser().parse_args(argv)
+def _stages(options: argparse.Namespace) -> int:
     from gearchaos.results.jumps import jumps
     from gearchaos.results.result import open_result
     from gearchaos.results.stage_table import labelled_lanes, stage_table
@@ -106,7 +90,7 @@ def _refined(result: Result, stages: list[Stage], options: argparse.Namespace) -
     if options.start != 0:
         raise ConfigurationError(f"--start {options.start}: only start 0 can be refined")
     config = refinable(result, options.result)
-    with notice(COMPILING, options.quiet):
+    with notice(COMPILING):
         return refined_boundaries(config, result, stages, options.refine, options.threads)
 
 
@@ -204,6 +188,8 @@ def _facts(
 def _number(value: float) -> float | None:
     return value if math.isfinite(value) else None
 
+
+main = Command("stages", DESCRIPTION, EPILOG, _arguments, _stages, common=("threads",))
 
 if __name__ == "__main__":
     sys.exit(main())
