@@ -1,10 +1,17 @@
-"""The command that shows what accuracy costs: ``python -m gearchaos.accuracy config.toml``."""
+"""Measure error and time of step sizes on some lanes of a sweep.
+
+The truth is what the engine finds with very fine steps. Errors are those that 95 % of the periodic
+lanes do not exceed. The table goes to stdout, everything else
+to stderr; a figure (PNG and PDF) and the table as JSON are written under the name in --output.
+Exit codes: 0 done, 2 usage or configuration, 4 cannot read or write.
+"""
 
 from __future__ import annotations
 
 import json
 import sys
 import time
+from argparse import ArgumentParser, Namespace
 from collections.abc import Sequence
 from itertools import product
 from pathlib import Path
@@ -16,22 +23,12 @@ from gearchaos.interrupts import check
 from gearchaos.progress import notice, say
 
 if TYPE_CHECKING:
-    from argparse import ArgumentParser, Namespace
-
     from gearchaos.engine.simulation import Simulation
 
 MODES = ("plain", "resolved")
 TRUTH_STEPS = 3200
 ROUNDS = 3
 WANTED = (1e-4, 1e-6, 1e-8)
-
-DESCRIPTION = "Measure error and time of step sizes on some lanes of a sweep."
-
-EPILOG = f"""\
-The truth is the engine's own finest setting, {TRUTH_STEPS} resolved steps per mesh period. Errors
-are those that 95 % of the periodic lanes do not exceed. The table goes to stdout, everything else
-to stderr; a figure (PNG and PDF) and the table as JSON are written under the name in --output.
-Exit codes: 0 done, 2 usage or configuration, 4 cannot read or write."""
 
 
 class Setting(NamedTuple):
@@ -201,9 +198,7 @@ def recommendation(settings: Sequence[Setting], error: float) -> str:
     return f"For an error of {error:.0e}: {best.steps} {best.mode} steps per mesh period."
 
 
-main = Command(
-    "accuracy", DESCRIPTION, EPILOG, _arguments, _accuracy, common=("overwrite", "threads", "set")
-)
+main = Command("accuracy", __doc__, _arguments, _accuracy, common=("overwrite", "threads", "set"))
 
 if __name__ == "__main__":
     sys.exit(main())

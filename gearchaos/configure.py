@@ -1,16 +1,11 @@
-"""The command that prints the schema of configurations: ``python -m gearchaos.configuration``."""
+"""Print the JSON Schema of a configuration file, for completion in editors."""
 
 from __future__ import annotations
 
 import sys
-from typing import TYPE_CHECKING
+from argparse import ArgumentParser, Namespace
 
 from gearchaos.command_line import OK, Command
-
-if TYPE_CHECKING:
-    from argparse import ArgumentParser, Namespace
-
-DESCRIPTION = "Print the JSON Schema of a configuration file, for completion in editors."
 
 
 def _arguments(parser: ArgumentParser) -> None:
@@ -26,7 +21,7 @@ def _describe(options: Namespace) -> int:
     return OK
 
 
-main = Command("configuration", DESCRIPTION, None, _arguments, _describe, writes=False)
+main = Command("configuration", __doc__, _arguments, _describe, writes=False)
 
 if __name__ == "__main__":
     sys.exit(main())

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from argparse import Namespace
 from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -12,8 +13,6 @@ from gearchaos.errors import FileError
 from gearchaos.progress import complain, say
 
 if TYPE_CHECKING:
-    from argparse import Namespace
-
     from gearchaos.engine.simulation import Simulation
 
 

@@ -1,24 +1,19 @@
-"""The command that shows what is in a result file: ``python -m gearchaos.info RESULT.h5``."""
+"""Show what a result file holds: what was computed, with which parameters, how accurately, and on
+what. Only the file is read.
+
+--verify reads all of the file and tries every checksum in it. Exit codes: 0 the file is sound, 2
+the command line asks for what cannot be, 4 the file cannot be read, is damaged or is not ours.
+"""
 
 from __future__ import annotations
 
 import json
 import sys
+from argparse import ArgumentParser, Namespace
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from gearchaos.command_line import OK, Command
-
-if TYPE_CHECKING:
-    from argparse import ArgumentParser, Namespace
-
-DESCRIPTION = """\
-Show what a result file holds: what was computed, with which parameters, how accurately, and on
-what. Only the file is read."""
-
-EPILOG = """\
---verify reads all of the file and tries every checksum in it. Exit codes: 0 the file is sound, 2
-the command line asks for what cannot be, 4 the file cannot be read, is damaged or is not ours."""
 
 
 def _arguments(parser: ArgumentParser) -> None:
@@ -106,7 +101,7 @@ def _write(text: str) -> None:
     print(text.encode(encoding, "replace").decode(encoding))
 
 
-main = Command("info", DESCRIPTION, EPILOG, _arguments, _info, writes=False)
+main = Command("info", __doc__, _arguments, _info, writes=False)
 
 if __name__ == "__main__":
     sys.exit(main())

@@ -1,8 +1,15 @@
-"""The command that joins the shards of a sweep: ``python -m gearchaos.merge sweep.h5``."""
+"""Join the shards that sweeps with --shard i/N have computed into one result file.
+
+All that is needed lies beside the output: the blocks and the configuration to which they belong.
+They are verified, and removed once the result is there. The path of the result goes to stdout,
+everything else to stderr. Exit codes as those of the sweep command; 4 names the shards that are
+missing, and everything stays as it is.
+"""
 
 from __future__ import annotations
 
 import sys
+from argparse import ArgumentParser, Namespace
 from typing import TYPE_CHECKING
 
 from gearchaos.command_line import OK, Command
@@ -11,19 +18,9 @@ from gearchaos.finishing import complete_already, ending
 from gearchaos.progress import say
 
 if TYPE_CHECKING:
-    from argparse import ArgumentParser, Namespace
-
     from gearchaos.results.block_store import Finished, ShardStore
 
 MOST_NAMED = 10
-
-DESCRIPTION = "Join the shards that sweeps with --shard i/N have computed into one result file."
-
-EPILOG = """\
-All that is needed lies beside the output: the blocks and the configuration to which they belong.
-They are verified, and removed once the result is there. The path of the result goes to stdout,
-everything else to stderr. Exit codes as those of the sweep command; 4 names the shards that are
-missing, and everything stays as it is."""
 
 
 def _arguments(parser: ArgumentParser) -> None:
@@ -90,7 +87,7 @@ def _require_all(store: ShardStore, found: Finished) -> None:
     raise FileError([*found.problems, f"{store.folder}: {lanes_text(gaps)} missing; {remedy}"])
 
 
-main = Command("merge", DESCRIPTION, EPILOG, _arguments, _merge, common=("overwrite",))
+main = Command("merge", __doc__, _arguments, _merge, common=("overwrite",))
 
 if __name__ == "__main__":
     sys.exit(main())

@@ -1,4 +1,12 @@
-"""The command that draws a result file: ``python -m gearchaos.plot RESULT.h5``."""
+"""Draw a result file as PNG and PDF beside it: of a sweep the bifurcation diagram over the Lyapunov
+chart, of a response one page for each lane, with time history, phase portrait, Poincare section
+and amplitude spectrum.
+
+A figure that this command drew before is replaced, so that it can be run again and again; any
+other file of that name is kept unless --overwrite is given. The paths of the figures go to
+stdout. Exit codes: 0 done, 2 the command line asks for what cannot be, 4 a file cannot be read
+or written.
+"""
 
 from __future__ import annotations
 
@@ -19,17 +27,6 @@ if TYPE_CHECKING:
     from gearchaos.results.result import Result
 
 RESULT_ENDINGS = (".h5", ".hdf5", ".nc")
-
-DESCRIPTION = """\
-Draw a result file as PNG and PDF beside it: of a sweep the bifurcation diagram over the Lyapunov
-chart, of a response one page for each lane, with time history, phase portrait, Poincare section
-and amplitude spectrum."""
-
-EPILOG = """\
-A figure that this command drew before is replaced, so that it can be run again and again; any
-other file of that name is kept unless --overwrite is given. The paths of the figures go to
-stdout. Exit codes: 0 done, 2 the command line asks for what cannot be, 4 a file cannot be read
-or written."""
 
 
 def _plot(options: argparse.Namespace) -> int:
@@ -247,7 +244,7 @@ def _dpi(text: str) -> int:
     return int(value)
 
 
-main = Command("plot", DESCRIPTION, EPILOG, _arguments, _plot, common=("overwrite",))
+main = Command("plot", __doc__, _arguments, _plot, common=("overwrite",))
 
 if __name__ == "__main__":
     sys.exit(main())

@@ -1,29 +1,23 @@
-"""The command that computes a paper again: ``python -m gearchaos.reproduce pan2021``."""
+"""Compute and draw everything that a paper shows, and compare every number it prints with ours.
+
+The folder gets the figures (PNG and PDF), the results (HDF5) and a
+report with the comparison, report.md and report.html. The path of report.md goes to stdout,
+everything else to stderr. Exit codes: 0 done, 2 usage, 4 cannot read or write.
+"""
 
 from __future__ import annotations
 
 import sys
 import time
+from argparse import ArgumentParser, Namespace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from gearchaos.command_line import OK, Command
 from gearchaos.errors import ConfigurationError
 from gearchaos.progress import say
 
-if TYPE_CHECKING:
-    from argparse import ArgumentParser, Namespace
-
 PAPERS = {"pan2021": ("pan2021.toml", "pan2021_full.toml")}
 """The configurations of each paper that can be reproduced."""
-
-DESCRIPTION = """\
-Compute and draw everything that a paper shows, and compare every number it prints with ours."""
-
-EPILOG = f"""\
-Papers: {", ".join(PAPERS)}. The folder gets the figures (PNG and PDF), the results (HDF5) and a
-report with the comparison, report.md and report.html. The path of report.md goes to stdout,
-everything else to stderr. Exit codes: 0 done, 2 usage, 4 cannot read or write."""
 
 
 def _arguments(parser: ArgumentParser) -> None:
@@ -54,9 +48,7 @@ def _reproduce(options: Namespace) -> int:
     return OK
 
 
-main = Command(
-    "reproduce", DESCRIPTION, EPILOG, _arguments, _reproduce, common=("overwrite", "threads")
-)
+main = Command("reproduce", __doc__, _arguments, _reproduce, common=("overwrite", "threads"))
 
 if __name__ == "__main__":
     sys.exit(main())

@@ -1,8 +1,15 @@
-"""The command that computes a time response: ``python -m gearchaos.response config.toml``."""
+"""Compute the motion of some pitch errors, or of some values of the swept parameter, at every step
+of the last mesh periods: displacements, velocities, accelerations, mesh forces and contact.
+
+The path of the result goes to stdout, everything else to stderr; python -m gearchaos.plot draws
+it. Exit codes: 0 done, 2 the command line or the configuration asks for what cannot be, 3 done, but
+more lanes diverged than outputs.allowed_diverged_share, 4 a file cannot be read or written.
+"""
 
 from __future__ import annotations
 
 import sys
+from argparse import ArgumentParser, Namespace
 from typing import TYPE_CHECKING
 
 from gearchaos.command_line import Command
@@ -11,20 +18,9 @@ from gearchaos.finishing import ending, output_of
 from gearchaos.progress import say
 
 if TYPE_CHECKING:
-    from argparse import ArgumentParser, Namespace
-
     from gearchaos.configuration import Configuration
 
 PITCH_ERROR = "pitch_error"
-
-DESCRIPTION = """\
-Compute the motion of some pitch errors, or of some values of the swept parameter, at every step of
-the last mesh periods: displacements, velocities, accelerations, mesh forces and contact."""
-
-EPILOG = """\
-The path of the result goes to stdout, everything else to stderr; python -m gearchaos.plot draws
-it. Exit codes: 0 done, 2 the command line or the configuration asks for what cannot be, 3 done, but
-more lanes diverged than outputs.allowed_diverged_share, 4 a file cannot be read or written."""
 
 
 def _arguments(parser: ArgumentParser) -> None:
@@ -37,12 +33,6 @@ def _arguments(parser: ArgumentParser) -> None:
     ):
         values.add_argument(flag, type=float, action="append", metavar=name, help=text)
     add("--periods", type=int, default=32, metavar="N", help="mesh periods kept (default: 32)")
-    add(
-        "-o",
-        "--output",
-        metavar="PATH",
-        help="result file (default: config_response.h5, in this folder)",
-    )
 
 
 def _respond(options: Namespace) -> int:
@@ -92,7 +82,7 @@ def _configuration(options: Namespace) -> Configuration:
 
 
 main = Command(
-    "response", DESCRIPTION, EPILOG, _arguments, _respond, common=("overwrite", "threads", "set")
+    "response", __doc__, _arguments, _respond, common=("output", "overwrite", "threads", "set")
 )
 
 if __name__ == "__main__":

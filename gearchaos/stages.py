@@ -1,4 +1,8 @@
-"""The command that lists the stages of a sweep: ``python -m gearchaos.stages RESULT.h5``."""
+"""List the stages of a sweep: stretches of the swept parameter in which the motion keeps its label.
+
+The table goes to stdout, everything else to stderr. Exit codes: 0 done, 2 the command line asks
+for what cannot be, 4 the file cannot be read, is damaged or holds no labels.
+"""
 
 from __future__ import annotations
 
@@ -17,13 +21,6 @@ if TYPE_CHECKING:
     from gearchaos.results.jumps import Jump
     from gearchaos.results.result import Result
     from gearchaos.results.stage_table import LabelledLanes, Stage
-
-DESCRIPTION = """\
-List the stages of a sweep: stretches of the swept parameter in which the motion keeps its label."""
-
-EPILOG = """\
-The table goes to stdout, everything else to stderr. Exit codes: 0 done, 2 the command line asks
-for what cannot be, 4 the file cannot be read, is damaged or holds no labels."""
 
 
 def _arguments(parser: argparse.ArgumentParser) -> None:
@@ -189,7 +186,7 @@ def _number(value: float) -> float | None:
     return value if math.isfinite(value) else None
 
 
-main = Command("stages", DESCRIPTION, EPILOG, _arguments, _stages, common=("threads",))
+main = Command("stages", __doc__, _arguments, _stages, common=("threads",))
 
 if __name__ == "__main__":
     sys.exit(main())

@@ -1,9 +1,16 @@
-"""The command that computes a sweep: ``python -m gearchaos.sweep config.toml``."""
+"""Compute the sweep that a TOML file describes and write it to an HDF5 file.
+
+The path of the result goes to stdout, everything else to stderr. Exit codes: 0 done, 2 the
+command line or the configuration asks for what cannot be, 3 done, but more lanes diverged than
+outputs.allowed_diverged_share, 4 a file cannot be read or written, 130 interrupted and 143
+terminated: finished blocks are kept and --resume goes on from them.
+"""
 
 from __future__ import annotations
 
 import sys
 import time
+from argparse import ArgumentParser, Namespace
 from typing import TYPE_CHECKING
 
 from gearchaos.command_line import OK, Command
@@ -12,25 +19,14 @@ from gearchaos.finishing import complete_already, ending, output_of
 from gearchaos.progress import say
 
 if TYPE_CHECKING:
-    from argparse import ArgumentParser, Namespace
-
     from gearchaos.configuration import Configuration
     from gearchaos.engine.sharding import Shard
     from gearchaos.engine.simulation import Simulation
-
-DESCRIPTION = "Compute the sweep that a TOML file describes and write it to an HDF5 file."
-
-EPILOG = """\
-The path of the result goes to stdout, everything else to stderr. Exit codes: 0 done, 2 the
-command line or the configuration asks for what cannot be, 3 done, but more lanes diverged than
-outputs.allowed_diverged_share, 4 a file cannot be read or written, 130 interrupted and 143
-terminated: finished blocks are kept and --resume goes on from them."""
 
 
 def _arguments(parser: ArgumentParser) -> None:
     add = parser.add_argument
     add("config", metavar="config.toml", help="what to compute")
-    add("-o", "--output", metavar="PATH", help="result file (default: config.h5, in this folder)")
     add("--resume", action="store_true", help="go on from the finished blocks of a stopped sweep")
     add(
         "--dask",
@@ -132,7 +128,7 @@ def _command(name: str, *arguments: str) -> str:
 
 
 main = Command(
-    "sweep", DESCRIPTION, EPILOG, _arguments, _sweep, common=("overwrite", "threads", "set")
+    "sweep", __doc__, _arguments, _sweep, common=("output", "overwrite", "threads", "set")
 )
 
 if __name__ == "__main__":
