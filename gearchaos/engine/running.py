@@ -15,12 +15,13 @@ from gearchaos.engine.executors import LocalExecutor, compute_blocks
 from gearchaos.engine.provenance import provenance
 from gearchaos.engine.simulation import Arrays, Bounds, Simulation
 from gearchaos.errors import ConfigurationError
-from gearchaos.progress import Progress, notice, say
+from gearchaos.interrupts import check
+from gearchaos.progress import Progress, notice, say, speaking
 from gearchaos.results.result import Result
 from gearchaos.results.variables import Variable
 
 PILOT_SECONDS = 0.2
-COMPILING = "gearchaos: preparing the kernel of this scene; the first time this takes some seconds"
+COMPILING = "preparing the kernel of this scene; the first time this takes some seconds"
 
 
 def run(config: Configuration, threads: int | None = None, progress: bool = False) -> Result:
@@ -46,17 +47,16 @@ def run(config: Configuration, threads: int | None = None, progress: bool = Fals
         If there are not so many threads.
     """
     choose_threads(threads)
-    simulation = Simulation(config)
-    with notice(COMPILING, quiet=not progress):
-        simulation.compile()
-    simulation.choose_steps()
-    for note in simulation.notes:
-        say(note, quiet=not progress)
+    with speaking(quiet=not progress):
+        return _run(Simulation(config))
+
+
+def _run(simulation: Simulation) -> Result:
+    prepare(simulation)
     began = time.monotonic()
     blocks: dict[int, Arrays] = {}
     tally = Tally()
-    lanes = len(simulation.lanes)
-    with LocalExecutor(simulation) as executor, Progress(lanes, quiet=not progress) as bar:
+    with LocalExecutor(simulation) as executor, Progress(len(simulation.lanes)) as bar:
 
         def keep(block: Bounds, arrays: Arrays) -> None:
             blocks[block[0]] = arrays
@@ -65,12 +65,9 @@ def run(config: Configuration, threads: int | None = None, progress: bool = Fals
 
         compute_blocks(executor, simulation.blocks(simulation.block_lanes(current_threads())), keep)
     if tally.errors:
-        say(tally.errors, quiet=not progress)
-    return result_of(
-        simulation,
-        [blocks[first] for first in sorted(blocks)],
-        metadata(simulation, time.monotonic() - began),
-    )
+        say(tally.errors)
+    in_order = [blocks[first] for first in sorted(blocks)]
+    return result_of(simulation, in_order, metadata(simulation, time.monotonic() - began))
 
 
 def result_of(
@@ -94,6 +91,16 @@ def result_of(
     axes = [axis.name for axis in simulation.lanes.axes]
     variables = [*simulation.variables, *more]
     return Result(axes, variables, data, simulation.lanes.parameters, facts)
+
+
+def prepare(simulation: Simulation, compile_now: bool = True) -> None:
+    """Compile the kernel, choose the steps where a tolerance is wanted, and say what was found."""
+    if compile_now:
+        with notice(COMPILING):
+            simulation.compile()
+    check()
+    simulation.choose_steps()
+    say(*simulation.notes)
 
 
 def pilot_rate(simulation: Simulation) -> float:
