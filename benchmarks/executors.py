@@ -39,7 +39,7 @@ def main() -> None:
     print_machine()
     use_threads(most_threads())
     simulation = Simulation(load_config(SWEEP, [f"sweep.count={options.lanes}", *SHORT]))
-    simulation.compile()
+    simulation.rehearse()
     began = time.perf_counter()
     with (
         LocalExecutor(simulation) as here,

@@ -146,21 +146,22 @@ def measure(simulation: Simulation, steps: Sequence[int], lanes: int) -> list[Se
     from statistics import fmean, median
 
     from gearchaos.engine.running import COMPILING
+    from gearchaos.engine.steps import pilot
     from gearchaos.records.difference import bound, difference
 
     with notice(COMPILING):
-        _, motion = simulation.pilot(lanes, TRUTH_STEPS)
+        _, solution = pilot(simulation.lanes, simulation.plan, lanes, TRUTH_STEPS)
         for mode in MODES:
-            motion(steps[0], mode == "resolved")
+            solution(steps[0], mode == "resolved")
     with notice(f"computing the truth with {TRUTH_STEPS} steps per period"):
-        truth = motion(TRUTH_STEPS, True)
+        truth = solution(TRUTH_STEPS, True)
     settings = []
     for mode, count in product(MODES, steps):
         seconds = []
         for _ in range(ROUNDS):
             check()
             began = time.perf_counter()
-            found = motion(count, mode == "resolved")
+            found = solution(count, mode == "resolved")
             seconds.append(time.perf_counter() - began)
         apart = difference(found, truth)
         settings.append(

@@ -20,21 +20,23 @@ def describe(simulation: Simulation, output: str) -> None:
     seconds = simulation.steps / pilot_rate(simulation)
     duration = f"{seconds:.1f} s" if seconds < 100 else str(timedelta(seconds=round(seconds)))
     config = simulation.config
+    lanes, threads = simulation.lanes, current_threads()
     sizes = {v.name: len(v.values) for v in simulation.variables if v.values is not None}
-    bytes_kept = simulation.lanes * sum(
-        np.dtype(v.dtype).itemsize * math.prod(sizes[dim] for dim in v.dims[1:])
+    bytes_kept = sum(
+        np.dtype(v.dtype).itemsize * math.prod(sizes[dim] for dim in v.dims)
         for v in simulation.variables
-        if v.dims[0] == simulation.axis
+        if v.values is None
     )
-    starts = f", {simulation.starts} starts each" if simulation.starts > 1 else ""
-    values, threads = simulation.values, current_threads()
+    spans = [
+        f"{axis.values.size} values of {axis.name} from {axis.values[0]:g} to {axis.values[-1]:g}"
+        for axis in lanes.axes
+    ]
     memory = simulation.block_memory(threads)
     for key, value in {
         "output": f"{output}{' (exists)' if os.path.exists(output) else ''}",
         "effects": ", ".join(config.scene.effects) or "none",
-        "states": f"{len(simulation.states)}{_left_out(simulation)}",
-        "lanes": f"{simulation.lanes} ({values.size} values of {config.sweep.parameter} from "
-        f"{values[0]:g} to {values[-1]:g}{starts})",
+        "states": f"{len(lanes.states)}{_left_out(simulation)}",
+        "lanes": f"{len(lanes)} ({', '.join(spans)})",
         "steps": f"{simulation.steps:.3g} ({simulation.plan.steps_per_period} per period)",
         "file": f"about {tqdm.format_sizeof(bytes_kept, 'B')} before compression",
         "memory": f"about {tqdm.format_sizeof(memory, 'B')} for a block of lanes",
@@ -44,5 +46,5 @@ def describe(simulation: Simulation, output: str) -> None:
 
 
 def _left_out(simulation: Simulation) -> str:
-    unused = [name for name in simulation.config.scene.effects if name not in simulation.effects]
+    unused = [name for name in simulation.config.scene.effects if name not in simulation.lanes.effects]
     return f" (nothing that is kept needs {', '.join(unused)})" if unused else ""

@@ -36,10 +36,10 @@ def output_of(options: Namespace, suffix: str = ".h5") -> str:
 def ending(simulation: Simulation, diverged: int) -> int:
     """Complain if too many lanes diverged, and return the exit code."""
     allowed = simulation.config.outputs.allowed_diverged_share
-    if diverged <= allowed * simulation.lanes:
+    if diverged <= allowed * len(simulation.lanes):
         return OK
     complain(
-        f"{diverged} of {simulation.lanes} lanes diverged, more than "
+        f"{diverged} of {len(simulation.lanes)} lanes diverged, more than "
         f"outputs.allowed_diverged_share = {allowed:g} allows; the file marks them: "
         "raise integration.steps_per_period, or check the load and the start state"
     )
@@ -60,8 +60,8 @@ def complete_already(simulation: Simulation, output: str) -> int | None:
         If the file is the result of another configuration.
     """
     from gearchaos.engine.store_filling import open_store
-    from gearchaos.results.completed import completed
     from gearchaos.results.manifest import differing_keys, folder_of
+    from gearchaos.results.result_reader import completed
 
     found = completed(output)
     if found is None:

@@ -24,6 +24,8 @@ PITCH_ERROR = "pitch_error"
 
 
 def _arguments(parser: ArgumentParser) -> None:
+    from gearchaos.results.response_variables import DEFAULT_PERIODS
+
     add = parser.add_argument
     add("config", metavar="config.toml", help="the pair, its scene, start and integration")
     values = parser.add_mutually_exclusive_group(required=True)
@@ -32,29 +34,32 @@ def _arguments(parser: ArgumentParser) -> None:
         ("--at", "VALUE", "value of the parameter that the configuration sweeps, may be repeated"),
     ):
         values.add_argument(flag, type=float, action="append", metavar=name, help=text)
-    add("--periods", type=int, default=32, metavar="N", help="mesh periods kept (default: 32)")
+    text = "mesh periods kept (default: %(default)s)"
+    add("--periods", type=int, default=DEFAULT_PERIODS, metavar="N", help=text)
 
 
 def _respond(options: Namespace) -> int:
     config = _configuration(options)
-    from gearchaos.engine.response_run import ResponseRun
+    from gearchaos.engine.response import compute_response, prepared
     from gearchaos.engine.running import choose_threads, prepare
     from gearchaos.results.atomic_file import check_output
 
     choose_threads(options.threads)
-    run = ResponseRun(config, options.periods)
+    simulation = prepared(config, options.periods)
     output = output_of(options, "_response.h5")
     check_output(output, options.overwrite)
-    prepare(run)
-    result = run.result()
+    prepare(simulation, history_periods=1)
+    result = compute_response(simulation, options.periods, config.text)
     result.save(output, overwrite=options.overwrite)
     print(output, flush=True)
     diverged = int((result["status"] != 0).sum())
+    lanes = len(simulation.lanes)
     say(
-        f"{run.lanes} lane{'s' if run.lanes != 1 else ''} over {run.axis}, {run.periods} mesh "
-        f"periods of {run.plan.steps_per_period} steps, {diverged} diverged"
+        f"{lanes} lane{'s' if lanes != 1 else ''} over {' by '.join(result.axes)}, "
+        f"{options.periods} mesh periods of {simulation.plan.steps_per_period} steps, "
+        f"{diverged} diverged"
     )
-    return ending(run, diverged)
+    return ending(simulation, diverged)
 
 
 def _configuration(options: Namespace) -> Configuration:

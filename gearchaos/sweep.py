@@ -106,7 +106,7 @@ def _compute(simulation: Simulation, output: str, shard: Shard | None, options: 
             seconds = time.monotonic() - began
             if shard is None:
                 facts = {**metadata(simulation, seconds), **performed_by}
-                store.merge(simulation.parameters, facts, overwrite=options.overwrite)
+                store.merge(simulation.lanes.parameters, facts, overwrite=options.overwrite)
         except (KeyboardInterrupt, FileError, ExecutionError, OSError) as fault:
             kept = sum(last - first for first, last in store.finished().bounds)
             fault.add_note(f"{kept} of {store.own_lanes} lanes are kept")

@@ -182,7 +182,7 @@ def _simulation(recipe: Recipe) -> Simulation:
     simulation.plan = simulation.plan._replace(steps_per_period=recipe.steps_per_period)
     # The first process of a node compiles; the others wait, and load what it has compiled.
     with waiting_lock(CACHE_FOLDER / "compiling.lock"):
-        simulation.compile()
+        simulation.rehearse()
     return simulation
 
 

@@ -78,16 +78,6 @@ def prepared(config: Configuration, periods: int) -> Simulation:
     return Simulation(whole.replace("outputs.section_points", recorded))
 
 
-def compile_response(simulation: Simulation) -> None:
-    """Compile the kernel that keeps the motion of this scene, or load it from the cache."""
-    plan = simulation.plan._replace(
-        transient_periods=0, recorded_periods=1, section_points=0, history_periods=1
-    )
-    lanes = np.arange(simulation.lanes.starts)
-    _, outcome = simulation.integrate(lanes, plan)
-    _motion(simulation.lanes.system_of(lanes), outcome, plan.steps_per_period)
-
-
 def compute_response(simulation: Simulation, periods: int, text: str) -> Result:
     """Compute all lanes.
 

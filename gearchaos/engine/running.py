@@ -93,11 +93,13 @@ def result_of(
     return Result(axes, variables, data, simulation.lanes.parameters, facts)
 
 
-def prepare(simulation: Simulation, compile_now: bool = True) -> None:
+def prepare(
+    simulation: Simulation, *, compile_now: bool = True, history_periods: int = 0
+) -> None:
     """Compile the kernel, choose the steps where a tolerance is wanted, and say what was found."""
     if compile_now:
         with notice(COMPILING):
-            simulation.compile()
+            simulation.rehearse(periods=history_periods, history_periods=history_periods)
     check()
     simulation.choose_steps()
     say(*simulation.notes)

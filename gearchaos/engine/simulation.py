@@ -142,13 +142,17 @@ class Simulation:
     def _splits_steps(self) -> bool:
         return self.plan.resolved and "backlash" in self.lanes.effects
 
-    def compile(self) -> None:
-        """Compile the kernel of this scene, or load it from the cache."""
-        self.rehearse(1, 0)
+    def rehearse(self, lanes: int = 1, periods: int = 0, history_periods: int = 0) -> int:
+        """Integrate the first lanes for a few mesh periods and return the number of steps.
 
-    def rehearse(self, lanes: int, periods: int) -> int:
-        """Integrate the first lanes for a few mesh periods and return the number of steps."""
-        plan = self.plan._replace(transient_periods=0, recorded_periods=periods, section_points=0)
+        The kernel of this scene is compiled for it, or loaded from the cache.
+        """
+        plan = self.plan._replace(
+            transient_periods=0,
+            recorded_periods=periods,
+            section_points=0,
+            history_periods=history_periods,
+        )
         numbers = np.arange(lanes)
         integrate(self.lanes.system_of(numbers), self.lanes.start_of(numbers), plan)
         return lanes * periods * plan.steps_per_period
