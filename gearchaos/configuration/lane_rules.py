@@ -110,11 +110,9 @@ def _missing(config: Configuration, row: GroupRow) -> Fault:
     because = f" for {' and '.join(effects)}" if effects else ""
     lacking = [entry for entry in row.derived_from if not _is_present(config, entry)]
     otherwise = f", or derive it by giving {', '.join(lacking)} as well" if lacking else ""
-    return Fault(
-        f"groups.{row.name}",
-        f"the {row.long_name} ({row.symbol}) is needed{because} and neither given nor derivable",
-        f"give {row.name} in [groups]{otherwise}",
-    )
+    name = f"the {row.long_name} ({row.symbol})"
+    rule = f"{name} is needed{because} and neither given nor derivable"
+    return Fault(f"groups.{row.name}", rule, f"give {row.name} in [groups]{otherwise}")
 
 
 def _is_present(config: Configuration, entry: str) -> bool:
@@ -138,11 +136,8 @@ def _out_of_range(groups: Groups) -> Iterator[Fault]:
 
 
 def _decoupled(config: Configuration, groups: Groups) -> Iterator[Fault]:
-    angle = groups.base_helix_angle_deg
-    if "axial" in config.scene.effects and angle is not None and np.all(np.equal(angle, 0.0)):
-        yield Fault(
-            "scene.effects",
-            '"axial" needs a helix angle: in a spur pair nothing drives the axial motion',
-            'drop "axial", or give pair.helix_angle_deg or groups.base_helix_angle_deg',
-            config.scene.effects,
-        )
+    effects, angle = config.scene.effects, groups.base_helix_angle_deg
+    if "axial" in effects and angle is not None and np.all(np.equal(angle, 0.0)):
+        rule = '"axial" needs a helix angle: in a spur pair nothing drives the axial motion'
+        remedy = 'drop "axial", or give pair.helix_angle_deg or groups.base_helix_angle_deg'
+        yield Fault("scene.effects", rule, remedy, effects)

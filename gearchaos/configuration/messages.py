@@ -79,7 +79,7 @@ def shown(value: object) -> str:
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, Mapping):
-        return "{...}"
+        return "{...}" if value else "{}"
     if isinstance(value, (list, tuple)):
         entries = ["[...]" if isinstance(one, (list, tuple)) else shown(one) for one in value[:5]]
         return f"[{', '.join([*entries, '...'] if len(value) > len(entries) else entries)}]"

@@ -67,22 +67,17 @@ def _shares_fill_the_period(config: Configuration) -> Iterator[Fault]:
         yield Fault("mesh.stiffness", rule, "the four are shares of one mesh period")
     half_height = config.physical()["mesh.stiffness.half_height"]
     if (half_height is None) == bool(shares):
-        yield Fault(
-            "mesh.stiffness.half_height",
-            "must be given with the four shares, and only with them",
-            "without both the contact ratio of [pair] decides",
-            half_height,
-        )
+        rule = "must be given with the four shares, and only with them"
+        remedy = "without both the contact ratio of [pair] decides"
+        yield Fault("mesh.stiffness.half_height", rule, remedy, half_height)
 
 
 @reads("mesh", "pair")
 def _contact_ratio_is_known(config: Configuration) -> Iterator[Fault]:
     if config.pair is None and _shares(config) == []:
-        yield Fault(
-            "mesh.stiffness",
-            "a trapezoid without shares takes its shape from the contact ratio of [pair]",
-            "give [pair], or rise, top, fall, bottom and half_height",
-        )
+        rule = "a trapezoid without shares takes its shape from the contact ratio of [pair]"
+        remedy = "give [pair], or rise, top, fall, bottom and half_height"
+        yield Fault("mesh.stiffness", rule, remedy)
 
 
 def _shares(config: Configuration) -> list[float] | None:
@@ -121,15 +116,12 @@ def _start_states_exist(config: Configuration) -> Iterator[Fault]:
 
 
 def _foreign(key: str, names: Collection[str], config: Configuration) -> Iterator[Fault]:
+    states = config.scene.states
     for name in dict.fromkeys(names):
-        if name not in config.scene.states:
+        if name not in states:
             effect = "transverse" if name.startswith(("delta_1", "delta_2")) else "axial"
-            yield Fault(
-                key,
-                f"the scene has no state `{name}`",
-                f'add "{effect}" to scene.effects, which now give {", ".join(config.scene.states)}',
-                tuple(names),
-            )
+            remedy = f'add "{effect}" to scene.effects, which now give {", ".join(states)}'
+            yield Fault(key, f"the scene has no state `{name}`", remedy, tuple(names))
 
 
 @reads("start")
@@ -158,12 +150,9 @@ def _section_points_are_recorded(config: Configuration) -> Iterator[Fault]:
 @reads("outputs", "start")
 def _exponents_are_not_carried(config: Configuration) -> Iterator[Fault]:
     if config.outputs.exponents and config.start.carry != "none":
-        yield Fault(
-            "outputs.exponents",
-            f'cannot be computed with start.carry = "{config.start.carry}"',
-            'set start.carry = "none", or compute the exponents in a sweep of its own',
-            config.outputs.exponents,
-        )
+        rule = f'cannot be computed with start.carry = "{config.start.carry}"'
+        remedy = 'set start.carry = "none", or compute the exponents in a sweep of its own'
+        yield Fault("outputs.exponents", rule, remedy, True)
 
 
 @reads("outputs", "integration")

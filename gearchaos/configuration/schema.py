@@ -64,6 +64,4 @@ def _default(key: Key) -> str:
         return "required"
     table, _, name = key.path.rpartition(".")
     default = GROUPS_BY_NAME[name].default if table == "groups" else key.field.default
-    if isinstance(default, dict):
-        return "`{}`"
     return "" if default is None else f"`{shown(default)}`"

@@ -105,27 +105,20 @@ def _swept_effect_is_on(config: Configuration) -> Iterator[Fault]:
         row = SWEEPABLE_GROUPS.get(sweep.parameter)
         if row is not None and not row.needed_by(config.scene.effects):
             effects = " or ".join(f'"{name}"' for name in sorted(row.effects))
-            yield Fault(
-                f"{table}.parameter",
-                "belongs to an effect that is off, so sweeping it changes nothing",
-                f"add {effects} to scene.effects",
-                row.name,
-            )
+            rule = "belongs to an effect that is off, so sweeping it changes nothing"
+            yield Fault(f"{table}.parameter", rule, f"add {effects} to scene.effects", row.name)
 
 
 @reads("scene", "outputs")
 def _swept_effect_is_kept(config: Configuration) -> Iterator[Fault]:
-    unused = set(config.scene.effects) - set(config.needed_effects)
     for table, sweep in config.sweeps.items():
         row = SWEEPABLE_GROUPS.get(sweep.parameter)
-        if row is not None and row.effects and row.effects <= unused:
-            yield Fault(
-                f"{table}.parameter",
-                "acts on the axial pair only, and nothing that is kept depends on that",
-                "add an axial state such as delta_3 to outputs.section, or set "
-                "outputs.lyapunov = true",
-                row.name,
-            )
+        if row is None or row.needed_by(config.needed_effects):
+            continue
+        if row.needed_by(config.scene.effects):
+            rule = "acts on the axial pair only, and nothing that is kept depends on that"
+            remedy = "keep delta_3 or the like in outputs.section, or set outputs.lyapunov = true"
+            yield Fault(f"{table}.parameter", rule, remedy, row.name)
 
 
 @reads("start")

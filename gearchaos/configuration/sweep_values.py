@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
@@ -19,14 +18,12 @@ if TYPE_CHECKING:
 
 FloatArray: TypeAlias = npt.NDArray[np.float64]
 
-SWEEPABLE_KEYS = MappingProxyType(
-    {path: key for path, key in PHYSICAL_KEYS.items() if key.is_number and path.count(".") == 1}
-)
+SWEEPABLE_KEYS = {
+    path: key for path, key in PHYSICAL_KEYS.items() if key.is_number and path.count(".") == 1
+}
 """Physical keys that a sweep may vary, by path: the single numbers of the physical tables."""
 
-SWEEPABLE_GROUPS = MappingProxyType(
-    {name: row for name, row in GROUPS_BY_NAME.items() if not row.is_list}
-)
+SWEEPABLE_GROUPS = {name: row for name, row in GROUPS_BY_NAME.items() if not row.is_list}
 """Groups that a sweep may vary, by name."""
 
 
@@ -47,8 +44,7 @@ def axis_values(config: Configuration) -> dict[str, FloatArray]:
 
     Each has the shape (values,); a parameter is in its own unit.
     """
-    sweeps = reversed(config.sweeps.values())
-    return {sweep.parameter: swept_values(sweep) for sweep in sweeps}
+    return {one.parameter: swept_values(one) for one in reversed(config.sweeps.values())}
 
 
 def groups_at(config: Configuration, values: Mapping[str, npt.ArrayLike]) -> Groups:

@@ -72,10 +72,8 @@ class TrapezoidalStiffness:
 
         Parameters
         ----------
-        transverse : float
-            eps_alpha > 0.
-        overlap : float
-            eps_beta >= 0; zero is a spur pair, whose contact length jumps.
+        transverse, overlap : float
+            eps_alpha > 0 and eps_beta >= 0; zero is a spur pair, whose contact length jumps.
 
         Raises
         ------

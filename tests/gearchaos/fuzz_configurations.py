@@ -9,6 +9,15 @@ from .commands import SMALL
 
 Random = random.Random
 
+PLACE = "[integration]"
+SECOND_SWEEPS = tuple(
+    SMALL.replace(PLACE, f'[second_sweep]\nparameter = "{parameter}"\n{values}\n\n{PLACE}')
+    for parameter, values in (
+        ("load", "from = 0.1\nto = 0.4\ncount = 3"),
+        ("operation.speed_rpm", "values = [7000.0, 8000.0, 9000.0]"),
+    )
+)
+
 WORDS = (
     "[", "]", "{", "}", "=", ".", ",", "#", '"', "'", '"""', "\\", "\n", "\r", "\0", "\x1b[31m",
     "nan", "-inf", "1e999", "-0", "0x", "1979-05-27", "true", "[[pair]]", "[sweep]", "\ufeff", "é",
@@ -24,7 +33,8 @@ def configuration(number: int) -> tuple[str, bytes]:
     """Return what was done to a configuration file, and the file."""
     source = random.Random(f"configuration {number}")
     kind = list(KINDS)[number % len(KINDS)]
-    return kind, KINDS[kind](source)
+    text = source.choice((SMALL, SMALL, *SECOND_SWEEPS))
+    return kind, KINDS[kind](source, text)
 
 
 def large_configuration(path: Path) -> None:
@@ -35,27 +45,26 @@ def large_configuration(path: Path) -> None:
             file.write("# a comment\n" * (1_000_000 // 12))
 
 
-def _bytes_changed(source: Random) -> bytes:
-    content = bytearray(SMALL.encode())
+def _bytes_changed(source: Random, text: str) -> bytes:
+    content = bytearray(text.encode())
     for _ in range(source.choice((1, 2, 5, 50))):
         content[source.randrange(len(content))] = source.randrange(256)
     return bytes(content)
 
 
-def _cut(source: Random) -> bytes:
-    return SMALL.encode()[: source.randrange(len(SMALL))]
+def _cut(source: Random, text: str) -> bytes:
+    return text.encode()[: source.randrange(len(text))]
 
 
-def _words_inserted(source: Random) -> bytes:
-    text = SMALL
+def _words_inserted(source: Random, text: str) -> bytes:
     for _ in range(source.choice((1, 2, 8))):
         place = source.randrange(len(text))
         text = text[:place] + source.choice(WORDS) + text[place:]
     return text.encode()
 
 
-def _lines_shuffled(source: Random) -> bytes:
-    lines = SMALL.splitlines(keepends=True)
+def _lines_shuffled(source: Random, text: str) -> bytes:
+    lines = text.splitlines(keepends=True)
     for _ in range(source.choice((1, 3, 10))):
         one, other = source.randrange(len(lines)), source.randrange(len(lines))
         how = source.randrange(3)
@@ -68,16 +77,15 @@ def _lines_shuffled(source: Random) -> bytes:
     return "".join(lines).encode()
 
 
-def _numbers_replaced(source: Random) -> bytes:
-    places = list(re.finditer(r"(?<![\w.])-?\d+(?:\.\d+)?(?:e-?\d+)?", SMALL))
-    text = SMALL
+def _numbers_replaced(source: Random, text: str) -> bytes:
+    places = list(re.finditer(r"(?<![\w.])-?\d+(?:\.\d+)?(?:e-?\d+)?", text))
     for place in sorted(source.sample(places, source.choice((1, 2))), key=lambda m: -m.start()):
         text = text[: place.start()] + source.choice(NUMBERS) + text[place.end() :]
     return text.encode()
 
 
-def _values_exchanged(source: Random) -> bytes:
-    lines = SMALL.splitlines()
+def _values_exchanged(source: Random, text: str) -> bytes:
+    lines = text.splitlines()
     keys = [index for index, line in enumerate(lines) if "=" in line]
     one, other = source.sample(keys, 2)
     name, _, _ = lines[one].partition("=")
@@ -86,7 +94,7 @@ def _values_exchanged(source: Random) -> bytes:
     return "\n".join(lines).encode()
 
 
-def _random_toml(source: Random) -> bytes:
+def _random_toml(source: Random, _: str) -> bytes:
     return "\n".join(_line(source) for _ in range(source.randrange(1, 30))).encode()
 
 
@@ -106,7 +114,7 @@ def _value(source: Random, depth: int) -> str:
     return source.choice((*NUMBERS[:8], '"text"', "'x'", "true", "1979-05-27T07:32:00Z", "[]"))
 
 
-def _nested_deeply(source: Random) -> bytes:
+def _nested_deeply(source: Random, text: str) -> bytes:
     depth = source.choice((50, 100, 300, 1000, 5000, 100_000))
     opening, inner, closing = source.choice(
         (("[", "1", "]"), ("{a = ", "1", "}"), ("a.", "b = 1", ""), ('"a".', "b = 1", ""))
@@ -114,35 +122,35 @@ def _nested_deeply(source: Random) -> bytes:
     key = "" if closing == "" else source.choice(("x = ", "title = ", "[sweep]\nvalues = "))
     if source.random() < 0.3:
         closing = ""
-    return (SMALL + f"\n{key}{opening * depth}{inner}{closing * depth}\n").encode()
+    return (text + f"\n{key}{opening * depth}{inner}{closing * depth}\n").encode()
 
 
-def _many_keys(source: Random) -> bytes:
+def _many_keys(source: Random, text: str) -> bytes:
     number = source.choice((100, 3000, 20_000))
     form = source.choice(("key{}=1\n", "[t{}]\n", "[pair.t{}]\n", "values.a{}=[]\n"))
-    return (SMALL + "".join(form.format(index) for index in range(number))).encode()
+    return (text + "".join(form.format(index) for index in range(number))).encode()
 
 
-def _long_values(source: Random) -> bytes:
+def _long_values(source: Random, text: str) -> bytes:
     entry = source.choice(("1.0,", "true,", '"x",', "[],", "{},", "1e400,", "'delta_5',"))
     key = source.choice(("values", "teeth", "effects", "section", "cosine_N_per_um_mm"))
     rows = ",".join([entry.rstrip(",")] * source.choice((10, 1000, 30_000)))
-    return re.sub(rf"(?m)^{key} = .*$|^count = 40$", f"{key} = [{rows}]", SMALL, count=1).encode()
+    return re.sub(rf"(?m)^{key} = .*$|^count = 40$", f"{key} = [{rows}]", text, count=1).encode()
 
 
-def _encoded_otherwise(source: Random) -> bytes:
-    text = SMALL.replace("a small sweep", "ein kleiner Läüf \U0001f600")
+def _encoded_otherwise(source: Random, text: str) -> bytes:
+    text = text.replace("a small sweep", "ein kleiner Läüf \U0001f600")
     encoding = source.choice(
         ("utf-16", "utf-32", "utf-16-le", "cp037", "utf-7", "latin-1", "cp1252")
     )
     return text.encode(encoding, "replace")
 
 
-def _random_bytes(source: Random) -> bytes:
+def _random_bytes(source: Random, _: str) -> bytes:
     return source.randbytes(source.choice((0, 1, 10, 1000, 100_000)))
 
 
-KINDS: dict[str, Callable[[Random], bytes]] = {
+KINDS: dict[str, Callable[[Random, str], bytes]] = {
     "bytes changed": _bytes_changed,
     "cut": _cut,
     "words inserted": _words_inserted,

@@ -81,6 +81,8 @@ to = 4000.0
 count = 8
 """
 
+SHARES = "{shape='trapezoid', rise=0.25, top=0.25, fall=0.25, bottom=0.25, half_height=0.1}"
+
 
 @pytest.mark.parametrize("path", SWEEPS, ids=lambda path: path.stem)
 def test_every_sweep_of_the_project_loads_and_resolves(path):
@@ -182,6 +184,92 @@ def test_a_group_given_directly_wins_over_the_physical_data():
 def test_a_swept_group_replaces_the_one_in_the_file():
     config = load_config(PAN2021, ['sweep={parameter="load", values=[0.1, 0.2]}'])
     assert np.asarray(lane_groups(config)[1].load).tolist() == [0.1, 0.2]
+
+
+def second(parameter, *values):
+    return f"second_sweep={{parameter='{parameter}', values={list(values)}}}"
+
+
+def test_the_axes_are_the_second_sweep_and_the_sweep():
+    config = load_config(PAN2021, [second("load", 0.3, 0.1)])
+    assert list(config.sweeps) == ["sweep", "second_sweep"]
+    values = axis_values(config)
+    assert list(values) == ["load", "pitch_error"]
+    assert values["load"].tolist() == [0.1, 0.3]
+    assert np.array_equal(values["pitch_error"], swept_values(config.sweep))
+    assert Configuration.from_toml(config.resolved_toml()) == config
+    assert list(load_config(PAN2021).sweeps) == ["sweep"]
+
+
+def test_groups_have_the_broadcast_shape_of_what_they_depend_on():
+    config = Configuration.from_toml(
+        PHYSICAL, overrides=[second("pair.face_width_mm", 14.0, 15.0), "mesh.stiffness=" + SHARES]
+    )
+    axes = axis_values(config)
+    widths, speeds = axes["pair.face_width_mm"], axes["operation.speed_rpm"]
+    groups = groups_at(config, dict(zip(axes, np.ix_(widths, speeds), strict=True)))
+    assert groups.mesh_frequency.shape == (2, 8)
+    assert groups.load.shape == (2, 1)
+    assert groups.pitch_error_amplitude == 11.0 / 40.0
+    assert groups.stiffness_cosine.shape == (6,)
+    flat = {
+        "operation.speed_rpm": np.tile(speeds, 2),
+        "pair.face_width_mm": np.repeat(widths, 8),
+    }
+    lanes = groups_at(config, flat)
+    assert np.array_equal(lanes.mesh_frequency, groups.mesh_frequency.ravel())
+    assert np.array_equal(lanes.load, np.repeat(groups.load.ravel(), 8))
+    for row, width in enumerate(widths):
+        alone = config.at({"pair.face_width_mm": width})
+        along = groups_at(alone, {"operation.speed_rpm": speeds})
+        assert np.array_equal(along.mesh_frequency, groups.mesh_frequency[row])
+        assert along.load == groups.load[row, 0]
+
+
+def test_groups_at_no_values_are_those_of_the_file_and_a_misspelt_parameter_is_an_error():
+    config = Configuration.from_toml(PHYSICAL)
+    assert groups_at(config, {}).load == groups_at(config, {"operation.torque_Nm": 50.0}).load
+    for name in ("operation.sped_rpm", "laod", "pair.teeth", "stiffness_cosine"):
+        with pytest.raises(KeyError):
+            groups_at(config, {name: 1.0})
+
+
+def test_a_parameter_fixed_at_a_value_leaves_its_sweep():
+    config = load_config(PAN2021, [second("load", 0.1, 0.3)])
+    point = config.at({"pitch_error": 10.75, "load": np.float64(0.2)})
+    assert point.second_sweep is None
+    assert axis_values(point)["pitch_error"].tolist() == [10.75]
+    assert point.groups.given()["load"] == 0.2
+    assert point.groups.given()["pitch_error"] == 10.75
+    assert point.source == config.source
+    along = config.at({"pitch_error": 10.75})
+    assert along.second_sweep == config.second_sweep
+    assert axis_values(along)["pitch_error"].tolist() == [10.75]
+    # What is not swept is fixed as well.
+    assert config.at({"damping_ratio": 0.02}).sweeps == config.sweeps
+    assert groups_at(config.at({"damping_ratio": 0.02}), {}).damping_ratio == 0.02
+    physical = Configuration.from_toml(PHYSICAL).at({"operation.speed_rpm": 3000.0})
+    assert physical.operation.speed_rpm == 3000.0
+    assert axis_values(physical)["operation.speed_rpm"].tolist() == [3000.0]
+
+
+def test_a_parameter_cannot_be_fixed_where_it_is_unknown_or_out_of_range():
+    config = load_config(PAN2021)
+    with pytest.raises(ConfigurationError, match="did you mean `pitch_error`"):
+        config.at({"pitch_eror": 3.0})
+    with pytest.raises(
+        ConfigurationError, match=r"groups\.damping_ratio = -1\.0: must be at least"
+    ):
+        config.at({"damping_ratio": -1.0})
+
+
+def test_catalogue_defaults_are_a_spur_pair_of_steel():
+    bare = PHYSICAL.replace("helix_angle_deg = 20.0\n", "").replace(', "axial"]', "]")
+    spur = Configuration.from_toml(bare)
+    explicit = spur.replace("pair.helix_angle_deg", 0.0).replace("pair.density_kg_m3", 7850.0)
+    assert groups_at(spur, {}).base_helix_angle_deg == 0.0
+    assert groups_at(spur, {}).load == groups_at(explicit, {}).load
+    assert groups_at(spur, {}).stiffness_cosine.shape == (6,)
 
 
 def test_an_effect_that_is_off_does_not_forbid_sweeping_what_its_harmonics_depend_on():

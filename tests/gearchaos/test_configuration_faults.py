@@ -171,6 +171,63 @@ ONE_FAULT = [
         "harmonics of the mesh stiffness would differ",
         "stiffness_variation_scale",
     ),
+    # the second sweep: the same rules with its own keys
+    ("second_sweep={values=[1]}", "second_sweep.parameter", "is missing", "group by its name"),
+    (
+        'second_sweep={parameter="laod", values=[1]}',
+        'second_sweep.parameter = "laod"',
+        "can be swept",
+        "did you mean `load`?",
+    ),
+    ('second_sweep={parameter="load"}', "second_sweep.from", "is missing", "`values`"),
+    (
+        'second_sweep={parameter="load", from=1, to=0, count=2}',
+        "second_sweep.to = 0",
+        "greater than second_sweep.from = 1",
+        "exchange",
+    ),
+    (
+        'second_sweep={parameter="load", values=[1, 1]}',
+        "second_sweep.values",
+        "lists 1 twice",
+        "list it once",
+    ),
+    (
+        'second_sweep={parameter="damping_ratio", values=[-0.5, 1]}',
+        "second_sweep.values = -0.5",
+        "damping_ratio must be finite and >= 0",
+        "inside that range",
+    ),
+    (
+        'second_sweep={parameter="axial_stiffness_p", values=[1, 2]}',
+        'second_sweep.parameter = "axial_stiffness_p"',
+        "an effect that is off",
+        'add "axial" to scene.effects',
+    ),
+    (
+        'second_sweep={parameter="operation.speed_rpm", values=[1000, 2000]}',
+        'second_sweep.parameter = "operation.speed_rpm"',
+        "changes nothing",
+        "remove mesh_frequency from [groups]",
+    ),
+    (
+        'second_sweep={parameter="pitch_error", values=[1, 2]}',
+        'second_sweep.parameter = "pitch_error"',
+        "what [sweep] sweeps already",
+        "drop [second_sweep]",
+    ),
+    (
+        'second_sweep={parameter="load", from=0.1, to=0.2, count=100_000}',
+        "pan.toml: second_sweep: ",
+        "1501 values of [sweep] x 100000 values of [second_sweep] make 150100000 lanes",
+        "must be at most 100000000; lower a count",
+    ),
+    (
+        'start={kind="random", count=1_000_000}',
+        "pan.toml: sweep: ",
+        "1501 values of [sweep] x 1000000 starts make 1501000000 lanes",
+        "lower a count",
+    ),
     # the groups
     (
         'scene.effects=["pitch_error", "backlash", "axial"]',
@@ -239,6 +296,75 @@ def test_a_swept_physical_key_without_its_effect_names_the_effect():
         'sweep={parameter="pitch_error.phase_deg", values=[0, 90]}', 'scene.effects=["backlash"]'
     )
     assert "add pitch_error to scene.effects" in problem
+
+
+PHYSICAL_MESH = (
+    "operation={speed_rpm=2000.0, torque_Nm=50.0}",
+    "groups={transverse_stiffness_p=1.0, transverse_damping_p=0.1, transverse_stiffness_g=1.0, "
+    "transverse_damping_g=0.1, pitch_error_amplitude=0.1}",
+    "mesh={mean_stiffness_N_per_um_mm=13.0, half_backlash_um=20.0, length_scale_um=25.0, "
+    "damping_ratio=0.1}",
+    "scene.effects=['pitch_error', 'backlash', 'transverse']",
+)
+
+
+@pytest.mark.parametrize(
+    ("first", "second"), [("sweep", "second_sweep"), ("second_sweep", "sweep")]
+)
+def test_of_two_sweeps_each_must_change_something_beside_the_other(first, second):
+    (problem,) = problems_of(
+        *PHYSICAL_MESH,
+        f"{first}={{parameter='mesh_frequency', values=[0.5, 1]}}",
+        f"{second}={{parameter='operation.speed_rpm', values=[1000, 2000]}}",
+    )
+    assert f'{second}.parameter = "operation.speed_rpm": changes nothing in this scene' in problem
+    assert f"{first}.parameter sweeps mesh_frequency, and a group wins over a derived" in problem
+    assert "sweep one of the two, operation.speed_rpm or mesh_frequency" in problem
+
+
+def test_the_two_dampings_are_one_whether_given_or_swept():
+    damping = "={parameter='mesh.damping_N_s_per_m', values=[100, 200]}"
+    ratio = "={parameter='mesh.damping_ratio', values=[0.1, 0.2]}"
+    (given,) = problems_of(*PHYSICAL_MESH, f"sweep{damping}")
+    assert "mesh.damping_N_s_per_m: mesh.damping_ratio = 0.1 is given as well; keep one" in given
+    (swept,) = problems_of(*PHYSICAL_MESH, f"sweep{damping}", f"second_sweep{ratio}")
+    assert "mesh.damping_N_s_per_m: mesh.damping_ratio is swept as well; keep one" in swept
+
+
+def test_a_half_backlash_can_be_swept_where_the_length_scale_is_swept_as_well():
+    backlash = "sweep={parameter='mesh.half_backlash_um', values=[10, 20]}"
+    unscaled = (*PHYSICAL_MESH[:2], PHYSICAL_MESH[2].replace("length_scale_um=25.0, ", ""))
+    assert "is also the length scale" in problems_of(*unscaled, PHYSICAL_MESH[3], backlash)[0]
+    scale = "second_sweep={parameter='mesh.length_scale_um', values=[25, 50]}"
+    Configuration.from_toml(TEXT, overrides=[*unscaled, PHYSICAL_MESH[3], backlash, scale])
+
+
+@pytest.mark.parametrize("table", ["sweep", "second_sweep"])
+def test_the_sweep_that_would_change_the_harmonics_is_named(table):
+    angles = f"{table}={{parameter='pair.helix_angle_deg', values=[10, 20]}}"
+    other = {"sweep": "second_sweep", "second_sweep": "sweep"}[table]
+    loads = f"{other}={{parameter='load', values=[0.1, 0.2]}}"
+    (problem,) = problems_of(angles, loads, "mesh.stiffness={shape='trapezoid'}")
+    assert f'{table}.parameter = "pair.helix_angle_deg": the harmonics' in problem
+    assert "sweep stiffness_variation_scale" in problem
+
+
+def test_a_faulty_second_sweep_hides_no_fault_of_the_first():
+    problems = problems_of("sweep.to=-1.0", 'second_sweep={parameter="load", count="x"}')
+    assert [problem.split(" = ")[0] for problem in problems] == [
+        "pan.toml: second_sweep.count",
+        "pan.toml: sweep.to",
+    ]
+
+
+def test_a_group_of_the_axial_pair_is_swept_where_something_kept_depends_on_it():
+    text = (ROOT / "sweeps" / "pan2021_full.toml").read_text(encoding="utf-8")
+    sweep = 'second_sweep={parameter="axial_stiffness_p", values=[10, 20]}'
+    Configuration.from_toml(text, overrides=[sweep])
+    with pytest.raises(ConfigurationError, match=r"second_sweep.*axial pair only.*delta_3"):
+        Configuration.from_toml(
+            text, overrides=[sweep, "outputs.lyapunov=false", 'outputs.section=["delta_5"]']
+        )
 
 
 def test_what_is_not_toml_is_located():

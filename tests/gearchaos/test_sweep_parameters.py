@@ -61,6 +61,20 @@ def test_a_sweep_moves_the_motion_and_each_lane_is_the_sweep_of_its_value_alone(
             assert np.array_equal(result[name][2:], alone[name]), name
 
 
+def test_a_sweep_of_two_parameters_is_the_sweep_of_the_first_at_every_value_of_the_second():
+    second = "second_sweep={parameter='operation.speed_rpm', values=[9000.0, 8000.0]}"
+    text = configured("pitch_error", 0.5, 1.5).resolved_toml()
+    config = gearchaos.Configuration.from_toml(text, "gears.toml", [second])
+    result = gearchaos.run(config)
+    assert list(result.axes) == ["operation_speed_rpm", "pitch_error"]
+    assert result["operation_speed_rpm"].tolist() == [8000.0, 9000.0]
+    for row, speed in enumerate(result["operation_speed_rpm"]):
+        alone = gearchaos.run(config.at({"operation.speed_rpm": speed}))
+        for name in alone.names:
+            if alone.dims(name)[0] == "pitch_error" and name != "pitch_error":
+                assert np.array_equal(result[name][row], alone[name]), name
+
+
 def test_a_swept_speed_is_the_sweep_of_the_mesh_frequency_that_it_gives():
     by_speed = gearchaos.run(configured("operation.speed_rpm", 7000.0, 9000.0))
     frequency = by_speed.parameters["mesh_frequency"]
