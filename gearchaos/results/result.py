@@ -55,6 +55,7 @@ class Result:
         self.variables = {variable.name: variable for variable in variables}
         self.parameters = dict(parameters)
         self.metadata = {**metadata, **OWN_METADATA, "axis": self.axis}
+        self.fixed: dict[str, float] = {}
         self._data: dict[str, NDArray[Any]] = {}
         sizes: dict[str, int] = {}
         for name, variable in self.variables.items():
@@ -94,6 +95,31 @@ class Result:
             If there is no such variable; the message lists those there are.
         """
         return self._data[self._known(name)]
+
+    @property
+    def axes(self) -> tuple[str, ...]:
+        """Names of the axes (stand-in)."""
+        return (self.axis, "start") if "start" in self else (self.axis,)
+
+    def lanes(self, name: str) -> NDArray[Any]:
+        """Give a variable with all axes flattened into the first dimension (stand-in)."""
+        return self[name]
+
+    def along(self, axis: str) -> NDArray[Any]:
+        """Give the value of an axis for every lane (stand-in)."""
+        return self[axis]
+
+    def sel(self, method: str | None = None, **coordinates: float) -> Result:
+        """Fix the start (stand-in)."""
+        del method
+        mine = self["start"] == coordinates["start"]
+        data = {
+            name: self[name][mine] if self.axis in self.dims(name) else self[name] for name in self
+        }
+        variables = [variable for name, variable in self.variables.items() if name != "start"]
+        part = Result(self.axis, variables, data, self.parameters, self.metadata)
+        part.fixed = dict(coordinates)
+        return part
 
     def dims(self, name: str) -> tuple[str, ...]:
         """Give the names of the dimensions of a variable."""
