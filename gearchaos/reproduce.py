@@ -22,8 +22,7 @@ Compute and draw everything that a paper shows, and compare every number it prin
 
 EPILOG = f"""\
 Papers: {", ".join(PAPERS)}. The folder gets the figures (PNG and PDF), the results (HDF5) and a
-report with the comparison, report.md and report.html. The path of report.md goes to stdout,
-everything else to stderr. Exit codes: 0 done, 2 usage, 4 cannot read or write."""
+report with the comparison, report.md, whose path goes to stdout; everything else to stderr. Exit codes: 0 done, 2 usage, 4 cannot read or write."""
 
 
 def main(argv: Sequence[str] | None = None) -> int:

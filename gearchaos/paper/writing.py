@@ -11,11 +11,9 @@ from gearchaos.paper.computation import Notify, Reproduction
 from gearchaos.paper.gallery import pictures
 from gearchaos.paper.published import published
 from gearchaos.paper.report import report
-from gearchaos.paper.report_html import html
 from gearchaos.results.atomic_file import check_output, replacing, writing
 
-REPORT, PAGE = "report.md", "report.html"
-TITLE = "Pan 2021, reproduced"
+REPORT = "report.md"
 DPI = 200
 RESULTS = {
     "sweep.h5": ("sweep", "figure 7, a sweep over the pitch error"),
@@ -65,7 +63,7 @@ def write_gallery(
     overwrite : bool
         Whether existing files are replaced.
     formats : sequence of str
-        Of the figures, ``"png"`` among them: that is what the report holds.
+        Of the figures, ``"png"`` among them: that is what the report shows.
     notify : callable
         Told what comes next.
 
@@ -75,10 +73,6 @@ def write_gallery(
         If a file cannot be written.
     """
     printed = published()
-    names = {
-        PAGE: "this report with its figures, one file",
-        **{n: t for n, (_, t) in RESULTS.items()},
-    }
     for name, (attribute, _) in RESULTS.items():
         notify(f"writing {name}")
         getattr(found, attribute).save(folder / name, overwrite=overwrite)
@@ -88,13 +82,12 @@ def write_gallery(
         for kind in formats:
             target = folder / f"{picture.name}.{kind}"
             save_figure(page, target, title=picture.title, dpi=DPI, overwrite=overwrite)
-    text = report(printed, found, names)
-    for name, content in ((PAGE, html(text, folder, TITLE)), (REPORT, text)):
-        with replacing(folder / name, overwrite=overwrite) as partial:
-            partial.write_text(content, encoding="utf-8")
+    text = report(printed, found, {name: words for name, (_, words) in RESULTS.items()})
+    with replacing(folder / REPORT, overwrite=overwrite) as partial:
+        partial.write_text(text, encoding="utf-8")
     return folder / REPORT
 
 
 def _names() -> list[str]:
     figures = [f"{picture.name}.{kind}" for picture in pictures() for kind in FORMATS]
-    return [REPORT, PAGE, *figures, *RESULTS]
+    return [REPORT, *figures, *RESULTS]
