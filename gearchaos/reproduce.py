@@ -56,7 +56,7 @@ def _run(argv: Sequence[str] | None) -> int:
     from gearchaos.engine.running import choose_threads
     from gearchaos.paper.computation import compute
     from gearchaos.paper.sweep_files import sweep_file
-    from gearchaos.paper.writing import check_folder, write_gallery
+    from gearchaos.paper.gallery import check_folder, write_gallery
 
     began = time.monotonic()
 

@@ -12,7 +12,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.ticker import AutoMinorLocator, MaxNLocator
 
-from gearchaos.figures.style import MM_PER_INCH, SMALL_FONT_PT, STYLE
+from gearchaos.figures.style import MM_PER_INCH, SINGLE_COLUMN_MM, SMALL_FONT_PT, STYLE
 
 NOTEBOOK_DPI = 200
 
@@ -37,6 +37,15 @@ def page(width_mm: float, height_mm: float) -> Iterator[Page]:
         yield figure
         # Ticks are made at the first drawing, in the style of that moment.
         figure.draw_without_rendering()
+
+
+@contextmanager
+def column(height_mm: float) -> Iterator[Page]:
+    """Make a page as wide as one column of a journal, and fix its layout at the end."""
+    with page(SINGLE_COLUMN_MM, height_mm) as figure:
+        yield figure
+    # The layout is found; looking for it again takes longer than the drawing itself.
+    figure.set_layout_engine("none")
 
 
 def letter(panels: Iterable[Axes]) -> None:

@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 
 from gearchaos.dynamics.following import StabilityLoss
-from gearchaos.paper.comparison import signed
+from gearchaos.paper.comparison import short, signed
 from gearchaos.paper.computation import Reproduction, lane_of
 from gearchaos.paper.hop_figure import STARTS
 from gearchaos.paper.published import Published
@@ -16,20 +16,15 @@ from gearchaos.paper.stages import motions_between
 from gearchaos.results.result import Result
 
 
-def short(value: float) -> str:
-    """Write a number in four digits, with a true minus sign."""
-    return f"{value:.4g}".replace("-", "−")
-
-
 def stages_in_words(printed: Published, found: Reproduction) -> str:
     """Tell what lies in the stages that do not agree, and in the last one."""
     texts = []
     for stage in printed.stages:
-        if stage.printed or stage is printed.stages[-1]:
+        if stage.printed != stage.motion or stage is printed.stages[-1]:
             counts = Counter(motions_between(found.sweep, stage.first, stage.last))
             worded = ", ".join(f"{count} {label}" for label, count in counts.most_common(6))
             texts.append(
-                f'In the paper\'s stage "{stage.words}", {stage.first:g} to {stage.last:g} e(τ), '
+                f'In the paper\'s stage "{stage.printed}", {stage.first:g} to {stage.last:g} e(τ), '
                 f"the {counts.total()} lanes of the sweep are: {worded}."
             )
     if "quasi-periodic" not in motions_between(

@@ -30,7 +30,7 @@ from gearchaos.paper.verdict import (
     motion_verdict,
     overlap_verdict,
 )
-from gearchaos.paper.writing import check_folder, write_gallery
+from gearchaos.paper.gallery import check_folder, write_gallery
 
 from .commands import run_module
 
