@@ -81,12 +81,9 @@ def _sweep_sheets(result: Result, options: argparse.Namespace) -> list[_Sheet]:
     name = in_a_name(result.fixed)
     if options.variable not in (None, DEFAULT_VARIABLE):
         name += f"_{options.variable}"
-    if options.low is not None:
-        name += f"_from_{options.low:g}"
-    if options.high is not None:
-        name += f"_to_{options.high:g}"
-    if options.stages:
-        name += "_stages"
+    for word, end in (("from", options.low), ("to", options.high)):
+        name += "" if end is None else f"_{word}_{end:g}"
+    name += "_stages" if options.stages else ""
     draw = partial(
         bifurcation_page,
         result,

@@ -37,14 +37,9 @@ def axis_label(result: Result, name: str, line_length: int = 60) -> str:
         words[-1] += f", {symbol}"
     if units not in DIMENSIONLESS:
         words[-1] += f" ({plain(units)})"
-    lines = _broken(words, line_length)
     # No shorter last line than need be: the narrowest lines that are as few.
-    for shorter in range(line_length, 0, -1):
-        narrower = _broken(words, shorter)
-        if len(narrower) > len(lines):
-            break
-        lines = narrower
-    return "\n".join(lines)
+    breaks = [_broken(words, length) for length in range(1, line_length + 1)]
+    return "\n".join(next(lines for lines in breaks if len(lines) == len(breaks[-1])))
 
 
 def place_of(result: Result, lane: int) -> dict[str, float]:

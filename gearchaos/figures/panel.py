@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib.artist import Artist
@@ -13,7 +13,7 @@ from matplotlib.lines import Line2D
 
 from gearchaos.figures.labels import axis_label, number, plain
 from gearchaos.figures.lanes import Floats, Lanes
-from gearchaos.figures.style import GREY, SMALL_FONT_PT, VERMILION
+from gearchaos.figures.style import GREY, LEGEND, VERMILION
 from gearchaos.results.result import Result
 
 OUTLYING_SHARE = 0.03
@@ -105,44 +105,36 @@ def _mark_diverged(axes: Axes, result: Result, parameter: Floats) -> Line2D | No
     """Draw a rug of red ticks at the bottom of the axes where lanes diverged."""
     if parameter.size == 0:
         return None
-    (rug,) = axes.plot(
-        parameter,
-        np.zeros(parameter.size),
-        linestyle="none",
-        marker="|",
-        markersize=8.0,
-        markeredgewidth=0.8,
-        color=VERMILION,
-        transform=axes.get_xaxis_transform(),
-        zorder=4,
-        label=_failure_meaning(result),
-    )
-    return rug
+    meanings = str(result.attributes("status").get("flag_meanings", "")).split()
+    label = plain(meanings[1].replace("_", " ")) if len(meanings) == 2 else "diverged"
+    look = {"marker": "|", "markersize": 8.0, "markeredgewidth": 0.8, "color": VERMILION}
+    return _marks(axes, parameter, 0.0, label, look)
 
 
 def _mark_off_scale(axes: Axes, parameter: Floats, low: Floats, high: Floats) -> list[Line2D]:
     """Draw a triangle at the edge of the axes for every lane that reaches beyond it."""
     bottom, top = axes.get_ylim()
     marks = []
-    for beyond, height, marker, end in (
-        (low < bottom, 0.02, "v", low),
-        (high > top, 0.98, "^", high),
+    for beyond, extreme, height, marker in (
+        (low < bottom, low.min(), 0.02, "v"),
+        (high > top, high.max(), 0.98, "^"),
     ):
         if beyond.any():
-            extreme = end[beyond].min() if marker == "v" else end[beyond].max()
-            marks += axes.plot(
-                parameter[beyond],
-                np.full(np.count_nonzero(beyond), height),
-                linestyle="none",
-                marker=marker,
-                markersize=2.2,
-                markeredgewidth=0.0,
-                color=GREY,
-                transform=axes.get_xaxis_transform(),
-                zorder=4,
-                label=f"off scale (to {number(float(extreme))})",
-            )
+            label = f"off scale (to {number(float(extreme))})"
+            look = {"marker": marker, "markersize": 2.2, "markeredgewidth": 0.0, "color": GREY}
+            marks.append(_marks(axes, parameter[beyond], height, label, look))
     return marks
+
+
+def _marks(
+    axes: Axes, parameter: Floats, height: float, label: str, look: dict[str, Any]
+) -> Line2D:
+    """Draw marks at some height of the axes, in parts of it."""
+    heights, place = np.full(parameter.size, height), axes.get_xaxis_transform()
+    (line,) = axes.plot(
+        parameter, heights, linestyle="none", transform=place, zorder=4, label=label, **look
+    )
+    return line
 
 
 def _say_nothing_to_show(axes: Axes, lanes: Lanes) -> None:
@@ -152,15 +144,8 @@ def _say_nothing_to_show(axes: Axes, lanes: Lanes) -> None:
     )
     axes.set_ylim(-1.0, 1.0)
     axes.tick_params(axis="y", which="both", left=False, right=False, labelleft=False)
-    axes.text(
-        0.5,
-        0.5,
-        reason,
-        transform=axes.transAxes,
-        ha="center",
-        va="center",
-        backgroundcolor="white",
-    )
+    text = axes.text(0.5, 0.5, reason, transform=axes.transAxes, ha="center", va="center")
+    text.set_backgroundcolor("white")
 
 
 def legend_above(axes: Axes, handles: Sequence[Artist]) -> Legend | None:
@@ -172,16 +157,6 @@ def legend_above(axes: Axes, handles: Sequence[Artist]) -> Legend | None:
         loc="lower right",
         bbox_to_anchor=(1.0, 1.0),
         ncols=len(handles),
-        frameon=False,
-        fontsize=SMALL_FONT_PT,
-        borderpad=0.0,
         borderaxespad=0.3,
-        handlelength=1.0,
-        handletextpad=0.4,
-        columnspacing=1.0,
+        **LEGEND,
     )
-
-
-def _failure_meaning(result: Result) -> str:
-    meanings = str(result.attributes("status").get("flag_meanings", "")).split()
-    return plain(meanings[1].replace("_", " ")) if len(meanings) == 2 else "diverged"

@@ -10,7 +10,7 @@ from matplotlib.legend import Legend
 from matplotlib.patches import Patch, Rectangle
 
 from gearchaos.errors import FigureError
-from gearchaos.figures.style import SMALL_FONT_PT
+from gearchaos.figures.style import LEGEND, SMALL_FONT_PT
 from gearchaos.results.result import Result
 from gearchaos.results.stage_table import Stage, labelled_lanes, stage_table
 
@@ -115,10 +115,5 @@ def _legend(axes: Axes, handles: list[Patch], title: str | None) -> Legend:
         ncols=len(handles),
         title=title,
         title_fontsize=SMALL_FONT_PT,
-        frameon=False,
-        fontsize=SMALL_FONT_PT,
-        borderpad=0.0,
-        handlelength=1.0,
-        handletextpad=0.4,
-        columnspacing=1.0,
+        **LEGEND,
     )

@@ -21,6 +21,16 @@ GREY = "#595959"
 SMALL_FONT_PT = 7.0
 FONT_PT = 8.0
 
+LEGEND: dict[str, Any] = {
+    "frameon": False,
+    "fontsize": SMALL_FONT_PT,
+    "borderpad": 0.0,
+    "handlelength": 1.0,
+    "handletextpad": 0.4,
+    "columnspacing": 1.0,
+}
+"""Arguments of a legend outside of the axes."""
+
 # The STIX fonts come with matplotlib, so that a figure is the same on every machine.
 STYLE: dict[RcKeyType, Any] = {
     "font.family": "STIXGeneral",
