@@ -18,7 +18,7 @@ from machine import machine_facts, print_machine
 from matplotlib.figure import Figure
 from throughput import engine, nanoseconds_per_step
 
-from gearchaos.figures.style import EXPONENT, POSITIVE, STYLE
+from gearchaos.figures.style import BLUE, ORANGE, STYLE
 
 SCENES = {
     "linear torsion": Scene(False, False, False, False, False),
@@ -36,10 +36,10 @@ MODES = {
 }
 
 LOOKS = {
-    "plain": {"color": POSITIVE},
-    "plain, tangent": {"facecolor": "white", "edgecolor": POSITIVE, "hatch": "//////"},
-    "resolved": {"color": EXPONENT},
-    "resolved, tangent": {"facecolor": "white", "edgecolor": EXPONENT, "hatch": "//////"},
+    "plain": {"color": ORANGE},
+    "plain, tangent": {"facecolor": "white", "edgecolor": ORANGE, "hatch": "//////"},
+    "resolved": {"color": BLUE},
+    "resolved, tangent": {"facecolor": "white", "edgecolor": BLUE, "hatch": "//////"},
 }
 
 

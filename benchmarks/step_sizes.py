@@ -21,7 +21,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import NullLocator
 
 import gearchaos
-from gearchaos.figures.style import EXPONENT, POSITIVE, STYLE
+from gearchaos.figures.style import BLUE, ORANGE, STYLE
 from gearchaos.records.period import motion_period
 from gearchaos.results.result import Result
 
@@ -115,7 +115,7 @@ def _draw(rows: list[tuple[str, int, dict[str, float], float]], path: Path) -> N
     with matplotlib.rc_context(STYLE):
         figure = Figure(figsize=(3.35, 3.2), layout="constrained")
         shifts, times = figure.subplots(2, sharex=True)
-        for mode, colour, marker in (("plain", POSITIVE, "o"), ("resolved", EXPONENT, "s")):
+        for mode, colour, marker in (("plain", ORANGE, "o"), ("resolved", BLUE, "s")):
             mine = [row for row in rows if row[0] == mode]
             steps = [row[1] for row in mine]
             worst = [

@@ -27,6 +27,12 @@ class ConfigurationError(GearchaosError):
     exit_code = 2
 
 
+class FigureError(GearchaosError):
+    """What is asked of a figure cannot be drawn from the result."""
+
+    exit_code = 2
+
+
 class FileError(GearchaosError):
     """A file cannot be read or written, or is not what it should be."""
 

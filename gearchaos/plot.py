@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 from gearchaos.command_line import OK, Command
-from gearchaos.errors import ConfigurationError, FileError
+from gearchaos.errors import FigureError, FileError
 from gearchaos.progress import say
 
 if TYPE_CHECKING:
@@ -34,7 +34,7 @@ def _plot(options: argparse.Namespace) -> int:
     from gearchaos.figures.response_lane import is_response
     from gearchaos.results.result import open_result
 
-    result = open_result(options.result)
+    result = _slice(open_result(options.result), dict(options.at))
     sheets = (_response_sheets if is_response(result) else _sweep_sheets)(result, options)
     targets = [_targets(options, sheet.name, len(sheets) == 1) for sheet in sheets]
     _check_targets([path for paths in targets for path in paths], options.result, options.overwrite)
@@ -59,19 +59,17 @@ class _Sheet(NamedTuple):
 
 def _sweep_sheets(result: Result, options: argparse.Namespace) -> list[_Sheet]:
     from gearchaos.figures import bifurcation_page
+    from gearchaos.figures.labels import in_a_name
     from gearchaos.figures.style import SINGLE_COLUMN_MM
     from gearchaos.results.result import DEFAULT_VARIABLE
 
     # A detail does not take the place of the whole.
-    name = ""
+    name = in_a_name(result.fixed)
     if options.variable not in (None, DEFAULT_VARIABLE):
         name += f"_{options.variable}"
-    if options.low is not None:
-        name += f"_from_{options.low:g}"
-    if options.high is not None:
-        name += f"_to_{options.high:g}"
-    if options.stages:
-        name += "_stages"
+    for word, end in (("from", options.low), ("to", options.high)):
+        name += "" if end is None else f"_{word}_{end:g}"
+    name += "_stages" if options.stages else ""
     draw = partial(
         bifurcation_page,
         result,
@@ -86,21 +84,21 @@ def _sweep_sheets(result: Result, options: argparse.Namespace) -> list[_Sheet]:
 
 
 def _response_sheets(result: Result, options: argparse.Namespace) -> list[_Sheet]:
+    from gearchaos.figures import response_page
+    from gearchaos.figures.labels import in_a_name, place_of
     from gearchaos.figures.lanes import select_lanes
     from gearchaos.figures.response_lane import COORDINATE
-    from gearchaos.figures.response_page import lane_in_a_name, response_page
     from gearchaos.figures.style import DOUBLE_COLUMN_MM
 
     for option in ("full_range", "stages"):
         if getattr(options, option):
-            raise ConfigurationError(
+            raise FigureError(
                 f"--{option.replace('_', '-')}: {options.result} is a response; it belongs to the "
                 "diagram of a sweep"
             )
-    _, chosen, diverged = select_lanes(result, (options.low, options.high))
-    lanes = (chosen & ~diverged).nonzero()[0].tolist()
-    if not lanes:
-        raise ConfigurationError(f"{options.result}: nothing to draw: every lane diverged")
+    lanes = select_lanes(result, (options.low, options.high))
+    if lanes.diverged.all():
+        raise FigureError(f"{options.result}: nothing to draw: every lane diverged")
     coordinate = "" if options.variable in (None, COORDINATE) else f"_{options.variable}"
     draw = partial(
         response_page,
@@ -110,9 +108,28 @@ def _response_sheets(result: Result, options: argparse.Namespace) -> list[_Sheet
         height_mm=options.height,
     )
     return [
-        _Sheet(f"_{lane_in_a_name(result, lane)}{coordinate}", partial(draw, lane))
-        for lane in lanes
+        _Sheet(f"{in_a_name(place_of(result, lane))}{coordinate}", partial(draw, lane))
+        for lane in lanes.numbers[~lanes.diverged].tolist()
     ]
+
+
+def _slice(result: Result, at: dict[str, float]) -> Result:
+    """Fix the axes that --at names at the values next to those it gives."""
+    from gearchaos.figures.lanes import swept_axes
+    from gearchaos.results.variables import axis_name
+
+    if not at:
+        return result
+    coordinates = {axis_name(name): value for name, value in at.items()}
+    for axis in coordinates:
+        if axis not in result.axes:
+            raise FigureError(f"--at {axis}: the result runs over {' and '.join(result.axes)}")
+    if not {*swept_axes(result)} - {*coordinates}:
+        raise FigureError(
+            f"--at {' and '.join(coordinates)}: nothing is left to draw against; choose values of "
+            f"{result.axis} with --from and --to"
+        )
+    return result.sel(method="nearest", **coordinates)
 
 
 def _arguments(parser: argparse.ArgumentParser) -> None:
@@ -133,6 +150,15 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
     )
     add("--from", dest="low", type=_number, metavar="VALUE", help="lowest parameter to show")
     add("--to", dest="high", type=_number, metavar="VALUE", help="highest parameter to show")
+    add(
+        "--at",
+        type=_place,
+        action="append",
+        default=[],
+        metavar="NAME=VALUE",
+        help="draw the slice next to this value of a second parameter, or of start; may be "
+        "repeated",
+    )
     add(
         "--stages",
         action="store_true",
@@ -160,33 +186,30 @@ def _targets(options: argparse.Namespace, name: str, alone: bool) -> list[Path]:
         formats = tuple(dict.fromkeys(kind.strip().lower() for kind in options.format.split(",")))
         unknown = [repr(kind) for kind in formats if kind not in FORMATS]
         if unknown:
-            raise ConfigurationError(
-                f"--format: {', '.join(unknown)} is none of {', '.join(FORMATS)}"
-            )
+            raise FigureError(f"--format: {', '.join(unknown)} is none of {', '.join(FORMATS)}")
     path: Path = options.result
     stem = path.stem if path.suffix.lower() in RESULT_ENDINGS else path.name
-    if options.output is None:
-        return [path.parent / f"{stem}{name}.{kind}" for kind in formats]
-    output = Path(options.output)
-    if output.is_dir() or options.output.endswith(("/", "\\")):
-        return [output / f"{stem}{name}.{kind}" for kind in formats]
+    output = path.parent if options.output is None else Path(options.output)
     ending = output.suffix.lower().removeprefix(".")
-    if ending in FigureCanvasBase.filetypes and ending not in FORMATS:
-        raise ConfigurationError(
+    if options.output is None or output.is_dir() or options.output.endswith(("/", "\\")):
+        output /= f"{stem}{name}"
+    elif ending in FORMATS:
+        if options.format is not None and formats != (ending,):
+            other = f"--format asks for {','.join(formats)}"
+        elif not alone:
+            other = "there are several pages to draw"
+        else:
+            return [output]
+        raise FigureError(
+            f"--output {output} is one {ending} file, but {other}; leave the ending off"
+        )
+    elif ending in FigureCanvasBase.filetypes:
+        raise FigureError(
             f"--output {options.output}: a figure is written as {' or '.join(FORMATS)}"
         )
-    if ending not in FORMATS:
-        base = output.name if alone else f"{output.name}{name}"
-        return [output.with_name(f"{base}.{kind}") for kind in formats]
-    if options.format is not None and formats != (ending,):
-        other = f"--format asks for {','.join(formats)}"
     elif not alone:
-        other = "there are several pages to draw"
-    else:
-        return [output]
-    raise ConfigurationError(
-        f"--output {output} is one {ending} file, but {other}; leave the ending off"
-    )
+        output = output.with_name(f"{output.name}{name}")
+    return [output.with_name(f"{output.name}.{kind}") for kind in formats]
 
 
 def _check_targets(targets: Sequence[Path], result: Path, overwrite: bool) -> None:
@@ -206,8 +229,11 @@ def _check_targets(targets: Sequence[Path], result: Path, overwrite: bool) -> No
 
 
 def _lanes_in_words(result: Result) -> str:
-    lanes = result[result.axis].size
-    words = f"{lanes} lane{'s' if lanes != 1 else ''} over {result.axis}"
+    from gearchaos.figures.lanes import swept_axes
+
+    lanes = result.along(result.axis).size
+    words = f"{lanes} lane{'s' if lanes != 1 else ''} over {' and '.join(swept_axes(result))}"
+    words += "".join(f" at {axis} = {value:.6g}" for axis, value in result.fixed.items())
     diverged = int((result["status"] != 0).sum()) if "status" in result else 0
     return f"{words}, {diverged} of them diverged" if diverged else words
 
@@ -222,23 +248,26 @@ def _number(text: str) -> float:
     return value
 
 
-def _within(text: str, low: float, high: float) -> float:
+def _place(text: str) -> tuple[str, float]:
+    name, found, value = text.partition("=")
+    if not (name and found):
+        raise argparse.ArgumentTypeError(f"{text!r} is not NAME=VALUE, such as start=0")
+    return name.strip(), _number(value)
+
+
+def _within(low: float, high: float, text: str) -> float:
     value = _number(text)
     if not low <= value <= high:
         raise argparse.ArgumentTypeError(f"{text} is not between {low:g} and {high:g}")
     return value
 
 
-def _width(text: str) -> float:
-    return _within(text, 60.0, 1000.0)
-
-
-def _height(text: str) -> float:
-    return _within(text, 70.0, 1000.0)
+_width = partial(_within, 60.0, 1000.0)
+_height = partial(_within, 70.0, 1000.0)
 
 
 def _dpi(text: str) -> int:
-    value = _within(text, 50.0, 1200.0)
+    value = _within(50.0, 1200.0, text)
     if value != int(value):
         raise argparse.ArgumentTypeError(f"{text} is not a whole number")
     return int(value)

@@ -1,7 +1,7 @@
 """Compute and draw everything that a paper shows, and compare every number it prints with ours.
 
 The folder gets the figures (PNG and PDF), the results (HDF5) and a
-report with the comparison, report.md and report.html. The path of report.md goes to stdout,
+report with the comparison, report.md. The path of report.md goes to stdout,
 everything else to stderr. Exit codes: 0 done, 2 usage, 4 cannot read or write.
 """
 
@@ -35,7 +35,7 @@ def _reproduce(options: Namespace) -> int:
     from gearchaos.engine.running import choose_threads
     from gearchaos.paper.computation import compute
     from gearchaos.paper.sweep_files import sweep_file
-    from gearchaos.paper.writing import check_folder, write_gallery
+    from gearchaos.paper.gallery import check_folder, write_gallery
 
     began = time.monotonic()
     folder = Path(options.output or options.paper)

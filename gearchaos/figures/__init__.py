@@ -3,7 +3,6 @@
 from gearchaos.figures.bifurcation import BifurcationArtists, bifurcation
 from gearchaos.figures.files import save_figure
 from gearchaos.figures.lyapunov import LyapunovArtists, lyapunov
-from gearchaos.figures.page import bifurcation_page
 from gearchaos.figures.response import (
     amplitude_spectrum,
     phase_portrait,
@@ -12,6 +11,7 @@ from gearchaos.figures.response import (
 )
 from gearchaos.figures.response_page import response_page
 from gearchaos.figures.stages import shade_stages
+from gearchaos.figures.sweep_page import bifurcation_page
 
 __all__ = [
     "BifurcationArtists",

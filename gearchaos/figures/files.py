@@ -7,7 +7,7 @@ from pathlib import Path
 import matplotlib as mpl
 from matplotlib.figure import Figure
 
-from gearchaos.errors import ConfigurationError
+from gearchaos.errors import FigureError
 from gearchaos.figures.style import STYLE
 from gearchaos.interrupts import check
 from gearchaos.results.atomic_file import replacing
@@ -41,16 +41,14 @@ def save_figure(
 
     Raises
     ------
-    ConfigurationError
+    FigureError
         If the ending names no known format.
     FileError
         If the file cannot be written.
     """
     kind = Path(path).suffix.lower().removeprefix(".")
     if kind not in FORMATS:
-        raise ConfigurationError(
-            f"{path}: a figure ends in {' or '.join('.' + f for f in FORMATS)}"
-        )
+        raise FigureError(f"{path}: a figure ends in {' or '.join('.' + f for f in FORMATS)}")
     # The name of a file, which may not be Unicode, can serve as a title.
     title = title.encode("utf-8", "replace").decode("utf-8")
     software = f"{SIGNATURE} {software_version()}"

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 from matplotlib.mathtext import MathTextParser
 
 from gearchaos.results.result import Result
@@ -28,22 +30,38 @@ def axis_label(result: Result, name: str, line_length: int = 60) -> str:
     """
     attributes = result.attributes(name)
     wording = " ".join(str(attributes.get("long_name", "") or name).split())
-    symbol = str(attributes.get("symbol", ""))
-    units = str(attributes.get("units", ""))
-    # The symbol stays on the line of the last word.
+    symbol, units = _formula(attributes.get("symbol", "")), str(attributes.get("units", ""))
     words = [plain(word) for word in (wording[:1].upper() + wording[1:]).split(" ")]
+    # The symbol stays on the line of the last word.
     if symbol:
-        words[-1] += ", " + (symbol if _is_mathtext(symbol) else plain(symbol))
+        words[-1] += f", {symbol}"
     if units not in DIMENSIONLESS:
         words[-1] += f" ({plain(units)})"
-    lines = _broken(words, line_length)
     # No shorter last line than need be: the narrowest lines that are as few.
-    for shorter in range(line_length, 0, -1):
-        narrower = _broken(words, shorter)
-        if len(narrower) > len(lines):
-            break
-        lines = narrower
-    return "\n".join(lines)
+    breaks = [_broken(words, length) for length in range(1, line_length + 1)]
+    return "\n".join(next(lines for lines in breaks if len(lines) == len(breaks[-1])))
+
+
+def place_of(result: Result, lane: int) -> dict[str, float]:
+    """Return the value of a lane along each axis of its result, and of those it was fixed at."""
+    return {**result.fixed, **{axis: result.along(axis)[lane] for axis in result.axes}}
+
+
+def in_words(result: Result, place: Mapping[str, float]) -> str:
+    """Word a place on the axes of a result, such as ``$P$ = 5.86, start 0``."""
+    texts = []
+    for axis, value in place.items():
+        attributes = result.attributes(axis) if axis in result else {}
+        units = str(attributes.get("units", ""))
+        name = _formula(attributes.get("symbol", "")) or plain(axis)
+        unit = "" if units in DIMENSIONLESS else f" {plain(units)}"
+        texts.append(f"start {value:g}" if axis == "start" else f"{name} = {value:.6g}{unit}")
+    return ", ".join(texts)
+
+
+def in_a_name(place: Mapping[str, float]) -> str:
+    """Word a place for the name of a file: ``_pitch_error_5.86_start_0``."""
+    return "".join(f"_{axis}_{value:.12g}" for axis, value in place.items())
 
 
 def number(value: float) -> str:
@@ -67,10 +85,12 @@ def _broken(words: list[str], line_length: int) -> list[str]:
     return lines
 
 
-def _is_mathtext(symbol: str) -> bool:
+def _formula(symbol: object) -> str:
+    """Return a symbol that is no formula as plain text."""
+    text = str(symbol)
     # A file may come from anywhere; a formula that matplotlib cannot read would fail at drawing.
     try:
-        MathTextParser("path").parse(symbol)
+        MathTextParser("path").parse(text)
     except ValueError:
-        return False
-    return symbol.count("$") % 2 == 0
+        return plain(text)
+    return text if text.count("$") % 2 == 0 else plain(text)

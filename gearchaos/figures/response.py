@@ -8,16 +8,17 @@ from matplotlib.collections import LineCollection
 from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 
-from gearchaos.errors import ConfigurationError
+from gearchaos.errors import FigureError
 from gearchaos.figures.labels import axis_label, plain
 from gearchaos.figures.lanes import Between, Floats
+from gearchaos.figures.page import remark
 from gearchaos.figures.response_lane import (
     COORDINATE,
     motion_of,
     repeats_after,
     samples_per_period,
 )
-from gearchaos.figures.style import DIVERGED, EXPONENT, POINTS, SMALL_FONT_PT
+from gearchaos.figures.style import BLACK, BLUE, VERMILION
 from gearchaos.records.amplitude_spectrum import spectral_lines
 from gearchaos.results.response_variables import TIME, acceleration_of
 from gearchaos.results.result import Result
@@ -49,19 +50,15 @@ def time_history(
     result : Result
         A response.
     lane : int
-        Number of the lane, from 0.
+        Number of the lane, from 0, all axes of the result flattened.
     variable : str
         A variable over time, such as ``"delta_5_acceleration"`` or ``"mesh_force_tangential"``.
     between : (float or None, float or None)
         Mesh periods to show; None: as far as the record goes.
 
-    Returns
-    -------
-    Line2D
-
     Raises
     ------
-    ConfigurationError
+    FigureError
         If the result is no response, or has no such lane or variable, or the lane diverged.
     """
     values = motion_of(result, lane, variable)
@@ -70,10 +67,10 @@ def time_history(
     high = time[-1] if between[1] is None else between[1]
     shown = (time >= low) & (time <= high)
     if np.count_nonzero(shown) < 2:
-        raise ConfigurationError(
+        raise FigureError(
             f"nothing between {low:g} and {high:g} mesh periods; the record has {time[-1]:g}"
         )
-    (line,) = axes.plot(time[shown], values[shown], color=POINTS, linewidth=0.6)
+    (line,) = axes.plot(time[shown], values[shown], color=BLACK, linewidth=0.6)
     axes.set_xlim(low, high)
     axes.set_xlabel(axis_label(result, TIME))
     _label_upwards(axes, result, variable)
@@ -85,27 +82,11 @@ def phase_portrait(
 ) -> tuple[Line2D, Line2D]:
     """Draw velocity against displacement, with the points at the beginning of each mesh period.
 
-    Parameters
-    ----------
-    axes : matplotlib.axes.Axes
-    result : Result
-        A response.
-    lane : int
-        Number of the lane, from 0.
-    coordinate : str
-        Such as ``"delta_5"``.
-
-    Returns
-    -------
-    curve, points : Line2D
-
-    Raises
-    ------
-    ConfigurationError
-        As `time_history`.
+    Parameters and errors as for `time_history`, but for a coordinate such as ``"delta_5"``; returns
+    the curve and the points.
     """
-    displacement, velocity = _plane(result, lane, coordinate)
-    (curve,) = axes.plot(displacement, velocity, color=POINTS, linewidth=0.4)
+    displacement, velocity = (motion_of(result, lane, name) for name in _plane(coordinate))
+    (curve,) = axes.plot(displacement, velocity, color=BLACK, linewidth=0.4)
     steps = samples_per_period(result)
     points = _points(axes, displacement[::steps], velocity[::steps], markersize=2.4)
     _label_plane(axes, result, coordinate)
@@ -115,21 +96,14 @@ def phase_portrait(
 def poincare_section(axes: Axes, result: Result, lane: int, coordinate: str = COORDINATE) -> Line2D:
     """Draw the states at the beginning of all recorded mesh periods.
 
-    Parameters are those of `phase_portrait`. The axes reach over at least a fifth of the phase
+    Parameters and errors as for `phase_portrait`. The axes reach over at least a fifth of the phase
     portrait, so that the points of a periodic motion coincide.
-
-    Returns
-    -------
-    Line2D
-
-    Raises
-    ------
-    ConfigurationError
-        As `time_history`.
     """
-    displacement, velocity = _plane(result, lane, coordinate)
-    x, y = (result[f"section_{name}"][lane] for name in (coordinate, f"{coordinate}_rate"))
-    limits = _limits(x, displacement), _limits(y, velocity)
+    plane = _plane(coordinate)
+    x, y = (result.lanes(f"section_{name}")[lane] for name in plane)
+    limits = [
+        _limits(v, motion_of(result, lane, name)) for v, name in zip((x, y), plane, strict=True)
+    ]
     places = np.round(
         [(v - low) / (high - low) for v, (low, high) in zip((x, y), limits, strict=True)], 3
     )
@@ -159,11 +133,8 @@ def amplitude_spectrum(
 
     Parameters
     ----------
-    axes : matplotlib.axes.Axes
-    result : Result
-        A response.
-    lane : int
-        Number of the lane, from 0.
+    axes, result, lane
+        As for `time_history`.
     variable : str, optional
         A variable over time; default ``"delta_5_acceleration"``.
     highest : float
@@ -180,10 +151,10 @@ def amplitude_spectrum(
 
     Raises
     ------
-    ConfigurationError
+    FigureError
         As `time_history`.
     """
-    variable = acceleration_of(COORDINATE) if variable is None else variable
+    variable = variable or acceleration_of(COORDINATE)
     values, steps = motion_of(result, lane, variable), samples_per_period(result)
     period = repeats_after(result, lane) or 1
     periods = values.size // (steps * period) * period or values.size // steps
@@ -198,7 +169,7 @@ def amplitude_spectrum(
         axes.set_yscale("log")
     seen = amplitude > floor
     width = 0.5 if np.count_nonzero(amplitude > 1e-3 * top) > _MANY_LINES else 1.0
-    lines = axes.vlines(order[seen], floor, amplitude[seen], color=EXPONENT, linewidth=width)
+    lines = axes.vlines(order[seen], floor, amplitude[seen], color=BLUE, linewidth=width)
     axes.set_ylim(floor, top)
     spare = 0.02 * highest
     axes.set_xlim(-spare, highest + spare)
@@ -206,17 +177,13 @@ def amplitude_spectrum(
     axes.xaxis.set_major_locator(MaxNLocator(9, integer=True))
     symbol = result.attributes(variable).get("symbol") or plain(variable)
     axes.set_ylabel(f"Amplitude of {symbol}")
-    axes.set_title(
-        f"{window.capitalize()} window, {periods} mesh period{'s' if periods > 1 else ''}",
-        loc="right",
-        fontsize=SMALL_FONT_PT,
-        fontweight="normal",
-    )
+    plural = "s" if periods > 1 else ""
+    remark(axes, f"{window.capitalize()} window, {periods} mesh period{plural}")
     return lines
 
 
-def _plane(result: Result, lane: int, coordinate: str) -> tuple[Floats, Floats]:
-    return motion_of(result, lane, coordinate), motion_of(result, lane, f"{coordinate}_rate")
+def _plane(coordinate: str) -> tuple[str, str]:
+    return coordinate, f"{coordinate}_rate"
 
 
 def _points(axes: Axes, x: Floats, y: Floats, markersize: float) -> Line2D:
@@ -227,7 +194,7 @@ def _points(axes: Axes, x: Floats, y: Floats, markersize: float) -> Line2D:
         marker="o",
         markersize=markersize,
         markeredgewidth=0.0,
-        color=DIVERGED,
+        color=VERMILION,
         zorder=3,
     )
     return points

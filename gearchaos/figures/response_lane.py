@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from gearchaos.errors import ConfigurationError
+from gearchaos.errors import FigureError
+from gearchaos.figures.labels import place_of
 from gearchaos.figures.lanes import Floats
 from gearchaos.records.period import motion_period
 from gearchaos.results.response_variables import TIME, acceleration_of
@@ -24,7 +25,7 @@ def response_variables_of(result: Result) -> tuple[str, ...]:
     return tuple(
         name
         for name in result.names
-        if result.dims(name)[1:] == (TIME,) and not result.variables[name].flags
+        if TIME in result.dims(name)[1:] and not result.variables[name].flags
     )
 
 
@@ -36,7 +37,7 @@ def coordinates_of(result: Result) -> tuple[str, ...]:
 
 def repeats_after(result: Result, lane: int) -> int:
     """Return after how many mesh periods the motion of a lane repeats, 0 for none up to 16."""
-    section = np.stack([result[name][lane] for name in section_variables(result)], axis=1)
+    section = np.stack([result.lanes(name)[lane] for name in section_variables(result)], axis=1)
     return int(motion_period(section[np.newaxis])[0])
 
 
@@ -46,28 +47,27 @@ def samples_per_period(result: Result) -> int:
 
 
 def motion_of(result: Result, lane: int, variable: str) -> Floats:
-    """Return a variable of one lane over time.
+    """Return a variable of one lane over time, shape (samples,).
 
     Raises
     ------
-    ConfigurationError
+    FigureError
         If the result is no response, or has no such lane or variable, or the lane diverged.
     """
     names = response_variables_of(result)
     if not names:
-        raise ConfigurationError(
+        raise FigureError(
             "the result holds no motion in time; compute one with python -m gearchaos.response"
         )
     if variable not in names:
-        raise ConfigurationError(
+        raise FigureError(
             f"no variable {variable!r} over time in the result; it has {', '.join(names)}"
         )
-    lanes = result[result.axis].size
+    lanes = result.along(result.axis).size
     if not 0 <= lane < lanes:
-        raise ConfigurationError(f"no lane {lane} in the result; it has 0 to {lanes - 1}")
-    values = np.asarray(result[variable][lane], dtype=np.float64)
+        raise FigureError(f"no lane {lane} in the result; it has 0 to {lanes - 1}")
+    values = np.asarray(result.lanes(variable)[lane], dtype=np.float64)
     if not np.isfinite(values).all():
-        raise ConfigurationError(
-            f"{result.axis} = {result[result.axis][lane]:g}: the lane diverged, it has no motion"
-        )
+        place = ", ".join(f"{axis} = {value:g}" for axis, value in place_of(result, lane).items())
+        raise FigureError(f"{place}: the lane diverged, it has no motion")
     return values

@@ -9,7 +9,8 @@ from matplotlib.axes import Axes
 from matplotlib.legend import Legend
 from matplotlib.patches import Patch, Rectangle
 
-from gearchaos.figures.style import SMALL_FONT_PT
+from gearchaos.errors import FigureError
+from gearchaos.figures.style import LEGEND, SMALL_FONT_PT
 from gearchaos.results.result import Result
 from gearchaos.results.stage_table import Stage, labelled_lanes, stage_table
 
@@ -42,7 +43,6 @@ def shade_stages(
     axes: Axes,
     result: Result,
     *,
-    start: int = 0,
     narrowest: float | None = None,
     legend: bool = True,
 ) -> StageArtists:
@@ -53,9 +53,8 @@ def shade_stages(
     axes : matplotlib.axes.Axes
         With the swept parameter along x, limits set.
     result : Result
-        With labels of the motion.
-    start : int
-        Number of the start, where every value has several.
+        Of one axis, with labels of the motion. Where it was chosen among several starts
+        (``result.sel(start=0)``), the legend names that start.
     narrowest : float, optional
         Narrower stages go into what surrounds them; default a 150th of the axis.
     legend : bool
@@ -70,18 +69,19 @@ def shade_stages(
     ------
     FileError
         If the result has no labels.
-    ConfigurationError
-        If there is no such start.
+    FigureError
+        If it has several axes.
     """
-    lanes = labelled_lanes(result, start)
+    if len(result.axes) > 1:
+        raise FigureError(
+            f"stages are those of one axis, but the result has {', '.join(result.axes)}; fix the "
+            "others with result.sel"
+        )
+    lanes = labelled_lanes(result)
     low, high = sorted(axes.get_xlim())
     stages = stage_table(lanes, NARROWEST_SHARE * (high - low) if narrowest is None else narrowest)
     # Neighbours meet halfway between their lanes, and the outermost reach to the ends of the axis.
-    edges = [
-        low,
-        *((one.end + other.start) / 2.0 for one, other in pairwise(stages)),
-        high,
-    ]
+    edges = [low, *((one.end + other.start) / 2.0 for one, other in pairwise(stages)), high]
     shades = [
         axes.axvspan(
             max(left, low), min(right, high), color=SHADES[_kind(stage)], linewidth=0.0, zorder=0.0
@@ -96,7 +96,8 @@ def shade_stages(
         for kind, shade in SHADES.items()
         if kind in drawn
     ]
-    return StageArtists(stages, shades, _legend(axes, handles) if legend else None)
+    title = f"stages of start {result.fixed['start']:g}" if "start" in result.fixed else None
+    return StageArtists(stages, shades, _legend(axes, handles, title) if legend else None)
 
 
 def _kind(stage: Stage) -> str:
@@ -105,17 +106,14 @@ def _kind(stage: Stage) -> str:
     return stage.label
 
 
-def _legend(axes: Axes, handles: list[Patch]) -> Legend:
+def _legend(axes: Axes, handles: list[Patch], title: str | None) -> Legend:
     # Above the axes are the panel's letter and the marks of lanes that cannot be shown.
     assert axes.figure is not None
     return axes.figure.legend(
         handles=handles,
         loc="outside lower center",
         ncols=len(handles),
-        frameon=False,
-        fontsize=SMALL_FONT_PT,
-        borderpad=0.0,
-        handlelength=1.0,
-        handletextpad=0.4,
-        columnspacing=1.0,
+        title=title,
+        title_fontsize=SMALL_FONT_PT,
+        **LEGEND,
     )

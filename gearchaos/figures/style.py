@@ -11,16 +11,25 @@ SINGLE_COLUMN_MM = 85.0
 DOUBLE_COLUMN_MM = 180.0
 MM_PER_INCH = 25.4
 
-# Black, blue, orange and vermilion of Okabe and Ito: told apart by colour-blind readers, and by
-# their lightness in grey.
-POINTS = "#000000"
-EXPONENT = "#0072B2"
-POSITIVE = "#E69F00"
-DIVERGED = "#D55E00"
-REFERENCE = "#595959"
+# Of Okabe and Ito: told apart by colour-blind readers, and by their lightness in grey.
+BLACK = "#000000"
+BLUE = "#0072B2"
+ORANGE = "#E69F00"
+VERMILION = "#D55E00"
+GREY = "#595959"
 
 SMALL_FONT_PT = 7.0
 FONT_PT = 8.0
+
+LEGEND: dict[str, Any] = {
+    "frameon": False,
+    "fontsize": SMALL_FONT_PT,
+    "borderpad": 0.0,
+    "handlelength": 1.0,
+    "handletextpad": 0.4,
+    "columnspacing": 1.0,
+}
+"""Arguments of a legend outside of the axes."""
 
 # The STIX fonts come with matplotlib, so that a figure is the same on every machine.
 STYLE: dict[RcKeyType, Any] = {
@@ -62,8 +71,3 @@ STYLE: dict[RcKeyType, Any] = {
     "pdf.fonttype": 42,
 }
 """Settings for `matplotlib.rc_context`; nothing is ever set globally."""
-
-
-def page_height_mm(width_mm: float) -> float:
-    """Return the height of a page of two panels that suits its width, both in mm."""
-    return 55.0 + 0.35 * width_mm

@@ -5,18 +5,17 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
 
-from gearchaos.figures.page import Page
-from gearchaos.figures.style import EXPONENT, MM_PER_INCH, POSITIVE, SINGLE_COLUMN_MM, STYLE
+from gearchaos.figures.page import Page, page
+from gearchaos.figures.style import BLUE, ORANGE, SINGLE_COLUMN_MM
 
 LOOKS: dict[str, dict[str, Any]] = {
-    "plain": {"color": POSITIVE, "marker": "o"},
-    "resolved": {"color": EXPONENT, "marker": "s"},
+    "plain": {"color": ORANGE, "marker": "o"},
+    "resolved": {"color": BLUE, "marker": "s"},
 }
 HEIGHT_MM = 65.0
 
@@ -31,11 +30,6 @@ def work_precision(axes: Axes, modes: Mapping[str, Points]) -> list[Line2D]:
     axes : Axes
     modes : mapping of str to sequence of (seconds, error, steps)
         Points are labelled with their steps; those without an error are left out.
-
-    Returns
-    -------
-    list of Line2D
-        One for each mode.
     """
     lines = []
     for mode, points in modes.items():
@@ -70,7 +64,6 @@ def work_precision(axes: Axes, modes: Mapping[str, Points]) -> list[Line2D]:
 
 def work_precision_page(modes: Mapping[str, Points], width_mm: float = SINGLE_COLUMN_MM) -> Page:
     """Draw `work_precision` as a figure of its own."""
-    with mpl.rc_context(STYLE):
-        page = Page(figsize=(width_mm / MM_PER_INCH, HEIGHT_MM / MM_PER_INCH), layout="constrained")
-        work_precision(page.add_subplot(), modes)
-    return page
+    with page(width_mm, HEIGHT_MM) as figure:
+        work_precision(figure.add_subplot(), modes)
+    return figure

@@ -24,19 +24,10 @@ Notify = Callable[[str], None]
 class Reproduction:
     """What was computed to answer the paper.
 
-    Attributes
-    ----------
-    config : Configuration
-        Of the torsional diagram, figure 7.
-    sweep : Result
-        Figure 7.
-    hop : Hop or None
-        The hop in figure 7, with the interval in which two motions coexist.
-    response : Result
-        All effects, at rest at the start: without pitch error and at those of figures 5, 6, 14
-        and 15 and of Table 3.
-    motions, motions_from_contact : Result
-        The pitch errors of figures 8 to 13, at rest at the start and from the contact flank.
+    ``config``: of the torsional diagram, figure 7; ``sweep``: that diagram; ``hop``: the hop in it,
+    with the interval in which two motions coexist; ``response``: all effects, at rest at the start,
+    without pitch error and at those of figures 5, 6, 14 and 15 and of Table 3; ``motions``,
+    ``motions_from_contact``: at the pitch errors of figures 8 to 13, by the start.
     """
 
     config: Configuration
@@ -45,6 +36,10 @@ class Reproduction:
     response: Result
     motions: Result
     motions_from_contact: Result
+
+    def group(self, name: str) -> float:
+        """Return a group that all lanes of the sweep share."""
+        return float(self.sweep.parameters[name].value)
 
 
 def compute(
@@ -72,7 +67,7 @@ def compute(
         Told what comes next.
     """
     printed = published()
-    notify(f"figure 7: {config.sweep.span[2]} pitch errors")
+    notify("figure 7: the sweep over the pitch error")
     sweep = run(config, threads)
     notify("the hop of figure 7: both motions, upwards and downwards")
     hop = find_hop(config, step=hop_step, threads=threads)
@@ -102,5 +97,4 @@ def largest_acceleration(result: Result, pitch_error: float, coordinate: str = "
     Signed, not in magnitude: so read, the growth between the pitch errors of figure 14 is as even
     as the paper prints it.
     """
-    values = result[f"{coordinate}_acceleration"][lane_of(result, pitch_error)]
-    return float(np.max(values))
+    return float(np.max(result[f"{coordinate}_acceleration"][lane_of(result, pitch_error)]))

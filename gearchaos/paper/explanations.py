@@ -7,8 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from gearchaos.dynamics.following import StabilityLoss
-from gearchaos.paper.comparison import signed
+from gearchaos.paper.comparison import short, signed
 from gearchaos.paper.computation import Reproduction, lane_of
 from gearchaos.paper.hop_figure import STARTS
 from gearchaos.paper.published import Published
@@ -16,20 +15,15 @@ from gearchaos.paper.stages import motions_between
 from gearchaos.results.result import Result
 
 
-def short(value: float) -> str:
-    """Write a number in four digits, with a true minus sign."""
-    return f"{value:.4g}".replace("-", "−")
-
-
 def stages_in_words(printed: Published, found: Reproduction) -> str:
     """Tell what lies in the stages that do not agree, and in the last one."""
     texts = []
     for stage in printed.stages:
-        if stage.printed or stage is printed.stages[-1]:
+        if stage.printed != stage.motion or stage is printed.stages[-1]:
             counts = Counter(motions_between(found.sweep, stage.first, stage.last))
             worded = ", ".join(f"{count} {label}" for label, count in counts.most_common(6))
             texts.append(
-                f'In the paper\'s stage "{stage.words}", {stage.first:g} to {stage.last:g} e(τ), '
+                f'In the paper\'s stage "{stage.printed}", {stage.first:g} to {stage.last:g} e(τ), '
                 f"the {counts.total()} lanes of the sweep are: {worded}."
             )
     if "quasi-periodic" not in motions_between(
@@ -66,17 +60,23 @@ def hop_in_words(printed: Published, found: Reproduction) -> str:
         float(sweep["crossings_per_period"][lane_of(sweep, paper)])
         for sweep in (hop.upwards, hop.downwards)
     )
+    parts = upper == 0.0 < lower
+    parting = ": on the one the teeth never part, on the other they do" if parts else ""
+    falls, rises = (loss.name.lower().replace("_", " ") for loss in hop.losses)
+    share = hop.share(paper)
+    inside = f"inside the interval, at {share:.0%} of it"
+    place = inside if 0.0 <= share <= 1.0 else "outside of the interval"
     rest = hop.changes.get("rest")
     texts = [
         "The hop is not a bifurcation at one pitch error. Two motions of period 1 coexist from "
         f"*P* = {hop.first:.4f}, where the sweep downwards loses the one "
-        f"({_ending(hop.losses[0])}), to *P* = {hop.last:.4f}, where the sweep upwards loses the "
-        f"other ({_ending(hop.losses[1])}). At {paper:g} e(τ) the motion of the upward sweep "
+        f"({falls}), to *P* = {hop.last:.4f}, where the sweep upwards loses the "
+        f"other ({rises}). At {paper:g} e(τ) the motion of the upward sweep "
         f"crosses {upper:g} clearance boundaries per period, "
-        f"that of the downward sweep {lower:g}{_parting(upper, lower)}. Which of the two "
+        f"that of the downward sweep {lower:g}{parting}. Which of the two "
         "a computation shows depends on its start state, "
         "which the paper does not give: "
-        f"{'; '.join(starts)}. The paper's {paper:g} lies {_position(hop.share(paper))}. That a "
+        f"{'; '.join(starts)}. The paper's {paper:g} lies {place}. That a "
         "start at rest puts the hop near it is why it was chosen.",
     ]
     if rest is not None:
@@ -92,21 +92,6 @@ def hop_in_words(printed: Published, found: Reproduction) -> str:
             "error before the hop can have the printed exponent."
         )
     return "\n\n".join(texts)
-
-
-def _ending(loss: StabilityLoss) -> str:
-    return loss.name.lower().replace("_", " ")
-
-
-def _parting(upper: float, lower: float) -> str:
-    parts = upper == 0.0 < lower
-    return ": on the one the teeth never part, on the other they do" if parts else ""
-
-
-def _position(share: float) -> str:
-    if 0.0 <= share <= 1.0:
-        return f"inside the interval, at {share:.0%} of it"
-    return "outside of the interval"
 
 
 def increments_in_words(printed: Published, found: Reproduction) -> str:

@@ -1,14 +1,17 @@
-"""The figures of the gallery in the paper's order, each with its name and its caption."""
+"""The folder of a gallery: figures, results and report, written once they are computed."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
 from functools import partial
+from pathlib import Path
+from typing import NamedTuple
 
+from gearchaos.errors import FileError
 from gearchaos.figures import bifurcation_page
+from gearchaos.figures.files import FORMATS, save_figure
 from gearchaos.figures.page import Page
-from gearchaos.paper.computation import Reproduction
+from gearchaos.paper.computation import Notify, Reproduction
 from gearchaos.paper.hop_figure import hop_page
 from gearchaos.paper.mesh_figures import mesh_stiffness_page, pitch_error_page
 from gearchaos.paper.motion_figures import (
@@ -19,97 +22,106 @@ from gearchaos.paper.motion_figures import (
     spectra_page,
 )
 from gearchaos.paper.published import Published, published
+from gearchaos.paper.report import report
+from gearchaos.results.atomic_file import check_output, replacing, writing
+
+REPORT = "report.md"
+DPI = 200
+RESULTS = {
+    "sweep.h5": ("sweep", "figure 7, a sweep over the pitch error"),
+    "accelerations.h5": ("response", "figures 5, 6, 14 and 15 and Table 3, a response"),
+    "motions.h5": ("motions", "figures 8 to 13, a response, starting at rest"),
+    "motions_from_contact.h5": ("motions_from_contact", "the same, starting on the contact flank"),
+}
+"""Result files by name: the attribute of `Reproduction`, and what they hold."""
 
 
-@dataclass(frozen=True)
-class Picture:
-    """One figure: the name of its files without ending, its title, its caption, and its drawing."""
+class Picture(NamedTuple):
+    """One figure: the name of its files without ending, its title, and how it is drawn."""
 
     name: str
     title: str
-    caption: str
     draw: Callable[[Published, Reproduction], Page]
 
 
-def staged_page(printed: Published, found: Reproduction) -> Page:
-    """Draw bifurcation diagram and Lyapunov chart with the stages behind them (figure 7)."""
-    del printed
-    return bifurcation_page(found.sweep, stages=True)
-
-
 def pictures() -> tuple[Picture, ...]:
-    """Return all figures, in the paper's order."""
-    shown = published().motions
-    return (
-        Picture(
-            "figure_03",
-            "Figure 3",
-            "One pitch error e(τ), *P* = 1, over one mesh cycle, and its components along the "
-            "transverse and the axial direction.",
-            pitch_error_page,
-        ),
-        Picture(
-            "figure_04",
-            "Figure 4",
-            "Mesh stiffness over one mesh cycle: the trapezoid of the contact lines, its Fourier "
-            "fit, and the variation with which everything below is computed.",
-            mesh_stiffness_page,
-        ),
-        Picture(
-            "figure_05",
-            "Figure 5",
-            "Accelerations without (*P* = 0) and with one pitch error (*P* = 1), dimensionless: "
-            "(a) torsional; transverse of (b) the driving and (c) the driven gear; axial of "
-            "(d) the driving and (e) the driven gear.",
-            accelerations_page,
-        ),
-        Picture(
-            "figure_06",
-            "Figure 6",
-            "Single-sided amplitude spectra of the accelerations of figure 5, dimensionless, "
-            "rectangular window over whole mesh periods; the lines of the two are drawn 0.07 to "
-            "the left and to the right of their frequency.",
-            spectra_page,
-        ),
-        Picture(
-            "figure_07",
-            "Figure 7",
-            "Bifurcation diagram (a) and largest Lyapunov exponent (b) over the pitch error in "
-            "multiples of e(τ), shaded by the motion; every lane starts at rest.",
-            staged_page,
-        ),
-        Picture(
-            "figure_07_hop",
-            "The hop of figure 7",
-            "Both motions of period 1 where they coexist (grey), by sweeps that carry their state "
-            "upwards and downwards; dashed, where starts at rest and on the contact flank change "
-            "from one to the other. Not a figure of the paper.",
-            hop_page,
-        ),
-        *(
-            Picture(
-                f"figure_{motion.figure:02d}",
-                f"Figure {motion.figure}",
-                f"Torsional motion at *P* = {motion.pitch_error:g}, dimensionless: time history "
-                "(a), phase portrait with one point per mesh period (b), Poincaré section (c). "
-                "At rest at the start, or on the contact flank where the figure says so. "
-                f"In the paper: {motion.words}.",
-                partial(motion_page, shown=motion),
-            )
-            for motion in shown
-        ),
-        Picture(
-            "figure_14",
-            "Figure 14",
-            "Torsional acceleration at growing pitch errors, dimensionless, on one scale; dashed, "
-            "the largest value, of which the table gives the increments.",
-            growing_accelerations_page,
-        ),
-        Picture(
-            "figure_15",
-            "Figure 15",
-            "Single-sided amplitude spectra of the accelerations of figure 14, rectangular window "
-            "over whole mesh periods, on one scale.",
-            growing_spectra_page,
-        ),
-    )
+    """Return all figures, in the paper's order; `report_text.md` holds their captions."""
+    numbered: dict[int, Callable[[Published, Reproduction], Page]] = {
+        3: pitch_error_page,
+        4: mesh_stiffness_page,
+        5: accelerations_page,
+        6: spectra_page,
+        7: lambda _, found: bifurcation_page(found.sweep, stages=True),
+        **{shown.figure: partial(motion_page, shown=shown) for shown in published().motions},
+        14: growing_accelerations_page,
+        15: growing_spectra_page,
+    }
+    own = Picture("figure_07_hop", "The hop of figure 7", hop_page)
+    shown = [Picture(f"figure_{n:02d}", f"Figure {n}", draw) for n, draw in numbered.items()]
+    return tuple(sorted([*shown, own]))
+
+
+def check_folder(folder: Path, overwrite: bool) -> None:
+    """Make the folder, and make sure that nothing in it is replaced unasked.
+
+    Raises
+    ------
+    FileError
+        If it holds a gallery that may not be replaced, is a file, or cannot be written to.
+    """
+    if folder.exists() and not folder.is_dir():
+        raise FileError(f"{folder}: is a file; give the name of a folder as --output")
+    figures = [f"{picture.name}.{kind}" for picture in pictures() for kind in FORMATS]
+    targets = [folder / name for name in (REPORT, *figures, *RESULTS)]
+    present = [target.name for target in targets if target.exists()]
+    if present and not overwrite:
+        raise FileError(
+            f"{folder}: holds {present[0]} already; replace the gallery with --overwrite or choose "
+            "another --output"
+        )
+    with writing(folder):
+        folder.mkdir(parents=True, exist_ok=True)
+    for target in targets:
+        check_output(target, overwrite)
+
+
+def write_gallery(
+    found: Reproduction,
+    folder: Path,
+    *,
+    overwrite: bool = False,
+    formats: Sequence[str] = FORMATS,
+    notify: Notify = lambda _: None,
+) -> Path:
+    """Write everything and return the path of the report, which comes last.
+
+    Parameters
+    ----------
+    found : Reproduction
+    folder : Path
+    overwrite : bool
+        Whether existing files are replaced.
+    formats : sequence of str
+        Of the figures, ``"png"`` among them: that is what the report shows.
+    notify : callable
+        Told what comes next.
+
+    Raises
+    ------
+    FileError
+        If a file cannot be written.
+    """
+    printed = published()
+    for name, (attribute, _) in RESULTS.items():
+        notify(f"writing {name}")
+        getattr(found, attribute).save(folder / name, overwrite=overwrite)
+    for picture in pictures():
+        notify(f"drawing {picture.title.lower()}")
+        page = picture.draw(printed, found)
+        for kind in formats:
+            target = folder / f"{picture.name}.{kind}"
+            save_figure(page, target, title=picture.title, dpi=DPI, overwrite=overwrite)
+    text = report(printed, found, {name: words for name, (_, words) in RESULTS.items()})
+    with replacing(folder / REPORT, overwrite=overwrite) as partly_written:
+        partly_written.write_text(text, encoding="utf-8")
+    return folder / REPORT

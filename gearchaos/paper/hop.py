@@ -8,8 +8,7 @@ place of a hop between them belongs to the start state as much as to the pair.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 from gearchaos_kernels import STATE_ROWS
@@ -45,19 +44,13 @@ APART = 1e-3
 """Distance of the section points, relative to the larger one, from which on motions differ."""
 
 
-@dataclass(frozen=True)
-class Change:
+class Change(NamedTuple):
     """Where a kind of start changes from one motion to the other.
 
-    Attributes
-    ----------
-    before, after : float
-        Last pitch error on the motion of the upward sweep, first one on the other.
-    returns : int
-        How often the start comes back to the first motion at higher pitch errors.
-    exponents : tuple of float
-        Largest Lyapunov exponents before and after, from the Floquet multipliers of the two
-        periodic orbits.
+    ``before``, ``after``: last pitch error on the motion of the upward sweep, first one on the
+    other; ``returns``: how often the start comes back to the first motion at higher pitch errors;
+    ``exponents``: the largest Lyapunov exponents before and after, from the Floquet multipliers of
+    the two periodic orbits.
     """
 
     before: float
@@ -66,20 +59,13 @@ class Change:
     exponents: tuple[float, float]
 
 
-@dataclass(frozen=True, eq=False)
-class Hop:
+class Hop(NamedTuple):
     """Two coexisting motions, and where they take over from each other.
 
-    Attributes
-    ----------
-    upwards, downwards : Result
-        Carried sweeps; between the ends of the interval they are on different motions.
-    first, last : float
-        Ends of the interval of pitch errors in which both exist.
-    losses : tuple of StabilityLoss
-        How the motion of the downward sweep ends at `first`, that of the upward one at `last`.
-    changes : dict of str to Change
-        By the kind of the start.
+    ``upwards``, ``downwards``: carried sweeps, on different motions between ``first`` and ``last``,
+    the ends of the interval of pitch errors in which both exist; ``losses``: how the motion of the
+    downward sweep ends at ``first``, that of the upward one at ``last``; ``changes``: by the kind
+    of the start.
     """
 
     upwards: Result
@@ -158,8 +144,7 @@ def _section(result: Result) -> Floats:
 def _apart(one: Result, other: Result) -> NDArray[np.bool_]:
     a, b = _section(one), _section(other)
     size = np.maximum(np.abs(a), np.abs(b)).max(axis=1)
-    apart: NDArray[np.bool_] = np.abs(a - b).max(axis=1) > APART * size
-    return apart
+    return np.asarray(np.abs(a - b).max(axis=1) > APART * size)
 
 
 def _end(
@@ -194,8 +179,7 @@ def _states(result: Result, lanes: int | slice) -> Floats:
 
 
 def _change(found: Result, config: Configuration, first: Result, second: Result) -> Change | None:
-    near = partial(_distance, found)
-    on_first = near(first) < near(second)
+    on_first = _distance(found, first) < _distance(found, second)
     changes = np.flatnonzero(on_first[:-1] & ~on_first[1:])
     if not changes.size:
         return None
@@ -221,5 +205,4 @@ def _distance(found: Result, sweep: Result) -> Floats:
     """Distance of each lane from the motion of a carried sweep, interpolated between its values."""
     values, known = found[found.axis], _section(sweep)
     there = [np.interp(values, sweep[sweep.axis], column) for column in known.T]
-    distance: Floats = np.abs(_section(found) - np.column_stack(there)).max(axis=1)
-    return distance
+    return np.asarray(np.abs(_section(found) - np.column_stack(there)).max(axis=1))

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from gearchaos.figures.page import Page
-from gearchaos.figures.style import EXPONENT, POINTS, REFERENCE
+from gearchaos.figures.page import Page, column, few_ticks
+from gearchaos.figures.style import BLACK, BLUE, GREY, VERMILION
 from gearchaos.paper.computation import Reproduction
 from gearchaos.paper.hop import HIGH, LOW
-from gearchaos.paper.panels import WITH_ERROR, few_ticks, page
 from gearchaos.paper.published import Published
 
 STARTS = {"rest": "at rest", "contact": "contact flank"}
@@ -17,14 +16,14 @@ STARTS = {"rest": "at rest", "contact": "contact flank"}
 def hop_page(printed: Published, found: Reproduction) -> Page:
     """Draw the section of the two coexisting motions over the pitch error."""
     hop = found.hop
-    with page(66.0) as figure:
+    with column(66.0) as figure:
         axes = figure.subplots()
         if hop is None:
             axes.text(0.5, 0.5, "no coexisting motions found", ha="center")
             return figure
         for sweep, color, marker, label in (
-            (hop.upwards, POINTS, "^", "swept upwards"),
-            (hop.downwards, EXPONENT, "v", "swept downwards"),
+            (hop.upwards, BLACK, "^", "swept upwards"),
+            (hop.downwards, BLUE, "v", "swept downwards"),
         ):
             axes.plot(
                 sweep[sweep.axis],
@@ -35,25 +34,25 @@ def hop_page(printed: Published, found: Reproduction) -> Page:
                 markeredgewidth=0.0,
                 label=label,
             )
-        axes.axvspan(hop.first, hop.last, color=REFERENCE, alpha=0.12, linewidth=0.0)
+        axes.axvspan(hop.first, hop.last, color=GREY, alpha=0.12, linewidth=0.0)
         middle = float(np.mean(axes.get_ylim()))
-        places = {STARTS[kind]: change.after for kind, change in hop.changes.items()}
-        places["Pan 2021"] = printed.numbers["hop"].value
-        for text, place in places.items():
-            own = text != "Pan 2021"
-            axes.axvline(
-                place, color=POINTS if own else WITH_ERROR, lw=0.7, dashes=(4, 2) if own else ()
-            )
+        places: list[tuple[str, float, str, tuple[int, ...]]] = [
+            (STARTS[kind], change.after, BLACK, (4, 2)) for kind, change in hop.changes.items()
+        ]
+        places.append(("Pan 2021", printed.numbers["hop"].value, VERMILION, ()))
+        for text, place, color, dashes in places:
+            left = text == STARTS["rest"]
+            axes.axvline(place, color=color, lw=0.7, dashes=dashes)
             axes.annotate(
                 f"{text}: {place:.2f}",
                 (place, middle),
-                (-2 if text == STARTS["rest"] else 2, 0),
+                (-2 if left else 2, 0),
                 textcoords="offset points",
                 rotation=90,
-                ha="right" if text == STARTS["rest"] else "left",
+                ha="right" if left else "left",
                 va="center",
                 fontsize=7,
-                color=POINTS if own else WITH_ERROR,
+                color=color,
             )
         axes.set_xlim(LOW, HIGH)
         axes.set_xlabel("Multiple of the pitch error, $P$")

@@ -2,43 +2,35 @@
 
 from __future__ import annotations
 
-import numpy as np
+from collections.abc import Iterator
+from contextlib import contextmanager
 
-from gearchaos.configuration import groups_at
-from gearchaos.figures.page import Page
-from gearchaos.figures.style import EXPONENT, POINTS, POSITIVE, REFERENCE
-from gearchaos.gear.mesh_stiffness import FloatArray
+import numpy as np
+from matplotlib.axes import Axes
+
+from gearchaos.figures.page import Page, column, few_ticks
+from gearchaos.figures.style import BLACK, BLUE, GREY, ORANGE
 from gearchaos.paper.computation import Reproduction
 from gearchaos.paper.our_numbers import contact_line_stiffness, printed_series
-from gearchaos.paper.panels import few_ticks, page
 from gearchaos.paper.published import Published
 
-POINTS_OF_A_CURVE = 1000
-CYCLE_LABEL = r"Mesh cycle, $\Omega\tau/2\pi$"
+CYCLE = np.arange(1001) / 1000
+"""Mesh phases, in parts of the mesh period."""
 
 
 def pitch_error_page(printed: Published, found: Reproduction) -> Page:
     """Draw one pitch error over one mesh cycle, with its two components (figure 3)."""
     del printed
-    groups = groups_at(found.config, {})
-    amplitude, angle = groups.pitch_error_amplitude, groups.base_helix_angle_deg
-    cycle = np.linspace(0.0, 1.0, POINTS_OF_A_CURVE + 1)
-    error = amplitude * np.sin(2.0 * np.pi * cycle)  # eq. 14
-    with page(58.0) as figure:
-        axes = figure.subplots()
-        axes.axhline(0.0, color=REFERENCE, linewidth=0.5)
-        beta = np.radians(angle)
-        for label, share, color, dashes in (
-            (r"$e$, along the line of action", 1.0, POINTS, ()),
-            (r"$e\,\cos\beta_b$, transverse", np.cos(beta), EXPONENT, (5, 2)),
-            (r"$e\,\sin\beta_b$, axial", np.sin(beta), POSITIVE, (1.5, 1.5)),
+    amplitude = found.group("pitch_error_amplitude")
+    beta = np.radians(found.group("base_helix_angle_deg"))
+    error = amplitude * np.sin(2.0 * np.pi * CYCLE)  # eq. 14
+    with _cycle(58.0, 0.0, "Pitch error, $e/b'$ (dimensionless)") as (figure, axes):
+        for label, share, look in (
+            (r"$e$, along the line of action", 1.0, {"color": BLACK}),
+            (r"$e\,\cos\beta_b$, transverse", np.cos(beta), {"color": BLUE, "dashes": (5, 2)}),
+            (r"$e\,\sin\beta_b$, axial", np.sin(beta), {"color": ORANGE, "dashes": (1.5, 1.5)}),
         ):
-            axes.plot(cycle, share * error, label=label, color=color, linewidth=1.0, dashes=dashes)
-        axes.set_xlim(0.0, 1.0)
-        axes.margins(y=0.08)
-        axes.set_xlabel(CYCLE_LABEL)
-        axes.set_ylabel("Pitch error, $e/b'$ (dimensionless)")
-        few_ticks(axes, 5, 6)
+            axes.plot(CYCLE, share * error, label=label, linewidth=1.0, **look)
         axes.legend(frameon=False, loc="upper right")
     return figure
 
@@ -46,38 +38,38 @@ def pitch_error_page(printed: Published, found: Reproduction) -> Page:
 def mesh_stiffness_page(printed: Published, found: Reproduction) -> Page:
     """Draw the mesh stiffness of the contact lines and its Fourier fit (figure 4)."""
     mean = printed.numbers["mean_stiffness"].value
-    scale = groups_at(found.config, {}).stiffness_variation_scale
-    cycle = np.arange(POINTS_OF_A_CURVE + 1) / POINTS_OF_A_CURVE
-
-    def closed(table: FloatArray) -> FloatArray:
-        return mean * np.append(table, table[0])
-
-    trapezoid = closed(contact_line_stiffness(printed).table(POINTS_OF_A_CURVE))
-    series = closed(printed_series(printed).table(POINTS_OF_A_CURVE))
-    with page(62.0) as figure:
-        axes = figure.subplots()
-        axes.axhline(mean, color=REFERENCE, linewidth=0.5)
+    scale = found.group("stiffness_variation_scale")
+    tables = (
+        stiffness.table(CYCLE.size - 1)
+        for stiffness in (contact_line_stiffness(printed), printed_series(printed))
+    )
+    trapezoid, series = (mean * np.append(table, table[0]) for table in tables)
+    computed = mean + scale * (series - mean)
+    with _cycle(62.0, mean, r"Mesh stiffness $k$ (N/(µm$\,$mm))") as (figure, axes):
         axes.annotate(
             "$k_m$", (0.985, mean), (0, 2), textcoords="offset points", ha="right", fontsize=7
         )
-        axes.plot(cycle, trapezoid, color=POINTS, lw=0.8, label="contact lines (eqs 15–18)")
-        axes.plot(
-            cycle, series, color=EXPONENT, lw=1.2, dashes=(5, 2), label="Fourier fit (Table 2)"
-        )
-        axes.plot(
-            cycle,
-            mean + scale * (series - mean),
-            color=POSITIVE,
-            lw=1.0,
-            dashes=(1.5, 1.5),
-            label=f"as computed, variation times {scale:.3g}",
-        )
-        axes.set_xlim(0.0, 1.0)
-        axes.margins(y=0.08)
-        axes.set_xlabel(CYCLE_LABEL)
-        axes.set_ylabel(r"Mesh stiffness $k$ (N/(µm$\,$mm))")
-        few_ticks(axes, 5, 6)
+        for label, values, color, width, dashes in (
+            ("contact lines (eqs 15–18)", trapezoid, BLACK, 0.8, ()),
+            ("Fourier fit (Table 2)", series, BLUE, 1.2, (5, 2)),
+            (f"as computed, variation times {scale:.3g}", computed, ORANGE, 1.0, (1.5, 1.5)),
+        ):
+            axes.plot(CYCLE, values, color=color, lw=width, dashes=dashes, label=label)
         axes.legend(
             frameon=False, loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=1, borderpad=0.0
         )
     return figure
+
+
+@contextmanager
+def _cycle(height_mm: float, level: float, label: str) -> Iterator[tuple[Page, Axes]]:
+    """Make a page with axes over one mesh cycle, and a line at the level about which it turns."""
+    with column(height_mm) as figure:
+        axes = figure.subplots()
+        axes.axhline(level, color=GREY, linewidth=0.5)
+        yield figure, axes
+        axes.set_xlim(0.0, 1.0)
+        axes.margins(y=0.08)
+        axes.set_xlabel(r"Mesh cycle, $\Omega\tau/2\pi$")
+        axes.set_ylabel(label)
+        few_ticks(axes, 5, 6)

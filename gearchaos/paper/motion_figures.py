@@ -2,29 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
-from gearchaos.figures.lanes import legend_above
-from gearchaos.figures.page import Page
+from gearchaos.figures.page import Page, column, few_ticks, letter, remark
+from gearchaos.figures.panel import legend_above
 from gearchaos.figures.response import phase_portrait, poincare_section, time_history
-from gearchaos.figures.response_lane import coordinates_of, samples_per_period
-from gearchaos.figures.style import FONT_PT, POINTS
+from gearchaos.figures.response_lane import COORDINATE, coordinates_of, samples_per_period
+from gearchaos.figures.style import BLACK, BLUE, FONT_PT, SMALL_FONT_PT, VERMILION
 from gearchaos.paper.computation import Reproduction, lane_of, largest_acceleration
-from gearchaos.paper.panels import (
-    SHOWN_PERIODS,
-    WITH_ERROR,
-    WITHOUT_ERROR,
-    few_ticks,
-    letter,
-    letter_inside,
-    page,
-    remark,
-    remark_inside,
-)
 from gearchaos.paper.published import Published, ShownMotion
 from gearchaos.paper.stages import motion_at
 from gearchaos.records.amplitude_spectrum import spectral_lines
@@ -33,64 +24,71 @@ from gearchaos.results.result import Result
 
 HIGHEST_ORDER = 8
 TIME_LABEL = r"Time in mesh periods, $\Omega\tau/2\pi$"
-ORDER_LABEL = "Frequency over mesh frequency"
-ACCELERATION_LABEL = "Acceleration (dimensionless)"
-AMPLITUDE_LABEL = "Amplitude of the acceleration (dimensionless)"
 PANEL_MM = 24.0
+SHOWN_PERIODS = 4.0
+"""Mesh periods of the histories of figures 5 and 14."""
+
 LONG_HISTORY = 16.0
 """Mesh periods of the histories of figures 8 to 13."""
+
+WITHOUT_AND_WITH = ((0.0, BLUE, -0.07), (1.0, VERMILION, 0.07))
+"""The pitch errors that figures 5 and 6 compare, their colours, and how far lines step aside."""
 
 
 def accelerations_page(printed: Published, found: Reproduction) -> Page:
     """Draw the accelerations of all coordinates without and with pitch error (figure 5)."""
     del printed
-    result = found.response
-    names = coordinates_of(result)
-    with page(PANEL_MM * len(names) + 12.0) as figure:
-        panels = figure.subplots(len(names), 1, sharex=True)
+    names = coordinates_of(found.response)
+    with _stack(found.response, names, 12.0) as (figure, panels):
         for axes, name in zip(panels, names, strict=True):
-            for p, color in ((0.0, WITHOUT_ERROR), (1.0, WITH_ERROR)):
-                line = time_history(
-                    axes,
-                    result,
-                    lane_of(result, p),
-                    acceleration_of(name),
-                    between=(0.0, SHOWN_PERIODS),
-                )
-                line.set(color=color, linewidth=0.9, label=f"$P$ = {p:g}")
-            _label_small(axes, result, name)
-        letter(panels)
+            for p, color, _ in WITHOUT_AND_WITH:
+                _history(axes, found.response, p, name).set(color=color, label=f"$P$ = {p:g}")
         legend_above(panels[0], panels[0].lines)
-        _close(figure, panels, TIME_LABEL, ACCELERATION_LABEL)
     return figure
 
 
 def spectra_page(printed: Published, found: Reproduction) -> Page:
     """Draw the amplitude spectra of those accelerations (figure 6)."""
     del printed
-    result = found.response
-    names = coordinates_of(result)
-    with page(PANEL_MM * len(names) + 18.0) as figure:
-        panels = figure.subplots(len(names), 1, sharex=True)
+    names = coordinates_of(found.response)
+    with _stack(found.response, names, 18.0, spectra=True) as (figure, panels):
         for axes, name in zip(panels, names, strict=True):
-            for p, color, shift in ((0.0, WITHOUT_ERROR, -0.07), (1.0, WITH_ERROR, 0.07)):
-                _stems(axes, result, lane_of(result, p), name, color, shift, f"$P$ = {p:g}")
-            axes.set_yscale("log")
-            _label_small(axes, result, name)
-        _frequency_axis(panels, result)
-        letter_inside(panels)
+            for p, color, shift in WITHOUT_AND_WITH:
+                _stems(axes, found.response, p, name, color, shift).set_label(f"$P$ = {p:g}")
         panels[0].legend(frameon=False, loc="upper right", ncols=2, handletextpad=0.0)
-        _close(figure, panels, ORDER_LABEL, AMPLITUDE_LABEL)
+    return figure
+
+
+def growing_accelerations_page(printed: Published, found: Reproduction) -> Page:
+    """Draw the torsional acceleration at growing pitch errors (figure 14)."""
+    values = printed.increments.pitch_errors
+    names = [COORDINATE] * len(values)
+    with _stack(found.response, names, 8.0, sharey=True) as (figure, panels):
+        for axes, p in zip(panels, values, strict=True):
+            _history(axes, found.response, p, COORDINATE)
+            largest = largest_acceleration(found.response, p)
+            axes.axhline(largest, color=VERMILION, linewidth=0.6, dashes=(4, 2))
+            remark(axes, f"$P$ = {p:g}, largest value {largest:.3f}")
+    return figure
+
+
+def growing_spectra_page(printed: Published, found: Reproduction) -> Page:
+    """Draw the spectra of the torsional acceleration at growing pitch errors (figure 15)."""
+    values = printed.increments.pitch_errors
+    names = [COORDINATE] * len(values)
+    with _stack(found.response, names, 14.0, spectra=True, sharey=True) as (figure, panels):
+        for axes, p in zip(panels, values, strict=True):
+            _stems(axes, found.response, p, COORDINATE, BLACK, 0.0)
+            _write_inside(axes, 0.985, 0.93, f"$P$ = {p:g}", ha="right", fontsize=SMALL_FONT_PT)
     return figure
 
 
 def motion_page(printed: Published, found: Reproduction, shown: ShownMotion) -> Page:
     """Draw history, phase portrait and Poincare section at one pitch error (figures 8 to 13)."""
     del printed
-    result, start = shown_response(found, shown)
-    lane = lane_of(result, shown.pitch_error)
-    label = motion_at(result, shown.pitch_error)
-    with page(86.0) as figure:
+    result, begun = shown_response(found, shown)
+    lane, label = lane_of(result, shown.pitch_error), motion_at(result, shown.pitch_error)
+    with column(86.0) as figure:
         grid = figure.add_gridspec(2, 2, height_ratios=(0.8, 1.0))
         history = figure.add_subplot(grid[0, :])
         portrait, section = figure.add_subplot(grid[1, 0]), figure.add_subplot(grid[1, 1])
@@ -100,96 +98,91 @@ def motion_page(printed: Published, found: Reproduction, shown: ShownMotion) -> 
         poincare_section(section, result, lane)
         history.set_xlabel(TIME_LABEL)
         history.set_ylabel(r"$\delta_5$ (dimensionless)")
+        few_ticks(history, 8, 5)
         for axes in (portrait, section):
             axes.set_xlabel(r"$\delta_5$")
             axes.set_ylabel(r"$\delta_5'$")
             few_ticks(axes, 4, 5)
-        few_ticks(history, 8, 5)
         letter((history, portrait, section))
-        begun = "" if start == "rest" else ", from the contact flank"
         remark(history, f"$P$ = {shown.pitch_error:g}, {label}{begun}")
-        points = result["section_delta_5"].shape[1]
-        remark(section, f"{points} points")
+        remark(section, f"{result['section_delta_5'].shape[1]} points")
     return figure
 
 
 def shown_response(found: Reproduction, shown: ShownMotion) -> tuple[Result, str]:
-    """Return the response that a figure shows, and the kind of its start.
+    """Return the response that a figure shows, and what is said of its start.
 
     At rest as everywhere, unless only the start from the contact flank comes to the motion that
     the paper shows.
     """
     p = shown.pitch_error
     if motion_at(found.motions, p) != shown.motion == motion_at(found.motions_from_contact, p):
-        return found.motions_from_contact, "contact"
-    return found.motions, "rest"
+        return found.motions_from_contact, ", from the contact flank"
+    return found.motions, ""
 
 
-def growing_accelerations_page(printed: Published, found: Reproduction) -> Page:
-    """Draw the torsional acceleration at growing pitch errors (figure 14)."""
-    result, values = found.response, printed.increments.pitch_errors
-    with page(PANEL_MM * len(values) + 8.0) as figure:
-        panels = figure.subplots(len(values), 1, sharex=True, sharey=True)
-        for axes, p in zip(panels, values, strict=True):
-            time_history(
-                axes,
-                result,
-                lane_of(result, p),
-                acceleration_of("delta_5"),
-                between=(0.0, SHOWN_PERIODS),
-            ).set_linewidth(0.9)
-            largest = largest_acceleration(result, p)
-            axes.axhline(largest, color=WITH_ERROR, linewidth=0.6, dashes=(4, 2))
-            _label_small(axes, result, "delta_5")
-            remark(axes, f"$P$ = {p:g}, largest value {largest:.3f}")
-        letter(panels)
-        _close(figure, panels, TIME_LABEL, ACCELERATION_LABEL)
-    return figure
+@contextmanager
+def _stack(
+    result: Result,
+    names: Sequence[str],
+    margin_mm: float,
+    *,
+    spectra: bool = False,
+    sharey: bool = False,
+) -> Iterator[tuple[Page, Sequence[Axes]]]:
+    """Make panels one above another for the accelerations of coordinates, or their spectra."""
+    with column(PANEL_MM * len(names) + margin_mm) as figure:
+        panels = figure.subplots(len(names), 1, sharex=True, sharey=sharey)
+        yield figure, panels
+        for axes, name, at in zip(panels, names, "abcdefgh", strict=False):
+            axes.set_ylabel(result.attributes(acceleration_of(name))["symbol"])
+            axes.set_xlabel("")
+            if spectra:
+                axes.set_yscale("log")
+                _write_inside(axes, 0.02, 0.94, f"({at})", fontweight="bold")
+            else:
+                few_ticks(axes)
+        if spectra:
+            _frequency_axis(panels[0], float(result["mesh_period"][0]))
+        else:
+            letter(panels)
+        panels[-1].set_xlabel("Frequency over mesh frequency" if spectra else TIME_LABEL)
+        quantity = "Amplitude of the acceleration" if spectra else "Acceleration"
+        figure.supylabel(f"{quantity} (dimensionless)", fontsize=FONT_PT)
+        figure.align_ylabels(panels)
 
 
-def growing_spectra_page(printed: Published, found: Reproduction) -> Page:
-    """Draw the spectra of the torsional acceleration at growing pitch errors (figure 15)."""
-    result, values = found.response, printed.increments.pitch_errors
-    with page(PANEL_MM * len(values) + 14.0) as figure:
-        panels = figure.subplots(len(values), 1, sharex=True, sharey=True)
-        for axes, p in zip(panels, values, strict=True):
-            _stems(axes, result, lane_of(result, p), "delta_5", POINTS, 0.0, "")
-            axes.set_yscale("log")
-            _label_small(axes, result, "delta_5")
-            remark_inside(axes, f"$P$ = {p:g}")
-        _frequency_axis(panels, result)
-        letter_inside(panels)
-        _close(figure, panels, ORDER_LABEL, AMPLITUDE_LABEL)
-    return figure
+def _history(axes: Axes, result: Result, pitch_error: float, name: str) -> Line2D:
+    lane, between = lane_of(result, pitch_error), (0.0, SHOWN_PERIODS)
+    line = time_history(axes, result, lane, acceleration_of(name), between=between)
+    line.set_linewidth(0.9)
+    return line
 
 
 def _stems(
-    axes: Axes, result: Result, lane: int, name: str, color: str, shift: float, label: str
-) -> None:
-    values = result[acceleration_of(name)][lane, :-1]
+    axes: Axes, result: Result, pitch_error: float, name: str, color: str, shift: float
+) -> Line2D:
+    """Draw an amplitude spectrum as lines with heads, which are returned."""
+    values = result[acceleration_of(name)][lane_of(result, pitch_error), :-1]
     lines = spectral_lines(values, samples_per_period(result))
     top = float(lines.amplitude[1:].max())
     seen = (lines.order > 0.0) & (lines.order <= HIGHEST_ORDER) & (lines.amplitude > 1e-4 * top)
     order, amplitude = lines.order[seen] + shift, lines.amplitude[seen]
     axes.vlines(order, 1e-12, amplitude, color=color, linewidth=0.9)
-    axes.plot(order, amplitude, "o", color=color, markersize=2.2, mew=0.0, label=label)
+    (heads,) = axes.plot(order, amplitude, "o", color=color, markersize=2.2, mew=0.0)
     # Logarithms of the common scale of a panel: three decades below its highest line.
     bottom, highest = axes.get_ylim() if len(axes.lines) > 1 else (top, top)
     axes.set_ylim(min(bottom, 3e-4 * top), max(highest, 4.0 * top))
     axes.set_xlim(0.0, HIGHEST_ORDER + 0.5)
+    return heads
 
 
-def _label_small(axes: Axes, result: Result, name: str) -> None:
-    symbol = result.attributes(acceleration_of(name))["symbol"]
-    axes.set_ylabel(symbol)
-    axes.set_xlabel("")
+def _write_inside(axes: Axes, x: float, y: float, text: str, **look: str | float) -> None:
+    axes.text(x, y, text, transform=axes.transAxes, va="top", **look)  # type: ignore[arg-type]
 
 
-def _frequency_axis(panels: Sequence[Axes], result: Result) -> None:
-    """Put the paper's frequency, in cycles per unit of tau, above the first panel."""
-    period = float(result["mesh_period"][0])
-    first = panels[0]
-    first.tick_params(axis="x", which="both", top=False)
+def _frequency_axis(axes: Axes, period: float) -> None:
+    """Put the paper's frequency, in cycles per unit of tau, above a panel."""
 
     def frequency(order: NDArray[np.float64]) -> NDArray[np.float64]:
         return order / period
@@ -197,14 +190,6 @@ def _frequency_axis(panels: Sequence[Axes], result: Result) -> None:
     def order(frequency: NDArray[np.float64]) -> NDArray[np.float64]:
         return frequency * period
 
-    above = first.secondary_xaxis("top", functions=(frequency, order))  # type: ignore[arg-type]
+    axes.tick_params(axis="x", which="both", top=False)
+    above = axes.secondary_xaxis("top", functions=(frequency, order))  # type: ignore[arg-type]
     above.set_xlabel(r"Frequency in cycles per unit of $\tau$")
-
-
-def _close(figure: Page, panels: Sequence[Axes], x_label: str, y_label: str) -> None:
-    for axes in panels:
-        logarithmic = axes.get_yscale() == "log"
-        few_ticks(axes, None if logarithmic else 5, None if logarithmic else 4)
-    panels[-1].set_xlabel(x_label)
-    figure.supylabel(y_label, fontsize=FONT_PT)
-    figure.align_ylabels(panels)

@@ -1,10 +1,8 @@
-"""The single numbers that the paper prints, computed: one line each, by the key of the number."""
+"""The single numbers that the paper prints, computed, by the key of the number."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
-from types import MappingProxyType
 
 import numpy as np
 
@@ -21,9 +19,35 @@ _METRES_PER_MM = 1e-3
 _N_PER_UM_MM = 1e9
 
 
-def our_numbers(printed: Published, found: Reproduction) -> Mapping[str, float]:
+def our_numbers(printed: Published, found: Reproduction) -> dict[str, float]:
     """Compute each number of `Published.numbers`; not a number where there is no such thing."""
-    return {key: float(compute(printed, found)) for key, compute in _OURS.items()}
+    pair, speed, response = pair_of(found), printed.driving_speed_rpm, found.response
+    harmonics = printed.harmonics
+    variation = FourierStiffness(harmonics.cosine, harmonics.sine).to_trapezoid().half_height
+    damping_ratio = found.group("damping_ratio")
+    whole_width = printed.numbers["mean_stiffness"].value * _N_PER_UM_MM * pair.face_width
+    driven = found.config.replace("operation", {"speed_rpm": speed})
+    change = None if found.hop is None else found.hop.changes.get("rest")
+    numbers = {
+        "driven_speed": speed * pair.teeth[0] / pair.teeth[1],
+        "mesh_frequency_hz": speed / 60.0 * pair.teeth[0],
+        "total_contact_ratio": pair.total_contact_ratio,
+        # The mean about which Table 2's variation is that of the contact lines, in N/(um mm).
+        "mean_stiffness": variation / printed.contact_lines.half_height,
+        "damping_ratio": damping_ratio,
+        # c_m = 2 xi sqrt(k_m m_e) with the stiffness of the whole face width, in N s/m (eq. 20).
+        "mesh_damping": 2.0 * damping_ratio * math.sqrt(whole_width * pair.equivalent_mass),
+        # omega = 2 pi f / omega_h (eq. 9).
+        "frequency": derive_groups(driven)["mesh_frequency"],
+        "mesh_period": response["mesh_period"][0],
+        "added_acceleration": largest_acceleration(response, 1.0)
+        - largest_acceleration(response, 0.0),
+        "spectral_peak": _highest_order(found) / response["mesh_period"][0],
+        "hop": NAN if change is None else change.after,
+        "hop_exponent_before": NAN if change is None else change.exponents[0],
+        "hop_exponent_after": NAN if change is None else change.exponents[1],
+    }
+    return {key: float(number) for key, number in numbers.items()}
 
 
 def contact_line_stiffness(printed: Published) -> TrapezoidalStiffness:
@@ -52,74 +76,8 @@ def pair_of(found: Reproduction) -> HelicalPair:
     )
 
 
-def _teeth(found: Reproduction, gear: int) -> float:
-    return float(pair_of(found).teeth[gear])
-
-
-def _mean_stiffness(printed: Published) -> float:
-    """Mean about which Table 2's variation is that of the contact lines, in N/(um mm)."""
-    cosine, sine = printed.harmonics.cosine, printed.harmonics.sine
-    variation = FourierStiffness(cosine, sine).to_trapezoid().half_height
-    return variation / printed.contact_lines.half_height
-
-
-def _mesh_damping(printed: Published, found: Reproduction) -> float:
-    """c_m = 2 xi sqrt(k_m m_e) with the stiffness of the whole face width, in N s/m."""
-    pair = pair_of(found)
-    per_width = printed.numbers["mean_stiffness"].value * _N_PER_UM_MM
-    product = per_width * pair.face_width * pair.equivalent_mass
-    return 2.0 * _damping_ratio(found) * math.sqrt(product)
-
-
-def _damping_ratio(found: Reproduction) -> float:
-    return float(found.config.groups.given()["damping_ratio"])  # type: ignore[arg-type]
-
-
-def _frequency(printed: Published, found: Reproduction) -> float:
-    """omega = 2 pi f / omega_h (eq. 9)."""
-    operation = {"speed_rpm": printed.driving_speed_rpm}
-    return float(derive_groups(found.config.replace("operation", operation))["mesh_frequency"])
-
-
-def _mesh_period(found: Reproduction) -> float:
-    return float(found.response["mesh_period"][0])
-
-
-def _spectral_peak(found: Reproduction) -> float:
-    """Frequency of the highest line at one e(tau), in cycles per unit of dimensionless time."""
-    response = found.response
-    values = response["delta_5_acceleration"][lane_of(response, 1.0)]
-    lines = spectral_lines(values[:-1], samples_per_period(response))
-    highest = lines.order[1:][np.argmax(lines.amplitude[1:])]
-    return float(highest) / _mesh_period(found)
-
-
-def _hop(found: Reproduction) -> float:
-    change = None if found.hop is None else found.hop.changes.get("rest")
-    return NAN if change is None else change.after
-
-
-def _hop_exponent(found: Reproduction, side: int) -> float:
-    change = None if found.hop is None else found.hop.changes.get("rest")
-    return NAN if change is None else change.exponents[side]
-
-
-_OURS: Mapping[str, Callable[[Published, Reproduction], float]] = MappingProxyType(
-    {
-        "driven_speed": lambda p, f: p.driving_speed_rpm * _teeth(f, 0) / _teeth(f, 1),
-        "mesh_frequency_hz": lambda p, f: p.driving_speed_rpm / 60.0 * _teeth(f, 0),
-        "total_contact_ratio": lambda _, f: float(pair_of(f).total_contact_ratio),
-        "mean_stiffness": lambda p, _: _mean_stiffness(p),
-        "damping_ratio": lambda _, f: _damping_ratio(f),
-        "mesh_damping": _mesh_damping,
-        "frequency": _frequency,
-        "mesh_period": lambda _, f: _mesh_period(f),
-        "added_acceleration": lambda _, f: (
-            largest_acceleration(f.response, 1.0) - largest_acceleration(f.response, 0.0)
-        ),
-        "spectral_peak": lambda _, f: _spectral_peak(f),
-        "hop": lambda _, f: _hop(f),
-        "hop_exponent_before": lambda _, f: _hop_exponent(f, 0),
-        "hop_exponent_after": lambda _, f: _hop_exponent(f, 1),
-    }
-)
+def _highest_order(found: Reproduction) -> float:
+    """Order of the highest line of the torsional acceleration at one e(tau)."""
+    values = found.response["delta_5_acceleration"][lane_of(found.response, 1.0)]
+    lines = spectral_lines(values[:-1], samples_per_period(found.response))
+    return float(lines.order[1:][np.argmax(lines.amplitude[1:])])

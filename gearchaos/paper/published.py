@@ -28,32 +28,22 @@ class Number:
 
 @dataclass(frozen=True)
 class Stage:
-    """A span of pitch errors (multiples of e(tau)) with one motion, from figure 7."""
+    """A span of pitch errors (multiples of e(tau)) with one motion, and what the paper calls it."""
 
     motion: str
     first: float
     last: float
-    printed: str = ""
-
-    @property
-    def words(self) -> str:
-        """The motion as the paper calls it."""
-        return self.printed or self.motion
+    printed: str
 
 
 @dataclass(frozen=True)
 class ShownMotion:
-    """The motion at one pitch error, which a figure of its own shows."""
+    """The motion at one pitch error, which a figure of its own shows, and its printed name."""
 
     figure: int
     pitch_error: float
     motion: str
-    printed: str = ""
-
-    @property
-    def words(self) -> str:
-        """The motion as the paper calls it."""
-        return self.printed or self.motion
+    printed: str
 
 
 @dataclass(frozen=True)
@@ -108,15 +98,16 @@ class Published:
 def published() -> Published:
     """Read the printed numbers."""
     text = files("gearchaos.paper").joinpath("published.toml").read_text(encoding="utf-8")
-    tables = tomllib.loads(text)
+    tables: dict[str, Any] = tomllib.loads(text)
     return Published(
         driving_speed_rpm=tables["given"]["driving_speed_rpm"],
         numbers={row["key"]: Number(**row) for row in tables["number"]},
         contact_lines=ContactLines(**_frozen(tables["contact_lines"])),
         harmonics=Harmonics(**_frozen(tables["harmonics"])),
         increments=Increments(**_frozen(tables["increments"])),
-        stages=tuple(Stage(**row) for row in tables["stage"]),
-        motions=tuple(ShownMotion(**row) for row in tables["motion"]),
+        # What the paper calls as this project does is written once.
+        stages=tuple(Stage(**{"printed": row["motion"], **row}) for row in tables["stage"]),
+        motions=tuple(ShownMotion(**{"printed": row["motion"], **row}) for row in tables["motion"]),
     )
 
 

@@ -20,14 +20,8 @@ class Verdict(StrEnum):
 class Rule:
     """How far a computed number may lie from a printed one.
 
-    Parameters
-    ----------
-    measure : str
-        What the distance is divided by, in words.
-    agrees, in_kind : float
-        Largest distances with these verdicts.
-    relative : bool
-        Whether the limits are shares, and shown in percent.
+    ``measure``: what the distance is measured by, in words; ``agrees``, ``in_kind``: the largest
+    distances with these verdicts; ``relative``: whether these are shares, shown in percent.
     """
 
     measure: str
@@ -36,15 +30,9 @@ class Rule:
     relative: bool = True
 
     def verdict(self, published: float, ours: float, size: float | None = None) -> Verdict:
-        """Judge a number.
+        """Judge a number, not a number where there is no such thing.
 
-        Parameters
-        ----------
-        published, ours : float
-            Not a number for ours where there is no such thing.
-        size : float, optional
-            What the distance is divided by where the rule is relative; by default the printed
-            number.
+        Where the rule is relative the distance is divided by ``size``, by default the printed one.
         """
         distance = abs(ours - published)
         if self.relative:
@@ -57,8 +45,7 @@ class Rule:
             return Verdict.AGREES
         return Verdict.IN_KIND if within <= self.in_kind else Verdict.DOES_NOT
 
-    def words(self) -> str:
-        """Return the rule as a sentence."""
+    def __str__(self) -> str:
         agrees, in_kind = (
             f"{100 * limit:g} %" if self.relative else f"{limit:g} e(τ)"
             for limit in (self.agrees, self.in_kind)
@@ -82,27 +69,16 @@ OVERLAP = Rule("of both spans together that is not common to them", 0.1, 0.5)
 
 
 def overlap_verdict(published: tuple[float, float], ours: tuple[float, float]) -> Verdict:
-    """Judge a span by how much of both spans together is common to them.
-
-    Parameters
-    ----------
-    published, ours : tuple of (float, float)
-        First and last value; not a number for ours where there is no such stage.
-    """
+    """Judge a span, its first and last value, by how much of both together is common to them."""
     common = min(published[1], ours[1]) - max(published[0], ours[0])
     together = max(published[1], ours[1]) - min(published[0], ours[0])
     return OVERLAP.verdict(1.0, max(common, 0.0) / together)
 
 
 def motion_verdict(published: str, ours: str, also: tuple[str, ...]) -> Verdict:
-    """Judge the motion at one pitch error.
+    """Judge the label of the motion at one pitch error.
 
-    Parameters
-    ----------
-    published, ours : str
-        Labels of the motion.
-    also : tuple of str
-        Labels found from another start or within the boundary rule's widest distance.
+    ``also`` are those found from another start or within the boundary rule's widest distance.
     """
     if ours == published:
         return Verdict.AGREES

@@ -13,9 +13,9 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 
-from gearchaos.errors import ConfigurationError
+from gearchaos.errors import FigureError
 from gearchaos.figures import bifurcation, bifurcation_page, lyapunov, save_figure
-from gearchaos.figures.lanes import robust_limits
+from gearchaos.figures.panel import robust_limits
 from gearchaos.results.result import Result, open_result
 from gearchaos.results.variables import sweep_variables
 
@@ -105,7 +105,7 @@ def test_the_torsional_section_is_drawn_unless_another_is_asked_for(axes, result
 
 
 def test_a_variable_the_result_lacks_is_named_with_those_it_has(axes, result):
-    with pytest.raises(ConfigurationError, match=r"'section_delta_2'.*section_delta_5"):
+    with pytest.raises(FigureError, match=r"'section_delta_2'.*section_delta_5"):
         bifurcation(axes, result, "section_delta_2")
 
 
@@ -216,7 +216,7 @@ def test_a_part_of_the_range_shows_its_lanes_only(axes, result):
     points = bifurcation(axes, result, between=(3.5, None)).points
     assert points.get_xdata().min() >= 3.5
     assert axes.get_xlim() == (3.5, 3.9)
-    with pytest.raises(ConfigurationError, match=r"growth from 5\.0 to 6\.0.*2\.8 to 3\.9"):
+    with pytest.raises(FigureError, match=r"growth from 5\.0 to 6\.0.*2\.8 to 3\.9"):
         lyapunov(axes, result, between=(5.0, 6.0))
 
 
@@ -283,7 +283,7 @@ def test_a_panel_without_lanes_says_why(axes):
 
 
 def test_a_result_with_nothing_to_draw_is_refused():
-    with pytest.raises(ConfigurationError, match="neither section points nor Lyapunov"):
+    with pytest.raises(FigureError, match="neither section points nor Lyapunov"):
         bifurcation_page(logistic_sweep([3.0], section=[], with_exponent=False))
 
 
@@ -306,7 +306,7 @@ def test_a_notebook_can_show_the_page(result):
 
 
 def test_a_figure_of_another_format_is_refused(result, tmp_path):
-    with pytest.raises(ConfigurationError, match=r"\.png or \.pdf"):
+    with pytest.raises(FigureError, match=r"\.png or \.pdf"):
         save_figure(bifurcation_page(result), tmp_path / "page.gif")
 
 

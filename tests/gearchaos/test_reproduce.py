@@ -20,7 +20,6 @@ from gearchaos.paper.our_numbers import (
     printed_series,
 )
 from gearchaos.paper.published import published
-from gearchaos.paper.report_html import html
 from gearchaos.paper.stages import counterparts, motion_at
 from gearchaos.paper.sweep_files import sweep_file
 from gearchaos.paper.verdict import (
@@ -31,7 +30,7 @@ from gearchaos.paper.verdict import (
     motion_verdict,
     overlap_verdict,
 )
-from gearchaos.paper.writing import check_folder, write_gallery
+from gearchaos.paper.gallery import check_folder, write_gallery
 
 from .commands import run_module
 
@@ -249,23 +248,9 @@ def test_the_report_shows_every_figure_and_every_row(found, folder):
 
 
 @pytest.mark.slow
-def test_the_page_needs_no_other_file(folder):
-    page = (folder / "report.html").read_text(encoding="utf-8")
-    sources = re.findall(r'(?:src|href)="([^"]{0,30})', page)
-    assert len(sources) == len(pictures())
-    assert all(source.startswith("data:image/png;base64,") for source in sources)
-    assert "<table>" in page and "|---|" not in page
-
-
-@pytest.mark.slow
 def test_results_lie_beside_the_report(found, folder):
     assert np.array_equal(open_result(folder / "sweep.h5")["motion"], found.sweep["motion"])
     assert "delta_4_acceleration" in open_result(folder / "accelerations.h5")
-
-
-def test_the_page_of_a_report_keeps_its_words(tmp_path):
-    page = html("# A & B\n\n| a | b |\n|---|---|\n| 1 | <sub>2</sub> |\n", tmp_path, "title")
-    assert "<h1>A &amp; B</h1>" in page and "<td><sub>2</sub></td>" in page
 
 
 def test_the_gallery_in_the_documentation_is_whole():

@@ -7,7 +7,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 
-from gearchaos.errors import ConfigurationError
+from gearchaos.errors import FigureError
 from gearchaos.figures import (
     amplitude_spectrum,
     phase_portrait,
@@ -94,7 +94,7 @@ def test_a_response_is_known_by_its_motion(result):
     kept = [v for v in result.variables.values() if "time" not in v.dims]
     bare = Result(result.axis, kept, {v.name: result[v.name] for v in kept}, {}, {})
     assert not is_response(bare)
-    with pytest.raises(ConfigurationError, match=r"python -m gearchaos\.response"):
+    with pytest.raises(FigureError, match=r"python -m gearchaos\.response"):
         time_history(Figure().add_subplot(), bare, 0)
 
 
@@ -167,12 +167,12 @@ def test_a_motion_that_does_not_repeat_is_transformed_as_a_whole(axes, result):
     ],
 )
 def test_what_cannot_be_drawn_is_told(axes, lane, variable, message):
-    with pytest.raises(ConfigurationError, match=message):
+    with pytest.raises(FigureError, match=message):
         time_history(axes, known_response(diverged=(1,)), lane, variable)
 
 
 def test_a_part_of_the_record_that_does_not_exist_is_told(axes, result):
-    with pytest.raises(ConfigurationError, match="between 9 and 12 mesh periods; the record has 8"):
+    with pytest.raises(FigureError, match="between 9 and 12 mesh periods; the record has 8"):
         time_history(axes, result, 0, between=(9.0, 12.0))
 
 

@@ -1,0 +1,162 @@
+"""How far the axes of a diagram reach, and how it marks what it cannot show."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.legend import Legend
+from matplotlib.lines import Line2D
+
+from gearchaos.figures.labels import axis_label, number, plain
+from gearchaos.figures.lanes import Floats, Lanes
+from gearchaos.figures.style import GREY, LEGEND, VERMILION
+from gearchaos.results.result import Result
+
+OUTLYING_SHARE = 0.03
+MARGIN = 0.05
+
+
+class Marks(NamedTuple):
+    """The rug of diverged lanes, triangles for lanes beyond bottom and top, and their legend."""
+
+    diverged: Line2D | None
+    off_scale: list[Line2D]
+    legend: Legend | None
+
+
+def close_panel(
+    axes: Axes,
+    result: Result,
+    lanes: Lanes,
+    low: Floats,
+    high: Floats,
+    *,
+    spread: Floats | float = 0.0,
+    hold_zero: bool = False,
+    full_range: bool = False,
+    also: Sequence[Artist] = (),
+) -> Marks:
+    """Set limits and the label of the parameter, and mark the lanes that cannot be shown.
+
+    Parameters
+    ----------
+    axes : matplotlib.axes.Axes
+    result : Result
+    lanes : Lanes
+    low, high : ndarray of float, shape (lanes,)
+        Lowest and highest value of each lane, not a number where there is none.
+    spread : ndarray of float, shape (lanes,), optional
+        What the limits leave room for beyond these.
+    hold_zero, full_range : bool
+        As for `robust_limits`.
+    also : sequence of Artist
+        What the legend names before the marks.
+    """
+    axes.set_xlim(lanes.limits)
+    axes.set_xlabel(axis_label(result, result.axis))
+    rug = _mark_diverged(axes, result, lanes.parameter[lanes.diverged])
+    off_scale: list[Line2D] = []
+    there = np.isfinite(low)
+    if there.any():
+        reach = (low - spread)[there], (high + spread)[there]
+        axes.set_ylim(robust_limits(*reach, hold_zero=hold_zero, full_range=full_range))
+        off_scale = _mark_off_scale(axes, lanes.parameter[there], low[there], high[there])
+    else:
+        _say_nothing_to_show(axes, lanes)
+    return Marks(rug, off_scale, legend_above(axes, [*also, *([rug] if rug else []), *off_scale]))
+
+
+def robust_limits(
+    low: Floats, high: Floats, *, hold_zero: bool = False, full_range: bool = False
+) -> tuple[float, float]:
+    """Return limits that a few outlying lanes cannot stretch.
+
+    Where the outermost 3 % of the lanes at either end would take more than half of the height
+    from all the others, those that lie far out are left out; a triangle then says so.
+
+    Parameters
+    ----------
+    low, high : ndarray of float, shape (lanes,)
+        Lowest and highest value of each lane, all finite.
+    hold_zero : bool
+        Zero is part of what is to be shown.
+    full_range : bool
+        Show every lane however far it lies.
+    """
+    bottom, top = float(low.min()), float(high.max())
+    inner_bottom = float(np.quantile(low, OUTLYING_SHARE))
+    inner_top = float(np.quantile(high, 1.0 - OUTLYING_SHARE))
+    if hold_zero:
+        bottom, inner_bottom = min(bottom, 0.0), min(inner_bottom, 0.0)
+        top, inner_top = max(top, 0.0), max(inner_top, 0.0)
+    inner = inner_top - inner_bottom
+    if not full_range and 0.0 < 2.0 * inner < top - bottom:
+        bottom = min(inner_bottom, float(low[low >= inner_bottom - inner / 2.0].min()))
+        top = max(inner_top, float(high[high <= inner_top + inner / 2.0].max()))
+    pad = MARGIN * (top - bottom) or abs(top) * MARGIN or 0.5
+    return bottom - pad, top + pad
+
+
+def _mark_diverged(axes: Axes, result: Result, parameter: Floats) -> Line2D | None:
+    """Draw a rug of red ticks at the bottom of the axes where lanes diverged."""
+    if parameter.size == 0:
+        return None
+    meanings = str(result.attributes("status").get("flag_meanings", "")).split()
+    label = plain(meanings[1].replace("_", " ")) if len(meanings) == 2 else "diverged"
+    look = {"marker": "|", "markersize": 8.0, "markeredgewidth": 0.8, "color": VERMILION}
+    return _marks(axes, parameter, 0.0, label, look)
+
+
+def _mark_off_scale(axes: Axes, parameter: Floats, low: Floats, high: Floats) -> list[Line2D]:
+    """Draw a triangle at the edge of the axes for every lane that reaches beyond it."""
+    bottom, top = axes.get_ylim()
+    marks = []
+    for beyond, extreme, height, marker in (
+        (low < bottom, low.min(), 0.02, "v"),
+        (high > top, high.max(), 0.98, "^"),
+    ):
+        if beyond.any():
+            label = f"off scale (to {number(float(extreme))})"
+            look = {"marker": marker, "markersize": 2.2, "markeredgewidth": 0.0, "color": GREY}
+            marks.append(_marks(axes, parameter[beyond], height, label, look))
+    return marks
+
+
+def _marks(
+    axes: Axes, parameter: Floats, height: float, label: str, look: dict[str, Any]
+) -> Line2D:
+    """Draw marks at some height of the axes, in parts of it."""
+    heights, place = np.full(parameter.size, height), axes.get_xaxis_transform()
+    (line,) = axes.plot(
+        parameter, heights, linestyle="none", transform=place, zorder=4, label=label, **look
+    )
+    return line
+
+
+def _say_nothing_to_show(axes: Axes, lanes: Lanes) -> None:
+    """Write into an empty panel why it is empty."""
+    reason = (
+        f"all {lanes.numbers.size} lanes diverged" if lanes.diverged.all() else "no finite values"
+    )
+    axes.set_ylim(-1.0, 1.0)
+    axes.tick_params(axis="y", which="both", left=False, right=False, labelleft=False)
+    text = axes.text(0.5, 0.5, reason, transform=axes.transAxes, ha="center", va="center")
+    text.set_backgroundcolor("white")
+
+
+def legend_above(axes: Axes, handles: Sequence[Artist]) -> Legend | None:
+    """Place a legend above the right end of the axes, where it hides nothing."""
+    if not handles:
+        return None
+    return axes.legend(
+        handles=handles,
+        loc="lower right",
+        bbox_to_anchor=(1.0, 1.0),
+        ncols=len(handles),
+        borderaxespad=0.3,
+        **LEGEND,
+    )

@@ -1,0 +1,95 @@
+"""The page of a sweep: the bifurcation diagram over the Lyapunov chart, on one shared axis."""
+
+from __future__ import annotations
+
+from matplotlib.axes import Axes
+
+from gearchaos.errors import FigureError
+from gearchaos.figures.bifurcation import bifurcation
+from gearchaos.figures.labels import in_words
+from gearchaos.figures.lanes import Between
+from gearchaos.figures.lyapunov import VARIABLE as LYAPUNOV_VARIABLE
+from gearchaos.figures.lyapunov import lyapunov
+from gearchaos.figures.page import Page, few_ticks, letter, page
+from gearchaos.figures.stages import shade_stages
+from gearchaos.figures.style import SINGLE_COLUMN_MM, SMALL_FONT_PT
+from gearchaos.results.result import Result, section_variables
+
+HEIGHT_RATIOS = (1.6, 1.0)
+MOST_INTERVALS = (7, 8)
+"""Between the ticks of the lower panel, and of the one above it."""
+
+
+def bifurcation_page(
+    result: Result,
+    variable: str | None = None,
+    *,
+    between: Between = (None, None),
+    full_range: bool = False,
+    stages: bool = False,
+    width_mm: float = SINGLE_COLUMN_MM,
+    height_mm: float | None = None,
+) -> Page:
+    """Draw the bifurcation diagram (a) over the Lyapunov chart (b).
+
+    A result without section points or without exponents gives the one panel it has data for.
+
+    Parameters
+    ----------
+    result : Result
+        Over one swept parameter.
+    variable, between, full_range
+        As for `bifurcation`.
+    stages : bool
+        Shade the stages behind both panels; of several starts those of the first, as the legend
+        then says.
+    width_mm, height_mm : float
+        Size of the page; 85 mm is one column of a journal and 180 mm two. The default height
+        follows from the width and the number of panels.
+
+    Returns
+    -------
+    Page
+        A Figure not known to pyplot, which a notebook shows; `savefig` or
+        `gearchaos.figures.save_figure` writes it.
+
+    Raises
+    ------
+    FigureError
+        If the result has nothing to draw, no such variable or no lane in the range, or runs over
+        two parameters.
+    FileError
+        If stages are wanted and the result has no labels of the motion.
+    """
+    # A variable that was asked for and is not there is an error, not a page without it.
+    has_section = variable is not None or bool(section_variables(result))
+    has_exponent = LYAPUNOV_VARIABLE in result
+    panels = has_section + has_exponent
+    if not panels:
+        raise FigureError(
+            "nothing to draw: the result has neither section points nor Lyapunov exponents"
+        )
+    height = height_mm or (55.0 + 0.35 * width_mm) * (1.0 if panels == 2 else 0.7)
+    with page(width_mm, height) as figure:
+        ratios = HEIGHT_RATIOS if panels == 2 else (1.0,)
+        stack: list[Axes] = list(
+            figure.subplots(panels, 1, sharex=True, squeeze=False, height_ratios=ratios)[:, 0]
+        )
+        if has_section:
+            bifurcation(stack[0], result, variable, between=between, full_range=full_range)
+        if has_exponent:
+            lyapunov(stack[-1], result, between=between, full_range=full_range)
+        if panels == 2:
+            stack[0].set_xlabel("")
+            letter(stack)
+        for axes, intervals in zip(reversed(stack), MOST_INTERVALS, strict=False):
+            few_ticks(axes, None, intervals)
+            axes.yaxis.label.set_linespacing(1.0)
+        if stages:
+            one = result.sel(start=0) if "start" in result.axes else result
+            for axes in stack:
+                shade_stages(axes, one, legend=axes is stack[0])
+        if result.fixed:
+            figure.suptitle(in_words(result, result.fixed), fontsize=SMALL_FONT_PT)
+        figure.align_ylabels(stack)
+    return figure
