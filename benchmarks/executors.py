@@ -69,7 +69,9 @@ def seconds_of(simulation: Simulation, executor: BlockExecutor, size: int) -> fl
         output = str(Path(folder) / "sweep.h5")
         with open_store(simulation, output, resume=False) as store:
             began = time.perf_counter()
-            compute_blocks(executor, simulation.blocks(size), lambda block, arrays: store.write(*block, arrays))
+            compute_blocks(
+                executor, simulation.blocks(size), lambda block, arrays: store.write(*block, arrays)
+            )
             return time.perf_counter() - began
 
 

@@ -12,10 +12,11 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from gearchaos.configuration import Configuration, load_config
-    from gearchaos.engine.response_run import respond
+    from gearchaos.engine.response import respond
     from gearchaos.engine.running import run
     from gearchaos.errors import ConfigurationError, FileError, GearchaosError
     from gearchaos.results.result import Result, open_result
+    from gearchaos.system import System
     from gearchaos.version import software_version
 
 __all__ = [
@@ -24,6 +25,7 @@ __all__ = [
     "FileError",
     "GearchaosError",
     "Result",
+    "System",
     "load_config",
     "open_result",
     "respond",
@@ -39,9 +41,10 @@ _HOMES = {
     "FileError": "gearchaos.errors",
     "GearchaosError": "gearchaos.errors",
     "Result": "gearchaos.results.result",
+    "System": "gearchaos.system",
     "load_config": "gearchaos.configuration",
     "open_result": "gearchaos.results.result",
-    "respond": "gearchaos.engine.response_run",
+    "respond": "gearchaos.engine.response",
     "run": "gearchaos.engine.running",
     "software_version": "gearchaos.version",
 }

@@ -46,5 +46,7 @@ def describe(simulation: Simulation, output: str) -> None:
 
 
 def _left_out(simulation: Simulation) -> str:
-    unused = [name for name in simulation.config.scene.effects if name not in simulation.lanes.effects]
+    unused = [
+        name for name in simulation.config.scene.effects if name not in simulation.lanes.effects
+    ]
     return f" (nothing that is kept needs {', '.join(unused)})" if unused else ""

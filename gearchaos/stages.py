@@ -17,7 +17,7 @@ from gearchaos.command_line import OK, Command
 from gearchaos.errors import ConfigurationError
 
 if TYPE_CHECKING:
-    from gearchaos.engine.stage_refinement import Boundary
+    from gearchaos.engine.refinement import Boundary
     from gearchaos.results.jumps import Jump
     from gearchaos.results.result import Result
     from gearchaos.results.stage_table import LabelledLanes, Stage
@@ -118,8 +118,8 @@ def _coordinates(texts: Sequence[str], result: Result) -> dict[str, float]:
 
 def _refined(result: Result, stages: list[Stage], options: argparse.Namespace) -> list[Boundary]:
     # Only here: reading a file needs no compiler.
+    from gearchaos.engine.refinement import refinable, refined_boundaries
     from gearchaos.engine.running import COMPILING
-    from gearchaos.engine.stage_refinement import refinable, refined_boundaries
     from gearchaos.progress import notice
 
     config = refinable(result, options.result)

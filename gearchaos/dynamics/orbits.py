@@ -82,9 +82,7 @@ def polish(
         chosen = np.flatnonzero(period == n)
         # With a tangent, so that map and Jacobian are compiled once and agree bit for bit.
         plan = Plan(steps_per_period, 0, n, section_points=n, tangent=True)
-        for whole, some in zip(
-            found, _polish(system.of(chosen), guess[chosen], plan), strict=True
-        ):
+        for whole, some in zip(found, _polish(system.of(chosen), guess[chosen], plan), strict=True):
             whole[chosen] = some
     return found
 

@@ -20,8 +20,8 @@ from gearchaos.dynamics.systems import system_of
 from gearchaos.engine.running import run
 from gearchaos.errors import ConfigurationError, FileError
 from gearchaos.results.result import Result
-from gearchaos.results.variables import axis_name
 from gearchaos.results.stage_table import Stage, labelled_lanes
+from gearchaos.results.variables import axis_name
 
 Floats = NDArray[np.float64]
 

@@ -93,9 +93,7 @@ def result_of(
     return Result(axes, variables, data, simulation.lanes.parameters, facts)
 
 
-def prepare(
-    simulation: Simulation, *, compile_now: bool = True, history_periods: int = 0
-) -> None:
+def prepare(simulation: Simulation, *, compile_now: bool = True, history_periods: int = 0) -> None:
     """Compile the kernel, choose the steps where a tolerance is wanted, and say what was found."""
     if compile_now:
         with notice(COMPILING):

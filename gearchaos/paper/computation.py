@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gearchaos.configuration import Configuration
-from gearchaos.engine.response_run import respond
+from gearchaos.engine.response import respond
 from gearchaos.engine.running import run
 from gearchaos.paper.hop import STEP, Hop, find_hop
 from gearchaos.paper.published import published

@@ -11,19 +11,18 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from gearchaos_kernels import STATE_ROWS
 from numpy.typing import NDArray
 
 from gearchaos.configuration import Configuration
-from gearchaos.configuration.sweep_values import groups_at
 from gearchaos.dynamics.following import StabilityLoss, follow, loss_of_stability
 from gearchaos.dynamics.orbits import orbit_exponent, polish
-from gearchaos.engine.lanes import model
+from gearchaos.dynamics.systems import system_of
 from gearchaos.engine.running import run
-from gearchaos.engine.simulation import Simulation
-from gearchaos.results.result import Result, section_variables
+from gearchaos.results.result import Result
 
 Floats = NDArray[np.float64]
+
+PITCH_ERROR = "pitch_error"
 
 LOW, HIGH = 0.5, 2.0
 """Pitch errors between which both motions are followed, in multiples of e(tau)."""
@@ -132,17 +131,12 @@ def find_hop(
 
 
 def _over(config: Configuration, low: float, high: float, count: int) -> Configuration:
-    sweep = {"parameter": "pitch_error", "from": low, "to": high, "count": count}
+    sweep = {"parameter": PITCH_ERROR, "from": low, "to": high, "count": count}
     return config.replace("sweep", sweep)
 
 
-def _section(result: Result) -> Floats:
-    """Section points of all lanes, shape (lanes, states)."""
-    return np.stack([result[name][:, -1] for name in section_variables(result)], axis=1)
-
-
 def _apart(one: Result, other: Result) -> NDArray[np.bool_]:
-    a, b = _section(one), _section(other)
+    a, b = one["end_state"], other["end_state"]
     size = np.maximum(np.abs(a), np.abs(b)).max(axis=1)
     return np.asarray(np.abs(a - b).max(axis=1) > APART * size)
 
@@ -152,30 +146,18 @@ def _end(
 ) -> tuple[float, StabilityLoss]:
     """Follow the period-1 orbit of a carried sweep beyond its last value, to where it ends."""
     value = float(sweep[sweep.axis][lane])
-    simulation = Simulation(config)
     followed = follow(
-        simulation.scene,
-        lambda values: model(groups_at(config, values), values.size),
-        *simulation.harmonics(),
-        _states(sweep, lane),
+        lambda values: system_of(config, {PITCH_ERROR: values}),
+        sweep["end_state"][[lane]],
         np.ones(1, dtype=np.int32),
         np.array([value]),
         np.array([value + step]),
         WIDTH,
-        simulation.plan.steps_per_period,
-        rederived=config.formulation == "rederived",
+        config.integration.steps_per_period,
     )
     loss = loss_of_stability(followed.stable.multipliers, followed.beyond.multipliers)
     end = float(followed.stable_value[0])
     return (end if np.isfinite(end) else value), StabilityLoss(int(loss.kind[0]))
-
-
-def _states(result: Result, lanes: int | slice) -> Floats:
-    """End states of some lanes, shape (lanes, 10), as the kernels take them."""
-    chosen = np.atleast_2d(result["end_state"][lanes])
-    states = np.zeros((chosen.shape[0], len(STATE_ROWS)))
-    states[:, [STATE_ROWS[str(name)] for name in result["state"]]] = chosen
-    return states
 
 
 def _change(found: Result, config: Configuration, first: Result, second: Result) -> Change | None:
@@ -183,26 +165,18 @@ def _change(found: Result, config: Configuration, first: Result, second: Result)
     changes = np.flatnonzero(on_first[:-1] & ~on_first[1:])
     if not changes.size:
         return None
-    lanes = slice(int(changes[0]), int(changes[0]) + 2)
-    before, after = found[found.axis][lanes].tolist()
-    simulation = Simulation(config)
-    numbers = np.arange(lanes.start, lanes.stop)
-    period = np.ones(2, dtype=np.int32)
-    orbits = polish(
-        simulation.scene,
-        simulation.model_of(numbers),
-        *simulation.harmonics(),
-        _states(found, lanes),
-        period,
-        simulation.plan.steps_per_period,
-        rederived=config.formulation == "rederived",
-    )
-    exponents = orbit_exponent(orbits.multipliers, period, simulation.periods_of(numbers))
+    lanes = changes[0] + np.arange(2)
+    values, period = found[found.axis][lanes], np.ones(2, dtype=np.int32)
+    system = system_of(config, {PITCH_ERROR: values})
+    steps = config.integration.steps_per_period
+    orbits = polish(system, found["end_state"][lanes], period, steps)
+    exponents = orbit_exponent(orbits.multipliers, period, system.mesh_period)
+    before, after = values.tolist()
     return Change(before, after, changes.size - 1, (float(exponents[0]), float(exponents[1])))
 
 
 def _distance(found: Result, sweep: Result) -> Floats:
     """Distance of each lane from the motion of a carried sweep, interpolated between its values."""
-    values, known = found[found.axis], _section(sweep)
+    values, known = found[found.axis], sweep["end_state"]
     there = [np.interp(values, sweep[sweep.axis], column) for column in known.T]
-    return np.asarray(np.abs(_section(found) - np.column_stack(there)).max(axis=1))
+    return np.asarray(np.abs(found["end_state"] - np.column_stack(there)).max(axis=1))
