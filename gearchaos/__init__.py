@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from gearchaos.configuration import Configuration, load_config
     from gearchaos.engine.response import respond
     from gearchaos.engine.running import run
-    from gearchaos.errors import ConfigurationError, FileError, GearchaosError
+    from gearchaos.errors import ConfigurationError, FigureError, FileError, GearchaosError
     from gearchaos.results.result import Result, open_result
     from gearchaos.system import System
     from gearchaos.version import software_version
@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 __all__ = [
     "Configuration",
     "ConfigurationError",
+    "FigureError",
     "FileError",
     "GearchaosError",
     "Result",
@@ -38,6 +39,7 @@ __all__ = [
 _HOMES = {
     "Configuration": "gearchaos.configuration",
     "ConfigurationError": "gearchaos.errors",
+    "FigureError": "gearchaos.errors",
     "FileError": "gearchaos.errors",
     "GearchaosError": "gearchaos.errors",
     "Result": "gearchaos.results.result",

@@ -38,7 +38,7 @@ def our_numbers(printed: Published, found: Reproduction) -> dict[str, float]:
         # c_m = 2 xi sqrt(k_m m_e) with the stiffness of the whole face width, in N s/m (eq. 20).
         "mesh_damping": 2.0 * damping_ratio * math.sqrt(whole_width * pair.equivalent_mass),
         # omega = 2 pi f / omega_h (eq. 9).
-        "frequency": derive_groups(driven)["mesh_frequency"],
+        "frequency": derive_groups(driven.physical())["mesh_frequency"],
         "mesh_period": response["mesh_period"][0],
         "added_acceleration": largest_acceleration(response, 1.0)
         - largest_acceleration(response, 0.0),
