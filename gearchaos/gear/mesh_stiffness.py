@@ -19,8 +19,6 @@ FloatArray: TypeAlias = npt.NDArray[np.float64]
 DEFAULT_HARMONICS = 6
 """Harmonics of a trapezoid where their number is not given, as in Pan 2021, Table 2."""
 
-_FEWEST_OF_A_FIT = 3
-
 
 @dataclass(frozen=True)
 class TrapezoidalStiffness:
@@ -153,44 +151,3 @@ class FourierStiffness:
         turns = np.outer(np.arange(points), n) % points / points
         variation: FloatArray = (np.exp(2j * np.pi * turns) @ coefficients).real
         return 1.0 + variation
-
-    def to_trapezoid(self) -> TrapezoidalStiffness:
-        """Return the trapezoid with equal rise and fall that fits the harmonics best.
-
-        Contact lines of equal teeth always rise as long as they fall. The phase of the first
-        harmonic places the middle of the top; rise and width (the distance between the middles
-        of rise and fall) minimise the squared distance of all harmonics, on a grid that is
-        refined around its best point; the half-height follows linearly.
-
-        Raises
-        ------
-        ValueError
-            If there are fewer than three harmonics or the first one is zero.
-        """
-        target = self.coefficients()
-        if target.size < _FEWEST_OF_A_FIT or target[0] == 0.0:
-            raise ValueError(
-                f"a trapezoid is fitted to at least {_FEWEST_OF_A_FIT} harmonics, the first of "
-                f"which is not 0, not to {target}"
-            )
-        n = np.arange(1.0, target.size + 1.0)
-        middle_of_top = -np.angle(target[0]) / (2.0 * np.pi)
-        centred = (target * np.exp(2j * np.pi * n * middle_of_top)).real
-        n, centred = n[:, None, None], centred[:, None, None]
-        steps = np.linspace(-1.0, 1.0, 33)
-        rise, width, half_height, reach = 0.25, 0.5, 0.0, 0.5
-        # Shrinking slowly lets the grid follow the valley of a nearly triangular trapezoid.
-        while reach > 1e-15:
-            rises = np.clip(rise + reach * steps, 0.0, 0.5)[:, None]
-            widths = np.clip(width + reach * steps[None, :], rises, 1.0 - rises)
-            # Cosine harmonics of half-height one about the middle of the top.
-            shapes = 4.0 / (np.pi * n) * np.sinc(n * rises) * np.sin(np.pi * n * widths)
-            fitted = (centred * shapes).sum(axis=0) / (np.square(shapes).sum(axis=0) + 1e-300)
-            heights = np.maximum(fitted, 0.0)
-            residuals = np.square(centred - heights * shapes).sum(axis=0)
-            best = np.unravel_index(np.argmin(residuals), residuals.shape)
-            rise, width = float(rises[best[0], 0]), float(widths[best])
-            half_height = float(heights[best])
-            reach *= 0.7
-        bottom, start = max(0.0, 1.0 - width - rise), (middle_of_top - (width + rise) / 2.0) % 1.0
-        return TrapezoidalStiffness(rise, width - rise, rise, bottom, half_height, float(start))

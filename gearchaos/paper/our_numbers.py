@@ -23,7 +23,8 @@ def our_numbers(printed: Published, found: Reproduction) -> dict[str, float]:
     """Compute each number of `Published.numbers`; not a number where there is no such thing."""
     pair, speed, response = pair_of(found), printed.driving_speed_rpm, found.response
     harmonics = printed.harmonics
-    variation = FourierStiffness(harmonics.cosine, harmonics.sine).to_trapezoid().half_height
+    table_2 = FourierStiffness(harmonics.cosine, harmonics.sine).coefficients()
+    lines = contact_line_stiffness(printed).to_fourier(table_2.size).coefficients()
     damping_ratio = found.group("damping_ratio")
     whole_width = printed.numbers["mean_stiffness"].value * _N_PER_UM_MM * pair.face_width
     driven = found.config.replace("operation", {"speed_rpm": speed})
@@ -33,7 +34,7 @@ def our_numbers(printed: Published, found: Reproduction) -> dict[str, float]:
         "mesh_frequency_hz": speed / 60.0 * pair.teeth[0],
         "total_contact_ratio": pair.total_contact_ratio,
         # The mean about which Table 2's variation is that of the contact lines, in N/(um mm).
-        "mean_stiffness": variation / printed.contact_lines.half_height,
+        "mean_stiffness": np.vdot(lines, table_2).real / np.vdot(lines, lines).real,
         "damping_ratio": damping_ratio,
         # c_m = 2 xi sqrt(k_m m_e) with the stiffness of the whole face width, in N s/m (eq. 20).
         "mesh_damping": 2.0 * damping_ratio * math.sqrt(whole_width * pair.equivalent_mass),

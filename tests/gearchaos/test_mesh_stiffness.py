@@ -35,14 +35,6 @@ def test_table_2_of_pan_2021_follows_from_the_trapezoid():
         assert np.max(np.abs(difference)) < 1e-3 * TABLE_2_FIRST_HARMONIC
 
 
-def test_the_trapezoid_follows_from_table_2_of_pan_2021():
-    fitted = TABLE_2.to_trapezoid()
-    for name in ("rise", "top", "fall", "bottom"):
-        assert getattr(fitted, name) == pytest.approx(0.25, abs=1e-3)
-    assert fitted.half_height == pytest.approx(1 / 9, rel=1e-3)
-    assert abs((fitted.start + 0.5) % 1.0 - 0.5) < 1e-3
-
-
 def test_rounded_contact_ratios_of_pan_2021_give_its_trapezoid():
     built = TrapezoidalStiffness.from_contact_ratios(1.5, 0.75)
     assert built == TrapezoidalStiffness(0.25, 0.25, 0.25, 0.25, half_height=0.25 / 2.25)
@@ -117,30 +109,6 @@ def closed_table(shape, points):
     return np.append(table, table[0])
 
 
-@pytest.mark.parametrize(
-    "shape",
-    [
-        PAN_2021,
-        TrapezoidalStiffness(0.1, 0.3, 0.1, 0.5, 0.2, start=0.3),
-        TrapezoidalStiffness(0.3, 0.35, 0.3, 0.05, 0.2, start=0.9),
-        TrapezoidalStiffness.from_contact_ratios(1.505, 0.7539),
-    ],
-)
-def test_fit_recovers_every_trapezoid_of_contact_lines_from_its_harmonics(shape):
-    fitted = shape.to_fourier(8).to_trapezoid()
-    for name in ("rise", "top", "fall", "bottom", "half_height"):
-        assert getattr(fitted, name) == pytest.approx(getattr(shape, name), abs=1e-7)
-    assert abs((fitted.start - shape.start + 0.5) % 1.0 - 0.5) < 1e-7
-
-
-def test_fit_recovers_the_jumps_of_a_spur_pair():
-    fitted = TrapezoidalStiffness.from_contact_ratios(1.625, 0.0).to_fourier(8).to_trapezoid()
-    # The harmonics depend on the square of a short rise, so its last digits leave no trace.
-    assert fitted.rise == pytest.approx(0.0, abs=1e-3)
-    assert fitted.top == pytest.approx(0.625, abs=1e-3)
-    assert fitted.half_height == pytest.approx(1 / 3.25, rel=1e-6)
-
-
 @pytest.mark.parametrize("stiffness", [*SHAPES, TABLE_2])
 def test_mean_of_kappa_over_a_mesh_period_is_one(stiffness):
     assert stiffness.table(1000).mean() == pytest.approx(1.0, abs=1e-12)
@@ -164,9 +132,3 @@ def test_fractions_that_make_no_period_are_refused(fractions):
 def test_impossible_contact_ratios_are_refused(ratios):
     with pytest.raises(ValueError, match="contact ratios"):
         TrapezoidalStiffness.from_contact_ratios(*ratios)
-
-
-@pytest.mark.parametrize("cosine", [(0.1, 0.2), (0.0, 0.1, 0.1)])
-def test_series_that_determines_no_trapezoid_is_refused(cosine):
-    with pytest.raises(ValueError, match="trapezoid"):
-        FourierStiffness(cosine=cosine).to_trapezoid()
