@@ -24,6 +24,11 @@ import numba
 from llvmlite import ir
 from numba import config, types
 from numba.core import cgutils
+from numba.core import ir as numba_ir
+from numba.core.compiler import CompilerBase, DefaultPassBuilder
+from numba.core.compiler_machinery import FunctionPass, register_pass
+from numba.core.ir_utils import get_definition, guard
+from numba.core.untyped_passes import RewriteSemanticConstants
 from numba.extending import intrinsic
 from numba.misc.appdirs import user_cache_dir
 
@@ -73,8 +78,52 @@ if config.CPU_FEATURES is None:
     config.CPU_FEATURES = widest_vectors()
 
 
+@register_pass(mutates_CFG=False, analysis_only=False)
+class KnownFlags(FunctionPass):  # type: ignore[misc]
+    """Make the flags of a record constants, where their types tell whether they are there.
+
+    Numba removes the branches of an argument that is None before it compiles anything. For a field
+    of a record only LLVM does, after the absent branch has cost its time too.
+    """
+
+    _name = "known_flags"
+
+    def __init__(self) -> None:
+        """Keep nothing between functions."""
+
+    def run_pass(self, state: Any) -> bool:
+        """Replace ``record.flag`` by None or ``()``."""
+        changed = False
+        for part in state.func_ir.blocks.values():
+            for assignment in part.find_insts(numba_ir.Assign):
+                value = assignment.value
+                if not (isinstance(value, numba_ir.Expr) and value.op == "getattr"):
+                    continue
+                record = guard(get_definition, state.func_ir, value.value)
+                kind = state.args[record.index] if isinstance(record, numba_ir.Arg) else None
+                if isinstance(kind, types.NamedTuple) and value.attr in kind.fields:
+                    field = kind.types[kind.fields.index(value.attr)]
+                    if field in (types.none, types.Tuple(())):
+                        constant = None if field is types.none else ()
+                        assignment.value = numba_ir.Const(constant, value.loc)
+                        state.func_ir._definitions[assignment.target.name] = [assignment.value]
+                        changed = True
+        return changed
+
+
+class _Compiler(CompilerBase):  # type: ignore[misc]
+    """Numba's own passes, and `KnownFlags` before it removes branches."""
+
+    def define_pipelines(self) -> list[Any]:
+        """Return the one list of passes."""
+        passes = DefaultPassBuilder.define_nopython_pipeline(self.state)
+        passes.add_pass_after(KnownFlags, RewriteSemanticConstants)
+        passes.finalize()
+        return [passes]
+
+
 def _decorate(function: Callable[..., Any], **flags: Any) -> Any:
-    return numba.njit(**_SHARED_FLAGS, **flags)(function)
+    return numba.njit(pipeline_class=_Compiler, **_SHARED_FLAGS, **flags)(function)
 
 
 def scalar(function: Callable[..., Any]) -> Any:

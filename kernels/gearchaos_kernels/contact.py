@@ -8,11 +8,9 @@ smooth field, so that the method keeps its order; one that leaves it has to be s
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
+from gearchaos_kernels.block_memory import Branch, Branches
 from gearchaos_kernels.compilation import scalar
-from gearchaos_kernels.lane import BRANCH, STRIDE
-from gearchaos_kernels.motion import axial_gap, tangential_gap
 
 NEVER = 2.0
 """Fraction of a step returned where the step does not leave its branch: beyond its end."""
@@ -21,22 +19,6 @@ _THIRD = 1.0 / 3.0
 _ITERATIONS = 60
 _LAST_CORRECTION = 1e-6
 """Newton's method squares the error: after so small a correction it is far below the cubic's."""
-
-
-class Branch(NamedTuple):
-    """One linear piece of the clearance function, and the gaps between which it holds."""
-
-    engaged: float
-    offset: float
-    floor: float
-    ceiling: float
-
-
-class Branches(NamedTuple):
-    """The active pieces of the tangential and of the axial clearance."""
-
-    tangential: Branch
-    axial: Branch
 
 
 @scalar
@@ -52,15 +34,20 @@ def branch_at(gap, half_backlash):
 
 
 @scalar
-def branches_at(position, lane, forcing, transverse, axial):
+def branches_at(gaps, half_backlash, present):
     """Return the pieces on which both gaps of a lane lie."""
-    gap = tangential_gap(position, lane, forcing, transverse)
-    tangential = branch_at(gap, lane.half_backlash)
-    if axial is None:
+    tangential = branch_at(gaps.tangential, half_backlash)
+    if present.axial is None:
         return Branches(tangential, tangential)
-    return Branches(
-        tangential, branch_at(axial_gap(position, gap, lane, forcing), lane.half_backlash)
-    )
+    return Branches(tangential, branch_at(gaps.axial, half_backlash))
+
+
+@scalar
+def flank_at(gap, half_backlash):
+    """Return 0 between the flanks, 1 on the driving flank and 2 on the back flank."""
+    if gap > half_backlash:
+        return 1
+    return 2 if gap < -half_backlash else 0
 
 
 @scalar
@@ -72,40 +59,20 @@ def next_branch(branch, gap, half_backlash):
 
 
 @scalar
-def read_branches(block, lane, axial):
-    """Return the active pieces of a lane; without axial pair the second one repeats the first."""
-    first = BRANCH * STRIDE + lane
-    tangential = Branch(
-        block[first],
-        block[first + STRIDE],
-        block[first + 2 * STRIDE],
-        block[first + 3 * STRIDE],
+def step_may_leave(begin, end, branches, present):
+    """Tell whether a step from one pair of gaps to another may leave a branch of either."""
+    suspect = may_leave(
+        begin.tangential,
+        begin.tangential_rate,
+        end.tangential,
+        end.tangential_rate,
+        branches.tangential,
     )
-    if axial is None:
-        return Branches(tangential, tangential)
-    return Branches(
-        tangential,
-        Branch(
-            block[first + 4 * STRIDE],
-            block[first + 5 * STRIDE],
-            block[first + 6 * STRIDE],
-            block[first + 7 * STRIDE],
-        ),
-    )
-
-
-@scalar
-def write_branches(block, lane, branches):
-    """Store the active pieces of a lane."""
-    first = BRANCH * STRIDE + lane
-    block[first] = branches.tangential.engaged
-    block[first + STRIDE] = branches.tangential.offset
-    block[first + 2 * STRIDE] = branches.tangential.floor
-    block[first + 3 * STRIDE] = branches.tangential.ceiling
-    block[first + 4 * STRIDE] = branches.axial.engaged
-    block[first + 5 * STRIDE] = branches.axial.offset
-    block[first + 6 * STRIDE] = branches.axial.floor
-    block[first + 7 * STRIDE] = branches.axial.ceiling
+    if present.axial is not None:
+        suspect |= may_leave(
+            begin.axial, begin.axial_rate, end.axial, end.axial_rate, branches.axial
+        )
+    return suspect
 
 
 @scalar

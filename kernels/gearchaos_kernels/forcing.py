@@ -31,7 +31,7 @@ class Phase(NamedTuple):
 
 
 class Forcing(NamedTuple):
-    """What acts on a lane at one instant; what a scene leaves out is the constant 0."""
+    """What acts on a lane at one instant, per step; what a scene leaves out is the constant 0."""
 
     stiffness: float
     drive: float
@@ -39,6 +39,14 @@ class Forcing(NamedTuple):
     error_rate: float
     axial_error: float
     axial_error_rate: float
+
+
+class During(NamedTuple):
+    """What acts on a lane at the beginning, in the middle and at the end of a step or a piece."""
+
+    begin: Forcing
+    middle: Forcing
+    end: Forcing
 
 
 def phase_table(
@@ -109,27 +117,27 @@ def phase_within(table, number, fraction):
 
 
 @scalar
-def forcing_at(lane, point, pitch_error, phase, stiffness_variation, axial):
+def forcing_at(lane, point, present):
     """Return mesh stiffness (eq. 19), load and pitch error (eq. 14) of a lane at a mesh phase."""
     stiffness = lane.mean_stiffness
-    if stiffness_variation is not None:
+    if present.stiffness_variation is not None:
         stiffness = lane.mean_stiffness + lane.stiffness_variation * point.variation
     drive = lane.load
     error = 0.0
     error_rate = 0.0
     axial_error = 0.0
     axial_error_rate = 0.0
-    if pitch_error is not None:
+    if present.pitch_error is not None:
         sine = point.sine
         cosine = point.cosine
-        if phase is not None:
+        if present.phase is not None:
             sine = lane.cos_phase * point.sine + lane.sin_phase * point.cosine
             cosine = lane.cos_phase * point.cosine - lane.sin_phase * point.sine
         # -e'' = Omega^2 e of the sine drives delta_5, which is measured from e (eq. 13).
         drive = lane.load + lane.error_inertia * sine
         error = lane.error_mean + lane.error_amplitude * sine
         error_rate = lane.error_rate * cosine
-        if axial is not None:
+        if present.axial is not None:
             axial_error = lane.axial_error_mean + lane.axial_error_amplitude * sine
             axial_error_rate = lane.axial_error_rate * cosine
     return Forcing(stiffness, drive, error, error_rate, axial_error, axial_error_rate)

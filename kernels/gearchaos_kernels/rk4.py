@@ -15,50 +15,85 @@ A whole step has the constant s = 1, which the compiler folds away.
 
 from __future__ import annotations
 
+from gearchaos_kernels.block_memory import Coordinates, State
 from gearchaos_kernels.compilation import scalar
-from gearchaos_kernels.lane import along, plus
-from gearchaos_kernels.motion import accelerations, tangent_accelerations
+from gearchaos_kernels.equations import accelerations, gaps_at, mesh_forces, tangent_forces
 
 
 @scalar
-def step(y, w, s, lane, start, middle, end, branches, backlash, transverse, axial):
-    """Advance one lane by a fraction of a step; return its state and the slopes of the stages."""
-    a1, slopes1 = accelerations(y, w, lane, start, branches, backlash, transverse, axial)
-    y2 = along(y, 0.5 * s, w)
-    w2 = along(w, 0.5 * s, a1)
-    a2, slopes2 = accelerations(y2, w2, lane, middle, branches, backlash, transverse, axial)
-    y3 = along(y2, 0.25 * s * s, a1)
-    w3 = along(w, 0.5 * s, a2)
-    a3, slopes3 = accelerations(y3, w3, lane, middle, branches, backlash, transverse, axial)
+def step(state, s, lane, during, branches, present):
+    """Advance a state by a fraction of a step; return it and the mesh slopes of the four stages."""
+    y, w = state
+    a1, slopes1 = stage(state, lane, during.begin, branches, present)
+    second = State(along(y, 0.5 * s, w), along(w, 0.5 * s, a1))
+    a2, slopes2 = stage(second, lane, during.middle, branches, present)
+    third = State(along(second.position, 0.25 * s * s, a1), along(w, 0.5 * s, a2))
+    a3, slopes3 = stage(third, lane, during.middle, branches, present)
     drifted = along(y, s, w)
-    y4 = along(drifted, 0.5 * s * s, a2)
-    w4 = along(w, s, a3)
-    a4, slopes4 = accelerations(y4, w4, lane, end, branches, backlash, transverse, axial)
-    y_end, w_end = combine(drifted, w, s, a1, a2, a3, a4)
-    return y_end, w_end, (slopes1, slopes2, slopes3, slopes4)
+    fourth = State(along(drifted, 0.5 * s * s, a2), along(w, s, a3))
+    a4, slopes4 = stage(fourth, lane, during.end, branches, present)
+    return combine(drifted, w, s, a1, a2, a3, a4), (slopes1, slopes2, slopes3, slopes4)
 
 
 @scalar
-def tangent_step(y, w, s, lane, slopes, transverse, axial):
+def tangent_step(tangent, s, lane, slopes, present):
     """Advance a tangent vector by the derivative of `step` at the same stages."""
-    a1 = tangent_accelerations(y, w, lane, slopes[0], transverse, axial)
-    y2 = along(y, 0.5 * s, w)
-    w2 = along(w, 0.5 * s, a1)
-    a2 = tangent_accelerations(y2, w2, lane, slopes[1], transverse, axial)
-    y3 = along(y2, 0.25 * s * s, a1)
-    w3 = along(w, 0.5 * s, a2)
-    a3 = tangent_accelerations(y3, w3, lane, slopes[2], transverse, axial)
+    y, w = tangent
+    a1 = tangent_stage(tangent, lane, slopes[0], present)
+    second = State(along(y, 0.5 * s, w), along(w, 0.5 * s, a1))
+    a2 = tangent_stage(second, lane, slopes[1], present)
+    third = State(along(second.position, 0.25 * s * s, a1), along(w, 0.5 * s, a2))
+    a3 = tangent_stage(third, lane, slopes[2], present)
     drifted = along(y, s, w)
-    y4 = along(drifted, 0.5 * s * s, a2)
-    w4 = along(w, s, a3)
-    a4 = tangent_accelerations(y4, w4, lane, slopes[3], transverse, axial)
+    fourth = State(along(drifted, 0.5 * s * s, a2), along(w, s, a3))
+    a4 = tangent_stage(fourth, lane, slopes[3], present)
     return combine(drifted, w, s, a1, a2, a3, a4)
 
 
 @scalar
+def stage(state, lane, forcing, branches, present):
+    """Return the accelerations of a state, per step squared, and the slopes of the mesh forces."""
+    gaps = gaps_at(state, lane, forcing, present)
+    forces, slopes = mesh_forces(gaps, lane, forcing.stiffness, branches, present)
+    return accelerations(state, forces, forcing.drive, lane, present), slopes
+
+
+@scalar
+def tangent_stage(tangent, lane, slopes, present):
+    """Return the accelerations of a tangent vector, per step squared."""
+    forces = tangent_forces(tangent, lane, slopes, present)
+    return accelerations(tangent, forces, 0.0, lane, present)
+
+
+@scalar
 def combine(drifted, w, s, a1, a2, a3, a4):
-    """Return displacements and rates at the end of the step from the four stages."""
+    """Return the state at the end of the step from the four stages."""
     middle = plus(a2, a3)
-    y_end = along(drifted, s * s / 6.0, plus(a1, middle))
-    w_end = along(w, s / 6.0, along(plus(a1, a4), 2.0, middle))
-    return y_end, w_end
+    return State(
+        along(drifted, s * s / 6.0, plus(a1, middle)),
+        along(w, s / 6.0, along(plus(a1, a4), 2.0, middle)),
+    )
+
+
+@scalar
+def plus(a, b):
+    """Return a + b, coordinate by coordinate."""
+    return Coordinates(
+        a.torsion + b.torsion,
+        a.transverse_p + b.transverse_p,
+        a.transverse_g + b.transverse_g,
+        a.axial_p + b.axial_p,
+        a.axial_g + b.axial_g,
+    )
+
+
+@scalar
+def along(a, factor, b):
+    """Return a + factor * b, coordinate by coordinate."""
+    return Coordinates(
+        a.torsion + factor * b.torsion,
+        a.transverse_p + factor * b.transverse_p,
+        a.transverse_g + factor * b.transverse_g,
+        a.axial_p + factor * b.axial_p,
+        a.axial_g + factor * b.axial_g,
+    )

@@ -1,41 +1,31 @@
 """One step of one lane, split wherever it leaves a contact branch.
 
-The lane loop integrates every step on the contact branches on which it begins, where the field is
-smooth. The few steps and lanes that may have left a branch come here one by one: the step is
-repeated up to the crossing, then on the next branch, as often as it crosses.
+The loop over slots integrates every step on the contact branches on which it begins, where the
+field is smooth. The few steps and lanes that may have left a branch come here one by one: the step
+is repeated up to the crossing, then on the next branch, as often as it crosses.
 """
 
 from __future__ import annotations
 
 import math
 
-from gearchaos_kernels.compilation import scalar
-from gearchaos_kernels.contact import (
-    NEVER,
-    Branches,
-    branches_at,
-    leaving_fraction,
-    next_branch,
-    read_branches,
-    write_branches,
-)
-from gearchaos_kernels.forcing import forcing_at, phase_on_grid, phase_within
-from gearchaos_kernels.lane import (
+from gearchaos_kernels.block_memory import (
     BEFORE,
-    POSITION,
-    RATE,
-    TANGENT_POSITION,
-    TANGENT_RATE,
-    read,
-    read_lane,
-    write,
+    COEFFICIENTS,
+    STATE,
+    TANGENT,
+    Branches,
+    Lane,
+    load,
+    read_branches,
+    read_state,
+    write_branches,
+    write_state,
 )
-from gearchaos_kernels.motion import (
-    axial_gap,
-    axial_gap_rate,
-    tangential_gap,
-    tangential_gap_rate,
-)
+from gearchaos_kernels.compilation import scalar
+from gearchaos_kernels.contact import NEVER, branches_at, leaving_fraction, next_branch
+from gearchaos_kernels.equations import gaps_at
+from gearchaos_kernels.forcing import During, forcing_at, phase_on_grid, phase_within
 from gearchaos_kernels.rk4 import step, tangent_step
 
 MOST_SPLITS = 16
@@ -43,29 +33,11 @@ MOST_SPLITS = 16
 
 
 @scalar
-def split_step(
-    memory,
-    slot,
-    table,
-    number,
-    speed_y,
-    speed_z,
-    pitch_error,
-    phase,
-    stiffness_variation,
-    transverse,
-    axial,
-    tangent,
-):
-    """Repeat one step of one lane in parts that each stay on their contact branches.
+def split_step(memory, slot, table, number, present):
+    """Repeat one step of one lane in pieces that each stay on their contact branches.
 
     The state before the step is in the rows from `BEFORE` on, the one after it, which ignored the
     crossing, in the ordinary rows. These are replaced where there is a crossing.
-
-    Parameters
-    ----------
-    speed_y, speed_z : float
-        What turns the rates of the two gaps into those of y_1 and y_2.
 
     Returns
     -------
@@ -75,108 +47,81 @@ def split_step(
     overflow : int
         1 if the step needed more than `MOST_SPLITS` splits.
     """
-    lane = read_lane(memory, slot)
-    b = lane.half_backlash
-    y = read(memory, BEFORE + POSITION, slot, transverse, axial)
-    w = read(memory, BEFORE + RATE, slot, transverse, axial)
-    y_end = read(memory, POSITION, slot, transverse, axial)
-    w_end = read(memory, RATE, slot, transverse, axial)
-    dy = y
-    dw = w
-    if tangent is not None:
-        dy = read(memory, BEFORE + TANGENT_POSITION, slot, transverse, axial)
-        dw = read(memory, BEFORE + TANGENT_RATE, slot, transverse, axial)
-    begin = forcing_at(
-        lane, phase_on_grid(table, 2 * number), pitch_error, phase, stiffness_variation, axial
-    )
-    end = forcing_at(
-        lane, phase_on_grid(table, 2 * number + 2), pitch_error, phase, stiffness_variation, axial
-    )
-    gap = tangential_gap(y, lane, begin, transverse)
-    gap_z = axial_gap(y, gap, lane, begin)
-    branches = read_branches(memory, slot, axial)
+    lane = load(memory, COEFFICIENTS, slot, Lane)
+    state = read_state(memory, BEFORE + STATE, slot, present)
+    after = read_state(memory, STATE, slot, present)
+    tangent = state
+    if present.tangent is not None:
+        tangent = read_state(memory, BEFORE + TANGENT, slot, present)
+    begin = forcing_at(lane, phase_on_grid(table, 2 * number), present)
+    end = forcing_at(lane, phase_on_grid(table, 2 * number + 2), present)
+    gaps = gaps_at(state, lane, begin, present)
+    branches = read_branches(memory, slot, present)
     done = 0.0
     crossings = 0
     slowest = math.inf
     while True:
         left = 1.0 - done
-        rate = left * tangential_gap_rate(w, lane, begin, transverse)
-        gap_end = tangential_gap(y_end, lane, end, transverse)
-        rate_end = left * tangential_gap_rate(w_end, lane, end, transverse)
-        part = leaving_fraction(gap, rate, gap_end, rate_end, branches.tangential, b)
-        part_z = NEVER
-        if axial is not None:
-            part_z = leaving_fraction(
-                gap_z,
-                axial_gap_rate(w, rate, left, lane, begin),
-                axial_gap(y_end, gap_end, lane, end),
-                axial_gap_rate(w_end, rate_end, left, lane, end),
-                branches.axial,
-                b,
-            )
-        first = min(part, part_z)
+        gaps_after = gaps_at(after, lane, end, present)
+        fraction, axially = first_crossing(gaps, gaps_after, left, branches, lane, present)
         # Also where the lane has left the range of numbers, and the fraction is not one.
-        if not first <= 1.0 or crossings == MOST_SPLITS:
+        if not fraction <= 1.0 or crossings == MOST_SPLITS:
             break
 
-        first *= left
-        middle = forcing_at(
-            lane,
-            phase_within(table, number, done + 0.5 * first),
-            pitch_error,
-            phase,
-            stiffness_variation,
-            axial,
-        )
-        done += first
-        crossing = forcing_at(
-            lane, phase_within(table, number, done), pitch_error, phase, stiffness_variation, axial
-        )
-        y, w, slopes = step(
-            y,
-            w,
-            first,
-            lane,
-            begin,
-            middle,
-            crossing,
-            branches,
-            None,
-            transverse,
-            axial,
-        )
-        if tangent is not None:
-            dy, dw = tangent_step(dy, dw, first, lane, slopes, transverse, axial)
+        piece = fraction * left
+        middle = forcing_at(lane, phase_within(table, number, done + 0.5 * piece), present)
+        done += piece
+        crossing = forcing_at(lane, phase_within(table, number, done), present)
+        during = During(begin, middle, crossing)
+        state, slopes = step(state, piece, lane, during, branches, present)
+        if present.tangent is not None:
+            tangent = tangent_step(tangent, piece, lane, slopes, present)
         begin = crossing
         crossings += 1
-        gap = tangential_gap(y, lane, begin, transverse)
-        gap_z = axial_gap(y, gap, lane, begin)
-        rate = tangential_gap_rate(w, lane, begin, transverse)
-        if part <= part_z:
-            slowest = min(slowest, speed_y * abs(rate))
-            branches = Branches(next_branch(branches.tangential, gap, b), branches.axial)
+        gaps = gaps_at(state, lane, begin, present)
+        if axially:
+            slowest = min(slowest, lane.axial_speed * abs(gaps.axial_rate))
+            following = next_branch(branches.axial, gaps.axial, lane.half_backlash)
+            branches = Branches(branches.tangential, following)
         else:
-            slowest = min(slowest, speed_z * abs(axial_gap_rate(w, rate, 1.0, lane, begin)))
-            branches = Branches(branches.tangential, next_branch(branches.axial, gap_z, b))
+            slowest = min(slowest, lane.tangential_speed * abs(gaps.tangential_rate))
+            following = next_branch(branches.tangential, gaps.tangential, lane.half_backlash)
+            branches = Branches(following, branches.axial)
 
         left = 1.0 - done
-        middle = forcing_at(
-            lane,
-            phase_within(table, number, done + 0.5 * left),
-            pitch_error,
-            phase,
-            stiffness_variation,
-            axial,
-        )
-        y_end, w_end, slopes = step(
-            y, w, left, lane, begin, middle, end, branches, None, transverse, axial
-        )
-        write(memory, POSITION, slot, y_end, transverse, axial)
-        write(memory, RATE, slot, w_end, transverse, axial)
-        if tangent is not None:
-            dy_end, dw_end = tangent_step(dy, dw, left, lane, slopes, transverse, axial)
-            write(memory, TANGENT_POSITION, slot, dy_end, transverse, axial)
-            write(memory, TANGENT_RATE, slot, dw_end, transverse, axial)
+        middle = forcing_at(lane, phase_within(table, number, done + 0.5 * left), present)
+        after, slopes = step(state, left, lane, During(begin, middle, end), branches, present)
+        write_state(memory, STATE, slot, after, present)
+        if present.tangent is not None:
+            tangent_after = tangent_step(tangent, left, lane, slopes, present)
+            write_state(memory, TANGENT, slot, tangent_after, present)
     if crossings > 0:
-        write_branches(memory, slot, branches_at(y_end, lane, end, transverse, axial))
-    return crossings, slowest, 1 if first <= 1.0 else 0
+        write_branches(memory, slot, branches_at(gaps_after, lane.half_backlash, present))
+    return crossings, slowest, 1 if fraction <= 1.0 else 0
+
+
+@scalar
+def first_crossing(begin, end, length, branches, lane, present):
+    """Return the fraction of a piece at which a gap leaves its branch, and if it is the axial one.
+
+    ``length`` is that of the piece in steps: the rates of the gaps are per step.
+    """
+    fraction = leaving_fraction(
+        begin.tangential,
+        length * begin.tangential_rate,
+        end.tangential,
+        length * end.tangential_rate,
+        branches.tangential,
+        lane.half_backlash,
+    )
+    fraction_z = NEVER
+    if present.axial is not None:
+        fraction_z = leaving_fraction(
+            begin.axial,
+            length * begin.axial_rate,
+            end.axial,
+            length * end.axial_rate,
+            branches.axial,
+            lane.half_backlash,
+        )
+    return min(fraction, fraction_z), not fraction <= fraction_z

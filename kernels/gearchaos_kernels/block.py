@@ -1,0 +1,249 @@
+"""One block of lanes through all its mesh periods, on one thread.
+
+The loop over slots in `step_block` has a whole step in plain local numbers as its body: this is
+what the compiler turns into vector instructions. What is done once per mesh period (section, check
+for divergence) stands outside it, and so do scaling the tangent vectors and the splitting of the
+few steps that cross a clearance boundary.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gearchaos_kernels.block_memory import (
+    BEFORE,
+    COEFFICIENTS,
+    GROWTH,
+    LANES,
+    STATE,
+    STRIDE,
+    SUSPECT,
+    TANGENT,
+    Block,
+    Lane,
+    aligned_memory,
+    load,
+    read_branches,
+    read_state,
+    write_branches,
+    write_state,
+)
+from gearchaos_kernels.compilation import align_stack, block, scalar
+from gearchaos_kernels.contact import branches_at, step_may_leave
+from gearchaos_kernels.equations import gaps_at
+from gearchaos_kernels.forcing import During, forcing_at, phase_on_grid
+from gearchaos_kernels.rk4 import step, tangent_step
+from gearchaos_kernels.splitting import split_step
+from gearchaos_kernels.status import Status
+
+LARGEST_STATE = 1e100
+"""A state beyond this has left every length scale: the lane is stopped as diverged."""
+
+_OK = int(Status.OK)
+_DIVERGED = int(Status.DIVERGED)
+
+
+class Batch(NamedTuple):
+    """What the blocks read, lanes first; see `coefficients`, and `forcing` for the table.
+
+    ``coefficients`` (lanes, fields of `Lane`), ``scales``, ``start`` and ``tangent_start`` (lanes,
+    states), ``steps_between_scalings`` (lanes,), ``table`` (rows, columns).
+    """
+
+    coefficients: NDArray[np.float64]
+    scales: NDArray[np.float64]
+    start: NDArray[np.float64]
+    tangent_start: NDArray[np.float64]
+    steps_between_scalings: NDArray[np.intp]
+    table: NDArray[np.float64]
+
+
+@block
+def integrate_block(first, batch, plan, outcome, present):
+    """Integrate the lanes from ``first`` on that a block holds, and write what comes of them."""
+    align_stack()
+    lanes = min(LANES, outcome.status.shape[0] - first)
+    block = Block(aligned_memory(), first, lanes)
+    interval = begin(block, batch, present)
+    periods = plan.transient_periods + plan.recorded_periods
+    for period in range(periods):
+        for number in range(plan.steps_per_period):
+            if period >= periods - plan.history_periods:
+                sample = (period - periods + plan.history_periods) * plan.steps_per_period + number
+                keep_state(block, batch, outcome.history, sample)
+            suspects = step_block(block.memory, batch.table, number, present)
+            if present.resolved is not None:
+                if suspects:
+                    recorded = period >= plan.transient_periods
+                    split(block, batch.table, number, recorded, outcome, present)
+            if present.tangent is not None:
+                last = number == plan.steps_per_period - 1
+                if (number + 1) % interval == 0 or last:
+                    scale_tangents(block, batch, number + 1, last)
+        end_period(block, batch, period, plan, outcome, present)
+    end(block, batch, plan, outcome)
+
+
+@scalar
+def begin(block, batch, present):
+    """Fill the memory of a block; return the shortest interval between scalings of a tangent."""
+    memory, first, lanes = block
+    # A scaling interval belongs to a lane, whatever its neighbours need.
+    interval = batch.steps_between_scalings[first]
+    for slot in range(LANES):
+        # A block that is not full repeats the last lane, and nothing of that is stored.
+        index = first + min(slot, lanes - 1)
+        interval = min(interval, batch.steps_between_scalings[index])
+        for column in range(batch.scales.shape[1]):
+            scale = batch.scales[index, column]
+            memory[(STATE + column) * STRIDE + slot] = batch.start[index, column] / scale
+            memory[(TANGENT + column) * STRIDE + slot] = batch.tangent_start[index, column] / scale
+        for column in range(batch.coefficients.shape[1]):
+            memory[(COEFFICIENTS + column) * STRIDE + slot] = batch.coefficients[index, column]
+        memory[GROWTH * STRIDE + slot] = 0.0
+        if present.resolved is not None:
+            lane = load(memory, COEFFICIENTS, slot, Lane)
+            forcing = forcing_at(lane, phase_on_grid(batch.table, 0), present)
+            state = read_state(memory, STATE, slot, present)
+            gaps = gaps_at(state, lane, forcing, present)
+            write_branches(memory, slot, branches_at(gaps, lane.half_backlash, present))
+    return interval
+
+
+@scalar
+def step_block(memory, table, number, present):
+    """Take one step in every slot; tell whether one may have left a contact branch."""
+    # Not in the loop over slots: nobody tells the compiler that its stores spare the table.
+    begin_phase = phase_on_grid(table, 2 * number)
+    middle_phase = phase_on_grid(table, 2 * number + 1)
+    end_phase = phase_on_grid(table, 2 * number + 2)
+    suspects = False
+    for slot in range(LANES):
+        lane = load(memory, COEFFICIENTS, slot, Lane)
+        state = read_state(memory, STATE, slot, present)
+        during = During(
+            forcing_at(lane, begin_phase, present),
+            forcing_at(lane, middle_phase, present),
+            forcing_at(lane, end_phase, present),
+        )
+        if present.resolved is None:
+            after, slopes = step(state, 1.0, lane, during, None, present)
+        else:
+            branches = read_branches(memory, slot, present)
+            after, slopes = step(state, 1.0, lane, during, branches, present)
+            gaps = gaps_at(state, lane, during.begin, present)
+            gaps_after = gaps_at(after, lane, during.end, present)
+            suspect = step_may_leave(gaps, gaps_after, branches, present)
+            suspects |= suspect
+            memory[SUSPECT * STRIDE + slot] = 1.0 if suspect else 0.0
+            write_state(memory, BEFORE + STATE, slot, state, present)
+        write_state(memory, STATE, slot, after, present)
+        if present.tangent is not None:
+            tangent = read_state(memory, TANGENT, slot, present)
+            if present.resolved is not None:
+                write_state(memory, BEFORE + TANGENT, slot, tangent, present)
+            tangent = tangent_step(tangent, 1.0, lane, slopes, present)
+            write_state(memory, TANGENT, slot, tangent, present)
+    return suspects
+
+
+@scalar
+def split(block, table, number, recorded, outcome, present):
+    """Split the step of every lane that may have left a contact branch."""
+    memory, first, lanes = block
+    for slot in range(lanes):
+        if memory[SUSPECT * STRIDE + slot] == 0.0:
+            continue
+        index = first + slot
+        crossings, slowest, overflow = split_step(memory, slot, table, number, present)
+        outcome.overflows[index] += overflow
+        if recorded:
+            outcome.crossings[index] += crossings
+            outcome.slowest_crossing[index] = min(outcome.slowest_crossing[index], slowest)
+
+
+@scalar
+def scale_tangents(block, batch, steps_done, last):
+    """Scale tangent vectors whose turn it is to length 1, and keep the logarithm of their growth."""
+    memory, first, lanes = block
+    for slot in range(lanes):
+        index = first + slot
+        if steps_done % batch.steps_between_scalings[index] != 0 and not last:
+            continue
+        scale = batch.scales[index]
+        square = 0.0
+        for column in range(scale.shape[0]):
+            square += (memory[(TANGENT + column) * STRIDE + slot] * scale[column]) ** 2
+        length = math.sqrt(square)
+        for column in range(scale.shape[0]):
+            memory[(TANGENT + column) * STRIDE + slot] /= length
+        memory[GROWTH * STRIDE + slot] += math.log(length)
+
+
+@scalar
+def end_period(block, batch, period, plan, outcome, present):
+    """Write section and growth of every lane, and stop those that have diverged."""
+    memory, first, lanes = block
+    recorded = period - plan.transient_periods
+    point = recorded - plan.recorded_periods + plan.section_points
+    for slot in range(lanes):
+        index = first + slot
+        if outcome.status[index] != _OK:
+            continue
+        sound = within_range(memory, slot, batch.scales[index])
+        if present.tangent is not None:
+            sound = sound and math.isfinite(memory[GROWTH * STRIDE + slot])
+        if not sound:
+            outcome.status[index] = _DIVERGED
+            outcome.diverged_period[index] = period
+            for row in range(COEFFICIENTS):
+                memory[row * STRIDE + slot] = math.nan
+            continue
+        if point >= 0:
+            write_columns(memory, STATE, slot, batch.scales[index], outcome.section[index, point])
+        if present.tangent is not None:
+            if recorded >= 0:
+                outcome.growth[index, recorded] = memory[GROWTH * STRIDE + slot]
+            memory[GROWTH * STRIDE + slot] = 0.0
+
+
+@scalar
+def end(block, batch, plan, outcome):
+    """Write the last state and tangent vector of every lane."""
+    memory, first, lanes = block
+    for slot in range(lanes):
+        index = first + slot
+        scale = batch.scales[index]
+        write_columns(memory, STATE, slot, scale, outcome.end_state[index])
+        write_columns(memory, TANGENT, slot, scale, outcome.end_tangent[index])
+    if plan.history_periods > 0:
+        keep_state(block, batch, outcome.history, plan.history_periods * plan.steps_per_period)
+
+
+@scalar
+def keep_state(block, batch, history, sample):
+    """Write the state of every lane into one sample of its history."""
+    memory, first, lanes = block
+    for slot in range(lanes):
+        index = first + slot
+        write_columns(memory, STATE, slot, batch.scales[index], history[index, sample])
+
+
+@scalar
+def write_columns(memory, row, slot, scale, target):
+    """Write a state or tangent vector in the units of eq. 13."""
+    for column in range(scale.shape[0]):
+        target[column] = memory[(row + column) * STRIDE + slot] * scale[column]
+
+
+@scalar
+def within_range(memory, slot, scale):
+    """Tell whether every state of a lane is a number of sensible size."""
+    for column in range(scale.shape[0]):
+        if not abs(memory[(STATE + column) * STRIDE + slot] * scale[column]) < LARGEST_STATE:
+            return False
+    return True

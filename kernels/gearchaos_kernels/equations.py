@@ -1,0 +1,161 @@
+"""Equations of motion of one lane (Pan 2021, eq. 13) and their linearisation, as plain formulas.
+
+Everything is in the scaled coordinates of `block_memory`, displacements dimensionless and rates,
+accelerations and forces per step and per step squared. There (with q = approach of the two gears)::
+
+    gap_y = q - e,            y_1 = cos(beta_b) gap_y
+    gap_z = p - gap_y - 2 e,  y_2 = sin(beta_b) gap_z,   p = mu_p axial_p + mu_g axial_g
+
+for the published formulation; the rederived one multiplies the first e by 1 - 1/cos(beta_b) and
+leaves the second line as it is. The clearance of both directions is then the same half backlash.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from gearchaos_kernels.block_memory import Coordinates
+from gearchaos_kernels.compilation import scalar
+
+
+class Gaps(NamedTuple):
+    """y_1 over cos(beta_b), y_2 over sin(beta_b), and their rates; 0 without axial pair."""
+
+    tangential: float
+    tangential_rate: float
+    axial: float
+    axial_rate: float
+
+
+class Directions(NamedTuple):
+    """A force or a stiffness of the mesh in its two directions."""
+
+    tangential: float
+    axial: float
+
+
+@scalar
+def approach(values, lane, present):
+    """Return delta_1 - delta_2 + delta_5 (eq. 6) over cos(beta_b), or its rate from rates."""
+    if present.transverse is None:
+        return values.torsion
+    return (
+        values.torsion
+        + lane.mass_ratio_p * values.transverse_p
+        + (lane.mass_ratio_g * values.transverse_g)
+    )
+
+
+@scalar
+def axial_approach(values, lane):
+    """Return delta_3 - delta_4 (eq. 7) over sin(beta_b), or its rate from rates."""
+    return lane.mass_ratio_p * values.axial_p + lane.mass_ratio_g * values.axial_g
+
+
+@scalar
+def gaps_at(state, lane, forcing, present):
+    """Return the gaps of eqs 6 and 7 and their rates."""
+    gap = approach(state.position, lane, present) - forcing.error
+    rate = approach(state.rate, lane, present) - forcing.error_rate
+    if present.axial is None:
+        return Gaps(gap, rate, 0.0, 0.0)
+    return Gaps(
+        gap,
+        rate,
+        axial_approach(state.position, lane) - gap - forcing.axial_error,
+        axial_approach(state.rate, lane) - forcing.axial_error_rate - rate,
+    )
+
+
+@scalar
+def clearance_force(gap, rate, stiffness, damping, half_backlash, present):
+    """Return the mesh force (eqs 2, 4) and the stiffness of its active branch (eqs 22, 23)."""
+    if present.backlash is None:
+        return stiffness * gap + damping * rate, stiffness
+    deflection = gap - min(max(gap, -half_backlash), half_backlash)
+    slope = stiffness if deflection != 0.0 else 0.0
+    return stiffness * deflection + damping * rate, slope
+
+
+@scalar
+def branch_force(gap, rate, stiffness, damping, branch):
+    """Return the mesh force and its stiffness on one linear piece of the clearance function."""
+    deflection = branch.engaged * gap - branch.offset
+    return stiffness * deflection + damping * rate, stiffness * branch.engaged
+
+
+@scalar
+def mesh_forces(gaps, lane, stiffness, branches, present):
+    """Return N_y and N_z of eq. 13, and their slopes d(force)/d(gap).
+
+    Without ``branches`` the clearance function itself is evaluated.
+    """
+    damping = lane.mesh_damping
+    stiffness_z = lane.axial_share * stiffness
+    damping_z = lane.axial_share * damping
+    force_z = 0.0
+    slope_z = 0.0
+    if branches is None:
+        b = lane.half_backlash
+        force_y, slope_y = clearance_force(
+            gaps.tangential, gaps.tangential_rate, stiffness, damping, b, present
+        )
+        if present.axial is not None:
+            force_z, slope_z = clearance_force(
+                gaps.axial, gaps.axial_rate, stiffness_z, damping_z, b, present
+            )
+    else:
+        force_y, slope_y = branch_force(
+            gaps.tangential, gaps.tangential_rate, stiffness, damping, branches.tangential
+        )
+        if present.axial is not None:
+            force_z, slope_z = branch_force(
+                gaps.axial, gaps.axial_rate, stiffness_z, damping_z, branches.axial
+            )
+    return Directions(force_y, force_z), Directions(slope_y, slope_z)
+
+
+@scalar
+def tangent_forces(tangent, lane, slopes, present):
+    """Return what a tangent vector adds to the mesh forces on branches of the given slopes.
+
+    The field is continuous across a clearance boundary, so the variational equation needs no jump
+    matrix there: its Jacobian is that of the active branch.
+    """
+    gap = approach(tangent.position, lane, present)
+    rate = approach(tangent.rate, lane, present)
+    force_z = 0.0
+    if present.axial is not None:
+        force_z = slopes.axial * (axial_approach(tangent.position, lane) - gap) + (
+            lane.axial_share * lane.mesh_damping
+        ) * (axial_approach(tangent.rate, lane) - rate)
+    return Directions(slopes.tangential * gap + lane.mesh_damping * rate, force_z)
+
+
+@scalar
+def accelerations(state, forces, drive, lane, present):
+    """Return the rows of eq. 13: what mesh forces, drive and bearings make of a state."""
+    y, w = state
+    transverse_p = 0.0
+    transverse_g = 0.0
+    axial_p = 0.0
+    axial_g = 0.0
+    # The mesh force comes last in each row: it is known last.
+    if present.transverse is not None:
+        transverse_p = (
+            -lane.transverse_damping_p * w.transverse_p
+            - lane.transverse_stiffness_p * y.transverse_p
+        ) - forces.tangential
+        transverse_g = (
+            -lane.transverse_damping_g * w.transverse_g
+            - lane.transverse_stiffness_g * y.transverse_g
+        ) - forces.tangential
+    if present.axial is not None:
+        axial_p = (
+            -lane.axial_damping_p * w.axial_p - lane.axial_stiffness_p * y.axial_p
+        ) - forces.axial
+        axial_g = (
+            -lane.axial_damping_g * w.axial_g - lane.axial_stiffness_g * y.axial_g
+        ) - forces.axial
+    torsion = drive - forces.tangential
+    return Coordinates(torsion, transverse_p, transverse_g, axial_p, axial_g)

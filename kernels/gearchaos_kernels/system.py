@@ -1,0 +1,165 @@
+"""What is integrated, how long, and what comes of it: the records that go in and out."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+STATES = (
+    "delta_5",
+    "delta_5_rate",
+    "delta_1",
+    "delta_1_rate",
+    "delta_2",
+    "delta_2_rate",
+    "delta_3",
+    "delta_3_rate",
+    "delta_4",
+    "delta_4_rate",
+)
+"""The states of eq. 13 of Pan 2021 in their one order; a scene has those of its effects."""
+
+
+class Effects(NamedTuple):
+    """Which effects act; what is off is absent from the compiled loop."""
+
+    pitch_error: bool = True
+    stiffness_variation: bool = True
+    backlash: bool = True
+    transverse: bool = True
+    axial: bool = True
+
+    @property
+    def states(self) -> tuple[str, ...]:
+        """The states that there are, in the order of `STATES`."""
+        present = np.repeat([True, self.transverse, self.axial], [2, 4, 4])
+        return tuple(name for name, there in zip(STATES, present, strict=True) if there)
+
+
+class Groups(NamedTuple):
+    """Dimensionless groups of eqs 8-13, each an array of shape (lanes,).
+
+    Angles are in radians. Groups of an effect that is off are ignored; 1 is a safe filling for the
+    mass ratios and 0 for everything else.
+    """
+
+    mesh_frequency: Floats
+    load: Floats
+    damping_ratio: Floats
+    base_helix_angle: Floats
+    half_backlash: Floats
+    error_mean: Floats
+    error_amplitude: Floats
+    error_phase: Floats
+    stiffness_variation_scale: Floats
+    mass_ratio_p: Floats
+    mass_ratio_g: Floats
+    transverse_stiffness_p: Floats
+    transverse_damping_p: Floats
+    transverse_stiffness_g: Floats
+    transverse_damping_g: Floats
+    axial_stiffness_p: Floats
+    axial_damping_p: Floats
+    axial_stiffness_g: Floats
+    axial_damping_g: Floats
+
+
+class System(NamedTuple):
+    """Everything that defines the right-hand side of eq. 13 for a batch of lanes.
+
+    ``stiffness_cosine`` and ``stiffness_sine``, shape (harmonics,), are the Fourier coefficients of
+    the mesh stiffness relative to its mean (eq. 19); ``rederived`` says whether delta_5 + e enters
+    the gaps, as eq. 1 gives, instead of delta_5 as eq. 6 is printed.
+    """
+
+    effects: Effects
+    groups: Groups
+    stiffness_cosine: Floats
+    stiffness_sine: Floats
+    rederived: bool = False
+
+    @property
+    def states(self) -> tuple[str, ...]:
+        """The states that there are, in the order of `STATES`."""
+        return self.effects.states
+
+    @property
+    def lanes(self) -> int:
+        """Number of lanes."""
+        return int(self.groups.mesh_frequency.size)
+
+    @property
+    def mesh_period(self) -> Floats:
+        """Duration of a mesh period in units of tau, shape (lanes,)."""
+        return 2.0 * np.pi / self.groups.mesh_frequency
+
+    def of(self, lanes: slice | NDArray[np.intp] | list[int]) -> System:
+        """Return the system of some lanes, in the order given."""
+        return self._replace(groups=Groups(*(group[lanes] for group in self.groups)))
+
+    def repeated(self, times: int) -> System:
+        """Return the system with every lane so many times in a row."""
+        return self.of(np.repeat(np.arange(self.lanes), times))
+
+
+class Plan(NamedTuple):
+    """How long and how finely a batch is integrated, and what is kept of it.
+
+    The section is kept at the end of the last ``section_points`` mesh periods. ``resolved`` splits
+    the steps that cross a clearance boundary; without it they are plain steps. Of the last
+    ``history_periods`` every step is kept.
+    """
+
+    steps_per_period: int
+    transient_periods: int
+    recorded_periods: int
+    section_points: int
+    tangent: bool = False
+    resolved: bool = True
+    history_periods: int = 0
+
+
+class Outcome(NamedTuple):
+    """What a batch yields; lanes first, states those of the system.
+
+    ``section`` (lanes, section points, states); ``growth`` (lanes, recorded periods): the
+    logarithm of the tangent vector's growth over each recorded period, None without tangent;
+    ``end_state``, ``end_tangent`` (lanes, states); ``status`` (lanes,) of `Status`;
+    ``diverged_period`` (lanes,): number of the period in which a lane diverged, or -1;
+    ``crossings`` (lanes,): clearance boundaries crossed in the recorded periods;
+    ``slowest_crossing`` (lanes,): smallest speed of y_1 or y_2 at one of them, or infinity;
+    ``overflows`` (lanes,): steps that crossed more often than they were split, in all periods;
+    these three stay as they began in scenes without backlash and with plain steps; ``history``
+    (lanes, history periods times steps + 1, states): the state at every step, or None.
+    """
+
+    section: Floats
+    growth: Floats | None
+    end_state: Floats
+    end_tangent: Floats
+    status: NDArray[np.uint8]
+    diverged_period: NDArray[np.int32]
+    crossings: NDArray[np.int64]
+    slowest_crossing: Floats
+    overflows: NDArray[np.int64]
+    history: Floats | None
+
+
+class MeshMotion(NamedTuple):
+    """Forces, contact and accelerations along a motion.
+
+    ``force_tangential``, ``force_axial`` (lanes, samples): N_y and N_z of eq. 13;
+    ``contact_tangential``, ``contact_axial`` (lanes, samples): 0 apart, 1 on the driving flank, 2
+    on the back flank; ``accelerations`` (lanes, samples, coordinates): delta_5'' and, where the
+    system has them, delta_1'' to delta_4''. Without an axial pair its force and contact are 0.
+    """
+
+    force_tangential: Floats
+    force_axial: Floats
+    contact_tangential: NDArray[np.uint8]
+    contact_axial: NDArray[np.uint8]
+    accelerations: Floats
