@@ -1,47 +1,29 @@
-"""The command that shows what is in a result file: ``python -m gearchaos.info RESULT.h5``."""
+"""Show what a result file holds: what was computed, with which parameters, how accurately, and on
+what. Only the file is read.
+
+--verify reads all of the file and tries every checksum in it. Exit codes: 0 the file is sound, 2
+the command line asks for what cannot be, 4 the file cannot be read, is damaged or is not ours.
+"""
 
 from __future__ import annotations
 
-import argparse
 import json
 import sys
-from collections.abc import Mapping, Sequence
-from functools import partial
+from argparse import ArgumentParser, Namespace
+from collections.abc import Mapping
 from typing import Any
 
-from gearchaos.command_line import OK, run_command, version_text
-
-NAME = "gearchaos info"
-
-DESCRIPTION = """\
-Show what a result file holds: what was computed, with which parameters, how accurately, and on
-what. Only the file is read."""
-
-EPILOG = """\
---verify reads all of the file and tries every checksum in it. Exit codes: 0 the file is sound, 2
-the command line asks for what cannot be, 4 the file cannot be read, is damaged or is not ours."""
+from gearchaos.command_line import OK, Command
 
 
-def main(argv: Sequence[str] | None = None) -> int:
-    """Run the command and return its exit code."""
-    return run_command(NAME, partial(_run, argv), writes=False)
-
-
-def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
-        prog=NAME, description=DESCRIPTION, epilog=EPILOG, allow_abbrev=False
-    )
+def _arguments(parser: ArgumentParser) -> None:
     add = parser.add_argument
     add("result", metavar="RESULT.h5", help="result file of a sweep")
     add("--verify", action="store_true", help="read everything and try every checksum")
     add("--json", action="store_true", help="write JSON for programs")
-    add("-q", "--quiet", action="store_true", help="say nothing on stderr unless something fails")
-    add("--version", action="version", version=version_text())
-    return parser
 
 
-def _run(argv: Sequence[str] | None) -> int:
-    options = _parser().parse_args(argv)
+def _info(options: Namespace) -> int:
     # Imported only now: --help and --version answer at once, and an interrupt is caught.
     from gearchaos.progress import notice
     from gearchaos.results.overview import overview
@@ -50,7 +32,7 @@ def _run(argv: Sequence[str] | None) -> int:
 
     verified: list[str] = []
     if options.verify:
-        with notice(f"{NAME}: reading all of {options.result}", options.quiet):
+        with notice(f"reading all of {options.result}"):
             verified = verify(options.result)
     summary = overview(options.result)
     if options.json:
@@ -101,6 +83,8 @@ def _write(text: str) -> None:
     encoding = getattr(sys.stdout, "encoding", None) or "utf-8"
     print(text.encode(encoding, "replace").decode(encoding))
 
+
+main = Command("info", __doc__, _arguments, _info, writes=False)
 
 if __name__ == "__main__":
     sys.exit(main())

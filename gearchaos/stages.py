@@ -1,4 +1,8 @@
-"""The command that lists the stages of a sweep: ``python -m gearchaos.stages RESULT.h5``."""
+"""List the stages of a sweep: stretches of the swept parameter in which the motion keeps its label.
+
+The table goes to stdout, everything else to stderr. Exit codes: 0 done, 2 the command line asks
+for what cannot be, 4 the file cannot be read, is damaged or holds no labels.
+"""
 
 from __future__ import annotations
 
@@ -7,10 +11,9 @@ import json
 import math
 import sys
 from collections.abc import Sequence
-from functools import partial
 from typing import TYPE_CHECKING, Any
 
-from gearchaos.command_line import OK, run_command, version_text
+from gearchaos.command_line import OK, Command
 from gearchaos.errors import ConfigurationError
 
 if TYPE_CHECKING:
@@ -19,25 +22,8 @@ if TYPE_CHECKING:
     from gearchaos.results.result import Result
     from gearchaos.results.stage_table import LabelledLanes, Stage
 
-NAME = "gearchaos stages"
 
-DESCRIPTION = """\
-List the stages of a sweep: stretches of the swept parameter in which the motion keeps its label."""
-
-EPILOG = """\
-The table goes to stdout, everything else to stderr. Exit codes: 0 done, 2 the command line asks
-for what cannot be, 4 the file cannot be read, is damaged or holds no labels."""
-
-
-def main(argv: Sequence[str] | None = None) -> int:
-    """Run the command and return its exit code."""
-    return run_command(NAME, partial(_run, argv))
-
-
-def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
-        prog=NAME, description=DESCRIPTION, epilog=EPILOG, allow_abbrev=False
-    )
+def _arguments(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument
     add("result", metavar="RESULT.h5", help="result file of a sweep")
     add(
@@ -63,10 +49,6 @@ def _parser() -> argparse.ArgumentParser:
         "be repeated (default: the first value of each but the first swept parameter)",
     )
     add("--json", action="store_true", help="print JSON instead of a table")
-    add("--threads", type=int, metavar="N", help="threads for --refine (default: all cores)")
-    add("-q", "--quiet", action="store_true", help="say nothing on stderr unless something fails")
-    add("--version", action="version", version=version_text())
-    return parser
 
 
 def _width(text: str) -> float:
@@ -79,8 +61,7 @@ def _width(text: str) -> float:
     return value
 
 
-def _run(argv: Sequence[str] | None) -> int:
-    options = _parser().parse_args(argv)
+def _stages(options: argparse.Namespace) -> int:
     from gearchaos.results.jumps import jumps
     from gearchaos.results.result import open_result
     from gearchaos.results.stage_table import (
@@ -142,7 +123,7 @@ def _refined(result: Result, stages: list[Stage], options: argparse.Namespace) -
     from gearchaos.progress import notice
 
     config = refinable(result, options.result)
-    with notice(COMPILING, options.quiet):
+    with notice(COMPILING):
         return refined_boundaries(config, result, stages, options.refine, options.threads)
 
 
@@ -238,6 +219,8 @@ def _facts(stages: Sequence[Stage], boundaries: Sequence[Boundary] | None) -> di
 def _number(value: float) -> float | None:
     return value if math.isfinite(value) else None
 
+
+main = Command("stages", __doc__, _arguments, _stages, common=("threads",))
 
 if __name__ == "__main__":
     sys.exit(main())

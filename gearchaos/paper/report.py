@@ -9,7 +9,6 @@ from string import Template
 
 import numpy as np
 
-from gearchaos.command_line import software_version
 from gearchaos.figures.response_lane import coordinates_of
 from gearchaos.paper.comparison import NONE, Comparison, Section
 from gearchaos.paper.computation import Reproduction, largest_acceleration
@@ -23,6 +22,7 @@ from gearchaos.paper.gallery import Picture, pictures
 from gearchaos.paper.our_numbers import our_numbers, pair_of
 from gearchaos.paper.published import CITATION, Published
 from gearchaos.paper.verdict import OVERLAP, RULES, Verdict
+from gearchaos.version import software_version
 
 TOLERANCE_UM = 11.0
 """Single pitch deviation of the driving gear in grade 7 (ISO 1328-1), in um."""
