@@ -60,7 +60,7 @@ def complete_already(simulation: Simulation, output: str) -> int | None:
         If the file is the result of another configuration.
     """
     from gearchaos.engine.store_filling import open_store
-    from gearchaos.results.completed import completed
+    from gearchaos.results.result_reader import completed
     from gearchaos.results.manifest import differing_keys, folder_of
 
     found = completed(output)

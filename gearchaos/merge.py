@@ -18,7 +18,7 @@ from gearchaos.finishing import complete_already, ending
 from gearchaos.progress import say
 
 if TYPE_CHECKING:
-    from gearchaos.results.block_store import Finished, ShardStore
+    from gearchaos.results.block_store import Finished, BlockStore
 
 MOST_NAMED = 10
 
@@ -32,7 +32,7 @@ def _arguments(parser: ArgumentParser) -> None:
 def _merge(options: Namespace) -> int:
     output: str = options.output
     from gearchaos.results.atomic_file import check_output
-    from gearchaos.results.completed import completed
+    from gearchaos.results.result_reader import completed
     from gearchaos.results.manifest import folder_of, stored_configuration
 
     finished_before = not options.overwrite and completed(output) is not None
@@ -67,7 +67,7 @@ def _merge(options: Namespace) -> int:
     return ending(simulation, tally.diverged)
 
 
-def _require_all(store: ShardStore, found: Finished) -> None:
+def _require_all(store: BlockStore, found: Finished) -> None:
     """Name the shards of which blocks are missing, as far as it is known how many there are."""
     from gearchaos.engine.sharding import shared_blocks
     from gearchaos.results.block_store import lanes_text, uncovered
@@ -76,9 +76,7 @@ def _require_all(store: ShardStore, found: Finished) -> None:
     if not gaps:
         return
     remedy = "go on with the sweep and --resume"
-    totals = {total for _, total in store.parts}
-    if len(totals) == 1:
-        (total,) = totals
+    if total := store.shards:
         blocks = enumerate(shared_blocks(store.lanes, total))
         lacking = {n % total + 1 for n, block in blocks if any(uncovered(block, found.bounds))}
         flags = ", ".join(f"--shard {number}/{total}" for number in sorted(lacking)[:MOST_NAMED])

@@ -49,11 +49,6 @@ class Shard(NamedTuple):
             )
         return shard
 
-    @property
-    def name(self) -> str:
-        """How files of this shard are called: ``2-of-8``."""
-        return f"{self.number}-of-{self.of}"
-
     def blocks(self, lanes: int) -> list[Bounds]:
         """Return the bounds of this shard's blocks of a sweep of so many lanes."""
         return shared_blocks(lanes, self.of)[self.number - 1 :: self.of]

@@ -11,13 +11,13 @@ from gearchaos.engine.executors import BlockExecutor, LocalExecutor, compute_blo
 from gearchaos.engine.sharding import Shard, shared_block_lanes
 from gearchaos.engine.simulation import Arrays, Bounds, Simulation
 from gearchaos.progress import Progress, complain
-from gearchaos.results.block_store import ShardStore
+from gearchaos.results.block_store import BlockStore
 
 
 def open_store(
     simulation: Simulation, output: str, *, resume: bool, shard: Shard | None = None
-) -> ShardStore:
-    """Open the store of a sweep whose number of steps has been chosen, see `ShardStore`.
+) -> BlockStore:
+    """Open the store of a sweep whose number of steps has been chosen, see `BlockStore`.
 
     Parameters
     ----------
@@ -29,21 +29,19 @@ def open_store(
     shard : Shard, optional
         The blocks that this process computes; by default all.
     """
-    return ShardStore(
+    return BlockStore(
         output,
         simulation.variables,
-        simulation.lanes,
         simulation.config.resolved_toml(),
-        axis=simulation.axis,
         text=simulation.config.text,
         resume=resume,
-        part=shard and shard.name,
         blocks=shard and shard.blocks(simulation.lanes),
+        shards=shard and shard.of,
     )
 
 
 def fill(
-    simulation: Simulation, store: ShardStore, cluster: str | None
+    simulation: Simulation, store: BlockStore, cluster: str | None
 ) -> tuple[Tally, dict[str, int]]:
     """Compute the blocks that are missing, and keep each of them as soon as it is there.
 
@@ -51,7 +49,7 @@ def fill(
     ----------
     simulation : Simulation
         Compiled, unless a cluster computes; its number of steps has been chosen.
-    store : ShardStore
+    store : BlockStore
         With what is finished already.
     cluster : str or None
         Where dask workers are, see `DaskExecutor`; None computes in this process.

@@ -48,9 +48,9 @@ class Parameter:
     ----------
     value : float or ndarray
     origin : str
-        ``"given"``, ``"derived"``, ``"default"`` or ``"swept"`` (differs from lane to lane).
+        One of `ORIGINS`; ``"swept"`` differs from lane to lane.
     units, long_name, symbol : str
-        Unit, wording and mathtext symbol.
+        As of a variable.
     dims : tuple of str
         Dimensions of the value: none, ``harmonic``, or the axes along which it differs.
 
