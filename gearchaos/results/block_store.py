@@ -154,7 +154,7 @@ class BlockStore:
     def finished(
         self, visit: Callable[[Mapping[str, NDArray[Any]]], None] | None = None
     ) -> Finished:
-        """Verify one's own blocks that are there; `visit` gets the arrays of those that are sound."""
+        """Verify one's own blocks that are there; `visit` gets the arrays of each sound one."""
         bounds: list[Bounds] = []
         problems: list[str] = []
         for first, last in self._own_blocks():
@@ -171,10 +171,7 @@ class BlockStore:
         return Finished(bounds, problems)
 
     def missing(self, bounds: Sequence[Bounds], block: int) -> list[Bounds]:
-        """List blocks of at most so many lanes that cover what the given bounds leave out.
-
-        The blocks of a shard are small enough as they are; lanes of other shards do not miss.
-        """
+        """List own blocks of at most so many lanes that cover what the given bounds leave out."""
         return [
             (start, min(start + block, last))
             for own in self._blocks
@@ -205,7 +202,7 @@ class BlockStore:
         parameters, metadata, overwrite
             As for `write_result`.
         found : Finished, optional
-            What `finished` has just given; by default it is asked.
+            What `finished` has just given.
 
         Raises
         ------

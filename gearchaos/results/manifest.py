@@ -58,13 +58,7 @@ class Manifest:
                 raise
 
     def compare(self) -> None:
-        """Make sure that the folder belongs to this sweep.
-
-        Raises
-        ------
-        FileError
-            If it does not; the message names the keys that differ.
-        """
+        """Raise a FileError that names the keys that differ if the folder is of another sweep."""
         earlier = read_manifest(self._folder)
         keys = differing_keys(earlier["configuration"], self._decisive["configuration"])
         keys = keys or [key for key in self._decisive if self._decisive[key] != earlier.get(key)]
@@ -84,10 +78,7 @@ def folder_of(output: str | os.PathLike[str]) -> Path:
 def stored_configuration(output: str | os.PathLike[str]) -> tuple[str, str]:
     """Return the configuration of the blocks beside an output: resolved, and as it was written.
 
-    Raises
-    ------
-    FileError
-        If there are no blocks, or if what describes them is damaged.
+    Raises FileError if there are no blocks, or if what describes them is damaged.
     """
     folder = folder_of(output)
     if not folder.is_dir():
@@ -109,13 +100,7 @@ def differing_keys(one: str, other: str) -> list[str]:
 
 
 def read_manifest(folder: Path) -> dict[str, Any]:
-    """Read the manifest of a folder.
-
-    Raises
-    ------
-    FileError
-        If it is missing, damaged or of another major version of the format.
-    """
+    """Read the manifest of a folder; FileError if there is none, or none of this version."""
     path = folder / MANIFEST
     try:
         manifest: dict[str, Any] = json.loads(unlinked_content(path, _LARGEST))

@@ -60,8 +60,7 @@ def damaged_pieces(path: str | os.PathLike[str]) -> Iterator[str]:
 
 
 def _unreadable(dataset: h5py.Dataset) -> Iterator[str]:
-    pieces = dataset.iter_chunks() if dataset.chunks else [()]
-    for piece in pieces:
+    for piece in dataset.iter_chunks() if dataset.chunks else [()]:
         try:
             dataset[piece]
         except OSError:
