@@ -132,13 +132,15 @@ class BlockStore:
         self._lock.release()
 
     def remove(self) -> None:
-        """Remove the blocks, and the folder if nothing else is in it."""
+        """Remove the blocks, the folder if nothing else is in it, and let go of the lock."""
         # Only what the store has made: the folder may hold files of the user.
         for name in [*self._names(), MANIFEST, LOCK]:
             with suppress(OSError):
                 (self.folder / name).unlink()
         with suppress(OSError):
             self.folder.rmdir()
+        # What comes to be there from now on is another sweep's.
+        self._lock.release()
 
     @property
     def own_lanes(self) -> int:

@@ -502,3 +502,17 @@ def test_several_axes_become_one_file_from_blocks_that_cut_them(output: Path) ->
     assert result["status"].shape == (4, 5, 5)
     for name, values in DATA.items():
         np.testing.assert_array_equal(result.lanes(name), values)
+
+
+def test_what_was_merged_leaves_the_next_sweep_alone(output: Path) -> None:
+    with open_store(output) as store:
+        fill(store)
+        store.merge(PARAMETERS, {})
+        following = open_store(output)
+    assert following.folder.is_dir()
+    with pytest.raises(FileError, match="another sweep is writing to it"):
+        open_store(output)
+    fill(following)
+    following.close()
+    with open_store(output, resume=True) as store:
+        assert store.finished().bounds == BLOCKS

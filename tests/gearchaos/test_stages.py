@@ -225,10 +225,14 @@ def test_a_slice_that_there_is_not_is_refused(tmp_path, at, words):
 
 
 @pytest.mark.slow
-def test_a_slice_of_several_starts_is_refined_from_its_own_start(tmp_path):
-    where = [f"sweep={{parameter='pitch_error', values={[10.2, 10.3]}}}", "start.count=2"]
+def test_a_slice_of_two_parameters_is_refined_where_it_was_taken(tmp_path):
+    damping = 0.025819888974716113  # That of the file.
+    where = [
+        "sweep={parameter='pitch_error', values=[10.2, 10.3]}",
+        f"second_sweep={{parameter='damping_ratio', values={[damping, 2.0 * damping]}}}",
+    ]
     gearchaos.run(gearchaos.load_config(PAN2021, where)).save(tmp_path / "several.h5")
-    facts = listed(tmp_path, "--at", "start=1", "--refine", "0.002")
-    assert facts["slice"]["start"] == {"value": 1.0, "number": 2, "of": 2}
+    facts = listed(tmp_path, "--at", f"damping_ratio={damping}", "--refine", "0.002")
+    assert facts["slice"]["damping_ratio"] == {"value": damping, "number": 1, "of": 2}
     (boundary,) = facts["boundaries"]
     assert boundary["below"] <= 10.268 <= boundary["above"]
