@@ -61,19 +61,11 @@ def _settings(metadata: Mapping[str, Any]) -> dict[str, list[str]]:
         )
     except ConfigurationError:  # Not ours to judge here: the numbers are there all the same.
         return {}
-    origins: dict[str, list[str]] = {
-        "as written": [],
-        "set for this run": [],
-        "by default": [],
-    }
+    origins: dict[str, list[str]] = {"as written": [], "set for this run": [], "by default": []}
     for key, value in resolved.items():
-        origin = (
-            "set for this run"
-            if by_itself.get(key) != value
-            else "as written"
-            if key in written
-            else "by default"
-        )
+        origin = "as written" if key in written else "by default"
+        if by_itself.get(key) != value:
+            origin = "set for this run"
         origins[origin].append(f"{key} = {shown(value)}")
     return {origin: keys for origin, keys in origins.items() if keys}
 

@@ -63,6 +63,7 @@ def _width(text: str) -> float:
 
 def _stages(options: argparse.Namespace) -> int:
     from gearchaos.results.jumps import jumps
+    from gearchaos.results.overview import finite
     from gearchaos.results.result import open_result
     from gearchaos.results.stage_table import (
         labelled_lanes,
@@ -85,7 +86,7 @@ def _stages(options: argparse.Namespace) -> int:
     if options.json:
         facts = {"parameter": result.axis, "slice": where, **_facts(stages, boundaries)}
         facts["jumps"] = [jump._asdict() for jump in found]
-        print(json.dumps(facts, indent=1, allow_nan=False))
+        print(json.dumps(finite(facts), indent=1, allow_nan=False))
     else:
         print("\n".join(table(result.axis, stages, slice_lines(where))))
         for lines in (remarks(found, lanes), boundary_list(boundaries or ())):
@@ -194,8 +195,8 @@ def _facts(stages: Sequence[Stage], boundaries: Sequence[Boundary] | None) -> di
                 "period": stage.period,
                 "lanes": stage.lanes,
                 "narrower_stages": stage.narrower,
-                "lowest_exponent": _number(stage.lowest_exponent),
-                "highest_exponent": _number(stage.highest_exponent),
+                "lowest_exponent": stage.lowest_exponent,
+                "highest_exponent": stage.highest_exponent,
             }
             for stage in stages
         ],
@@ -208,16 +209,12 @@ def _facts(stages: Sequence[Stage], boundaries: Sequence[Boundary] | None) -> di
                 "motion_below": boundary.label_below,
                 "motion_above": boundary.label_above,
                 "loss_of_stability": boundary.loss or None,
-                "multiplier_real": _number(boundary.multiplier.real),
-                "multiplier_imaginary": _number(boundary.multiplier.imag),
+                "multiplier_real": boundary.multiplier.real,
+                "multiplier_imaginary": boundary.multiplier.imag,
             }
             for boundary in boundaries
         ]
     return facts
-
-
-def _number(value: float) -> float | None:
-    return value if math.isfinite(value) else None
 
 
 main = Command("stages", __doc__, _arguments, _stages, common=("threads",))

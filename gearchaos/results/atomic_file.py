@@ -58,13 +58,6 @@ def writing(path: str | os.PathLike[str]) -> Iterator[None]:
 def check_output(path: str | os.PathLike[str], overwrite: bool = False) -> None:
     """Make sure that a file can be written, before anything is computed for it.
 
-    Parameters
-    ----------
-    path : path
-        The file to be; nothing is left behind beside it.
-    overwrite : bool
-        Whether the file may exist.
-
     Raises
     ------
     FileError
@@ -124,7 +117,9 @@ def replacing(
                 partial.replace(target)
             else:
                 _rename_to_new(partial, target)
-            _synchronise_folder(target.parent)
+            # Not every system can do this to a folder; the file itself is on the disk by now.
+            with suppress(OSError):
+                _synchronise(target.parent)
         except FileExistsError as error:
             raise _exists(path) from error
         finally:
@@ -185,9 +180,3 @@ def _synchronise(path: Path) -> None:
         os.fsync(descriptor)
     finally:
         os.close(descriptor)
-
-
-def _synchronise_folder(path: Path) -> None:
-    # Not every system can do this; the file itself is on the disk by now.
-    with suppress(OSError):
-        _synchronise(path)

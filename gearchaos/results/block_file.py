@@ -40,36 +40,25 @@ class BlockFormat:
     def write(self, path: Path, first: int, last: int, arrays: Mapping[str, NDArray[Any]]) -> None:
         """Write the lanes first to last - 1; the file appears complete or not at all.
 
-        Raises
-        ------
-        FileError
-            If the file cannot be written.
-        ValueError
-            If an array has another shape than its variable says.
+        Raises FileError if it cannot be written, ValueError if an array has a wrong shape.
         """
         records = np.empty(last - first, self.record)
         for name in self.record.names or ():
-            if np.shape(arrays[name]) != records[name].shape:
-                shape = np.shape(arrays[name])
+            if (shape := np.shape(arrays[name])) != records[name].shape:
                 raise ValueError(f"{name} of lanes {first} to {last - 1} has shape {shape}")
             records[name] = arrays[name]
         head = self._head(first, last)
-        digest = hashlib.sha256(head)
-        digest.update(records.data)
         with (
             replacing(path, overwrite=True, through_links=False) as partial,
             partial.open("wb") as file,
         ):
-            file.write(head + digest.digest())
+            file.write(head + _digest(head, records.data))
             file.write(records.data)
 
     def read(self, path: Path, first: int, last: int) -> dict[str, NDArray[Any]]:
         """Give the arrays of the lanes first to last - 1, verified.
 
-        Raises
-        ------
-        FileError
-            If the file is missing or damaged, or belongs to other lanes or another sweep.
+        Raises FileError if the file is missing, damaged or of other lanes or another sweep.
         """
         if not 0 <= first < last <= self.lanes:
             raise FileError(f"{path}: its lanes are none of the {self.lanes} of this sweep")
@@ -85,19 +74,18 @@ class BlockFormat:
             raise FileError(f"{path}: has not the {size} bytes of its lanes")
         if content[: len(head)] != head:
             raise FileError(f"{path}: belongs to another sweep or another version of the format")
-        digest = hashlib.sha256(head)
-        digest.update(content[start:])
-        if content[len(head) : start] != digest.digest():
+        if content[len(head) : start] != _digest(head, content[start:]):
             raise FileError(f"{path}: is damaged; its checksum does not fit")
         records = np.frombuffer(content[start:], self.record)
         return {name: records[name] for name in self.record.names or ()}
 
     def _head(self, first: int, last: int) -> bytes:
-        head = {
-            "schema": BLOCK_SCHEMA,
-            "schema_version": BLOCK_SCHEMA_VERSION,
-            "fingerprint": self.fingerprint,
-            "first": first,
-            "last": last,
-        }
-        return json.dumps(head).encode() + b"\n"
+        schema = {"schema": BLOCK_SCHEMA, "schema_version": BLOCK_SCHEMA_VERSION}
+        own = {"fingerprint": self.fingerprint, "first": first, "last": last}
+        return json.dumps(schema | own).encode() + b"\n"
+
+
+def _digest(head: bytes, records: memoryview) -> bytes:
+    digest = hashlib.sha256(head)
+    digest.update(records)
+    return digest.digest()

@@ -30,12 +30,8 @@ Bounds = tuple[int, int]
 class Finished(NamedTuple):
     """What `BlockStore.finished` has found.
 
-    Attributes
-    ----------
-    bounds : list of (first, last)
-        Blocks that are complete and verified, by lane, without overlap; last is exclusive.
-    problems : list of str
-        One sentence for each block that is bad and has to be computed again.
+    ``bounds``: of the blocks that are complete and verified, by lane, last exclusive, without
+    overlap; ``problems``: a sentence for each that is bad and has to be computed again.
     """
 
     bounds: list[Bounds]
@@ -99,8 +95,8 @@ class BlockStore:
                 if v.values is None
             ]
         ).newbyteorder("<")
-        beside = {"text": text, "shards": shards}
-        manifest = Manifest(self.folder, self.lanes, record, configuration, beside)
+        decisive = {"lanes": self.lanes, "variables": record.descr, "configuration": configuration}
+        manifest = Manifest(self.folder, decisive, {"text": text, "shards": shards})
         self._format = BlockFormat(manifest.fingerprint, self.lanes, record)
         self._blocks = [(0, self.lanes)] if blocks is None else list(blocks)
         self._lock = StoreLock(self.folder, self.output, shared=blocks is not None)
@@ -136,13 +132,15 @@ class BlockStore:
         self._lock.release()
 
     def remove(self) -> None:
-        """Remove the blocks, and the folder if nothing else is in it."""
+        """Remove the blocks, the folder if nothing else is in it, and let go of the lock."""
         # Only what the store has made: the folder may hold files of the user.
         for name in [*self._names(), MANIFEST, LOCK]:
             with suppress(OSError):
                 (self.folder / name).unlink()
         with suppress(OSError):
             self.folder.rmdir()
+        # What comes to be there from now on is another sweep's.
+        self._lock.release()
 
     @property
     def own_lanes(self) -> int:
@@ -153,18 +151,12 @@ class BlockStore:
     def shards(self) -> int | None:
         """Into how many shards whoever began divided the sweep; None for one process."""
         number = read_manifest(self.folder).get("shards")
-        return number if isinstance(number, int) and 0 < number <= self.lanes else None
+        return number if isinstance(number, int) and number > 0 else None
 
     def finished(
         self, visit: Callable[[Mapping[str, NDArray[Any]]], None] | None = None
     ) -> Finished:
-        """Verify one's own blocks that are there: schema, configuration, bounds, checksum.
-
-        Parameters
-        ----------
-        visit : callable, optional
-            Called with the arrays of each block that is sound.
-        """
+        """Verify one's own blocks that are there; `visit` gets the arrays of each sound one."""
         bounds: list[Bounds] = []
         problems: list[str] = []
         for first, last in self._own_blocks():
@@ -181,10 +173,7 @@ class BlockStore:
         return Finished(bounds, problems)
 
     def missing(self, bounds: Sequence[Bounds], block: int) -> list[Bounds]:
-        """List blocks of at most so many lanes that cover what the given bounds leave out.
-
-        The blocks of a shard are small enough as they are; lanes of other shards do not miss.
-        """
+        """List own blocks of at most so many lanes that cover what the given bounds leave out."""
         return [
             (start, min(start + block, last))
             for own in self._blocks
@@ -193,25 +182,11 @@ class BlockStore:
         ]
 
     def write(self, first: int, last: int, arrays: Mapping[str, NDArray[Any]]) -> None:
-        """Keep the lanes first to last - 1 of every variable that is computed.
-
-        Raises
-        ------
-        FileError
-            If the block cannot be written.
-        ValueError
-            If an array has another shape than the variables say.
-        """
+        """Keep the lanes first to last - 1 of every computed variable, see `BlockFormat.write`."""
         self._format.write(self._path(first, last), first, last, arrays)
 
     def read(self, first: int, last: int) -> dict[str, NDArray[Any]]:
-        """Give the arrays of one block, verified.
-
-        Raises
-        ------
-        FileError
-            If the block is missing or damaged, or belongs to another sweep.
-        """
+        """Give the arrays of one block, verified, see `BlockFormat.read`."""
         return self._format.read(self._path(first, last), first, last)
 
     def merge(
@@ -229,12 +204,7 @@ class BlockStore:
         parameters, metadata, overwrite
             As for `write_result`.
         found : Finished, optional
-            What `finished` has just given; by default it is asked.
-
-        Returns
-        -------
-        Path
-            The result file.
+            What `finished` has just given.
 
         Raises
         ------

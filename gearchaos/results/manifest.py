@@ -10,8 +10,6 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from gearchaos.configuration.toml_text import flat_tables
 from gearchaos.errors import FileError
 from gearchaos.results.atomic_file import reason, replacing, unlinked_content
@@ -29,41 +27,25 @@ class Manifest:
     ----------
     folder : Path
         Where the manifest is.
-    lanes : int
-        Lanes of the sweep.
-    record : numpy.dtype
-        What every lane has, see `BlockFormat`.
-    configuration : str
-        The resolved configuration in TOML.
+    decisive : mapping
+        ``lanes``, ``variables`` and ``configuration``, the resolved one in TOML.
     beside : mapping
         What decides nothing: ``text``, the configuration as it was written, and ``shards``, into
         how many the sweep was divided by whoever began it.
     """
 
     def __init__(
-        self,
-        folder: Path,
-        lanes: int,
-        record: np.dtype[Any],
-        configuration: str,
-        beside: Mapping[str, str | int | None],
+        self, folder: Path, decisive: Mapping[str, Any], beside: Mapping[str, Any]
     ) -> None:
-        self._folder = folder
-        self._path = folder / MANIFEST
-        self._beside = beside
-        self._decisive = {
-            "schema": STORE_SCHEMA,
-            "schema_version": BLOCK_SCHEMA_VERSION,
-            "lanes": lanes,
-            "variables": record.descr,
-            "configuration": configuration,
-        }
+        self._folder, self._path, self._beside = folder, folder / MANIFEST, beside
+        versions = {"schema": STORE_SCHEMA, "schema_version": BLOCK_SCHEMA_VERSION}
+        # As it is read again: with lists for tuples.
+        self._decisive = json.loads(json.dumps({**versions, **decisive}))
 
     @property
     def fingerprint(self) -> str:
         """A hash of all that decides the numbers."""
-        text = json.dumps(self._decisive, sort_keys=True)
-        return hashlib.sha256(text.encode()).hexdigest()
+        return hashlib.sha256(json.dumps(self._decisive, sort_keys=True).encode()).hexdigest()
 
     def write(self, overwrite: bool = True) -> None:
         """Write the manifest; one that somebody else has just written may be left as it is."""
@@ -76,17 +58,10 @@ class Manifest:
                 raise
 
     def compare(self) -> None:
-        """Make sure that the folder belongs to this sweep.
-
-        Raises
-        ------
-        FileError
-            If it does not; the message names the keys that differ.
-        """
+        """Raise a FileError that names the keys that differ if the folder is of another sweep."""
         earlier = read_manifest(self._folder)
-        keys = differing_keys(earlier["configuration"], str(self._decisive["configuration"]))
-        own = json.loads(json.dumps(self._decisive))
-        keys = keys or [key for key in own if own[key] != earlier.get(key)]
+        keys = differing_keys(earlier["configuration"], self._decisive["configuration"])
+        keys = keys or [key for key in self._decisive if self._decisive[key] != earlier.get(key)]
         if keys:
             raise FileError(
                 f"{self._folder}: holds blocks of another configuration, which differs in "
@@ -103,10 +78,7 @@ def folder_of(output: str | os.PathLike[str]) -> Path:
 def stored_configuration(output: str | os.PathLike[str]) -> tuple[str, str]:
     """Return the configuration of the blocks beside an output: resolved, and as it was written.
 
-    Raises
-    ------
-    FileError
-        If there are no blocks, or if what describes them is damaged.
+    Raises FileError if there are no blocks, or if what describes them is damaged.
     """
     folder = folder_of(output)
     if not folder.is_dir():
@@ -128,13 +100,7 @@ def differing_keys(one: str, other: str) -> list[str]:
 
 
 def read_manifest(folder: Path) -> dict[str, Any]:
-    """Read the manifest of a folder.
-
-    Raises
-    ------
-    FileError
-        If it is missing, damaged or of another major version of the format.
-    """
+    """Read the manifest of a folder; FileError if there is none, or none of this version."""
     path = folder / MANIFEST
     try:
         manifest: dict[str, Any] = json.loads(unlinked_content(path, _LARGEST))

@@ -27,11 +27,8 @@ def overview(path: str | os.PathLike[str]) -> dict[str, Any]:
     Returns
     -------
     dict
-        ``file``, ``bytes``, ``lanes``, ``axes`` by name (values, range, unit), ``metadata`` (root
-        attributes and texts), ``parameters`` by name, ``counts`` (lanes by each enumeration),
-        ``errors`` (measured ones: lanes, median, largest), ``step_choice`` (what was measured for
-        each candidate), ``slice`` and ``stages`` (those of the first slice along the swept
-        parameter) and ``variables`` by name. What is not finite is None.
+        Axes, parameters, counts and variables are by name; ``errors`` are the measured ones,
+        ``stages`` those of the first slice along the swept parameter. What is not finite is None.
 
     Raises
     ------
@@ -50,12 +47,7 @@ def overview(path: str | os.PathLike[str]) -> dict[str, Any]:
         "bytes": Path(path).stat().st_size,
         "lanes": math.prod(sizes[axis] for axis in axes),
         "axes": {
-            axis: {
-                "values": sizes[axis],
-                **_range(data[axis]),
-                "units": result.variables[axis].units,
-                "long_name": result.variables[axis].long_name,
-            }
+            axis: {"values": sizes[axis], **_range(data[axis]), **_wording(result.variables[axis])}
             for axis in axes
         },
         "metadata": metadata,
@@ -82,8 +74,7 @@ def overview(path: str | os.PathLike[str]) -> dict[str, Any]:
                 "dims": list(v.dims),
                 "shape": [sizes.get(dim) for dim in v.dims],
                 "dtype": v.dtype,
-                "units": v.units,
-                "long_name": v.long_name,
+                **_wording(v),
             }
             for v in variables
         },
@@ -109,8 +100,11 @@ def _parameter(parameter: Parameter) -> dict[str, Any]:
     # What differs from lane to lane may be a million numbers.
     along_axes = parameter.dims not in ((), (HARMONIC,))
     content = _range(value) if along_axes else {"value": value.tolist()}
-    wording = {"units": parameter.units, "long_name": parameter.long_name}
-    return {"origin": parameter.origin, **content, **wording}
+    return {"origin": parameter.origin, **content, **_wording(parameter)}
+
+
+def _wording(entry: Variable | Parameter) -> dict[str, str]:
+    return {"units": entry.units, "long_name": entry.long_name}
 
 
 def _counts(variable: Variable, values: NDArray[Any]) -> dict[str, int]:
@@ -122,11 +116,7 @@ def _spread(values: NDArray[Any]) -> dict[str, Any]:
     known = values[np.isfinite(values)]
     if known.size == 0:
         return {"lanes": 0, "median": None, "greatest": None}
-    return {
-        "lanes": known.size,
-        "median": float(np.median(known)),
-        "greatest": float(known.max()),
-    }
+    return {"lanes": known.size, "median": float(np.median(known)), "greatest": float(known.max())}
 
 
 def finite(value: Any) -> Any:

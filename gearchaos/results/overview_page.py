@@ -36,17 +36,7 @@ _ORIGINS = {
 def overview_page(
     overview: Mapping[str, Any], settings: Mapping[str, list[str]], verified: Iterable[str]
 ) -> str:
-    """Write an overview as text.
-
-    Parameters
-    ----------
-    overview : mapping
-        From `gearchaos.results.overview.overview`.
-    settings : mapping of str to list of str
-        Keys of the configuration with their values, by where they come from.
-    verified : iterable of str
-        What was verified.
-    """
+    """Write an overview as text, with the keys of the configuration by origin and what fits."""
     sections = {
         "": _file(overview),
         "Accuracy": _accuracy(overview),

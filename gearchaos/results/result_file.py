@@ -48,9 +48,9 @@ class Parameter:
     ----------
     value : float or ndarray
     origin : str
-        ``"given"``, ``"derived"``, ``"default"`` or ``"swept"`` (differs from lane to lane).
+        One of `ORIGINS`; ``"swept"`` differs from lane to lane.
     units, long_name, symbol : str
-        Unit, wording and mathtext symbol.
+        As of a variable.
     dims : tuple of str
         Dimensions of the value: none, ``harmonic``, or the axes along which it differs.
 
@@ -168,7 +168,7 @@ def _write_metadata(file: h5py.File, metadata: Metadata) -> None:
             file.attrs[name] = value
         elif name in TEXTS or len(value.encode("utf-8", "replace")) > _LONGEST_ATTRIBUTE:
             text = file.create_dataset(name, data=_plain(value), dtype=_STRING, track_order=True)
-            text.attrs.update({"units": "1", "long_name": TEXTS.get(name, name)})
+            _describe(text, {"units": "1", "long_name": TEXTS.get(name, name)})
         else:
             file.attrs[name] = _plain(value)
 
@@ -196,7 +196,7 @@ def _create(file: h5py.File, variable: Variable, shape: tuple[int, ...]) -> None
         dataset[...] = variable.values
     if variable.dims == (variable.name,):
         dataset.make_scale(variable.name)
-    dataset.attrs.update(variable.attributes)
+    _describe(dataset, variable.attributes)
     if variable.fill_value is not None:
         dataset.attrs["_FillValue"] = np.array([variable.fill_value], dtype=variable.dtype)
 
@@ -222,9 +222,13 @@ def _write_parameters(file: h5py.File, parameters: Mapping[str, Parameter]) -> N
         path, values = f"{PARAMETERS}/{name}", np.asarray(parameter.value, dtype=np.float64)
         dataset = file.create_dataset(path, data=values, track_order=True)
         _attach_scales(file, path, parameter.dims)
-        long_name = parameter.long_name or name
-        dataset.attrs.update({"units": parameter.units, "long_name": long_name})
-        dataset.attrs.update({"symbol": parameter.symbol, "origin": parameter.origin})
+        wording = {"units": parameter.units, "long_name": parameter.long_name or name}
+        _describe(dataset, {**wording, "symbol": parameter.symbol, "origin": parameter.origin})
+
+
+def _describe(dataset: h5py.Dataset, notes: Mapping[str, Any]) -> None:
+    for name, note in notes.items():
+        dataset.attrs[name] = _plain(note) if isinstance(note, str) else note
 
 
 def _plain(text: str) -> str:

@@ -48,7 +48,10 @@ _HIGHEST_COMPRESSION = 1100
 
 
 class _UnfitError(Exception):
-    """What is wrong with the file, in words; becomes a FileError."""
+    """What is wrong with the file, in words; becomes a FileError, by default with one remedy."""
+
+    def __init__(self, fault: str, remedy: str = "run the sweep again") -> None:
+        super().__init__(f"{fault}; {remedy}")
 
 
 def read_result(path: str | os.PathLike[str], *, rows: bool = True) -> Contents:
@@ -66,10 +69,8 @@ def read_result(path: str | os.PathLike[str], *, rows: bool = True) -> Contents:
 
     Returns
     -------
-    variables : list of Variable
-    data : dict of str to ndarray
-    parameters : dict of str to Parameter
-    metadata : dict of str to str, int or float
+    variables, data, parameters, metadata
+        As for `Result`.
 
     Raises
     ------
@@ -103,17 +104,7 @@ def read_result(path: str | os.PathLike[str], *, rows: bool = True) -> Contents:
 
 
 class Completed(NamedTuple):
-    """What a finished sweep has computed.
-
-    Attributes
-    ----------
-    configuration : str
-        The resolved configuration in TOML.
-    lanes : int
-        Lanes of the sweep.
-    diverged : int
-        Those of them that diverged.
-    """
+    """What a finished sweep has computed: resolved TOML, lanes, and how many of them diverged."""
 
     configuration: str
     lanes: int
@@ -184,23 +175,21 @@ def _read(file: h5py.File, rows: bool) -> Contents:
                 data[name] = _values(dataset)
             variables.append(_variable(dataset, dims))
     _check_variables(axes, {variable.name: variable for variable in variables}, data)
-    with suppress(ValueError):
-        fixed_coordinates(metadata)
-        return variables, data, _read_parameters(file, axes, sizes), metadata
-    raise _UnfitError("holds an attribute fixed without coordinates; run the sweep again")
+    fixed_coordinates(metadata)
+    return variables, data, _read_parameters(file, axes, sizes), metadata
 
 
 def _check_schema(metadata: Mapping[str, Any]) -> None:
     if metadata.get("schema") != SCHEMA:
         raise _UnfitError(
-            f'is not a gearchaos result: it lacks the attribute schema = "{SCHEMA}"; '
-            "give the name of a file that a sweep has written"
+            f'is not a gearchaos result: it lacks the attribute schema = "{SCHEMA}"',
+            "give the name of a file that a sweep has written",
         )
     version, own = str(metadata.get("schema_version", "")), SCHEMA_VERSION.split(".")[0]
     if version.split(".")[0] != own:
         raise _UnfitError(
-            f"has version {version!r} of the file format, of which this gearchaos reads {own}.x; "
-            "run the sweep again, or use the gearchaos that wrote it"
+            f"has version {version!r} of the file format, of which this gearchaos reads {own}.x",
+            "run the sweep again, or use the gearchaos that wrote it",
         )
 
 
@@ -209,9 +198,9 @@ def _check_variables(
 ) -> None:
     """Compare what a sweep must yield with what there is; more than that is welcome."""
     if not axes or len(set(axes)) < len(axes):
-        raise _UnfitError("does not name its axes, each once; run the sweep again")
+        raise _UnfitError("does not name its axes, each once")
     if STATE not in data:
-        raise _UnfitError(f"lacks the variable {STATE}; run the sweep again")
+        raise _UnfitError(f"lacks the variable {STATE}")
     types = {name: np.dtype("i4" if name == START else "f8") for name in axes}
     expected = sweep_variables(
         [Axis(name, "", "", "", np.zeros(1, dtype)) for name, dtype in types.items()],
@@ -228,27 +217,25 @@ def _check_variables(
     for due in expected:
         got = found.get(due.name)
         if got is None:
-            raise _UnfitError(f"lacks the variable {due.name}; run the sweep again")
+            raise _UnfitError(f"lacks the variable {due.name}")
         if (got.dims, got.dtype) != (due.dims, due.dtype):
             raise _UnfitError(
                 f"holds {due.name} as {got.dtype} over ({', '.join(got.dims)}), which should be "
-                f"{due.dtype} over ({', '.join(due.dims)}); run the sweep again"
+                f"{due.dtype} over ({', '.join(due.dims)})"
             )
     for name in axes:
         if not is_coordinate(data[name]):
-            raise _UnfitError(
-                f"holds values of {name} that do not ascend, each once; run the sweep again"
-            )
+            raise _UnfitError(f"holds values of {name} that do not ascend, each once")
     for name in {STATUS, "motion"} & found.keys():
         if data[name].max() >= max(1, len(found[name].flags)):
-            raise _UnfitError(f"holds a {name} without a meaning; run the sweep again")
+            raise _UnfitError(f"holds a {name} without a meaning")
 
 
 def _read_parameters(
     file: h5py.File, axes: tuple[str, ...], sizes: dict[str, int]
 ) -> dict[str, Parameter]:
     if not isinstance(_hard_linked(file, PARAMETERS), h5py.Group):
-        raise _UnfitError(f"lacks the group {PARAMETERS}; run the sweep again")
+        raise _UnfitError(f"lacks the group {PARAMETERS}")
     parameters = {}
     for name in file[PARAMETERS]:
         dataset = _dataset(file, f"{PARAMETERS}/{name}")
@@ -258,7 +245,7 @@ def _read_parameters(
         number = _DTYPES.get(dataset.dtype.str[1:]) == "float64"
         of_the_model = dims == (HARMONIC,) or dims == tuple(a for a in axes if a in dims)
         if not number or not of_the_model or origin not in ORIGINS:
-            raise _UnfitError(f"holds a parameter {name} that is none; run the sweep again")
+            raise _UnfitError(f"holds a parameter {name} that is none")
         values = dataset[()]
         value = values if dims else float(values)
         parameters[name] = Parameter(value, origin, **_wording(notes), dims=dims)
@@ -268,7 +255,7 @@ def _read_parameters(
 def _hard_linked(file: h5py.File, name: str) -> Any:
     # A soft or an external link could lead anywhere.
     if not isinstance(file.get(name, getlink=True), h5py.HardLink):
-        raise _UnfitError(f"holds no {name}, or a link in its place; run the sweep again")
+        raise _UnfitError(f"holds no {name}, or a link in its place")
     return file[name]
 
 
@@ -276,7 +263,7 @@ def _dataset(file: h5py.File, name: str) -> h5py.Dataset:
     """Open a dataset that lies in this file, is compressed in known ways and fits into it."""
     dataset = _hard_linked(file, name)
     if not isinstance(dataset, h5py.Dataset) or dataset.is_virtual or dataset.external:
-        raise _UnfitError(f"keeps {name} outside of itself or not as an array; run the sweep again")
+        raise _UnfitError(f"keeps {name} outside of itself or not as an array")
     known = {h5py.h5z.FILTER_DEFLATE, h5py.h5z.FILTER_SHUFFLE, h5py.h5z.FILTER_FLETCHER32}
     layout = dataset.id.get_create_plist()
     filters = {layout.get_filter(index)[0] for index in range(layout.get_nfilters())}
@@ -289,10 +276,7 @@ def _dataset(file: h5py.File, name: str) -> h5py.Dataset:
     if dataset.chunks and size > pieces * chunk:
         packed = 0
     if filters - known or chunk > _LARGEST_CHUNK or not 0 < size <= packed * stored:
-        raise _UnfitError(
-            f"declares {size} bytes for {name} that it does not hold in a known way; "
-            "run the sweep again"
-        )
+        raise _UnfitError(f"declares {size} bytes for {name} that it does not hold in a known way")
     return dataset
 
 
@@ -302,7 +286,7 @@ def _dims(file: h5py.File, dataset: h5py.Dataset, sizes: dict[str, int]) -> tupl
     for dim, size in zip(dataset.dims, dataset.shape, strict=True):
         scale = name if dataset.is_scale else dim[0].name.lstrip("/") if len(dim) == 1 else ""
         if scale not in file or sizes.setdefault(scale, size) != size:
-            raise _UnfitError(f"holds {name} with dimensions that do not fit; run the sweep again")
+            raise _UnfitError(f"holds {name} with dimensions that do not fit")
         dims.append(scale)
     return tuple(dims)
 
@@ -313,25 +297,20 @@ def _values(dataset: h5py.Dataset) -> NDArray[Any]:
         try:
             values: NDArray[Any] = dataset[...]
         except OSError as error:
-            raise _UnfitError(
-                f"is damaged in {dataset.name} ({reason(error)}); run the sweep again"
-            ) from error
+            raise _UnfitError(f"is damaged in {dataset.name} ({reason(error)})") from error
         return values.astype(kind, copy=False)
     words = dataset.asstr()[...]
     if max(map(len, words.flat)) > np.iinfo(np.uint8).max:
-        raise _UnfitError(f"holds no plain words in {dataset.name}; run the sweep again")
+        raise _UnfitError(f"holds no plain words in {dataset.name}")
     return np.asarray(words, dtype="str")
 
 
 def _dtype(dataset: h5py.Dataset) -> str:
     if h5py.check_string_dtype(dataset.dtype):
         return "str"
-    try:
-        return _DTYPES[dataset.dtype.str[1:]]
-    except KeyError:
-        raise _UnfitError(
-            f"holds {dataset.name} as {dataset.dtype}, which no variable is; run the sweep again"
-        ) from None
+    if dataset.dtype.str[1:] not in _DTYPES:
+        raise _UnfitError(f"holds {dataset.name} as {dataset.dtype}, which no variable is")
+    return _DTYPES[dataset.dtype.str[1:]]
 
 
 def _variable(dataset: h5py.Dataset, dims: tuple[str, ...]) -> Variable:

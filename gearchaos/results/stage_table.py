@@ -63,14 +63,7 @@ class _Stretch(NamedTuple):
 
 
 def labelled_lanes(result: Result, *, name: str = "the result") -> LabelledLanes:
-    """Take the labels out of a result with one axis.
-
-    Parameters
-    ----------
-    result : Result
-        A slice, where there are several axes.
-    name : str
-        What messages call the result.
+    """Take the labels out of a result with one axis, which messages call by a name.
 
     Raises
     ------
@@ -99,14 +92,9 @@ def labelled_lanes(result: Result, *, name: str = "the result") -> LabelledLanes
 
 
 def one_axis(result: Result, **coordinates: float) -> Result:
-    """Take the slice of a result along one swept parameter.
+    """Take the slice of a result along one swept parameter, at the coordinates nearest to these.
 
-    Parameters
-    ----------
-    result : Result
-    **coordinates : float
-        Where to take it, by the names of axes: at the nearest value. Other axes than that of a
-        diagram are fixed at their first value.
+    Other axes are fixed at their first value.
 
     Raises
     ------

@@ -22,16 +22,13 @@ class StoreLock:
     """A locked file in a folder that is made if need be; a killed process leaves it unlocked.
 
     A sweep that takes all blocks has the folder to itself. Shards share it among each other; two
-    that are the same do the same work and write the same bits.
-
-    Where the system has no such locks, two sweeps on one output are not noticed.
+    that are the same do the same work and write the same bits. Where the system has no such locks,
+    two sweeps on one output are not noticed.
 
     Parameters
     ----------
-    folder : Path
-        The folder of the blocks.
-    output : Path
-        The result file to be, for the message.
+    folder, output : Path
+        The folder of the blocks, and the result file to be, for the message.
     shared : bool
         Whether others may hold the lock as well.
 
@@ -43,7 +40,6 @@ class StoreLock:
 
     def __init__(self, folder: Path, output: Path, shared: bool = False) -> None:
         path = folder / LOCK
-        self._alone = not shared
         self._descriptor: int | None = None
         with writing(folder):
             while self._descriptor is None:
@@ -66,11 +62,11 @@ class StoreLock:
 
     def alone(self) -> bool:
         """Tell whether nobody else works in the folder, and keep it so."""
-        if self._descriptor is not None and not self._alone:
-            with suppress(BlockingIOError):
+        with suppress(BlockingIOError):
+            if self._descriptor is not None:
                 _lock(self._descriptor, shared=False)
-                self._alone = True
-        return self._descriptor is not None and self._alone
+                return True
+        return False
 
     def release(self) -> None:
         """Let other sweeps in."""

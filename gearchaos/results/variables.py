@@ -145,22 +145,15 @@ def sweep_variables(
     ----------
     axes : sequence of Axis
         Second swept parameter, first swept parameter, start; those that there are.
-    states : sequence of str
-        In the order of the scene's states.
-    section : sequence of str
-        States recorded once a mesh period.
+    states, section : sequence of str
+        Those of the scene, in its order, and those recorded at the section.
     section_points : int
         Mesh periods recorded.
-    lyapunov, exponents : bool
-        Whether the largest Lyapunov exponent, and whether all of them are computed.
-    crossings : bool
-        Whether steps are split at clearance boundaries, and their crossings counted.
-    check_meanings : sequence of str
-        Meanings of ``motion_changed`` where lanes are computed twice to measure their error.
-    motion_meanings : sequence of str
-        Meanings of ``motion`` where lanes are labelled.
-    status_meanings : sequence of str
-        Meanings of the lane status 0, 1, ...
+    lyapunov, exponents, crossings : bool
+        Whether the largest exponent, all exponents, and crossings of clearance boundaries are kept.
+    status_meanings, check_meanings, motion_meanings : sequence of str
+        Meanings of 0, 1, ... in ``status``, in ``motion_changed`` where lanes are computed twice
+        to measure their error, and in ``motion`` where lanes are labelled.
     """
     names = tuple(axis.name for axis in axes)
 
@@ -246,7 +239,7 @@ def step_choice_variables(
     steps : sequence of int
         Numbers of steps per period that were tried; the last one was taken.
     measured : mapping of str to sequence of float
-        ``section_error``, ``exponent_error``, ``changed_share`` and ``periodic_share`` of each.
+        Keys as below.
     """
     name = "candidate_steps"
     wording = {
@@ -256,16 +249,12 @@ def step_choice_variables(
         "periodic_share": "share of lanes that move periodically: errors are measured on these",
     }
     text = "steps per period that were tried before the sweep; the last number was taken"
-    coordinate = _coordinate(name, np.asarray(steps, dtype=np.int32), text, "$N$")
-    return [
-        coordinate,
-        *(
-            Variable(
-                f"candidate_{key}", (name,), "float64", "1", wording[key], values=np.array(values)
-            )
-            for key, values in measured.items()
-        ),
-    ]
+    variables = [_coordinate(name, np.asarray(steps, dtype=np.int32), text, "$N$")]
+    for key, row in measured.items():
+        values = np.asarray(row, dtype=np.float64)
+        key, text = f"candidate_{key}", wording[key]
+        variables.append(Variable(key, (name,), "float64", "1", text, values=values))
+    return variables
 
 
 def _coordinate(

@@ -4,6 +4,7 @@ import math
 import re
 import shutil
 import subprocess
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -140,7 +141,10 @@ def test_arrays_that_contradict_their_dimensions_are_refused(result: Result) -> 
 
 def test_texts_that_hdf5_cannot_hold_lose_nothing_else(tmp_path: Path) -> None:
     odd = make_result(title="a\0b\udc80c", note="x" * 70_000)
+    long_name = replace(odd.variables["status"], long_name="a\0b\udc80c")
+    odd.variables["status"] = long_name
     odd.save(tmp_path / "odd.h5")
+    assert open_result(tmp_path / "odd.h5").attributes("status")["long_name"] == "a\ufffdb?c"
     metadata = open_result(tmp_path / "odd.h5").metadata
     assert metadata["title"] == "a\ufffdb?c"
     assert metadata["note"] == "x" * 70_000

@@ -9,6 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gearchaos.errors import ConfigurationError, FileError
+from gearchaos.results.result import Result
 from gearchaos.results.stage_table import (
     LabelledLanes,
     Stage,
@@ -182,7 +183,8 @@ def test_the_other_parameter_can_be_listed_but_not_starts():
 
 
 def test_a_result_without_labels_has_no_stages():
-    result = result_over(AXES["one start"])
-    del result.variables["motion"], result._data["motion"]
+    full = result_over(AXES["one start"])
+    variables = [variable for name, variable in full.variables.items() if name != "motion"]
+    result = Result(full.axes, variables, {name: full[name] for name in full}, {}, {})
     with pytest.raises(FileError, match="holds no labels of the motion"):
         labelled_lanes(result)
