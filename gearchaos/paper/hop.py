@@ -132,8 +132,8 @@ def find_hop(
 
 
 def _over(config: Configuration, low: float, high: float, count: int) -> Configuration:
-    sweep = {"parameter": "pitch_error", "from": low, "to": high, "count": count}
-    return config.replace("sweep", sweep)
+    ends = {"from": low, "to": high, "count": count}
+    return config.replace("sweep", {"parameter": "pitch_error", **ends})
 
 
 def _section(result: Result) -> Floats:
