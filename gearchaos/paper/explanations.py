@@ -94,13 +94,10 @@ def hop_in_words(printed: Published, found: Reproduction) -> str:
 def increments_in_words(printed: Published, found: Reproduction) -> str:
     """Tell why the increments of figure 14 are even, and of what they are."""
     response, steps = found.response, printed.increments.pitch_errors
-    groups = found.response.parameters
-    omega, amplitude = (
-        float(groups[name].value) for name in ("mesh_frequency", "pitch_error_amplitude")
-    )
-    magnitude = [
-        float(np.max(np.abs(response["delta_5_acceleration"][lane_of(response, p)]))) for p in steps
-    ]
+    groups = [response.parameters[name] for name in ("mesh_frequency", "pitch_error_amplitude")]
+    omega, amplitude = (float(group.value) for group in groups)
+    motions = [response["delta_5_acceleration"][lane_of(response, p)] for p in steps]
+    magnitude = [float(np.max(np.abs(motion))) for motion in motions]
     grown = ", ".join(short(b - a) for a, b in pairwise(magnitude))
     apart = [p for p in steps if _largest_while_apart(response, lane_of(response, p))]
     if len(apart) < 2:
@@ -110,8 +107,7 @@ def increments_in_words(printed: Published, found: Reproduction) -> str:
         "and more falls into the time in which the teeth are apart. There δ<sub>5</sub>″ = "
         "f<sub>n</sub> + Ω² *P* e<sub>r</sub> sin Ωτ, but for damping: two e(τ) more add 2 Ω² "
         f"e<sub>r</sub> = {short(2.0 * omega**2 * amplitude)}, whatever the motion. The first "
-        "increment spans the "
-        'hop. This holds for the largest *signed* acceleration, as which "amplitude" is read; the '
+        'increment spans the hop. This holds for the largest *signed* acceleration, as which "amplitude" is read; the '
         f"largest magnitudes grow by {grown}, not at all as printed."
     )
 
