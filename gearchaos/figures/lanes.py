@@ -14,7 +14,6 @@ Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 Between = tuple[float | None, float | None]
 
-
 PAD = 0.05
 """What is added to either end of an axis of one value, in parts of the value."""
 

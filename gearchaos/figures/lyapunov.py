@@ -72,7 +72,6 @@ def lyapunov(
     reach = np.full(x.shape, np.nan)
     if ERROR_VARIABLE in result:
         reach = BAND_STANDARD_ERRORS * result.lanes(ERROR_VARIABLE)[lanes.numbers]
-    lower, upper = exponent - reach, exponent + reach
     several_starts = bool(np.any(np.diff(x) == 0.0))
     # Several starts may lie on different motions, which no line should join.
     alone = np.isfinite(exponent) if several_starts else _without_neighbours(exponent)
@@ -84,14 +83,15 @@ def lyapunov(
     )
     band = axes.fill_between(
         x,
-        np.where(alone, np.nan, lower),
-        np.where(alone, np.nan, upper),
+        joined - reach,
+        joined + reach,
         color=BLUE,
         alpha=0.35,
         linewidth=0.0,
         label="\N{PLUS-MINUS SIGN}2 standard errors",
     )
-    bars = axes.vlines(x[alone], lower[alone], upper[alone], colors=BLUE, lw=0.6, alpha=0.5)
+    ends = (exponent - reach)[alone], (exponent + reach)[alone]
+    bars = axes.vlines(x[alone], *ends, colors=BLUE, lw=0.6, alpha=0.5)
     line_style = "none" if several_starts and alone.any() else "-"
     (line,) = axes.plot(x, exponent, color=BLUE, linewidth=0.6, linestyle=line_style)
     (points,) = axes.plot(
@@ -113,7 +113,7 @@ def lyapunov(
         spread=np.nan_to_num(reach),
         hold_zero=True,
         full_range=full_range,
-        also=[band] if np.isfinite(lower).any() else [],
+        also=[band] if np.isfinite(exponent + reach).any() else [],
     )
     return LyapunovArtists(line, points, band, bars, positive, zero, *marks)
 

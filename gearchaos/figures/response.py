@@ -99,19 +99,17 @@ def poincare_section(axes: Axes, result: Result, lane: int, coordinate: str = CO
     Parameters and errors as for `phase_portrait`. The axes reach over at least a fifth of the phase
     portrait, so that the points of a periodic motion coincide.
     """
-    plane = _plane(coordinate)
-    x, y = (result.lanes(f"section_{name}")[lane] for name in plane)
-    limits = [
-        _limits(v, motion_of(result, lane, name)) for v, name in zip((x, y), plane, strict=True)
-    ]
-    places = np.round(
-        [(v - low) / (high - low) for v, (low, high) in zip((x, y), limits, strict=True)], 3
-    )
+    curve = np.array([motion_of(result, lane, name) for name in _plane(coordinate)])
+    section = np.array([result.lanes(f"section_{name}")[lane] for name in _plane(coordinate)])
+    reach = (0.5 + _MARGIN) * np.maximum(np.ptp(section, 1), _SMALLEST_SHARE * np.ptp(curve, 1))
+    reach[reach == 0.0] = 1.0
+    middle = (section.min(axis=1) + section.max(axis=1)) / 2.0
+    low, high = middle - reach, middle + reach
+    places = np.round((section.T - low) / (high - low), 3)
     # Few points are seen as such only if they are large.
-    markersize = np.clip(40.0 / np.unique(places, axis=1).shape[1], 1.5, 3.5)
-    points = _points(axes, x, y, float(markersize))
-    axes.set_xlim(limits[0])
-    axes.set_ylim(limits[1])
+    markersize = float(np.clip(40.0 / len(np.unique(places, axis=0)), 1.5, 3.5))
+    points = _points(axes, section[0], section[1], markersize)
+    axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
     _label_plane(axes, result, coordinate)
     return points
 
@@ -129,7 +127,8 @@ def amplitude_spectrum(
     """Draw the single-sided amplitude spectrum; a sine of amplitude A is a line of height A.
 
     A motion that repeats is transformed over as many of its periods as the record holds, so that
-    all its lines are those of the transform; any other one over the whole record.
+    all its lines are those of the transform; any other one over the whole record. Errors as for
+    `time_history`; each of the lines that are returned begins at the bottom of the axes.
 
     Parameters
     ----------
@@ -143,16 +142,6 @@ def amplitude_spectrum(
         ``"rectangular"``, exact for a motion that repeats, or ``"hann"``.
     logarithmic : bool
         Show five decades up to that of the highest line, instead of a linear scale.
-
-    Returns
-    -------
-    LineCollection
-        One segment per line, from the bottom of the axes to its height.
-
-    Raises
-    ------
-    FigureError
-        As `time_history`.
     """
     variable = variable or acceleration_of(COORDINATE)
     values, steps = motion_of(result, lane, variable), samples_per_period(result)
@@ -198,12 +187,6 @@ def _points(axes: Axes, x: Floats, y: Floats, markersize: float) -> Line2D:
         zorder=3,
     )
     return points
-
-
-def _limits(section: Floats, curve: Floats) -> tuple[float, float]:
-    reach = (0.5 + _MARGIN) * max(np.ptp(section), _SMALLEST_SHARE * np.ptp(curve)) or 1.0
-    middle = (section.min() + section.max()) / 2.0
-    return float(middle - reach), float(middle + reach)
 
 
 def _label_plane(axes: Axes, result: Result, coordinate: str) -> None:

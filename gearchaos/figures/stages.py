@@ -97,19 +97,11 @@ def shade_stages(
         if kind in drawn
     ]
     title = f"stages of start {result.fixed['start']:g}" if "start" in result.fixed else None
-    return StageArtists(stages, shades, _legend(axes, handles, title) if legend else None)
-
-
-def _kind(stage: Stage) -> str:
-    if stage.period > 2:
-        return "longer period"
-    return stage.label
-
-
-def _legend(axes: Axes, handles: list[Patch], title: str | None) -> Legend:
-    # Above the axes are the panel's letter and the marks of lanes that cannot be shown.
+    if not legend:
+        return StageArtists(stages, shades, None)
     assert axes.figure is not None
-    return axes.figure.legend(
+    # Above the axes are the panel's letter and the marks of lanes that cannot be shown.
+    names = axes.figure.legend(
         handles=handles,
         loc="outside lower center",
         ncols=len(handles),
@@ -117,3 +109,8 @@ def _legend(axes: Axes, handles: list[Patch], title: str | None) -> Legend:
         title_fontsize=SMALL_FONT_PT,
         **LEGEND,
     )
+    return StageArtists(stages, shades, names)
+
+
+def _kind(stage: Stage) -> str:
+    return "longer period" if stage.period > 2 else stage.label

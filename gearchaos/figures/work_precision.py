@@ -34,8 +34,7 @@ def work_precision(axes: Axes, modes: Mapping[str, Points]) -> list[Line2D]:
     lines = []
     for mode, points in modes.items():
         known = [point for point in points if np.isfinite(point[1]) and point[1] > 0.0]
-        seconds = [point[0] for point in known]
-        errors = [point[1] for point in known]
+        seconds, errors = ([point[column] for point in known] for column in (0, 1))
         lines += axes.plot(seconds, errors, label=mode, markersize=3, linewidth=0.8, **LOOKS[mode])
         # Labels of the two modes keep apart: above to the right, below to the left.
         offset, side = ((3, 3), "left") if mode == "plain" else ((-3, -7), "right")

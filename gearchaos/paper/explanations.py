@@ -69,27 +69,24 @@ def hop_in_words(printed: Published, found: Reproduction) -> str:
     rest = hop.changes.get("rest")
     texts = [
         "The hop is not a bifurcation at one pitch error. Two motions of period 1 coexist from "
-        f"*P* = {hop.first:.4f}, where the sweep downwards loses the one "
-        f"({falls}), to *P* = {hop.last:.4f}, where the sweep upwards loses the "
-        f"other ({rises}). At {paper:g} e(τ) the motion of the upward sweep "
-        f"crosses {upper:g} clearance boundaries per period, "
-        f"that of the downward sweep {lower:g}{parting}. Which of the two "
-        "a computation shows depends on its start state, "
-        "which the paper does not give: "
-        f"{'; '.join(starts)}. The paper's {paper:g} lies {place}. That a "
-        "start at rest puts the hop near it is why it was chosen.",
+        f"*P* = {hop.first:.4f}, where the sweep downwards loses the one ({falls}), to *P* = "
+        f"{hop.last:.4f}, where the sweep upwards loses the other ({rises}). At {paper:g} e(τ) the "
+        f"motion of the upward sweep crosses {upper:g} clearance boundaries per period, that of "
+        f"the downward sweep {lower:g}{parting}. Which of the two a computation shows depends on "
+        f"its start state, which the paper does not give: {'; '.join(starts)}. The paper's "
+        f"{paper:g} lies {place}. That a start at rest puts the hop near it is why it was chosen.",
     ]
     if rest is not None:
         values = found.sweep[found.sweep.axis]
         exponents = found.sweep["lyapunov_exponent"][values <= rest.before]
+        before, after = (signed(exponent, 5) for exponent in rest.exponents)
         texts.append(
-            f"From the Floquet multipliers of the two orbits the largest exponent is "
-            f"{signed(rest.exponents[0], 5)} before the hop and "
-            f"{signed(rest.exponents[1], 5)} after it, where the paper prints "
-            f"{signed(theirs, 4)}. While the teeth stay in contact the model is linear, "
-            "so the pitch error is a mere forcing and does not enter the exponent: over all lanes "
-            f"before the hop it varies by {np.ptp(exponents):.0e}. With these groups no pitch "
-            "error before the hop can have the printed exponent."
+            f"From the Floquet multipliers of the two orbits the largest exponent is {before} "
+            f"before the hop and {after} after it, where the paper prints {signed(theirs, 4)}. "
+            "While the teeth stay in contact the model is linear, so the pitch error is a mere "
+            "forcing and does not enter the exponent: over all lanes before the hop it varies by "
+            f"{np.ptp(exponents):.0e}. With these groups no pitch error before the hop can have "
+            "the printed exponent."
         )
     return "\n\n".join(texts)
 
@@ -97,13 +94,10 @@ def hop_in_words(printed: Published, found: Reproduction) -> str:
 def increments_in_words(printed: Published, found: Reproduction) -> str:
     """Tell why the increments of figure 14 are even, and of what they are."""
     response, steps = found.response, printed.increments.pitch_errors
-    groups = found.response.parameters
-    omega, amplitude = (
-        float(groups[name].value) for name in ("mesh_frequency", "pitch_error_amplitude")
-    )
-    magnitude = [
-        float(np.max(np.abs(response["delta_5_acceleration"][lane_of(response, p)]))) for p in steps
-    ]
+    groups = [response.parameters[name] for name in ("mesh_frequency", "pitch_error_amplitude")]
+    omega, amplitude = (float(group.value) for group in groups)
+    motions = [response["delta_5_acceleration"][lane_of(response, p)] for p in steps]
+    magnitude = [float(np.max(np.abs(motion))) for motion in motions]
     grown = ", ".join(short(b - a) for a, b in pairwise(magnitude))
     apart = [p for p in steps if _largest_while_apart(response, lane_of(response, p))]
     if len(apart) < 2:
@@ -113,8 +107,7 @@ def increments_in_words(printed: Published, found: Reproduction) -> str:
         "and more falls into the time in which the teeth are apart. There δ<sub>5</sub>″ = "
         "f<sub>n</sub> + Ω² *P* e<sub>r</sub> sin Ωτ, but for damping: two e(τ) more add 2 Ω² "
         f"e<sub>r</sub> = {short(2.0 * omega**2 * amplitude)}, whatever the motion. The first "
-        "increment spans the "
-        'hop. This holds for the largest *signed* acceleration, as which "amplitude" is read; the '
+        'increment spans the hop. This holds for the largest *signed* acceleration, as which "amplitude" is read; the '
         f"largest magnitudes grow by {grown}, not at all as printed."
     )
 

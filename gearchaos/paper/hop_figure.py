@@ -54,8 +54,7 @@ def hop_page(printed: Published, found: Reproduction) -> Page:
                 fontsize=7,
                 color=color,
             )
-        axes.set_xlim(LOW, HIGH)
-        axes.set_xlabel("Multiple of the pitch error, $P$")
+        axes.set(xlim=(LOW, HIGH), xlabel="Multiple of the pitch error, $P$")
         axes.set_ylabel(r"$\delta_5$ at the section (dimensionless)")
         few_ticks(axes, 8, 6)
         axes.legend(

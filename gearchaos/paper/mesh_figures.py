@@ -68,8 +68,6 @@ def _cycle(height_mm: float, level: float, label: str) -> Iterator[tuple[Page, A
         axes = figure.subplots()
         axes.axhline(level, color=GREY, linewidth=0.5)
         yield figure, axes
-        axes.set_xlim(0.0, 1.0)
+        axes.set(xlim=(0.0, 1.0), xlabel=r"Mesh cycle, $\Omega\tau/2\pi$", ylabel=label)
         axes.margins(y=0.08)
-        axes.set_xlabel(r"Mesh cycle, $\Omega\tau/2\pi$")
-        axes.set_ylabel(label)
         few_ticks(axes, 5, 6)

@@ -5,10 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 
-import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
-from numpy.typing import NDArray
 
 from gearchaos.figures.page import Page, column, few_ticks, letter, remark
 from gearchaos.figures.panel import legend_above
@@ -96,12 +94,10 @@ def motion_page(printed: Published, found: Reproduction, shown: ShownMotion) -> 
         time_history(history, result, lane, between=(max(0.0, end - LONG_HISTORY), end))
         phase_portrait(portrait, result, lane)
         poincare_section(section, result, lane)
-        history.set_xlabel(TIME_LABEL)
-        history.set_ylabel(r"$\delta_5$ (dimensionless)")
+        history.set(xlabel=TIME_LABEL, ylabel=r"$\delta_5$ (dimensionless)")
         few_ticks(history, 8, 5)
         for axes in (portrait, section):
-            axes.set_xlabel(r"$\delta_5$")
-            axes.set_ylabel(r"$\delta_5'$")
+            axes.set(xlabel=r"$\delta_5$", ylabel=r"$\delta_5'$")
             few_ticks(axes, 4, 5)
         letter((history, portrait, section))
         remark(history, f"$P$ = {shown.pitch_error:g}, {label}{begun}")
@@ -183,13 +179,7 @@ def _write_inside(axes: Axes, x: float, y: float, text: str, **look: str | float
 
 def _frequency_axis(axes: Axes, period: float) -> None:
     """Put the paper's frequency, in cycles per unit of tau, above a panel."""
-
-    def frequency(order: NDArray[np.float64]) -> NDArray[np.float64]:
-        return order / period
-
-    def order(frequency: NDArray[np.float64]) -> NDArray[np.float64]:
-        return frequency * period
-
     axes.tick_params(axis="x", which="both", top=False)
-    above = axes.secondary_xaxis("top", functions=(frequency, order))  # type: ignore[arg-type]
+    to_and_fro = (lambda order: order / period, lambda frequency: frequency * period)
+    above = axes.secondary_xaxis("top", functions=to_and_fro)
     above.set_xlabel(r"Frequency in cycles per unit of $\tau$")
