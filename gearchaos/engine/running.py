@@ -77,10 +77,11 @@ def _run(simulation: Simulation) -> Result:
 
 def prepare(simulation: Simulation, compile_now: bool = True) -> None:
     """Compile the kernel, choose the steps where a tolerance is wanted, and say what was found."""
+    check()  # Imports take a while.
     if compile_now:
         with notice(COMPILING):
             simulation.compile()
-    check()
+        check()
     simulation.choose_steps()
     say(*simulation.notes)
 
