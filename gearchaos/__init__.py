@@ -37,27 +37,23 @@ __all__ = [
 # Each name is imported on first use: reading and drawing results needs neither Numba nor the
 # kernels, and a command that only prints its help imports nothing.
 _HOMES = {
-    "Configuration": "gearchaos.configuration",
-    "ConfigurationError": "gearchaos.errors",
-    "FigureError": "gearchaos.errors",
-    "FileError": "gearchaos.errors",
-    "GearchaosError": "gearchaos.errors",
-    "Result": "gearchaos.results.result",
-    "System": "gearchaos.system",
-    "load_config": "gearchaos.configuration",
-    "open_result": "gearchaos.results.result",
-    "respond": "gearchaos.engine.response",
-    "run": "gearchaos.engine.running",
-    "software_version": "gearchaos.version",
+    "configuration": ("Configuration", "load_config"),
+    "engine.response": ("respond",),
+    "engine.running": ("run",),
+    "errors": ("ConfigurationError", "FigureError", "FileError", "GearchaosError"),
+    "results.result": ("Result", "open_result"),
+    "system": ("System",),
+    "version": ("software_version",),
 }
 
 
 def __getattr__(name: str) -> Any:
-    if name not in _HOMES:
-        raise AttributeError(f"module 'gearchaos' has no attribute {name!r}")
-    from importlib import import_module
+    for home, names in _HOMES.items():
+        if name in names:
+            from importlib import import_module
 
-    return getattr(import_module(_HOMES[name]), name)
+            return getattr(import_module(f"gearchaos.{home}"), name)
+    raise AttributeError(f"module 'gearchaos' has no attribute {name!r}")
 
 
 def __dir__() -> list[str]:

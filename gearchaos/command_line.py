@@ -9,9 +9,8 @@ from collections.abc import Callable, Sequence
 from io import TextIOWrapper
 from typing import Any, NamedTuple, TextIO
 
-from gearchaos import interrupts
 from gearchaos.errors import FileError, GearchaosError
-from gearchaos.interrupts import Termination
+from gearchaos.interrupts import Termination, check, heeded
 from gearchaos.progress import complain, speaking
 from gearchaos.version import software_version
 
@@ -80,9 +79,9 @@ class Command(NamedTuple):
             sys.stdout.reconfigure(errors="surrogateescape")
         with speaking(f"gearchaos {self.name}"):
             try:
-                with interrupts.noted() if self.writes else interrupts.deadly():
+                with heeded(at_once=not self.writes):
                     code = self._code(list(sys.argv[1:] if arguments is None else arguments))
-                    interrupts.check()
+                    check()
                 if sys.stdout is not None:
                     sys.stdout.flush()
                 return code

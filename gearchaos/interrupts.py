@@ -10,7 +10,7 @@ from __future__ import annotations
 import os
 import signal
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from types import FrameType
 
@@ -24,20 +24,24 @@ class Termination(KeyboardInterrupt):
 
 
 @contextmanager
-def noted() -> Iterator[None]:
-    """Take note of Ctrl-C and SIGTERM for `check`; a second one ends the process at once."""
-    try:
-        with _handled_by(_take_note):
-            yield
-    finally:
-        _arrived.clear()
+def heeded(*, at_once: bool) -> Iterator[None]:
+    """Let Ctrl-C and SIGTERM end the process at once, or take note of them for `check`.
 
-
-@contextmanager
-def deadly() -> Iterator[None]:
-    """Let Ctrl-C and SIGTERM end the process at once."""
-    with _handled_by(signal.SIG_DFL):
+    A second one ends it at once in any case.
+    """
+    if threading.current_thread() is not threading.main_thread():
         yield
+        return
+    # What runs in the background may have been told to ignore Ctrl-C.
+    before = {n: signal.getsignal(n) for n in _SIGNALS if signal.getsignal(n) != signal.SIG_IGN}
+    for number in before:
+        signal.signal(number, signal.SIG_DFL if at_once else _take_note)
+    try:
+        yield
+    finally:
+        for number, previous in before.items():
+            signal.signal(number, previous or signal.SIG_DFL)
+        _arrived.clear()
 
 
 def check() -> None:
@@ -58,21 +62,3 @@ def _take_note(number: int, _frame: FrameType | None) -> None:
     # Not through sys.stderr, which may be in the middle of a line of its own.
     with suppress(OSError):
         os.write(2, _ENDING)
-
-
-@contextmanager
-def _handled_by(
-    handler: signal.Handlers | Callable[[int, FrameType | None], None],
-) -> Iterator[None]:
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    # What runs in the background may have been told to ignore Ctrl-C.
-    before = {n: signal.getsignal(n) for n in _SIGNALS if signal.getsignal(n) != signal.SIG_IGN}
-    for number in before:
-        signal.signal(number, handler)
-    try:
-        yield
-    finally:
-        for number, previous in before.items():
-            signal.signal(number, previous or signal.SIG_DFL)

@@ -1,7 +1,19 @@
 """Settings of all tests."""
 
+import pytest
 from hypothesis import settings
 
 # The same examples on every run: a failure is a failure of the change that was made.
 settings.register_profile("repeatable", derandomize=True, deadline=None)
 settings.load_profile("repeatable")
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_cmdline_main(config):
+    """Use all cores unless -n says how many, or somebody wants to look into this process."""
+    option = config.option
+    looked_into = option.usepdb or option.trace or option.capture == "no"
+    if hasattr(config, "workerinput") or looked_into:  # A worker starts none of its own.
+        return
+    if getattr(option, "numprocesses", 0) is None:
+        option.numprocesses = "logical"

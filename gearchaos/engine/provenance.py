@@ -35,12 +35,12 @@ def provenance(threads: int, seconds: float) -> dict[str, str | int | float]:
         "threads": threads,
         "wall_time_seconds": round(seconds, 3),
     }
-    commit = _commit()
+    commit = commit_of(Path(__file__).parents[2])
     return {**facts, "git_commit": commit} if commit else facts
 
 
-def _commit() -> str:
-    clone = Path(__file__).parents[2]
+def commit_of(clone: Path) -> str:
+    """Return the commit that a folder is at, with "-dirty" after changes; "" if it is no clone."""
     if not (clone / ".git").exists():
         return ""
     command = ["git", "-C", str(clone), "describe", "--always", "--dirty", "--abbrev=40"]

@@ -95,10 +95,11 @@ def result_of(
 
 def prepare(simulation: Simulation, *, compile_now: bool = True, history_periods: int = 0) -> None:
     """Compile the kernel, choose the steps where a tolerance is wanted, and say what was found."""
+    check()  # Imports take a while.
     if compile_now:
         with notice(COMPILING):
             simulation.rehearse(periods=history_periods, history_periods=history_periods)
-    check()
+        check()
     simulation.choose_steps()
     say(*simulation.notes)
 

@@ -135,8 +135,6 @@ def _over(config: Configuration, low: float, high: float, count: int) -> Configu
     return config.replace("sweep", sweep)
 
 
-
-
 def _apart(one: Result, other: Result) -> NDArray[np.bool_]:
     a, b = one["end_state"], other["end_state"]
     size = np.maximum(np.abs(a), np.abs(b)).max(axis=1)

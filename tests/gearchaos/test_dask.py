@@ -194,6 +194,7 @@ def test_what_a_cluster_cannot_do_is_code_2(tmp_path, arguments, message):
     ended = sweep(tmp_path, *arguments)
     assert (ended.code, ended.out) == (2, "")
     assert message in ended.err
+    assert "go on with" not in ended.err  # It would be refused again.
     assert names_in(tmp_path) == ["gears.toml"]
 
 

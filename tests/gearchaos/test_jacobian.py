@@ -2,9 +2,8 @@
 
 import numpy as np
 import pytest
-from gearchaos_kernels import STATE_ROWS, Model, Scene
-
 from gearchaos.dynamics.jacobian import COORDINATES, coordinates, jacobian
+from gearchaos_kernels import STATE_ROWS, Model, Scene
 
 from ..kernels.twin import Twin
 from .random_pairs import EVERY_SCENE, name_of, random_pairs

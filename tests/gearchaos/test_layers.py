@@ -7,10 +7,13 @@ from pathlib import Path
 import pytest
 from importlinter.cli import lint_imports
 
+from gearchaos.__main__ import COMMANDS
+
 ROOT = Path(__file__).resolve().parents[2]
 
 ENGINE = {"numba", "llvmlite", "gearchaos_kernels"}
-HEAVY = ENGINE | {"numpy", "h5py", "matplotlib", "pydantic", "tqdm"}
+# With email, importlib.metadata: what takes time is imported where an interrupt is caught.
+HEAVY = ENGINE | {"numpy", "h5py", "matplotlib", "pydantic", "tqdm", "email", "inspect"}
 
 
 def imported_by(statement: str) -> set[str]:
@@ -42,7 +45,13 @@ def test_results_figures_and_configurations_need_no_engine(statement):
 
 @pytest.mark.parametrize(
     "statement",
-    ["import gearchaos", "import gearchaos.__main__", "import gearchaos.sweep", "dir(gearchaos)"],
+    [
+        "import gearchaos",
+        "import gearchaos.__main__",
+        "dir(gearchaos)",
+        *(f"import gearchaos.{name}" for name in COMMANDS if name != "configuration"),
+        "import gearchaos.configure",
+    ],
 )
 def test_commands_start_light(statement):
     assert not imported_by(f"import gearchaos; {statement}") & HEAVY

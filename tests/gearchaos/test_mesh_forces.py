@@ -2,8 +2,6 @@
 
 import numpy as np
 import pytest
-from gearchaos_kernels import STATE_ROWS, Scene
-
 from gearchaos.dynamics.mesh_forces import (
     APART,
     BACK_FLANK,
@@ -12,6 +10,7 @@ from gearchaos.dynamics.mesh_forces import (
     excitation,
     mesh_forces,
 )
+from gearchaos_kernels import STATE_ROWS, Scene
 
 from ..kernels.reference import COSINE, FULL, SINE, lanes_of, pan2021
 from ..kernels.twin import Twin

@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
+from gearchaos.dynamics.jacobian import jacobian
 from gearchaos_kernels import STATE_ROWS, Plan, integrate
 
 from gearchaos.dynamics.exponents import sum_of_exponents
-from gearchaos.dynamics.jacobian import jacobian
 from gearchaos.dynamics.orbits import CLOSED, Orbits, orbit_exponent, polish
 from gearchaos.records.period import motion_period
 

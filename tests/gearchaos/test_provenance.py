@@ -1,14 +1,18 @@
 """What a result says about where it comes from."""
 
 import platform
+import re
+import shutil
+import subprocess
 from datetime import UTC, datetime, timedelta
+from pathlib import Path
 
 import h5py
 import numpy as np
 import pytest
 
 import gearchaos
-from gearchaos.engine.provenance import provenance
+from gearchaos.engine.provenance import commit_of
 
 from .commands import SMALL, sweep
 
@@ -80,6 +84,28 @@ def test_the_result_says_what_was_integrated_and_how(result):
     assert (facts["transient_periods"], facts["recorded_periods"]) == (5, 10)
 
 
-def test_the_commit_is_named_where_there_is_one_and_left_out_elsewhere():
-    commit = provenance(threads=1, seconds=0.0).get("git_commit")
-    assert commit is None or len(commit.removesuffix("-dirty")) == 40
+@pytest.mark.skipif(shutil.which("git") is None, reason="git is not installed here")
+def test_the_commit_is_named_with_its_changes_where_there_is_one_and_left_out_elsewhere(tmp_path):
+    def git(*arguments):
+        command = ["git", "-c", "user.name=n", "-c", "user.email=e", "-C", str(tmp_path)]
+        done = subprocess.run([*command, *arguments], capture_output=True, text=True, check=True)
+        return done.stdout.strip()
+
+    file = tmp_path / "gears.toml"
+    file.write_text(SMALL)
+    assert commit_of(tmp_path) == ""
+    git("init", "--quiet")
+    assert commit_of(tmp_path) == ""  # Nothing is committed yet.
+    git("add", ".")
+    git("commit", "--quiet", "--message", "first")
+    commit = git("rev-parse", "HEAD")
+    assert re.fullmatch(r"[0-9a-f]{40}", commit)
+    assert commit_of(tmp_path) == commit
+    file.write_text("changed")
+    assert commit_of(tmp_path) == f"{commit}-dirty"
+
+
+def test_the_result_names_the_commit_of_the_clone_that_made_it(result):
+    # Somebody may have changed a file since.
+    commit = commit_of(Path(gearchaos.__file__).parents[1]).removesuffix("-dirty")
+    assert result.metadata.get("git_commit", "").removesuffix("-dirty") == commit

@@ -11,7 +11,7 @@ import pytest
 from gearchaos import FileError, load_config, open_result
 from gearchaos.paper.comparison import Comparison
 from gearchaos.paper.computation import compute, lane_of, largest_acceleration
-from gearchaos.paper.gallery import pictures
+from gearchaos.paper.gallery import check_folder, pictures, write_gallery
 from gearchaos.paper.hop import find_hop
 from gearchaos.paper.our_numbers import (
     contact_line_stiffness,
@@ -30,7 +30,6 @@ from gearchaos.paper.verdict import (
     motion_verdict,
     overlap_verdict,
 )
-from gearchaos.paper.gallery import check_folder, write_gallery
 
 from .commands import run_module
 

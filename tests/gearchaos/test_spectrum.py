@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
+from gearchaos.dynamics.jacobian import jacobian
 from gearchaos_kernels import Plan, Scene, integrate
 
 from gearchaos.dynamics.exponents import exponents, period_jacobian, sum_of_exponents
-from gearchaos.dynamics.jacobian import jacobian
 from gearchaos.dynamics.stable_region import amplification
 from gearchaos.records.lyapunov import largest_exponent
 

@@ -5,9 +5,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from gearchaos.dynamics.jacobian import jacobian
 from gearchaos_kernels import Model, Scene, Status
 
-from gearchaos.dynamics.jacobian import jacobian
 from gearchaos.dynamics.stability import (
     MOST_STEPS,
     fewest_stable_steps,
