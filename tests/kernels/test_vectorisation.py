@@ -7,14 +7,11 @@ from collections import Counter
 
 import llvmlite.binding
 import numba
-import numpy as np
 import pytest
-from gearchaos_kernels import Outcome, Scene
+from gearchaos_kernels import Effects
 from gearchaos_kernels.block_loop import integrate_block
-from gearchaos_kernels.coefficients import lane_coefficients, state_scales
-from gearchaos_kernels.forcing import phase_table
 
-from .reference import COSINE, FULL, SINE, pan2021
+from .reference import FULL
 
 pytestmark = pytest.mark.skipif(
     platform.machine().lower() not in ("x86_64", "amd64")
@@ -24,49 +21,22 @@ pytestmark = pytest.mark.skipif(
 
 ARITHMETIC = re.compile(r"v(add|sub|mul|f(n?)m(add|sub)\d+)(pd|sd)$")
 WIDE = ("ymm", "zmm")
-TORSION = Scene(*[False] * len(Scene._fields))
-
-
-def arguments(scene: Scene, tangent: bool, resolved: bool) -> tuple:
-    """Return what the driver hands to the block loop for a single lane."""
-    model, steps = pan2021(1.0), 4
-    outcome = Outcome(
-        section=np.zeros((1, 1, 1)),
-        growth=np.zeros((1, 1)) if tangent else None,
-        end_state=np.zeros((1, 10)),
-        end_tangent=np.zeros((1, 10)),
-        status=np.zeros(1, dtype=np.uint8),
-        diverged_period=np.zeros(1, dtype=np.int32),
-        crossings=np.zeros(1, dtype=np.int64),
-        slowest_crossing=np.zeros(1),
-        overflows=np.zeros(1, dtype=np.int64),
-        history=None,
-    )
-    flags = {effect: () if present else None for effect, present in scene._asdict().items()}
-    return (
-        0,
-        lane_coefficients(model, steps, False),
-        state_scales(model, steps),
-        np.zeros((1, 10)),
-        np.ones((1, 10)),
-        phase_table(COSINE, SINE, steps),
-        0,
-        1,
-        np.full(1, steps),
-        np.zeros(1, dtype=np.intp),
-        flags["pitch_error"],
-        None,
-        flags["stiffness_variation"],
-        flags["backlash"],
-        flags["backlash"] if resolved else None,
-        flags["transverse"],
-        flags["axial"],
-        *outcome,
-    )
+TORSION = Effects(*[False] * len(Effects._fields))
 
 
 @functools.cache
-def instructions(scene: Scene, tangent: bool, resolved: bool = False) -> Counter[tuple[str, str]]:
+def compiled(present: tuple):
+    """Compile the block loop of one scene; the flags have to be packed in compiled code."""
+
+    @block
+    def loop(batch, plan, outcome):
+        integrate_block(0, batch, plan, outcome, Present(*present))
+
+    return loop
+
+
+@functools.cache
+def instructions(scene: Effects, tangent: bool, resolved: bool = False) -> Counter[tuple[str, str]]:
     """Count the vector instructions of one compiled scene by mnemonic and register width."""
     # Called directly: the driver may come from the cache and then compiles nothing.
     given = arguments(scene, tangent, resolved)
