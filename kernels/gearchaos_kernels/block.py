@@ -168,7 +168,7 @@ def split(block, table, number, recorded, outcome, present):
 
 @scalar
 def scale_tangents(block, batch, steps_done, last):
-    """Scale tangent vectors whose turn it is to length 1, and keep the logarithm of their growth."""
+    """Scale tangent vectors whose turn it is to length 1; keep the logarithm of their growth."""
     memory, first, lanes = block
     for slot in range(lanes):
         index = first + slot

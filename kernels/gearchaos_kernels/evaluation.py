@@ -59,7 +59,7 @@ def jacobian(system: System, tangential: Floats, axial: Floats) -> Floats:
     linear = system._replace(
         effects=Effects(False, False, False, system.effects.transverse, system.effects.axial)
     )
-    slopes = Directions(*np.broadcast_arrays(tangential, axial, per_tau)[:2])
+    slopes = np.stack(np.broadcast_arrays(tangential, axial), axis=1)
     coefficients = lane_coefficients(system, per_tau)
     _differentiate(coefficients, scales, slopes, result, flags(linear, _ALONE))
     return result
@@ -74,8 +74,8 @@ def _differentiate(coefficients, scales, slopes, result, present):
         fill_lane(memory, 0, coefficients[index])
         lane = load(memory, COEFFICIENTS, 0, Lane)
         stiffness = Directions(
-            lane.mean_stiffness * slopes.tangential[index],
-            lane.axial_share * lane.mean_stiffness * slopes.axial[index],
+            lane.mean_stiffness * slopes[index, 0],
+            lane.axial_share * lane.mean_stiffness * slopes[index, 1],
         )
         for column in range(scale.shape[0]):
             unit = np.zeros(scale.shape[0])

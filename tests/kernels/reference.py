@@ -107,8 +107,9 @@ def run(
 ) -> Outcome:
     """Integrate Pan 2021's mesh stiffness, by default keeping every state after every period.
 
-    A start has all ten states, the outcome those of the scene. The tangent vector is on unless a test is about the plain loop: one compiled scene then serves
-    many tests. Steps are plain ones unless ``resolved`` splits those that cross a clearance.
+    A start has all ten states, the outcome those of the scene. The tangent vector is on unless a
+    test is about the plain loop: one compiled scene then serves many tests. Steps are plain ones
+    unless ``resolved`` splits those that cross a clearance.
     """
     rest = np.zeros((model.load.size, len(STATES)))
     start = rest if start is None else np.broadcast_to(start, rest.shape)

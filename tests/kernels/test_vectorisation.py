@@ -6,12 +6,14 @@ import re
 from collections import Counter
 
 import llvmlite.binding
-import numba
+import numpy as np
 import pytest
-from gearchaos_kernels import Effects
-from gearchaos_kernels.block_loop import integrate_block
+from gearchaos_kernels import Effects, Plan, batch, integrate
+from gearchaos_kernels.block import integrate_block
+from gearchaos_kernels.block_memory import Present
+from gearchaos_kernels.compilation import block
 
-from .reference import FULL
+from .reference import FULL, pan2021, system_of
 
 pytestmark = pytest.mark.skipif(
     platform.machine().lower() not in ("x86_64", "amd64")
@@ -24,15 +26,20 @@ WIDE = ("ymm", "zmm")
 TORSION = Effects(*[False] * len(Effects._fields))
 
 
-@functools.cache
-def compiled(present: tuple):
-    """Compile the block loop of one scene; the flags have to be packed in compiled code."""
+@block
+def loop(batch, plan, outcome, *flags):
+    """Stand in for the driver: the flags are packed in compiled code."""
+    integrate_block(0, batch, plan, outcome, Present(*flags))
 
-    @block
-    def loop(batch, plan, outcome):
-        integrate_block(0, batch, plan, outcome, Present(*present))
 
-    return loop
+def arguments(scene: Effects, tangent: bool, resolved: bool) -> tuple:
+    """Return what the driver gets for a single lane, as `integrate` makes it."""
+    given: list[tuple] = []
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(batch, "_integrate_blocks", lambda *passed: given.append(passed))
+        plan = Plan(4, 0, 1, 1, tangent, resolved)
+        integrate(system_of(pan2021(1.0), scene), np.zeros((1, len(scene.states))), plan)
+    return given[0]
 
 
 @functools.cache
@@ -40,8 +47,8 @@ def instructions(scene: Effects, tangent: bool, resolved: bool = False) -> Count
     """Count the vector instructions of one compiled scene by mnemonic and register width."""
     # Called directly: the driver may come from the cache and then compiles nothing.
     given = arguments(scene, tangent, resolved)
-    integrate_block(*given)
-    assembly = integrate_block.inspect_asm(tuple(numba.typeof(value) for value in given))
+    loop(*given)
+    assembly = loop.inspect_asm(loop.signatures[-1])
     counts: Counter[tuple[str, str]] = Counter()
     for mnemonic, operands in re.findall(r"^\s+(v\w+)\s+(.*)$", assembly, re.MULTILINE):
         width = next((name for name in ("zmm", "ymm", "xmm") if name in operands), "")
