@@ -13,7 +13,7 @@ import statistics
 from pathlib import Path
 
 import matplotlib
-from gearchaos_kernels import Scene
+from gearchaos_kernels import Effects
 from machine import machine_facts, print_machine
 from matplotlib.figure import Figure
 from throughput import engine, nanoseconds_per_step
@@ -21,12 +21,12 @@ from throughput import engine, nanoseconds_per_step
 from gearchaos.figures.style import BLUE, ORANGE, STYLE
 
 SCENES = {
-    "linear torsion": Scene(False, False, False, False, False),
-    "+ pitch error": Scene(True, False, False, False, False),
-    "+ stiffness variation": Scene(True, True, False, False, False),
-    "+ backlash": Scene(True, True, True, False, False),
-    "+ transverse pair": Scene(True, True, True, True, False),
-    "+ axial pair": Scene(True, True, True, True, True),
+    "linear torsion": Effects(False, False, False, False, False),
+    "+ pitch error": Effects(True, False, False, False, False),
+    "+ stiffness variation": Effects(True, True, False, False, False),
+    "+ backlash": Effects(True, True, True, False, False),
+    "+ transverse pair": Effects(True, True, True, True, False),
+    "+ axial pair": Effects(True, True, True, True, True),
 }
 MODES = {
     "plain": {"tangent": False, "resolved": False},

@@ -14,7 +14,7 @@ import time
 from pathlib import Path
 
 import numpy as np
-from gearchaos_kernels import Plan, Scene, integrate, use_threads
+from gearchaos_kernels import Effects, Plan, System, integrate, use_threads
 from machine import print_machine
 
 from gearchaos import load_config
@@ -38,11 +38,12 @@ def main() -> None:
     use_threads(1)
     config = load_config(SWEEP, ["sweep.from=3.0", "sweep.to=11.0", f"sweep.count={LANES}"])
     _, groups = lane_groups(config)
-    data = model(groups, LANES), groups.stiffness_cosine, groups.stiffness_sine
+    stiffness = groups.stiffness_cosine, groups.stiffness_sine
+    system = System(Effects(), model(groups, LANES), *stiffness)
 
     def end_states(steps: int, resolved: bool) -> np.ndarray:
-        plan = Plan(steps, 0, PERIODS, 0, (), False, resolved)
-        return integrate(Scene(), *data, np.zeros((LANES, 10)), plan).end_state
+        plan = Plan(steps, 0, PERIODS, 0, False, resolved)
+        return integrate(system, np.zeros((LANES, 10)), plan).end_state
 
     truth = end_states(TRUTH_STEPS, True)
     errors = {

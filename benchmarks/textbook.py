@@ -5,7 +5,7 @@ model, the same method and the same step counts, written straight from the equat
 """
 
 import numpy as np
-from gearchaos_kernels.coefficients import Model
+from gearchaos_kernels import Groups
 from numba import njit, prange
 
 
@@ -118,7 +118,7 @@ def integrate_textbook(model, cosine, sine, periods, steps, tangent, end_state, 
         end_state[lane] = state
 
 
-def run_textbook(model: Model, cosine, sine, periods, steps, tangent):
+def run_textbook(model: Groups, cosine, sine, periods, steps, tangent):
     """Return end states, shape (lanes, 10) in pairs of displacement and rate, and growth."""
     lanes = model.load.size
     end_state, growth = np.empty((lanes, 10)), np.zeros(lanes)

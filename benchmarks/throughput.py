@@ -13,7 +13,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
-from gearchaos_kernels import Plan, Scene, integrate, most_threads, use_threads
+from gearchaos_kernels import Effects, Plan, System, integrate, most_threads, use_threads
 from machine import print_machine
 from textbook import run_textbook
 
@@ -27,9 +27,9 @@ PERIODS = 100
 LANES = 512
 TEXTBOOK_LANES = 16
 SCENES = {
-    "full, 10 states": Scene(),
-    "no axial pair, 6 states": Scene(axial=False),
-    "torsion, 2 states": Scene(transverse=False, axial=False),
+    "full, 10 states": Effects(),
+    "no axial pair, 6 states": Effects(axial=False),
+    "torsion, 2 states": Effects(transverse=False, axial=False),
 }
 
 
@@ -57,7 +57,7 @@ def _contestants():
             for name, scene in SCENES.items():
                 kind = f"{name}, resolved" if resolved else name
                 yield kind, tangent, engine(scene, tangent, resolved, threads=1)
-        everything = engine(Scene(), tangent, False, most_threads())
+        everything = engine(Effects(), tangent, False, most_threads())
         yield f"full, {most_threads()} threads", tangent, everything
 
 
@@ -68,17 +68,17 @@ def _pan(lanes: int):
 
 
 def engine(
-    scene: Scene, tangent: bool, resolved: bool, threads: int, steps: int = STEPS
+    scene: Effects, tangent: bool, resolved: bool, threads: int, steps: int = STEPS
 ) -> Callable[[], int]:
     """Return work that integrates the sweep of Pan 2021 and tells how many steps that took."""
     lanes = LANES * threads
-    data = _pan(lanes)
+    system = System(scene, *_pan(lanes))
     # The end state is written in full, so that no effect can be optimised away.
-    plan = Plan(steps, 0, PERIODS, 1, ("delta_5",), tangent, resolved)
+    plan = Plan(steps, 0, PERIODS, 1, tangent, resolved)
 
     def work() -> int:
         use_threads(threads)
-        integrate(scene, *data, np.zeros((lanes, 10)), plan)
+        integrate(system, np.zeros((lanes, len(system.states))), plan)
         return lanes * PERIODS * steps
 
     return work

@@ -3,6 +3,29 @@
 from gearchaos_kernels.batch import integrate
 from gearchaos_kernels.block_memory import LANES
 from gearchaos_kernels.compilation import CACHE_FOLDER, source_hash
+from gearchaos_kernels.evaluation import jacobian, mesh_motion
 from gearchaos_kernels.status import STATUS_TEXTS, Status
 from gearchaos_kernels.system import STATES, Effects, Groups, MeshMotion, Outcome, Plan, System
 from gearchaos_kernels.threads import current_threads, most_threads, processor, use_threads
+
+__all__ = [
+    "CACHE_FOLDER",
+    "LANES",
+    "STATES",
+    "STATUS_TEXTS",
+    "Effects",
+    "Groups",
+    "MeshMotion",
+    "Outcome",
+    "Plan",
+    "Status",
+    "System",
+    "current_threads",
+    "integrate",
+    "jacobian",
+    "mesh_motion",
+    "most_threads",
+    "processor",
+    "source_hash",
+    "use_threads",
+]

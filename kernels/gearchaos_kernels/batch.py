@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from numba import prange
 
@@ -104,7 +102,7 @@ def integrate(
 def flags(system: System, plan: Plan) -> Present:
     """Tell in types what the loop of a scene has, so that every scene is compiled for itself."""
     effects = system.effects
-    values: dict[str, Any] = {
+    values = {
         **effects._asdict(),
         "phase": effects.pitch_error and bool(np.any(system.groups.error_phase)),
         "resolved": effects.backlash and plan.resolved,

@@ -26,9 +26,12 @@ from gearchaos_kernels.block_memory import (
     Block,
     Lane,
     aligned_memory,
+    fill,
+    fill_lane,
     load,
     read_branches,
     read_state,
+    take,
     write_branches,
     write_state,
 )
@@ -98,12 +101,9 @@ def begin(block, batch, present):
         # A block that is not full repeats the last lane, and nothing of that is stored.
         index = first + min(slot, lanes - 1)
         interval = min(interval, batch.steps_between_scalings[index])
-        for column in range(batch.scales.shape[1]):
-            scale = batch.scales[index, column]
-            memory[(STATE + column) * STRIDE + slot] = batch.start[index, column] / scale
-            memory[(TANGENT + column) * STRIDE + slot] = batch.tangent_start[index, column] / scale
-        for column in range(batch.coefficients.shape[1]):
-            memory[(COEFFICIENTS + column) * STRIDE + slot] = batch.coefficients[index, column]
+        fill_lane(memory, slot, batch.coefficients[index])
+        fill(memory, STATE, slot, batch.scales[index], batch.start[index])
+        fill(memory, TANGENT, slot, batch.scales[index], batch.tangent_start[index])
         memory[GROWTH * STRIDE + slot] = 0.0
         if present.resolved is not None:
             lane = load(memory, COEFFICIENTS, slot, Lane)
@@ -168,7 +168,7 @@ def split(block, table, number, recorded, outcome, present):
 
 @scalar
 def scale_tangents(block, batch, steps_done, last):
-    """Scale tangent vectors whose turn it is to length 1, and keep the logarithm of their growth."""
+    """Scale tangent vectors whose turn it is to length 1; keep the logarithm of their growth."""
     memory, first, lanes = block
     for slot in range(lanes):
         index = first + slot
@@ -204,7 +204,7 @@ def end_period(block, batch, period, plan, outcome, present):
                 memory[row * STRIDE + slot] = math.nan
             continue
         if point >= 0:
-            write_columns(memory, STATE, slot, batch.scales[index], outcome.section[index, point])
+            take(memory, STATE, slot, batch.scales[index], outcome.section[index, point])
         if present.tangent is not None:
             if recorded >= 0:
                 outcome.growth[index, recorded] = memory[GROWTH * STRIDE + slot]
@@ -218,8 +218,8 @@ def end(block, batch, plan, outcome):
     for slot in range(lanes):
         index = first + slot
         scale = batch.scales[index]
-        write_columns(memory, STATE, slot, scale, outcome.end_state[index])
-        write_columns(memory, TANGENT, slot, scale, outcome.end_tangent[index])
+        take(memory, STATE, slot, scale, outcome.end_state[index])
+        take(memory, TANGENT, slot, scale, outcome.end_tangent[index])
     if plan.history_periods > 0:
         keep_state(block, batch, outcome.history, plan.history_periods * plan.steps_per_period)
 
@@ -230,14 +230,7 @@ def keep_state(block, batch, history, sample):
     memory, first, lanes = block
     for slot in range(lanes):
         index = first + slot
-        write_columns(memory, STATE, slot, batch.scales[index], history[index, sample])
-
-
-@scalar
-def write_columns(memory, row, slot, scale, target):
-    """Write a state or tangent vector in the units of eq. 13."""
-    for column in range(scale.shape[0]):
-        target[column] = memory[(row + column) * STRIDE + slot] * scale[column]
+        take(memory, STATE, slot, batch.scales[index], history[index, sample])
 
 
 @scalar

@@ -183,6 +183,27 @@ def store(_typing_context: Any, memory: Any, row: Any, slot: Any, record: Any) -
 
 
 @scalar
+def fill_lane(memory, slot, coefficients):
+    """Store the coefficients of a lane, shape (fields of `Lane`,)."""
+    for column in range(coefficients.shape[0]):
+        memory[(COEFFICIENTS + column) * STRIDE + slot] = coefficients[column]
+
+
+@scalar
+def fill(memory, row, slot, scale, source):
+    """Store a state or tangent vector, shape (states,) and in the units of eq. 13."""
+    for column in range(scale.shape[0]):
+        memory[(row + column) * STRIDE + slot] = source[column] / scale[column]
+
+
+@scalar
+def take(memory, row, slot, scale, target):
+    """Write a state or tangent vector in the units of eq. 13 into an array of shape (states,)."""
+    for column in range(scale.shape[0]):
+        target[column] = memory[(row + column) * STRIDE + slot] * scale[column]
+
+
+@scalar
 def read_state(memory, first, slot, present):
     """Return a state from the rows from ``first`` on; an absent pair is the constant 0."""
     return State(

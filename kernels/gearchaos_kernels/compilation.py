@@ -131,15 +131,20 @@ def scalar(function: Callable[..., Any]) -> Any:
     return _decorate(function, forceinline=True, no_cfunc_wrapper=True)
 
 
-def driver(function: Callable[..., Any]) -> Any:
+def driver(function: Callable[..., Any], parallel: bool = True) -> Any:
     """Compile a function that only splits, calls and merges, in parallel and cached on disk."""
     user_setting = config.CACHE_DIR
     # The cache folder is read once, at decoration: other users of Numba keep their own.
     config.CACHE_DIR = str(CACHE_FOLDER)
     try:
-        return _decorate(function, parallel=True, nogil=True, cache=True)
+        return _decorate(function, parallel=parallel, nogil=True, cache=True)
     finally:
         config.CACHE_DIR = user_setting
+
+
+def evaluator(function: Callable[..., Any]) -> Any:
+    """Compile a function that visits lanes one after the other, cached on disk."""
+    return driver(function, parallel=False)
 
 
 def block(function: Callable[..., Any]) -> Any:

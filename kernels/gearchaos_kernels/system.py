@@ -9,18 +9,7 @@ from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 
-STATES = (
-    "delta_5",
-    "delta_5_rate",
-    "delta_1",
-    "delta_1_rate",
-    "delta_2",
-    "delta_2_rate",
-    "delta_3",
-    "delta_3_rate",
-    "delta_4",
-    "delta_4_rate",
-)
+STATES = tuple(f"delta_{n}{kind}" for n in (5, 1, 2, 3, 4) for kind in ("", "_rate"))
 """The states of eq. 13 of Pan 2021 in their one order; a scene has those of its effects."""
 
 

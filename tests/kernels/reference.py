@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from gearchaos_kernels import STATE_ROWS, Model, Outcome, Plan, Scene, integrate
+from gearchaos_kernels import STATES, Effects, Groups, Outcome, Plan, System, integrate
 
 SOLUTIONS = json.loads((Path(__file__).parents[1] / "data" / "pan2021.json").read_text())
 
@@ -26,22 +26,14 @@ COSINE /= SOLUTIONS["mean_stiffness"]
 SINE = np.array([1.203, -1.15e-4, -0.1335, 9.478e-8, 0.04819, -3.819e-5])
 SINE /= SOLUTIONS["mean_stiffness"]
 
-STATES = tuple(STATE_ROWS)
-ROWS_IN_FILE = [
-    STATE_ROWS[name]
-    for pair in ("5", "1", "2", "3", "4")
-    for name in (f"delta_{pair}", f"delta_{pair}_rate")
-]
-"""Column of the kernels for each column of the stored states."""
-
-FULL = Scene()
-NO_AXIAL = Scene(axial=False)
-TORSION_ONLY = Scene(transverse=False, axial=False)
-NO_BACKLASH = Scene(backlash=False)
-LINEAR = Scene(stiffness_variation=False, backlash=False)
+FULL = Effects()
+NO_AXIAL = Effects(axial=False)
+TORSION_ONLY = Effects(transverse=False, axial=False)
+NO_BACKLASH = Effects(backlash=False)
+LINEAR = Effects(stiffness_variation=False, backlash=False)
 
 
-def pan2021(pitch_error: Any, **groups: Any) -> Model:
+def pan2021(pitch_error: Any, **groups: Any) -> Groups:
     """Return the model of Pan 2021 for one or several multiples of the pitch error.
 
     Every other group may be given as a number or with one value per lane.
@@ -71,54 +63,59 @@ def pan2021(pitch_error: Any, **groups: Any) -> Model:
     assert groups.keys() <= values.keys()
     values.update(groups)
     lanes = max([np.size(value) for value in values.values()])
-    return Model(**{name: np.full(lanes, value, dtype=float) for name, value in values.items()})
+    return Groups(**{name: np.full(lanes, value, dtype=float) for name, value in values.items()})
 
 
-def lanes_of(model: Model, chosen: Any) -> Model:
+def lanes_of(model: Groups, chosen: Any) -> Groups:
     """Return the model of some lanes, in the order given."""
-    return Model(*(group[chosen] for group in model))
+    return Groups(*(group[chosen] for group in model))
+
+
+def system_of(groups: Groups, effects: Effects = FULL, rederived: bool = False) -> System:
+    """Return a system with the mesh stiffness of Pan 2021."""
+    return System(effects, groups, COSINE, SINE, rederived)
+
+
+def columns(effects: Effects) -> list[int]:
+    """Return the columns of a scene's states among all ten."""
+    return [STATES.index(name) for name in effects.states]
 
 
 def state(**values: float) -> np.ndarray:
     """Return one full state by the names of its components; the others are 0."""
-    full = np.zeros(len(STATE_ROWS))
-    for name, value in values.items():
-        full[STATE_ROWS[name]] = value
-    return full
+    assert values.keys() <= set(STATES)
+    return np.array([values.get(name, 0.0) for name in STATES])
 
 
 def stored_state(values: list[float]) -> np.ndarray:
-    """Return a state of the file in the columns of the kernels."""
-    full = np.zeros(len(STATE_ROWS))
-    full[ROWS_IN_FILE[: len(values)]] = values
-    return full
+    """Return a state of the file, whose order is that of the kernels, with all ten states."""
+    return np.pad(np.asarray(values, dtype=float), (0, len(STATES) - len(values)))
 
 
 def run(
-    model: Model,
-    scene: Scene = FULL,
+    model: Groups,
+    scene: Effects = FULL,
     start: np.ndarray | None = None,
     *,
     steps: int = 100,
     transient: int = 0,
     periods: int = 1,
     points: int | None = None,
-    section: tuple[str, ...] = STATES,
     tangent: bool = True,
     rederived: bool = False,
     resolved: bool = False,
 ) -> Outcome:
     """Integrate Pan 2021's mesh stiffness, by default keeping every state after every period.
 
-    The tangent vector is on unless a test is about the plain loop: one compiled scene then serves
-    many tests. Steps are plain ones unless ``resolved`` splits those that cross a clearance.
+    A start has all ten states, the outcome those of the scene. The tangent vector is on unless a
+    test is about the plain loop: one compiled scene then serves many tests. Steps are plain ones
+    unless ``resolved`` splits those that cross a clearance.
     """
-    lanes = model.load.size
-    rest = np.zeros((lanes, len(STATE_ROWS)))
+    rest = np.zeros((model.load.size, len(STATES)))
     start = rest if start is None else np.broadcast_to(start, rest.shape)
     points = transient + periods if points is None else points
-    plan = Plan(steps, transient, periods, points, section, tangent, resolved)
-    return integrate(scene, model, COSINE, SINE, start, plan, rederived=rederived)
+    plan = Plan(steps, transient, periods, points, tangent, resolved)
+    return integrate(system_of(model, scene, rederived), start[:, columns(scene)], plan)
 
 
 def assert_same_bits(one: Outcome, other: Outcome) -> None:

@@ -4,7 +4,7 @@ All examples have a tangent vector and split steps; few scenes, because each is 
 """
 
 import numpy as np
-from gearchaos_kernels import Model, Status
+from gearchaos_kernels import Groups, Status
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -58,25 +58,25 @@ starts = st.lists(numbers(-3.0, 3.0), min_size=10, max_size=10).map(np.array)
 anything = st.sampled_from([0.0, 1e-300, 1e-9, 1.0, 1e3, 1e9, 1e30, 1e150, np.inf, np.nan])
 
 
-def value(model: Model, name: str) -> float:
+def value(model: Groups, name: str) -> float:
     return float(getattr(model, name)[0])
 
 
-def stiffness_wave(model: Model) -> np.ndarray:
+def stiffness_wave(model: Groups) -> np.ndarray:
     """Return kappa over one period, eq. 19."""
     angle = np.linspace(0.0, 2.0 * np.pi, 4001)[:, np.newaxis] * np.arange(1, COSINE.size + 1)
     variation = np.cos(angle) @ COSINE + np.sin(angle) @ SINE
     return 1.0 + value(model, "stiffness_variation_scale") * variation
 
 
-def relative(model: Model, states: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def relative(model: Groups, states: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return y_1 and y_2 of eqs 6 and 7 as printed, at the end of a period."""
     beta = value(model, "base_helix_angle")
     phase = value(model, "error_phase")
     error = value(model, "error_mean") + value(model, "error_amplitude") * np.sin(phase)
-    along_mesh = states[..., 1] - states[..., 2] + states[..., 0]
+    along_mesh = states[..., 2] - states[..., 4] + states[..., 0]
     y_1 = along_mesh - error * np.cos(beta)
-    y_2 = states[..., 3] - states[..., 4] - np.tan(beta) * along_mesh - error * np.sin(beta)
+    y_2 = states[..., 6] - states[..., 8] - np.tan(beta) * along_mesh - error * np.sin(beta)
     return y_1, y_2
 
 
@@ -85,25 +85,25 @@ def stored_in(y, half_backlash, kappa) -> np.ndarray:
     return 0.5 * kappa * np.maximum(np.abs(y) - half_backlash, 0.0) ** 2
 
 
-def energies(model: Model, states: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def energies(model: Groups, states: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return the energy of the torsional and transverse motion, and that of the axial one."""
     beta, half_backlash = value(model, "base_helix_angle"), value(model, "half_backlash")
     kappa = stiffness_wave(model)[0]
     y_1, y_2 = relative(model, states)
     cosine, sine = np.cos(beta), np.sin(beta)
-    tangential = 0.5 * states[..., 5] ** 2 + cosine * stored_in(y_1, half_backlash * cosine, kappa)
+    tangential = 0.5 * states[..., 1] ** 2 + cosine * stored_in(y_1, half_backlash * cosine, kappa)
     axial = sine * stored_in(y_2, half_backlash * sine, kappa)
-    for row, way, gear in ((1, "transverse", "p"), (2, "transverse", "g")):
+    for row, way, gear in ((2, "transverse", "p"), (4, "transverse", "g")):
         tangential = tangential + of_gear(model, states, row, way, gear)
-    for row, way, gear in ((3, "axial", "p"), (4, "axial", "g")):
+    for row, way, gear in ((6, "axial", "p"), (8, "axial", "g")):
         axial = axial + of_gear(model, states, row, way, gear)
     return tangential, axial
 
 
-def of_gear(model: Model, states: np.ndarray, row: int, way: str, gear: str) -> np.ndarray:
+def of_gear(model: Groups, states: np.ndarray, row: int, way: str, gear: str) -> np.ndarray:
     """Return the energy of one gear and its bearing in one direction."""
     stiffness = value(model, f"{way}_stiffness_{gear}")
-    energy = 0.5 * (states[..., row + 5] ** 2 + stiffness * states[..., row] ** 2)
+    energy = 0.5 * (states[..., row + 1] ** 2 + stiffness * states[..., row] ** 2)
     return energy / value(model, f"mass_ratio_{gear}")
 
 
@@ -139,8 +139,8 @@ def test_the_energy_of_a_motion_is_bounded_by_what_load_error_and_stiffness_put_
     assert (tangential <= 1.01 * largest + 1e-6).all()
 
     # The axial pair is driven by the approach of the gears, whose speed that energy bounds.
-    feels = 1.0 + value(model, "mass_ratio_p") + value(model, "mass_ratio_g")
-    driven = np.tan(beta) * np.sqrt(2.0 * feels * largest) + sine * error_rate
+    mobility = 1.0 + value(model, "mass_ratio_p") + value(model, "mass_ratio_g")
+    driven = np.tan(beta) * np.sqrt(2.0 * mobility * largest) + sine * error_rate
     largest_axial = bound(
         first_axial,
         np.sqrt(kappa.max() * sine) * driven,

@@ -17,17 +17,17 @@ PACKAGE = Path(gearchaos_kernels.__file__).parent
 PROGRAM = """
 import json, sys
 import numpy as np
-from gearchaos_kernels import Model, Plan, Scene, integrate
+from gearchaos_kernels import Effects, Groups, Plan, System, integrate
 from gearchaos_kernels.batch import _integrate_blocks
 from gearchaos_kernels.compilation import CACHE_FOLDER
 
-model = Model(*[np.full(1, 0.1) for _ in Model._fields])
+groups = Groups(*[np.full(1, 0.1) for _ in Groups._fields])
 ends = []
 for backlash in json.loads(sys.argv[1]):
-    scene = Scene(False, False, backlash, False, False)
+    effects = Effects(False, False, backlash, False, False)
     nothing = np.zeros(0)
-    start = np.ones((1, 10))
-    ends.append(integrate(scene, model, nothing, nothing, start, Plan(50, 0, 1, 0)).end_state[0, 0])
+    system = System(effects, groups, nothing, nothing)
+    ends.append(integrate(system, np.ones((1, 2)), Plan(50, 0, 1, 0)).end_state[0, 0])
 stats = _integrate_blocks.stats
 print(json.dumps({
     "hits": sum(stats.cache_hits.values()),
@@ -91,17 +91,17 @@ def test_an_edited_formula_in_another_file_is_never_served_from_the_cache(cache,
     shutil.copytree(PACKAGE, package, ignore=shutil.ignore_patterns("__pycache__"))
     copy = integrate(cache, LINEAR, package=package)
     assert copy["ends"] == first["ends"]
-    motion = package / "motion.py"
-    source = motion.read_text()
-    line = "return stiffness * gap + damping * gap_rate, stiffness"
+    equations = package / "equations.py"
+    source = equations.read_text()
+    line = "return stiffness * gap + damping * rate, stiffness"
     assert source.count(line) == 1
     changed = source.replace(line, line.replace("stiffness * gap", "stiffness * gap * 2.0"))
-    motion.write_text(changed)
+    equations.write_text(changed)
     edited = integrate(cache, LINEAR, package=package)
     assert edited["misses"] == 1
     assert edited["ends"] != first["ends"]
     assert edited["folder"] != copy["folder"]
-    motion.write_text(source)
+    equations.write_text(source)
     restored = integrate(cache, LINEAR, package=package)
     assert restored["ends"] == first["ends"]
     assert restored["folder"] == copy["folder"]

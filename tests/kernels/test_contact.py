@@ -5,9 +5,9 @@ import math
 
 import numpy as np
 import pytest
+from gearchaos_kernels.block_memory import Branch
 from gearchaos_kernels.contact import (
     NEVER,
-    Branch,
     branch_at,
     first_fall,
     leaving_fraction,

@@ -8,21 +8,20 @@ import functools
 
 import numpy as np
 import pytest
-from gearchaos_kernels import Plan, Scene, integrate
+from gearchaos_kernels import Effects, Plan, integrate
 
 from .reference import (
     BASE_HELIX_ANGLE,
-    COSINE,
     FULL,
     NO_BACKLASH,
     PERIOD,
-    SINE,
     SOLUTIONS,
     assert_same_bits,
     pan2021,
     run,
     state,
     stored_state,
+    system_of,
 )
 from .test_order import measured_order
 from .test_twin import ALL_SCENES, MODEL, START, named
@@ -31,11 +30,11 @@ STEPS = np.array([100, 141, 200, 283, 400, 566, 800])
 RUNS = [solution for solution in SOLUTIONS["runs"] if solution["crossings"] > 0]
 CHAOTIC = (12.47, 12.97, 14.68)
 ORBITS = [orbit for orbit in SOLUTIONS["periodic_orbits"] if orbit["crossings"] > 0]
-CLEARANCE = Scene(False, False, True, False, False)
+CLEARANCE = Effects(False, False, True, False, False)
 
 
-def scene_of(solution: dict) -> Scene:
-    return Scene(**{effect: effect in solution["effects"] for effect in Scene._fields})
+def scene_of(solution: dict) -> Effects:
+    return Effects(**{effect: effect in solution["effects"] for effect in Effects._fields})
 
 
 def name_of(solution: dict) -> str:
@@ -61,7 +60,7 @@ def followed(number: int, steps: int) -> tuple[float, int, int]:
         rederived=solution["formulation"] == "rederived",
         resolved=True,
     )
-    wanted = np.stack([stored_state(values) for values in solution["state"]])
+    wanted = np.array(solution["state"])
     error = np.abs(outcome.section[0, periods - 1] - wanted).max()
     return float(error), int(outcome.crossings[0]), int(outcome.overflows[0])
 
@@ -100,21 +99,16 @@ def test_a_run_crosses_as_often_as_the_stored_solution(number):
 
 def multipliers(orbit: dict, steps: int, resolved: bool = True) -> np.ndarray:
     """Return the Floquet multipliers of an orbit, from one tangent vector for each state."""
-    scene = Scene(axial=orbit["scene"] == "full")
-    present = [0, 1, 2, 5, 6, 7] if not scene.axial else list(range(10))
-    count = len(present)
-    plan = Plan(steps, 0, orbit["period"], 0, (), True, resolved)
+    scene = Effects(axial=orbit["scene"] == "full")
+    count = len(scene.states)
     outcome = integrate(
-        scene,
-        pan2021(np.full(count, orbit["pitch_error"])),
-        COSINE,
-        SINE,
-        np.tile(stored_state(orbit["section_points"][0]), (count, 1)),
-        plan,
-        tangent_start=np.eye(10)[present],
+        system_of(pan2021(np.full(count, orbit["pitch_error"])), scene),
+        np.tile(orbit["section_points"][0], (count, 1)),
+        Plan(steps, 0, orbit["period"], 0, True, resolved),
+        tangent_start=np.eye(count),
     )
     length = np.exp(outcome.growth.sum(axis=1))
-    return np.linalg.eigvals(outcome.end_tangent[:, present] * length[:, np.newaxis])
+    return np.linalg.eigvals(outcome.end_tangent * length[:, np.newaxis])
 
 
 def exponent_error(orbit: dict, steps: int, resolved: bool = True) -> float:
@@ -154,7 +148,7 @@ def test_an_orbit_crosses_the_known_number_of_times_in_every_period(orbit):
     turns = 20
     outcome = run(
         pan2021(orbit["pitch_error"]),
-        Scene(axial=orbit["scene"] == "full"),
+        Effects(axial=orbit["scene"] == "full"),
         stored_state(orbit["section_points"][0]),
         steps=200,
         periods=turns * orbit["period"],
@@ -162,17 +156,14 @@ def test_an_orbit_crosses_the_known_number_of_times_in_every_period(orbit):
     )
     assert outcome.crossings[0] == turns * orbit["crossings"]
     assert 0.0 < outcome.slowest_crossing[0] < np.inf
-    points = np.stack([stored_state(values) for values in orbit["section_points"]])
-    assert outcome.section[0, -1] == pytest.approx(points[0], rel=0, abs=2e-5)
+    assert outcome.section[0, -1] == pytest.approx(orbit["section_points"][0], rel=0, abs=2e-5)
 
 
 def test_no_crossing_is_counted_twice_wherever_in_its_step_it_falls():
     # Neighbours of one period-1 motion: their crossings fall everywhere within the steps.
     lanes, periods = 320, 50
     model = pan2021(np.linspace(5.0, 7.0, lanes))
-    outcome = run(
-        model, FULL, steps=100, transient=600, periods=periods, points=1, section=(), resolved=True
-    )
+    outcome = run(model, FULL, steps=100, transient=600, periods=periods, points=1, resolved=True)
     assert (outcome.crossings == 4 * periods).all()
     assert not outcome.overflows.any()
 
@@ -213,10 +204,10 @@ def test_the_slowest_crossing_is_the_one_that_energy_gives(excess):
 
 
 def test_the_slowest_crossing_of_the_axial_clearance_is_a_speed_of_y_2():
-    # Scene and lane in which the tangential clearance is never crossed, and the axial one is.
+    # Effects and lane in which the tangential clearance is never crossed, and the axial one is.
     model = pan2021(0.0, load=0.0, damping_ratio=0.0, axial_damping_p=0.0, axial_damping_g=0.0)
     model = model._replace(axial_stiffness_p=np.zeros(1), axial_stiffness_g=np.zeros(1))
-    scene = Scene(pitch_error=False, stiffness_variation=False)
+    scene = Effects(pitch_error=False, stiffness_variation=False)
     speed = 0.3
     # y_2 runs from 0 through the clearance at constant speed and springs back at the flank.
     outcome = run(model, scene, state(delta_3_rate=speed), steps=200, periods=2, resolved=True)
@@ -285,7 +276,7 @@ def test_resolved_steps_agree_with_plain_ones_so_fine_that_crossings_do_not_matt
             assert (resolved.crossings > 0).all()
 
 
-@pytest.mark.parametrize("scene", [FULL, Scene(axial=False)], ids=named)
+@pytest.mark.parametrize("scene", [FULL, Effects(axial=False)], ids=named)
 def test_resolved_steps_without_tangent_give_the_states_of_those_with_it(scene):
     how = {"steps": 60, "periods": 3, "resolved": True}
     plain = run(MODEL, scene, START, **how, tangent=False)

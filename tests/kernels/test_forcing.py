@@ -4,8 +4,8 @@ import math
 
 import numpy as np
 import pytest
+from gearchaos_kernels.block_memory import Lane, Present
 from gearchaos_kernels.forcing import forcing_at, phase_on_grid, phase_table, phase_within
-from gearchaos_kernels.lane import Lane
 
 ROUNDING = 1e-14
 FEW_STEPS = [8, 9, 12, 16]
@@ -85,6 +85,9 @@ def test_the_table_is_no_wider_than_its_series_needs():
     assert widths == sorted(widths, reverse=True)
 
 
+EVERYTHING, NOTHING = (Present(*[flag] * len(Present._fields)) for flag in ((), None))
+
+
 def lane(**values: float) -> Lane:
     return Lane(*[0.0] * len(Lane._fields))._replace(**values)
 
@@ -109,7 +112,7 @@ def test_load_and_pitch_error_follow_the_shifted_phase(fraction, phi):
         cos_phase=math.cos(phi),
         sin_phase=math.sin(phi),
     )
-    found = forcing_at(groups, phase_within(table, number, fraction), (), (), (), ())
+    found = forcing_at(groups, phase_within(table, number, fraction), EVERYTHING)
     wave, slope = math.sin(angle + phi), math.cos(angle + phi)
     wanted = (
         0.9 + 0.6 * variation(*series(6), angle),
@@ -134,7 +137,7 @@ def test_what_a_scene_leaves_out_is_zero_or_constant():
         cos_phase=1.0,
     )
     point = phase_within(phase_table(*series(6), 40), 3, 0.3)
-    assert tuple(forcing_at(groups, point, None, None, None, None)) == (0.9, 0.3, 0.0, 0.0, 0, 0)
-    without_axial = forcing_at(groups, point, (), None, (), None)
+    assert tuple(forcing_at(groups, point, NOTHING)) == (0.9, 0.3, 0.0, 0.0, 0, 0)
+    without_axial = forcing_at(groups, point, EVERYTHING._replace(phase=None, axial=None))
     assert without_axial.axial_error == without_axial.axial_error_rate == 0.0
     assert without_axial.error == pytest.approx(0.05 + 1.3 * point.sine, abs=ROUNDING)

@@ -2,17 +2,17 @@
 
 import numpy as np
 import pytest
-from gearchaos_kernels import STATE_ROWS, Outcome, Plan, integrate
+from gearchaos_kernels import Outcome, Plan, integrate
 
-from .reference import COSINE, FULL, OMEGA, SINE, assert_same_bits, pan2021
+from .reference import OMEGA, assert_same_bits, pan2021, system_of
 
 STEPS, RECORDED, KEPT, LANES = 60, 7, 3, 35
 
 
 def run(transient: int, kept: int) -> Outcome:
-    plan = Plan(STEPS, transient, RECORDED, RECORDED, tuple(STATE_ROWS), True, True, kept)
+    plan = Plan(STEPS, transient, RECORDED, RECORDED, True, True, kept)
     model = pan2021(np.linspace(0.0, 15.0, LANES))
-    return integrate(FULL, model, COSINE, SINE, np.zeros((LANES, 10)), plan)
+    return integrate(system_of(model), np.zeros((LANES, 10)), plan)
 
 
 @pytest.fixture(scope="module")
@@ -44,7 +44,7 @@ def test_keeping_the_history_changes_nothing_else(outcome):
 def test_between_two_steps_displacements_follow_the_rates(outcome):
     """The trapezoidal rule over one step: what a wrong order of the samples would break."""
     step = 2.0 * np.pi / OMEGA / STEPS
-    moved = np.diff(outcome.history[:, :, :5], axis=1)
-    rates = outcome.history[:, :, 5:]
+    moved = np.diff(outcome.history[:, :, 0::2], axis=1)
+    rates = outcome.history[:, :, 1::2]
     expected = 0.5 * step * (rates[:, 1:] + rates[:, :-1])
     assert np.max(np.abs(moved - expected)) < 0.01 * np.max(np.abs(moved))

@@ -2,26 +2,26 @@
 
 import numpy as np
 import pytest
-from gearchaos_kernels import Model, Scene
+from gearchaos_kernels import Effects, Groups
 
 from gearchaos.records.lyapunov import largest_exponent
 
 from .reference import BASE_HELIX_ANGLE, LINEAR, PERIOD, pan2021, run, state
 
-TORSION = Scene(*[False] * len(Scene._fields))
+TORSION = Effects(*[False] * len(Effects._fields))
 CLEARANCE = TORSION._replace(backlash=True)
 
 MODEL = pan2021(5.86, error_mean=0.1, error_phase=0.4)
 
 
-def one(model: Model, name: str) -> float:
+def one(model: Groups, name: str) -> float:
     return float(getattr(model, name)[0])
 
 
-def system(model: Model) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def system(model: Groups) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return A and the columns B_y, B_z of x' = A x + B_y n_y + B_z n_z + load.
 
-    x holds delta_5, delta_1 ... delta_4 and their rates; n_y and n_z are what the pitch error
+    x holds the states in the order of `STATES`; n_y and n_z are what the pitch error
     adds to the mesh forces of eq. 13.
     """
     beta = one(model, "base_helix_angle")
@@ -35,12 +35,13 @@ def system(model: Model) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     stiffness = np.diag([0.0] + [one(model, name.format("stiffness")) for name in bearings])
     damping = np.diag([0.0] + [one(model, name.format("damping")) for name in bearings])
     lower = [mesh - stiffness, 2.0 * one(model, "damping_ratio") * mesh - 2.0 * damping]
-    matrix = np.block([[np.zeros((5, 5)), np.eye(5)], lower])
-    zeros = np.zeros(5)
-    return matrix, np.concatenate([zeros, row_y]), np.concatenate([zeros, row_z])
+    matrix = np.zeros((10, 10))
+    matrix[0::2, 1::2] = np.eye(5)
+    matrix[1::2, 0::2], matrix[1::2, 1::2] = lower
+    return matrix, np.kron(row_y, [0.0, 1.0]), np.kron(row_z, [0.0, 1.0])
 
 
-def steady_state(model: Model, rederived: bool) -> np.ndarray:
+def steady_state(model: Groups, rederived: bool) -> np.ndarray:
     """Return the periodic response at tau = 0: a constant and one harmonic."""
     matrix, row_y, row_z = system(model)
     beta, omega = one(model, "base_helix_angle"), one(model, "mesh_frequency")
@@ -60,7 +61,7 @@ def steady_state(model: Model, rederived: bool) -> np.ndarray:
     return constant + np.imag(phasor * wave)
 
 
-def exponent_of(model: Model, scene, start=None, **how) -> float:
+def exponent_of(model: Groups, scene, start=None, **how) -> float:
     period = 2.0 * np.pi / model.mesh_frequency
     outcome = run(model, scene, start, points=1, **how)
     return float(largest_exponent(outcome.growth, period)[0][0])

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from gearchaos_kernels import Model, Scene
+from gearchaos_kernels import Effects, Groups
 
 from gearchaos.records.lyapunov import largest_exponent
 
@@ -21,8 +21,8 @@ EXACT = 1e-10
 """What the stored solutions themselves are believed to."""
 
 
-def scene_of(solution: dict) -> Scene:
-    return Scene(**{effect: effect in solution["effects"] for effect in Scene._fields})
+def scene_of(solution: dict) -> Effects:
+    return Effects(**{effect: effect in solution["effects"] for effect in Effects._fields})
 
 
 def name_of(solution: dict) -> str:
@@ -39,7 +39,7 @@ def tolerance(solution: dict, steps: int) -> float:
     return (1.5 if solution["pitch_error"] > 10.0 else 0.6) * h**2
 
 
-def error(solution: dict, model: Model, steps: int) -> float:
+def error(solution: dict, model: Groups, steps: int) -> float:
     # 20 periods of the chaotic transient at P = 12.97 amplify every error a thousandfold.
     kept = 2 if solution["pitch_error"] == 12.97 else len(solution["periods"])
     periods = np.array(solution["periods"][:kept])
@@ -66,7 +66,7 @@ def test_run_ends_where_the_stored_solution_ends(solution, steps):
 # the damping of the bearings is hardly felt.
 WRONG_BY = {
     name: 0.1 if "axial_damping" in name or "transverse_damping" in name else 1e-3
-    for name in Model._fields
+    for name in Groups._fields
     if name not in ("error_mean", "error_phase")
 }
 
@@ -105,8 +105,8 @@ def test_a_full_run_without_pitch_error_is_a_run_of_the_scene_without_it():
     assert absent.section == pytest.approx(present.section, rel=0, abs=1e-12)
 
 
-def orbit_scene(orbit: dict) -> Scene:
-    return {"full": Scene(), "no_axial": Scene(axial=False)}[orbit["scene"]]
+def orbit_scene(orbit: dict) -> Effects:
+    return {"full": Effects(), "no_axial": Effects(axial=False)}[orbit["scene"]]
 
 
 def orbit_tolerance(orbit: dict, steps: int) -> float:

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from gearchaos_kernels import Scene
+from gearchaos_kernels import Effects
 
 from .reference import FULL, LINEAR, NO_BACKLASH, SOLUTIONS, pan2021, run, state, stored_state
 
@@ -25,7 +25,7 @@ def largest_difference(one, other) -> float:
 def test_states_of_a_scene_without_clearance_converge_with_order_four(name):
     solution = next(s for s in SOLUTIONS["runs"] if s["scene"] == name)
     scene = {"no_backlash": NO_BACKLASH, "linear": LINEAR}[name]
-    wanted = stored_state(solution["state"][solution["periods"].index(PERIODS)])
+    wanted = np.array(solution["state"][solution["periods"].index(PERIODS)])
     errors = [
         largest_difference(
             run(pan2021(5.86), scene, steps=steps, periods=PERIODS).section[0, -1], wanted
@@ -71,8 +71,8 @@ def test_growth_of_the_tangent_vector_converges_with_order_four(scene, pitch_err
 
 def test_clearance_crossings_leave_an_error_that_falls_like_the_square_of_the_step():
     solution = next(s for s in SOLUTIONS["runs"] if s["scene"] == "no_pitch_error")
-    scene = Scene(pitch_error=False)
-    wanted = np.stack([stored_state(values) for values in solution["state"]])
+    scene = Effects(pitch_error=False)
+    wanted = np.array(solution["state"])
     at = np.array(solution["periods"]) - 1
 
     def error(steps):

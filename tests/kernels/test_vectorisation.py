@@ -6,15 +6,14 @@ import re
 from collections import Counter
 
 import llvmlite.binding
-import numba
 import numpy as np
 import pytest
-from gearchaos_kernels import Outcome, Scene
-from gearchaos_kernels.block_loop import integrate_block
-from gearchaos_kernels.coefficients import lane_coefficients, state_scales
-from gearchaos_kernels.forcing import phase_table
+from gearchaos_kernels import Effects, Plan, batch, integrate
+from gearchaos_kernels.block import integrate_block
+from gearchaos_kernels.block_memory import Present
+from gearchaos_kernels.compilation import block
 
-from .reference import COSINE, FULL, SINE, pan2021
+from .reference import FULL, pan2021, system_of
 
 pytestmark = pytest.mark.skipif(
     platform.machine().lower() not in ("x86_64", "amd64")
@@ -24,54 +23,32 @@ pytestmark = pytest.mark.skipif(
 
 ARITHMETIC = re.compile(r"v(add|sub|mul|f(n?)m(add|sub)\d+)(pd|sd)$")
 WIDE = ("ymm", "zmm")
-TORSION = Scene(*[False] * len(Scene._fields))
+TORSION = Effects(*[False] * len(Effects._fields))
 
 
-def arguments(scene: Scene, tangent: bool, resolved: bool) -> tuple:
-    """Return what the driver hands to the block loop for a single lane."""
-    model, steps = pan2021(1.0), 4
-    outcome = Outcome(
-        section=np.zeros((1, 1, 1)),
-        growth=np.zeros((1, 1)) if tangent else None,
-        end_state=np.zeros((1, 10)),
-        end_tangent=np.zeros((1, 10)),
-        status=np.zeros(1, dtype=np.uint8),
-        diverged_period=np.zeros(1, dtype=np.int32),
-        crossings=np.zeros(1, dtype=np.int64),
-        slowest_crossing=np.zeros(1),
-        overflows=np.zeros(1, dtype=np.int64),
-        history=None,
-    )
-    flags = {effect: () if present else None for effect, present in scene._asdict().items()}
-    return (
-        0,
-        lane_coefficients(model, steps, False),
-        state_scales(model, steps),
-        np.zeros((1, 10)),
-        np.ones((1, 10)),
-        phase_table(COSINE, SINE, steps),
-        0,
-        1,
-        np.full(1, steps),
-        np.zeros(1, dtype=np.intp),
-        flags["pitch_error"],
-        None,
-        flags["stiffness_variation"],
-        flags["backlash"],
-        flags["backlash"] if resolved else None,
-        flags["transverse"],
-        flags["axial"],
-        *outcome,
-    )
+@block
+def loop(batch, plan, outcome, *flags):
+    """Stand in for the driver: the flags are packed in compiled code."""
+    integrate_block(0, batch, plan, outcome, Present(*flags))
+
+
+def arguments(scene: Effects, tangent: bool, resolved: bool) -> tuple:
+    """Return what the driver gets for a single lane, as `integrate` makes it."""
+    given: list[tuple] = []
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(batch, "_integrate_blocks", lambda *passed: given.append(passed))
+        plan = Plan(4, 0, 1, 1, tangent, resolved)
+        integrate(system_of(pan2021(1.0), scene), np.zeros((1, len(scene.states))), plan)
+    return given[0]
 
 
 @functools.cache
-def instructions(scene: Scene, tangent: bool, resolved: bool = False) -> Counter[tuple[str, str]]:
+def instructions(scene: Effects, tangent: bool, resolved: bool = False) -> Counter[tuple[str, str]]:
     """Count the vector instructions of one compiled scene by mnemonic and register width."""
     # Called directly: the driver may come from the cache and then compiles nothing.
     given = arguments(scene, tangent, resolved)
-    integrate_block(*given)
-    assembly = integrate_block.inspect_asm(tuple(numba.typeof(value) for value in given))
+    loop(*given)
+    assembly = loop.inspect_asm(loop.signatures[-1])
     counts: Counter[tuple[str, str]] = Counter()
     for mnemonic, operands in re.findall(r"^\s+(v\w+)\s+(.*)$", assembly, re.MULTILINE):
         width = next((name for name in ("zmm", "ymm", "xmm") if name in operands), "")

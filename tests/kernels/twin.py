@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from gearchaos_kernels import Scene
+from gearchaos_kernels import Effects
 
 from .reference import COSINE, SINE
 
@@ -17,16 +17,16 @@ DELTA_5, DELTA_1, DELTA_2, DELTA_3, DELTA_4 = range(5)
 
 
 class Motion(NamedTuple):
-    """State after each period, shape (periods, 10), and growth of the tangent in each."""
+    """State after each period, shape (periods, 10) in the order of `STATES`, and growth."""
 
     states: np.ndarray
     growth: np.ndarray
 
 
 class Twin:
-    """One lane: groups are plain numbers, named as in `Model`."""
+    """One lane: groups are plain numbers, named as in `Groups`."""
 
-    def __init__(self, groups, scene: Scene, rederived: bool = False) -> None:
+    def __init__(self, groups, scene: Effects, rederived: bool = False) -> None:
         self.groups = groups
         self.scene = scene
         self.rederived = rederived
@@ -120,7 +120,8 @@ class Twin:
 
     def integrate(self, start, steps: int, periods: int) -> Motion:
         """Take ``steps`` Runge-Kutta steps in each mesh period."""
-        start = np.where(self.present, start, 0.0)
+        # Here displacements come first, then rates.
+        start = np.where(self.present, np.concatenate([start[0::2], start[1::2]]), 0.0)
         joint = np.concatenate([start, self.present / np.sqrt(np.sum(self.present))])
         h = 2.0 * np.pi / self.groups.mesh_frequency / steps
         states, growth = [], []
@@ -134,6 +135,6 @@ class Twin:
                 joint = joint + h / 6.0 * (k_1 + 2.0 * k_2 + 2.0 * k_3 + k_4)
             length = np.linalg.norm(joint[10:])
             joint[10:] /= length
-            states.append(joint[:10].copy())
+            states.append(joint[:10].reshape(2, 5).T.ravel())
             growth.append(np.log(length))
         return Motion(np.array(states), np.array(growth))
