@@ -326,10 +326,8 @@ def test_every_derived_number_in_the_report_is_the_computed_one(report, found):
     for row, (name, value) in zip(rows, ours.items(), strict=True):
         assert row[0].startswith(name)
         assert close(row[3], value, 4)
-        assert (
-            close(row[4], 100.0 * (value / numbers(row[2])[0] - 1.0), 1)
-            or abs(value / numbers(row[2])[0] - 1.0) < 1e-3
-        )
+        share = 100.0 * (value / numbers(row[2])[0] - 1.0)
+        assert numbers(row[4])[0] == pytest.approx(share, abs=0.06 if abs(share) > 1.0 else 0.006)
 
 
 @pytest.mark.slow
@@ -355,8 +353,8 @@ def test_every_acceleration_in_the_report_is_the_largest_of_its_array(report, fo
     }
     torsion = [largest[p]["delta_5"] for p in sorted(largest)]
     rows = tables(report)["Table 3, figures 14 and 15: accelerations"]
-    assert len(rows) == len(torsion) + 1 == 7 + 1
-    assert all(close(row[3], d, 4) for row, d in zip(rows, np.diff(torsion), strict=False))
+    for row, grown in zip(rows[:-1], np.diff(torsion), strict=True):
+        assert close(row[3], grown, 4)
     printed = [0.0113, *published().increments.values, 0.1394]
     assert [numbers(row[2])[0] for row in rows] == printed
     # The highest line of a motion that is forced with the mesh frequency is at that frequency.
