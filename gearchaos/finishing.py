@@ -60,8 +60,8 @@ def complete_already(simulation: Simulation, output: str) -> int | None:
         If the file is the result of another configuration.
     """
     from gearchaos.engine.store_filling import open_store
-    from gearchaos.results.result_reader import completed
     from gearchaos.results.manifest import differing_keys, folder_of
+    from gearchaos.results.result_reader import completed
 
     found = completed(output)
     if found is None:

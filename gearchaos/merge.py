@@ -18,7 +18,7 @@ from gearchaos.finishing import complete_already, ending
 from gearchaos.progress import say
 
 if TYPE_CHECKING:
-    from gearchaos.results.block_store import Finished, BlockStore
+    from gearchaos.results.block_store import BlockStore, Finished
 
 MOST_NAMED = 10
 
@@ -32,8 +32,8 @@ def _arguments(parser: ArgumentParser) -> None:
 def _merge(options: Namespace) -> int:
     output: str = options.output
     from gearchaos.results.atomic_file import check_output
-    from gearchaos.results.result_reader import completed
     from gearchaos.results.manifest import folder_of, stored_configuration
+    from gearchaos.results.result_reader import completed
 
     finished_before = not options.overwrite and completed(output) is not None
     if finished_before and not folder_of(output).is_dir():
