@@ -43,8 +43,8 @@ def main() -> None:
     began = time.perf_counter()
     with (
         LocalExecutor(simulation, [], {}) as here,
-        DaskExecutor(simulation, "local:1", quiet=True) as one,
-        DaskExecutor(simulation, "local:2", quiet=True) as two,
+        DaskExecutor(simulation, "local:1") as one,
+        DaskExecutor(simulation, "local:2") as two,
     ):
         executors = {"in this process": here, "1 dask worker": one, "2 dask workers": two}
         for executor in executors.values():

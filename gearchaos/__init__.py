@@ -11,12 +11,12 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from gearchaos.command_line import software_version
     from gearchaos.configuration import Configuration, load_config
     from gearchaos.engine.response_run import respond
     from gearchaos.engine.running import run
     from gearchaos.errors import ConfigurationError, FileError, GearchaosError
     from gearchaos.results.result import Result, open_result
+    from gearchaos.version import software_version
 
 __all__ = [
     "Configuration",
@@ -43,7 +43,7 @@ _HOMES = {
     "open_result": "gearchaos.results.result",
     "respond": "gearchaos.engine.response_run",
     "run": "gearchaos.engine.running",
-    "software_version": "gearchaos.command_line",
+    "software_version": "gearchaos.version",
 }
 
 

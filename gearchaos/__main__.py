@@ -19,27 +19,27 @@ COMMANDS = {
     "merge": "join what several jobs have computed of one sweep",
     "configuration": "print the JSON Schema of a configuration file",
 }
-_HOMES = {"configuration": "gearchaos.configuration.__main__"}
 
 
-def main(argv: Sequence[str] | None = None) -> int:
+def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command named first and return its exit code."""
-    arguments = list(sys.argv[1:] if argv is None else argv)
-    if arguments and arguments[0] in COMMANDS:
-        home = _HOMES.get(arguments[0], f"gearchaos.{arguments[0]}")
-        code = import_module(home).main(arguments[1:])
-        return int(code)
-    if arguments == ["--version"]:
+    given = list(sys.argv[1:] if arguments is None else arguments)
+    first = given[0] if given else ""
+    if first in COMMANDS:
+        # The package of that name is not the command.
+        module = "configure" if first == "configuration" else first
+        code: int = import_module(f"gearchaos.{module}").main(given[1:])
+        return code
+    if given == ["--version"]:
         print(version_text())
         return OK
-    usage = "usage: gearchaos COMMAND ...\n\n" + "\n".join(
-        f"  {name:14} {text}" for name, text in COMMANDS.items()
-    )
-    if arguments and arguments[0] in ("-h", "--help"):
+    lines = [f"  {name:14} {text}" for name, text in COMMANDS.items()]
+    usage = "\n".join(["usage: gearchaos COMMAND ...", "", *lines])
+    if first in ("-h", "--help"):
         print(usage)
         return OK
-    if arguments:
-        print(f"gearchaos: error: no command `{arguments[0]}`", file=sys.stderr)
+    if first:
+        print(f"gearchaos: error: no command `{first}`", file=sys.stderr)
     print(usage, file=sys.stderr)
     return USAGE
 

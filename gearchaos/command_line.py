@@ -1,18 +1,19 @@
-"""What every command does alike: the text of --version, and faults turned into exit codes."""
+"""The frame of every command: common options, lines on stderr, faults turned into exit codes."""
 
 from __future__ import annotations
 
 import os
-import platform
 import sys
-from collections.abc import Callable
-from importlib.metadata import PackageNotFoundError, version
+from argparse import ArgumentParser, Namespace
+from collections.abc import Callable, Sequence
 from io import TextIOWrapper
-from typing import TextIO
+from typing import Any, NamedTuple, TextIO
 
 from gearchaos import interrupts
 from gearchaos.errors import FileError, GearchaosError
 from gearchaos.interrupts import Termination
+from gearchaos.progress import complain, speaking
+from gearchaos.version import software_version
 
 OK = 0
 USAGE = 2
@@ -22,75 +23,119 @@ INTERRUPTED = 130
 CLOSED_PIPE = 141
 TERMINATED = 143
 
+COMMON_OPTIONS: dict[str, dict[str, Any]] = {
+    "output": {
+        "metavar": "PATH",
+        "help": "result file (default: named after the configuration, in the current folder)",
+    },
+    "overwrite": {"action": "store_true", "help": "replace what exists already"},
+    "threads": {"type": int, "metavar": "N", "help": "threads to use (default: all cores)"},
+    "set": {
+        "action": "append",
+        "default": [],
+        "metavar": "KEY=VALUE",
+        "help": "replace one key of the configuration, such as integration.steps_per_period=400",
+    },
+    "quiet": {"action": "store_true", "help": "say nothing on stderr unless something fails"},
+}
 
-def software_version() -> str:
-    """Return the installed version of gearchaos, "0+unknown" in a clone never installed."""
-    try:
-        return version("gearchaos")
-    except PackageNotFoundError:
-        return "0+unknown"
+
+class Command(NamedTuple):
+    """A command: called with arguments, by default those of this process, it returns its exit code.
+
+    That is what the body returns or with which argparse exits. A fault a user can cause becomes
+    lines on stderr, its notes after it, and a code: that of a GearchaosError, 4 for an operating
+    system error that nobody has worded and, as the shell says, 130 for an interrupt, 143 for
+    SIGTERM, 141 when the reader of the output has gone.
+
+    Attributes
+    ----------
+    name : str
+        As it follows ``gearchaos``.
+    text : str
+        What --help says before the options and, from the first empty line on, after them.
+    arguments : callable
+        Adds what only this command takes to its parser.
+    body : callable
+        Does it. Has beside the parsed options the `arguments` as they were given. Imports what is
+        heavy, so that --help answers at once.
+    common : tuple of str
+        Names of the `COMMON_OPTIONS` that it takes too; all have --quiet and --version.
+    writes : bool
+        Whether an interrupt finds anything to put in order: then the body asks for it at moments
+        of its own choice, see `interrupts`.
+    """
+
+    name: str
+    text: str
+    arguments: Callable[[ArgumentParser], None]
+    body: Callable[[Namespace], int]
+    common: tuple[str, ...] = ()
+    writes: bool = True
+
+    def __call__(self, arguments: Sequence[str] | None = None) -> int:
+        """Run the command and return its exit code."""
+        if isinstance(sys.stdout, TextIOWrapper):
+            # Paths that are not Unicode go out byte for byte, as they came in.
+            sys.stdout.reconfigure(errors="surrogateescape")
+        with speaking(f"gearchaos {self.name}"):
+            try:
+                with interrupts.noted() if self.writes else interrupts.deadly():
+                    code = self._code(list(sys.argv[1:] if arguments is None else arguments))
+                    interrupts.check()
+                if sys.stdout is not None:
+                    sys.stdout.flush()
+                return code
+            except GearchaosError as error:
+                texts = [f"error: {text}" for text in error.problems]
+                return _report(error, texts, error.exit_code)
+            except Termination as termination:
+                return _report(termination, ["terminated"], TERMINATED)
+            except KeyboardInterrupt as interrupt:
+                return _report(interrupt, ["interrupted"], INTERRUPTED)
+            except BrokenPipeError:
+                _discard(sys.stdout)
+                return CLOSED_PIPE
+            except OSError as error:
+                return _report(error, [f"error: {error}"], CANNOT_READ_OR_WRITE)
+
+    def _code(self, arguments: list[str]) -> int:
+        try:
+            options = self._parser().parse_args(arguments, Namespace(arguments=arguments))
+            # Matplotlib would refuse to be imported where the environment names an unknown backend.
+            os.environ["MPLBACKEND"] = "agg"
+            with speaking(quiet=options.quiet):
+                return self.body(options)
+        except SystemExit as leaving:
+            return leaving.code if isinstance(leaving.code, int) else OK
+
+    def _parser(self) -> ArgumentParser:
+        description, _, epilog = self.text.partition("\n\n")
+        parser = ArgumentParser(
+            prog=f"gearchaos {self.name}",
+            description=description,
+            epilog=epilog,
+            allow_abbrev=False,
+        )
+        self.arguments(parser)
+        add = parser.add_argument
+        for name in (*self.common, "quiet"):
+            short = [f"-{name[0]}"] if name in ("output", "quiet") else []
+            add(*short, f"--{name}", **COMMON_OPTIONS[name])
+        add("--version", action="version", version=version_text())
+        return parser
 
 
 def version_text() -> str:
     """Return the one line that --version prints: gearchaos, Python and the platform."""
-    return f"gearchaos {software_version()} (Python {platform.python_version()}, {sys.platform})"
+    from platform import python_version
+
+    return f"gearchaos {software_version()} (Python {python_version()}, {sys.platform})"
 
 
-def run_command(name: str, body: Callable[[], int], *, writes: bool = True) -> int:
-    """Run a command's body and turn every fault a user can cause into lines on stderr.
-
-    Parameters
-    ----------
-    name : str
-        What the lines begin with, such as "gearchaos plot".
-    body : callable
-        The command. Returns its exit code; raises GearchaosError for what it cannot do.
-    writes : bool
-        Whether an interrupt finds anything to put in order: then the command asks for it at moments
-        of its own choice, see `interrupts`.
-
-    Returns
-    -------
-    int
-        The body's code, also that with which argparse exits; otherwise that of the
-        GearchaosError, 4 for an operating system error that nobody has worded and, as the shell
-        says, 130 for an interrupt, 143 for SIGTERM and 141 when the reader of the output has gone.
-        The notes of a fault are printed after it.
-    """
-    if isinstance(sys.stdout, TextIOWrapper):
-        # Paths that are not Unicode go out byte for byte, as they came in.
-        sys.stdout.reconfigure(errors="surrogateescape")
+def _report(fault: BaseException, texts: list[str], code: int) -> int:
     try:
-        with interrupts.noted() if writes else interrupts.deadly():
-            code = _code_of(body)
-            interrupts.check()
-        if sys.stdout is not None:
-            sys.stdout.flush()
-        return code
-    except GearchaosError as error:
-        return _report(name, error, [f"error: {text}" for text in error.problems], error.exit_code)
-    except Termination as termination:
-        return _report(name, termination, ["terminated"], TERMINATED)
-    except KeyboardInterrupt as interrupt:
-        return _report(name, interrupt, ["interrupted"], INTERRUPTED)
-    except BrokenPipeError:
-        _discard(sys.stdout)
-        return CLOSED_PIPE
-    except OSError as error:
-        return _report(name, error, [f"error: {error}"], CANNOT_READ_OR_WRITE)
-
-
-def _code_of(body: Callable[[], int]) -> int:
-    try:
-        return body()
-    except SystemExit as leaving:
-        return leaving.code if isinstance(leaving.code, int) else OK
-
-
-def _report(name: str, fault: BaseException, texts: list[str], code: int) -> int:
-    lines = [f"{name}: {text}" for text in [*texts, *getattr(fault, "__notes__", [])]]
-    try:
-        print("\n".join(lines), file=sys.stderr, flush=True)
+        complain(*texts, *getattr(fault, "__notes__", []))
     except BrokenPipeError:
         _discard(sys.stderr)
     return code

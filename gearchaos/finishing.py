@@ -1,44 +1,52 @@
-"""How a sweep begins and ends, whether one process computes it or several share it."""
+"""How a command that computes names its output, and how it ends."""
 
 from __future__ import annotations
 
-import sys
+import os
+from argparse import Namespace
 from contextlib import suppress
+from pathlib import Path
+from typing import TYPE_CHECKING
 
 from gearchaos.command_line import OK, TOO_MANY_DIVERGED
-from gearchaos.engine.running import COMPILING
-from gearchaos.engine.simulation import Simulation
-from gearchaos.engine.store_filling import open_store
 from gearchaos.errors import FileError
-from gearchaos.progress import notice, say
-from gearchaos.results.completed import completed
-from gearchaos.results.manifest import differing_keys, folder_of
+from gearchaos.progress import complain, say
+
+if TYPE_CHECKING:
+    from gearchaos.engine.simulation import Simulation
 
 
-def prepare(simulation: Simulation, quiet: bool, compile_now: bool = True) -> None:
-    """Compile the kernel, choose the steps where a tolerance is wanted, and say what was found."""
-    if compile_now:
-        with notice(COMPILING, quiet):
-            simulation.compile()
-    simulation.choose_steps()
-    for note in simulation.notes:
-        say(note, quiet)
+def output_of(options: Namespace, suffix: str = ".h5") -> str:
+    """Return the result file to be: that of --output, or one named after the configuration.
+
+    Raises
+    ------
+    FileError
+        If it is the configuration itself.
+    """
+    # A text, not a Path, which would drop the slash that tells a folder from a file.
+    output: str = options.output
+    if options.output is None:
+        output = f"{Path(options.config).stem}{suffix}"
+    if os.path.exists(output) and os.path.samefile(output, options.config):
+        raise FileError(f"{output}: is the configuration itself; choose another --output")
+    return output
 
 
-def ending(name: str, simulation: Simulation, diverged: int) -> int:
-    """Complain in the name of a command if too many lanes diverged, and return the exit code."""
+def ending(simulation: Simulation, diverged: int) -> int:
+    """Complain if too many lanes diverged, and return the exit code."""
     allowed = simulation.config.outputs.allowed_diverged_share
     if diverged <= allowed * simulation.lanes:
         return OK
-    sys.stderr.write(
-        f"{name}: {diverged} of {simulation.lanes} lanes diverged, more than "
+    complain(
+        f"{diverged} of {simulation.lanes} lanes diverged, more than "
         f"outputs.allowed_diverged_share = {allowed:g} allows; the file marks them: "
-        "raise integration.steps_per_period, or check the load and the start state\n"
+        "raise integration.steps_per_period, or check the load and the start state"
     )
     return TOO_MANY_DIVERGED
 
 
-def complete_already(name: str, simulation: Simulation, output: str, quiet: bool) -> int | None:
+def complete_already(simulation: Simulation, output: str) -> int | None:
     """Go on with a sweep whose result exists: nothing is left to be done.
 
     Returns
@@ -51,6 +59,10 @@ def complete_already(name: str, simulation: Simulation, output: str, quiet: bool
     FileError
         If the file is the result of another configuration.
     """
+    from gearchaos.engine.store_filling import open_store
+    from gearchaos.results.manifest import differing_keys, folder_of
+    from gearchaos.results.result_reader import completed
+
     found = completed(output)
     if found is None:
         return None
@@ -64,6 +76,6 @@ def complete_already(name: str, simulation: Simulation, output: str, quiet: bool
         # A process that was killed while it tidied up has left its blocks.
         with suppress(FileError), open_store(simulation, output, resume=True) as store:
             store.remove()
-    sys.stdout.write(f"{output}\n")
-    say(f"complete already: {found.lanes} lanes, {found.diverged} diverged", quiet)
-    return ending(name, simulation, found.diverged)
+    print(output, flush=True)
+    say(f"complete already: {found.lanes} lanes, {found.diverged} diverged")
+    return ending(simulation, found.diverged)

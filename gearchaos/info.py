@@ -1,80 +1,45 @@
-"""The command that shows what is in a result file: ``python -m gearchaos.info RESULT.h5``."""
+"""Show what a result file holds: what was computed, with which parameters, how accurately, and on
+what. Only the file is read.
+
+--verify reads all of the file and tries every checksum in it. Exit codes: 0 the file is sound, 2
+the command line asks for what cannot be, 4 the file cannot be read, is damaged or is not ours.
+"""
 
 from __future__ import annotations
 
-import argparse
 import json
 import sys
-from collections.abc import Mapping, Sequence
-from functools import partial
+from argparse import ArgumentParser, Namespace
+from collections.abc import Mapping
 from typing import Any
 
-from gearchaos.command_line import OK, run_command, version_text
-
-NAME = "gearchaos info"
-
-DESCRIPTION = """\
-Show what a result file holds: what was computed, with which parameters, how accurately, and on
-what. Only the file is read."""
-
-EPILOG = """\
---verify reads all of the file and tries every checksum in it. Exit codes: 0 the file is sound, 2
-the command line asks for what cannot be, 4 the file cannot be read, is damaged or is not ours."""
+from gearchaos.command_line import OK, Command
 
 
-def main(argv: Sequence[str] | None = None) -> int:
-    """Run the command and return its exit code."""
-    return run_command(NAME, partial(_run, argv), writes=False)
-
-
-def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
-        prog=NAME, description=DESCRIPTION, epilog=EPILOG, allow_abbrev=False
-    )
+def _arguments(parser: ArgumentParser) -> None:
     add = parser.add_argument
     add("result", metavar="RESULT.h5", help="result file of a sweep")
     add("--verify", action="store_true", help="read everything and try every checksum")
     add("--json", action="store_true", help="write JSON for programs")
-    add("-q", "--quiet", action="store_true", help="say nothing on stderr unless something fails")
-    add("--version", action="version", version=version_text())
-    return parser
 
 
-def _run(argv: Sequence[str] | None) -> int:
-    options = _parser().parse_args(argv)
+def _info(options: Namespace) -> int:
     # Imported only now: --help and --version answer at once, and an interrupt is caught.
     from gearchaos.progress import notice
-    from gearchaos.results.overview import finite, overview
+    from gearchaos.results.overview import overview
     from gearchaos.results.overview_page import overview_page
     from gearchaos.results.verification import verify
 
     verified: list[str] = []
     if options.verify:
-        with notice(f"{NAME}: reading all of {options.result}", options.quiet):
+        with notice(f"reading all of {options.result}"):
             verified = verify(options.result)
     summary = overview(options.result)
     if options.json:
-        facts = {**summary, "stages": _stages(options.result, summary), "verified": verified}
-        _write(json.dumps(finite(facts), indent=1, allow_nan=False))
-        return OK
-    stages = [
-        f"{stage['label']}: {stage['start']:.6g} to {stage['end']:.6g}, "
-        f"{stage['lanes']} lane{'s' if stage['lanes'] != 1 else ''}"
-        for stage in _stages(options.result, summary)
-    ]
-    _write(overview_page(summary, _settings(summary["metadata"]), stages, verified))
+        _write(json.dumps({**summary, "verified": verified}, indent=1, allow_nan=False))
+    else:
+        _write(overview_page(summary, _settings(summary["metadata"]), verified))
     return OK
-
-
-def _stages(path: str, summary: Mapping[str, Any]) -> list[dict[str, Any]]:
-    """List the stages of the sweep where its motion is labelled."""
-    from gearchaos.results.result import open_result
-    from gearchaos.results.stage_table import LABELS, labelled_lanes, stage_table
-
-    if not all(name in summary["variables"] for name in LABELS):
-        return []
-    stages = stage_table(labelled_lanes(open_result(path), name=path))
-    return [{**stage._asdict(), "lanes": stage.lanes} for stage in stages]
 
 
 def _settings(metadata: Mapping[str, Any]) -> dict[str, list[str]]:
@@ -96,19 +61,11 @@ def _settings(metadata: Mapping[str, Any]) -> dict[str, list[str]]:
         )
     except ConfigurationError:  # Not ours to judge here: the numbers are there all the same.
         return {}
-    origins: dict[str, list[str]] = {
-        "as written": [],
-        "set for this run": [],
-        "by default": [],
-    }
+    origins: dict[str, list[str]] = {"as written": [], "set for this run": [], "by default": []}
     for key, value in resolved.items():
-        origin = (
-            "set for this run"
-            if by_itself.get(key) != value
-            else "as written"
-            if key in written
-            else "by default"
-        )
+        origin = "as written" if key in written else "by default"
+        if by_itself.get(key) != value:
+            origin = "set for this run"
         origins[origin].append(f"{key} = {shown(value)}")
     return {origin: keys for origin, keys in origins.items() if keys}
 
@@ -118,6 +75,8 @@ def _write(text: str) -> None:
     encoding = getattr(sys.stdout, "encoding", None) or "utf-8"
     print(text.encode(encoding, "replace").decode(encoding))
 
+
+main = Command("info", __doc__, _arguments, _info, writes=False)
 
 if __name__ == "__main__":
     sys.exit(main())

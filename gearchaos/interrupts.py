@@ -26,9 +26,11 @@ class Termination(KeyboardInterrupt):
 @contextmanager
 def noted() -> Iterator[None]:
     """Take note of Ctrl-C and SIGTERM for `check`; a second one ends the process at once."""
-    with _handled_by(_take_note):
+    try:
+        with _handled_by(_take_note):
+            yield
+    finally:
         _arrived.clear()
-        yield
 
 
 @contextmanager

@@ -1,48 +1,35 @@
-"""The command that draws a result file: ``python -m gearchaos.plot RESULT.h5``."""
+"""Draw a result file as PNG and PDF beside it: of a sweep the bifurcation diagram over the Lyapunov
+chart, of a response one page for each lane, with time history, phase portrait, Poincare section
+and amplitude spectrum.
+
+A figure that this command drew before is replaced, so that it can be run again and again; any
+other file of that name is kept unless --overwrite is given. The paths of the figures go to
+stdout. Exit codes: 0 done, 2 the command line asks for what cannot be, 4 a file cannot be read
+or written.
+"""
 
 from __future__ import annotations
 
 import argparse
 import math
-import os
 import sys
 from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
-from gearchaos.command_line import OK, run_command, version_text
+from gearchaos.command_line import OK, Command
 from gearchaos.errors import FigureError, FileError
+from gearchaos.progress import say
 
 if TYPE_CHECKING:
     from gearchaos.figures.page import Page
     from gearchaos.results.result import Result
 
-NAME = "gearchaos plot"
 RESULT_ENDINGS = (".h5", ".hdf5", ".nc")
 
-DESCRIPTION = """\
-Draw a result file as PNG and PDF beside it: of a sweep the bifurcation diagram over the Lyapunov
-chart, of a response one page for each lane, with time history, phase portrait, Poincare section
-and amplitude spectrum."""
 
-EPILOG = """\
-A figure that this command drew before is replaced, so that it can be run again and again; any
-other file of that name is kept unless --overwrite is given. The paths of the figures go to
-stdout. Exit codes: 0 done, 2 the command line asks for what cannot be, 4 a file cannot be read
-or written."""
-
-
-def main(argv: Sequence[str] | None = None) -> int:
-    """Run the command and return its exit code."""
-    return run_command(NAME, partial(_run, argv))
-
-
-def _run(argv: Sequence[str] | None) -> int:
-    options = _parser().parse_args(argv)
-    # Matplotlib is imported only now: --help and --version answer at once, and an interrupt is
-    # caught. It would refuse to be imported where the environment names an unknown backend.
-    os.environ["MPLBACKEND"] = "agg"
+def _plot(options: argparse.Namespace) -> int:
     from gearchaos.figures import save_figure
     from gearchaos.figures.response_lane import is_response
     from gearchaos.results.result import open_result
@@ -57,10 +44,9 @@ def _run(argv: Sequence[str] | None) -> int:
         for path in paths:
             save_figure(figure, path, title=title, dpi=options.dpi)
             print(path, flush=True)
-    if not options.quiet:
-        width, height = (25.4 * inches for inches in figure.get_size_inches())
-        size = f"{width:.0f} mm x {height:.0f} mm at {options.dpi} dpi"
-        print(f"{NAME}: {_lanes_in_words(result)}, {size}", file=sys.stderr)
+    width, height = (25.4 * inches for inches in figure.get_size_inches())
+    size = f"{width:.0f} mm x {height:.0f} mm at {options.dpi} dpi"
+    say(f"{_lanes_in_words(result)}, {size}")
     return OK
 
 
@@ -143,13 +129,7 @@ def _slice(result: Result, at: dict[str, float]) -> Result:
     return result.sel(method="nearest", **coordinates)
 
 
-def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
-        prog=NAME,
-        description=DESCRIPTION,
-        epilog=EPILOG,
-        allow_abbrev=False,
-    )
+def _arguments(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument
     add("result", type=Path, metavar="RESULT.h5", help="result file of a sweep or a response")
     add(
@@ -191,10 +171,6 @@ def _parser() -> argparse.ArgumentParser:
     )
     add("--height", type=_height, metavar="MM", help="height of the page (default: by the width)")
     add("--dpi", type=_dpi, default=300, help="pixels per inch (default: 300)")
-    add("--overwrite", action="store_true", help="replace files that this command did not draw")
-    add("-q", "--quiet", action="store_true", help="say nothing on stderr unless something fails")
-    add("--version", action="version", version=version_text())
-    return parser
 
 
 def _targets(options: argparse.Namespace, name: str, alone: bool) -> list[Path]:
@@ -293,6 +269,8 @@ def _dpi(text: str) -> int:
         raise argparse.ArgumentTypeError(f"{text} is not a whole number")
     return int(value)
 
+
+main = Command("plot", __doc__, _arguments, _plot, common=("overwrite",))
 
 if __name__ == "__main__":
     sys.exit(main())

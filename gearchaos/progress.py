@@ -1,4 +1,4 @@
-"""How far a sweep has come: a bar on a terminal, a plain line now and then elsewhere."""
+"""What is said on stderr while a command runs, and how far a sweep has come."""
 
 from __future__ import annotations
 
@@ -7,16 +7,53 @@ import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from contextvars import ContextVar, copy_context
 from typing import Self
-
-from tqdm import tqdm
 
 SECONDS_BETWEEN_LINES = 30.0
 SECONDS_BEFORE_NOTICE = 0.5
 
+# Who speaks, and whether only complaints are to be heard: as a library, nothing is said unasked.
+_name = ContextVar("name", default="gearchaos")
+_quiet = ContextVar("quiet", default=True)
+
+
+@contextmanager
+def speaking(name: str | None = None, *, quiet: bool = False) -> Iterator[None]:
+    """Let every line begin with a name, by default the one there is, or let none be said."""
+    named, hushed = _name.set(name or _name.get()), _quiet.set(quiet)
+    try:
+        yield
+    finally:
+        _name.reset(named)
+        _quiet.reset(hushed)
+
+
+def complain(*texts: str) -> None:
+    """Print lines on stderr, also where it is quiet."""
+    print(*(f"{_name.get()}: {text}" for text in texts), sep="\n", file=sys.stderr, flush=True)
+
+
+def say(*texts: str) -> None:
+    """Print lines on stderr unless it is quiet."""
+    if texts and not _quiet.get():
+        complain(*texts)
+
+
+@contextmanager
+def notice(text: str) -> Iterator[None]:
+    """Say something if what follows takes longer than a moment."""
+    timer = threading.Timer(SECONDS_BEFORE_NOTICE, copy_context().run, [say, text])
+    timer.daemon = True
+    timer.start()
+    try:
+        yield
+    finally:
+        timer.cancel()
+
 
 class Progress:
-    """Lanes done, with lanes per second and the time left.
+    """Lanes done: a bar on a terminal, a plain line now and then elsewhere.
 
     Parameters
     ----------
@@ -24,16 +61,20 @@ class Progress:
         Lanes of the whole sweep.
     done : int
         Those finished before.
-    quiet : bool
-        Show nothing.
     """
 
-    def __init__(self, lanes: int, done: int = 0, quiet: bool = False) -> None:
+    def __init__(self, lanes: int, done: int = 0) -> None:
+        from tqdm import tqdm
+
         self._lanes, self._done, self._began_with = lanes, done, done
-        self._lines = not quiet and not sys.stderr.isatty()
+        self._lines = not sys.stderr.isatty()
         self._began = self._spoke = time.monotonic()
         self._bar = tqdm(
-            total=lanes, initial=done, unit="lane", disable=quiet or self._lines, dynamic_ncols=True
+            total=lanes,
+            initial=done,
+            unit="lane",
+            disable=_quiet.get() or self._lines,
+            dynamic_ncols=True,
         )
 
     def advance(self, lanes: int) -> None:
@@ -45,32 +86,10 @@ class Progress:
             self._spoke = now
             rate = (self._done - self._began_with) / max(now - self._began, 1e-9)
             left = (self._lanes - self._done) / rate
-            text = f"{self._done} of {self._lanes} lanes, {rate:.0f} lanes/s, {left:.0f} s left"
-            print(f"gearchaos sweep: {text}", file=sys.stderr, flush=True)
+            say(f"{self._done} of {self._lanes} lanes, {rate:.0f} lanes/s, {left:.0f} s left")
 
     def __enter__(self) -> Self:
         return self
 
     def __exit__(self, *_: object) -> None:
         self._bar.close()
-
-
-def say(text: str, quiet: bool = False) -> None:
-    """Print a line on stderr."""
-    if not quiet:
-        print(f"gearchaos sweep: {text}", file=sys.stderr, flush=True)
-
-
-@contextmanager
-def notice(text: str, quiet: bool = False) -> Iterator[None]:
-    """Print a line on stderr if what follows takes longer than a moment."""
-    timer = threading.Timer(
-        SECONDS_BEFORE_NOTICE, print, [text], {"file": sys.stderr, "flush": True}
-    )
-    timer.daemon = True
-    if not quiet:
-        timer.start()
-    try:
-        yield
-    finally:
-        timer.cancel()

@@ -1,115 +1,63 @@
-"""The command that computes a time response: ``python -m gearchaos.response config.toml``."""
+"""Compute the motion of some pitch errors, or of some values of the swept parameter, at every step
+of the last mesh periods: displacements, velocities, accelerations, mesh forces and contact.
+
+The path of the result goes to stdout, everything else to stderr; python -m gearchaos.plot draws
+it. Exit codes: 0 done, 2 the command line or the configuration asks for what cannot be, 3 done, but
+more lanes diverged than outputs.allowed_diverged_share, 4 a file cannot be read or written.
+"""
 
 from __future__ import annotations
 
-import argparse
-import os
 import sys
-from collections.abc import Sequence
-from functools import partial
-from pathlib import Path
+from argparse import ArgumentParser, Namespace
 from typing import TYPE_CHECKING
 
-from gearchaos.command_line import run_command, version_text
-from gearchaos.errors import ConfigurationError, FileError
+from gearchaos.command_line import Command
+from gearchaos.errors import ConfigurationError
+from gearchaos.finishing import ending, output_of
+from gearchaos.progress import say
 
 if TYPE_CHECKING:
     from gearchaos.configuration import Configuration
 
-NAME = "gearchaos response"
 PITCH_ERROR = "pitch_error"
 
-DESCRIPTION = """\
-Compute the motion of some pitch errors, or of some values of the swept parameter, at every step of
-the last mesh periods: displacements, velocities, accelerations, mesh forces and contact."""
 
-EPILOG = """\
-The path of the result goes to stdout, everything else to stderr; python -m gearchaos.plot draws
-it. Exit codes: 0 done, 2 the command line or the configuration asks for what cannot be, 3 done, but
-more lanes diverged than outputs.allowed_diverged_share, 4 a file cannot be read or written."""
-
-
-def main(argv: Sequence[str] | None = None) -> int:
-    """Run the command and return its exit code."""
-    return run_command(NAME, partial(_run, argv))
-
-
-def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
-        prog=NAME, description=DESCRIPTION, epilog=EPILOG, allow_abbrev=False
-    )
+def _arguments(parser: ArgumentParser) -> None:
     add = parser.add_argument
     add("config", metavar="config.toml", help="the pair, its scene, start and integration")
     values = parser.add_mutually_exclusive_group(required=True)
-    values.add_argument(
-        "--pitch-error",
-        type=float,
-        action="append",
-        metavar="P",
-        help="multiple of the pitch error, may be repeated",
-    )
-    values.add_argument(
-        "--at",
-        type=float,
-        action="append",
-        metavar="VALUE",
-        help="value of the parameter that the configuration sweeps, may be repeated",
-    )
+    for flag, name, text in (
+        ("--pitch-error", "P", "multiple of the pitch error, may be repeated"),
+        ("--at", "VALUE", "value of the parameter that the configuration sweeps, may be repeated"),
+    ):
+        values.add_argument(flag, type=float, action="append", metavar=name, help=text)
     add("--periods", type=int, default=32, metavar="N", help="mesh periods kept (default: 32)")
-    add(
-        "-o",
-        "--output",
-        metavar="PATH",
-        help="result file (default: the name of the configuration, _response.h5, in the current "
-        "folder)",
-    )
-    add("--overwrite", action="store_true", help="replace an existing result")
-    add("--threads", type=int, metavar="N", help="threads to use (default: all cores)")
-    add(
-        "--set",
-        action="append",
-        default=[],
-        metavar="KEY=VALUE",
-        help="replace one key of the configuration, such as start.kind=contact",
-    )
-    add("-q", "--quiet", action="store_true", help="say nothing on stderr unless something fails")
-    add("--version", action="version", version=version_text())
-    return parser
 
 
-def _run(argv: Sequence[str] | None) -> int:
-    options = _parser().parse_args(argv)
+def _respond(options: Namespace) -> int:
     config = _configuration(options)
     from gearchaos.engine.response_run import ResponseRun
-    from gearchaos.engine.running import COMPILING, choose_threads
-    from gearchaos.finishing import ending
-    from gearchaos.progress import notice
+    from gearchaos.engine.running import choose_threads, prepare
     from gearchaos.results.atomic_file import check_output
 
     choose_threads(options.threads)
     run = ResponseRun(config, options.periods)
-    output = options.output or f"{Path(options.config).stem}_response.h5"
-    if os.path.exists(output) and os.path.samefile(output, options.config):
-        raise FileError(f"{output}: is the configuration itself; choose another --output")
+    output = output_of(options, "_response.h5")
     check_output(output, options.overwrite)
-    with notice(COMPILING, options.quiet):
-        run.compile()
-    run.choose_steps()
+    prepare(run)
     result = run.result()
     result.save(output, overwrite=options.overwrite)
     print(output, flush=True)
-    lanes, diverged = run.lanes, int((result["status"] != 0).sum())
-    if not options.quiet:
-        summary = (
-            f"{lanes} lane{'s' if lanes != 1 else ''} over {run.axis}, {run.periods} mesh periods "
-            f"of {run.plan.steps_per_period} steps, {diverged} diverged"
-        )
-        for note in [*run.notes, summary]:
-            print(f"{NAME}: {note}", file=sys.stderr)
-    return ending(NAME, run, diverged)
+    diverged = int((result["status"] != 0).sum())
+    say(
+        f"{run.lanes} lane{'s' if run.lanes != 1 else ''} over {run.axis}, {run.periods} mesh "
+        f"periods of {run.plan.steps_per_period} steps, {diverged} diverged"
+    )
+    return ending(run, diverged)
 
 
-def _configuration(options: argparse.Namespace) -> Configuration:
+def _configuration(options: Namespace) -> Configuration:
     from gearchaos.configuration import load_config
     from gearchaos.configuration.toml_text import toml_literal
 
@@ -132,6 +80,10 @@ def _configuration(options: argparse.Namespace) -> Configuration:
         )
         raise ConfigurationError([*error.problems, hint]) from error
 
+
+main = Command(
+    "response", __doc__, _arguments, _respond, common=("output", "overwrite", "threads", "set")
+)
 
 if __name__ == "__main__":
     sys.exit(main())

@@ -1,4 +1,8 @@
-"""The command that lists the stages of a sweep: ``python -m gearchaos.stages RESULT.h5``."""
+"""List the stages of a sweep: stretches of the swept parameter in which the motion keeps its label.
+
+The table goes to stdout, everything else to stderr. Exit codes: 0 done, 2 the command line asks
+for what cannot be, 4 the file cannot be read, is damaged or holds no labels.
+"""
 
 from __future__ import annotations
 
@@ -7,10 +11,9 @@ import json
 import math
 import sys
 from collections.abc import Sequence
-from functools import partial
 from typing import TYPE_CHECKING, Any
 
-from gearchaos.command_line import OK, run_command, version_text
+from gearchaos.command_line import OK, Command
 from gearchaos.errors import ConfigurationError
 
 if TYPE_CHECKING:
@@ -19,25 +22,8 @@ if TYPE_CHECKING:
     from gearchaos.results.result import Result
     from gearchaos.results.stage_table import LabelledLanes, Stage
 
-NAME = "gearchaos stages"
 
-DESCRIPTION = """\
-List the stages of a sweep: stretches of the swept parameter in which the motion keeps its label."""
-
-EPILOG = """\
-The table goes to stdout, everything else to stderr. Exit codes: 0 done, 2 the command line asks
-for what cannot be, 4 the file cannot be read, is damaged or holds no labels."""
-
-
-def main(argv: Sequence[str] | None = None) -> int:
-    """Run the command and return its exit code."""
-    return run_command(NAME, partial(_run, argv))
-
-
-def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
-        prog=NAME, description=DESCRIPTION, epilog=EPILOG, allow_abbrev=False
-    )
+def _arguments(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument
     add("result", metavar="RESULT.h5", help="result file of a sweep")
     add(
@@ -54,12 +40,15 @@ def _parser() -> argparse.ArgumentParser:
         help="bisect every boundary to this width, and tell how the orbit beside it is lost; lanes "
         "are computed again with the configuration in the file",
     )
-    add("--start", type=int, default=0, metavar="N", help="start to list (default: 0)")
+    add(
+        "--at",
+        action="append",
+        default=[],
+        metavar="NAME=VALUE",
+        help="where to fix an axis of a result that has several, at the nearest of its values; may "
+        "be repeated (default: the first value of each but the first swept parameter)",
+    )
     add("--json", action="store_true", help="print JSON instead of a table")
-    add("--threads", type=int, metavar="N", help="threads for --refine (default: all cores)")
-    add("-q", "--quiet", action="store_true", help="say nothing on stderr unless something fails")
-    add("--version", action="version", version=version_text())
-    return parser
 
 
 def _width(text: str) -> float:
@@ -72,29 +61,60 @@ def _width(text: str) -> float:
     return value
 
 
-def _run(argv: Sequence[str] | None) -> int:
-    options = _parser().parse_args(argv)
+def _stages(options: argparse.Namespace) -> int:
     from gearchaos.results.jumps import jumps
+    from gearchaos.results.overview import finite
     from gearchaos.results.result import open_result
-    from gearchaos.results.stage_table import labelled_lanes, stage_table
+    from gearchaos.results.stage_table import (
+        labelled_lanes,
+        one_axis,
+        slice_facts,
+        slice_lines,
+        stage_table,
+    )
 
-    result = open_result(options.result)
-    lanes = labelled_lanes(result, options.start, name=options.result)
+    whole = open_result(options.result)
+    result = one_axis(whole, **_coordinates(options.at, whole))
+    where = slice_facts(whole, result)
+    lanes = labelled_lanes(result, name=options.result)
     stages = stage_table(lanes, options.narrowest)
     boundaries = None
     if options.refine is not None:
         boundaries = _refined(result, stages, options)
         stages = refined_stages(stages, boundaries)
-    found = jumps(result, options.start)
+    found = jumps(result)
     if options.json:
-        facts = _facts(result, stages, boundaries)
+        facts = {"parameter": result.axis, "slice": where, **_facts(stages, boundaries)}
         facts["jumps"] = [jump._asdict() for jump in found]
-        print(json.dumps(facts, indent=1, allow_nan=False))
+        print(json.dumps(finite(facts), indent=1, allow_nan=False))
     else:
-        print("\n".join([*table(result.axis, stages), *remarks(found, lanes)]))
-        if boundaries:
-            print("\n".join(["", *boundary_list(boundaries)]))
+        print("\n".join(table(result.axis, stages, slice_lines(where))))
+        for lines in (remarks(found, lanes), boundary_list(boundaries or ())):
+            if lines:
+                print("\n".join(["", *lines]))
     return OK
+
+
+def _coordinates(texts: Sequence[str], result: Result) -> dict[str, float]:
+    """Read where axes are to be fixed: ``NAME=VALUE``, or a value where there is one other axis."""
+    from gearchaos.results.variables import axis_name
+
+    others = [name for name in result.axes if name != result.axis]
+    coordinates: dict[str, float] = {}
+    for text in texts:
+        key, _, value = text.rpartition("=")
+        name = axis_name(key.strip()) or (others[0] if len(others) == 1 else "")
+        try:
+            number = float(value)
+        except ValueError:
+            number = math.nan
+        if not name or name in coordinates or not math.isfinite(number):
+            raise ConfigurationError(
+                f"--at {text}: must be NAME=VALUE with a number, each of the axes "
+                f"{', '.join(result.axes)} once"
+            )
+        coordinates[name] = number
+    return coordinates
 
 
 def _refined(result: Result, stages: list[Stage], options: argparse.Namespace) -> list[Boundary]:
@@ -103,10 +123,8 @@ def _refined(result: Result, stages: list[Stage], options: argparse.Namespace) -
     from gearchaos.engine.stage_refinement import refinable, refined_boundaries
     from gearchaos.progress import notice
 
-    if options.start != 0:
-        raise ConfigurationError(f"--start {options.start}: only start 0 can be refined")
     config = refinable(result, options.result)
-    with notice(COMPILING, options.quiet):
+    with notice(COMPILING):
         return refined_boundaries(config, result, stages, options.refine, options.threads)
 
 
@@ -120,10 +138,11 @@ def refined_stages(stages: list[Stage], boundaries: Sequence[Boundary]) -> list[
     ]
 
 
-def table(axis: str, stages: Sequence[Stage]) -> list[str]:
-    """Word the stages as lines of a table, no longer than 80 characters."""
+def table(axis: str, stages: Sequence[Stage], where: Sequence[str] = ()) -> list[str]:
+    """Word the stages of a slice as lines of a table, no longer than 80 characters."""
     lines = [
         f"stages over {axis}",
+        *where,
         f"{'from':>10}  {'to':>10}  {'motion':15}{'lanes':>6}  {'exponent':>20}  narrower",
     ]
     for stage in stages:
@@ -148,7 +167,7 @@ def remarks(found: Sequence[Jump], lanes: LabelledLanes) -> list[str]:
             f"{late} periodic lanes came to rest within their record, the chaos before it\n"
             "included in their exponent; integration.transient_periods leaves it out"
         )
-    return ["", *lines] if lines else []
+    return lines
 
 
 def boundary_list(boundaries: Sequence[Boundary]) -> list[str]:
@@ -166,11 +185,8 @@ def boundary_list(boundaries: Sequence[Boundary]) -> list[str]:
     return lines
 
 
-def _facts(
-    result: Result, stages: Sequence[Stage], boundaries: Sequence[Boundary] | None
-) -> dict[str, Any]:
+def _facts(stages: Sequence[Stage], boundaries: Sequence[Boundary] | None) -> dict[str, Any]:
     facts: dict[str, Any] = {
-        "parameter": result.axis,
         "stages": [
             {
                 "from": stage.start,
@@ -179,8 +195,8 @@ def _facts(
                 "period": stage.period,
                 "lanes": stage.lanes,
                 "narrower_stages": stage.narrower,
-                "lowest_exponent": _number(stage.lowest_exponent),
-                "highest_exponent": _number(stage.highest_exponent),
+                "lowest_exponent": stage.lowest_exponent,
+                "highest_exponent": stage.highest_exponent,
             }
             for stage in stages
         ],
@@ -193,17 +209,15 @@ def _facts(
                 "motion_below": boundary.label_below,
                 "motion_above": boundary.label_above,
                 "loss_of_stability": boundary.loss or None,
-                "multiplier_real": _number(boundary.multiplier.real),
-                "multiplier_imaginary": _number(boundary.multiplier.imag),
+                "multiplier_real": boundary.multiplier.real,
+                "multiplier_imaginary": boundary.multiplier.imag,
             }
             for boundary in boundaries
         ]
     return facts
 
 
-def _number(value: float) -> float | None:
-    return value if math.isfinite(value) else None
-
+main = Command("stages", __doc__, _arguments, _stages, common=("threads",))
 
 if __name__ == "__main__":
     sys.exit(main())

@@ -15,13 +15,13 @@ import distributed
 from gearchaos_kernels import current_threads, most_threads, use_threads
 from gearchaos_kernels.compilation import CACHE_FOLDER, source_hash
 
-from gearchaos.command_line import software_version
 from gearchaos.configuration import Configuration
 from gearchaos.engine.executors import ExecutionError
 from gearchaos.engine.simulation import Arrays, Bounds, Simulation
 from gearchaos.errors import ConfigurationError
 from gearchaos.progress import say
 from gearchaos.results.store_lock import waiting_lock
+from gearchaos.version import software_version
 
 # Its constructors carry no annotations.
 _Client: Any = distributed.Client
@@ -61,8 +61,6 @@ class DaskExecutor:
         Not carried; its number of steps has been chosen.
     address : str
         Of a scheduler, such as ``tcp://node7:8786``, or ``local:N`` for N processes here.
-    quiet : bool
-        Whether to say nothing on stderr.
 
     Raises
     ------
@@ -72,7 +70,7 @@ class DaskExecutor:
         If there is no scheduler at the address.
     """
 
-    def __init__(self, simulation: Simulation, address: str, quiet: bool = False) -> None:
+    def __init__(self, simulation: Simulation, address: str) -> None:
         self._address = address
         self._recipe = Recipe(
             simulation.config.resolved_toml(), simulation.plan.steps_per_period, software()
@@ -83,12 +81,12 @@ class DaskExecutor:
         with ExitStack() as stack:
             self._client: Any = stack.enter_context(_connected(stack, address))
             if not self.workers:
-                say(f"{address}: waits for the first worker to join", quiet)
+                say(f"{address}: waits for the first worker to join")
                 self._client.wait_for_workers(1)
             self._require_software()
             self._executor = self._client.get_executor(pure=False)
             self._closing = stack.pop_all()
-        say(f"{self.workers} dask worker{'s' if self.workers > 1 else ''} at {address}", quiet)
+        say(f"{self.workers} dask worker{'s' if self.workers > 1 else ''} at {address}")
 
     @property
     def workers(self) -> int:

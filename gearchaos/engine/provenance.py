@@ -10,7 +10,7 @@ from pathlib import Path
 
 from gearchaos_kernels import processor
 
-from gearchaos.command_line import software_version
+from gearchaos.version import software_version
 
 
 def provenance(threads: int, seconds: float) -> dict[str, str | int | float]:

@@ -14,11 +14,12 @@ from gearchaos.engine.error_check import Tally
 from gearchaos.engine.provenance import provenance
 from gearchaos.engine.simulation import Simulation, compute_all
 from gearchaos.errors import ConfigurationError
-from gearchaos.progress import Progress, notice, say
+from gearchaos.interrupts import check
+from gearchaos.progress import Progress, notice, say, speaking
 from gearchaos.results.result import Result
 
 PILOT_SECONDS = 0.2
-COMPILING = "gearchaos: preparing the kernel of this scene; the first time this takes some seconds"
+COMPILING = "preparing the kernel of this scene; the first time this takes some seconds"
 
 
 def run(config: Configuration, threads: int | None = None, progress: bool = False) -> Result:
@@ -44,25 +45,25 @@ def run(config: Configuration, threads: int | None = None, progress: bool = Fals
         If there are not so many threads.
     """
     choose_threads(threads)
-    simulation = Simulation(config)
-    with notice(COMPILING, quiet=not progress):
-        simulation.compile()
-    simulation.choose_steps()
-    for note in simulation.notes:
-        say(note, quiet=not progress)
+    with speaking(quiet=not progress):
+        return _run(Simulation(config))
+
+
+def _run(simulation: Simulation) -> Result:
+    prepare(simulation)
     began = time.monotonic()
     size = simulation.block_lanes(current_threads())
     edges = range(0, simulation.lanes, size)
     bounds = simulation.in_order((first, min(first + size, simulation.lanes)) for first in edges)
     parts = {}
     tally = Tally()
-    with Progress(simulation.lanes, quiet=not progress) as bar:
+    with Progress(simulation.lanes) as bar:
         for (first, last), arrays in compute_all(simulation, bounds):
             parts[first] = arrays
             tally.add(arrays)
             bar.advance(last - first)
     if tally.errors:
-        say(tally.errors, quiet=not progress)
+        say(tally.errors)
     in_order = [parts[first] for first in sorted(parts)]
     data = {name: np.concatenate([part[name] for part in in_order]) for name in in_order[0]}
     return Result(
@@ -72,6 +73,16 @@ def run(config: Configuration, threads: int | None = None, progress: bool = Fals
         simulation.parameters,
         metadata(simulation, time.monotonic() - began),
     )
+
+
+def prepare(simulation: Simulation, compile_now: bool = True) -> None:
+    """Compile the kernel, choose the steps where a tolerance is wanted, and say what was found."""
+    if compile_now:
+        with notice(COMPILING):
+            simulation.compile()
+    check()
+    simulation.choose_steps()
+    say(*simulation.notes)
 
 
 def pilot_rate(simulation: Simulation) -> float:

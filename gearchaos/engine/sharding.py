@@ -1,4 +1,4 @@
-"""The parts in which several jobs share one sweep: ``--shard 2/8`` takes every eighth block."""
+"""The shards of a sweep that several jobs compute: ``--shard 2/8`` takes every eighth block."""
 
 from __future__ import annotations
 
@@ -10,22 +10,22 @@ from gearchaos_kernels import LANES
 from gearchaos.engine.simulation import Bounds
 from gearchaos.errors import ConfigurationError
 
-BLOCKS_PER_PART = 4
-"""At least so many blocks for everyone, as far as there are enough lanes: parts end together."""
+BLOCKS_PER_SHARD = 4
+"""At least so many blocks for everyone, as far as there are enough lanes: shards end together."""
 
 FEWEST_LANES, MOST_LANES = 8 * LANES, 128 * LANES
 """Lanes of a block: a few threads are kept busy by the fewest, a whole node by the most."""
 
 
-class Part(NamedTuple):
-    """One of several jobs that share the blocks of a sweep.
+class Shard(NamedTuple):
+    """One of several portions of the blocks of a sweep, each the work of one job.
 
     Attributes
     ----------
     number : int
         From 1 to `of`.
     of : int
-        Jobs that share the sweep.
+        Shards that the sweep has.
     """
 
     number: int
@@ -38,42 +38,37 @@ class Part(NamedTuple):
         Raises
         ------
         ConfigurationError
-            If it is no part.
+            If it is no shard.
         """
         found = re.fullmatch(r"(\d{1,9})/(\d{1,9})", text, re.ASCII)
-        part = cls(*map(int, found.groups())) if found else cls(0, 0)
-        if not 1 <= part.number <= part.of:
+        shard = cls(*map(int, found.groups())) if found else cls(0, 0)
+        if not 1 <= shard.number <= shard.of:
             raise ConfigurationError(
                 f"--shard {text}: must be i/N with i from 1 to N, such as 2/8 for the second of "
                 "eight jobs"
             )
-        return part
-
-    @property
-    def name(self) -> str:
-        """How files of this part are called: ``2-of-8``."""
-        return f"{self.number}-of-{self.of}"
+        return shard
 
     def blocks(self, lanes: int) -> list[Bounds]:
-        """Return the bounds of this part's blocks of a sweep of so many lanes."""
+        """Return the bounds of this shard's blocks of a sweep of so many lanes."""
         return shared_blocks(lanes, self.of)[self.number - 1 :: self.of]
 
 
-def shared_blocks(lanes: int, parts: int) -> list[Bounds]:
+def shared_blocks(lanes: int, shards: int) -> list[Bounds]:
     """Cut a sweep into blocks that do not depend on the machine on which this is asked.
 
     Parameters
     ----------
     lanes : int
         Lanes of the sweep.
-    parts : int
+    shards : int
         How many jobs or workers share it.
     """
-    size = shared_block_lanes(lanes, parts)
+    size = shared_block_lanes(lanes, shards)
     return [(first, min(first + size, lanes)) for first in range(0, lanes, size)]
 
 
-def shared_block_lanes(lanes: int, parts: int) -> int:
+def shared_block_lanes(lanes: int, shards: int) -> int:
     """Return how many lanes such a block has."""
-    share = -(-lanes // (BLOCKS_PER_PART * parts))
+    share = -(-lanes // (BLOCKS_PER_SHARD * shards))
     return min(max(LANES * -(-share // LANES), FEWEST_LANES), MOST_LANES)

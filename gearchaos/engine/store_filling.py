@@ -8,16 +8,16 @@ from gearchaos_kernels import current_threads
 
 from gearchaos.engine.error_check import Tally
 from gearchaos.engine.executors import BlockExecutor, LocalExecutor, compute_blocks
-from gearchaos.engine.sharding import Part, shared_block_lanes
+from gearchaos.engine.sharding import Shard, shared_block_lanes
 from gearchaos.engine.simulation import Arrays, Bounds, Simulation
-from gearchaos.progress import Progress, say
-from gearchaos.results.block_store import ShardStore
+from gearchaos.progress import Progress, complain
+from gearchaos.results.block_store import BlockStore
 
 
 def open_store(
-    simulation: Simulation, output: str, *, resume: bool, part: Part | None = None
-) -> ShardStore:
-    """Open the store of a sweep whose number of steps has been chosen, see `ShardStore`.
+    simulation: Simulation, output: str, *, resume: bool, shard: Shard | None = None
+) -> BlockStore:
+    """Open the store of a sweep whose number of steps has been chosen, see `BlockStore`.
 
     Parameters
     ----------
@@ -26,24 +26,22 @@ def open_store(
         The result file to be.
     resume : bool
         Whether there may be blocks of an earlier run.
-    part : Part, optional
-        The part of the blocks that this process computes; by default all.
+    shard : Shard, optional
+        The blocks that this process computes; by default all.
     """
-    return ShardStore(
+    return BlockStore(
         output,
         simulation.variables,
-        simulation.lanes,
         simulation.config.resolved_toml(),
-        axis=simulation.axis,
         text=simulation.config.text,
         resume=resume,
-        part=part and part.name,
-        blocks=part and part.blocks(simulation.lanes),
+        blocks=shard and shard.blocks(simulation.lanes),
+        shards=shard and shard.of,
     )
 
 
 def fill(
-    simulation: Simulation, store: ShardStore, cluster: str | None, quiet: bool
+    simulation: Simulation, store: BlockStore, cluster: str | None
 ) -> tuple[Tally, dict[str, int]]:
     """Compute the blocks that are missing, and keep each of them as soon as it is there.
 
@@ -51,12 +49,10 @@ def fill(
     ----------
     simulation : Simulation
         Compiled, unless a cluster computes; its number of steps has been chosen.
-    store : ShardStore
+    store : BlockStore
         With what is finished already.
     cluster : str or None
         Where dask workers are, see `DaskExecutor`; None computes in this process.
-    quiet : bool
-        Whether to show no progress.
 
     Returns
     -------
@@ -68,7 +64,7 @@ def fill(
     tally = Tally()
     finished, problems = store.finished(tally.add)
     for problem in problems:
-        say(f"{problem}; it is computed again")
+        complain(f"{problem}; it is computed again")
     done = sum(last - first for first, last in finished)
     if cluster is None:
         size = simulation.block_lanes(current_threads())
@@ -80,10 +76,10 @@ def fill(
     else:
         from gearchaos.engine.dask_executor import DaskExecutor
 
-        executor = DaskExecutor(simulation, cluster, quiet)
+        executor = DaskExecutor(simulation, cluster)
         missing = store.missing(finished, shared_block_lanes(simulation.lanes, executor.workers))
         performed_by = {"threads": 1, "workers": executor.workers}
-    with executor, Progress(store.own_lanes, done, quiet) as progress:
+    with executor, Progress(store.own_lanes, done) as progress:
 
         def keep(block: Bounds, arrays: Arrays) -> None:
             store.write(*block, arrays)

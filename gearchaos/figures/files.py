@@ -7,11 +7,11 @@ from pathlib import Path
 import matplotlib as mpl
 from matplotlib.figure import Figure
 
-from gearchaos.command_line import software_version
 from gearchaos.errors import FigureError
 from gearchaos.figures.style import STYLE
 from gearchaos.interrupts import check
 from gearchaos.results.atomic_file import replacing
+from gearchaos.version import software_version
 
 FORMATS: tuple[str, ...] = ("png", "pdf")
 PDF_FINENESS = 2

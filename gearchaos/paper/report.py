@@ -9,7 +9,6 @@ from importlib.resources import files
 
 import numpy as np
 
-from gearchaos.command_line import software_version
 from gearchaos.figures.response_lane import coordinates_of
 from gearchaos.paper.comparison import NONE, Row, compare, short
 from gearchaos.paper.computation import Reproduction, largest_acceleration
@@ -19,6 +18,7 @@ from gearchaos.paper.published import CITATION, Published
 from gearchaos.paper.stages import WINDOW
 from gearchaos.paper.verdict import OVERLAP, RULES, Verdict
 from gearchaos.results.response_variables import acceleration_of
+from gearchaos.version import software_version
 
 TOLERANCE_MM = 0.011
 """Single pitch deviation of the driving gear in grade 7 (ISO 1328-1)."""

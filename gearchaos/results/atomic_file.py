@@ -16,6 +16,9 @@ from gearchaos.errors import FileError
 PARTIAL = ".partial"
 """Ending of the names of unfinished files; nothing reads them and they can be deleted."""
 
+NO_LINK: int = getattr(os, "O_NOFOLLOW", 0)
+"""Flag with which a file in a folder of ours is opened."""
+
 _REMEDIES = {
     errno.ENOSPC: "free some space or choose another place",
     errno.EDQUOT: "free some space or choose another place",
@@ -55,13 +58,6 @@ def writing(path: str | os.PathLike[str]) -> Iterator[None]:
 def check_output(path: str | os.PathLike[str], overwrite: bool = False) -> None:
     """Make sure that a file can be written, before anything is computed for it.
 
-    Parameters
-    ----------
-    path : path
-        The file to be; nothing is left behind beside it.
-    overwrite : bool
-        Whether the file may exist.
-
     Raises
     ------
     FileError
@@ -73,23 +69,33 @@ def check_output(path: str | os.PathLike[str], overwrite: bool = False) -> None:
         _create_partial(target.parent, target.name).unlink()
 
 
+def unlinked_content(path: Path, most: int) -> bytes:
+    """Read a file, unless it is a link: at most so many bytes, and without waiting for any."""
+    descriptor = os.open(path, os.O_RDONLY | NO_LINK | getattr(os, "O_NONBLOCK", 0))
+    with open(descriptor, "rb") as file:
+        return file.read(min(most, os.fstat(descriptor).st_size))
+
+
 @contextmanager
 def replacing(
     path: str | os.PathLike[str],
     *,
     overwrite: bool = False,
     scratch: str | os.PathLike[str] | None = None,
+    through_links: bool = True,
 ) -> Iterator[Path]:
     """Write a file under a temporary name; it gets its own name once it is complete on the disk.
 
     Parameters
     ----------
     path : path
-        The file to be. Symbolic links are followed.
+        The file to be.
     overwrite : bool
         Whether an existing file is replaced.
     scratch : path, optional
         Folder on the same file system for the temporary name; by default that of the file.
+    through_links : bool
+        Whether symbolic links are followed, and not replaced themselves.
 
     Yields
     ------
@@ -102,7 +108,7 @@ def replacing(
         If the file cannot be written; one that existed before is left as it was.
     """
     with writing(path):
-        target = _checked_target(path, overwrite)
+        target = _checked_target(path, overwrite) if through_links else Path(path)
         partial = _create_partial(Path(scratch or target.parent), target.name)
         try:
             yield partial
@@ -111,7 +117,9 @@ def replacing(
                 partial.replace(target)
             else:
                 _rename_to_new(partial, target)
-            _synchronise_folder(target.parent)
+            # Not every system can do this to a folder; the file itself is on the disk by now.
+            with suppress(OSError):
+                _synchronise(target.parent)
         except FileExistsError as error:
             raise _exists(path) from error
         finally:
@@ -172,9 +180,3 @@ def _synchronise(path: Path) -> None:
         os.fsync(descriptor)
     finally:
         os.close(descriptor)
-
-
-def _synchronise_folder(path: Path) -> None:
-    # Not every system can do this; the file itself is on the disk by now.
-    with suppress(OSError):
-        _synchronise(path)

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from gearchaos.records.period import section_distance
 from gearchaos.results.result import Result, section_variables
-from gearchaos.results.stage_table import labelled_lanes, lanes_of_start
+from gearchaos.results.stage_table import labelled_lanes
 
 Floats = NDArray[np.float64]
 
@@ -28,7 +28,7 @@ class Jump(NamedTuple):
     label: str
 
 
-def jumps(result: Result, start: int = 0) -> list[Jump]:
+def jumps(result: Result) -> list[Jump]:
     """Find where a sweep jumps from one motion to another of the same period.
 
     On one branch the points of the section move little from lane to lane, and steadily so: towards
@@ -37,17 +37,14 @@ def jumps(result: Result, start: int = 0) -> list[Jump]:
     Parameters
     ----------
     result : Result
-        With labels; without a section nothing is found.
-    start : int
-        Number of the start, where every value has several.
+        With one axis and labels; without a section nothing is found.
     """
-    lanes = labelled_lanes(result, start)
+    lanes = labelled_lanes(result)
     names = section_variables(result)
     if not names or lanes.values.size < 3:
         return []
-    mine = lanes_of_start(result, start)
-    sections = np.stack([result[name][mine] for name in names], axis=2)
-    size = np.nanmax(np.abs(sections), axis=(0, 1))
+    sections = np.stack([result[name] for name in names], axis=2)
+    size = np.nanmax(np.abs(sections), axis=(0, 1), initial=0.0)
     found = jumps_at(lanes.period, sections / np.where(size > 0.0, size, 1.0))
     return [
         Jump(float(lanes.values[at]), float(lanes.values[at + 1]), str(lanes.labels[at]))

@@ -6,115 +6,87 @@ import hashlib
 import json
 import os
 import tomllib
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from gearchaos.configuration.toml_text import flat_tables
 from gearchaos.errors import FileError
-from gearchaos.results.atomic_file import reason, replacing
-from gearchaos.results.block_file import SHARD_SCHEMA_VERSION
+from gearchaos.results.atomic_file import reason, replacing, unlinked_content
+from gearchaos.results.block_file import BLOCK_SCHEMA_VERSION
 
-STORE_SCHEMA = "gearchaos-shards"
+STORE_SCHEMA = "gearchaos-blocks"
 MANIFEST = "manifest.json"
-
-Columns = tuple[tuple[str, str, tuple[int, ...]], ...]
+_LARGEST = 64 << 20
 
 
 class Manifest:
-    """What decides the numbers of a sweep, and with it whose shards are whose.
+    """What decides the numbers of a sweep, and with it whose blocks are whose.
 
     Parameters
     ----------
-    lanes : int
-        Lanes of the sweep.
-    columns : tuple of (name, dtype, row)
-        As in `ShardFormat`.
-    configuration : str
-        The resolved configuration in TOML.
-    text : str
-        The configuration as it was written, which decides nothing.
+    folder : Path
+        Where the manifest is.
+    decisive : mapping
+        ``lanes``, ``variables`` and ``configuration``, the resolved one in TOML.
+    beside : mapping
+        What decides nothing: ``text``, the configuration as it was written, and ``shards``, into
+        how many the sweep was divided by whoever began it.
     """
 
-    def __init__(self, lanes: int, columns: Columns, configuration: str, text: str) -> None:
-        self._decisive = {
-            "schema": STORE_SCHEMA,
-            "schema_version": SHARD_SCHEMA_VERSION,
-            "lanes": lanes,
-            "variables": columns,
-            "configuration": configuration,
-        }
-        self._text = text
+    def __init__(
+        self, folder: Path, decisive: Mapping[str, Any], beside: Mapping[str, Any]
+    ) -> None:
+        self._folder, self._path, self._beside = folder, folder / MANIFEST, beside
+        versions = {"schema": STORE_SCHEMA, "schema_version": BLOCK_SCHEMA_VERSION}
+        # As it is read again: with lists for tuples.
+        self._decisive = json.loads(json.dumps({**versions, **decisive}))
 
     @property
     def fingerprint(self) -> str:
         """A hash of all that decides the numbers."""
-        text = json.dumps(self._decisive, sort_keys=True)
-        return hashlib.sha256(text.encode()).hexdigest()
+        return hashlib.sha256(json.dumps(self._decisive, sort_keys=True).encode()).hexdigest()
 
-    def write(self, folder: Path, overwrite: bool = True) -> None:
-        """Write the manifest into the folder of the shards."""
-        text = json.dumps({**self._decisive, "text": self._text}, indent=1)
-        with replacing(folder / MANIFEST, overwrite=overwrite) as partial:
-            partial.write_text(text, encoding="utf-8")
-
-    def write_if_new(self, folder: Path) -> None:
-        """Write the manifest unless there is one, or unless somebody else writes it just now."""
-        path = folder / MANIFEST
-        if path.exists():
-            return
+    def write(self, overwrite: bool = True) -> None:
+        """Write the manifest; one that somebody else has just written may be left as it is."""
+        text = json.dumps({**self._decisive, **self._beside}, indent=1)
         try:
-            self.write(folder, overwrite=False)
+            with replacing(self._path, overwrite=overwrite, through_links=False) as partial:
+                partial.write_text(text, encoding="utf-8")
         except FileError:
-            if not path.exists():
+            if overwrite or not self._path.exists():
                 raise
 
-    def compare(self, folder: Path) -> None:
-        """Make sure that the folder belongs to this sweep.
-
-        Raises
-        ------
-        FileError
-            If it does not; the message names the keys that differ.
-        """
-        path = folder / MANIFEST
-        earlier = _read(path)
-        try:
-            keys = differing_keys(earlier["configuration"], str(self._decisive["configuration"]))
-        except (ValueError, LookupError, TypeError, AttributeError, RecursionError) as error:
-            raise _damaged(path, error) from error
-        own = json.loads(json.dumps(self._decisive))
-        keys = keys or [key for key in own if own[key] != earlier.get(key)]
+    def compare(self) -> None:
+        """Raise a FileError that names the keys that differ if the folder is of another sweep."""
+        earlier = read_manifest(self._folder)
+        keys = differing_keys(earlier["configuration"], self._decisive["configuration"])
+        keys = keys or [key for key in self._decisive if self._decisive[key] != earlier.get(key)]
         if keys:
             raise FileError(
-                f"{folder}: holds blocks of another configuration, which differs in "
+                f"{self._folder}: holds blocks of another configuration, which differs in "
                 f"{', '.join(keys)}; restore these values, delete the folder or choose another "
                 "--output"
             )
 
 
 def folder_of(output: str | os.PathLike[str]) -> Path:
-    """Return the folder of the shards of a result file to be."""
-    return Path(os.path.realpath(output) + ".shards")
+    """Return the folder of the blocks of a result file to be."""
+    return Path(os.path.realpath(output) + ".blocks")
 
 
 def stored_configuration(output: str | os.PathLike[str]) -> tuple[str, str]:
     """Return the configuration of the blocks beside an output: resolved, and as it was written.
 
-    Raises
-    ------
-    FileError
-        If there are no blocks, or if what describes them is damaged.
+    Raises FileError if there are no blocks, or if what describes them is damaged.
     """
     folder = folder_of(output)
     if not folder.is_dir():
         raise FileError(
             f"{folder}: no such folder; name the result file to be, beside which the blocks are"
         )
-    manifest = _read(folder / MANIFEST)
-    resolved, text = manifest.get("configuration"), manifest.get("text")
-    if not isinstance(resolved, str) or not isinstance(text, str):
-        raise _damaged(folder / MANIFEST, LookupError("it lacks the configuration"))
-    return resolved, text or resolved
+    manifest = read_manifest(folder)
+    return manifest["configuration"], manifest["text"] or manifest["configuration"]
 
 
 def differing_keys(one: str, other: str) -> list[str]:
@@ -127,24 +99,22 @@ def differing_keys(one: str, other: str) -> list[str]:
     ]
 
 
-def _read(path: Path) -> dict[str, Any]:
+def read_manifest(folder: Path) -> dict[str, Any]:
+    """Read the manifest of a folder; FileError if there is none, or none of this version."""
+    path = folder / MANIFEST
     try:
-        manifest = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError, RecursionError) as error:
-        raise _damaged(path, error) from error
-    if not isinstance(manifest, dict):
-        raise _damaged(path, TypeError("it is no table"))
-    version, own = str(manifest.get("schema_version", "")), SHARD_SCHEMA_VERSION.split(".")[0]
-    if version.split(".")[0] != own:
+        manifest: dict[str, Any] = json.loads(unlinked_content(path, _LARGEST))
+        version, own = str(manifest.get("schema_version", "")), BLOCK_SCHEMA_VERSION.split(".")[0]
+        if version.split(".")[0] != own:
+            raise FileError(
+                f"{folder}: has version {version!r} of the format of blocks, of which this "
+                f"gearchaos reads {own}.x; finish it with the gearchaos that began it, or delete "
+                "the folder"
+            )
+        tomllib.loads(manifest["configuration"])
+        manifest["text"] = str(manifest["text"])
+    except (OSError, ValueError, LookupError, TypeError, AttributeError, RecursionError) as error:
         raise FileError(
-            f"{path.parent}: has version {version!r} of the format of blocks, of which this "
-            f"gearchaos reads {own}.x; finish it with the gearchaos that began it, or delete the "
-            "folder"
-        )
+            f"{path}: is damaged or missing ({reason(error)}); delete the folder to start again"
+        ) from error
     return manifest
-
-
-def _damaged(path: Path, error: BaseException) -> FileError:
-    return FileError(
-        f"{path}: is damaged or missing ({reason(error)}); delete the folder to start again"
-    )

@@ -11,80 +11,84 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gearchaos.results.result import Result
 from gearchaos.results.result_file import Parameter
 from gearchaos.results.result_reader import read_result
-from gearchaos.results.variables import Variable
+from gearchaos.results.stage_table import labelled_lanes, one_axis, slice_facts, stage_table
+from gearchaos.results.variables import HARMONIC, LABELS, START, Variable
 
 ERRORS = ("section_error", "exponent_error")
 _CANDIDATE = "candidate_"
 
 
 def overview(path: str | os.PathLike[str]) -> dict[str, Any]:
-    """Sum up a result file without reading its arrays of several dimensions.
+    """Sum up a result file without reading more than one number of each lane and variable.
 
     Returns
     -------
     dict
-        ``file``, ``bytes``, ``lanes``, ``swept`` (name, unit, range), ``metadata`` (root
-        attributes and texts), ``parameters`` by name, ``counts`` (lanes by each enumeration),
-        ``errors`` (measured ones: lanes, median, largest), ``step_choice`` (what was measured for
-        each candidate) and ``variables`` by name. What is not finite is None.
+        Axes, parameters, counts and variables are by name; ``errors`` are the measured ones,
+        ``stages`` those of the first slice along the swept parameter. What is not finite is None.
 
     Raises
     ------
     FileError
-        If the file is missing, damaged, of another kind or of a newer major format version.
+        If the file is missing, damaged, of another kind or of another major format version.
     """
     variables, data, parameters, metadata = read_result(path, rows=False)
-    axis = str(metadata["axis"])
-    sizes = {
-        dim: size
-        for variable in variables
-        if variable.name in data
-        for dim, size in zip(variable.dims, data[variable.name].shape, strict=True)
-    }
-    swept = next(variable for variable in variables if variable.name == axis)
+    read = [variable for variable in variables if variable.name in data]
+    result = Result(str(metadata["axes"]).split(), read, data, parameters, metadata)
+    axes = result.axes
+    sizes = {dim: size for v in read for dim, size in zip(v.dims, data[v.name].shape, strict=True)}
+    of_the_lanes = {v.name: v for v in read if v.dims == axes and v.name not in axes}
+    part, stages = _stages(result)
     summary = {
         "file": os.fspath(path),
         "bytes": Path(path).stat().st_size,
-        "lanes": sizes[axis],
-        "swept": {
-            "name": axis,
-            "values": np.unique(data[axis]).size,
-            **_range(data[axis]),
-            "units": swept.units,
-            "long_name": swept.long_name,
+        "lanes": math.prod(sizes[axis] for axis in axes),
+        "axes": {
+            axis: {"values": sizes[axis], **_range(data[axis]), **_wording(result.variables[axis])}
+            for axis in axes
         },
         "metadata": metadata,
         "parameters": {name: _parameter(entry) for name, entry in parameters.items()},
         "counts": {
-            variable.name: _counts(variable, data[variable.name])
-            for variable in variables
-            if variable.flags and variable.dims == (axis,) and variable.dtype == "uint8"
+            name: _counts(variable, data[name])
+            for name, variable in of_the_lanes.items()
+            if variable.flags and variable.dtype == "uint8"
         },
         "errors": {
-            variable.name: _spread(data[variable.name])
-            for variable in variables
-            if variable.name in ERRORS and (variable.dims, variable.dtype) == ((axis,), "float64")
+            name: _spread(data[name])
+            for name in ERRORS
+            if name in of_the_lanes and of_the_lanes[name].dtype == "float64"
         },
         "step_choice": {
-            variable.name.removeprefix(_CANDIDATE): data[variable.name].tolist()
-            for variable in variables
-            if variable.dims == (f"{_CANDIDATE}steps",) and variable.dtype in ("float64", "int32")
+            v.name.removeprefix(_CANDIDATE): data[v.name].tolist()
+            for v in read
+            if v.dims == (f"{_CANDIDATE}steps",) and v.dtype in ("float64", "int32")
         },
+        "slice": part,
+        "stages": stages,
         "variables": {
-            variable.name: {
-                "dims": list(variable.dims),
-                "shape": [sizes.get(dim) for dim in variable.dims],
-                "dtype": variable.dtype,
-                "units": variable.units,
-                "long_name": variable.long_name,
+            v.name: {
+                "dims": list(v.dims),
+                "shape": [sizes.get(dim) for dim in v.dims],
+                "dtype": v.dtype,
+                **_wording(v),
             }
-            for variable in variables
+            for v in variables
         },
     }
     known: dict[str, Any] = finite(summary)
     return known
+
+
+def _stages(result: Result) -> tuple[dict[str, Any], list[dict[str, Any]]]:
+    if result.axis == START or not all(name in result for name in LABELS):
+        return {}, []
+    part = one_axis(result)
+    stages = stage_table(labelled_lanes(part))
+    return slice_facts(result, part), [s._asdict() | {"lanes": s.lanes} for s in stages]
 
 
 def _range(values: NDArray[Any]) -> dict[str, float]:
@@ -94,13 +98,17 @@ def _range(values: NDArray[Any]) -> dict[str, float]:
 def _parameter(parameter: Parameter) -> dict[str, Any]:
     value = np.asarray(parameter.value)
     # What differs from lane to lane may be a million numbers.
-    content = _range(value) if parameter.origin == "swept" else {"value": value.tolist()}
-    wording = {"units": parameter.units, "long_name": parameter.long_name}
-    return {"origin": parameter.origin, **content, **wording}
+    along_axes = parameter.dims not in ((), (HARMONIC,))
+    content = _range(value) if along_axes else {"value": value.tolist()}
+    return {"origin": parameter.origin, **content, **_wording(parameter)}
+
+
+def _wording(entry: Variable | Parameter) -> dict[str, str]:
+    return {"units": entry.units, "long_name": entry.long_name}
 
 
 def _counts(variable: Variable, values: NDArray[Any]) -> dict[str, int]:
-    numbers = np.bincount(values, minlength=len(variable.flags))
+    numbers = np.bincount(values.ravel(), minlength=len(variable.flags))
     return {flag: int(number) for flag, number in zip(variable.flags, numbers, strict=False)}
 
 
@@ -108,11 +116,7 @@ def _spread(values: NDArray[Any]) -> dict[str, Any]:
     known = values[np.isfinite(values)]
     if known.size == 0:
         return {"lanes": 0, "median": None, "greatest": None}
-    return {
-        "lanes": known.size,
-        "median": float(np.median(known)),
-        "greatest": float(known.max()),
-    }
+    return {"lanes": known.size, "median": float(np.median(known)), "greatest": float(known.max())}
 
 
 def finite(value: Any) -> Any:

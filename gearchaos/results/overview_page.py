@@ -7,10 +7,11 @@ from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
 from gearchaos.results.result_reader import printable
+from gearchaos.results.stage_table import slice_lines
 
 WIDTH = 80
 _LABEL = 18
-_SETTINGS = ("title", "effects", "formulation", "start", "carry")
+_SETTINGS = ("title", "effects", "formulation", "start", "carry", "fixed")
 _INTEGRATION = (
     "method",
     "steps_per_period",
@@ -21,6 +22,9 @@ _INTEGRATION = (
     "recorded_periods",
 )
 _RUN = ("wall_time_seconds", "threads", "processor", "system", "software", "git_commit", "created")
+MOST_STAGES = 20
+"""Of more stages, the first and the last ones are shown."""
+
 _ORIGINS = {
     "swept": "differ from lane to lane",
     "given": "given",
@@ -30,29 +34,14 @@ _ORIGINS = {
 
 
 def overview_page(
-    overview: Mapping[str, Any],
-    settings: Mapping[str, list[str]],
-    stages: Iterable[str],
-    verified: Iterable[str],
+    overview: Mapping[str, Any], settings: Mapping[str, list[str]], verified: Iterable[str]
 ) -> str:
-    """Write an overview as text.
-
-    Parameters
-    ----------
-    overview : mapping
-        From `gearchaos.results.overview.overview`.
-    settings : mapping of str to list of str
-        Keys of the configuration with their values, by where they come from.
-    stages : iterable of str
-        The stages of the sweep, one line each.
-    verified : iterable of str
-        What was verified.
-    """
+    """Write an overview as text, with the keys of the configuration by origin and what fits."""
     sections = {
         "": _file(overview),
         "Accuracy": _accuracy(overview),
         "Run": _metadata(overview, _RUN),
-        "Stages": (_wrapped(line, "  ") for line in stages),
+        "Stages": _stages(overview),
         "Dimensionless groups": _groups(overview["parameters"]),
         "Configuration": _settings_by_origin(settings),
         "Variables": _variables(overview["variables"]),
@@ -72,14 +61,14 @@ def number(value: float | None) -> str:
 
 
 def _file(overview: Mapping[str, Any]) -> Iterator[str]:
-    metadata, swept = overview["metadata"], overview["swept"]
+    metadata = overview["metadata"]
     size = f"{overview['bytes']:,} bytes, {metadata['schema']} {metadata['schema_version']}"
     yield _entry("file", f"{overview['file']} ({size})")
     yield from _metadata(overview, _SETTINGS)
-    units = "" if swept["units"] in ("", "1") else f" {swept['units']}"
-    values = "1 value" if swept["values"] == 1 else f"{swept['values']} values"
-    span = f"{number(swept['least'])} to {number(swept['greatest'])}{units}"
-    yield _entry("swept", f"{swept['name']} ({swept['long_name']}), {values}, {span}")
+    for name, axis in overview["axes"].items():
+        values = "1 value" if axis["values"] == 1 else f"{axis['values']} values"
+        span = f"{number(axis['least'])} to {number(axis['greatest'])}{_units(axis)}"
+        yield _entry("axis", f"{name} ({axis['long_name']}), {values}, {span}")
     yield _entry("lanes", f"{overview['lanes']}")
     for name, counts in overview["counts"].items():
         yield _entry(name, ", ".join(f"{n} {flag}" for flag, n in counts.items() if n))
@@ -100,6 +89,23 @@ def _accuracy(overview: Mapping[str, Any]) -> Iterator[str]:
             f"{name} {number(values[row])}" for name, values in choice.items() if name != "steps"
         )
         yield _entry("step choice", f"{steps} steps: {', '.join(measured)}")
+
+
+def _stages(overview: Mapping[str, Any]) -> Iterator[str]:
+    lines = [
+        f"{stage['label']}: {stage['start']:.6g} to {stage['end']:.6g}, "
+        f"{stage['lanes']} lane{'s' if stage['lanes'] != 1 else ''}"
+        for stage in overview["stages"]
+    ]
+    half = MOST_STAGES // 2
+    if len(lines) > MOST_STAGES:
+        lines = [
+            f"{len(lines)} stages: the first {half} and the last {half}",
+            *lines[:half],
+            *lines[-half:],
+        ]
+    for line in [*slice_lines(overview["slice"]), *lines]:
+        yield _wrapped(line, "  ")
 
 
 def _metadata(overview: Mapping[str, Any], names: Iterable[str]) -> Iterator[str]:
@@ -124,12 +130,11 @@ def _groups(parameters: Mapping[str, Any]) -> Iterator[str]:
             values = entry.get("value")
             if isinstance(values, list):
                 text = ", ".join(map(number, values))
-            elif origin == "swept":
+            elif "least" in entry:
                 text = f"{number(entry['least'])} to {number(entry['greatest'])}"
             else:
                 text = number(values)
-            units = "" if entry["units"] in ("", "1") else f" {entry['units']}"
-            yield _wrapped(f"{name:26} {text}{units}", "    ", " " * 31)
+            yield _wrapped(f"{name:26} {text}{_units(entry)}", "    ", " " * 31)
 
 
 def _variables(variables: Mapping[str, Any]) -> Iterator[str]:
@@ -138,8 +143,11 @@ def _variables(variables: Mapping[str, Any]) -> Iterator[str]:
             dim if size is None else f"{dim}: {size}"
             for dim, size in zip(variable["dims"], variable["shape"], strict=True)
         )
-        units = "" if variable["units"] in ("", "1") else f", {variable['units']}"
-        yield _wrapped(f"{name} ({dims}) {variable['dtype']}{units}", "  ", "      ")
+        yield _wrapped(f"{name} ({dims}) {variable['dtype']}{_units(variable)}", "  ", "      ")
+
+
+def _units(entry: Mapping[str, Any]) -> str:
+    return "" if entry["units"] in ("", "1") else f" {entry['units']}"
 
 
 def _entry(label: str, text: str) -> str:

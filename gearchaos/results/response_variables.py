@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from gearchaos.results.variables import STATE_WORDING, Variable, axis_name
+from gearchaos.results.variables import STATE_WORDING, Axis, Variable
 
 TIME = "time"
 MESH_PERIOD = "mesh_period"
@@ -15,7 +15,7 @@ NO_CONTACT_STATE = 255
 
 
 def response_variables(
-    axis: str,
+    axes: Sequence[Axis],
     *,
     states: Sequence[str],
     periods: int,
@@ -27,10 +27,10 @@ def response_variables(
 
     Parameters
     ----------
-    axis : str
-        The swept parameter, bare or as a dotted path.
+    axes : sequence of Axis
+        As for `sweep_variables`.
     states : sequence of str
-        States of the scene, in the order of the kernels.
+        In the order of the scene's states.
     periods, steps_per_period : int
         Mesh periods of the record, and steps of each.
     axial : bool
@@ -38,37 +38,30 @@ def response_variables(
     contacts : sequence of str
         Meanings of the contact states 0, 1, ...
     """
-    lane = axis_name(axis)
-    dims, nan = (lane, TIME), float("nan")
+    lane = tuple(axis.name for axis in axes)
     instants = np.arange(periods * steps_per_period + 1) / steps_per_period
-    text = "time in mesh periods"
+
+    def motion(name: str, long_name: str, symbol: str) -> Variable:
+        return Variable(name, (*lane, TIME), "float64", "1", long_name, symbol, float("nan"))
+
+    text, symbol = "time in mesh periods", r"$\Omega\tau/2\pi$"
     period = "mesh period in units of dimensionless time"
-    symbol = r"$\Omega\tau/2\pi$"
-    values = tuple(instants.tolist())
     variables = [
-        Variable(TIME, (TIME,), "float64", "1", text, symbol, values=values),
-        Variable(MESH_PERIOD, (lane,), "float64", "1", period, r"$2\pi/\Omega$"),
+        Variable(TIME, (TIME,), "float64", "1", text, symbol, values=instants),
+        Variable(MESH_PERIOD, lane, "float64", "1", period, r"$2\pi/\Omega$"),
     ]
     for state in states:
-        variables.append(Variable(state, dims, "float64", "1", *STATE_WORDING[state], nan))
+        text, symbol = STATE_WORDING[state]
+        variables.append(motion(state, text, symbol))
         if state.endswith("_rate"):
-            text, symbol = STATE_WORDING[state]
             text, symbol = text.replace("velocity", "acceleration"), symbol.replace("'", "''")
-            name = acceleration_of(state.removesuffix("_rate"))
-            variables.append(Variable(name, dims, "float64", "1", text, symbol, nan))
+            variables.append(motion(acceleration_of(state.removesuffix("_rate")), text, symbol))
     for direction, symbol in (("tangential", "$N_y$"), ("axial", "$N_z$"))[: 2 if axial else 1]:
-        text, contact = f"{direction} mesh force", f"contact in the {direction} direction"
+        name, text = f"contact_{direction}", f"contact in the {direction} direction"
+        dims, flags = (*lane, TIME), tuple(contacts)
         variables += [
-            Variable(f"mesh_force_{direction}", dims, "float64", "1", text, symbol, nan),
-            Variable(
-                f"contact_{direction}",
-                dims,
-                "uint8",
-                "1",
-                contact,
-                fill_value=NO_CONTACT_STATE,
-                flags=tuple(contacts),
-            ),
+            motion(f"mesh_force_{direction}", f"{direction} mesh force", symbol),
+            Variable(name, dims, "uint8", "1", text, "", NO_CONTACT_STATE, flags),
         ]
     return variables
 

@@ -1,22 +1,23 @@
-"""The result of a sweep: named arrays with their units, parameters and provenance."""
+"""The result of a sweep: named arrays over its axes, with units, parameters and provenance."""
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gearchaos.results.result_file import OWN_METADATA, Parameter, write_result
-from gearchaos.results.result_reader import read_result
-from gearchaos.results.variables import Variable, axis_name
+from gearchaos.errors import ConfigurationError, FileError
+from gearchaos.results.result_file import Parameter, own_metadata, write_result
+from gearchaos.results.result_reader import fixed_coordinates, is_coordinate, read_result
+from gearchaos.results.variables import SECTION, SECTION_POINT, Variable, diagram_axis
 
 __all__ = ["Parameter", "Result", "open_result", "section_variables"]
 
-SECTION = "section_"
 DEFAULT_VARIABLE = "section_delta_5"
 
 
@@ -25,13 +26,14 @@ class Result:
 
     Parameters
     ----------
-    axis : str
-        Name of the swept parameter, bare or as a dotted path; `axis_name` of it is that of the
-        first dimension.
+    axes : sequence of str
+        Names of the dimensions of the lanes: second swept parameter, first swept parameter,
+        start; those that there are.
     variables : sequence of Variable
         What there is, in the order of the file.
     data : mapping of str to ndarray
-        The values of each variable; those that carry their own ``values`` may be left out.
+        The values of each variable, of the shape of its dimensions or with all axes flattened
+        into the first one; those that carry their own ``values`` may be left out.
     parameters : mapping of str to Parameter
         Dimensionless groups of the model, with their origin.
     metadata : mapping of str to str, int or float
@@ -40,37 +42,49 @@ class Result:
     Raises
     ------
     ValueError
-        If an array is missing, its shape contradicts the dimensions, or there are no lanes.
+        If an array is missing, its shape contradicts the dimensions, or an axis is no ascending
+        row of values.
     """
 
     def __init__(
         self,
-        axis: str,
+        axes: Sequence[str],
         variables: Sequence[Variable],
         data: Mapping[str, Any],
         parameters: Mapping[str, Parameter],
         metadata: Mapping[str, str | int | float],
     ) -> None:
-        self.axis = axis_name(axis)
-        self.variables = {variable.name: variable for variable in variables}
+        self.axes = tuple(axes)
         self.parameters = dict(parameters)
-        self.metadata = {**metadata, **OWN_METADATA, "axis": self.axis}
-        self.fixed: dict[str, float] = {}
-        self._data: dict[str, NDArray[Any]] = {}
-        sizes: dict[str, int] = {}
-        for name, variable in self.variables.items():
-            values = data.get(name, variable.values)
-            if values is None:
-                raise ValueError(f"no values for the variable {name}")
-            array = np.asarray(values, dtype=variable.dtype)
-            if array.ndim != len(variable.dims) or any(
+        self.metadata = {**metadata, **own_metadata(self.axes)}
+        self._data = {variable.name: _array(variable, data) for variable in variables}
+        for axis in self.axes:
+            if axis not in self._data or not is_coordinate(self._data[axis]):
+                raise ValueError(f"{axis} is an axis, but there is no ascending row of its values")
+        self.variables: dict[str, Variable] = {}
+        shape = tuple(self._data[axis].size for axis in self.axes)
+        sizes = dict(zip(self.axes, shape, strict=True))
+        for variable in variables:
+            name, dims, array = variable.name, variable.dims, self._data[variable.name]
+            of_the_lanes = dims[: len(shape)] == self.axes and name not in self.axes
+            if of_the_lanes and array.ndim == len(dims) - len(shape) + 1 < len(dims):
+                array = self._data[name] = array.reshape(*shape, *array.shape[1:])
+            if array.ndim != len(dims) or any(
                 sizes.setdefault(dim, size) != size
-                for dim, size in zip(variable.dims, array.shape, strict=True)
+                for dim, size in zip(dims, array.shape, strict=True)
             ):
-                raise ValueError(f"{name} has shape {array.shape}, but dimensions {variable.dims}")
-            self._data[name] = array
-        if not sizes.get(self.axis):
-            raise ValueError(f"no lanes along {self.axis}")
+                raise ValueError(f"{name} has shape {array.shape}, but dimensions {dims}")
+            self.variables[name] = replace(variable, values=None if of_the_lanes else array)
+
+    @property
+    def axis(self) -> str:
+        """The axis along which a diagram runs: the first swept parameter."""
+        return diagram_axis(self.axes)
+
+    @property
+    def fixed(self) -> dict[str, float]:
+        """Coordinates of the axes that `sel` has fixed."""
+        return fixed_coordinates(self.metadata)
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -87,7 +101,7 @@ class Result:
         return len(self._data)
 
     def __getitem__(self, name: str) -> NDArray[Any]:
-        """Give the values of a variable.
+        """Give the values of a variable, of the shape of its dimensions.
 
         Raises
         ------
@@ -95,31 +109,6 @@ class Result:
             If there is no such variable; the message lists those there are.
         """
         return self._data[self._known(name)]
-
-    @property
-    def axes(self) -> tuple[str, ...]:
-        """Names of the axes (stand-in)."""
-        return (self.axis, "start") if "start" in self else (self.axis,)
-
-    def lanes(self, name: str) -> NDArray[Any]:
-        """Give a variable with all axes flattened into the first dimension (stand-in)."""
-        return self[name]
-
-    def along(self, axis: str) -> NDArray[Any]:
-        """Give the value of an axis for every lane (stand-in)."""
-        return self[axis]
-
-    def sel(self, method: str | None = None, **coordinates: float) -> Result:
-        """Fix the start (stand-in)."""
-        del method
-        mine = self["start"] == coordinates["start"]
-        data = {
-            name: self[name][mine] if self.axis in self.dims(name) else self[name] for name in self
-        }
-        variables = [variable for name, variable in self.variables.items() if name != "start"]
-        part = Result(self.axis, variables, data, self.parameters, self.metadata)
-        part.fixed = dict(coordinates)
-        return part
 
     def dims(self, name: str) -> tuple[str, ...]:
         """Give the names of the dimensions of a variable."""
@@ -129,33 +118,98 @@ class Result:
         """Give units, long_name, symbol and, for the status, flag_values and flag_meanings."""
         return self.variables[self._known(name)].attributes
 
+    def lanes(self, name: str) -> NDArray[Any]:
+        """Give a variable of the lanes with all axes flattened into the first dimension."""
+        values = self[name]
+        count = math.prod(values.shape[: len(self.axes)])
+        return values.reshape(count, *values.shape[len(self.axes) :])
+
+    def along(self, axis: str) -> NDArray[Any]:
+        """Give the value of an axis for every lane in that order, shape (lanes,)."""
+        grid = np.meshgrid(*(self[name] for name in self.axes), indexing="ij")
+        return np.ravel(grid[self.axes.index(axis)])
+
+    def sel(self, method: Literal["nearest"] | None = None, **coordinates: float) -> Result:
+        """Fix axes at one of their values each; what is left runs over the other axes.
+
+        Parameters
+        ----------
+        method : "nearest", optional
+            Take the nearest value, the larger of two; by default a value must be met exactly.
+        **coordinates : float
+            The value by the name of its axis; those that were met are in `fixed`.
+
+        Raises
+        ------
+        ConfigurationError
+            If there is no such axis or value; the message names the nearest.
+        """
+        index: dict[str, int] = {}
+        for name, wanted in coordinates.items():
+            if name not in self.axes:
+                there = ", ".join(self.axes) or "none"
+                raise ConfigurationError(f"{name}: is no axis of the result; its axes: {there}")
+            values = self[name]
+            if not math.isfinite(wanted):
+                raise ConfigurationError(f"{name} = {wanted}: must be a number")
+            number = values.size - 1 - int(np.argmin(np.abs(values - wanted)[::-1]))
+            if method != "nearest" and values[number] != wanted:
+                raise ConfigurationError(
+                    f"{name} = {wanted:g}: is none of the {values.size} values of the result; the "
+                    f'nearest is {values[number]!s}: give it, or method="nearest"'
+                )
+            index[name] = number
+        if not index:
+            return self
+        met = self.fixed | {name: float(self[name][at]) for name, at in index.items()}
+
+        def part(values: Any, dims: Sequence[str]) -> Any:
+            return values[tuple(index.get(dim, slice(None)) for dim in dims)] if dims else values
+
+        def rest(dims: Sequence[str]) -> tuple[str, ...]:
+            return tuple(dim for dim in dims if dim not in index)
+
+        left = [variable for variable in self.variables.values() if variable.name not in index]
+        return Result(
+            rest(self.axes),
+            [replace(variable, dims=rest(variable.dims)) for variable in left],
+            {variable.name: part(self[variable.name], variable.dims) for variable in left},
+            {
+                name: replace(entry, value=part(entry.value, entry.dims), dims=rest(entry.dims))
+                for name, entry in self.parameters.items()
+            },
+            {
+                **self.metadata,
+                "fixed": " ".join(f"{name}={value!r}" for name, value in met.items()),
+            },
+        )
+
     def save(self, path: str | os.PathLike[str], overwrite: bool = False) -> None:
         """Write the result to an HDF5 file, which appears complete or not at all.
 
         Raises
         ------
         FileError
-            If the file exists and may not be overwritten, or cannot be written.
+            If the file exists and may not be overwritten, cannot be written, or if no axis is
+            left.
         """
-        variables = [
-            variable
-            if self.axis in variable.dims
-            else replace(variable, values=tuple(self[variable.name].tolist()))
-            for variable in self.variables.values()
-        ]
-        lanes = self[self.axis].size
+        if not self.axes:
+            raise FileError(f"{path}: a single lane is no result file; leave one axis in sel")
+        of_the_lanes = [v.name for v in self.variables.values() if v.values is None]
+        arrays = {name: self.lanes(name) for name in of_the_lanes}
+        block = (0, math.prod(self[axis].size for axis in self.axes), arrays)
         write_result(
             path,
-            variables,
-            [(0, lanes, self._data)],
+            list(self.variables.values()),
+            [block],
             self.parameters,
             self.metadata,
-            lanes=lanes,
             overwrite=overwrite,
         )
 
     def __repr__(self) -> str:
-        lines = [f"<Result {self.metadata.get('title', '')!r}, {self[self.axis].size} lanes>"]
+        sizes = " x ".join(f"{self[axis].size} {axis}" for axis in self.axes) or "one lane"
+        lines = [f"<Result {self.metadata.get('title', '')!r}, {sizes}>"]
         for name, variable in self.variables.items():
             lines.append(f"  {name} ({', '.join(variable.dims)}): {variable.long_name}")
         return "\n".join(lines)
@@ -166,21 +220,35 @@ class Result:
         return name
 
 
+def _array(variable: Variable, data: Mapping[str, Any]) -> NDArray[Any]:
+    values = data.get(variable.name, variable.values)
+    if values is None:
+        raise ValueError(f"no values for the variable {variable.name}")
+    return np.asarray(values, dtype=variable.dtype)
+
+
 def section_variables(result: Result) -> tuple[str, ...]:
     """Return the section variables of a result, `section_delta_5` first where there is one."""
-    names = [
-        name for name in result.names if name.startswith(SECTION) and len(result.dims(name)) == 2
-    ]
+    dims = (*result.axes, SECTION_POINT)
+    names = [name for name in result if name.startswith(SECTION) and result.dims(name) == dims]
     return tuple(sorted(names, key=lambda name: name != DEFAULT_VARIABLE))
 
 
-def open_result(path: str | os.PathLike[str]) -> Result:
+def open_result(path: str | os.PathLike[str], *, rows: bool = True) -> Result:
     """Read a result file into memory.
+
+    Parameters
+    ----------
+    path : path
+    rows : bool
+        Whether to read the variables that have dimensions beside the axes; without them a large
+        file is read in a moment.
 
     Raises
     ------
     FileError
-        If the file is missing, damaged, of another kind or of a newer major format version.
+        If the file is missing, damaged, of another kind or of another major format version.
     """
-    variables, data, parameters, metadata = read_result(path)
-    return Result(str(metadata["axis"]), variables, data, parameters, metadata)
+    variables, data, parameters, metadata = read_result(path, rows=rows)
+    there = [variable for variable in variables if variable.name in data]
+    return Result(str(metadata["axes"]).split(), there, data, parameters, metadata)

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import math
 import os
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any, TypeAlias
 
 import h5py
@@ -15,11 +17,10 @@ from gearchaos.interrupts import check
 from gearchaos.results.atomic_file import replacing
 from gearchaos.results.checksum_line import append_checksum
 from gearchaos.results.sink import Sink
-from gearchaos.results.variables import HARMONIC, Variable
+from gearchaos.results.variables import HARMONIC, Variable, diagram_axis, lane_axes
 
 SCHEMA = "gearchaos-sweep"
-SCHEMA_VERSION = "1.0"
-OWN_METADATA = {"schema": SCHEMA, "schema_version": SCHEMA_VERSION}
+SCHEMA_VERSION = "2.0"
 PARAMETERS = "parameters"
 ORIGINS = ("given", "derived", "default", "swept")
 TEXTS = {
@@ -30,11 +31,13 @@ TEXTS = {
 
 Block: TypeAlias = tuple[int, int, Mapping[str, NDArray[Any]]]
 Metadata: TypeAlias = Mapping[str, str | int | float]
+Box: TypeAlias = tuple[slice, ...]
 
 _CHUNK_BYTES = 1 << 19
 _LONGEST_ATTRIBUTE = 32_000
 _CACHE_BYTES = 4 << 20
 _STRING = h5py.string_dtype("utf-8")
+_PACKED = {"compression": "gzip", "compression_opts": 4, "shuffle": True, "fletcher32": True}
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,12 +47,17 @@ class Parameter:
     Parameters
     ----------
     value : float or ndarray
-        A number, a row over the harmonics of the mesh stiffness or, for what differs from lane
-        to lane, a row over the lanes.
     origin : str
-        ``"given"``, ``"derived"``, ``"default"`` or ``"swept"`` (differs from lane to lane).
+        One of `ORIGINS`; ``"swept"`` differs from lane to lane.
     units, long_name, symbol : str
-        Unit, wording and mathtext symbol.
+        As of a variable.
+    dims : tuple of str
+        Dimensions of the value: none, ``harmonic``, or the axes along which it differs.
+
+    Raises
+    ------
+    ValueError
+        If the value has another number of dimensions.
     """
 
     value: float | NDArray[np.float64]
@@ -57,6 +65,21 @@ class Parameter:
     units: str = "1"
     long_name: str = ""
     symbol: str = ""
+    dims: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        if np.ndim(self.value) != len(self.dims):
+            raise ValueError(f"{np.ndim(self.value)} dimensions of a parameter over {self.dims}")
+
+
+def own_metadata(axes: Sequence[str]) -> dict[str, str]:
+    """Give the root attributes that tell a reader what it has before it."""
+    return {
+        "schema": SCHEMA,
+        "schema_version": SCHEMA_VERSION,
+        "axes": " ".join(axes),
+        "axis": diagram_axis(axes),
+    }
 
 
 def write_result(
@@ -66,7 +89,6 @@ def write_result(
     parameters: Mapping[str, Parameter],
     metadata: Metadata,
     *,
-    lanes: int,
     overwrite: bool = False,
     scratch: str | os.PathLike[str] | None = None,
 ) -> None:
@@ -77,16 +99,14 @@ def write_result(
     path : path
         The file to be.
     variables : sequence of Variable
-        What the file holds, in this order. Those that do not run over the lanes carry their
-        values.
+        What the file holds, in this order.
     blocks : iterable of (first, last, arrays)
-        The lanes first to last - 1 of every other variable, by name.
+        The lanes first to last - 1, in C order over the axes, of every variable without values
+        of its own, by name: shape (last - first, own dimensions).
     parameters : mapping of str to Parameter
         Dimensionless groups of the model.
     metadata : mapping of str to str, int or float
-        Root attributes; ``"axis"`` among them names the dimension of the lanes.
-    lanes : int
-        Lanes in all blocks together.
+        Root attributes.
     overwrite : bool
         Whether an existing file is replaced.
     scratch : path, optional
@@ -97,28 +117,49 @@ def write_result(
     FileError
         If the file cannot be written.
     """
-    axis = str(metadata["axis"])
-    everything = [*variables, *_harmonics(axis, parameters)]
-    sizes = {v.name: len(v.values) for v in everything if v.values is not None} | {axis: lanes}
+    axes = lane_axes(variables)
+    everything = [*variables, *_harmonics(parameters)]
+    sizes = {v.name: len(v.values) for v in everything if v.values is not None and v.dims}
+    shape = tuple(sizes[axis] for axis in axes)
     with replacing(path, overwrite=overwrite, scratch=scratch) as partial:
         with (
             Sink(partial) as sink,
             h5py.File(sink, "w", track_order=True, rdcc_nbytes=_CACHE_BYTES) as file,
         ):
-            _write_metadata(file, {**metadata, **OWN_METADATA})
+            _write_metadata(file, {**metadata, **own_metadata(axes)})
             for variable in everything:
                 _create(file, variable, tuple(sizes[dim] for dim in variable.dims))
             for variable in everything:
                 _attach_scales(file, variable.name, variable.dims)
-            _write_parameters(file, axis, parameters)
+            _write_parameters(file, parameters)
             # Kept open: HDF5 packs a chunk anew each time its dataset is closed.
-            over_lanes = {v.name: file[v.name] for v in everything if v.dims[0] == axis}
+            of_the_lanes = {v.name: file[v.name] for v in everything if v.values is None}
             for first, last, arrays in blocks:
-                for name, dataset in over_lanes.items():
-                    dataset[first:last] = arrays[name]
+                boxes = list(hyperslabs(first, last, shape))
+                for name, dataset in of_the_lanes.items():
+                    place = 0
+                    for box in boxes:
+                        extent = [side.stop - side.start for side in box]
+                        piece = arrays[name][place : place + math.prod(extent)]
+                        dataset[box] = piece.reshape(*extent, *piece.shape[1:])
+                        place += len(piece)
                 sink.check()
                 check()
         append_checksum(partial)
+
+
+def hyperslabs(first: int, last: int, shape: Sequence[int]) -> Iterator[Box]:
+    """Cut the lanes first to last - 1 of an array in C order into boxes, in their order."""
+    row = math.prod(shape[1:])
+    # Whole rows in the middle, and what precedes and follows them in rows of their own.
+    inner = [edge for edge in (-(-first // row) * row, last // row * row) if first < edge < last]
+    for begin, end in pairwise(sorted({first, *inner, last})):
+        number = begin // row
+        if begin % row == end % row == 0:
+            yield slice(number, end // row), *(slice(0, size) for size in shape[1:])
+        else:
+            for box in hyperslabs(begin - number * row, end - number * row, shape[1:]):
+                yield slice(number, number + 1), *box
 
 
 def _write_metadata(file: h5py.File, metadata: Metadata) -> None:
@@ -127,55 +168,46 @@ def _write_metadata(file: h5py.File, metadata: Metadata) -> None:
             file.attrs[name] = value
         elif name in TEXTS or len(value.encode("utf-8", "replace")) > _LONGEST_ATTRIBUTE:
             text = file.create_dataset(name, data=_plain(value), dtype=_STRING, track_order=True)
-            _describe(text, "1", TEXTS.get(name, name))
+            _describe(text, {"units": "1", "long_name": TEXTS.get(name, name)})
         else:
             file.attrs[name] = _plain(value)
 
 
-def _harmonics(axis: str, parameters: Mapping[str, Parameter]) -> list[Variable]:
-    rows = [p.value for p in parameters.values() if _parameter_dims(p, axis) == (HARMONIC,)]
-    if not rows:
-        return []
-    numbers = tuple(range(1, np.size(rows[0]) + 1))
+def _harmonics(parameters: Mapping[str, Parameter]) -> list[Variable]:
+    rows = (np.size(p.value) for p in parameters.values() if p.dims == (HARMONIC,))
+    numbers = np.arange(1, next(rows, 0) + 1)
     text = "harmonic of the mesh frequency in the mesh stiffness"
-    return [Variable(HARMONIC, (HARMONIC,), "int32", "1", text, "$n$", values=numbers)]
+    harmonic = Variable(HARMONIC, (HARMONIC,), "int32", "1", text, "$n$", values=numbers)
+    return [harmonic] if numbers.size else []
 
 
 def _create(file: h5py.File, variable: Variable, shape: tuple[int, ...]) -> None:
     options: dict[str, Any] = {"track_order": True}
     if variable.dtype == "str":
-        values = [_plain(str(value)) for value in variable.values or ()]
-        dataset = file.create_dataset(variable.name, data=values, dtype=_STRING, **options)
+        assert variable.values is not None
+        words = [_plain(str(word)) for word in variable.values.flat]
+        options |= {"data": np.reshape(words, shape).astype(object), "dtype": _STRING}
     else:
-        dataset = file.create_dataset(
-            variable.name,
-            shape,
-            dtype=variable.dtype,
-            fillvalue=variable.fill_value,
-            chunks=_chunks(shape, np.dtype(variable.dtype).itemsize),
-            compression="gzip",
-            compression_opts=4,
-            shuffle=True,
-            fletcher32=True,
-            **options,
-        )
-        if variable.values is not None:
-            dataset[...] = variable.values
+        chunks = _chunks(shape, np.dtype(variable.dtype).itemsize)
+        options |= {"dtype": variable.dtype, "fillvalue": variable.fill_value, "chunks": chunks}
+        options |= _PACKED
+    dataset = file.create_dataset(variable.name, shape, **options)
+    if variable.values is not None and variable.dtype != "str":
+        dataset[...] = variable.values
     if variable.dims == (variable.name,):
         dataset.make_scale(variable.name)
-    for name, value in variable.attributes.items():
-        dataset.attrs[name] = value
+    _describe(dataset, variable.attributes)
     if variable.fill_value is not None:
         dataset.attrs["_FillValue"] = np.array([variable.fill_value], dtype=variable.dtype)
 
 
 def _chunks(shape: tuple[int, ...], itemsize: int) -> tuple[int, ...]:
-    """Give chunks of half a MiB that hold whole rows, or parts of one row if it is longer."""
-    row = shape[1:]
-    if row:
-        row = (min(row[0], _CHUNK_BYTES // itemsize), *row[1:])
-    rows = _CHUNK_BYTES // (itemsize * max(1, int(np.prod(row))))
-    return (min(shape[0], max(1, rows)), *row)
+    """Give chunks of half a MiB that follow the C order."""
+    room, chunks = _CHUNK_BYTES // itemsize, []
+    for size in reversed(shape):
+        chunks.append(min(size, max(1, room)))
+        room //= size
+    return tuple(reversed(chunks))
 
 
 def _attach_scales(file: h5py.File, name: str, dims: tuple[str, ...]) -> None:
@@ -184,28 +216,19 @@ def _attach_scales(file: h5py.File, name: str, dims: tuple[str, ...]) -> None:
             file[name].dims[index].attach_scale(file[dim])
 
 
-def _write_parameters(file: h5py.File, axis: str, parameters: Mapping[str, Parameter]) -> None:
+def _write_parameters(file: h5py.File, parameters: Mapping[str, Parameter]) -> None:
     file.create_group(PARAMETERS, track_order=True)
     for name, parameter in parameters.items():
-        path = f"{PARAMETERS}/{name}"
-        dataset = file.create_dataset(
-            path, data=np.asarray(parameter.value, dtype=np.float64), track_order=True
-        )
-        _attach_scales(file, path, _parameter_dims(parameter, axis))
-        _describe(dataset, parameter.units, parameter.long_name or name)
-        dataset.attrs["symbol"] = parameter.symbol
-        dataset.attrs["origin"] = parameter.origin
+        path, values = f"{PARAMETERS}/{name}", np.asarray(parameter.value, dtype=np.float64)
+        dataset = file.create_dataset(path, data=values, track_order=True)
+        _attach_scales(file, path, parameter.dims)
+        wording = {"units": parameter.units, "long_name": parameter.long_name or name}
+        _describe(dataset, {**wording, "symbol": parameter.symbol, "origin": parameter.origin})
 
 
-def _parameter_dims(parameter: Parameter, axis: str) -> tuple[str, ...]:
-    if np.ndim(parameter.value) == 0:
-        return ()
-    return (axis,) if parameter.origin == "swept" else (HARMONIC,)
-
-
-def _describe(dataset: h5py.Dataset, units: str, long_name: str) -> None:
-    dataset.attrs["units"] = units
-    dataset.attrs["long_name"] = long_name
+def _describe(dataset: h5py.Dataset, notes: Mapping[str, Any]) -> None:
+    for name, note in notes.items():
+        dataset.attrs[name] = _plain(note) if isinstance(note, str) else note
 
 
 def _plain(text: str) -> str:

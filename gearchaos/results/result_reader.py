@@ -7,7 +7,7 @@ import stat
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import h5py
 import numpy as np
@@ -18,7 +18,19 @@ from gearchaos.results.atomic_file import reason
 from gearchaos.results.checksum_line import checksum_fits
 from gearchaos.results.global_heap import heaps_end
 from gearchaos.results.result_file import ORIGINS, PARAMETERS, SCHEMA, SCHEMA_VERSION, Parameter
-from gearchaos.results.variables import HARMONIC, SECTION_POINT, STATE, Variable, sweep_variables
+from gearchaos.results.variables import (
+    ALL_EXPONENTS,
+    HARMONIC,
+    LARGEST_EXPONENT,
+    SECTION,
+    SECTION_POINT,
+    START,
+    STATE,
+    STATUS,
+    Axis,
+    Variable,
+    sweep_variables,
+)
 
 Contents = tuple[
     list[Variable],
@@ -36,7 +48,10 @@ _HIGHEST_COMPRESSION = 1100
 
 
 class _UnfitError(Exception):
-    """What is wrong with the file, in words; becomes a FileError."""
+    """What is wrong with the file, in words; becomes a FileError, by default with one remedy."""
+
+    def __init__(self, fault: str, remedy: str = "run the sweep again") -> None:
+        super().__init__(f"{fault}; {remedy}")
 
 
 def read_result(path: str | os.PathLike[str], *, rows: bool = True) -> Contents:
@@ -49,20 +64,18 @@ def read_result(path: str | os.PathLike[str], *, rows: bool = True) -> Contents:
     ----------
     path : path
     rows : bool
-        Whether the arrays of several dimensions are read; without them `data` lacks their
-        values, and the checksum of a file above 1 GiB is left unchecked.
+        Whether variables with dimensions beside the axes are read; without them `data` lacks
+        their values, and the checksum of a file above 1 GiB is left unchecked.
 
     Returns
     -------
-    variables : list of Variable
-    data : dict of str to ndarray
-    parameters : dict of str to Parameter
-    metadata : dict of str to str, int or float
+    variables, data, parameters, metadata
+        As for `Result`.
 
     Raises
     ------
     FileError
-        If the file is missing, damaged, of another kind or of a newer major format version.
+        If the file is missing, damaged, of another kind or of another major format version.
     """
     name = os.fspath(path)
     try:
@@ -90,6 +103,42 @@ def read_result(path: str | os.PathLike[str], *, rows: bool = True) -> Contents:
         raise FileError(f"{name}: {what} ({why}); run the sweep again") from error
 
 
+class Completed(NamedTuple):
+    """What a finished sweep has computed: resolved TOML, lanes, and how many of them diverged."""
+
+    configuration: str
+    lanes: int
+    diverged: int
+
+
+def completed(path: str | os.PathLike[str]) -> Completed | None:
+    """Look into a result file; None if there is none, or if it is not as it was written."""
+    with suppress(OSError, ValueError, FileError):
+        if checksum_fits(Path(path)):
+            _, data, _, metadata = read_result(path, rows=False)
+            status, text = data[STATUS], str(metadata.get("configuration_resolved", ""))
+            return Completed(text, status.size, int(np.count_nonzero(status)))
+    return None
+
+
+def fixed_coordinates(metadata: Mapping[str, Any]) -> dict[str, float]:
+    """Read the root attribute ``fixed``, such as ``start=1.0``: where a slice was taken.
+
+    Raises
+    ------
+    ValueError
+        If it is no list of coordinates.
+    """
+    pairs = (entry.rpartition("=") for entry in str(metadata.get("fixed", "")).split())
+    return {name: float(value) for name, _, value in pairs}
+
+
+def is_coordinate(values: NDArray[Any]) -> bool:
+    """Tell whether values are those of an axis: numbers that ascend, none of them twice."""
+    numbers = values.ndim == 1 and values.size > 0 and values.dtype.kind in "if"
+    return numbers and bool(np.isfinite(values).all() and (np.diff(values) > 0).all())
+
+
 def printable(text: str) -> str:
     """Return a text of a file without the control characters that act on a terminal."""
     return "".join(c if c.isprintable() else "\N{REPLACEMENT CHARACTER}" for c in text)
@@ -108,7 +157,7 @@ def own_datasets(file: h5py.File) -> Iterator[h5py.Dataset]:
 def _read(file: h5py.File, rows: bool) -> Contents:
     metadata = _scalars(file)
     _check_schema(metadata)
-    axis = str(metadata.get("axis", ""))
+    axes = tuple(str(metadata.get("axes", "")).split())
     variables: list[Variable] = []
     data: dict[str, NDArray[Any]] = {}
     sizes: dict[str, int] = {}
@@ -122,68 +171,71 @@ def _read(file: h5py.File, rows: bool) -> Contents:
             continue
         dims = _dims(file, dataset, sizes)
         if name != HARMONIC:
-            if rows or len(dims) == 1:
+            if rows or len(dims) == 1 or set(dims) <= set(axes):
                 data[name] = _values(dataset)
-            variables.append(_variable(dataset, dims, data.get(name), on_lanes=axis in dims))
-    _check_variables(axis, variables, data)
-    return variables, data, _read_parameters(file, axis, sizes), metadata
+            variables.append(_variable(dataset, dims))
+    _check_variables(axes, {variable.name: variable for variable in variables}, data)
+    fixed_coordinates(metadata)
+    return variables, data, _read_parameters(file, axes, sizes), metadata
 
 
 def _check_schema(metadata: Mapping[str, Any]) -> None:
     if metadata.get("schema") != SCHEMA:
         raise _UnfitError(
-            f'is not a gearchaos result: it lacks the attribute schema = "{SCHEMA}"; '
-            "give the name of a file that a sweep has written"
+            f'is not a gearchaos result: it lacks the attribute schema = "{SCHEMA}"',
+            "give the name of a file that a sweep has written",
         )
     version, own = str(metadata.get("schema_version", "")), SCHEMA_VERSION.split(".")[0]
     if version.split(".")[0] != own:
         raise _UnfitError(
-            f"has version {version!r} of the file format, of which this gearchaos reads {own}.x; "
-            "use a gearchaos that knows it"
+            f"has version {version!r} of the file format, of which this gearchaos reads {own}.x",
+            "run the sweep again, or use the gearchaos that wrote it",
         )
 
 
 def _check_variables(
-    axis: str, variables: list[Variable], data: Mapping[str, NDArray[Any]]
+    axes: tuple[str, ...], found: Mapping[str, Variable], data: Mapping[str, NDArray[Any]]
 ) -> None:
     """Compare what a sweep must yield with what there is; more than that is welcome."""
+    if not axes or len(set(axes)) < len(axes):
+        raise _UnfitError("does not name its axes, each once")
     if STATE not in data:
-        raise _UnfitError(f"lacks the variable {STATE}; run the sweep again")
-    found = {variable.name: variable for variable in variables}
-    prefix = "section_"
+        raise _UnfitError(f"lacks the variable {STATE}")
+    types = {name: np.dtype("i4" if name == START else "f8") for name in axes}
     expected = sweep_variables(
-        axis,
-        units="1",
-        long_name="",
-        symbol="",
+        [Axis(name, "", "", "", np.zeros(1, dtype)) for name, dtype in types.items()],
         states=tuple(data[STATE].ravel()),
-        section=[n.removeprefix(prefix) for n in found if n.startswith(prefix + "delta_")],
+        section=[n.removeprefix(SECTION) for n in found if n.startswith(f"{SECTION}delta_")],
         section_points=np.size(data.get(SECTION_POINT, ())),
-        lyapunov="lyapunov_exponent" in found,
-        several_starts="start" in found,
+        lyapunov=LARGEST_EXPONENT in found,
         status_meanings=(),
         crossings="crossings_per_period" in found,
-        spectrum="lyapunov_spectrum" in found,
+        exponents=ALL_EXPONENTS in found,
         check_meanings=["same"] if "motion_changed" in found else [],
         motion_meanings=["periodic"] if "motion" in found else [],
     )
     for due in expected:
         got = found.get(due.name)
         if got is None:
-            raise _UnfitError(f"lacks the variable {due.name}; run the sweep again")
+            raise _UnfitError(f"lacks the variable {due.name}")
         if (got.dims, got.dtype) != (due.dims, due.dtype):
             raise _UnfitError(
                 f"holds {due.name} as {got.dtype} over ({', '.join(got.dims)}), which should be "
-                f"{due.dtype} over ({', '.join(due.dims)}); run the sweep again"
+                f"{due.dtype} over ({', '.join(due.dims)})"
             )
-    for name in {"status", "motion"} & found.keys():
+    for name in axes:
+        if not is_coordinate(data[name]):
+            raise _UnfitError(f"holds values of {name} that do not ascend, each once")
+    for name in {STATUS, "motion"} & found.keys():
         if data[name].max() >= max(1, len(found[name].flags)):
-            raise _UnfitError(f"holds a {name} without a meaning; run the sweep again")
+            raise _UnfitError(f"holds a {name} without a meaning")
 
 
-def _read_parameters(file: h5py.File, axis: str, sizes: dict[str, int]) -> dict[str, Parameter]:
+def _read_parameters(
+    file: h5py.File, axes: tuple[str, ...], sizes: dict[str, int]
+) -> dict[str, Parameter]:
     if not isinstance(_hard_linked(file, PARAMETERS), h5py.Group):
-        raise _UnfitError(f"lacks the group {PARAMETERS}; run the sweep again")
+        raise _UnfitError(f"lacks the group {PARAMETERS}")
     parameters = {}
     for name in file[PARAMETERS]:
         dataset = _dataset(file, f"{PARAMETERS}/{name}")
@@ -191,21 +243,19 @@ def _read_parameters(file: h5py.File, axis: str, sizes: dict[str, int]) -> dict[
         dims = _dims(file, dataset, sizes) if dataset.shape else ()
         origin = str(notes.get("origin"))
         number = _DTYPES.get(dataset.dtype.str[1:]) == "float64"
-        if not number or dims not in ((), (axis,), (HARMONIC,)) or origin not in ORIGINS:
-            raise _UnfitError(f"holds a parameter {name} that is none; run the sweep again")
+        of_the_model = dims == (HARMONIC,) or dims == tuple(a for a in axes if a in dims)
+        if not number or not of_the_model or origin not in ORIGINS:
+            raise _UnfitError(f"holds a parameter {name} that is none")
         values = dataset[()]
-        parameters[name] = Parameter(
-            values if dims else float(values),
-            origin,
-            **_wording(notes),
-        )
+        value = values if dims else float(values)
+        parameters[name] = Parameter(value, origin, **_wording(notes), dims=dims)
     return parameters
 
 
 def _hard_linked(file: h5py.File, name: str) -> Any:
     # A soft or an external link could lead anywhere.
     if not isinstance(file.get(name, getlink=True), h5py.HardLink):
-        raise _UnfitError(f"holds no {name}, or a link in its place; run the sweep again")
+        raise _UnfitError(f"holds no {name}, or a link in its place")
     return file[name]
 
 
@@ -213,7 +263,7 @@ def _dataset(file: h5py.File, name: str) -> h5py.Dataset:
     """Open a dataset that lies in this file, is compressed in known ways and fits into it."""
     dataset = _hard_linked(file, name)
     if not isinstance(dataset, h5py.Dataset) or dataset.is_virtual or dataset.external:
-        raise _UnfitError(f"keeps {name} outside of itself or not as an array; run the sweep again")
+        raise _UnfitError(f"keeps {name} outside of itself or not as an array")
     known = {h5py.h5z.FILTER_DEFLATE, h5py.h5z.FILTER_SHUFFLE, h5py.h5z.FILTER_FLETCHER32}
     layout = dataset.id.get_create_plist()
     filters = {layout.get_filter(index)[0] for index in range(layout.get_nfilters())}
@@ -226,10 +276,7 @@ def _dataset(file: h5py.File, name: str) -> h5py.Dataset:
     if dataset.chunks and size > pieces * chunk:
         packed = 0
     if filters - known or chunk > _LARGEST_CHUNK or not 0 < size <= packed * stored:
-        raise _UnfitError(
-            f"declares {size} bytes for {name} that it does not hold in a known way; "
-            "run the sweep again"
-        )
+        raise _UnfitError(f"declares {size} bytes for {name} that it does not hold in a known way")
     return dataset
 
 
@@ -239,7 +286,7 @@ def _dims(file: h5py.File, dataset: h5py.Dataset, sizes: dict[str, int]) -> tupl
     for dim, size in zip(dataset.dims, dataset.shape, strict=True):
         scale = name if dataset.is_scale else dim[0].name.lstrip("/") if len(dim) == 1 else ""
         if scale not in file or sizes.setdefault(scale, size) != size:
-            raise _UnfitError(f"holds {name} with dimensions that do not fit; run the sweep again")
+            raise _UnfitError(f"holds {name} with dimensions that do not fit")
         dims.append(scale)
     return tuple(dims)
 
@@ -250,30 +297,23 @@ def _values(dataset: h5py.Dataset) -> NDArray[Any]:
         try:
             values: NDArray[Any] = dataset[...]
         except OSError as error:
-            raise _UnfitError(
-                f"is damaged in {dataset.name} ({reason(error)}); run the sweep again"
-            ) from error
+            raise _UnfitError(f"is damaged in {dataset.name} ({reason(error)})") from error
         return values.astype(kind, copy=False)
     words = dataset.asstr()[...]
     if max(map(len, words.flat)) > np.iinfo(np.uint8).max:
-        raise _UnfitError(f"holds no plain words in {dataset.name}; run the sweep again")
+        raise _UnfitError(f"holds no plain words in {dataset.name}")
     return np.asarray(words, dtype="str")
 
 
 def _dtype(dataset: h5py.Dataset) -> str:
     if h5py.check_string_dtype(dataset.dtype):
         return "str"
-    try:
-        return _DTYPES[dataset.dtype.str[1:]]
-    except KeyError:
-        raise _UnfitError(
-            f"holds {dataset.name} as {dataset.dtype}, which no variable is; run the sweep again"
-        ) from None
+    if dataset.dtype.str[1:] not in _DTYPES:
+        raise _UnfitError(f"holds {dataset.name} as {dataset.dtype}, which no variable is")
+    return _DTYPES[dataset.dtype.str[1:]]
 
 
-def _variable(
-    dataset: h5py.Dataset, dims: tuple[str, ...], values: NDArray[Any] | None, *, on_lanes: bool
-) -> Variable:
+def _variable(dataset: h5py.Dataset, dims: tuple[str, ...]) -> Variable:
     notes = _scalars(dataset)
     return Variable(
         dataset.name.lstrip("/"),
@@ -282,7 +322,6 @@ def _variable(
         **_wording(notes),
         fill_value=notes.get("_FillValue"),
         flags=tuple(str(notes.get("flag_meanings", "")).split()),
-        values=None if on_lanes or values is None else tuple(values.tolist()),
     )
 
 

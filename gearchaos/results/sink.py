@@ -6,15 +6,15 @@ while it closes a file. So it is never told: it writes into a sink, whose error 
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable
+from io import FileIO
 from pathlib import Path
 from types import TracebackType
-from typing import Self
+from typing import Any
 
 
-class Sink:
-    """What h5py needs of a file that is open for writing, without the failures.
+class Sink(FileIO):
+    """A file that is open for writing, without the failures.
 
     Parameters
     ----------
@@ -23,12 +23,9 @@ class Sink:
     """
 
     def __init__(self, path: Path) -> None:
-        # Unbuffered: the error of a buffered write would surface in any later call.
-        self._file = path.open("w+b", buffering=0)
         self._error: BaseException | None = None
-
-    def __enter__(self) -> Self:
-        return self
+        # Unbuffered: the error of a buffered write would surface in any later call.
+        super().__init__(path, "w+")
 
     def __exit__(
         self,
@@ -36,41 +33,29 @@ class Sink:
         error: BaseException | None,
         traceback: TracebackType | None,
     ) -> None:
-        self._try(self._file.close)
+        self._try(self.close)
         # An error that HDF5 has met in what it reads back is but a consequence of ours.
-        if self._error is not None and (kind is None or issubclass(kind, Exception)):
-            raise self._error
+        if kind is None or issubclass(kind, Exception):
+            self.check()
 
     def check(self) -> None:
         """Raise the first failure, if there was one."""
         if self._error is not None:
             raise self._error
 
-    def seek(self, offset: int, whence: int = os.SEEK_SET) -> int:
-        return self._file.seek(offset, whence)
-
-    def tell(self) -> int:
-        return self._file.tell()
-
-    def read(self, size: int = -1) -> bytes:
-        return self._file.read(size)
-
-    def readinto(self, buffer: memoryview) -> int:
-        return self._file.readinto(buffer)
-
-    def write(self, data: memoryview) -> int:
+    def write(self, data: Any) -> int:
+        """Write all of it, or nothing once something has failed."""
         self._try(lambda: self._write_all(memoryview(data).cast("B")))
         return len(data)
 
-    def truncate(self, size: int) -> None:
-        self._try(lambda: self._file.truncate(size))
-
-    def flush(self) -> None:
-        """Do nothing: nothing is buffered."""
+    def truncate(self, size: int | None = None) -> int:
+        """Set the size, unless something has failed."""
+        self._try(lambda: super(Sink, self).truncate(size))
+        return size or 0
 
     def _write_all(self, data: memoryview) -> None:
         while data:
-            data = data[self._file.write(data) :]
+            data = data[super().write(data) :]
 
     def _try(self, action: Callable[[], object]) -> None:
         if self._error is None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from heapq import heapify, heappop, heappush
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -10,11 +11,9 @@ from numpy.typing import NDArray
 
 from gearchaos.errors import ConfigurationError, FileError
 from gearchaos.results.result import Result
+from gearchaos.results.variables import LABELS, LARGEST_EXPONENT, START
 
 Floats = NDArray[np.float64]
-
-LABELS = ("motion", "period")
-EXPONENT = "lyapunov_exponent"
 
 
 class LabelledLanes(NamedTuple):
@@ -54,53 +53,81 @@ class Stage(NamedTuple):
         return self.last - self.first + 1
 
 
-def labelled_lanes(result: Result, start: int = 0, *, name: str = "the result") -> LabelledLanes:
-    """Take the labels out of a result.
+class _Stretch(NamedTuple):
+    """First lane, the lane after its last one, a lane that has its label, narrower stages."""
 
-    Parameters
-    ----------
-    result : Result
-    start : int
-        Number of the start, where every value has several.
-    name : str
-        What messages call the result.
+    first: int
+    after: int
+    own: int
+    narrower: int
+
+
+def labelled_lanes(result: Result, *, name: str = "the result") -> LabelledLanes:
+    """Take the labels out of a result with one axis, which messages call by a name.
 
     Raises
     ------
     FileError
         If the result has no labels.
     ConfigurationError
-        If there is no such start.
+        If it has several axes, or none.
     """
     if not all(variable in result for variable in LABELS):
         raise FileError(
             f"{name}: holds no labels of the motion; run the sweep again with outputs.motion = true"
         )
-    mine = lanes_of_start(result, start)
-    if not mine.any():
-        highest = result["start"].max() if "start" in result else 0
+    if len(result.axes) != 1:
         raise ConfigurationError(
-            f"{name}: start {start}: there is none; give one from 0 to {highest}"
+            f"{name}: has {len(result.axes)} axes ({', '.join(result.axes)}), stages lie along "
+            "one; fix the others with sel (--at)"
         )
-    meanings = result.variables["motion"].flags
-    period = result["period"][mine]
+    meanings, period = result.variables["motion"].flags, result["period"]
     labels = [
         label_text(meanings[motion], int(n))
-        for motion, n in zip(result["motion"][mine], period, strict=True)
+        for motion, n in zip(result["motion"], period, strict=True)
     ]
-    known = EXPONENT in result
-    return LabelledLanes(
-        result[result.axis][mine],
-        np.array(labels),
-        period,
-        result[EXPONENT][mine] if known else np.full(period.shape, np.nan),
-    )
+    known = LARGEST_EXPONENT in result
+    exponent = result[LARGEST_EXPONENT] if known else np.full(period.shape, np.nan)
+    return LabelledLanes(result[result.axis], np.array(labels), period, exponent)
 
 
-def lanes_of_start(result: Result, start: int) -> NDArray[np.bool_]:
-    """Return which lanes have this start; where every value has one, its number is 0."""
-    numbers = result["start"] if "start" in result else np.zeros(result[result.axis].size, int)
-    return np.asarray(numbers == start)
+def one_axis(result: Result, **coordinates: float) -> Result:
+    """Take the slice of a result along one swept parameter, at the coordinates nearest to these.
+
+    Other axes are fixed at their first value.
+
+    Raises
+    ------
+    ConfigurationError
+        If there is no such axis, or if no swept parameter is left.
+    """
+    part = result.sel("nearest", **coordinates)
+    if part.axis in ("", START):
+        raise ConfigurationError(f"{', '.join(coordinates)}: fixed, no swept parameter is left")
+    return part.sel(**{name: part[name][0] for name in part.axes if name != part.axis})
+
+
+def slice_facts(result: Result, part: Result) -> dict[str, dict[str, float]]:
+    """Tell of each axis that a slice lacks at which value, which of how many, it was fixed."""
+    return {
+        name: {
+            "value": part.fixed[name],
+            "number": int(np.searchsorted(result[name], part.fixed[name])) + 1,
+            "of": result[name].size,
+        }
+        for name in result.axes
+        if name not in part.axes
+    }
+
+
+def slice_lines(facts: dict[str, dict[str, float]]) -> list[str]:
+    """Word `slice_facts`, one line per axis."""
+    return [
+        f"slice {name} = {at['value']:.6g}, "
+        f"{'the first' if at['number'] == 1 else 'number {number}'.format(**at)} of {at['of']}; "
+        f"others with --at {name}=VALUE"
+        for name, at in facts.items()
+    ]
 
 
 def label_text(meaning: str, period: int) -> str:
@@ -116,35 +143,40 @@ def stage_table(lanes: LabelledLanes, narrowest: float = 0.0) -> list[Stage]:
     lanes : LabelledLanes
     narrowest : float
         Stages narrower than this go into what surrounds them: the narrowest first, into both
-        neighbours where these are alike and otherwise into the wider one. A stage reaches halfway
-        to the lanes beside it.
+        neighbours where these are alike and otherwise into the wider one; of two alike the lower
+        one. A stage reaches halfway to the lanes beside it.
     """
     changes = np.flatnonzero(lanes.labels[1:] != lanes.labels[:-1]) + 1
     edges = [0, *changes.tolist(), lanes.values.size]
-    # Of each stage: first lane, the lane after its last one, a lane that has its label, narrower.
-    parts = [[a, b, a, 0] for a, b in pairwise(edges)]
     middles = (lanes.values[1:] + lanes.values[:-1]) / 2.0
-    borders = np.concatenate([lanes.values[:1], middles, lanes.values[-1:]])
+    borders = np.concatenate([lanes.values[:1], middles, lanes.values[-1:]]).tolist()
 
-    def width(part: list[int]) -> float:
-        return float(borders[part[1]] - borders[part[0]])
+    def width(stretch: _Stretch) -> float:
+        return float(borders[stretch.after] - borders[stretch.first])
 
-    while len(parts) > 1:
-        at = min(range(len(parts)), key=lambda number: width(parts[number]))
-        if width(parts[at]) >= narrowest:
-            break
-        beside = parts[max(at - 1, 0) : at] + parts[at + 1 : at + 2]
-        label = lanes.labels[max(beside, key=width)[2]]
-        merged = [part for part in beside if lanes.labels[part[2]] == label] + [parts[at]]
-        whole = [
-            min(part[0] for part in merged),
-            max(part[1] for part in merged),
-            merged[0][2],
-            1 + sum(part[3] for part in merged),
-        ]
-        here = parts.index(min(merged))
-        parts[here : here + len(merged)] = [whole]
-    return [_stage(lanes, *part) for part in parts]
+    by_first = {a: _Stretch(a, b, a, 0) for a, b in pairwise(edges)}
+    by_after = {stretch.after: stretch for stretch in by_first.values()}
+    heap = [(width(stretch), stretch) for stretch in by_first.values()]
+    heapify(heap)
+    while len(by_first) > 1 and heap[0][0] < narrowest:
+        _, stretch = heappop(heap)
+        if by_first.get(stretch.first) is not stretch:
+            continue  # It has become part of another one since.
+        beside = [by_after.get(stretch.first), by_first.get(stretch.after)]
+        there = [neighbour for neighbour in beside if neighbour is not None]
+        label = lanes.labels[max(there, key=width).own]
+        merged = [near for near in there if lanes.labels[near.own] == label] + [stretch]
+        whole = _Stretch(
+            min(old.first for old in merged),
+            max(old.after for old in merged),
+            merged[0].own,
+            1 + sum(old.narrower for old in merged),
+        )
+        for old in merged:
+            del by_first[old.first], by_after[old.after]
+        by_first[whole.first] = by_after[whole.after] = whole
+        heappush(heap, (width(whole), whole))
+    return [_stage(lanes, *by_first[first]) for first in sorted(by_first)]
 
 
 def _stage(lanes: LabelledLanes, first: int, after: int, own: int, narrower: int) -> Stage:

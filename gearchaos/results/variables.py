@@ -7,11 +7,23 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+START = "start"
 SECTION_POINT = "section_point"
 STATE = "state"
-EXPONENT = "exponent"
+EXPONENT_NUMBER = "exponent"
 HARMONIC = "harmonic"
+"""Dimensions: the start of a lane is one of its axes, the others belong to single variables."""
+
+SECTION = "section_"
+"""What the names of section variables begin with."""
+
+LARGEST_EXPONENT = "lyapunov_exponent"
+ALL_EXPONENTS = "lyapunov_exponents"
+STANDARD_ERROR = "_standard_error"
+LABELS = ("motion", "period")
+STATUS = "status"
 
 STATE_WORDING: dict[str, tuple[str, str]] = {
     "delta_5": ("relative torsional displacement", r"$\delta_5$"),
@@ -25,19 +37,18 @@ STATE_WORDING: dict[str, tuple[str, str]] = {
     "delta_4": ("axial displacement of the driven gear", r"$\delta_4$"),
     "delta_4_rate": ("axial velocity of the driven gear", r"$\delta_4'$"),
 }
-"""Long name and mathtext symbol of each state (all dimensionless), in the order of the kernels."""
+"""Long name and mathtext symbol of each state (all dimensionless), in the one order of states."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Variable:
-    """One named array of a sweep.
+    """One named array of a result.
 
     Parameters
     ----------
     name : str
     dims : tuple of str
-        Names of the dimensions; the first one of everything that differs from lane to lane is
-        the axis of the sweep.
+        Names of the dimensions; those of what differs from lane to lane begin with all axes.
     dtype : str
         ``"float64"``, ``"int32"``, ``"uint8"`` or ``"str"``.
     units, long_name, symbol : str
@@ -46,8 +57,9 @@ class Variable:
         The value that stands for "none here"; ``None`` where every value means something.
     flags : tuple of str
         Meanings of the values 0, 1, 2, ... of an enumeration, one word each.
-    values : tuple, optional
-        The values themselves where they are known before the sweep (``section_point``, ``state``).
+    values : ndarray, optional
+        The values themselves, of the shape of `dims`, where they are known before the sweep, as
+        those of coordinates are; ``None`` for what every lane has to be computed for.
     """
 
     name: str
@@ -58,7 +70,7 @@ class Variable:
     symbol: str = ""
     fill_value: float | int | None = None
     flags: tuple[str, ...] = ()
-    values: tuple[int, ...] | tuple[float, ...] | tuple[str, ...] | None = None
+    values: NDArray[Any] | None = None
 
     @property
     def attributes(self) -> dict[str, Any]:
@@ -72,25 +84,58 @@ class Variable:
         return attributes
 
 
+@dataclass(frozen=True, eq=False)
+class Axis:
+    """One dimension of the lanes of a sweep.
+
+    Parameters
+    ----------
+    name : str
+        See `axis_name`.
+    units, long_name, symbol : str
+        As of a variable.
+    values : ndarray, shape (values,)
+        Ascending, none of them twice.
+    """
+
+    name: str
+    units: str
+    long_name: str
+    symbol: str
+    values: NDArray[Any]
+
+
 def axis_name(parameter: str) -> str:
-    """Give the name of the dimension of a swept parameter, e.g. ``operation_speed_rpm``."""
+    """Give the name of the axis of a swept parameter, e.g. ``operation_speed_rpm``."""
     return parameter.replace(".", "_")
 
 
+def start_axis(count: int) -> Axis:
+    """Give the axis of several starts of each parameter value."""
+    text = "number of the start among those of one parameter value"
+    return Axis(START, "1", text, "", np.arange(count))
+
+
+def diagram_axis(axes: Sequence[str]) -> str:
+    """Name the axis along which a diagram runs: the first swept parameter, "" without axes."""
+    return ([START] + [name for name in axes if name != START])[-1] if axes else ""
+
+
+def lane_axes(variables: Sequence[Variable]) -> tuple[str, ...]:
+    """Name the axes of a result: the dimensions of ``status``, which every lane has."""
+    return next(variable.dims for variable in variables if variable.name == STATUS)
+
+
 def sweep_variables(
-    axis: str,
+    axes: Sequence[Axis],
     *,
-    units: str,
-    long_name: str,
-    symbol: str,
     states: Sequence[str],
     section: Sequence[str],
     section_points: int,
     lyapunov: bool,
-    several_starts: bool,
     status_meanings: Sequence[str],
     crossings: bool = False,
-    spectrum: bool = False,
+    exponents: bool = False,
     check_meanings: Sequence[str] = (),
     motion_meanings: Sequence[str] = (),
 ) -> list[Variable]:
@@ -98,109 +143,89 @@ def sweep_variables(
 
     Parameters
     ----------
-    axis : str
-        The swept parameter, bare or as a dotted path.
-    units, long_name, symbol : str
-        Of the swept parameter.
-    states : sequence of str
-        States of the scene, in the order of the kernels.
-    section : sequence of str
-        States recorded once a mesh period.
+    axes : sequence of Axis
+        Second swept parameter, first swept parameter, start; those that there are.
+    states, section : sequence of str
+        Those of the scene, in its order, and those recorded at the section.
     section_points : int
         Mesh periods recorded.
-    lyapunov : bool
-        Whether the largest Lyapunov exponent is computed.
-    crossings : bool
-        Whether steps are split at clearance boundaries, and their crossings counted.
-    spectrum : bool
-        Whether all Lyapunov exponents are computed.
-    check_meanings : sequence of str
-        Meanings of ``motion_changed`` where lanes are computed twice to measure their error.
-    motion_meanings : sequence of str
-        Meanings of ``motion`` where lanes are labelled.
-    several_starts : bool
-        Whether each parameter value has several lanes that differ in their start.
-    status_meanings : sequence of str
-        Meanings of the lane status 0, 1, ...
-
-    Returns
-    -------
-    list of Variable
+    lyapunov, exponents, crossings : bool
+        Whether the largest exponent, all exponents, and crossings of clearance boundaries are kept.
+    status_meanings, check_meanings, motion_meanings : sequence of str
+        Meanings of 0, 1, ... in ``status``, in ``motion_changed`` where lanes are computed twice
+        to measure their error, and in ``motion`` where lanes are labelled.
     """
-    lane = axis_name(axis)
-    nan = float("nan")
-    variables = [Variable(lane, (lane,), "float64", units, long_name, symbol)]
-    if several_starts:
-        start = "number of the start among those of one parameter value"
-        variables.append(Variable("start", (lane,), "int32", "1", start))
+    names = tuple(axis.name for axis in axes)
+
+    def real(name: str, text: str, symbol: str = "", *dims: str) -> Variable:
+        return Variable(name, (*names, *dims), "float64", "1", text, symbol, float("nan"))
+
+    def count(name: str, text: str, symbol: str = "", fill_value: int | None = None) -> Variable:
+        return Variable(name, names, "int32", "1", text, symbol, fill_value)
+
+    def kind(name: str, text: str, meanings: Sequence[str]) -> Variable:
+        flags = tuple("_".join(meaning.split()) for meaning in meanings)
+        return Variable(name, names, "uint8", "1", text, flags=flags)
+
+    variables = [
+        _coordinate(axis.name, axis.values, axis.long_name, axis.symbol, axis.units)
+        for axis in axes
+    ]
     if section and section_points > 0:
-        points = tuple(range(section_points))
         text = "number of the section point, one mesh period apart; the last one ends the lane"
-        dims: tuple[str, ...] = (SECTION_POINT,)
-        variables.append(Variable(SECTION_POINT, dims, "int32", "1", text, values=points))
-        dims = (lane, SECTION_POINT)
+        variables.append(_coordinate(SECTION_POINT, np.arange(section_points), text))
         for state in section:
-            text, mark = STATE_WORDING[state]
+            text, symbol = STATE_WORDING[state]
             text += " at the stroboscopic section"
-            variables.append(Variable(f"section_{state}", dims, "float64", "1", text, mark, nan))
+            variables.append(real(SECTION + state, text, symbol, SECTION_POINT))
     if lyapunov:
-        name, text = "lyapunov_exponent", "largest Lyapunov exponent"
-        error, error_text = f"{name}_standard_error", f"standard error of the {text}"
-        variables += [
-            Variable(name, (lane,), "float64", "1", text, r"$\lambda_1$", nan),
-            Variable(error, (lane,), "float64", "1", error_text, r"$s_{\lambda_1}$", nan),
-        ]
+        name, text = LARGEST_EXPONENT, "largest Lyapunov exponent"
+        error = f"standard error of the {text}"
+        variables.append(real(name, text, r"$\lambda_1$"))
+        variables.append(real(name + STANDARD_ERROR, error, r"$s_{\lambda_1}$"))
     if motion_meanings:
-        text = "smallest distance after which the motion returns, of all states, scaled"
-        kind, meanings = "kind of motion", tuple(motion_meanings)
         period = "mesh periods after which the motion repeats, 0 where it is not periodic"
+        text = "smallest distance after which the motion returns, of all states, scaled"
         variables += [
-            Variable("motion", (lane,), "uint8", "1", kind, flags=meanings),
-            Variable("period", (lane,), "int32", "1", period, "$n$"),
-            Variable("return_distance", (lane,), "float64", "1", text, "", nan),
+            kind("motion", "kind of motion", motion_meanings),
+            count("period", period, "$n$"),
+            real("return_distance", text),
         ]
-    if spectrum:
-        numbers = tuple(range(1, len(states) + 1))
+    if exponents:
+        name, error = ALL_EXPONENTS, "standard error of each Lyapunov exponent"
         text = "number of the Lyapunov exponent, the largest first"
-        variables.append(Variable(EXPONENT, (EXPONENT,), "int32", "1", text, "$i$", values=numbers))
-        dims, name = (lane, EXPONENT), "lyapunov_spectrum"
-        error, error_text = f"{name}_standard_error", "standard error of each Lyapunov exponent"
         total = "sum of all Lyapunov exponents as the damping gives it, exactly"
         variables += [
-            Variable(name, dims, "float64", "1", "all Lyapunov exponents", r"$\lambda_i$", nan),
-            Variable(error, dims, "float64", "1", error_text, "", nan),
-            Variable("lyapunov_sum", (lane,), "float64", "1", total, r"$\sum\lambda_i$", nan),
+            _coordinate(EXPONENT_NUMBER, np.arange(1, len(states) + 1), text, "$i$"),
+            real(name, "all Lyapunov exponents", r"$\lambda_i$", EXPONENT_NUMBER),
+            real(name + STANDARD_ERROR, error, "", EXPONENT_NUMBER),
+            real("lyapunov_sum", total, r"$\sum\lambda_i$"),
         ]
     if crossings:
         text = "clearance boundaries crossed per mesh period, tangential and axial together"
         slow = "smallest speed of a gap at a crossing of its clearance boundary"
-        unsplit = "steps with more crossings than they were split at"
         variables += [
-            Variable("crossings_per_period", (lane,), "float64", "1", text, "", nan),
-            Variable("slowest_crossing", (lane,), "float64", "1", slow, "", nan),
-            Variable("unsplit_steps", (lane,), "int32", "1", unsplit),
+            real("crossings_per_period", text),
+            real("slowest_crossing", slow),
+            count("unsplit_steps", "steps with more crossings than they were split at"),
         ]
     if check_meanings:
         text = "change of the section of a periodic lane when the step is halved"
         exponent = "change of the largest Lyapunov exponent when the step is halved"
         motion = "whether the lane moves in another way when the step is halved"
-        meanings = tuple(check_meanings)
         variables += [
-            Variable("section_error", (lane,), "float64", "1", text, "", nan),
-            Variable("exponent_error", (lane,), "float64", "1", exponent, "", nan),
-            Variable("motion_changed", (lane,), "uint8", "1", motion, flags=meanings),
+            real("section_error", text),
+            real("exponent_error", exponent),
+            kind("motion_changed", motion, check_meanings),
         ]
-    flags = tuple("_".join(meaning.split()) for meaning in status_meanings)
     diverged = "mesh period in which the lane diverged, -1 where it did not"
-    names = tuple(states)
     return [
         *variables,
-        Variable("status", (lane,), "uint8", "1", "status of the lane", flags=flags),
-        Variable("diverged_period", (lane,), "int32", "1", diverged, fill_value=-1),
-        Variable(STATE, (STATE,), "str", "1", "name of the state variable", values=names),
-        Variable(
-            "end_state", (lane, STATE), "float64", "1", "state at the end of the lane", "", nan
-        ),
+        kind(STATUS, "status of the lane", status_meanings),
+        count("diverged_period", diverged, fill_value=-1),
+        _coordinate(STATE, np.array(states, dtype=str), "name of the state variable"),
+        real("start_state", "state at the start of the lane", "", STATE),
+        real("end_state", "state at the end of the lane", "", STATE),
     ]
 
 
@@ -214,7 +239,7 @@ def step_choice_variables(
     steps : sequence of int
         Numbers of steps per period that were tried; the last one was taken.
     measured : mapping of str to sequence of float
-        ``section_error``, ``exponent_error``, ``changed_share`` and ``periodic_share`` of each.
+        Keys as below.
     """
     name = "candidate_steps"
     wording = {
@@ -224,12 +249,16 @@ def step_choice_variables(
         "periodic_share": "share of lanes that move periodically: errors are measured on these",
     }
     text = "steps per period that were tried before the sweep; the last number was taken"
-    return [
-        Variable(name, (name,), "int32", "1", text, "$N$", values=tuple(steps)),
-        *(
-            Variable(
-                f"candidate_{key}", (name,), "float64", "1", wording[key], values=tuple(values)
-            )
-            for key, values in measured.items()
-        ),
-    ]
+    variables = [_coordinate(name, np.asarray(steps, dtype=np.int32), text, "$N$")]
+    for key, row in measured.items():
+        values = np.asarray(row, dtype=np.float64)
+        key, text = f"candidate_{key}", wording[key]
+        variables.append(Variable(key, (name,), "float64", "1", text, values=values))
+    return variables
+
+
+def _coordinate(
+    name: str, values: NDArray[Any], long_name: str, symbol: str = "", units: str = "1"
+) -> Variable:
+    dtype = {"U": "str", "i": "int32", "f": "float64"}[values.dtype.kind]
+    return Variable(name, (name,), dtype, units, long_name, symbol, values=values)

@@ -16,12 +16,7 @@ from gearchaos.results.result_reader import own_datasets, read_result
 
 
 def verify(path: str | os.PathLike[str]) -> list[str]:
-    """Read all of a result file, piece by piece, and compare it with its checksums and format.
-
-    Returns
-    -------
-    list of str
-        What was checked and found sound, one phrase each.
+    """Read all of a result file, piece by piece, and say what was found sound, a phrase each.
 
     Raises
     ------
@@ -34,21 +29,16 @@ def verify(path: str | os.PathLike[str]) -> list[str]:
         raise FileError([*error.problems, *damaged_pieces(path)]) from error
     fits = checksum_fits(Path(path))
     problems = list(damaged_pieces(path))
+    # Of a large file the reader has not tried the checksum.
     if fits is False:
         problems.insert(0, f"{path}: is damaged (its checksum does not fit); run the sweep again")
     if problems:
         raise FileError(problems)
     with h5py.File(path, "r") as file:
-        summed = sum(
-            dataset.id.get_num_chunks() for dataset in own_datasets(file) if dataset.fletcher32
-        )
-    line = (
-        "there is no checksum of the file: another program than gearchaos has written to it"
-        if fits is None
-        else "the checksum of the file fits"
-    )
+        summed = sum(d.id.get_num_chunks() for d in own_datasets(file) if d.fletcher32)
+    foreign = "there is no checksum of the file: another program than gearchaos has written to it"
     return [
-        line,
+        foreign if fits is None else "the checksum of the file fits",
         f"{summed} chunks of numbers fit their checksums",
         f"format {metadata['schema']} {metadata['schema_version']}: {len(variables)} variables and "
         f"{len(parameters)} {PARAMETERS} have their types, dimensions and sizes",
@@ -70,8 +60,7 @@ def damaged_pieces(path: str | os.PathLike[str]) -> Iterator[str]:
 
 
 def _unreadable(dataset: h5py.Dataset) -> Iterator[str]:
-    pieces = dataset.iter_chunks() if dataset.chunks else [()]
-    for piece in pieces:
+    for piece in dataset.iter_chunks() if dataset.chunks else [()]:
         try:
             dataset[piece]
         except OSError:

@@ -12,7 +12,12 @@ import numpy as np
 
 from gearchaos.results.checksum_line import append_checksum
 from gearchaos.results.result import Parameter, Result
-from gearchaos.results.variables import STATE_WORDING, step_choice_variables, sweep_variables
+from gearchaos.results.variables import (
+    STATE_WORDING,
+    Axis,
+    step_choice_variables,
+    sweep_variables,
+)
 
 from .commands import SMALL
 
@@ -27,18 +32,14 @@ def good_result(path: Path) -> None:
     states = list(STATE_WORDING)[:2]
     choice = dict.fromkeys(("section_error", "exponent_error", "changed_share"), (1e-3, 1e-7))
     variables = sweep_variables(
-        "load",
-        units="1",
-        long_name="static load",
-        symbol="$f_n$",
+        [Axis("load", "1", "static load", "$f_n$", np.linspace(0.0, 1.0, LANES))],
         states=states,
         section=["delta_5"],
         section_points=POINTS,
         lyapunov=True,
-        several_starts=False,
         status_meanings=["ok", "diverged"],
         crossings=True,
-        spectrum=True,
+        exponents=True,
         check_meanings=["not_checked", "same", "changed"],
         motion_meanings=["periodic", "quasi_periodic", "chaotic", "unresolved", "diverged"],
     )
@@ -54,11 +55,11 @@ def good_result(path: Path) -> None:
                 if variable.dtype == "float64"
                 else numbers.integers(0, max(1, len(variable.flags)), size=shape)
             )
-    data["load"] = np.linspace(0.0, 1.0, LANES)
+    load = np.linspace(0.0, 1.0, LANES)
     parameters = {
-        "load": Parameter(data["load"], "swept"),
+        "load": Parameter(load, "swept", dims=("load",)),
         "damping_ratio": Parameter(0.1, "given"),
-        "stiffness_cosine": Parameter(np.array([0.1, 0.2]), "derived"),
+        "stiffness_cosine": Parameter(np.array([0.1, 0.2]), "derived", dims=("harmonic",)),
     }
     metadata: dict[str, str | int | float] = {
         "title": "a small result",
@@ -68,7 +69,7 @@ def good_result(path: Path) -> None:
         "configuration": SMALL,
         "configuration_resolved": SMALL,
     }
-    Result("load", variables, data, parameters, metadata).save(path)
+    Result(["load"], variables, data, parameters, metadata).save(path)
 
 
 def damaged_result(number: int, good: bytes, path: Path) -> str:
@@ -194,7 +195,7 @@ def _describe(source: Random, file: h5py.File, name: str) -> None:
         (
             "", "x" * 20_000, "\x1b[2J\x07\n\r", "\u202egnp.exe", "$\\frac{1$", "$" * 7, "a " * 99,
             r"$\input{/etc/passwd}$", "%s%n{0}", 7, -1, 2.5, float("nan"), 10**18, file[name].ref,
-            np.arange(3), np.zeros(0), b"\xff\xfe", "2.0", "1.9", h5py.Empty("f8"),
+            np.arange(3), np.zeros(0), b"\xff\xfe", "3.0", "2.9", h5py.Empty("f8"),
         )
     )  # fmt: skip
     item.attrs[key] = value
@@ -275,7 +276,7 @@ def _add(source: Random, file: h5py.File, name: str) -> None:
     )
     if other not in file:
         file.create_dataset(other, data=_array(source, source.choice(((), (LANES,), (3, 3)))))
-        file[name].attrs["axis"] = other
+        file[name].attrs["axes"] = other
 
 
 EDITS: tuple[Callable[[Random, h5py.File, str], None], ...] = (
@@ -288,8 +289,8 @@ def _another_hdf5_file(source: Random, _: bytes, path: Path) -> None:
     with h5py.File(path, "w", userblock_size=source.choice((0, 512))) as file:
         if source.random() < 0.7:
             file.attrs["schema"] = source.choice(("gearchaos-sweep", "other", 3))
-            file.attrs["schema_version"] = source.choice(("1.0", "2.0", "", 1.0))
-            file.attrs["axis"] = source.choice(("load", "state", "", "/", "..", "parameters"))
+            file.attrs["schema_version"] = source.choice(("1.0", "2.0", "", 2.0))
+            file.attrs["axes"] = source.choice(("load", "state", "", "/", "..", "parameters"))
         for name in ("load", "state", "status", "parameters", "x/y"):
             if source.random() < 0.6:
                 file.create_dataset(name, data=_array(source, source.choice(((), (4,), (2, 3)))))

@@ -12,6 +12,7 @@ import os
 import resource
 import sys
 import traceback
+from argparse import ArgumentParser, Namespace
 from collections.abc import Callable
 
 MEMORY = 6 << 30
@@ -47,16 +48,16 @@ def _main(command: str) -> Callable[[list[str]], int]:
     if command != "load_config":
         return importlib.import_module(f"gearchaos.{command}").main
     from gearchaos import load_config
-    from gearchaos.command_line import OK, run_command
+    from gearchaos.command_line import OK, Command
 
-    def main(arguments: list[str]) -> int:
-        def body() -> int:
-            load_config(*arguments)
-            return OK
+    def body(options: Namespace) -> int:
+        load_config(*options.paths)
+        return OK
 
-        return run_command("gearchaos load_config", body)
+    def paths(parser: ArgumentParser) -> None:
+        parser.add_argument("paths", nargs="*")
 
-    return main
+    return Command("load_config", "Load a configuration.", paths, body)
 
 
 if __name__ == "__main__":

@@ -4,14 +4,17 @@ import json
 import re
 
 import h5py
+import numpy as np
 import pytest
 
 from gearchaos.results.checksum_line import append_checksum
 from gearchaos.results.overview import overview
-from gearchaos.results.result import open_result
+from gearchaos.results.result import Result, open_result
+from gearchaos.results.variables import Axis
 
 from .commands import run_module
 from .fuzz_results import CHECKSUM_LINE, LANES, good_result
+from .test_result_axes import AXES, result_over
 
 
 @pytest.fixture
@@ -45,7 +48,7 @@ def test_json_holds_the_numbers_of_the_file(good):
     facts = json.loads(ended.out, parse_constant=pytest.fail)
     result = open_result(good)
     assert facts["lanes"] == LANES
-    assert facts["swept"]["greatest"] == result["load"].max()
+    assert facts["axes"]["load"]["greatest"] == result["load"].max()
     assert facts["parameters"]["stiffness_cosine"]["value"] == [0.1, 0.2]
     assert facts["counts"]["status"]["diverged"] == (result["status"] == 1).sum()
     assert facts["variables"].keys() == set(result.names)
@@ -96,10 +99,10 @@ def test_rows_that_are_damaged_are_named(good):
 def test_a_newer_format_is_refused_in_a_sentence(good):
     without_checksum(good)
     with h5py.File(good, "r+") as file:
-        file.attrs["schema_version"] = "2.0"
+        file.attrs["schema_version"] = "3.0"
     ended = info(good)
     assert ended.code == 4
-    assert "has version '2.0' of the file format, of which this gearchaos reads 1.x" in ended.err
+    assert "has version '3.0' of the file format, of which this gearchaos reads 2.x" in ended.err
 
 
 def test_control_characters_do_not_reach_the_terminal(good):
@@ -117,3 +120,43 @@ def test_reading_leaves_the_file_as_it_was(good, tmp_path):
     assert info(good, "--verify").code == 0
     assert good.read_bytes() == before
     assert sorted(path.name for path in tmp_path.iterdir()) == ["good.h5"]
+
+
+def test_several_axes_are_listed_and_the_stages_are_those_of_a_named_slice(tmp_path):
+    result = result_over(AXES["two parameters, several starts"])
+    path = tmp_path / "several.h5"
+    result.save(path)
+    out = info(path).out
+    assert max(map(len, out.splitlines())) <= 80
+    words = " ".join(out.split())
+    for text in (
+        "axis load (static load), 3 values, 0.1 to 0.5",
+        "axis pitch_error (pitch error), 7 values, 0 to 3",
+        "axis start (number of the start among those of one parameter value), 2 values, 0 to 1",
+        "lanes 42",
+        f"status {(result['status'] == 0).sum()} ok, {(result['status'] == 1).sum()} diverged",
+        "Stages slice load = 0.1, the first of 3; others with --at load=VALUE",
+        "slice start = 0, the first of 2; others with --at start=VALUE",
+        "(load: 3, pitch_error: 7, start: 2, section_point: 6) float64",
+    ):
+        assert text in words
+    facts = json.loads(info(path, "--json").out)
+    assert facts["lanes"] == 42
+    assert facts["slice"]["start"] == {"value": 0.0, "number": 1, "of": 2}
+    assert sum(stage["lanes"] for stage in facts["stages"]) == 7
+
+
+@pytest.mark.parametrize("lanes", [20, 31])
+def test_of_many_stages_the_first_and_the_last_are_shown(lanes, tmp_path):
+    result = result_over((Axis("load", "1", "static load", "", np.arange(float(lanes))),))
+    data = {name: result[name] for name in result}
+    data["period"], data["motion"] = np.arange(lanes) + 1, np.zeros(lanes)
+    variables = list(result.variables.values())
+    Result(result.axes, variables, data, {}, {}).save(tmp_path / "many.h5")
+    lines = info(tmp_path / "many.h5").out.split("Stages\n")[1].split("\n\n")[0].splitlines()
+    if lanes == 20:
+        assert [line.split(":")[0] for line in lines] == [f"  period {n}" for n in range(1, 21)]
+    else:
+        assert lines[0] == "  31 stages: the first 10 and the last 10"
+        shown = [line.split(":")[0] for line in lines[1:]]
+        assert shown == [f"  period {n}" for n in (*range(1, 11), *range(22, 32))]

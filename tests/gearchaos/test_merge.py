@@ -8,7 +8,7 @@ SHARDS = "gears.h5.shards"
 COUNT = ("--set", "sweep.count=1000", "--quiet")
 
 
-def parts(folder, *numbers, total=3, flags=COUNT):
+def shards(folder, *numbers, total=3, flags=COUNT):
     for number in numbers:
         assert sweep(folder, *flags, "--shard", f"{number}/{total}").code == 0
 
@@ -17,15 +17,15 @@ def merge(folder, *arguments):
     return run_module("gearchaos.merge", *arguments, cwd=folder)
 
 
-def test_missing_and_damaged_blocks_are_named_with_the_parts_to_run(tmp_path):
-    parts(tmp_path, 1, 2)
+def test_missing_and_damaged_blocks_are_named_with_the_shards_to_run(tmp_path):
+    shards(tmp_path, 1, 2)
     before = names_in(tmp_path / SHARDS)
     ended = merge(tmp_path, "gears.h5")
     assert (ended.code, ended.out) == (4, "")
     (line,) = ended.err.splitlines()
     assert "lanes 512 to 767 are missing; run the sweep with --shard 3/3 and --resume" in line
     assert names_in(tmp_path / SHARDS) == sorted({*before, "lock"})
-    # The fourth block is the second of part 1.
+    # The fourth block is the second of shard 1.
     damaged = max((tmp_path / SHARDS).glob("*.shard"))
     content = bytearray(damaged.read_bytes())
     content[-1] ^= 1
@@ -38,7 +38,7 @@ def test_missing_and_damaged_blocks_are_named_with_the_parts_to_run(tmp_path):
 
 
 def test_the_result_carries_the_configuration_as_it_was_written(tmp_path):
-    parts(tmp_path, 1, total=1)
+    shards(tmp_path, 1, total=1)
     ended = merge(tmp_path, "gears.h5")
     assert (ended.code, ended.out) == (0, "gears.h5\n")
     assert ended.err == "gearchaos merge: 1000 lanes, 0 diverged\n"
@@ -50,7 +50,7 @@ def test_the_result_carries_the_configuration_as_it_was_written(tmp_path):
 def test_a_chosen_number_of_steps_is_chosen_again(tmp_path):
     flags = ("--set", "integration.tolerance=1e-4", "--set", "groups.damping_ratio=0.3", "--quiet")
     flags += ("--set", "integration.transient_periods=300", "--set", "outputs.section_points=10")
-    parts(tmp_path, 1, total=1, flags=flags)
+    shards(tmp_path, 1, total=1, flags=flags)
     assert merge(tmp_path, "gears.h5").code == 0
     assert sweep(tmp_path, *flags, "--output", "one.h5").code == 0
     one, joined = (gearchaos.open_result(tmp_path / name) for name in ("one.h5", "gears.h5"))
@@ -59,7 +59,7 @@ def test_a_chosen_number_of_steps_is_chosen_again(tmp_path):
 
 
 def test_an_existing_file_is_kept_unless_it_may_be_replaced(tmp_path):
-    parts(tmp_path, 1, total=1)
+    shards(tmp_path, 1, total=1)
     (tmp_path / "gears.h5").write_bytes(b"precious")
     ended = merge(tmp_path, "gears.h5")
     assert ended.code == 4
@@ -71,7 +71,7 @@ def test_an_existing_file_is_kept_unless_it_may_be_replaced(tmp_path):
 
 
 def test_diverged_lanes_make_the_exit_code_that_of_the_sweep(tmp_path):
-    parts(tmp_path, 1, total=1, flags=(*DIVERGING, "--quiet"))
+    shards(tmp_path, 1, total=1, flags=(*DIVERGING, "--quiet"))
     ended = merge(tmp_path, "gears.h5")
     assert (ended.code, ended.out) == (3, "gears.h5\n")
     assert "gearchaos merge: 40 of 40 lanes diverged, more than" in ended.err

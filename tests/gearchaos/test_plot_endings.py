@@ -6,28 +6,36 @@ import sys
 
 import pytest
 
-from gearchaos.command_line import run_command, version_text
+from gearchaos.command_line import Command, version_text
 from gearchaos.errors import ConfigurationError, FileError
 
 
 def raising(fault: BaseException):
-    def body() -> int:
+    def body(_options) -> int:
         raise fault
 
     return body
 
 
+def run(body) -> int:
+    return Command("turn", "Turn a gear.", lambda _parser: None, body)([])
+
+
 @pytest.mark.parametrize(
     ("fault", "code", "lines"),
     [
-        (ConfigurationError(["one", "two"]), 2, "gear: error: one\ngear: error: two\n"),
-        (FileError("a.h5: is not there"), 4, "gear: error: a.h5: is not there\n"),
+        (
+            ConfigurationError(["one", "two"]),
+            2,
+            "gearchaos turn: error: one\ngearchaos turn: error: two\n",
+        ),
+        (FileError("a.h5: is not there"), 4, "gearchaos turn: error: a.h5: is not there\n"),
         (PermissionError(13, "Permission denied", "b"), 4, "denied: 'b'\n"),
-        (KeyboardInterrupt(), 130, "gear: interrupted\n"),
+        (KeyboardInterrupt(), 130, "gearchaos turn: interrupted\n"),
     ],
 )
 def test_each_fault_has_its_code_and_its_lines(fault, code, lines, capsys):
-    assert run_command("gear", raising(fault)) == code
+    assert run(raising(fault)) == code
     out, err = capsys.readouterr()
     assert out == ""
     assert err.endswith(lines)
@@ -35,24 +43,24 @@ def test_each_fault_has_its_code_and_its_lines(fault, code, lines, capsys):
 
 def test_a_fault_nobody_foresaw_is_not_hidden():
     with pytest.raises(ZeroDivisionError):
-        run_command("gear", raising(ZeroDivisionError()))
+        run(raising(ZeroDivisionError()))
 
 
 def test_the_codes_of_the_body_and_of_argparse_are_kept():
-    assert run_command("gear", lambda: 3) == 3
-    assert run_command("gear", raising(SystemExit(2))) == 2
-    assert run_command("gear", raising(SystemExit())) == 0
+    assert run(lambda _options: 3) == 3
+    assert run(raising(SystemExit(2))) == 2
+    assert run(raising(SystemExit())) == 0
 
 
 def test_a_reader_that_goes_away_ends_the_command_quietly():
     code = """
 import sys
-from gearchaos.command_line import run_command
-def body():
+from gearchaos.command_line import Command
+def body(options):
     sys.stdin.read()
     print("a path")
     return 0
-sys.exit(run_command("gear", body))
+sys.exit(Command("turn", "Turn a gear.", lambda parser: None, body)())
 """
     with subprocess.Popen(
         [sys.executable, "-c", code],

@@ -13,7 +13,7 @@ import pytest
 
 from gearchaos.errors import FileError
 from gearchaos.results.result import Parameter, Result, open_result
-from gearchaos.results.variables import sweep_variables
+from gearchaos.results.variables import Axis, sweep_variables
 
 CHECKSUM_LINE = 82
 
@@ -21,15 +21,11 @@ CHECKSUM_LINE = 82
 @pytest.fixture(scope="module")
 def good(tmp_path_factory: pytest.TempPathFactory) -> Path:
     variables = sweep_variables(
-        "load",
-        units="1",
-        long_name="static load",
-        symbol="$f_n$",
+        [Axis("load", "1", "static load", "$f_n$", np.linspace(0.0, 1.0, 20))],
         states=["delta_5", "delta_5_rate"],
         section=["delta_5"],
         section_points=5,
         lyapunov=True,
-        several_starts=False,
         status_meanings=["ok", "diverged"],
     )
     sizes = {"section_point": 5, "state": 2}
@@ -41,12 +37,12 @@ def good(tmp_path_factory: pytest.TempPathFactory) -> Path:
     }
     data["section_delta_5"] = random.normal(size=(20, 5))
     parameters = {
-        "load": Parameter(data["load"], "swept"),
+        "load": Parameter(np.linspace(0.0, 1.0, 20), "swept", dims=("load",)),
         "damping_ratio": Parameter(0.1, "given"),
-        "stiffness_cosine": Parameter(np.array([0.1, 0.2]), "given"),
+        "stiffness_cosine": Parameter(np.array([0.1, 0.2]), "given", dims=("harmonic",)),
     }
     path = tmp_path_factory.mktemp("good") / "good.h5"
-    Result("load", variables, data, parameters, {"title": "t"}).save(path)
+    Result(["load"], variables, data, parameters, {"title": "t"}).save(path)
     return path
 
 
@@ -64,8 +60,10 @@ def refusal(path: Path) -> str:
 def test_every_truncation_is_refused(good: Path, tmp_path: Path) -> None:
     content = good.read_bytes()
     cut = tmp_path / "cut.h5"
-    ends = {0, 1, 7, 8, 9, 95, 96, *range(100, len(content), 997)}
-    for end in sorted(ends | {len(content) - CHECKSUM_LINE - 1, len(content) - 1}):
+    whole = len(content) - CHECKSUM_LINE
+    # With less than the first word of the checksum line left, the file is one without that line.
+    ends = {0, 1, 7, 8, 9, 95, 96, *range(100, whole, 997), whole - 1, whole + 17}
+    for end in sorted(ends | {len(content) - 50, len(content) - 1}):
         cut.write_bytes(content[:end])
         assert refusal(cut)
 
@@ -136,14 +134,21 @@ def scaled(name: str, shape: tuple[int, ...], dtype: str) -> Callable[[h5py.File
     return change
 
 
+def descending(file: h5py.File) -> None:
+    file["load"][...] = file["load"][...][::-1]
+
+
 HUGE = {"shape": (10**12, 100), "dtype": "f8", "chunks": (1000, 100), "compression": "gzip"}
 CHANGES: dict[str, tuple[Callable[[h5py.File], None], str]] = {
     "another schema": (attribute("/", "schema", "other"), "is not a gearchaos result"),
     "a schema that is a number": (attribute("/", "schema", 3), "is not a gearchaos result"),
-    "the next major version": (attribute("/", "schema_version", "2.0"), "has version '2.0'"),
+    "the next major version": (attribute("/", "schema_version", "3.0"), "has version '3.0'"),
+    "the version before": (attribute("/", "schema_version", "1.0"), "run the sweep again"),
     "a version without sense": (attribute("/", "schema_version", "x"), "has version 'x'"),
-    "an unknown axis": (attribute("/", "axis", "speed"), "lacks the variable speed"),
-    "the states as axis": (attribute("/", "axis", "state"), "state"),
+    "an unknown axis": (attribute("/", "axes", "speed"), "lacks the variable speed"),
+    "the states as axis": (attribute("/", "axes", "state"), "state"),
+    "no axes": (attribute("/", "axes", ""), "does not name its axes"),
+    "an axis that descends": (descending, "values of load that do not ascend"),
     "no status": (lambda file: file.__delitem__("status"), "lacks the variable status"),
     "no states": (lambda file: file.__delitem__("state"), "is damaged"),
     "no parameters": (lambda file: file.__delitem__("parameters"), "parameters"),

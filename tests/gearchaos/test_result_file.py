@@ -1,8 +1,10 @@
 """A result file holds what was put in, and any program for HDF5 or netCDF reads it."""
 
+import math
 import re
 import shutil
 import subprocess
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +15,7 @@ import pytest
 import xarray as xr
 
 from gearchaos.results.result import Parameter, Result, open_result
-from gearchaos.results.variables import STATE_WORDING, sweep_variables
+from gearchaos.results.variables import STATE_WORDING, Axis, axis_name, start_axis, sweep_variables
 
 LANES = 300
 POINTS = 1000
@@ -21,40 +23,46 @@ STATES = ("delta_5", "delta_5_rate")
 SIZES = {"section_point": POINTS, "state": len(STATES), "exponent": len(STATES)}
 
 
-def make_result(axis: str = "pitch_error", **metadata: Any) -> Result:
+def swept(parameter: str = "pitch_error", count: int = LANES) -> Axis:
+    values = np.linspace(-1.0, 4.0, count)
+    return Axis(axis_name(parameter), "1", "pitch error", "$P$", values)
+
+
+def make_result(*axes: Axis, **metadata: Any) -> Result:
+    axes = axes or (swept(),)
     variables = sweep_variables(
-        axis,
-        units="1",
-        long_name="pitch error",
-        symbol="$P$",
+        axes,
         states=STATES,
         section=["delta_5"],
         section_points=POINTS,
         lyapunov=True,
-        several_starts=True,
         status_meanings=["ok", "diverged"],
         crossings=True,
-        spectrum=True,
+        exponents=True,
         check_meanings=["not_checked", "same", "changed"],
         motion_meanings=["periodic", "chaotic"],
     )
     random = np.random.default_rng(1)
+    lanes = math.prod(axis.values.size for axis in axes)
     data: dict[str, Any] = {
-        v.name: random.normal(size=(LANES, *(SIZES[dim] for dim in v.dims[1:])))
+        v.name: random.normal(size=(lanes, *(SIZES[dim] for dim in v.dims[len(axes) :])))
         for v in variables
         if v.values is None
     }
-    data["start"] = np.arange(LANES) % 3
-    data["unsplit_steps"] = np.zeros(LANES)
-    data["motion_changed"] = np.arange(LANES) % 3
-    data["motion"] = data["period"] = np.arange(LANES) % 2
-    data["status"] = (np.arange(LANES) == 7).astype(np.uint8)
+    data["unsplit_steps"] = np.zeros(lanes)
+    data["motion_changed"] = np.arange(lanes) % 3
+    data["motion"] = data["period"] = np.arange(lanes) % 2
+    data["status"] = (np.arange(lanes) == 7).astype(np.uint8)
     data["diverged_period"] = np.where(data["status"], 12, -1)
     data["section_delta_5"][7] = data["lyapunov_exponent"][7] = np.nan
     parameters = {
         "load": Parameter(0.1, "given", "1", "static load", "$f_n$"),
-        "pitch_error": Parameter(data[axis.replace(".", "_")], "swept", "1", "pitch error", "$P$"),
-        "stiffness_cosine": Parameter(np.array([0.3, 0.2, 0.1]), "derived", "1", "cosine", "$a$"),
+        "pitch_error": Parameter(
+            axes[-1].values, "swept", "1", "pitch error", "$P$", (axes[-1].name,)
+        ),
+        "stiffness_cosine": Parameter(
+            np.array([0.3, 0.2, 0.1]), "derived", "1", "cosine", "$a$", ("harmonic",)
+        ),
     }
     texts = {
         "title": "Δ sweep",
@@ -64,7 +72,8 @@ def make_result(axis: str = "pitch_error", **metadata: Any) -> Result:
         "configuration": "# every line counts\n" * 10_000,
         "configuration_resolved": "[scene]\n",
     }
-    return Result(axis, variables, data, parameters, texts | metadata)
+    names = [axis.name for axis in axes]
+    return Result(names, variables, data, parameters, texts | metadata)
 
 
 @pytest.fixture(scope="module")
@@ -102,14 +111,14 @@ def test_what_was_read_can_be_saved_again(path: Path, tmp_path: Path) -> None:
 
 
 def test_a_dotted_parameter_gives_its_axis_underscores(tmp_path: Path) -> None:
-    make_result("operation.speed_rpm").save(tmp_path / "speed.h5")
+    make_result(swept("operation.speed_rpm")).save(tmp_path / "speed.h5")
     speed = open_result(tmp_path / "speed.h5")
     assert speed.axis == "operation_speed_rpm"
     assert speed.dims("status") == ("operation_speed_rpm",)
 
 
 def test_a_name_that_is_not_there_is_told_with_those_that_are(result: Result) -> None:
-    with pytest.raises(KeyError, match=r"'delta'.*pitch_error, start, section_point"):
+    with pytest.raises(KeyError, match=r"'delta'.*pitch_error, section_point"):
         result["delta"]
 
 
@@ -118,15 +127,24 @@ def test_arrays_that_contradict_their_dimensions_are_refused(result: Result) -> 
     variables = list(result.variables.values())
     for wrong in (result["status"][1:], result["end_state"]):
         with pytest.raises(ValueError, match="status has shape"):
-            Result(result.axis, variables, data | {"status": wrong}, {}, {})
+            Result(result.axes, variables, data | {"status": wrong}, {}, {})
     none = {name: v[:0] if result.axis in result.dims(name) else v for name, v in data.items()}
-    with pytest.raises(ValueError, match="no lanes"):
-        Result(result.axis, variables, none, {}, {})
+    twice = np.repeat(data["pitch_error"][::2], 2)
+    for wrong in (
+        none,
+        data | {"pitch_error": twice},
+        data | {"pitch_error": -data["pitch_error"]},
+    ):
+        with pytest.raises(ValueError, match="no ascending row"):
+            Result(result.axes, variables, wrong, {}, {})
 
 
 def test_texts_that_hdf5_cannot_hold_lose_nothing_else(tmp_path: Path) -> None:
     odd = make_result(title="a\0b\udc80c", note="x" * 70_000)
+    long_name = replace(odd.variables["status"], long_name="a\0b\udc80c")
+    odd.variables["status"] = long_name
     odd.save(tmp_path / "odd.h5")
+    assert open_result(tmp_path / "odd.h5").attributes("status")["long_name"] == "a\ufffdb?c"
     metadata = open_result(tmp_path / "odd.h5").metadata
     assert metadata["title"] == "a\ufffdb?c"
     assert metadata["note"] == "x" * 70_000
@@ -196,8 +214,9 @@ def test_netcdf_finds_real_dimensions_only(path: Path, result: Result) -> None:
 
 def test_every_dataset_follows_the_rules_of_the_format(path: Path) -> None:
     with h5py.File(path) as file:
+        assert (file.attrs["axes"], file.attrs["axis"]) == ("pitch_error", "pitch_error")
         assert file.libver[0] == "earliest"
-        assert (file.attrs["schema"], file.attrs["schema_version"]) == ("gearchaos-sweep", "1.0")
+        assert (file.attrs["schema"], file.attrs["schema_version"]) == ("gearchaos-sweep", "2.0")
         datasets: list[h5py.Dataset] = []
         file.visititems(lambda _, item: datasets.append(item) if hasattr(item, "shape") else None)
         assert len(datasets) == 29
@@ -280,14 +299,16 @@ def test_every_state_has_a_wording_of_its_own() -> None:
     assert len(set(STATE_WORDING.values())) == len(STATE_WORDING) == 10
 
 
-def test_the_documented_variables_are_those_that_are_written(result: Result) -> None:
+def test_the_documented_variables_are_those_that_are_written() -> None:
     page = (Path(__file__).parents[2] / "docs" / "file-format.md").read_text(encoding="utf-8")
     lines = re.findall(r"^\| `\w+` \| \(.*$", page, re.M)
     rows = [[cell.strip(" `") for cell in line.split("|")[1:5]] for line in lines]
     documented = {name: (dims.strip("()"), dtype, fill) for name, dims, dtype, fill in rows}
+    result = make_result(swept("load", 3), swept(count=4), start_axis(2))
+    short = {"load": "B", "pitch_error": "A", "section_delta_5": "section_STATE"}
     for name, variable in result.variables.items():
-        dims = ", ".join("A" if dim == result.axis else dim for dim in variable.dims)
-        name = {result.axis: "A", "section_delta_5": "section_STATE"}.get(name, name)
+        dims = ", ".join(variable.dims).replace(", ".join(result.axes), "axes")
         fill = "" if variable.fill_value is None else str(variable.fill_value)
-        assert documented.pop(name) == (dims, variable.dtype, fill.replace("nan", "NaN"))
+        described = (short.get(dims, dims), variable.dtype, fill.replace("nan", "NaN"))
+        assert documented.pop(short.get(name, name)) == described
     assert set(documented) == {"harmonic", "configuration", "configuration_resolved"}

@@ -15,20 +15,19 @@ import pytest
 from gearchaos.errors import FileError
 from gearchaos.results.atomic_file import check_output, replacing
 from gearchaos.results.result import Result, open_result
-from gearchaos.results.variables import sweep_variables
+from gearchaos.results.variables import Axis, sweep_variables
 
 PROGRAM = """
 import sys
 import numpy as np
 from gearchaos.errors import FileError
 from gearchaos.results.result import Result
-from gearchaos.results.variables import sweep_variables
+from gearchaos.results.variables import Axis, sweep_variables
 
 def result(lanes):
     variables = sweep_variables(
-        "load", units="1", long_name="static load", symbol="$f_n$", states=["delta_5"],
-        section=["delta_5"], section_points=100, lyapunov=False, several_starts=False,
-        status_meanings=["ok", "diverged"],
+        [Axis("load", "1", "static load", "$f_n$", np.arange(float(lanes)))], states=["delta_5"],
+        section=["delta_5"], section_points=100, lyapunov=False, status_meanings=["ok", "diverged"],
     )
     sizes = {"section_point": 100, "state": 1}
     random = np.random.default_rng(0)
@@ -36,7 +35,7 @@ def result(lanes):
         v.name: random.random((lanes, *(sizes[dim] for dim in v.dims[1:])))
         for v in variables if v.values is None
     }
-    return Result("load", variables, data, {}, {})
+    return Result(["load"], variables, data, {}, {})
 """
 
 
@@ -57,19 +56,15 @@ def run(program: str, *arguments: str | Path, limit: int | None = None) -> str:
 @pytest.fixture
 def result() -> Result:
     variables = sweep_variables(
-        "load",
-        units="1",
-        long_name="static load",
-        symbol="$f_n$",
+        [Axis("load", "1", "static load", "$f_n$", np.arange(3.0))],
         states=["delta_5"],
         section=[],
         section_points=0,
         lyapunov=False,
-        several_starts=False,
         status_meanings=["ok", "diverged"],
     )
-    data = {"load": np.arange(3.0), "status": [0, 0, 1], "diverged_period": [-1, -1, 4]}
-    return Result("load", variables, data | {"end_state": np.ones((3, 1))}, {}, {})
+    data = {"status": [0, 0, 1], "diverged_period": [-1, -1, 4], "start_state": np.zeros((3, 1))}
+    return Result(["load"], variables, data | {"end_state": np.ones((3, 1))}, {}, {})
 
 
 def test_an_existing_result_is_replaced_only_when_told(result: Result, tmp_path: Path) -> None:

@@ -1,10 +1,10 @@
-"""Several jobs share a sweep: each computes its part of the blocks beside one output."""
+"""Several jobs share a sweep: each computes its shard of the blocks beside one output."""
 
 import numpy as np
 import pytest
 
 import gearchaos
-from gearchaos.engine.sharding import Part, shared_blocks
+from gearchaos.engine.sharding import Shard, shared_blocks
 from gearchaos.errors import ConfigurationError
 from gearchaos.results.manifest import folder_of
 from gearchaos.results.store_lock import StoreLock
@@ -17,11 +17,11 @@ COUNT = ("--set", "sweep.count=1000", "--quiet")
 
 
 @pytest.mark.parametrize("lanes", [1, 255, 256, 1000, 123_456, 1_000_000])
-@pytest.mark.parametrize("parts", [1, 2, 7, 1000])
-def test_the_parts_cover_a_sweep_once_and_evenly(lanes, parts):
-    blocks = [Part(number, parts).blocks(lanes) for number in range(1, parts + 1)]
+@pytest.mark.parametrize("shards", [1, 2, 7, 1000])
+def test_the_shards_cover_a_sweep_once_and_evenly(lanes, shards):
+    blocks = [Shard(number, shards).blocks(lanes) for number in range(1, shards + 1)]
     together = sorted(bounds for own in blocks for bounds in own)
-    assert together == shared_blocks(lanes, parts)
+    assert together == shared_blocks(lanes, shards)
     edges = [0, *(last for _, last in together)]
     assert [first for first, _ in together] == edges[:-1]
     assert edges[-1] == lanes
@@ -35,12 +35,12 @@ def test_a_million_lanes_are_few_files():
 
 
 @pytest.mark.parametrize("text", ["0/4", "5/4", "4", "1/0", "-1/4", "1/4/2", "one/4", "", "٣/٤"])
-def test_what_is_no_part_is_refused(text):
+def test_what_is_no_shard_is_refused(text):
     with pytest.raises(ConfigurationError, match="must be i/N with i from 1 to N"):
-        Part.from_text(text)
+        Shard.from_text(text)
 
 
-def test_parts_computed_with_other_threads_join_to_the_undisturbed_result(tmp_path):
+def test_shards_computed_with_other_threads_join_to_the_undisturbed_result(tmp_path):
     for number, threads in ((2, "2"), (3, "1"), (1, "1")):
         shard = f"{number}/3"
         ended = sweep(tmp_path, *COUNT, "--shard", shard, "--threads", threads)
@@ -58,12 +58,12 @@ def test_parts_computed_with_other_threads_join_to_the_undisturbed_result(tmp_pa
     assert differing <= {"created", "threads", "wall_time_seconds"}
 
 
-def test_a_part_says_what_is_next_and_is_not_computed_twice(tmp_path):
+def test_a_shard_says_what_is_next_and_is_not_computed_twice(tmp_path):
     told = ("--set", "sweep.count=1000", "--shard", "2/2")
     first = sweep(tmp_path, *told)
     assert first.code == 0
     assert "488 lanes, 0 diverged" in first.err
-    assert "this was part 2/2; once all are there: " in first.err
+    assert "this was shard 2/2; once all are there: " in first.err
     assert first.err.endswith("-m gearchaos.merge gears.h5\n")
     refused = sweep(tmp_path, *told)
     assert refused.code == 4
@@ -77,19 +77,19 @@ def test_a_part_says_what_is_next_and_is_not_computed_twice(tmp_path):
     kept = sweep(tmp_path, *told, "--resume")
     assert kept.code == 0
     assert "lanes/s" not in kept.err  # Nothing was left to be computed.
-    # A sweep of all parts takes over what there is.
+    # A sweep of all shards takes over what there is.
     assert sweep(tmp_path, *COUNT, "--resume") == (0, "gears.h5\n", "")
     assert names_in(tmp_path) == ["gears.h5", "gears.toml"]
 
 
-def test_parts_of_another_configuration_are_refused_with_the_key(tmp_path):
+def test_shards_of_another_configuration_are_refused_with_the_key(tmp_path):
     assert sweep(tmp_path, *COUNT, "--shard", "1/2").code == 0
     other = sweep(tmp_path, *COUNT, "--shard", "2/2", "--set", "groups.damping_ratio=0.06")
     assert other.code == 4
     assert "which differs in groups.damping_ratio (0.05, now 0.06)" in other.err
 
 
-def test_different_parts_may_run_at_once_the_same_part_and_the_whole_may_not(tmp_path):
+def test_different_shards_may_run_at_once_the_same_shard_and_the_whole_may_not(tmp_path):
     output = tmp_path / "gears.h5"
     other = StoreLock(folder_of(output), output, "1-of-4")
     try:

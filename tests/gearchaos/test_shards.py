@@ -8,15 +8,17 @@ import subprocess
 import sys
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 from gearchaos.errors import FileError
-from gearchaos.results.block_store import ShardStore
+from gearchaos.results.block_store import BlockStore
 from gearchaos.results.manifest import differing_keys
 from gearchaos.results.result import Parameter, Result, open_result
-from gearchaos.results.variables import sweep_variables
+from gearchaos.results.store_lock import StoreLock
+from gearchaos.results.variables import Axis, Variable, start_axis, sweep_variables
 
 LANES = 100
 POINTS = 7
@@ -27,18 +29,20 @@ steps_per_period = 288
 [sweep]
 values = [1.0, 2.0]
 """
-VARIABLES = sweep_variables(
-    "load",
-    units="1",
-    long_name="static load",
-    symbol="$f_n$",
-    states=["delta_5", "delta_5_rate"],
-    section=["delta_5"],
-    section_points=POINTS,
-    lyapunov=True,
-    several_starts=False,
-    status_meanings=["ok", "diverged"],
-)
+
+
+def variables(lanes: int = LANES) -> list[Variable]:
+    return sweep_variables(
+        [Axis("load", "1", "static load", "$f_n$", np.arange(float(lanes)))],
+        states=["delta_5", "delta_5_rate"],
+        section=["delta_5"],
+        section_points=POINTS,
+        lyapunov=True,
+        status_meanings=["ok", "diverged"],
+    )
+
+
+VARIABLES = variables()
 PARAMETERS = {"damping_ratio": Parameter(0.1, "given", "1", "damping", "$d$")}
 BLOCKS = [(0, 30), (30, 60), (60, 90), (90, 100)]
 
@@ -49,7 +53,7 @@ def sweep(lanes: int = LANES) -> dict[str, np.ndarray]:
     numbers = {
         v.name: random.normal(size=(lanes, *(sizes[dim] for dim in v.dims[1:])))
         for v in VARIABLES
-        if v.dims[0] == "load"
+        if v.values is None
     }
     numbers["status"] = np.zeros(lanes, np.uint8)
     numbers["diverged_period"] = np.full(lanes, -1, np.int32)
@@ -65,11 +69,11 @@ def block(first: int, last: int) -> dict[str, np.ndarray]:
 
 def open_store(
     output: Path, *, resume: bool = False, configuration: str = CONFIGURATION, lanes: int = LANES
-) -> ShardStore:
-    return ShardStore(output, VARIABLES, lanes, configuration, axis="load", resume=resume)
+) -> BlockStore:
+    return BlockStore(output, variables(lanes), configuration, resume=resume)
 
 
-def fill(store: ShardStore, blocks: Sequence[tuple[int, int]] = BLOCKS) -> None:
+def fill(store: BlockStore, blocks: Sequence[tuple[int, int]] = BLOCKS) -> None:
     for first, last in blocks:
         store.write(first, last, block(first, last))
 
@@ -93,7 +97,7 @@ def test_blocks_in_any_order_become_the_file_of_the_whole_sweep(output: Path) ->
         assert store.merge(PARAMETERS, {"title": "t"}) == output
     assert list(output.parent.iterdir()) == [output]
     whole = output.with_name("whole.h5")
-    Result("load", VARIABLES, DATA, PARAMETERS, {"title": "t"}).save(whole)
+    Result(["load"], VARIABLES, DATA, PARAMETERS, {"title": "t"}).save(whole)
     merged, saved = open_result(output), open_result(whole)
     assert merged.metadata == saved.metadata
     assert merged.names == saved.names
@@ -128,7 +132,7 @@ def test_a_sweep_that_finished_no_block_leaves_no_folder(output: Path) -> None:
 
 
 def test_files_of_the_user_in_the_folder_stay(output: Path) -> None:
-    folder = output.with_name("sweep.h5.shards")
+    folder = output.with_name("sweep.h5.blocks")
     folder.mkdir()
     (folder / "notes.txt").write_text("mine", encoding="utf-8")
     with open_store(output) as store:
@@ -170,25 +174,25 @@ def test_types_and_nans_are_told_apart_where_they_matter() -> None:
 
 @pytest.mark.parametrize(
     "content",
-    ["", "{", "[]", '{"schema_version": "1.0", "configuration": 3}', "[" * 100_000],
+    ["", "{", "[]", '{"schema_version": "2.0", "configuration": 3}', "[" * 100_000],
 )
 def test_a_damaged_manifest_is_named(content: str, output: Path) -> None:
     with open_store(output) as store:
         fill(store)
-    manifest = output.with_name("sweep.h5.shards") / "manifest.json"
+    manifest = output.with_name("sweep.h5.blocks") / "manifest.json"
     manifest.write_text(content, encoding="utf-8")
     with pytest.raises(FileError, match=r"manifest.json: is damaged or missing"):
         open_store(output, resume=True)
-    assert len(list(manifest.parent.glob("*.shard"))) == len(BLOCKS)
+    assert len(list(manifest.parent.glob("*.block"))) == len(BLOCKS)
 
 
 def test_blocks_of_a_newer_format_are_refused_in_a_clear_sentence(output: Path) -> None:
     with open_store(output) as store:
         fill(store)
-    manifest = output.with_name("sweep.h5.shards") / "manifest.json"
-    newer = manifest.read_text(encoding="utf-8").replace('"1.0"', '"2.0"')
+    manifest = output.with_name("sweep.h5.blocks") / "manifest.json"
+    newer = manifest.read_text(encoding="utf-8").replace('"2.0"', '"3.0"')
     manifest.write_text(newer, encoding="utf-8")
-    with pytest.raises(FileError, match=r"has version '2\.0' .* reads 1\.x; finish it with"):
+    with pytest.raises(FileError, match=r"has version '3\.0' .* reads 2\.x; finish it with"):
         open_store(output, resume=True)
 
 
@@ -199,15 +203,15 @@ def test_bad_shards_are_named_and_left_out(output: Path, tmp_path: Path) -> None
         fill(store)
     with open_store(output) as store:
         fill(store)
-    names = [f"{first:012d}-{last:012d}.shard" for first, last in BLOCKS]
-    folder = output.with_name("sweep.h5.shards")
+    names = [f"{first:012d}-{last:012d}.block" for first, last in BLOCKS]
+    folder = output.with_name("sweep.h5.blocks")
     flipped = bytearray((folder / names[0]).read_bytes())
     flipped[-5] ^= 4
     (folder / names[0]).write_bytes(flipped)
     (folder / names[1]).write_bytes((folder / names[1]).read_bytes()[:-1])
-    os.replace(another.with_name("sweep.h5.shards") / names[2], folder / names[2])
-    (folder / f"{95:012d}-{105:012d}.shard").write_bytes(b"")
-    (folder / f"{91:012d}-{92:012d}.shard").write_bytes(b"x" * 1000)
+    os.replace(another.with_name("sweep.h5.blocks") / names[2], folder / names[2])
+    (folder / f"{95:012d}-{105:012d}.block").write_bytes(b"")
+    (folder / f"{91:012d}-{92:012d}.block").write_bytes(b"x" * 1000)
     with open_store(output, resume=True) as store:
         bounds, problems = store.finished()
         assert bounds == [(90, 100)]
@@ -228,7 +232,7 @@ def test_bad_shards_are_named_and_left_out(output: Path, tmp_path: Path) -> None
 def test_any_changed_byte_of_a_shard_is_noticed(position: int, output: Path) -> None:
     with open_store(output) as store:
         fill(store)
-        (path, *_) = sorted(store.folder.glob("*.shard"))
+        (path, *_) = sorted(store.folder.glob("*.block"))
         content = bytearray(path.read_bytes())
         content[position] ^= 0x20
         path.write_bytes(content)
@@ -277,7 +281,7 @@ def test_a_killed_sweep_neither_blocks_nor_loses_anything(output: Path) -> None:
         with pytest.raises(FileError, match="another sweep"):
             open_store(output, resume=True)
         process.kill()
-    partial = output.with_name("sweep.h5.shards") / ".sweep.h5.0.partial"
+    partial = output.with_name("sweep.h5.blocks") / ".sweep.h5.0.partial"
     partial.write_bytes(b"half a file")
     with open_store(output, resume=True) as store:
         assert not partial.exists()
@@ -344,7 +348,7 @@ def test_a_folder_that_vanishes_is_reported(output: Path) -> None:
 
 def test_an_output_whose_folder_cannot_be_made_is_reported(tmp_path: Path) -> None:
     for output in (tmp_path / "missing" / "sweep.h5", Path("/proc/sweep.h5")):
-        with pytest.raises(FileError, match=r"\.shards: cannot be written: No such file"):
+        with pytest.raises(FileError, match=r"\.blocks: cannot be written: No such file"):
             open_store(output)
 
 
@@ -358,21 +362,22 @@ def test_merging_takes_the_memory_of_a_block(output: Path) -> None:
     program = """
 import numpy as np
 from test_shards import CONFIGURATION, POINTS
-from gearchaos.results.block_store import ShardStore
-from gearchaos.results.variables import sweep_variables
+from gearchaos.results.block_store import BlockStore
+from gearchaos.results.variables import Axis, sweep_variables
 points, size, count = 500, 250, 80
 variables = sweep_variables(
-    "load", units="1", long_name="load", symbol="", states=["delta_5"], section=["delta_5"],
-    section_points=points, lyapunov=False, several_starts=False, status_meanings=["ok"],
+    [Axis("load", "1", "load", "", np.arange(float(size * count)))], states=["delta_5"],
+    section=["delta_5"], section_points=points, lyapunov=False, status_meanings=["ok"],
 )
 random = np.random.default_rng(0)
 one = {
-    "load": np.zeros(size), "section_delta_5": random.integers(0, 9, (size, points)),
-    "status": np.zeros(size), "diverged_period": np.zeros(size), "end_state": np.zeros((size, 1)),
+    "section_delta_5": random.integers(0, 9, (size, points)), "status": np.zeros(size),
+    "diverged_period": np.zeros(size), "start_state": np.zeros((size, 1)),
+    "end_state": np.zeros((size, 1)),
 }
 memory = lambda: resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
 import resource
-with ShardStore(output, variables, size * count, CONFIGURATION, axis="load") as store:
+with BlockStore(output, variables, CONFIGURATION) as store:
     for number in range(count):
         store.write(number * size, (number + 1) * size, one)
     before = memory()
@@ -383,3 +388,131 @@ print(memory() - before)
         text, _ = process.communicate()
     numbers = 80 * 250 * 500 * 8
     assert int(text) * 1024 < numbers / 4
+
+
+HALVES = [[(0, 30), (60, 90)], [(30, 60), (90, 100)]]
+
+
+def open_shard(output: Path, number: int, **options: Any) -> BlockStore:
+    return BlockStore(
+        output, VARIABLES, CONFIGURATION, blocks=HALVES[number], shards=2, resume=True, **options
+    )
+
+
+def test_shards_share_the_folder_and_a_whole_sweep_does_not(output: Path) -> None:
+    with (
+        open_shard(output, 0) as one,
+        open_shard(output, 1) as other,
+        open_shard(output, 0) as same,
+    ):
+        fill(one, HALVES[0])
+        assert (one.own_lanes, other.own_lanes, one.shards) == (60, 40, 2)
+        assert other.finished() == ([], [])
+        # Who does the same work twice writes the same bits.
+        before = sorted((path.name, path.read_bytes()) for path in one.folder.glob("*.block"))
+        fill(same, HALVES[0])
+        assert before == sorted((p.name, p.read_bytes()) for p in one.folder.glob("*.block"))
+        with pytest.raises(FileError, match="another sweep is writing to it"):
+            open_store(output, resume=True)
+        fill(other, HALVES[1])
+    with open_store(output, resume=True) as store:
+        with pytest.raises(FileError, match="another sweep is writing to it"):
+            open_shard(output, 0)
+        assert store.shards == 2
+        store.merge(PARAMETERS, {})
+    assert_whole(output)
+    assert list(output.parent.iterdir()) == [output]
+
+
+def test_a_refused_shard_leaves_nothing_behind(output: Path) -> None:
+    def names() -> list[str]:
+        return sorted(path.name for path in output.with_name("sweep.h5.blocks").iterdir())
+
+    with open_store(output) as store:
+        before = names()
+        with pytest.raises(FileError, match="another sweep is writing to it"):
+            open_shard(output, 1)
+        fill(store, BLOCKS[:1])
+        assert names() == sorted([*before, "000000000000-000000000030.block"])
+    before = names()
+    for options in ({"configuration": "title = 'other'"}, {"resume": False}):
+        given = {"configuration": CONFIGURATION, "resume": True, **options}
+        with pytest.raises(FileError):
+            BlockStore(output, VARIABLES, **given, blocks=HALVES[0], shards=2)
+        assert names() == before
+
+
+def test_the_folder_is_its_owners_alone(output: Path) -> None:
+    with open_store(output) as store:
+        assert store.folder.stat().st_mode & 0o777 == 0o700
+
+
+def test_links_in_the_folder_are_not_followed(output: Path, tmp_path: Path) -> None:
+    victim = tmp_path / "victim"
+    victim.write_text("precious", encoding="utf-8")
+    with open_store(output) as store:
+        (store.folder / "000000000000-000000000030.block").symlink_to(victim)
+        bounds, (problem,) = store.finished()
+        assert bounds == []
+        assert "000000000000-000000000030.block: cannot be read: " in problem
+        fill(store)
+        assert victim.read_text(encoding="utf-8") == "precious"
+        manifest = store.folder / "manifest.json"
+        victim.write_bytes(manifest.read_bytes())
+        manifest.unlink()
+        manifest.symlink_to(victim)
+    with pytest.raises(FileError, match=r"manifest\.json: is damaged or missing"):
+        open_store(output, resume=True)
+
+
+@pytest.mark.parametrize("target", ["nowhere/lock", "victim"])
+def test_a_link_in_the_place_of_the_lock_is_refused(target: str, output: Path) -> None:
+    folder = output.with_name("sweep.h5.blocks")
+    folder.mkdir()
+    (folder / "lock").symlink_to(output.parent / target)
+    with pytest.raises(FileError, match="cannot be written: Too many levels of symbolic links"):
+        StoreLock(folder, output)
+    assert not (output.parent / target).exists()
+
+
+def test_what_is_no_file_in_the_place_of_a_block_is_not_waited_for(output: Path) -> None:
+    with open_store(output) as store:
+        os.mkfifo(store.folder / "000000000000-000000000030.block")
+        (store.folder / "000000000030-000000000060.block").mkdir()
+        bounds, problems = store.finished()
+        assert bounds == []
+        assert ["has not the" in problem for problem in problems] == [True, False]
+
+
+def test_several_axes_become_one_file_from_blocks_that_cut_them(output: Path) -> None:
+    axes = [
+        Axis("load", "1", "load", "", np.arange(4.0)),
+        Axis("pitch_error", "1", "pitch error", "", np.arange(5.0)),
+        start_axis(5),
+    ]
+    several = sweep_variables(
+        axes, states=["delta_5", "delta_5_rate"], section=["delta_5"], section_points=POINTS,
+        lyapunov=True, status_meanings=["ok", "diverged"],
+    )  # fmt: skip
+    with BlockStore(output, several, CONFIGURATION) as store:
+        assert store.lanes == LANES
+        fill(store)
+        store.merge(PARAMETERS, {})
+    result = open_result(output)
+    assert result["status"].shape == (4, 5, 5)
+    for name, values in DATA.items():
+        np.testing.assert_array_equal(result.lanes(name), values)
+
+
+def test_what_was_merged_leaves_the_next_sweep_alone(output: Path) -> None:
+    with open_store(output) as store:
+        fill(store)
+        store.merge(PARAMETERS, {})
+        following = open_store(output)
+    assert following.folder.is_dir()
+    with pytest.raises(FileError, match="another sweep is writing to it"):
+        open_store(output)
+    fill(following)
+    following.close()
+    with open_store(output, resume=True) as store:
+        assert store.finished().bounds == BLOCKS

@@ -1,9 +1,27 @@
 """Stages are the stretches of equal labels; narrow ones go into what surrounds them."""
 
+import time
+from itertools import pairwise
+
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
-from gearchaos.results.stage_table import LabelledLanes, Stage, label_text, stage_table
+from gearchaos.errors import ConfigurationError, FileError
+from gearchaos.results.result import Result
+from gearchaos.results.stage_table import (
+    LabelledLanes,
+    Stage,
+    label_text,
+    labelled_lanes,
+    one_axis,
+    slice_facts,
+    slice_lines,
+    stage_table,
+)
+
+from .test_result_axes import AXES, ERRORS, LOADS, result_over
 
 
 def lanes(labels: str, values: list[float] | None = None) -> LabelledLanes:
@@ -82,3 +100,91 @@ def test_an_unknown_exponent_is_not_a_number():
 )
 def test_labels_are_worded(meaning, period, text):
     assert label_text(meaning, period) == (text or meaning)
+
+
+def slow_twin(lanes: LabelledLanes, narrowest: float) -> list[list[int]]:
+    """First lane, lane after the last, lane with the label, narrower stages: rule by rule."""
+    changes = np.flatnonzero(lanes.labels[1:] != lanes.labels[:-1]) + 1
+    edges = [0, *changes.tolist(), lanes.values.size]
+    parts = [[a, b, a, 0] for a, b in pairwise(edges)]
+    middles = (lanes.values[1:] + lanes.values[:-1]) / 2.0
+    borders = np.concatenate([lanes.values[:1], middles, lanes.values[-1:]])
+
+    def width(part: list[int]) -> float:
+        return float(borders[part[1]] - borders[part[0]])
+
+    while len(parts) > 1:
+        at = min(range(len(parts)), key=lambda number: width(parts[number]))
+        if width(parts[at]) >= narrowest:
+            break
+        beside = parts[max(at - 1, 0) : at] + parts[at + 1 : at + 2]
+        label = lanes.labels[max(beside, key=width)[2]]
+        merged = [part for part in beside if lanes.labels[part[2]] == label] + [parts[at]]
+        whole = [
+            min(part[0] for part in merged),
+            max(part[1] for part in merged),
+            merged[0][2],
+            1 + sum(part[3] for part in merged),
+        ]
+        here = parts.index(min(merged))
+        parts[here : here + len(merged)] = [whole]
+    return parts
+
+
+@given(
+    st.text("12c", min_size=1, max_size=40),
+    st.lists(st.integers(1, 4), min_size=40, max_size=40),
+    st.sampled_from([0.0, 0.6, 1.0, 1.5, 2.5, 4.0, 9.0, 1e9]),
+)
+def test_the_stages_are_those_of_the_rule_taken_step_by_step(labels, steps, narrowest):
+    some = lanes(labels, np.cumsum(steps[: len(labels)]).astype(float).tolist())
+    told = [
+        (stage.first, stage.last + 1, stage.label, stage.narrower)
+        for stage in stage_table(some, narrowest)
+    ]
+    assert told == [
+        (first, after, some.labels[own], narrower)
+        for first, after, own, narrower in slow_twin(some, narrowest)
+    ]
+
+
+def test_twenty_thousand_alternating_stages_take_no_time():
+    began = time.perf_counter()
+    stages = stage_table(lanes("1c" * 10_000), narrowest=1.5)
+    assert sum(stage.lanes for stage in stages) == 20_000
+    assert time.perf_counter() - began < 5.0
+
+
+def test_stages_lie_along_one_axis_only():
+    result = result_over(AXES["two parameters, several starts"])
+    with pytest.raises(ConfigurationError, match=r"r\.h5: has 3 axes \(load, pitch_error, start\)"):
+        labelled_lanes(result, name="r.h5")
+    part = one_axis(result, load=0.31)
+    taken = labelled_lanes(part)
+    np.testing.assert_array_equal(taken.values, ERRORS.values)
+    np.testing.assert_array_equal(taken.period, result["period"][1, :, 0])
+    facts = slice_facts(result, part)
+    assert facts == {
+        "load": {"value": LOADS.values[1], "number": 2, "of": 3},
+        "start": {"value": 0.0, "number": 1, "of": 2},
+    }
+    assert slice_lines(facts) == [
+        "slice load = 0.3, number 2 of 3; others with --at load=VALUE",
+        "slice start = 0, the first of 2; others with --at start=VALUE",
+    ]
+
+
+def test_the_other_parameter_can_be_listed_but_not_starts():
+    result = result_over(AXES["two parameters, several starts"])
+    assert one_axis(result, pitch_error=1.0, start=1.0).axes == ("load",)
+    for fixed in ({"load": 0.1, "pitch_error": 0.0}, {"load": 0.1, "pitch_error": 0.0, "start": 0}):
+        with pytest.raises(ConfigurationError, match="no swept parameter is left"):
+            one_axis(result, **fixed)
+
+
+def test_a_result_without_labels_has_no_stages():
+    full = result_over(AXES["one start"])
+    variables = [variable for name, variable in full.variables.items() if name != "motion"]
+    result = Result(full.axes, variables, {name: full[name] for name in full}, {}, {})
+    with pytest.raises(FileError, match="holds no labels of the motion"):
+        labelled_lanes(result)

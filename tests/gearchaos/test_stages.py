@@ -11,6 +11,7 @@ from gearchaos.results.result import Result
 
 from .commands import run_module
 from .short_sweeps import PAN2021, SOFT_BEARINGS, SPEEDS
+from .test_result_axes import AXES, LOADS, result_over
 
 WHERE = (
     "sweep.from=9.8",
@@ -97,7 +98,7 @@ def test_a_torus_is_born_in_a_neimark_sacker_bifurcation(tmp_path):
 
 def changed(result: Result, **metadata: str) -> Result:
     return Result(
-        result.axis,
+        result.axes,
         list(result.variables.values()),
         {name: result[name] for name in result},
         result.parameters,
@@ -126,7 +127,7 @@ def test_lanes_that_do_not_stand_for_themselves_are_not_refined(
 def test_a_file_without_labels_or_without_its_configuration_is_told(result, tmp_path):
     labels = ("motion", "period", "return_distance")
     without = Result(
-        result.axis,
+        result.axes,
         [variable for name, variable in result.variables.items() if name not in labels],
         {name: result[name] for name in result},
         result.parameters,
@@ -149,7 +150,89 @@ def test_what_is_no_result_or_no_width_is_refused(folder):
         (["missing.h5"], 4),
         (["pan.h5", "--refine", "0"], 2),
         (["pan.h5", "--narrowest", "nan"], 2),
-        (["pan.h5", "--start", "3"], 2),
+        (["pan.h5", "--at", "start=3"], 2),
     ):
         ended = stages(folder, *arguments)
         assert (ended.code, ended.out) == (code, "")
+
+
+@pytest.fixture
+def several(tmp_path):
+    result = result_over(AXES["two parameters, several starts"])
+    result.save(tmp_path / "several.h5")
+    return result
+
+
+def listed(folder, *arguments: str):
+    ended = stages(folder, "several.h5", *arguments, "--json")
+    assert (ended.code, ended.err) == (0, "")
+    return json.loads(ended.out)
+
+
+def test_a_slice_is_named_and_the_first_one_is_not_all(several, tmp_path):
+    ended = stages(tmp_path, "several.h5")
+    assert ended.code == 0
+    assert ended.out.splitlines()[:3] == [
+        "stages over pitch_error",
+        "slice load = 0.1, the first of 3; others with --at load=VALUE",
+        "slice start = 0, the first of 2; others with --at start=VALUE",
+    ]
+    facts = listed(tmp_path)
+    assert facts["slice"] == {
+        "load": {"value": 0.1, "number": 1, "of": 3},
+        "start": {"value": 0.0, "number": 1, "of": 2},
+    }
+    assert sum(stage["lanes"] for stage in facts["stages"]) == several["pitch_error"].size
+
+
+def test_another_slice_is_listed_at_the_nearest_values(several, tmp_path):
+    facts = listed(tmp_path, "--at", "load=0.33", "--at", "start=1")
+    assert facts["parameter"] == "pitch_error"
+    assert facts["slice"]["load"] == {"value": LOADS.values[1], "number": 2, "of": 3}
+    assert facts["slice"]["start"]["number"] == 2
+    changes = (several["period"][1, 1:, 1] != several["period"][1, :-1, 1]) | (
+        several["motion"][1, 1:, 1] != several["motion"][1, :-1, 1]
+    )
+    assert len(facts["stages"]) == 1 + changes.sum()
+    over_loads = listed(tmp_path, "--at", "pitch_error=1.5")
+    assert over_loads["parameter"] == "load"
+    assert sum(stage["lanes"] for stage in over_loads["stages"]) == 3
+
+
+def test_a_bare_value_is_enough_where_there_is_one_other_axis(tmp_path):
+    result_over(AXES["several starts"]).save(tmp_path / "several.h5")
+    facts = listed(tmp_path, "--at", "2")
+    assert facts["slice"] == {"start": {"value": 2.0, "number": 3, "of": 4}}
+
+
+@pytest.mark.parametrize(
+    ("at", "words"),
+    [
+        (["0.1"], "--at 0.1: must be NAME=VALUE with a number, each of the axes load, pitch_error"),
+        (["load=x"], "--at load=x: must be NAME=VALUE"),
+        (["load=nan"], "--at load=nan: must be NAME=VALUE"),
+        (["load=0.1", "load=0.3"], "--at load=0.3: must be NAME=VALUE"),
+        (["torque=1"], "torque: is no axis of the result; its axes: load, pitch_error, start"),
+        (["load=0.1", "pitch_error=0"], "no swept parameter is left"),
+    ],
+)
+@pytest.mark.usefixtures("several")
+def test_a_slice_that_there_is_not_is_refused(tmp_path, at, words):
+    flags = [part for text in at for part in ("--at", text)]
+    ended = stages(tmp_path, "several.h5", *flags)
+    assert (ended.code, ended.out) == (2, "")
+    assert words in ended.err
+
+
+@pytest.mark.slow
+def test_a_slice_of_two_parameters_is_refined_where_it_was_taken(tmp_path):
+    damping = 0.025819888974716113  # That of the file.
+    where = [
+        "sweep={parameter='pitch_error', values=[10.2, 10.3]}",
+        f"second_sweep={{parameter='damping_ratio', values={[damping, 2.0 * damping]}}}",
+    ]
+    gearchaos.run(gearchaos.load_config(PAN2021, where)).save(tmp_path / "several.h5")
+    facts = listed(tmp_path, "--at", f"damping_ratio={damping}", "--refine", "0.002")
+    assert facts["slice"]["damping_ratio"] == {"value": damping, "number": 1, "of": 2}
+    (boundary,) = facts["boundaries"]
+    assert boundary["below"] <= 10.268 <= boundary["above"]
