@@ -22,7 +22,8 @@ Compute and draw everything that a paper shows, and compare every number it prin
 
 EPILOG = f"""\
 Papers: {", ".join(PAPERS)}. The folder gets the figures (PNG and PDF), the results (HDF5) and a
-report with the comparison, report.md, whose path goes to stdout; everything else to stderr. Exit codes: 0 done, 2 usage, 4 cannot read or write."""
+report with the comparison, report.md, whose path goes to stdout; everything else to stderr. Exit
+codes: 0 done, 2 usage, 4 cannot read or write."""
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -55,8 +56,8 @@ def _run(argv: Sequence[str] | None) -> int:
     from gearchaos.configuration import load_config
     from gearchaos.engine.running import choose_threads
     from gearchaos.paper.computation import compute
-    from gearchaos.paper.sweep_files import sweep_file
     from gearchaos.paper.gallery import check_folder, write_gallery
+    from gearchaos.paper.sweep_files import sweep_file
 
     began = time.monotonic()
 
