@@ -121,9 +121,6 @@ def _slice(result: Result, at: dict[str, float]) -> Result:
     if not at:
         return result
     coordinates = {axis_name(name): value for name, value in at.items()}
-    for axis in coordinates:
-        if axis not in result.axes:
-            raise FigureError(f"--at {axis}: the result runs over {' and '.join(result.axes)}")
     if not {*swept_axes(result)} - {*coordinates}:
         raise FigureError(
             f"--at {' and '.join(coordinates)}: nothing is left to draw against; choose values of "

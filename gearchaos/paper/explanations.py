@@ -107,8 +107,8 @@ def increments_in_words(printed: Published, found: Reproduction) -> str:
         "and more falls into the time in which the teeth are apart. There δ<sub>5</sub>″ = "
         "f<sub>n</sub> + Ω² *P* e<sub>r</sub> sin Ωτ, but for damping: two e(τ) more add 2 Ω² "
         f"e<sub>r</sub> = {short(2.0 * omega**2 * amplitude)}, whatever the motion. The first "
-        'increment spans the hop. This holds for the largest *signed* acceleration, as which "amplitude" is read; the '
-        f"largest magnitudes grow by {grown}, not at all as printed."
+        "increment spans the hop. This holds for the largest *signed* acceleration, as which "
+        f'"amplitude" is read; the largest magnitudes grow by {grown}, not at all as printed.'
     )
 
 

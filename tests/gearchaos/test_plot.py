@@ -11,7 +11,7 @@ import pytest
 
 from gearchaos.plot import main
 from gearchaos.results.result import Result
-from gearchaos.results.variables import sweep_variables
+from gearchaos.results.variables import Axis, sweep_variables
 
 
 @pytest.fixture
@@ -23,29 +23,25 @@ def result_file(tmp_path) -> Path:
     status[20] = 1
     points[20] = np.nan
     variables = sweep_variables(
-        "load",
-        units="1",
-        long_name="load",
-        symbol="$f_n$",
+        [Axis("load", "1", "load", "$f_n$", load)],
         states=("delta_5",),
         section=("delta_5", "delta_1"),
         section_points=2,
         lyapunov=True,
-        several_starts=False,
         status_meanings=("ok", "diverged"),
     )
     data = {
-        "load": load,
         "section_delta_5": points,
         "section_delta_1": -points,
         "lyapunov_exponent": points[:, 0],
         "lyapunov_exponent_standard_error": np.full(50, 0.01),
         "status": status,
         "diverged_period": np.where(status == 1, 9, -1),
+        "start_state": points[:, :1],
         "end_state": points[:, 1:],
     }
     path = tmp_path / "pair.h5"
-    Result("load", variables, data, {}, {"title": "a pair"}).save(path)
+    Result(["load"], variables, data, {}, {"title": "a pair"}).save(path)
     return path
 
 

@@ -19,7 +19,7 @@ from gearchaos.figures.response_lane import coordinates_of, is_response, repeats
 from gearchaos.plot import main
 from gearchaos.results.response_variables import response_variables
 from gearchaos.results.result import Result
-from gearchaos.results.variables import sweep_variables
+from gearchaos.results.variables import Axis, axis_name, sweep_variables
 
 STEPS, PERIODS, POINTS = 40, 8, 60
 STATES = ("delta_5", "delta_5_rate")
@@ -41,20 +41,24 @@ def known_response(diverged: tuple[int, ...] = (), swept: str = "pitch_error") -
         wave[list(diverged)] = np.nan
     motion = dict(zip((*STATES, "delta_5_acceleration"), waves, strict=True))
     record = {name: values[:, -PERIODS * STEPS - 1 :] for name, values in motion.items()}
+    physical = "." in swept
+    axis = Axis(
+        axis_name(swept),
+        "rpm" if physical else "1",
+        "multiple of the pitch error",
+        "" if physical else "$P$",
+        np.array([5.86, 12.5]),
+    )
     variables = sweep_variables(
-        swept,
-        units="rpm" if "." in swept else "1",
-        long_name="multiple of the pitch error",
-        symbol="" if "." in swept else "$P$",
+        [axis],
         states=STATES,
         section=STATES,
         section_points=POINTS,
         lyapunov=False,
-        several_starts=False,
         status_meanings=("ok", "diverged"),
     )
     variables += response_variables(
-        swept,
+        [axis],
         states=STATES,
         periods=PERIODS,
         steps_per_period=STEPS,
@@ -63,17 +67,17 @@ def known_response(diverged: tuple[int, ...] = (), swept: str = "pitch_error") -
     )
     status = np.isin(np.arange(2), diverged)
     data = {
-        swept.replace(".", "_"): [5.86, 12.5],
         **{f"section_{name}": motion[name][:, STEPS::STEPS] for name in STATES},
         "status": status,
         "diverged_period": np.where(status, 4, -1),
+        "start_state": np.zeros((2, 2)),
         "end_state": np.stack([motion[name][:, -1] for name in STATES], axis=1),
         "mesh_period": np.full(2, 7.17),
         **record,
         "mesh_force_tangential": record["delta_5"],
         "contact_tangential": np.ones((2, PERIODS * STEPS + 1)),
     }
-    return Result(swept, variables, data, {}, {"title": "waves"})
+    return Result([axis.name], variables, data, {}, {"title": "waves"})
 
 
 @pytest.fixture(scope="module")
@@ -92,7 +96,7 @@ def test_a_response_is_known_by_its_motion(result):
     assert is_response(result)
     assert coordinates_of(result) == ("delta_5",)
     kept = [v for v in result.variables.values() if "time" not in v.dims]
-    bare = Result(result.axis, kept, {v.name: result[v.name] for v in kept}, {}, {})
+    bare = Result(result.axes, kept, {v.name: result[v.name] for v in kept}, {}, {})
     assert not is_response(bare)
     with pytest.raises(FigureError, match=r"python -m gearchaos\.response"):
         time_history(Figure().add_subplot(), bare, 0)

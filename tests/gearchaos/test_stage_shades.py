@@ -9,7 +9,7 @@ from gearchaos.errors import FileError
 from gearchaos.figures.stages import SHADES, shade_stages
 from gearchaos.records.label import MEANINGS
 from gearchaos.results.result import Result
-from gearchaos.results.variables import sweep_variables
+from gearchaos.results.variables import Axis, sweep_variables
 
 KINDS = {"1": (0, 1), "2": (0, 2), "5": (0, 5), "q": (1, 0), "c": (2, 0), "u": (3, 0), "d": (4, 0)}
 
@@ -17,29 +17,25 @@ KINDS = {"1": (0, 1), "2": (0, 2), "5": (0, 5), "q": (1, 0), "c": (2, 0), "u": (
 def result_of(labels: str, *, labelled: bool = True) -> Result:
     """A sweep over 0, 1, 2, ... whose lanes have labels of one letter."""
     variables = sweep_variables(
-        "load",
-        units="1",
-        long_name="static load",
-        symbol="",
+        [Axis("load", "1", "static load", "", np.arange(float(len(labels))))],
         states=["delta_5", "delta_5_rate"],
         section=[],
         section_points=0,
         lyapunov=False,
-        several_starts=False,
         status_meanings=["ok", "diverged"],
         motion_meanings=MEANINGS if labelled else (),
     )
     lanes = len(labels)
     data = {
-        "load": np.arange(float(lanes)),
         "motion": [KINDS[letter][0] for letter in labels],
         "period": [KINDS[letter][1] for letter in labels],
         "return_distance": np.zeros(lanes),
         "status": np.zeros(lanes),
         "diverged_period": np.full(lanes, -1),
+        "start_state": np.zeros((lanes, 2)),
         "end_state": np.zeros((lanes, 2)),
     }
-    return Result("load", variables, data, {}, {})
+    return Result(["load"], variables, data, {}, {})
 
 
 def shaded(labels: str, limits: tuple[float, float], **options):

@@ -1,0 +1,80 @@
+"""A diagram runs over one parameter; of several axes it says which slice it shows."""
+
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+
+from gearchaos.errors import FigureError
+from gearchaos.figures import bifurcation, bifurcation_page, lyapunov, shade_stages
+from gearchaos.plot import main
+
+from .test_result_axes import AXES, result_over
+
+BOTH = result_over(AXES["two parameters"])
+STARTS = result_over(AXES["several starts"])
+STARTS["period"][:] = 1
+
+
+@pytest.mark.parametrize("draw", [bifurcation, lyapunov])
+def test_two_swept_parameters_are_refused_with_their_names_and_the_remedy(draw):
+    with pytest.raises(FigureError, match=r"load and pitch_error.*--at load=0\.1"):
+        draw(Figure().subplots(), BOTH)
+
+
+def test_a_slice_of_two_parameters_is_drawn_and_named():
+    one = BOTH.sel(load=0.3, method="nearest")
+    page = bifurcation_page(one)
+    assert page.get_suptitle() == "load = 0.3"
+    axes = Figure().subplots()
+    points = bifurcation(axes, one).points
+    well = one["status"] == 0
+    np.testing.assert_array_equal(points.get_ydata(), one["section_delta_5"][well].ravel())
+
+
+def test_the_diagram_shows_all_starts_and_the_stages_say_whose_they_are():
+    page = bifurcation_page(STARTS, stages=True)
+    (legend,) = page.legends
+    assert legend.get_title().get_text() == "stages of start 0"
+    points = bifurcation(Figure().subplots(), STARTS).points
+    assert points.get_xdata().size == np.count_nonzero(STARTS["status"] == 0) * 6
+
+
+def test_stages_are_those_of_one_axis():
+    with pytest.raises(FigureError, match=r"pitch_error, start.*result\.sel"):
+        shade_stages(Figure().subplots(), STARTS)
+
+
+@pytest.mark.parametrize(
+    ("axes", "at", "name"),
+    [
+        ("two parameters", ["load=0.28"], "r_load_0.3"),
+        ("two parameters", ["pitch_error=3"], "r_pitch_error_3"),
+        ("several starts", ["start=2"], "r_start_2"),
+        ("two parameters, several starts", ["load=0.1", "start=1"], "r_load_0.1_start_1"),
+    ],
+)
+def test_the_command_draws_the_slice_it_names(axes, at, name, tmp_path, capsys):
+    result_over(AXES[axes]).save(tmp_path / "r.h5")
+    asked = [word for value in at for word in ("--at", value)]
+    assert main([str(tmp_path / "r.h5"), "--format", "png", "--dpi", "50", *asked]) == 0
+    out, err = capsys.readouterr()
+    assert out == f"{tmp_path / name}.png\n"
+    assert all(f" at {value.split('=')[0]} = " in err for value in at)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ([], "--at load=0.1"),
+        (["--at", "load"], "'load' is not NAME=VALUE"),
+        (["--at", "load=much"], "'much' is not a finite number"),
+        (["--at", "torque=3"], "torque: is no axis of the result"),
+        (["--at", "load=0.1", "--at", "pitch_error=1"], "nothing is left to draw against"),
+    ],
+)
+def test_a_slice_that_cannot_be_drawn_is_told(arguments, message, tmp_path, capsys):
+    BOTH.save(tmp_path / "r.h5")
+    assert main([str(tmp_path / "r.h5"), *arguments]) == 2
+    out, err = capsys.readouterr()
+    assert out == "" and message in err
+    assert len(list(tmp_path.iterdir())) == 1
