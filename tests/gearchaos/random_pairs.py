@@ -3,18 +3,18 @@
 import itertools
 
 import numpy as np
-from gearchaos_kernels import Model, Scene
+from gearchaos_kernels import Effects, Groups
 
 from ..kernels.reference import pan2021
 
-EVERY_SCENE = [Scene(*flags) for flags in itertools.product([False, True], repeat=5)]
+EVERY_SCENE = [Effects(*flags) for flags in itertools.product([False, True], repeat=5)]
 
 
-def name_of(scene: Scene) -> str:
+def name_of(scene: Effects) -> str:
     return "+".join(name for name, on in scene._asdict().items() if on) or "torsion"
 
 
-def random_pairs(lanes: int, seed: int) -> Model:
+def random_pairs(lanes: int, seed: int) -> Groups:
     rng = np.random.default_rng(seed)
 
     def between(low, high):

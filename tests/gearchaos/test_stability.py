@@ -1,37 +1,46 @@
 """The fewest stable steps: known limits, and limits found by integrating on either side of them."""
 
 import itertools
-from dataclasses import replace
 
 import numpy as np
 import pytest
 from gearchaos.dynamics.jacobian import jacobian
-from gearchaos_kernels import Model, Scene, Status
+from gearchaos_kernels import Status
 
 from gearchaos.dynamics.stability import (
     MOST_STEPS,
     fewest_stable_steps,
-    joined_limit,
     stability_limit,
     sufficient_steps,
 )
 from gearchaos.dynamics.stable_region import steps_per_time
 from gearchaos.gear.mesh_stiffness import FourierStiffness
 
-from ..kernels.reference import COSINE, FULL, LINEAR, PERIOD, SINE, lanes_of, pan2021, run, state
+from ..kernels.reference import (
+    COSINE,
+    FULL,
+    LINEAR,
+    PERIOD,
+    SINE,
+    lanes_of,
+    pan2021,
+    run,
+    state,
+    system_of,
+)
 from .random_pairs import EVERY_SCENE, name_of, random_pairs
+from .short_sweeps import simulation
 
-NO_HARMONICS = np.zeros(0)
-TORSION = Scene(False, False, False, False, False)
+TORSION = Effects(False, False, False, False, False)
 LOOSE_TORSION = TORSION._replace(backlash=True)
 REACH_OF_DECAY = 2.785293563405282
 
 
-def fewest(scene: Scene, model: Model) -> np.ndarray:
-    return fewest_stable_steps(scene, model, COSINE, SINE)
+def fewest(effects: Effects, groups: Groups) -> np.ndarray:
+    return fewest_stable_steps(system_of(groups, effects))
 
 
-def oscillator(damping_ratio, mesh_frequency=0.01) -> Model:
+def oscillator(damping_ratio, mesh_frequency=0.01) -> Groups:
     """A spur pair: delta_5'' + 2 xi delta_5' + delta_5 = 0."""
     return pan2021(
         1.0, damping_ratio=damping_ratio, mesh_frequency=mesh_frequency, base_helix_angle=0.0
@@ -72,7 +81,7 @@ def test_a_mode_that_grows_by_itself_sets_no_limit():
     # Mesh stiffness -0.5 at its lowest: exponents +-0.7, beside the oscillation at 1.5.
     model = oscillator(0.0)._replace(stiffness_variation_scale=np.ones(1))
     scene = TORSION._replace(stiffness_variation=True)
-    found = fewest_stable_steps(scene, model, np.array([1.5]), np.zeros(1))
+    found = fewest_stable_steps(System(scene, model, np.array([1.5]), np.zeros(1)))
     assert found == np.ceil(200.0 * np.pi * np.sqrt(2.5) / np.sqrt(8.0))
 
 
@@ -84,17 +93,18 @@ def test_limit_of_every_scene_is_that_of_its_whole_jacobian_and_no_more_than_the
     branches = [*extremes, 0.0] if scene.backlash else extremes
     demand = np.zeros(40)
     for tangential, axial in itertools.product(branches, repeat=2):
-        whole = jacobian(scene, model, np.full(40, tangential), np.full(40, axial))
+        system = system_of(model, scene)
+        whole = jacobian(system, np.full(40, tangential), np.full(40, axial))
         demand = np.maximum(demand, steps_per_time(np.linalg.eigvals(whole)).max(axis=1))
     wanted = 2.0 * np.pi / model.mesh_frequency * demand
     found = fewest(scene, model)
     # Stiffness sampled on another grid, and rounding up to whole steps.
     assert np.all(found >= wanted * (1.0 - 1e-3))
     assert np.all(found <= wanted * (1.0 + 1e-3) + 1.0)
-    assert np.all(sufficient_steps(scene, model, COSINE, SINE) >= found)
+    assert np.all(sufficient_steps(system_of(model, scene)) >= found)
 
 
-def largest_state(model: Model, steps: int) -> float:
+def largest_state(model: Groups, steps: int) -> float:
     outcome = run(model, LINEAR, start_of_all_modes(), steps=steps, periods=400, points=1)
     if outcome.status[0] == Status.DIVERGED:
         return np.inf
@@ -115,7 +125,7 @@ def test_integration_grows_with_one_step_less_and_is_bounded_with_the_fewest(lan
 
 def test_stiffer_bearings_never_need_fewer_steps():
     stiffness = np.geomspace(1e-3, 1e4, 500)
-    dampings = [name for name in Model._fields if "damping" in name]
+    dampings = [name for name in Groups._fields if "damping" in name]
     undamped = pan2021(1.0, **dict.fromkeys(dampings, 0.0))
     for name in ("transverse_stiffness_p", "axial_stiffness_g"):
         steps = fewest(FULL, pan2021(1.0, **undamped_with(undamped, name, stiffness)))
@@ -123,7 +133,7 @@ def test_stiffer_bearings_never_need_fewer_steps():
         assert steps[-1] == np.ceil(2.0 * np.pi / undamped.mesh_frequency[0] * 100.0 / np.sqrt(8))
 
 
-def undamped_with(model: Model, name: str, values: np.ndarray) -> dict:
+def undamped_with(model: Groups, name: str, values: np.ndarray) -> dict:
     return {**{group: value[0] for group, value in model._asdict().items()}, name: values}
 
 
@@ -149,53 +159,98 @@ def test_lanes_that_share_some_groups_but_not_all_are_told_apart():
 def test_limit_names_the_lanes_the_steps_and_the_cause():
     stiffness = np.linspace(10.0, 1000.0, 100)
     model = pan2021(1.0, transverse_stiffness_g=stiffness)
-    limit = stability_limit(FULL, model, COSINE, SINE, 60)
+    limit = stability_limit(system_of(model), 60)
     assert limit is not None
     steps = fewest(FULL, model)
     assert np.array_equal(limit.lanes, np.flatnonzero(steps > 60))
     assert np.array_equal(limit.fewest, steps[limit.lanes])
     assert limit.owner == "transverse bearing of the driven gear"
     assert limit.eigenvalue.imag**2 == pytest.approx(1000.0, rel=1e-2)
-    first = stiffness[limit.lanes[0]]
-    assert limit.fault(60, "transverse_stiffness_g", stiffness).text("pair.toml") == (
-        "pair.toml: integration.steps_per_period = 60: RK4 is unstable below "
-        f"{steps[-1]} steps per period for {limit.lanes.size} of 100 lanes "
+
+
+def test_the_refusal_names_lanes_steps_and_cause():
+    swept = 'sweep={parameter="transverse_stiffness_g", from=10.0, to=1000.0, count=100}'
+    fixed = ("groups.pitch_error=1.0", "integration.steps_per_period=60")
+    with pytest.raises(ConfigurationError) as refused:
+        simulation(swept, *fixed)
+    limit = stability_limit(
+        system_of(
+            pan2021(1.0, transverse_stiffness_g=np.linspace(10.0, 1000.0, 100)),
+            Effects(axial=False),
+        ),
+        60,
+    )
+    first = 10.0 * (1 + limit.lanes[0])
+    (text,) = refused.value.problems
+    assert text.split(": ", 1)[1] == (
+        "integration.steps_per_period = 60: RK4 is unstable below "
+        f"{limit.steps} steps per period for {limit.lanes.size} of 100 lanes "
         f"(transverse_stiffness_g from {first:g} to 1000), because of the eigenvalue "
         "-0.00914 ± 31.6i of the transverse bearing of the driven gear; "
-        f'raise it to {steps[-1]} or more, or set integration.unstable = "raise"'
+        f'raise it to {limit.steps} or more, or set integration.unstable = "raise"'
     )
+
+
+def test_the_refusal_of_two_parameters_names_both():
+    both = (
+        'sweep={parameter="damping_ratio", values=[2.0]}',
+        'second_sweep={parameter="mesh_frequency", values=[0.01, 0.9]}',
+        'scene.effects=["pitch_error"]',
+        "integration.steps_per_period=100",
+    )
+    with pytest.raises(ConfigurationError) as refused:
+        simulation(*both)
+    (text,) = refused.value.problems
+    assert "1 of 2 lanes (mesh_frequency = 0.01, damping_ratio = 2), because" in text
+    assert "of the torsion; raise it to" in text
+
+
+def test_steps_are_raised_to_the_limit_of_the_strictest_lane():
+    swept = 'sweep={parameter="transverse_stiffness_g", from=10.0, to=1000.0, count=20}'
+    raised = simulation(
+        swept,
+        "groups.pitch_error=1.0",
+        "integration.steps_per_period=60",
+        'integration.unstable="raise"',
+        "start.kind=random",
+        "start.count=3",
+    )
+    system = raised.lanes.system_of(np.arange(60))
+    limit = stability_limit(system, 60)
+    assert raised.plan.steps_per_period == limit.steps == fewest_stable_steps(system).max()
+    (note,) = raised.notes
+    assert f"raised from 60 to {limit.steps}" in note
+    assert note.endswith(f"the stability limit of {limit.lanes.size} of 60 lanes")
 
 
 @pytest.mark.parametrize("direction", ["transverse", "axial"])
 @pytest.mark.parametrize(("gear", "word"), [("p", "driving"), ("g", "driven")])
 def test_limit_names_the_stiffest_bearing(direction, gear, word):
     model = pan2021(1.0, **{f"{direction}_stiffness_{gear}": 1e4})
-    limit = stability_limit(FULL, model, COSINE, SINE, 100)
+    limit = stability_limit(system_of(model), 100)
     assert limit is not None
     assert limit.owner == f"{direction} bearing of the {word} gear"
     assert limit.steps == fewest(FULL, model)[0]
 
 
-def test_limit_of_a_decay_names_a_real_eigenvalue_and_a_single_value():
-    limit = stability_limit(TORSION, oscillator(2.0), NO_HARMONICS, NO_HARMONICS, 100)
+def test_limit_of_a_decay_names_a_real_eigenvalue():
+    limit = stability_limit(system_of(oscillator(2.0), TORSION), 100)
     assert limit is not None
-    text = limit.fault(100, "damping_ratio", np.array([2.0])).text("spur.toml")
-    assert (
-        "1 of 1 lanes (damping_ratio = 2), because of the eigenvalue -3.73 of the torsion" in text
-    )
+    assert limit.owner == "torsion"
+    assert limit.eigenvalue == pytest.approx(-2.0 - np.sqrt(3.0))
 
 
 @pytest.mark.parametrize("steps", [16, 17, 18, 100])
 def test_a_stable_number_of_steps_has_no_limit(steps):
-    assert stability_limit(FULL, pan2021([0.0, 15.0]), COSINE, SINE, steps) is None
-    assert stability_limit(FULL, pan2021([0.0, 15.0]), COSINE, SINE, 15) is not None
+    assert stability_limit(system_of(pan2021([0.0, 15.0])), steps) is None
+    assert stability_limit(system_of(pan2021([0.0, 15.0])), 15) is not None
 
 
 @pytest.mark.parametrize("name", ["transverse_stiffness_p", "damping_ratio", "axial_damping_g"])
 def test_groups_beyond_all_measure_ask_for_more_steps_than_there_are(name):
     model = pan2021(1.0, **{name: np.array([1.0, 1e300, 1.7e308])})
     assert fewest(FULL, model)[1:].tolist() == [MOST_STEPS, MOST_STEPS]
-    limit = stability_limit(FULL, model, COSINE, SINE, 10**6)
+    limit = stability_limit(system_of(model), 10**6)
     assert limit is not None
     assert limit.lanes.tolist() == [1, 2]
 
@@ -203,25 +258,3 @@ def test_groups_beyond_all_measure_ask_for_more_steps_than_there_are(name):
 def test_a_state_at_rest_without_load_stays_there_with_any_number_of_steps():
     outcome = run(pan2021(0.0, load=0.0), LINEAR, state(), steps=2, periods=50)
     assert np.all(outcome.end_state == 0.0)
-
-
-def test_limits_of_parts_join_to_that_of_the_whole():
-    model = oscillator(np.array([1.0, 40.0, 0.0, 90.0, 60.0]))
-    whole = stability_limit(TORSION, model, NO_HARMONICS, NO_HARMONICS, 1000)
-    parts = [
-        replace(limit, lanes=limit.lanes + first)
-        for first, last in ((0, 2), (2, 3), (3, 5))
-        if (
-            limit := stability_limit(
-                TORSION,
-                Model(*(group[first:last] for group in model)),
-                NO_HARMONICS,
-                NO_HARMONICS,
-                1000,
-            )
-        )
-    ]
-    together = joined_limit(parts)
-    assert together.lanes.tolist() == whole.lanes.tolist()
-    assert together.fewest.tolist() == whole.fewest.tolist()
-    assert (together.steps, together.eigenvalue) == (whole.steps, whole.eigenvalue)

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from gearchaos_kernels import STATE_ROWS, Plan, integrate
+from gearchaos_kernels import Plan, integrate
 
 from gearchaos.dynamics.following import (
     STABILITY_LOSS_TEXTS,
@@ -13,7 +13,7 @@ from gearchaos.dynamics.following import (
 )
 from gearchaos.records.period import motion_period
 
-from ..kernels.reference import COSINE, NO_AXIAL, SINE, pan2021
+from ..kernels.reference import NO_AXIAL, pan2021, system_of
 
 STEPS = 200
 WIDTH = 1e-5
@@ -34,19 +34,23 @@ DOUBLINGS = np.flatnonzero(KINDS == StabilityLoss.PERIOD_DOUBLING)
 
 
 def run(multiples, start, transient: int):
-    plan = Plan(STEPS, transient, 48, 48, tuple(STATE_ROWS), tangent=True)
-    return integrate(NO_AXIAL, pan2021(multiples), COSINE, SINE, start, plan)
+    plan = Plan(STEPS, transient, 48, 48, tangent=True)
+    return integrate(system_at(multiples), start, plan)
+
+
+def system_at(multiples):
+    return system_of(pan2021(multiples), NO_AXIAL)
 
 
 def followed_from(start, period, first, last, width=WIDTH) -> Followed:
     period = np.asarray(period, dtype=np.int32)
     first, last = np.asarray(first), np.asarray(last)
-    return follow(NO_AXIAL, pan2021, COSINE, SINE, start, period, first, last, width, STEPS)
+    return follow(system_at, start, period, first, last, width, STEPS)
 
 
 @pytest.fixture(scope="module")
 def begin() -> np.ndarray:
-    settled = run(FIRST, np.zeros((FIRST.size, 10)), 500)
+    settled = run(FIRST, np.zeros((FIRST.size, 6)), 500)
     assert np.array_equal(motion_period(settled.section), PERIODS)
     return settled.end_state
 
@@ -163,7 +167,7 @@ def test_the_boundary_is_the_same_from_wherever_the_orbit_is_followed(followed, 
 
 
 def test_where_there_is_no_orbit_at_the_beginning_nothing_is_told(begin):
-    start = np.concatenate([begin[:1], np.full((1, 10), 5.0)])
+    start = np.concatenate([begin[:1], np.full((1, 6), 5.0)])
     none = followed_from(start, [0, 1], [10.2, 10.2], [10.3, 10.3])
     told = loss_of_stability(none.stable.multipliers, none.beyond.multipliers)
     assert np.all(told.kind == StabilityLoss.NOT_FOLLOWED)

