@@ -80,7 +80,7 @@ def integrate_block(first, batch, plan, outcome, present):
                 keep_state(block, batch, outcome.history, sample)
             suspects = step_block(block.memory, batch.table, number, present)
             if present.resolved is not None:
-                if suspects:
+                if suspects > 0:
                     recorded = period >= plan.transient_periods
                     split(block, batch.table, number, recorded, outcome, present)
             if present.tangent is not None:
@@ -116,12 +116,13 @@ def begin(block, batch, present):
 
 @scalar
 def step_block(memory, table, number, present):
-    """Take one step in every slot; tell whether one may have left a contact branch."""
+    """Take one step in every slot; return how many may have left a contact branch."""
     # Not in the loop over slots: nobody tells the compiler that its stores spare the table.
     begin_phase = phase_on_grid(table, 2 * number)
     middle_phase = phase_on_grid(table, 2 * number + 1)
     end_phase = phase_on_grid(table, 2 * number + 2)
-    suspects = False
+    # A sum of integers, which the compiler knows how to vectorise; it does not know a flag.
+    suspects = 0
     for slot in range(LANES):
         lane = load(memory, COEFFICIENTS, slot, Lane)
         state = read_state(memory, STATE, slot, present)
@@ -138,7 +139,7 @@ def step_block(memory, table, number, present):
             gaps = gaps_at(state, lane, during.begin, present)
             gaps_after = gaps_at(after, lane, during.end, present)
             suspect = step_may_leave(gaps, gaps_after, branches, present)
-            suspects |= suspect
+            suspects += 1 if suspect else 0
             memory[SUSPECT * STRIDE + slot] = 1.0 if suspect else 0.0
             write_state(memory, BEFORE + STATE, slot, state, present)
         write_state(memory, STATE, slot, after, present)
