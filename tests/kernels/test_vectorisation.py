@@ -6,6 +6,7 @@ import re
 from collections import Counter
 
 import llvmlite.binding
+import numba
 import numpy as np
 import pytest
 from gearchaos_kernels import Effects, Plan, batch, integrate
@@ -48,7 +49,7 @@ def instructions(scene: Effects, tangent: bool, resolved: bool = False) -> Count
     # Called directly: the driver may come from the cache and then compiles nothing.
     given = arguments(scene, tangent, resolved)
     loop(*given)
-    assembly = loop.inspect_asm(loop.signatures[-1])
+    assembly = loop.inspect_asm(tuple(numba.typeof(value) for value in given))
     counts: Counter[tuple[str, str]] = Counter()
     for mnemonic, operands in re.findall(r"^\s+(v\w+)\s+(.*)$", assembly, re.MULTILINE):
         width = next((name for name in ("zmm", "ymm", "xmm") if name in operands), "")
