@@ -6,7 +6,6 @@ import re
 from collections import Counter
 
 import llvmlite.binding
-import numba
 import numpy as np
 import pytest
 from gearchaos_kernels import Effects, Plan, batch, integrate
@@ -43,13 +42,18 @@ def arguments(scene: Effects, tangent: bool, resolved: bool) -> tuple:
     return given[0]
 
 
-@functools.cache
 def instructions(scene: Effects, tangent: bool, resolved: bool = False) -> Counter[tuple[str, str]]:
     """Count the vector instructions of one compiled scene by mnemonic and register width."""
+    return counted(scene, tangent, resolved)
+
+
+@functools.cache
+def counted(scene: Effects, tangent: bool, resolved: bool) -> Counter[tuple[str, str]]:
+    """Compile a scene, once, and count."""
     # Called directly: the driver may come from the cache and then compiles nothing.
     given = arguments(scene, tangent, resolved)
     loop(*given)
-    assembly = loop.inspect_asm(tuple(numba.typeof(value) for value in given))
+    assembly = loop.inspect_asm(loop.signatures[-1])
     counts: Counter[tuple[str, str]] = Counter()
     for mnemonic, operands in re.findall(r"^\s+(v\w+)\s+(.*)$", assembly, re.MULTILINE):
         width = next((name for name in ("zmm", "ymm", "xmm") if name in operands), "")
