@@ -116,11 +116,12 @@ def begin(block, batch, present):
 
 @scalar
 def step_block(memory, table, number, present):
-    """Take one step in every slot; count those that may have left a contact branch."""
+    """Take one step in every slot; return how many may have left a contact branch."""
     # Not in the loop over slots: nobody tells the compiler that its stores spare the table.
     begin_phase = phase_on_grid(table, 2 * number)
     middle_phase = phase_on_grid(table, 2 * number + 1)
     end_phase = phase_on_grid(table, 2 * number + 2)
+    # A sum of integers, which the compiler knows how to vectorise; it does not know a flag.
     suspects = 0
     for slot in range(LANES):
         lane = load(memory, COEFFICIENTS, slot, Lane)
@@ -138,7 +139,6 @@ def step_block(memory, table, number, present):
             gaps = gaps_at(state, lane, during.begin, present)
             gaps_after = gaps_at(after, lane, during.end, present)
             suspect = step_may_leave(gaps, gaps_after, branches, present)
-            # A sum of whole numbers: the vectoriser does not see through an `or` of flags here.
             suspects += 1 if suspect else 0
             memory[SUSPECT * STRIDE + slot] = 1.0 if suspect else 0.0
             write_state(memory, BEFORE + STATE, slot, state, present)

@@ -42,9 +42,14 @@ def arguments(scene: Effects, tangent: bool, resolved: bool) -> tuple:
     return given[0]
 
 
-@functools.cache
 def instructions(scene: Effects, tangent: bool, resolved: bool = False) -> Counter[tuple[str, str]]:
     """Count the vector instructions of one compiled scene by mnemonic and register width."""
+    return counted(scene, tangent, resolved)
+
+
+@functools.cache
+def counted(scene: Effects, tangent: bool, resolved: bool) -> Counter[tuple[str, str]]:
+    """Compile a scene, once, and count."""
     # Called directly: the driver may come from the cache and then compiles nothing.
     given = arguments(scene, tangent, resolved)
     loop(*given)
