@@ -123,14 +123,14 @@ class System:
         if not isinstance(config, Configuration):
             config = load_config(config)
         values = {name: float(value) for name, value in {**(at or {}), **groups}.items()}
-        for sweep in config.sweeps.values():
-            if sweep.parameter not in values and swept_values(sweep).size > 1:
+        self.config = config.at(values)
+        for sweep in self.config.sweeps.values():
+            if swept_values(sweep).size > 1:
                 raise ConfigurationError(
                     f"{config.source}: {sweep.parameter}: is swept, and a system has one value of "
                     f"it; give {sweep.parameter}, such as System(config, at="
                     f'{{"{sweep.parameter}": ...}})'
                 )
-        self.config = config.at(values)
         self._record = self._at({})
         self.state = start_states(self.config, self._record, np.zeros(1, dtype=np.intp))[0]
 

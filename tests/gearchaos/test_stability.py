@@ -4,9 +4,9 @@ import itertools
 
 import numpy as np
 import pytest
-from gearchaos.dynamics.jacobian import jacobian
-from gearchaos_kernels import Status
+from gearchaos_kernels import Effects, Groups, Status, System, jacobian
 
+from gearchaos import ConfigurationError
 from gearchaos.dynamics.stability import (
     MOST_STEPS,
     fewest_stable_steps,
