@@ -14,8 +14,8 @@ from gearchaos.configuration.sweep_values import SWEEPABLE_GROUPS, SWEEPABLE_KEY
 from gearchaos.dynamics.systems import system_of
 from gearchaos.engine.starts import start_states
 from gearchaos.gear.group_table import GROUP_TABLE
-from gearchaos.results.result_file import HARMONIC, Parameter
-from gearchaos.results.variables import Axis, axis_name, start_axis
+from gearchaos.results.result_file import Parameter
+from gearchaos.results.variables import HARMONIC, Axis, axis_name, start_axis
 
 Floats = NDArray[np.float64]
 Numbers = NDArray[np.intp]

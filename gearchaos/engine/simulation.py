@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -84,7 +83,10 @@ class Simulation:
         coarsest = self.plan.steps_per_period
         lanes, solution = pilot(self.lanes, self.plan, PILOT_LANES, 4 * coarsest)
         candidates = choose_steps(
-            partial(solution, resolved=self.plan.resolved), coarsest, tolerance, self.config.source
+            lambda steps: solution(steps, self.plan.resolved),
+            coarsest,
+            tolerance,
+            self.config.source,
         )
         steps, *measured = zip(*candidates, strict=True)
         self._choice = step_choice_variables(
@@ -286,11 +288,13 @@ class Simulation:
 
 def joined(outcomes: list[Outcome]) -> Outcome:
     """Join the outcomes of consecutive lanes."""
-    arrays: Any = zip(*outcomes, strict=True)
-    return Outcome(*(None if some[0] is None else np.concatenate(some) for some in arrays))
+    every: Any = zip(*outcomes, strict=True)
+    arrays: Any = (None if some[0] is None else np.concatenate(some) for some in every)
+    return Outcome(*arrays)
 
 
 def outcome_of(outcome: Outcome, lanes: NDArray[np.intp], plan: Plan) -> Outcome:
     """Return the outcome of some lanes, with the section that a plan keeps."""
-    some = Outcome(*(None if array is None else array[lanes] for array in outcome))
+    arrays: Any = (None if array is None else array[lanes] for array in outcome)
+    some = Outcome(*arrays)
     return some._replace(section=some.section[:, -plan.section_points :])

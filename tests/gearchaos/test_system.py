@@ -14,7 +14,7 @@ from ..kernels.reference import SOLUTIONS
 
 PAN2021 = Path(__file__).resolve().parents[2] / "sweeps" / "pan2021.toml"
 ORBITS = [orbit for orbit in SOLUTIONS["periodic_orbits"] if orbit["scene"] == "no_axial"]
-LINEAR = ('scene.effects=["pitch_error", "transverse"]', "integration.recorded_periods=60")
+LINEAR = ('scene.effects=["pitch_error", "transverse"]', "outputs.section_points=1")
 
 
 @pytest.fixture(scope="module")
