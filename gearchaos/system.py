@@ -17,7 +17,7 @@ from gearchaos_kernels import Plan, Status
 from numpy.typing import NDArray
 
 from gearchaos.configuration import Configuration, axis_values, load_config, swept_values
-from gearchaos.dynamics.exponents import exponents, sum_of_exponents
+from gearchaos.dynamics.exponents import Exponents, exponents, sum_of_exponents
 from gearchaos.dynamics.following import (
     STABILITY_LOSS_TEXTS,
     StabilityLoss,
@@ -27,8 +27,10 @@ from gearchaos.dynamics.following import (
 from gearchaos.dynamics.orbits import Orbits, orbit_exponent, polish
 from gearchaos.dynamics.stability import fewest_stable_steps
 from gearchaos.dynamics.systems import system_of
+from gearchaos.engine.lanes import Lanes
 from gearchaos.engine.response import respond
 from gearchaos.engine.starts import start_states
+from gearchaos.engine.steps import stable_steps
 from gearchaos.errors import ConfigurationError
 from gearchaos.records.amplitude_spectrum import SpectralLines, spectral_lines
 from gearchaos.results.response_variables import DEFAULT_PERIODS
@@ -82,14 +84,6 @@ class Branch(NamedTuple):
     multiplier: complex
 
 
-class LyapunovExponents(NamedTuple):
-    """All exponents per unit of tau, largest first, their standard errors, and their exact sum."""
-
-    values: Floats
-    standard_errors: Floats
-    exact_sum: float
-
-
 class System:
     """A gear pair with all its parameters fixed.
 
@@ -111,7 +105,8 @@ class System:
     Raises
     ------
     ConfigurationError
-        If a swept parameter is left open, or a parameter is unknown or out of its range.
+        If a swept parameter is left open, a parameter is unknown or out of its range, or the steps
+        per period are unstable.
     """
 
     def __init__(
@@ -131,6 +126,8 @@ class System:
                     f"it; give {sweep.parameter}, such as System(config, at="
                     f'{{"{sweep.parameter}": ...}})'
                 )
+        lanes = Lanes(self.config)
+        self._steps, _ = stable_steps(lanes, self.config.integration.steps_per_period)
         self._record = self._at({})
         self.state = start_states(self.config, self._record, np.zeros(1, dtype=np.intp))[0]
 
@@ -292,12 +289,17 @@ class System:
             complex(losses.multiplier[0]),
         )
 
-    def exponents(self, start: Floats | None = None) -> LyapunovExponents:
-        """Compute all Lyapunov exponents over the configured record, after its transient."""
+    def exponents(self, start: Floats | None = None) -> Exponents:
+        """Compute all Lyapunov exponents over the configured record, after its transient.
+
+        Per unit of tau and largest first, with their standard errors, each of shape (states,).
+        """
         found = exponents(self._record, self._start(start), self._plan)
-        return LyapunovExponents(
-            found.values[0], found.standard_errors[0], float(sum_of_exponents(self._record)[0])
-        )
+        return Exponents(*(values[0] for values in found))
+
+    def sum_of_exponents(self) -> float:
+        """Return the sum of all Lyapunov exponents as the damping gives it, exactly."""
+        return float(sum_of_exponents(self._record)[0])
 
     def spectrum(self, state: str = "delta_5", periods: int = 64) -> SpectralLines:
         """Return the amplitude spectrum of a state after the configured transient.
@@ -326,14 +328,10 @@ class System:
         return kernels.MeshMotion(*(array[0] for array in found))
 
     @property
-    def _steps(self) -> int:
-        return self.config.integration.steps_per_period
-
-    @property
     def _plan(self) -> Plan:
         integration = self.config.integration
         return Plan(
-            integration.steps_per_period,
+            self._steps,
             integration.transient_periods,
             integration.recorded_periods,
             section_points=0,
