@@ -9,9 +9,10 @@ from typing import NamedTuple
 
 from gearchaos.paper.computation import Reproduction, largest_acceleration
 from gearchaos.paper.our_numbers import NAN, contact_line_stiffness, our_numbers
-from gearchaos.paper.published import Published, Stage
-from gearchaos.paper.stages import Span, counterparts, motion_at, motions_between
+from gearchaos.paper.published import PrintedStage, Published
+from gearchaos.paper.stages import counterparts, motion_at, motions_between
 from gearchaos.paper.verdict import RULES, Verdict, motion_verdict, overlap_verdict
+from gearchaos.results.stage_table import Stage
 
 NONE = "–"
 
@@ -74,22 +75,24 @@ def _increments(printed: Published, found: Reproduction) -> Iterator[Row]:
         yield _judged(quantity, table.where, table.rule, value, after - before)
 
 
-def _stages(pairs: list[tuple[Stage, Span | None]]) -> Iterator[Row]:
-    for stage, span in pairs:
+def _stages(pairs: list[tuple[PrintedStage, Stage | None]]) -> Iterator[Row]:
+    for printed, stage in pairs:
         mine = difference = NONE
         verdict = Verdict.DOES_NOT
-        if span is not None:
-            mine = f"{span[0]:.2f} – {span[1]:.2f}"
-            difference = f"{signed(span[0] - stage.first)}, {signed(span[1] - stage.last)}"
-            verdict = overlap_verdict((stage.first, stage.last), span)
-        theirs = f"{stage.first:.2f} – {stage.last:.2f}"
-        yield Row(stage.printed, "figure 7", theirs, mine, difference, verdict)
+        if stage is not None:
+            mine = f"{stage.start:.2f} – {stage.end:.2f}"
+            difference = (
+                f"{signed(stage.start - printed.first)}, {signed(stage.end - printed.last)}"
+            )
+            verdict = overlap_verdict((printed.first, printed.last), (stage.start, stage.end))
+        theirs = f"{printed.first:.2f} – {printed.last:.2f}"
+        yield Row(printed.printed, "figure 7", theirs, mine, difference, verdict)
 
 
-def _boundaries(pairs: list[tuple[Stage, Span | None]]) -> Iterator[Row]:
+def _boundaries(pairs: list[tuple[PrintedStage, Stage | None]]) -> Iterator[Row]:
     for (before, ended), (after, begun) in pairwise(pairs):
         # A boundary has two sides.
-        mine = NAN if ended is None or begun is None else begun[0]
+        mine = NAN if ended is None or begun is None else begun.start
         quantity = f"{before.printed} → {after.printed}"
         yield _judged(quantity, "figure 7", "boundary", after.first, mine, unit=" e(τ)", digits=2)
 

@@ -27,7 +27,7 @@ class Number:
 
 
 @dataclass(frozen=True)
-class Stage:
+class PrintedStage:
     """A span of pitch errors (multiples of e(tau)) with one motion, and what the paper calls it."""
 
     motion: str
@@ -90,7 +90,7 @@ class Published:
     contact_lines: ContactLines
     harmonics: Harmonics
     increments: Increments
-    stages: tuple[Stage, ...]
+    stages: tuple[PrintedStage, ...]
     motions: tuple[ShownMotion, ...]
 
 
@@ -106,7 +106,7 @@ def published() -> Published:
         harmonics=Harmonics(**_frozen(tables["harmonics"])),
         increments=Increments(**_frozen(tables["increments"])),
         # What the paper calls as this project does is written once.
-        stages=tuple(Stage(**{"printed": row["motion"], **row}) for row in tables["stage"]),
+        stages=tuple(PrintedStage(**{"printed": row["motion"], **row}) for row in tables["stage"]),
         motions=tuple(ShownMotion(**{"printed": row["motion"], **row}) for row in tables["motion"]),
     )
 

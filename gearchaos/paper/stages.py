@@ -1,31 +1,28 @@
-"""The stages of a sweep as the paper counts them: spans with one motion, narrow windows aside."""
+"""The stages of a sweep beside those that the paper prints."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import pairwise
 
 import numpy as np
 
-from gearchaos.paper.published import Stage
+from gearchaos.paper.published import PrintedStage
 from gearchaos.paper.verdict import RULES
 from gearchaos.results.result import Result
-from gearchaos.results.stage_table import LabelledLanes, labelled_lanes
-
-Span = tuple[float, float]
+from gearchaos.results.stage_table import Stage, labelled_lanes, stage_table
 
 WINDOW = 0.1
-"""Width, in multiples of e(tau), up to which other motions inside a stage do not end it."""
+"""Narrowest stage, in multiples of e(tau): narrower ones are windows in what surrounds them."""
 
 
-def counterparts(published: Sequence[Stage], result: Result) -> list[Span | None]:
+def counterparts(printed: Sequence[PrintedStage], result: Result) -> list[Stage | None]:
     """Find the stage of a sweep that answers each printed one.
 
-    Of the spans with the printed motion, the one that has most in common with the printed span; if
+    Of the stages with the printed motion, the one that has most in common with the printed one; if
     there is none that overlaps, the nearest one within reach of the rule for boundaries, or None.
     """
-    lanes = labelled_lanes(result)
-    return [_counterpart(stage, _spans(lanes, stage.motion)) for stage in published]
+    stages = stage_table(labelled_lanes(result), WINDOW)
+    return [_counterpart(one, [s for s in stages if s.label == one.motion]) for one in printed]
 
 
 def motion_at(result: Result, value: float) -> str:
@@ -43,20 +40,9 @@ def motions_between(result: Result, first: float, last: float) -> list[str]:
     return [str(label) for label in lanes.labels[inside]]
 
 
-def _spans(lanes: LabelledLanes, motion: str) -> list[Span]:
-    """First and last value of every span with a motion, other motions in narrow windows aside."""
-    numbers = np.flatnonzero(lanes.labels == motion)
-    if not numbers.size:
-        return []
-    values = lanes.values[numbers]
-    apart = (np.diff(values) > WINDOW) & (np.diff(numbers) > 1)
-    edges = [0, *(np.flatnonzero(apart) + 1).tolist(), values.size]
-    return [(float(values[a]), float(values[b - 1])) for a, b in pairwise(edges)]
+def _counterpart(printed: PrintedStage, alike: Sequence[Stage]) -> Stage | None:
+    def common(stage: Stage) -> float:
+        return min(stage.end, printed.last) - max(stage.start, printed.first)
 
-
-def _counterpart(stage: Stage, spans: Sequence[Span]) -> Span | None:
-    def common(span: Span) -> float:
-        return min(span[1], stage.last) - max(span[0], stage.first)
-
-    best = max(spans, key=common, default=None)
+    best = max(alike, key=common, default=None)
     return best if best is not None and common(best) >= -RULES["boundary"].in_kind else None

@@ -280,8 +280,8 @@ def test_the_exponent_before_the_hop_is_that_of_the_sweep(found):
 @pytest.mark.slow
 def test_stages_are_found_where_the_labels_are(found):
     first = counterparts(published().stages, found.sweep)[0]
-    assert first is not None and first[0] == 0.0
-    assert motion_at(found.sweep, first[1]) == "period 1"
+    assert first is not None and first.start == 0.0
+    assert motion_at(found.sweep, first.end) == "period 1"
 
 
 @pytest.fixture(scope="module")
