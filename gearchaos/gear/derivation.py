@@ -44,7 +44,7 @@ def derive_groups(physical: Mapping[str, Any], without: Collection[str] = ()) ->
     KeyError
         If the mapping lacks a path.
     """
-    quantities = _Quantities(physical)
+    quantities = Quantities(physical)
     groups: dict[str, Value] = {}
     for name, derivation in _DERIVATIONS.items():
         if name not in without:
@@ -57,7 +57,7 @@ class _UnknownError(Exception):
     """A physical quantity that a derivation needs is not known."""
 
 
-class _Quantities:
+class Quantities:
     """Physical data in SI units, and what follows from them."""
 
     def __init__(self, physical: Mapping[str, Any]) -> None:
@@ -161,10 +161,10 @@ def _common_to_lanes(value: Any) -> float:
     return float(values[0])
 
 
-_DERIVATIONS: dict[str, Callable[[_Quantities], Any]] = {
-    "mesh_frequency": _Quantities.mesh_frequency,
-    "load": _Quantities.load,
-    "damping_ratio": _Quantities.damping_ratio,
+_DERIVATIONS: dict[str, Callable[[Quantities], Any]] = {
+    "mesh_frequency": Quantities.mesh_frequency,
+    "load": Quantities.load,
+    "damping_ratio": Quantities.damping_ratio,
     "base_helix_angle_deg": lambda q: np.degrees(q.pair.base_helix_angle),
     "half_backlash": lambda q: q.over_length_scale("mesh.half_backlash_um"),
     "pitch_error_amplitude": lambda q: q.over_length_scale("pitch_error.amplitude_um"),

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from gearchaos.figures.response_lane import samples_per_period
-from gearchaos.gear.derivation import derive_groups
+from gearchaos.gear.derivation import Quantities, derive_groups
 from gearchaos.gear.geometry import HelicalPair
 from gearchaos.gear.mesh_stiffness import FourierStiffness, TrapezoidalStiffness
 from gearchaos.paper.computation import Reproduction, lane_of, largest_acceleration
@@ -15,7 +15,6 @@ from gearchaos.paper.published import Published
 from gearchaos.records.amplitude_spectrum import spectral_lines
 
 NAN = float("nan")
-_METRES_PER_MM = 1e-3
 _N_PER_UM_MM = 1e9
 
 
@@ -66,15 +65,7 @@ def printed_series(printed: Published) -> FourierStiffness:
 
 def pair_of(found: Reproduction) -> HelicalPair:
     """Return the gear pair of the configuration (Table 1)."""
-    pair = found.config.pair
-    assert pair is not None, "the configuration of the paper has a pair"
-    return HelicalPair(
-        teeth=pair.teeth,
-        normal_module=pair.normal_module_mm * _METRES_PER_MM,
-        normal_pressure_angle=math.radians(pair.normal_pressure_angle_deg),
-        helix_angle=math.radians(pair.helix_angle_deg),
-        face_width=pair.face_width_mm * _METRES_PER_MM,
-    )
+    return Quantities(found.config.physical()).pair
 
 
 def _highest_order(found: Reproduction) -> float:
