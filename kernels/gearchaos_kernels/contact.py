@@ -36,10 +36,10 @@ def branch_at(gap, half_backlash):
 @scalar
 def branches_at(gaps, half_backlash, present):
     """Return the pieces on which both gaps of a lane lie."""
-    tangential = branch_at(gaps.tangential, half_backlash)
+    tangential = branch_at(gaps.tangential.value, half_backlash)
     if present.axial is None:
         return Branches(tangential, tangential)
-    return Branches(tangential, branch_at(gaps.axial, half_backlash))
+    return Branches(tangential, branch_at(gaps.axial.value, half_backlash))
 
 
 @scalar
@@ -61,66 +61,54 @@ def next_branch(branch, gap, half_backlash):
 @scalar
 def step_may_leave(begin, end, branches, present):
     """Tell whether a step from one pair of gaps to another may leave a branch of either."""
-    suspect = may_leave(
-        begin.tangential,
-        begin.tangential_rate,
-        end.tangential,
-        end.tangential_rate,
-        branches.tangential,
-    )
+    suspect = may_leave(begin.tangential, end.tangential, branches.tangential)
     if present.axial is not None:
-        suspect |= may_leave(
-            begin.axial, begin.axial_rate, end.axial, end.axial_rate, branches.axial
-        )
+        suspect |= may_leave(begin.axial, end.axial, branches.axial)
     return suspect
 
 
 @scalar
-def may_leave(gap0, rate0, gap1, rate1, branch):
+def may_leave(begin, end, branch):
     """Tell whether a step may leave its branch, be it for a moment only.
 
     Rates are per step. The cubic through both ends lies between the smallest and the largest of its
     Bezier points; a step that begins on a branch, and whose other points lie there, stays there.
     """
-    point1 = gap0 + _THIRD * rate0
-    point2 = gap1 - _THIRD * rate1
-    lowest = min(min(point1, point2), gap1)
-    highest = max(max(point1, point2), gap1)
+    point1 = begin.value + _THIRD * begin.rate
+    point2 = end.value - _THIRD * end.rate
+    lowest = min(min(point1, point2), end.value)
+    highest = max(max(point1, point2), end.value)
     return (lowest < branch.floor) | (highest > branch.ceiling)
 
 
 @scalar
-def leaving_fraction(gap0, rate0, gap1, rate1, branch, half_backlash):
-    """Return the fraction of a step at which the gap leaves its branch, or `NEVER`.
+def leaving_fraction(begin, end, length, branch, half_backlash):
+    """Return the fraction of a piece at which the gap leaves its branch, or `NEVER`.
 
-    The gap over the step is the cubic through its values and rates at both ends (rates per step).
-    The field is continuous, so an error of the moment moves the state by its square only.
+    The gap over the piece, so many steps long, is the cubic through its values and rates at both
+    ends. The field is continuous, so an error of the moment moves the state by its square only.
     """
     if half_backlash == 0.0:
         return NEVER
     # One formula for a motion and its mirror image: the compiler then rounds both alike.
     if branch.engaged != 0.0:
         side = math.copysign(1.0, branch.offset)
-        return first_fall(
-            side * gap0 - half_backlash,
-            side * rate0,
-            side * gap1 - half_backlash,
-            side * rate1,
-        )
-    side = math.copysign(1.0, gap1)
+        return first_fall_of(begin, end, length, side, -half_backlash)
+    side = math.copysign(1.0, end.value)
     return min(
-        first_fall(
-            half_backlash - side * gap0,
-            -side * rate0,
-            half_backlash - side * gap1,
-            -side * rate1,
-        ),
-        first_fall(
-            half_backlash + side * gap0,
-            side * rate0,
-            half_backlash + side * gap1,
-            side * rate1,
-        ),
+        first_fall_of(begin, end, length, -side, half_backlash),
+        first_fall_of(begin, end, length, side, half_backlash),
+    )
+
+
+@scalar
+def first_fall_of(begin, end, length, side, distance):
+    """Return where a gap, seen from one side and raised by a distance, first falls below zero."""
+    return first_fall(
+        side * begin.value + distance,
+        side * length * begin.rate,
+        side * end.value + distance,
+        side * length * end.rate,
     )
 
 

@@ -18,13 +18,18 @@ from gearchaos_kernels.block_memory import Coordinates
 from gearchaos_kernels.compilation import scalar
 
 
-class Gaps(NamedTuple):
-    """y_1 over cos(beta_b), y_2 over sin(beta_b), and their rates; 0 without axial pair."""
+class Gap(NamedTuple):
+    """A gap and its rate."""
 
-    tangential: float
-    tangential_rate: float
-    axial: float
-    axial_rate: float
+    value: float
+    rate: float
+
+
+class Gaps(NamedTuple):
+    """y_1 over cos(beta_b) and y_2 over sin(beta_b); the latter 0 without axial pair."""
+
+    tangential: Gap
+    axial: Gap
 
 
 class Directions(NamedTuple):
@@ -57,31 +62,29 @@ def gaps_at(state, lane, forcing, present):
     """Return the gaps of eqs 6 and 7 and their rates."""
     gap = approach(state.position, lane, present) - forcing.error
     rate = approach(state.rate, lane, present) - forcing.error_rate
-    if present.axial is None:
-        return Gaps(gap, rate, 0.0, 0.0)
-    return Gaps(
-        gap,
-        rate,
-        axial_approach(state.position, lane) - gap - forcing.axial_error,
-        axial_approach(state.rate, lane) - forcing.axial_error_rate - rate,
-    )
+    axial_gap = 0.0
+    axial_rate = 0.0
+    if present.axial is not None:
+        axial_gap = axial_approach(state.position, lane) - gap - forcing.axial_error
+        axial_rate = axial_approach(state.rate, lane) - forcing.axial_error_rate - rate
+    return Gaps(Gap(gap, rate), Gap(axial_gap, axial_rate))
 
 
 @scalar
-def clearance_force(gap, rate, stiffness, damping, half_backlash, present):
+def clearance_force(gap, stiffness, damping, half_backlash, present):
     """Return the mesh force (eqs 2, 4) and the stiffness of its active branch (eqs 22, 23)."""
     if present.backlash is None:
-        return stiffness * gap + damping * rate, stiffness
-    deflection = gap - min(max(gap, -half_backlash), half_backlash)
+        return stiffness * gap.value + damping * gap.rate, stiffness
+    deflection = gap.value - min(max(gap.value, -half_backlash), half_backlash)
     slope = stiffness if deflection != 0.0 else 0.0
-    return stiffness * deflection + damping * rate, slope
+    return stiffness * deflection + damping * gap.rate, slope
 
 
 @scalar
-def branch_force(gap, rate, stiffness, damping, branch):
+def branch_force(gap, stiffness, damping, branch):
     """Return the mesh force and its stiffness on one linear piece of the clearance function."""
-    deflection = branch.engaged * gap - branch.offset
-    return stiffness * deflection + damping * rate, stiffness * branch.engaged
+    deflection = branch.engaged * gap.value - branch.offset
+    return stiffness * deflection + damping * gap.rate, stiffness * branch.engaged
 
 
 @scalar
@@ -97,21 +100,13 @@ def mesh_forces(gaps, lane, stiffness, branches, present):
     slope_z = 0.0
     if branches is None:
         b = lane.half_backlash
-        force_y, slope_y = clearance_force(
-            gaps.tangential, gaps.tangential_rate, stiffness, damping, b, present
-        )
+        force_y, slope_y = clearance_force(gaps.tangential, stiffness, damping, b, present)
         if present.axial is not None:
-            force_z, slope_z = clearance_force(
-                gaps.axial, gaps.axial_rate, stiffness_z, damping_z, b, present
-            )
+            force_z, slope_z = clearance_force(gaps.axial, stiffness_z, damping_z, b, present)
     else:
-        force_y, slope_y = branch_force(
-            gaps.tangential, gaps.tangential_rate, stiffness, damping, branches.tangential
-        )
+        force_y, slope_y = branch_force(gaps.tangential, stiffness, damping, branches.tangential)
         if present.axial is not None:
-            force_z, slope_z = branch_force(
-                gaps.axial, gaps.axial_rate, stiffness_z, damping_z, branches.axial
-            )
+            force_z, slope_z = branch_force(gaps.axial, stiffness_z, damping_z, branches.axial)
     return Directions(force_y, force_z), Directions(slope_y, slope_z)
 
 

@@ -142,10 +142,12 @@ def _follow(coefficients, scales, steps, table, states, motion, present):
             forces, _ = mesh_forces(gaps, lane, forcing.stiffness, None, present)
             # Scaled, N_y and N_z enter eq. 13 with coefficient -1, and per step squared.
             motion.force_tangential[index, sample] = forces.tangential / step**2
-            motion.contact_tangential[index, sample] = flank_at(gaps.tangential, half_backlash)
+            motion.contact_tangential[index, sample] = flank_at(
+                gaps.tangential.value, half_backlash
+            )
             if present.axial is not None:
                 motion.force_axial[index, sample] = forces.axial / step**2
-                motion.contact_axial[index, sample] = flank_at(gaps.axial, half_backlash)
+                motion.contact_axial[index, sample] = flank_at(gaps.axial.value, half_backlash)
             acceleration = accelerations(state, forces, forcing.drive, lane, present)
             write_state(memory, STATE, 0, State(state.rate, acceleration), present)
             take(memory, STATE, 0, scales[index], change)

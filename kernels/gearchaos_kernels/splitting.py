@@ -80,12 +80,12 @@ def split_step(memory, slot, table, number, present):
         crossings += 1
         gaps = gaps_at(state, lane, begin, present)
         if axially:
-            slowest = min(slowest, lane.axial_speed * abs(gaps.axial_rate))
-            following = next_branch(branches.axial, gaps.axial, lane.half_backlash)
+            slowest = min(slowest, lane.axial_speed * abs(gaps.axial.rate))
+            following = next_branch(branches.axial, gaps.axial.value, lane.half_backlash)
             branches = Branches(branches.tangential, following)
         else:
-            slowest = min(slowest, lane.tangential_speed * abs(gaps.tangential_rate))
-            following = next_branch(branches.tangential, gaps.tangential, lane.half_backlash)
+            slowest = min(slowest, lane.tangential_speed * abs(gaps.tangential.rate))
+            following = next_branch(branches.tangential, gaps.tangential.value, lane.half_backlash)
             branches = Branches(following, branches.axial)
 
         left = 1.0 - done
@@ -106,22 +106,9 @@ def first_crossing(begin, end, length, branches, lane, present):
 
     ``length`` is that of the piece in steps: the rates of the gaps are per step.
     """
-    fraction = leaving_fraction(
-        begin.tangential,
-        length * begin.tangential_rate,
-        end.tangential,
-        length * end.tangential_rate,
-        branches.tangential,
-        lane.half_backlash,
-    )
+    b = lane.half_backlash
+    fraction = leaving_fraction(begin.tangential, end.tangential, length, branches.tangential, b)
     fraction_z = NEVER
     if present.axial is not None:
-        fraction_z = leaving_fraction(
-            begin.axial,
-            length * begin.axial_rate,
-            end.axial,
-            length * end.axial_rate,
-            branches.axial,
-            lane.half_backlash,
-        )
+        fraction_z = leaving_fraction(begin.axial, end.axial, length, branches.axial, b)
     return min(fraction, fraction_z), not fraction <= fraction_z
