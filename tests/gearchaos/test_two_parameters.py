@@ -1,4 +1,4 @@
-"""A sweep of two parameters with several starts, from the command line to whoever reads its file."""
+"""A sweep of two parameters with several starts, from the command line to all who read its file."""
 
 import json
 import signal
