@@ -216,19 +216,23 @@ def test_a_slice_is_refined_like_the_sweep_of_one_parameter_that_it_is(tmp_path)
     assert sweep(tmp_path, *flags) == (0, "both.h5\n", "")
     both = gearchaos.load_config(tmp_path / "both.toml", overrides)
     assert gearchaos.open_result(tmp_path / "both.h5").axes == ("load", "pitch_error")
-    boundaries = {}
-    for load in (0.1, 0.5):
-        (tmp_path / "alone.toml").write_text(both.at({"load": load}).resolved_toml())
-        alone = run_module("gearchaos.sweep", "alone.toml", "-q", "--overwrite", cwd=tmp_path)
-        assert alone.code == 0
-        facts = [
-            json.loads(of_the_file("stages", tmp_path / name, *at, "--refine", "0.01", "--json"))
-            for name, at in (("both.h5", ("--at", f"load={load}")), ("alone.h5", ()))
-        ]
-        assert facts[0].pop("slice")["load"]["value"] == load
-        assert facts[1].pop("slice") == {}
-        assert facts[0] == facts[1]
-        boundaries[load] = facts[0]["boundaries"]
-    assert [edge["motion_above"] for edge in boundaries[0.1]] == ["period 2", "period 1"]
-    assert all(0.0 < edge["above"] - edge["below"] <= 0.01 for edge in boundaries[0.1])
-    assert boundaries[0.5] == []
+    (tmp_path / "alone.toml").write_text(both.at({"load": 0.1}).resolved_toml())
+    assert run_module("gearchaos.sweep", "alone.toml", "-q", cwd=tmp_path).code == 0
+    refined = [
+        json.loads(of_the_file("stages", tmp_path / name, *at, "--refine", "0.01", "--json"))
+        for name, at in (
+            ("both.h5", ["--at", "0.1"]),
+            ("both.h5", ["--at", "0.5"]),
+            ("alone.h5", []),
+        )
+    ]
+    assert [facts.pop("slice").get("load") for facts in refined] == [
+        {"value": 0.1, "number": 1, "of": 2},
+        {"value": 0.5, "number": 2, "of": 2},
+        None,
+    ]
+    light, heavy, alone = refined
+    assert light == alone
+    assert [edge["motion_above"] for edge in light["boundaries"]] == ["period 2", "period 1"]
+    assert all(0.0 < edge["above"] - edge["below"] <= 0.01 for edge in light["boundaries"])
+    assert heavy["boundaries"] == []
