@@ -14,12 +14,11 @@ import time
 from pathlib import Path
 
 import numpy as np
-from gearchaos_kernels import Effects, Plan, System, integrate, use_threads
+from gearchaos_kernels import Effects, Plan, integrate, use_threads
 from machine import print_machine
 
 from gearchaos import load_config
-from gearchaos.configuration import lane_groups
-from gearchaos.engine.lanes import model
+from gearchaos.engine.lanes import Lanes
 
 SWEEP = Path(__file__).parent.parent / "sweeps" / "pan2021_full.toml"
 LANES = 64
@@ -37,9 +36,7 @@ def main() -> None:
     print_machine()
     use_threads(1)
     config = load_config(SWEEP, ["sweep.from=3.0", "sweep.to=11.0", f"sweep.count={LANES}"])
-    _, groups = lane_groups(config)
-    stiffness = groups.stiffness_cosine, groups.stiffness_sine
-    system = System(Effects(), model(groups, LANES), *stiffness)
+    system = Lanes(config).system_of(np.arange(LANES))._replace(effects=Effects())
 
     def end_states(steps: int, resolved: bool) -> np.ndarray:
         plan = Plan(steps, 0, PERIODS, 0, False, resolved)

@@ -18,8 +18,7 @@ from machine import print_machine
 from textbook import run_textbook
 
 from gearchaos import load_config
-from gearchaos.configuration import lane_groups
-from gearchaos.engine.lanes import model
+from gearchaos.engine.lanes import Lanes
 
 SWEEP = Path(__file__).parent.parent / "sweeps" / "pan2021_full.toml"
 STEPS = 200
@@ -61,10 +60,9 @@ def _contestants():
         yield f"full, {most_threads()} threads", tangent, everything
 
 
-def _pan(lanes: int):
+def _pan(lanes: int) -> System:
     config = load_config(SWEEP, ["sweep.from=0.0", "sweep.to=15.0", f"sweep.count={lanes}"])
-    _, groups = lane_groups(config)
-    return model(groups, lanes), groups.stiffness_cosine, groups.stiffness_sine
+    return Lanes(config).system_of(np.arange(lanes))
 
 
 def engine(
@@ -72,7 +70,7 @@ def engine(
 ) -> Callable[[], int]:
     """Return work that integrates the sweep of Pan 2021 and tells how many steps that took."""
     lanes = LANES * threads
-    system = System(scene, *_pan(lanes))
+    system = _pan(lanes)._replace(effects=scene)
     # The end state is written in full, so that no effect can be optimised away.
     plan = Plan(steps, 0, PERIODS, 1, tangent, resolved)
 
@@ -85,7 +83,8 @@ def engine(
 
 
 def _textbook(tangent: bool) -> Callable[[], int]:
-    data = _pan(TEXTBOOK_LANES)
+    pan = _pan(TEXTBOOK_LANES)
+    data = pan.groups, pan.stiffness_cosine, pan.stiffness_sine
 
     def work() -> int:
         use_threads(1)

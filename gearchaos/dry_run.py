@@ -13,6 +13,7 @@ from tqdm import tqdm
 
 from gearchaos.engine.running import pilot_rate
 from gearchaos.engine.simulation import Simulation
+from gearchaos.results.variables import START
 
 
 def describe(simulation: Simulation, output: str) -> None:
@@ -30,7 +31,10 @@ def describe(simulation: Simulation, output: str) -> None:
     spans = [
         f"{axis.values.size} values of {axis.name} from {axis.values[0]:g} to {axis.values[-1]:g}"
         for axis in lanes.axes
+        if axis.name != START
     ]
+    if lanes.starts > 1:
+        spans.append(f"{lanes.starts} starts each")
     memory = simulation.block_memory(threads)
     for key, value in {
         "output": f"{output}{' (exists)' if os.path.exists(output) else ''}",

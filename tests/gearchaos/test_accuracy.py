@@ -9,6 +9,7 @@ import pytest
 import gearchaos
 from gearchaos.accuracy import TRUTH_STEPS, Setting, measure, recommendation
 from gearchaos.engine.simulation import Simulation
+from gearchaos.engine.steps import pilot
 
 from ..kernels.reference import SOLUTIONS
 from .commands import names_in, run_module
@@ -111,7 +112,7 @@ def test_the_truth_is_that_of_the_stored_orbits():
     }
     values = f"sweep={{parameter='pitch_error', values={[*stored]}}}"
     sweep = Simulation(gearchaos.load_config(PAN2021, [values]))
-    _, motion = sweep.pilot(2, TRUTH_STEPS)
+    _, motion = pilot(sweep.lanes, sweep.plan, 2, TRUTH_STEPS)
     truth = motion(TRUTH_STEPS, True)
     for lane, orbit in enumerate(stored.values()):
         # The mean over 150 periods is off by up to 1e-6.

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from gearchaos.records.bands import dealt_parts_differ_by
+from gearchaos.records.bands import subsequence_spread
 from gearchaos.records.period import LONGEST_PERIOD
 
 POINTS = 2000
@@ -31,12 +31,12 @@ def logistic(r: float, points: int = POINTS) -> np.ndarray:
 
 
 def apart(section: np.ndarray) -> float:
-    return float(dealt_parts_differ_by(section[np.newaxis])[0])
+    return float(subsequence_spread(section[np.newaxis])[0])
 
 
 @pytest.mark.parametrize("curves", [1, 2, 3, 5, 16])
 @pytest.mark.parametrize("rotation", [GOLDEN, np.sqrt(2.0) - 1.0])
-def test_the_parts_of_a_torus_lie_on_top_of_each_other(rotation, curves):
+def test_the_subsequences_of_a_torus_lie_on_top_of_each_other(rotation, curves):
     assert apart(torus(rotation, curves)) < 0.1
 
 

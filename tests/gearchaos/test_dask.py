@@ -18,7 +18,7 @@ from .commands import names_in, same_data, small_config, sweep
 
 pytest.importorskip("distributed")
 
-SHARDS = "gears.h5.shards"
+BLOCKS = "gears.h5.blocks"
 # Six blocks of lanes that take a second or so each.
 LONG = ("--set", "sweep.count=1500", "--set", "integration.transient_periods=700")
 SCHEDULER = "from distributed.cli.dask_scheduler import main; main()"
@@ -79,7 +79,7 @@ def begun(folder, *arguments):
         env={**os.environ, "DASK_DISTRIBUTED__COMM__TIMEOUTS__CONNECT": "3s"},
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
     ) as process:
-        while process.poll() is None and not list((folder / SHARDS).glob("*.shard")):
+        while process.poll() is None and not list((folder / BLOCKS).glob("*.block")):
             time.sleep(0.005)
         yield process
 
@@ -118,7 +118,7 @@ def test_an_interrupt_keeps_what_local_workers_have_and_any_machine_goes_on(tmp_
     assert 0 < int(re.search(r"(\d+) of 1500 lanes are kept", err)[1]) < 1500
     _, alive = psutil.wait_procs(workers, timeout=10)
     assert alive == []
-    assert names_in(tmp_path) == [SHARDS, "gears.toml"]
+    assert names_in(tmp_path) == [BLOCKS, "gears.toml"]
     assert sweep(tmp_path, *LONG, "--resume", "--quiet") == (0, "gears.h5\n", "")
     assert same_data(gearchaos.open_result(tmp_path / "gears.h5"), undisturbed)
 
@@ -141,7 +141,7 @@ def test_a_worker_with_other_software_is_refused(tmp_path, before, message):
         ended = sweep(tmp_path, "--dask", address)
     assert (ended.code, ended.out) == (4, "")
     assert re.search(message, ended.err)
-    assert SHARDS not in names_in(tmp_path)
+    assert BLOCKS not in names_in(tmp_path)
 
 
 @pytest.mark.slow

@@ -4,7 +4,7 @@ import gearchaos
 
 from .commands import DIVERGING, SMALL, names_in, run_module, same_data, sweep
 
-SHARDS = "gears.h5.shards"
+BLOCKS = "gears.h5.blocks"
 COUNT = ("--set", "sweep.count=1000", "--quiet")
 
 
@@ -19,14 +19,14 @@ def merge(folder, *arguments):
 
 def test_missing_and_damaged_blocks_are_named_with_the_shards_to_run(tmp_path):
     shards(tmp_path, 1, 2)
-    before = names_in(tmp_path / SHARDS)
+    before = names_in(tmp_path / BLOCKS)
     ended = merge(tmp_path, "gears.h5")
     assert (ended.code, ended.out) == (4, "")
     (line,) = ended.err.splitlines()
     assert "lanes 512 to 767 are missing; run the sweep with --shard 3/3 and --resume" in line
-    assert names_in(tmp_path / SHARDS) == sorted({*before, "lock"})
+    assert names_in(tmp_path / BLOCKS) == sorted({*before, "lock"})
     # The fourth block is the second of shard 1.
-    damaged = max((tmp_path / SHARDS).glob("*.shard"))
+    damaged = max((tmp_path / BLOCKS).glob("*.block"))
     content = bytearray(damaged.read_bytes())
     content[-1] ^= 1
     damaged.write_bytes(content)
@@ -34,7 +34,7 @@ def test_missing_and_damaged_blocks_are_named_with_the_shards_to_run(tmp_path):
     assert ended.code == 4
     assert f"{damaged.name}: is damaged; its checksum does not fit" in ended.err
     assert "lanes 512 to 999 are missing; run the sweep with --shard 1/3, --shard 3/3" in ended.err
-    assert names_in(tmp_path) == [SHARDS, "gears.toml"]
+    assert names_in(tmp_path) == [BLOCKS, "gears.toml"]
 
 
 def test_the_result_carries_the_configuration_as_it_was_written(tmp_path):
@@ -80,15 +80,15 @@ def test_diverged_lanes_make_the_exit_code_that_of_the_sweep(tmp_path):
 def test_where_no_blocks_are_nothing_is_joined_and_nothing_made(tmp_path):
     ended = merge(tmp_path, "none.h5")
     assert (ended.code, ended.out) == (4, "")
-    assert "none.h5.shards: no such folder; name the result file to be" in ended.err
+    assert "none.h5.blocks: no such folder; name the result file to be" in ended.err
     assert names_in(tmp_path) == []
 
 
 def test_a_damaged_manifest_is_named(tmp_path):
-    (tmp_path / SHARDS).mkdir()
+    (tmp_path / BLOCKS).mkdir()
     for content in ("{", "[]", '{"configuration": 3}', '{"configuration": "= 3", "text": ""}'):
-        (tmp_path / SHARDS / "manifest.json").write_text(content)
+        (tmp_path / BLOCKS / "manifest.json").write_text(content)
         ended = merge(tmp_path, "gears.h5")
         assert ended.code in (2, 4)
-        assert SHARDS in ended.err
-        assert (tmp_path / SHARDS / "manifest.json").read_text() == content
+        assert BLOCKS in ended.err
+        assert (tmp_path / BLOCKS / "manifest.json").read_text() == content

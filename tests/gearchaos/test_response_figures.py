@@ -63,7 +63,6 @@ def known_response(diverged: tuple[int, ...] = (), swept: str = "pitch_error") -
         periods=PERIODS,
         steps_per_period=STEPS,
         axial=False,
-        contacts=("apart", "driving_flank", "back_flank"),
     )
     status = np.isin(np.arange(2), diverged)
     data = {

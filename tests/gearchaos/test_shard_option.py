@@ -11,7 +11,7 @@ from gearchaos.results.store_lock import StoreLock
 
 from .commands import names_in, run_module, same_data, sweep
 
-SHARDS = "gears.h5.shards"
+BLOCKS = "gears.h5.blocks"
 # Four blocks of lanes.
 COUNT = ("--set", "sweep.count=1000", "--quiet")
 
@@ -46,8 +46,8 @@ def test_shards_computed_with_other_threads_join_to_the_undisturbed_result(tmp_p
         ended = sweep(tmp_path, *COUNT, "--shard", shard, "--threads", threads)
         if ended.code == 2:
             pytest.skip("a single core")
-        assert ended == (0, f"{tmp_path / SHARDS}\n", "")
-        assert names_in(tmp_path) == [SHARDS, "gears.toml"]
+        assert ended == (0, f"{tmp_path / BLOCKS}\n", "")
+        assert names_in(tmp_path) == [BLOCKS, "gears.toml"]
     assert run_module("gearchaos.merge", "gears.h5", "-q", cwd=tmp_path) == (0, "gears.h5\n", "")
     assert names_in(tmp_path) == ["gears.h5", "gears.toml"]
     assert sweep(tmp_path, *COUNT, "--output", "one.h5").code == 0
@@ -68,11 +68,11 @@ def test_a_shard_says_what_is_next_and_is_not_computed_twice(tmp_path):
     refused = sweep(tmp_path, *told)
     assert refused.code == 4
     assert "holds 2 finished blocks of an earlier run; continue it with --resume" in refused.err
-    block = max((tmp_path / SHARDS).glob("*.shard"))
+    block = max((tmp_path / BLOCKS).glob("*.block"))
     block.write_bytes(block.read_bytes()[:-1])
     again = sweep(tmp_path, *told, "--resume")
     assert again.code == 0
-    assert f"{block.name}: has " in again.err
+    assert f"{block.name}: has not the " in again.err
     assert "488 of 488 lanes" in again.err
     kept = sweep(tmp_path, *told, "--resume")
     assert kept.code == 0
@@ -89,22 +89,33 @@ def test_shards_of_another_configuration_are_refused_with_the_key(tmp_path):
     assert "which differs in groups.damping_ratio (0.05, now 0.06)" in other.err
 
 
-def test_different_shards_may_run_at_once_the_same_shard_and_the_whole_may_not(tmp_path):
+def test_shards_may_run_at_once_the_same_one_too_the_whole_sweep_and_merge_may_not(tmp_path):
     output = tmp_path / "gears.h5"
-    other = StoreLock(folder_of(output), output, "1-of-4")
+    other = StoreLock(folder_of(output), output, shared=True)
     try:
         assert sweep(tmp_path, *COUNT, "--shard", "4/4").code == 0
-        before = names_in(tmp_path / SHARDS)
-        for arguments in (["--shard", "1/4"], []):
-            refused = sweep(tmp_path, *COUNT, *arguments, "--resume")
-            assert refused.code == 4
-            assert "gears.h5: another sweep is writing to it; wait for its end" in refused.err
+        before = names_in(tmp_path / BLOCKS)
+        assert sweep(tmp_path, *COUNT, "--shard", "4/4", "--resume").code == 0
+        refused = sweep(tmp_path, *COUNT, "--resume")
+        assert refused.code == 4
+        assert "gears.h5: another sweep is writing to it; wait for its end" in refused.err
         merged = run_module("gearchaos.merge", "gears.h5", cwd=tmp_path)
         assert merged.code == 4
         assert "gears.h5: another sweep is writing to it" in merged.err
-        assert names_in(tmp_path / SHARDS) == before
+        assert names_in(tmp_path / BLOCKS) == before
     finally:
         other.release()
+
+
+def test_a_shard_is_refused_while_a_whole_sweep_is_writing(tmp_path):
+    output = tmp_path / "gears.h5"
+    whole = StoreLock(folder_of(output), output)
+    try:
+        refused = sweep(tmp_path, *COUNT, "--shard", "1/4")
+        assert refused.code == 4
+        assert "gears.h5: another sweep is writing to it; wait for its end" in refused.err
+    finally:
+        whole.release()
 
 
 def test_a_carried_sweep_cannot_be_shared(tmp_path):

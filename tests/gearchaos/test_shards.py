@@ -196,7 +196,7 @@ def test_blocks_of_a_newer_format_are_refused_in_a_clear_sentence(output: Path) 
         open_store(output, resume=True)
 
 
-def test_bad_shards_are_named_and_left_out(output: Path, tmp_path: Path) -> None:
+def test_bad_blocks_are_named_and_left_out(output: Path, tmp_path: Path) -> None:
     (tmp_path / "other").mkdir()
     another = tmp_path / "other" / "sweep.h5"
     with open_store(another, configuration="title = 'other'") as store:
@@ -229,7 +229,7 @@ def test_bad_shards_are_named_and_left_out(output: Path, tmp_path: Path) -> None
 
 
 @pytest.mark.parametrize("position", [0, 20, 100, 200, 250, 300, 1000])
-def test_any_changed_byte_of_a_shard_is_noticed(position: int, output: Path) -> None:
+def test_any_changed_byte_of_a_block_is_noticed(position: int, output: Path) -> None:
     with open_store(output) as store:
         fill(store)
         (path, *_) = sorted(store.folder.glob("*.block"))

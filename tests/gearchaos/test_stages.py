@@ -164,7 +164,7 @@ def several(tmp_path):
 
 
 def listed(folder, *arguments: str):
-    ended = stages(folder, "several.h5", *arguments, "--json")
+    ended = stages(folder, "several.h5", "--quiet", *arguments, "--json")
     assert (ended.code, ended.err) == (0, "")
     return json.loads(ended.out)
 

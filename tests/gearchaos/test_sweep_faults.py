@@ -155,7 +155,7 @@ def test_a_full_disk_costs_neither_the_old_result_nor_the_finished_lanes(tmp_pat
     assert "gears.h5: cannot be written: File too large" in ended.err
     assert "gearchaos sweep: 40 of 40 lanes are kept\n" in ended.err
     assert (tmp_path / "gears.h5").read_bytes() == old
-    assert names_in(tmp_path) == ["gears.h5", "gears.h5.shards", "gears.toml"]
+    assert names_in(tmp_path) == ["gears.h5", "gears.h5.blocks", "gears.toml"]
     again = sweep(tmp_path, *arguments, "--resume")
     assert again.code == 0
     assert "lanes/s" not in again.err  # Nothing was left to be computed.
@@ -168,9 +168,9 @@ def test_a_disk_that_fills_up_in_the_middle_costs_the_blocks_that_do_not_fit(tmp
     assert sweep(tmp_path, *several, "--shard", "1/2", "--quiet").code == 0
     ended = sweep(tmp_path, *several, "--resume", preexec_fn=lambda: _limit_file_size(20_000))
     assert (ended.code, ended.out) == (4, "")
-    assert ".shard: cannot be written: File too large" in ended.err
+    assert ".block: cannot be written: File too large" in ended.err
     assert "gearchaos sweep: 512 of 1000 lanes are kept\n" in ended.err
-    assert names_in(tmp_path) == ["gears.h5.shards", "gears.toml"]
+    assert names_in(tmp_path) == ["gears.h5.blocks", "gears.toml"]
     assert sweep(tmp_path, *several, "--resume", "--quiet") == (0, "gears.h5\n", "")
 
 

@@ -1,0 +1,238 @@
+"""A sweep of two parameters with several starts, from the command line to all who read its file."""
+
+import json
+import signal
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import gearchaos
+
+from .commands import SMALL, names_in, run_module, same_data
+
+LOADS = np.linspace(0.1, 0.5, 9)
+ERRORS = np.linspace(0.0, 5.0, 40)
+STARTS = 3
+SETTLED = "transient_periods = 300\nrecorded_periods = 40"
+# Five blocks of lanes, cut across both axes, that take a second or two together.
+BOTH = SMALL.replace(
+    "[integration]",
+    f"""\
+[second_sweep]
+parameter = "load"
+from = 0.1
+to = 0.5
+count = {LOADS.size}
+
+[start]
+kind = "random"
+seed = 7
+count = {STARTS}
+
+[integration]""",
+).replace("transient_periods = 5\nrecorded_periods = 10", SETTLED)
+BLOCKS = "both.h5.blocks"
+
+
+@pytest.fixture
+def folder(tmp_path):
+    (tmp_path / "both.toml").write_text(BOTH, encoding="utf-8")
+    return tmp_path
+
+
+@pytest.fixture(scope="module")
+def path(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("undisturbed")
+    (folder / "both.toml").write_text(BOTH, encoding="utf-8")
+    assert sweep(folder) == (0, "both.h5\n", "")
+    return folder / "both.h5"
+
+
+@pytest.fixture(scope="module")
+def result(path):
+    return gearchaos.open_result(path)
+
+
+def sweep(folder, *arguments):
+    return run_module("gearchaos.sweep", "both.toml", "--quiet", *arguments, cwd=folder)
+
+
+def of_the_file(module, path, *arguments):
+    ended = run_module(f"gearchaos.{module}", path.name, "-q", *arguments, cwd=path.parent)
+    assert (ended.code, ended.err) == (0, "")
+    return ended.out
+
+
+def test_each_axis_is_a_dimension_with_a_coordinate_of_its_own(result):
+    assert result.axes == ("load", "pitch_error", "start")
+    assert result.axis == "pitch_error"
+    assert result["status"].shape == (LOADS.size, ERRORS.size, STARTS)
+    assert not result["status"].any()
+    for name, values in (("load", LOADS), ("pitch_error", ERRORS), ("start", np.arange(STARTS))):
+        assert result[name] == pytest.approx(values)
+        assert result.dims(name) == (name,)
+    assert result.parameters["load"].dims == ("load",)
+    assert result.parameters["pitch_error"].dims == ("pitch_error",)
+
+
+@pytest.mark.parametrize(("row", "column", "start"), [(0, 39, 0), (4, 7, 2), (8, 0, 1)])
+def test_a_lane_is_what_its_coordinates_and_its_start_state_give(result, row, column, start):
+    place = (row, column, start)
+    names = [str(name) for name in result["state"]]
+    state = dict(zip(names, result["start_state"][place].tolist(), strict=True))
+    given = "{" + ", ".join(f"{name}={value!r}" for name, value in state.items()) + "}"
+    values = {
+        "load": float(result["load"][row]),
+        "pitch_error": float(result["pitch_error"][column]),
+    }
+    both = gearchaos.Configuration.from_toml(BOTH, "both.toml")
+    alone = gearchaos.Configuration.from_toml(
+        both.at(values).resolved_toml(), "alone.toml", [f"start={{kind='given', state={given}}}"]
+    )
+    lane = gearchaos.run(alone)
+    assert lane.axes == ("pitch_error",)
+    for name in ("start_state", "end_state", "section_delta_5", "lyapunov_exponent", "period"):
+        assert np.array_equal(lane[name][0], result[name][place]), name
+
+
+def test_python_gives_the_same_bits(result):
+    assert same_data(gearchaos.run(gearchaos.Configuration.from_toml(BOTH, "both.toml")), result)
+
+
+def test_stopped_half_way_and_resumed_it_is_the_same(folder, result):
+    with subprocess.Popen(
+        [sys.executable, "-m", "gearchaos.sweep", "both.toml", "--threads", "1"],
+        cwd=folder,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        # A test run in the background may have been told to ignore Ctrl-C, and hands that on.
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
+    ) as process:
+        while process.poll() is None and not list((folder / BLOCKS).glob("*.block")):
+            time.sleep(0.005)
+        process.send_signal(signal.SIGINT)
+        out, err = process.communicate(timeout=60)
+    assert (process.returncode, out) == (130, ""), err
+    assert " of 1080 lanes are kept" in err
+    kept = len(list((folder / BLOCKS).glob("*.block")))
+    assert 0 < kept < 5
+    assert sweep(folder, "--resume") == (0, "both.h5\n", "")
+    assert names_in(folder) == ["both.h5", "both.toml"]
+    assert same_data(gearchaos.open_result(folder / "both.h5"), result)
+
+
+def test_computed_in_shards_and_merged_it_is_the_same(folder, result):
+    for number in (2, 1):
+        assert sweep(folder, "--shard", f"{number}/2").code == 0
+    assert run_module("gearchaos.merge", "both.h5", "-q", cwd=folder) == (0, "both.h5\n", "")
+    assert names_in(folder) == ["both.h5", "both.toml"]
+    merged = gearchaos.open_result(folder / "both.h5")
+    assert same_data(merged, result)
+    differing = {key for key, fact in result.metadata.items() if merged.metadata.get(key) != fact}
+    assert differing <= {"created", "threads", "wall_time_seconds"}
+
+
+def test_computed_by_a_dask_worker_it_is_the_same(folder, result):
+    pytest.importorskip("distributed")
+    assert sweep(folder, "--dask", "local:1") == (0, "both.h5\n", "")
+    assert same_data(gearchaos.open_result(folder / "both.h5"), result)
+
+
+@pytest.mark.parametrize("engine", ["netcdf4", "h5netcdf"])
+def test_xarray_finds_the_nearest_lanes(engine, path, result):
+    with xr.open_dataset(path, engine=engine) as whole:
+        assert dict(whole["end_state"].sizes) == {
+            "load": LOADS.size, "pitch_error": ERRORS.size, "start": STARTS, "state": 10,
+        }  # fmt: skip
+        there = whole.sel(pitch_error=3.0, method="nearest")
+        assert there["lyapunov_exponent"].dims == ("load", "start")
+        column = int(np.abs(ERRORS - 3.0).argmin())
+        assert float(there["pitch_error"]) == result["pitch_error"][column]
+        assert np.array_equal(there["end_state"], result["end_state"][:, column])
+        lane = whole.sel(pitch_error=3.0, load=0.33, start=2, method="nearest")
+        row = int(np.abs(LOADS - 0.33).argmin())
+        assert np.array_equal(lane["section_delta_5"], result["section_delta_5"][row, column, 2])
+        part = result.sel("nearest", pitch_error=3.0, load=0.33, start=2)
+        assert np.array_equal(lane["section_delta_5"], part["section_delta_5"])
+
+
+def test_info_tells_every_axis_and_which_slice_its_stages_are_of(path, result):
+    words = " ".join(of_the_file("info", path).split())
+    for text in (
+        "axis load (static load), 9 values, 0.1 to 0.5",
+        "axis pitch_error (multiple of the pitch error), 40 values, 0 to 5",
+        "3 values, 0 to 2 lanes 1080",
+        "status 1080 ok",
+        "Stages slice load = 0.1, the first of 9; others with --at load=VALUE "
+        "slice start = 0, the first of 3; others with --at start=VALUE",
+        "section_delta_5 (load: 9, pitch_error: 40, start: 3, section_point: 5) float64",
+    ):
+        assert text in words, words
+    facts = json.loads(of_the_file("info", path, "--json", "--verify"))
+    assert facts["lanes"] == result["status"].size
+    motions = result.variables["motion"].flags
+    counted = np.bincount(result["motion"].ravel(), minlength=len(motions)).tolist()
+    assert facts["counts"]["motion"] == dict(zip(motions, counted, strict=True))
+    assert [list(result[name].shape) for name in result] == [
+        facts["variables"][name]["shape"] for name in result
+    ]
+
+
+@pytest.mark.parametrize(("load", "row"), [(0.1, 0), (0.33, 5), (9.0, 8)])
+def test_stages_are_those_of_the_slice_that_is_named(path, result, load, row):
+    facts = json.loads(
+        of_the_file("stages", path, "--at", f"load={load}", "--at", "start=1", "--json")
+    )
+    assert facts["parameter"] == "pitch_error"
+    assert facts["slice"] == {
+        "load": {"value": result["load"][row], "number": row + 1, "of": 9},
+        "start": {"value": 1.0, "number": 2, "of": 3},
+    }
+    listed = np.repeat(
+        [stage["period"] for stage in facts["stages"]],
+        [stage["lanes"] for stage in facts["stages"]],
+    )
+    assert np.array_equal(listed, result["period"][row, :, 1])
+
+
+def test_lanes_of_random_starts_are_not_refined(path):
+    ended = run_module("gearchaos.stages", path.name, "--refine", "0.1", cwd=path.parent)
+    assert (ended.code, ended.out) == (2, "")
+    assert 'start.kind = "random": a lane between two others has no start of its own' in ended.err
+
+
+def test_a_slice_is_refined_like_the_sweep_of_one_parameter_that_it_is(tmp_path):
+    # With well damped bearings, the lighter load doubles its period within these pitch errors.
+    text = BOTH[: BOTH.index("[start]")] + BOTH[BOTH.index("[integration]") :]
+    (tmp_path / "both.toml").write_text(text, encoding="utf-8")
+    overrides = [f"groups.{way}_damping_{g}=0.05" for way in ("transverse", "axial") for g in "pg"]
+    overrides += ["sweep.from=9.0", "sweep.to=14.0", "sweep.count=5", "second_sweep.count=2"]
+    flags = [word for override in overrides for word in ("--set", override)]
+    assert sweep(tmp_path, *flags) == (0, "both.h5\n", "")
+    both = gearchaos.load_config(tmp_path / "both.toml", overrides)
+    assert gearchaos.open_result(tmp_path / "both.h5").axes == ("load", "pitch_error")
+    (tmp_path / "alone.toml").write_text(both.at({"load": 0.1}).resolved_toml())
+    assert run_module("gearchaos.sweep", "alone.toml", "-q", cwd=tmp_path).code == 0
+    refined = [
+        json.loads(of_the_file("stages", tmp_path / name, *at, "--refine", "0.01", "--json"))
+        for name, at in (
+            ("both.h5", ["--at", "0.1"]),
+            ("both.h5", ["--at", "0.5"]),
+            ("alone.h5", []),
+        )
+    ]
+    assert [facts.pop("slice").get("load") for facts in refined] == [
+        {"value": 0.1, "number": 1, "of": 2},
+        {"value": 0.5, "number": 2, "of": 2},
+        None,
+    ]
+    light, heavy, alone = refined
+    assert light == alone
+    assert [edge["motion_above"] for edge in light["boundaries"]] == ["period 2", "period 1"]
+    assert all(0.0 < edge["above"] - edge["below"] <= 0.01 for edge in light["boundaries"])
+    assert heavy["boundaries"] == []
