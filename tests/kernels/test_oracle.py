@@ -141,6 +141,7 @@ def test_states_converge_with_order_four_whatever_is_crossed(number):
 
 @stored([solution for solution in RUNS + ORBITS if scene_of(solution).backlash])
 def test_the_clearance_is_crossed_as_often_as_in_the_stored_solution(number):
+    # The stored runs were restarted at every crossing of either clearance, over all their periods.
     solution = (RUNS + ORBITS)[number]
     turns = 2 if "section_points" in solution else 1
     for steps in GRIDS:
