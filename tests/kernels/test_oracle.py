@@ -134,7 +134,7 @@ def test_states_converge_with_order_four_whatever_is_crossed(number):
     between = np.diff(np.log(errors)) / -np.diff(np.log(GRIDS))
     # An error A h^4 (1 + c h) bends the line: from one grid to the next its slope goes from
     # 4 + 0.92 c to 4 + 0.27 c, with h = 1 at the default, and that of all is 4 + 0.53 c. What it is
-    # off is thus less than what the slopes spread; where crossings fall in their steps adds to that.
+    # off is thus less than the slopes spread; where crossings fall in their steps adds to that.
     assert measured_order(errors, GRIDS) == pytest.approx(4.0, rel=0, abs=np.ptp(between))
     assert np.ptp(between) < 0.5
 

@@ -7,7 +7,6 @@ from collections import Counter
 from typing import NamedTuple
 
 import llvmlite.binding
-import numba
 import numpy as np
 import pytest
 from gearchaos_kernels import Effects, Plan, batch, integrate
@@ -98,12 +97,12 @@ def rows_written(scene: Effects, tangent: bool, resolved: bool) -> int:
 
 
 @functools.cache
-def loop_of(scene: Effects, tangent: bool, resolved: bool = False) -> Loop:
+def loop_of(scene: Effects, tangent: bool, resolved: bool, /) -> Loop:
     """Compile a scene, once, and count."""
     # Called directly: the driver may come from the cache and then compiles nothing.
     given = arguments(scene, tangent, resolved)
     loop(*given)
-    assembly = loop.inspect_asm(tuple(map(numba.typeof, given)))
+    assembly = loop.inspect_asm(loop.signatures[-1])
     found = INSTRUCTION.findall(assembly)
     body = max(map(INSTRUCTION.findall, LABEL.split(assembly)), key=stores_of)
     scalars = sum(bool(SCALAR.match(name)) for name, _ in body)
@@ -140,32 +139,34 @@ def test_scalar_arithmetic_is_left_only_outside_the_lane_loop(tangent, resolved)
 def test_the_widest_registers_of_the_processor_are_used():
     if not llvmlite.binding.get_host_cpu_features().get("avx512f", False):
         pytest.skip("needs AVX-512")
-    found = loop_of(FULL, False)
+    found = loop_of(FULL, False, False)
     assert found.arithmetic("zmm") > 10 * found.arithmetic("ymm")
 
 
 def test_the_clearance_costs_one_minimum_and_one_maximum_for_each_stage_and_direction():
-    found = loop_of(FULL, False)
+    found = loop_of(FULL, False, False)
     assert found.wide("vmin") == found.wide("vmax") == 4 * 2 * found.copies
 
 
 @TANGENT
 def test_on_a_branch_the_stages_need_no_minimum_or_maximum(tangent):
-    found = loop_of(FULL, tangent, resolved=True)
+    found = loop_of(FULL, tangent, True)
     # Two for each direction, in the test for a crossing: the largest and smallest of three points.
     assert found.wide("vmax") <= 4 * found.copies
     assert found.wide("vmin") <= 4 * found.copies
 
 
 def test_a_scene_without_backlash_has_no_minimum_or_maximum():
-    without = loop_of(FULL._replace(backlash=False), False)
+    without = loop_of(FULL._replace(backlash=False), False, False)
     assert without.wide("vmax") == without.wide("vmin") == 0
-    assert without.per_vector() < loop_of(FULL, False).per_vector()
+    assert without.per_vector() < loop_of(FULL, False, False).per_vector()
 
 
 def test_a_torsional_scene_has_none_of_the_arithmetic_of_the_bearings():
     # It has a fifth of the states, without the dampers and springs of the other four fifths.
-    assert loop_of(TORSION, False).per_vector() < 0.2 * loop_of(FULL, False).per_vector()
+    assert (
+        loop_of(TORSION, False, False).per_vector() < 0.2 * loop_of(FULL, False, False).per_vector()
+    )
 
 
 @SPLIT
