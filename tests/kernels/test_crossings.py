@@ -1,10 +1,7 @@
 """Steps that are split where a clearance is crossed: the order of the method holds there.
 
-The stored runs were restarted at every crossing of either clearance, over all their periods: their
-number of crossings is the number that a run from the same start has to find.
+States and numbers of crossings of the stored runs and orbits: `test_oracle`.
 """
-
-import functools
 
 import numpy as np
 import pytest
@@ -23,78 +20,13 @@ from .reference import (
     stored_state,
     system_of,
 )
+from .test_oracle import name_of
 from .test_order import measured_order
 from .test_twin import ALL_SCENES, MODEL, START, named
 
 STEPS = np.array([100, 141, 200, 283, 400, 566, 800])
-RUNS = [solution for solution in SOLUTIONS["runs"] if solution["crossings"] > 0]
-CHAOTIC = (12.47, 12.97, 14.68)
 ORBITS = [orbit for orbit in SOLUTIONS["periodic_orbits"] if orbit["crossings"] > 0]
 CLEARANCE = Effects(False, False, True, False, False)
-
-
-def scene_of(solution: dict) -> Effects:
-    return Effects(**{effect: effect in solution["effects"] for effect in Effects._fields})
-
-
-def name_of(solution: dict) -> str:
-    return f"{solution['scene']}-{solution.get('formulation', 'orbit')}-{solution['pitch_error']}"
-
-
-def stored_run(pitch_error: float) -> int:
-    """Return the number of the stored run of the full scene at one multiple of the error."""
-    return [name_of(solution) for solution in RUNS].index(f"full-published-{pitch_error}")
-
-
-@functools.cache
-def followed(number: int, steps: int) -> tuple[float, int, int]:
-    """Return the largest error of the full state along a stored run, crossings and overflows."""
-    solution = RUNS[number]
-    periods = np.array(solution["periods"])
-    outcome = run(
-        pan2021(solution["pitch_error"]),
-        scene_of(solution),
-        stored_state(solution["start"]),
-        steps=steps,
-        periods=periods[-1],
-        rederived=solution["formulation"] == "rederived",
-        resolved=True,
-    )
-    wanted = np.array(solution["state"])
-    error = np.abs(outcome.section[0, periods - 1] - wanted).max()
-    return float(error), int(outcome.crossings[0]), int(outcome.overflows[0])
-
-
-@pytest.mark.parametrize(
-    ("pitch_error", "steps", "largest"),
-    [
-        (5.86, 100, 1e-4),
-        (5.86, 200, 7e-6),
-        (5.86, 400, 5e-7),
-        (10.75, 100, 3e-4),
-        (10.75, 200, 2e-5),
-        (10.75, 400, 1e-6),
-    ],
-)
-def test_a_run_with_tooth_separation_stays_within_the_error_of_a_smooth_one(
-    pitch_error, steps, largest
-):
-    assert followed(stored_run(pitch_error), steps)[0] < largest
-
-
-@pytest.mark.parametrize("number", range(len(RUNS)), ids=map(name_of, RUNS))
-def test_states_of_a_run_with_crossings_converge_with_order_four(number):
-    # A chaotic run amplifies its errors: it needs finer steps until they are small.
-    steps = 2 * STEPS if RUNS[number]["pitch_error"] in CHAOTIC else STEPS
-    assert measured_order([followed(number, int(s))[0] for s in steps], steps) > 3.8
-
-
-@pytest.mark.parametrize("number", range(len(RUNS)), ids=map(name_of, RUNS))
-def test_a_run_crosses_as_often_as_the_stored_solution(number):
-    for steps in STEPS:
-        _, crossings, overflows = followed(number, int(steps))
-        assert crossings == RUNS[number]["crossings"]
-        assert overflows == 0
 
 
 def multipliers(orbit: dict, steps: int, resolved: bool = True) -> np.ndarray:
@@ -114,18 +46,6 @@ def multipliers(orbit: dict, steps: int, resolved: bool = True) -> np.ndarray:
 def exponent_error(orbit: dict, steps: int, resolved: bool = True) -> float:
     largest = np.abs(multipliers(orbit, steps, resolved)).max()
     return abs(np.log(largest) / (orbit["period"] * PERIOD) - orbit["largest_exponent"])
-
-
-def multiplier_error(orbit: dict, steps: int) -> float:
-    wanted = np.array([complex(*pair) for pair in orbit["floquet_multipliers"]])
-    found = multipliers(orbit, steps)
-    return float(np.abs(wanted[:, np.newaxis] - found).min(axis=1).max())
-
-
-@pytest.mark.parametrize("orbit", ORBITS, ids=name_of)
-def test_floquet_multipliers_of_an_orbit_with_crossings_converge_with_order_four(orbit):
-    errors = [multiplier_error(orbit, int(steps)) for steps in STEPS]
-    assert measured_order(errors, STEPS) > 3.8
 
 
 @pytest.mark.parametrize("orbit", ORBITS, ids=name_of)
