@@ -13,14 +13,13 @@ from typing import Any, NamedTuple, Self
 
 import distributed
 from gearchaos_kernels import current_threads, most_threads, use_threads
-from gearchaos_kernels.compilation import CACHE_FOLDER, source_hash
+from gearchaos_kernels.compilation import source_hash
 
 from gearchaos.configuration import Configuration
 from gearchaos.engine.executors import ExecutionError
 from gearchaos.engine.simulation import Arrays, Bounds, Simulation
 from gearchaos.errors import ConfigurationError
 from gearchaos.progress import say
-from gearchaos.results.store_lock import waiting_lock
 from gearchaos.version import software_version
 
 # Its constructors carry no annotations.
@@ -180,9 +179,6 @@ _ONE_AT_A_TIME = Lock()
 def _simulation(recipe: Recipe) -> Simulation:
     simulation = Simulation(Configuration.from_toml(recipe.configuration, "<client>"))
     simulation.plan = simulation.plan._replace(steps_per_period=recipe.steps_per_period)
-    # The first process of a node compiles; the others wait, and load what it has compiled.
-    with waiting_lock(CACHE_FOLDER / "compiling.lock"):
-        simulation.rehearse()
     return simulation
 
 
