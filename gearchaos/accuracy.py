@@ -133,15 +133,9 @@ def _write(settings: Sequence[Setting], title: str, targets: list[str], overwrit
 
 
 def measure(simulation: Simulation, steps: Sequence[int], lanes: int) -> list[Setting]:
-    """Measure error and time of every number of steps, plain and resolved.
+    """Measure error and time of every number of steps per mesh period, plain and resolved.
 
-    Parameters
-    ----------
-    simulation : Simulation
-    steps : sequence of int
-        Steps per mesh period.
-    lanes : int
-        Lanes to try, spread evenly over the sweep.
+    So many lanes are tried, spread evenly over the sweep.
     """
     from statistics import fmean, median
 

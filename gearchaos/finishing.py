@@ -19,10 +19,7 @@ if TYPE_CHECKING:
 def output_of(options: Namespace, suffix: str = ".h5") -> str:
     """Return the result file to be: that of --output, or one named after the configuration.
 
-    Raises
-    ------
-    FileError
-        If it is the configuration itself.
+    Raises FileError if it is the configuration itself.
     """
     # A text, not a Path, which would drop the slash that tells a folder from a file.
     output: str = options.output
@@ -49,15 +46,8 @@ def ending(simulation: Simulation, diverged: int) -> int:
 def complete_already(simulation: Simulation, output: str) -> int | None:
     """Go on with a sweep whose result exists: nothing is left to be done.
 
-    Returns
-    -------
-    int or None
-        The exit code that the sweep had; None if the file is no undamaged result.
-
-    Raises
-    ------
-    FileError
-        If the file is the result of another configuration.
+    Returns the exit code that the sweep had, None if the file is no undamaged result. Raises
+    FileError if it is the result of another configuration.
     """
     from gearchaos.engine.store_filling import open_store
     from gearchaos.results.manifest import differing_keys, folder_of

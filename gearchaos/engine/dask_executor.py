@@ -36,14 +36,8 @@ _IGNORE_INTERRUPTS = "import signal; signal.signal(signal.SIGINT, signal.SIG_IGN
 class Recipe(NamedTuple):
     """All that a worker must know to compute blocks of a sweep.
 
-    Attributes
-    ----------
-    configuration : str
-        The resolved configuration in TOML.
-    steps_per_period : int
-        Where a tolerance was given it is chosen once, not on every worker.
-    software : tuple of str
-        Versions that decide the numbers; see `software`.
+    ``configuration`` is the resolved one in TOML; the steps are chosen once, not on every worker;
+    ``software`` are the versions that decide the numbers.
     """
 
     configuration: str
@@ -54,12 +48,8 @@ class Recipe(NamedTuple):
 class DaskExecutor:
     """Hands blocks to the workers of a cluster; blocks of a lost worker are run again.
 
-    Parameters
-    ----------
-    simulation : Simulation
-        Not carried; its number of steps has been chosen.
-    address : str
-        Of a scheduler, such as ``tcp://node7:8786``, or ``local:N`` for N processes here.
+    The simulation is not carried and its number of steps has been chosen; the address is that of a
+    scheduler, such as ``tcp://node7:8786``, or ``local:N`` for N processes here.
 
     Raises
     ------
@@ -150,13 +140,7 @@ def software() -> tuple[str, str]:
 
 
 def compute_block(recipe: Recipe, block: Bounds) -> dict[str, Any]:
-    """Compute a block; this runs on a worker.
-
-    Raises
-    ------
-    ExecutionError
-        If the software of the worker is not that of the client.
-    """
+    """Compute a block on a worker; ExecutionError if its software is not that of the client."""
     if software() != recipe.software:
         here, wanted = (
             f"{version} (kernels {kernels})" for version, kernels in (software(), recipe.software)

@@ -58,11 +58,8 @@ def writing(path: str | os.PathLike[str]) -> Iterator[None]:
 def check_output(path: str | os.PathLike[str], overwrite: bool = False) -> None:
     """Make sure that a file can be written, before anything is computed for it.
 
-    Raises
-    ------
-    FileError
-        If it exists and must not be overwritten, is a directory or a device, or if its folder
-        is missing or cannot be written to.
+    Raises FileError if it exists and must not be overwritten, is a directory or a device, or if
+    its folder is missing or cannot be written to.
     """
     with writing(path):
         target = _checked_target(path, overwrite)
@@ -86,21 +83,9 @@ def replacing(
 ) -> Iterator[Path]:
     """Write a file under a temporary name; it gets its own name once it is complete on the disk.
 
-    Parameters
-    ----------
-    path : path
-        The file to be.
-    overwrite : bool
-        Whether an existing file is replaced.
-    scratch : path, optional
-        Folder on the same file system for the temporary name; by default that of the file.
-    through_links : bool
-        Whether symbolic links are followed, and not replaced themselves.
-
-    Yields
-    ------
-    Path
-        The temporary name, an empty file to be filled. It goes away if the block raises.
+    The temporary name, of an empty file to be filled, lies in ``scratch``, a folder on the same
+    file system, or beside the file, and goes away if the block raises. Without ``through_links``
+    a symbolic link is replaced itself.
 
     Raises
     ------

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+import json
 import math
 import os
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -24,16 +24,10 @@ _CANDIDATE = "candidate_"
 def overview(path: str | os.PathLike[str]) -> dict[str, Any]:
     """Sum up a result file without reading more than one number of each lane and variable.
 
-    Returns
-    -------
-    dict
-        Axes, parameters, counts and variables are by name; ``errors`` are the measured ones,
-        ``stages`` those of the first slice along the swept parameter. What is not finite is None.
+    Axes, parameters, counts and variables are by name; ``errors`` are the measured ones, ``stages``
+    those of the first slice along the swept parameter. What is not finite is None.
 
-    Raises
-    ------
-    FileError
-        If the file is missing, damaged, of another kind or of another major format version.
+    Raises FileError if the file is missing, damaged, of another kind or another major version.
     """
     variables, data, parameters, metadata = read_result(path, rows=False)
     read = [variable for variable in variables if variable.name in data]
@@ -121,10 +115,4 @@ def _spread(values: NDArray[Any]) -> dict[str, Any]:
 
 def finite(value: Any) -> Any:
     """Replace what is not finite in nested tables and lists by None."""
-    if isinstance(value, Mapping):
-        return {key: finite(entry) for key, entry in value.items()}
-    if isinstance(value, list):
-        return [finite(entry) for entry in value]
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    return value
+    return json.loads(json.dumps(value), parse_constant=lambda _: None)

@@ -235,14 +235,7 @@ def section_variables(result: Result) -> tuple[str, ...]:
 
 
 def open_result(path: str | os.PathLike[str], *, rows: bool = True) -> Result:
-    """Read a result file into memory.
-
-    Parameters
-    ----------
-    path : path
-    rows : bool
-        Whether to read the variables that have dimensions beside the axes; without them a large
-        file is read in a moment.
+    """Read a result file into memory; without ``rows`` only variables over axes alone, in a moment.
 
     Raises
     ------

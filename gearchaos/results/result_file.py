@@ -44,15 +44,9 @@ _PACKED = {"compression": "gzip", "compression_opts": 4, "shuffle": True, "fletc
 class Parameter:
     """One dimensionless group of the model.
 
-    Parameters
-    ----------
-    value : float or ndarray
-    origin : str
-        One of `ORIGINS`; ``"swept"`` differs from lane to lane.
-    units, long_name, symbol : str
-        As of a variable.
-    dims : tuple of str
-        Dimensions of the value: none, ``harmonic``, or the axes along which it differs.
+    The origin is one of `ORIGINS`, of which ``"swept"`` differs from lane to lane; the dimensions
+    of the value are none, ``harmonic``, or the axes along which it differs; the rest is as of a
+    variable.
 
     Raises
     ------
@@ -96,26 +90,20 @@ def write_result(
 
     Parameters
     ----------
-    path : path
-        The file to be.
     variables : sequence of Variable
         What the file holds, in this order.
     blocks : iterable of (first, last, arrays)
         The lanes first to last - 1, in C order over the axes, of every variable without values
         of its own, by name: shape (last - first, own dimensions).
-    parameters : mapping of str to Parameter
-        Dimensionless groups of the model.
-    metadata : mapping of str to str, int or float
-        Root attributes.
-    overwrite : bool
-        Whether an existing file is replaced.
+    parameters, metadata : mapping by name
+        Dimensionless groups of the model, and root attributes.
     scratch : path, optional
         Folder for the temporary file, on the same file system; by default that of the file.
 
     Raises
     ------
     FileError
-        If the file cannot be written.
+        If the file cannot be written, or exists and is not to be overwritten.
     """
     axes = lane_axes(variables)
     everything = [*variables, *_harmonics(parameters)]

@@ -65,12 +65,7 @@ class _Stretch(NamedTuple):
 def labelled_lanes(result: Result, *, name: str = "the result") -> LabelledLanes:
     """Take the labels out of a result with one axis, which messages call by a name.
 
-    Raises
-    ------
-    FileError
-        If the result has no labels.
-    ConfigurationError
-        If it has several axes, or none.
+    Raises FileError if the result has no labels, ConfigurationError if it has not one axis.
     """
     if not all(variable in result for variable in LABELS):
         raise FileError(
@@ -94,12 +89,8 @@ def labelled_lanes(result: Result, *, name: str = "the result") -> LabelledLanes
 def one_axis(result: Result, **coordinates: float) -> Result:
     """Take the slice of a result along one swept parameter, at the coordinates nearest to these.
 
-    Other axes are fixed at their first value.
-
-    Raises
-    ------
-    ConfigurationError
-        If there is no such axis, or if no swept parameter is left.
+    Other axes are fixed at their first value. Raises ConfigurationError if there is no such axis,
+    or if no swept parameter is left.
     """
     part = result.sel("nearest", **coordinates)
     if part.axis in ("", START):

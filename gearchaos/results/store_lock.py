@@ -24,13 +24,6 @@ class StoreLock:
     that are the same do the same work and write the same bits. Where the system has no such locks,
     two sweeps on one output are not noticed.
 
-    Parameters
-    ----------
-    folder, output : Path
-        The folder of the blocks, and the result file to be, for the message.
-    shared : bool
-        Whether others may hold the lock as well.
-
     Raises
     ------
     FileError

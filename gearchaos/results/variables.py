@@ -86,16 +86,9 @@ class Variable:
 
 @dataclass(frozen=True, eq=False)
 class Axis:
-    """One dimension of the lanes of a sweep.
+    """One dimension of the lanes of a sweep; values of shape (values,) ascend, none of them twice.
 
-    Parameters
-    ----------
-    name : str
-        See `axis_name`.
-    units, long_name, symbol : str
-        As of a variable.
-    values : ndarray, shape (values,)
-        Ascending, none of them twice.
+    For the name see `axis_name`; the other texts are as of a variable.
     """
 
     name: str
@@ -141,19 +134,10 @@ def sweep_variables(
 ) -> list[Variable]:
     """List the variables of a sweep in the order of the file.
 
-    Parameters
-    ----------
-    axes : sequence of Axis
-        Second swept parameter, first swept parameter, start; those that there are.
-    states, section : sequence of str
-        Those of the scene, in its order, and those recorded at the section.
-    section_points : int
-        Mesh periods recorded.
-    lyapunov, exponents, crossings : bool
-        Whether the largest exponent, all exponents, and crossings of clearance boundaries are kept.
-    status_meanings, check_meanings, motion_meanings : sequence of str
-        Meanings of 0, 1, ... in ``status``, in ``motion_changed`` where lanes are computed twice
-        to measure their error, and in ``motion`` where lanes are labelled.
+    The axes are second swept parameter, first swept parameter, start, those that there are;
+    ``states`` those of the scene in its order, ``section`` those recorded at so many section
+    points. Meanings are those of 0, 1, ...: of ``status``, of ``motion_changed`` where lanes are
+    computed twice to measure their error, and of ``motion`` where lanes are labelled.
     """
     names = tuple(axis.name for axis in axes)
 
@@ -234,12 +218,7 @@ def step_choice_variables(
 ) -> list[Variable]:
     """List what was measured to choose the number of steps, one value per candidate.
 
-    Parameters
-    ----------
-    steps : sequence of int
-        Numbers of steps per period that were tried; the last one was taken.
-    measured : mapping of str to sequence of float
-        Keys as below.
+    The last candidate was taken; ``measured`` has the keys below.
     """
     name = "candidate_steps"
     wording = {
