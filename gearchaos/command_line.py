@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import math
 import os
 import sys
-from argparse import ArgumentParser, Namespace
+from argparse import ArgumentParser, ArgumentTypeError, Namespace
 from collections.abc import Callable, Sequence
 from io import TextIOWrapper
 from typing import Any, NamedTuple, TextIO
@@ -112,6 +113,19 @@ class Command(NamedTuple):
             add(*short, f"--{name}", **COMMON_OPTIONS[name])
         add("--version", action="version", version=version_text())
         return parser
+
+
+def number(text: str, low: float = -math.inf, high: float = math.inf) -> float:
+    """Read a finite number within bounds off the command line."""
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        raise ArgumentTypeError(f"{text!r} is not a finite number")
+    if not low <= value <= high:
+        raise ArgumentTypeError(f"{text} is not between {low:g} and {high:g}")
+    return value
 
 
 def version_text() -> str:

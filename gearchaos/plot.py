@@ -11,14 +11,13 @@ or written.
 from __future__ import annotations
 
 import argparse
-import math
 import sys
 from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
-from gearchaos.command_line import OK, Command
+from gearchaos.command_line import OK, Command, number
 from gearchaos.errors import FigureError, FileError
 from gearchaos.progress import say
 
@@ -145,8 +144,8 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
         help="section variable of a sweep (default: section_delta_5), coordinate of a response "
         "(default: delta_5)",
     )
-    add("--from", dest="low", type=_number, metavar="VALUE", help="lowest parameter to show")
-    add("--to", dest="high", type=_number, metavar="VALUE", help="highest parameter to show")
+    add("--from", dest="low", type=number, metavar="VALUE", help="lowest parameter to show")
+    add("--to", dest="high", type=number, metavar="VALUE", help="highest parameter to show")
     add(
         "--at",
         type=_place,
@@ -165,11 +164,16 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
     add("--full-range", action="store_true", help="show every lane, however few lie far out")
     add(
         "--width",
-        type=_width,
+        type=partial(number, low=60.0, high=1000.0),
         metavar="MM",
         help="width of the page (default: 85, one column of a journal; a response: 180, two)",
     )
-    add("--height", type=_height, metavar="MM", help="height of the page (default: by the width)")
+    add(
+        "--height",
+        type=partial(number, low=70.0, high=1000.0),
+        metavar="MM",
+        help="height of the page (default: by the width)",
+    )
     add("--dpi", type=_dpi, default=300, help="pixels per inch (default: 300)")
 
 
@@ -235,36 +239,15 @@ def _lanes_in_words(result: Result) -> str:
     return f"{words}, {diverged} of them diverged" if diverged else words
 
 
-def _number(text: str) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
-    if not math.isfinite(value):
-        raise argparse.ArgumentTypeError(f"{text!r} is not a finite number")
-    return value
-
-
 def _place(text: str) -> tuple[str, float]:
     name, found, value = text.partition("=")
     if not (name and found):
         raise argparse.ArgumentTypeError(f"{text!r} is not NAME=VALUE, such as start=0")
-    return name.strip(), _number(value)
-
-
-def _within(low: float, high: float, text: str) -> float:
-    value = _number(text)
-    if not low <= value <= high:
-        raise argparse.ArgumentTypeError(f"{text} is not between {low:g} and {high:g}")
-    return value
-
-
-_width = partial(_within, 60.0, 1000.0)
-_height = partial(_within, 70.0, 1000.0)
+    return name.strip(), number(value)
 
 
 def _dpi(text: str) -> int:
-    value = _within(50.0, 1200.0, text)
+    value = number(text, 50.0, 1200.0)
     if value != int(value):
         raise argparse.ArgumentTypeError(f"{text} is not a whole number")
     return int(value)

@@ -11,9 +11,10 @@ import json
 import math
 import sys
 from collections.abc import Sequence
+from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
-from gearchaos.command_line import OK, Command
+from gearchaos.command_line import OK, Command, number
 from gearchaos.errors import ConfigurationError
 
 if TYPE_CHECKING:
@@ -52,13 +53,10 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def _width(text: str) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
-    if not (math.isfinite(value) and value > 0.0):
+    width = number(text)
+    if width <= 0.0:
         raise argparse.ArgumentTypeError(f"{text!r} is not a positive number")
-    return value
+    return width
 
 
 def _stages(options: argparse.Namespace) -> int:
@@ -104,16 +102,14 @@ def _coordinates(texts: Sequence[str], result: Result) -> dict[str, float]:
     for text in texts:
         key, _, value = text.rpartition("=")
         name = axis_name(key.strip()) or (others[0] if len(others) == 1 else "")
-        try:
-            number = float(value)
-        except ValueError:
-            number = math.nan
-        if not name or name in coordinates or not math.isfinite(number):
-            raise ConfigurationError(
-                f"--at {text}: must be NAME=VALUE with a number, each of the axes "
-                f"{', '.join(result.axes)} once"
-            )
-        coordinates[name] = number
+        with suppress(argparse.ArgumentTypeError):
+            if name and name not in coordinates:
+                coordinates[name] = number(value)
+                continue
+        raise ConfigurationError(
+            f"--at {text}: must be NAME=VALUE with a number, each of the axes "
+            f"{', '.join(result.axes)} once"
+        )
     return coordinates
 
 
