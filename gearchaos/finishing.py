@@ -51,12 +51,13 @@ def complete_already(simulation: Simulation, output: str) -> int | None:
     """
     from gearchaos.engine.store_filling import open_store
     from gearchaos.results.manifest import differing_keys, folder_of
-    from gearchaos.results.result_reader import completed
+    from gearchaos.results.result import completed
 
     found = completed(output)
     if found is None:
         return None
-    if keys := differing_keys(found.configuration, simulation.config.resolved_toml()):
+    resolved = str(found.metadata.get("configuration_resolved", ""))
+    if keys := differing_keys(resolved, simulation.config.resolved_toml()):
         raise FileError(
             f"{output}: is the result of another configuration, which differs in "
             f"{', '.join(keys)}; restore these values, replace it with --overwrite or choose "
@@ -67,5 +68,6 @@ def complete_already(simulation: Simulation, output: str) -> int | None:
         with suppress(FileError), open_store(simulation, output, resume=True) as store:
             store.remove()
     print(output, flush=True)
-    say(f"complete already: {found.lanes} lanes, {found.diverged} diverged")
-    return ending(simulation, found.diverged)
+    diverged = int((found["status"] != 0).sum())
+    say(f"complete already: {found['status'].size} lanes, {diverged} diverged")
+    return ending(simulation, diverged)

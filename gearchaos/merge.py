@@ -33,7 +33,7 @@ def _merge(options: Namespace) -> int:
     output: str = options.output
     from gearchaos.results.atomic_file import check_output
     from gearchaos.results.manifest import folder_of, stored_configuration
-    from gearchaos.results.result_reader import completed
+    from gearchaos.results.result import completed
 
     finished_before = not options.overwrite and completed(output) is not None
     if finished_before and not folder_of(output).is_dir():

@@ -15,7 +15,7 @@ import sys
 from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 from gearchaos.command_line import OK, Command, number
 from gearchaos.errors import FigureError, FileError
@@ -24,6 +24,9 @@ from gearchaos.progress import say
 if TYPE_CHECKING:
     from gearchaos.figures.page import Page
     from gearchaos.results.result import Result
+
+    Sheet = tuple[str, Callable[[], Page]]
+    """One page: what its name says beside that of the result, and how it is drawn."""
 
 RESULT_ENDINGS = (".h5", ".hdf5", ".nc")
 
@@ -35,11 +38,11 @@ def _plot(options: argparse.Namespace) -> int:
 
     result = _slice(open_result(options.result), dict(options.at))
     sheets = (_response_sheets if is_response(result) else _sweep_sheets)(result, options)
-    targets = [_targets(options, sheet.name, len(sheets) == 1) for sheet in sheets]
+    targets = [_targets(options, name, len(sheets) == 1) for name, _ in sheets]
     _check_targets([path for paths in targets for path in paths], options.result, options.overwrite)
     title = str(result.metadata.get("title", "")) or options.result.stem
-    for sheet, paths in zip(sheets, targets, strict=True):
-        figure = sheet.draw()
+    for (_, draw), paths in zip(sheets, targets, strict=True):
+        figure = draw()
         for path in paths:
             save_figure(figure, path, title=title, dpi=options.dpi)
             print(path, flush=True)
@@ -49,14 +52,7 @@ def _plot(options: argparse.Namespace) -> int:
     return OK
 
 
-class _Sheet(NamedTuple):
-    """One page: what its name says beside that of the result, and how it is drawn."""
-
-    name: str
-    draw: Callable[[], Page]
-
-
-def _sweep_sheets(result: Result, options: argparse.Namespace) -> list[_Sheet]:
+def _sweep_sheets(result: Result, options: argparse.Namespace) -> list[Sheet]:
     from gearchaos.figures import bifurcation_page
     from gearchaos.figures.labels import in_a_name
     from gearchaos.figures.style import SINGLE_COLUMN_MM
@@ -79,10 +75,10 @@ def _sweep_sheets(result: Result, options: argparse.Namespace) -> list[_Sheet]:
         width_mm=options.width or SINGLE_COLUMN_MM,
         height_mm=options.height,
     )
-    return [_Sheet(name, draw)]
+    return [(name, draw)]
 
 
-def _response_sheets(result: Result, options: argparse.Namespace) -> list[_Sheet]:
+def _response_sheets(result: Result, options: argparse.Namespace) -> list[Sheet]:
     from gearchaos.figures import response_page
     from gearchaos.figures.labels import in_a_name, place_of
     from gearchaos.figures.lanes import select_lanes
@@ -107,7 +103,7 @@ def _response_sheets(result: Result, options: argparse.Namespace) -> list[_Sheet
         height_mm=options.height,
     )
     return [
-        _Sheet(f"{in_a_name(place_of(result, lane))}{coordinate}", partial(draw, lane))
+        (f"{in_a_name(place_of(result, lane))}{coordinate}", partial(draw, lane))
         for lane in lanes.numbers[~lanes.diverged].tolist()
     ]
 

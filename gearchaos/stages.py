@@ -181,35 +181,29 @@ def boundary_list(boundaries: Sequence[Boundary]) -> list[str]:
     return lines
 
 
+_NAMES = {
+    "start": "from",
+    "end": "to",
+    "label": "motion",
+    "narrower": "narrower_stages",
+    "label_below": "motion_below",
+    "label_above": "motion_above",
+    "loss": "loss_of_stability",
+}
+"""Names in JSON of what stages and boundaries have, where they differ."""
+
+
 def _facts(stages: Sequence[Stage], boundaries: Sequence[Boundary] | None) -> dict[str, Any]:
-    facts: dict[str, Any] = {
-        "stages": [
-            {
-                "from": stage.start,
-                "to": stage.end,
-                "motion": stage.label,
-                "period": stage.period,
-                "lanes": stage.lanes,
-                "narrower_stages": stage.narrower,
-                "lowest_exponent": stage.lowest_exponent,
-                "highest_exponent": stage.highest_exponent,
-            }
-            for stage in stages
-        ],
-    }
+    def named(record: Stage | Boundary) -> dict[str, Any]:
+        return {_NAMES.get(name, name): value for name, value in record._asdict().items()}
+
+    facts = {"stages": [{**named(stage), "lanes": stage.lanes} for stage in stages]}
     if boundaries is not None:
-        facts["boundaries"] = [
-            {
-                "below": boundary.below,
-                "above": boundary.above,
-                "motion_below": boundary.label_below,
-                "motion_above": boundary.label_above,
-                "loss_of_stability": boundary.loss or None,
-                "multiplier_real": boundary.multiplier.real,
-                "multiplier_imaginary": boundary.multiplier.imag,
-            }
-            for boundary in boundaries
-        ]
+        facts["boundaries"] = [named(boundary) for boundary in boundaries]
+    for fact in facts.get("boundaries", ()):
+        multiplier = fact.pop("multiplier")
+        fact |= {"multiplier_real": multiplier.real, "multiplier_imaginary": multiplier.imag}
+        fact["loss_of_stability"] = fact["loss_of_stability"] or None
     return facts
 
 

@@ -149,12 +149,7 @@ class Configuration(Table):
         """Return a copy in which parameters, by name, are fixed at values in their units.
 
         Where [sweep] swept one, that becomes a sweep of this one value; where [second_sweep] did,
-        that goes.
-
-        Raises
-        ------
-        ConfigurationError
-            If a parameter cannot be swept, or the changed configuration breaks a rule.
+        that goes. Raises ConfigurationError if a parameter cannot be swept, or if a rule is broken.
         """
         unknown = [fault for name in values for fault in unknown_parameter("parameter", name)]
         if unknown:

@@ -49,14 +49,8 @@ class DaskExecutor:
     """Hands blocks to the workers of a cluster; blocks of a lost worker are run again.
 
     The simulation is not carried and its number of steps has been chosen; the address is that of a
-    scheduler, such as ``tcp://node7:8786``, or ``local:N`` for N processes here.
-
-    Raises
-    ------
-    ConfigurationError
-        If a local cluster of no workers is asked for.
-    ExecutionError
-        If there is no scheduler at the address.
+    scheduler, such as ``tcp://node7:8786``, or ``local:N`` for N processes here. Raises
+    ConfigurationError if N is no number of workers, ExecutionError if no scheduler answers.
     """
 
     def __init__(self, simulation: Simulation, address: str) -> None:

@@ -60,14 +60,8 @@ class Boundary(NamedTuple):
 def refinable(result: Result, name: str) -> Configuration:
     """Return the configuration with which single lanes of a result can be computed again.
 
-    Messages call the result ``name``.
-
-    Raises
-    ------
-    FileError
-        If the result does not hold its configuration.
-    ConfigurationError
-        If its lanes do not stand for themselves.
+    Messages call the result ``name``. Raises FileError if it does not hold its configuration,
+    ConfigurationError if its lanes do not stand for themselves.
     """
     text = str(result.metadata.get("configuration_resolved", ""))
     if not text:

@@ -50,8 +50,8 @@ def writing(path: str | os.PathLike[str]) -> Iterator[None]:
         if isinstance(error, RuntimeError) and "errno = " not in str(error):
             raise
         text = reason(error)
-        remedies = (remedy for code, remedy in _REMEDIES.items() if os.strerror(code) == text)
-        remedy = next(remedies, "choose another place")
+        by_text = {os.strerror(code): remedy for code, remedy in _REMEDIES.items()}
+        remedy = by_text.get(text, "choose another place")
         raise FileError(f"{path}: cannot be written: {text}; {remedy}") from error
 
 
@@ -85,12 +85,8 @@ def replacing(
 
     The temporary name, of an empty file to be filled, lies in ``scratch``, a folder on the same
     file system, or beside the file, and goes away if the block raises. Without ``through_links``
-    a symbolic link is replaced itself.
-
-    Raises
-    ------
-    FileError
-        If the file cannot be written; one that existed before is left as it was.
+    a symbolic link is replaced itself. Raises FileError if the file cannot be written; one that
+    existed before is left as it was.
     """
     with writing(path):
         target = _checked_target(path, overwrite) if through_links else Path(path)

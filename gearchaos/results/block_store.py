@@ -47,10 +47,6 @@ class BlockStore:
 
     Parameters
     ----------
-    output : path
-        The result file to be.
-    variables : sequence of Variable
-        What the sweep yields.
     configuration, text : str
         The configuration in TOML: resolved, of which others are refused, and as it was written.
     resume : bool
@@ -209,11 +205,7 @@ class BlockStore:
         """Make the result file of all blocks, one block in memory at a time, and tidy up.
 
         The first three are those of `write_result`; ``found`` is what `finished` has just given.
-
-        Raises
-        ------
-        FileError
-            If blocks are missing or the file cannot be written; the blocks stay.
+        Raises FileError if blocks are missing or the file cannot be written; the blocks stay.
         """
         bounds, problems = found or self.finished()
         if gaps := self.missing(bounds, self.lanes):

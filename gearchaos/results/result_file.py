@@ -47,11 +47,6 @@ class Parameter:
     The origin is one of `ORIGINS`, of which ``"swept"`` differs from lane to lane; the dimensions
     of the value are none, ``harmonic``, or the axes along which it differs; the rest is as of a
     variable.
-
-    Raises
-    ------
-    ValueError
-        If the value has another number of dimensions.
     """
 
     value: float | NDArray[np.float64]
@@ -88,17 +83,10 @@ def write_result(
 ) -> None:
     """Write a result block by block; the file appears complete or not at all.
 
-    Parameters
-    ----------
-    variables : sequence of Variable
-        What the file holds, in this order.
-    blocks : iterable of (first, last, arrays)
-        The lanes first to last - 1, in C order over the axes, of every variable without values
-        of its own, by name: shape (last - first, own dimensions).
-    parameters, metadata : mapping by name
-        Dimensionless groups of the model, and root attributes.
-    scratch : path, optional
-        Folder for the temporary file, on the same file system; by default that of the file.
+    The variables come in this order. Of every one without values of its own, by name, a block
+    (first, last, arrays) holds the lanes first to last - 1, in C order over the axes: shape
+    (last - first, own dimensions). ``scratch`` is a folder for the temporary file, on the same file
+    system; by default that of the file.
 
     Raises
     ------

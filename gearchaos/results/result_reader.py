@@ -5,9 +5,8 @@ from __future__ import annotations
 import os
 import stat
 from collections.abc import Mapping
-from contextlib import suppress
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import h5py
 import numpy as np
@@ -55,12 +54,8 @@ def read_result(path: str | os.PathLike[str], *, rows: bool = True) -> Contents:
 
     Links to other files are not followed, and nothing larger than what the file can hold is
     allocated. Without ``rows`` the values of variables with dimensions beside the axes are left
-    out, and the checksum of a file above 1 GiB is left unchecked.
-
-    Raises
-    ------
-    FileError
-        If the file is missing, damaged, of another kind or of another major format version.
+    out, and the checksum of a file above 1 GiB is left unchecked. Raises FileError if the file is
+    missing, damaged, of another kind or of another major format version.
     """
     name = os.fspath(path)
     try:
@@ -86,24 +81,6 @@ def read_result(path: str | os.PathLike[str], *, rows: bool = True) -> Contents:
         what = "is damaged" if h5py.is_hdf5(name) else "is not an HDF5 file, or is cut off"
         why = printable(reason(error))
         raise FileError(f"{name}: {what} ({why}); run the sweep again") from error
-
-
-class Completed(NamedTuple):
-    """What a finished sweep has computed: resolved TOML, lanes, and how many of them diverged."""
-
-    configuration: str
-    lanes: int
-    diverged: int
-
-
-def completed(path: str | os.PathLike[str]) -> Completed | None:
-    """Look into a result file; None if there is none, or if it is not as it was written."""
-    with suppress(OSError, ValueError, FileError):
-        if checksum_fits(Path(path)):
-            _, data, _, metadata = read_result(path, rows=False)
-            status, text = data[STATUS], str(metadata.get("configuration_resolved", ""))
-            return Completed(text, status.size, int(np.count_nonzero(status)))
-    return None
 
 
 def fixed_coordinates(metadata: Mapping[str, Any]) -> dict[str, float]:

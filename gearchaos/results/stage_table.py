@@ -129,13 +129,9 @@ def label_text(meaning: str, period: int) -> str:
 def stage_table(lanes: LabelledLanes, narrowest: float = 0.0) -> list[Stage]:
     """List the stages of a sweep in ascending order.
 
-    Parameters
-    ----------
-    lanes : LabelledLanes
-    narrowest : float
-        Stages narrower than this go into what surrounds them: the narrowest first, into both
-        neighbours where these are alike and otherwise into the wider one; of two alike the lower
-        one. A stage reaches halfway to the lanes beside it.
+    Stages narrower than ``narrowest`` go into what surrounds them: the narrowest first, into both
+    neighbours where these are alike and otherwise into the wider one; of two alike the lower one. A
+    stage reaches halfway to the lanes beside it.
     """
     changes = np.flatnonzero(lanes.labels[1:] != lanes.labels[:-1]) + 1
     edges = [0, *changes.tolist(), lanes.values.size]

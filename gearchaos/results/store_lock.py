@@ -22,12 +22,8 @@ class StoreLock:
 
     A sweep that takes all blocks has the folder to itself. Shards share it among each other; two
     that are the same do the same work and write the same bits. Where the system has no such locks,
-    two sweeps on one output are not noticed.
-
-    Raises
-    ------
-    FileError
-        If another process holds the lock, or if the folder cannot be made.
+    two sweeps on one output are not noticed. Raises FileError if another process holds the lock, or
+    if the folder cannot be made.
     """
 
     def __init__(self, folder: Path, output: Path, shared: bool = False) -> None:

@@ -44,22 +44,11 @@ STATE_WORDING: dict[str, tuple[str, str]] = {
 class Variable:
     """One named array of a result.
 
-    Parameters
-    ----------
-    name : str
-    dims : tuple of str
-        Names of the dimensions; those of what differs from lane to lane begin with all axes.
-    dtype : str
-        ``"float64"``, ``"int32"``, ``"uint8"`` or ``"str"``.
-    units, long_name, symbol : str
-        Unit (``"1"`` where dimensionless), wording and mathtext symbol for axis labels.
-    fill_value : float or int, optional
-        The value that stands for "none here"; ``None`` where every value means something.
-    flags : tuple of str
-        Meanings of the values 0, 1, 2, ... of an enumeration, one word each.
-    values : ndarray, optional
-        The values themselves, of the shape of `dims`, where they are known before the sweep, as
-        those of coordinates are; ``None`` for what every lane has to be computed for.
+    The dimensions of what differs from lane to lane begin with all axes; the type is ``"float64"``,
+    ``"int32"``, ``"uint8"`` or ``"str"``, the unit ``"1"`` where dimensionless, the symbol
+    mathtext. The fill value stands for "none here", None where every value means something; flags
+    are the meanings of 0, 1, 2, ... of an enumeration, one word each. Values, of the shape of the
+    dimensions, are there where they are known before the sweep, as those of coordinates are.
     """
 
     name: str
