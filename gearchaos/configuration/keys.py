@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import types
 import typing
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Annotated, Any, TypeAlias, Union
+from typing import Annotated, Any, TypeAlias
 
 from pydantic import BaseModel, ConfigDict, Field
 from pydantic.fields import FieldInfo
@@ -110,6 +109,5 @@ def keys_of(model: type[Table], path: str = "") -> Iterator[Key]:
 def _tables(annotation: Any) -> Iterator[type[Table]]:
     if isinstance(annotation, type) and issubclass(annotation, Table):
         yield annotation
-    elif typing.get_origin(annotation) in (Union, types.UnionType, Annotated):
-        for part in typing.get_args(annotation):
-            yield from _tables(part)
+    for part in typing.get_args(annotation):
+        yield from _tables(part)

@@ -19,9 +19,9 @@ from gearchaos.results.block_file import read_block, write_block
 from gearchaos.results.lane_ranges import Bounds, lanes_text, uncovered
 from gearchaos.results.manifest import (
     MANIFEST,
+    decisive_facts,
     fingerprint,
     folder_of,
-    manifest_of,
     read_manifest,
     settle_manifest,
 )
@@ -89,10 +89,10 @@ class BlockStore:
                 if v.values is None
             ]
         ).newbyteorder("<")
-        yields = self._record.descr
-        decisive = {"lanes": self.lanes, "variables": yields, "configuration": configuration}
-        manifest = manifest_of(decisive, text, shards)
-        self._fingerprint = fingerprint(manifest)
+        decisive = decisive_facts(
+            lanes=self.lanes, variables=self._record.descr, configuration=configuration
+        )
+        self._fingerprint = fingerprint(decisive)
         self._blocks = [(0, self.lanes)] if blocks is None else list(blocks)
         self._lock = StoreLock(self.folder, self.output, shared=blocks is not None)
         try:
@@ -106,8 +106,9 @@ class BlockStore:
             for partial in self.folder.glob(f".*{PARTIAL}") if blocks is None else ():
                 partial.unlink(missing_ok=True)
             # Of several shards, whoever comes first writes it.
-            shared = blocks is not None
-            settle_manifest(self.folder, manifest, write=shared or not own, overwrite=not shared)
+            shared, beside = blocks is not None, {"text": text, "shards": shards}
+            how = {"write": shared or not own, "overwrite": not shared}
+            settle_manifest(self.folder, decisive, beside, **how)
         except BaseException:
             self.close()
             raise

@@ -20,54 +20,51 @@ MANIFEST = "manifest.json"
 _LARGEST = 64 << 20
 
 
-def manifest_of(
-    decisive: Mapping[str, Any], text: str = "", shards: int | None = None
-) -> dict[str, Any]:
-    """Return what the manifest of a sweep says.
+def decisive_facts(**facts: Any) -> dict[str, Any]:
+    """Return what decides the numbers of a sweep, and with them whose blocks are whose.
 
-    ``decisive`` is what decides the numbers, and with them whose blocks are whose: ``lanes``,
-    ``variables`` and ``configuration``, the resolved one in TOML. ``text`` is the configuration as
-    it was written, ``shards`` into how many whoever began the sweep divided it.
+    That is ``lanes``, ``variables`` and ``configuration``, the resolved one in TOML.
     """
     versions = {"schema": STORE_SCHEMA, "schema_version": BLOCK_SCHEMA_VERSION}
     # As it is read again: with lists for tuples.
-    whole: dict[str, Any] = json.loads(json.dumps({**versions, **decisive}))
-    return {**whole, "text": text, "shards": shards}
+    return dict(json.loads(json.dumps({**versions, **facts})))
 
 
-def fingerprint(manifest: Mapping[str, Any]) -> str:
+def fingerprint(decisive: Mapping[str, Any]) -> str:
     """Return a hash of all that decides the numbers."""
-    return hashlib.sha256(json.dumps(_decisive(manifest), sort_keys=True).encode()).hexdigest()
+    return hashlib.sha256(json.dumps(decisive, sort_keys=True).encode()).hexdigest()
 
 
 def settle_manifest(
-    folder: Path, manifest: Mapping[str, Any], *, write: bool, overwrite: bool
+    folder: Path,
+    decisive: Mapping[str, Any],
+    beside: Mapping[str, Any],
+    *,
+    write: bool,
+    overwrite: bool,
 ) -> None:
     """Write the manifest of a folder, and refuse a folder of another sweep.
 
-    One that somebody else has just written is left as it is unless `overwrite` is set. Raises a
-    FileError that names the keys that differ.
+    ``beside`` decides nothing: ``text``, the configuration as it was written, and ``shards``, into
+    how many whoever began divided the sweep. A manifest that somebody else has just written stays
+    unless `overwrite` is set. Raises a FileError that names the keys that differ.
     """
     path = folder / MANIFEST
     try:
         if write:
             with replacing(path, overwrite=overwrite, through_links=False) as partial:
-                partial.write_text(json.dumps(manifest, indent=1), encoding="utf-8")
+                partial.write_text(json.dumps({**decisive, **beside}, indent=1), encoding="utf-8")
     except FileError:
         if overwrite or not path.exists():
             raise
-    earlier, own = read_manifest(folder), _decisive(manifest)
-    keys = differing_keys(earlier["configuration"], own["configuration"])
-    if keys := keys or [key for key in own if own[key] != earlier.get(key)]:
+    earlier = read_manifest(folder)
+    keys = differing_keys(earlier["configuration"], decisive["configuration"])
+    if keys := keys or [key for key in decisive if decisive[key] != earlier.get(key)]:
         raise FileError(
             f"{folder}: holds blocks of another configuration, which differs in "
             f"{', '.join(keys)}; restore these values, delete the folder or choose another "
             "--output"
         )
-
-
-def _decisive(manifest: Mapping[str, Any]) -> dict[str, Any]:
-    return {key: value for key, value in manifest.items() if key not in ("text", "shards")}
 
 
 def folder_of(output: str | os.PathLike[str]) -> Path:

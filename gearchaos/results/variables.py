@@ -141,8 +141,7 @@ def sweep_variables(
         return Variable(name, names, "uint8", "1", text, flags=flags)
 
     variables = [
-        _coordinate(axis.name, axis.values, axis.long_name, axis.symbol, axis.units)
-        for axis in axes
+        _coordinate(one.name, one.values, one.long_name, one.symbol, one.units) for one in axes
     ]
     if section and section_points > 0:
         text = "number of the section point, one mesh period apart; the last one ends the lane"
