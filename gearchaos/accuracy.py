@@ -113,12 +113,10 @@ def _write(settings: Sequence[Setting], title: str, targets: list[str], overwrit
     from gearchaos.figures.work_precision import work_precision_page
     from gearchaos.results.atomic_file import replacing
 
-    page = work_precision_page(
-        {
-            mode: [(s.seconds, s.error, s.steps) for s in settings if s.mode == mode]
-            for mode in MODES
-        }
-    )
+    points = {
+        mode: [(s.seconds, s.error, s.steps) for s in settings if s.mode == mode] for mode in MODES
+    }
+    page = work_precision_page(points)
     *pictures, table_file = targets
     for target in pictures:
         save_figure(page, target, title=title, overwrite=overwrite)
@@ -133,15 +131,9 @@ def _write(settings: Sequence[Setting], title: str, targets: list[str], overwrit
 
 
 def measure(simulation: Simulation, steps: Sequence[int], lanes: int) -> list[Setting]:
-    """Measure error and time of every number of steps, plain and resolved.
+    """Measure error and time of every number of steps per mesh period, plain and resolved.
 
-    Parameters
-    ----------
-    simulation : Simulation
-    steps : sequence of int
-        Steps per mesh period.
-    lanes : int
-        Lanes to try, spread evenly over the sweep.
+    So many lanes are tried, spread evenly over the sweep.
     """
     from statistics import fmean, median
 
@@ -164,16 +156,8 @@ def measure(simulation: Simulation, steps: Sequence[int], lanes: int) -> list[Se
             found = solution(count, mode == "resolved")
             seconds.append(time.perf_counter() - began)
         apart = difference(found, truth)
-        settings.append(
-            Setting(
-                count,
-                mode,
-                bound(apart.section_error),
-                bound(apart.exponent_error[apart.period > 0]),
-                fmean(apart.changed),
-                median(seconds),
-            )
-        )
+        errors = bound(apart.section_error), bound(apart.exponent_error[apart.period > 0])
+        settings.append(Setting(count, mode, *errors, fmean(apart.changed), median(seconds)))
     return settings
 
 

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import math
 import os
 import sys
-from argparse import ArgumentParser, Namespace
+from argparse import ArgumentParser, ArgumentTypeError, Namespace
 from collections.abc import Callable, Sequence
 from io import TextIOWrapper
 from typing import Any, NamedTuple, TextIO
@@ -47,22 +48,11 @@ class Command(NamedTuple):
     system error that nobody has worded and, as the shell says, 130 for an interrupt, 143 for
     SIGTERM, 141 when the reader of the output has gone.
 
-    Attributes
-    ----------
-    name : str
-        As it follows ``gearchaos``.
-    text : str
-        What --help says before the options and, from the first empty line on, after them.
-    arguments : callable
-        Adds what only this command takes to its parser.
-    body : callable
-        Does it. Has beside the parsed options the `arguments` as they were given. Imports what is
-        heavy, so that --help answers at once.
-    common : tuple of str
-        Names of the `COMMON_OPTIONS` that it takes too; all have --quiet and --version.
-    writes : bool
-        Whether an interrupt finds anything to put in order: then the body asks for it at moments
-        of its own choice, see `interrupts`.
+    ``name`` follows ``gearchaos``; ``text`` is what --help says before the options and, from the
+    first empty line on, after them; ``arguments`` adds the command's own to its parser, ``common``
+    names the `COMMON_OPTIONS` that it takes too. ``body`` does it, with the options and, as their
+    `arguments`, what was given; it imports what is heavy, so that --help answers at once. Where
+    the command ``writes``, it asks for interrupts at moments of its own choice, see `interrupts`.
     """
 
     name: str
@@ -123,6 +113,19 @@ class Command(NamedTuple):
             add(*short, f"--{name}", **COMMON_OPTIONS[name])
         add("--version", action="version", version=version_text())
         return parser
+
+
+def number(text: str, low: float = -math.inf, high: float = math.inf) -> float:
+    """Read a finite number within bounds off the command line."""
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        raise ArgumentTypeError(f"{text!r} is not a finite number")
+    if not low <= value <= high:
+        raise ArgumentTypeError(f"{text} is not between {low:g} and {high:g}")
+    return value
 
 
 def version_text() -> str:

@@ -19,10 +19,7 @@ if TYPE_CHECKING:
 def output_of(options: Namespace, suffix: str = ".h5") -> str:
     """Return the result file to be: that of --output, or one named after the configuration.
 
-    Raises
-    ------
-    FileError
-        If it is the configuration itself.
+    Raises FileError if it is the configuration itself.
     """
     # A text, not a Path, which would drop the slash that tells a folder from a file.
     output: str = options.output
@@ -49,24 +46,18 @@ def ending(simulation: Simulation, diverged: int) -> int:
 def complete_already(simulation: Simulation, output: str) -> int | None:
     """Go on with a sweep whose result exists: nothing is left to be done.
 
-    Returns
-    -------
-    int or None
-        The exit code that the sweep had; None if the file is no undamaged result.
-
-    Raises
-    ------
-    FileError
-        If the file is the result of another configuration.
+    Returns the exit code that the sweep had, None if the file is no undamaged result. Raises
+    FileError if it is the result of another configuration.
     """
     from gearchaos.engine.store_filling import open_store
     from gearchaos.results.manifest import differing_keys, folder_of
-    from gearchaos.results.result_reader import completed
+    from gearchaos.results.result import completed
 
     found = completed(output)
     if found is None:
         return None
-    if keys := differing_keys(found.configuration, simulation.config.resolved_toml()):
+    resolved = str(found.metadata.get("configuration_resolved", ""))
+    if keys := differing_keys(resolved, simulation.config.resolved_toml()):
         raise FileError(
             f"{output}: is the result of another configuration, which differs in "
             f"{', '.join(keys)}; restore these values, replace it with --overwrite or choose "
@@ -77,5 +68,6 @@ def complete_already(simulation: Simulation, output: str) -> int | None:
         with suppress(FileError), open_store(simulation, output, resume=True) as store:
             store.remove()
     print(output, flush=True)
-    say(f"complete already: {found.lanes} lanes, {found.diverged} diverged")
-    return ending(simulation, found.diverged)
+    diverged = int((found["status"] != 0).sum())
+    say(f"complete already: {found['status'].size} lanes, {diverged} diverged")
+    return ending(simulation, diverged)

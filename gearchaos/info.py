@@ -42,32 +42,29 @@ def _info(options: Namespace) -> int:
     return OK
 
 
-def _settings(metadata: Mapping[str, Any]) -> dict[str, list[str]]:
-    """Sort the keys of the configuration by where their values come from."""
+def _settings(metadata: Mapping[str, Any]) -> list[str]:
+    """Word the keys of the configuration, and where those that were not written come from."""
     from gearchaos.configuration import Configuration
     from gearchaos.configuration.messages import shown
     from gearchaos.configuration.toml_text import flat_tables, tables_from_toml
     from gearchaos.errors import ConfigurationError
 
     text = str(metadata.get("configuration", ""))
+    resolved = str(metadata.get("configuration_resolved", ""))
     try:
-        written, by_itself, resolved = (
-            flat_tables(tables_from_toml(toml, "configuration"))
-            for toml in (
-                text,
-                Configuration.from_toml(text, "configuration").resolved_toml(),
-                str(metadata.get("configuration_resolved", "")),
-            )
+        alone = Configuration.from_toml(text, "configuration").resolved_toml()
+        written, by_itself, ran = (
+            flat_tables(tables_from_toml(toml, "configuration")) for toml in (text, alone, resolved)
         )
     except ConfigurationError:  # Not ours to judge here: the numbers are there all the same.
-        return {}
-    origins: dict[str, list[str]] = {"as written": [], "set for this run": [], "by default": []}
-    for key, value in resolved.items():
-        origin = "as written" if key in written else "by default"
+        return []
+    lines = []
+    for key, value in ran.items():
+        origin = "" if key in written else " (by default)"
         if by_itself.get(key) != value:
-            origin = "set for this run"
-        origins[origin].append(f"{key} = {shown(value)}")
-    return {origin: keys for origin, keys in origins.items() if keys}
+            origin = " (set for this run)"
+        lines.append(f"{key} = {shown(value)}{origin}")
+    return lines
 
 
 def _write(text: str) -> None:

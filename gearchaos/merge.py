@@ -33,7 +33,7 @@ def _merge(options: Namespace) -> int:
     output: str = options.output
     from gearchaos.results.atomic_file import check_output
     from gearchaos.results.manifest import folder_of, stored_configuration
-    from gearchaos.results.result_reader import completed
+    from gearchaos.results.result import completed
 
     finished_before = not options.overwrite and completed(output) is not None
     if finished_before and not folder_of(output).is_dir():
@@ -70,7 +70,7 @@ def _merge(options: Namespace) -> int:
 def _require_all(store: BlockStore, found: Finished) -> None:
     """Name the shards of which blocks are missing, as far as it is known how many there are."""
     from gearchaos.engine.sharding import shared_blocks
-    from gearchaos.results.block_store import lanes_text, uncovered
+    from gearchaos.results.lane_ranges import lanes_text, uncovered
 
     gaps = store.missing(found.bounds, store.lanes)
     if not gaps:

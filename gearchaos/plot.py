@@ -11,20 +11,22 @@ or written.
 from __future__ import annotations
 
 import argparse
-import math
 import sys
 from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
-from gearchaos.command_line import OK, Command
+from gearchaos.command_line import OK, Command, number
 from gearchaos.errors import FigureError, FileError
 from gearchaos.progress import say
 
 if TYPE_CHECKING:
     from gearchaos.figures.page import Page
     from gearchaos.results.result import Result
+
+    Sheet = tuple[str, Callable[[], Page]]
+    """One page: what its name says beside that of the result, and how it is drawn."""
 
 RESULT_ENDINGS = (".h5", ".hdf5", ".nc")
 
@@ -36,11 +38,11 @@ def _plot(options: argparse.Namespace) -> int:
 
     result = _slice(open_result(options.result), dict(options.at))
     sheets = (_response_sheets if is_response(result) else _sweep_sheets)(result, options)
-    targets = [_targets(options, sheet.name, len(sheets) == 1) for sheet in sheets]
+    targets = [_targets(options, name, len(sheets) == 1) for name, _ in sheets]
     _check_targets([path for paths in targets for path in paths], options.result, options.overwrite)
     title = str(result.metadata.get("title", "")) or options.result.stem
-    for sheet, paths in zip(sheets, targets, strict=True):
-        figure = sheet.draw()
+    for (_, draw), paths in zip(sheets, targets, strict=True):
+        figure = draw()
         for path in paths:
             save_figure(figure, path, title=title, dpi=options.dpi)
             print(path, flush=True)
@@ -50,14 +52,7 @@ def _plot(options: argparse.Namespace) -> int:
     return OK
 
 
-class _Sheet(NamedTuple):
-    """One page: what its name says beside that of the result, and how it is drawn."""
-
-    name: str
-    draw: Callable[[], Page]
-
-
-def _sweep_sheets(result: Result, options: argparse.Namespace) -> list[_Sheet]:
+def _sweep_sheets(result: Result, options: argparse.Namespace) -> list[Sheet]:
     from gearchaos.figures import bifurcation_page
     from gearchaos.figures.labels import in_a_name
     from gearchaos.figures.style import SINGLE_COLUMN_MM
@@ -80,10 +75,10 @@ def _sweep_sheets(result: Result, options: argparse.Namespace) -> list[_Sheet]:
         width_mm=options.width or SINGLE_COLUMN_MM,
         height_mm=options.height,
     )
-    return [_Sheet(name, draw)]
+    return [(name, draw)]
 
 
-def _response_sheets(result: Result, options: argparse.Namespace) -> list[_Sheet]:
+def _response_sheets(result: Result, options: argparse.Namespace) -> list[Sheet]:
     from gearchaos.figures import response_page
     from gearchaos.figures.labels import in_a_name, place_of
     from gearchaos.figures.lanes import select_lanes
@@ -108,7 +103,7 @@ def _response_sheets(result: Result, options: argparse.Namespace) -> list[_Sheet
         height_mm=options.height,
     )
     return [
-        _Sheet(f"{in_a_name(place_of(result, lane))}{coordinate}", partial(draw, lane))
+        (f"{in_a_name(place_of(result, lane))}{coordinate}", partial(draw, lane))
         for lane in lanes.numbers[~lanes.diverged].tolist()
     ]
 
@@ -145,8 +140,8 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
         help="section variable of a sweep (default: section_delta_5), coordinate of a response "
         "(default: delta_5)",
     )
-    add("--from", dest="low", type=_number, metavar="VALUE", help="lowest parameter to show")
-    add("--to", dest="high", type=_number, metavar="VALUE", help="highest parameter to show")
+    add("--from", dest="low", type=number, metavar="VALUE", help="lowest parameter to show")
+    add("--to", dest="high", type=number, metavar="VALUE", help="highest parameter to show")
     add(
         "--at",
         type=_place,
@@ -165,11 +160,16 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
     add("--full-range", action="store_true", help="show every lane, however few lie far out")
     add(
         "--width",
-        type=_width,
+        type=partial(number, low=60.0, high=1000.0),
         metavar="MM",
         help="width of the page (default: 85, one column of a journal; a response: 180, two)",
     )
-    add("--height", type=_height, metavar="MM", help="height of the page (default: by the width)")
+    add(
+        "--height",
+        type=partial(number, low=70.0, high=1000.0),
+        metavar="MM",
+        help="height of the page (default: by the width)",
+    )
     add("--dpi", type=_dpi, default=300, help="pixels per inch (default: 300)")
 
 
@@ -235,36 +235,15 @@ def _lanes_in_words(result: Result) -> str:
     return f"{words}, {diverged} of them diverged" if diverged else words
 
 
-def _number(text: str) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
-    if not math.isfinite(value):
-        raise argparse.ArgumentTypeError(f"{text!r} is not a finite number")
-    return value
-
-
 def _place(text: str) -> tuple[str, float]:
     name, found, value = text.partition("=")
     if not (name and found):
         raise argparse.ArgumentTypeError(f"{text!r} is not NAME=VALUE, such as start=0")
-    return name.strip(), _number(value)
-
-
-def _within(low: float, high: float, text: str) -> float:
-    value = _number(text)
-    if not low <= value <= high:
-        raise argparse.ArgumentTypeError(f"{text} is not between {low:g} and {high:g}")
-    return value
-
-
-_width = partial(_within, 60.0, 1000.0)
-_height = partial(_within, 70.0, 1000.0)
+    return name.strip(), number(value)
 
 
 def _dpi(text: str) -> int:
-    value = _within(50.0, 1200.0, text)
+    value = number(text, 50.0, 1200.0)
     if value != int(value):
         raise argparse.ArgumentTypeError(f"{text} is not a whole number")
     return int(value)

@@ -53,15 +53,7 @@ def notice(text: str) -> Iterator[None]:
 
 
 class Progress:
-    """Lanes done: a bar on a terminal, a plain line now and then elsewhere.
-
-    Parameters
-    ----------
-    lanes : int
-        Lanes of the whole sweep.
-    done : int
-        Those finished before.
-    """
+    """Lanes done of so many: a bar on a terminal, a plain line now and then elsewhere."""
 
     def __init__(self, lanes: int, done: int = 0) -> None:
         from tqdm import tqdm

@@ -11,9 +11,10 @@ import json
 import math
 import sys
 from collections.abc import Sequence
+from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
-from gearchaos.command_line import OK, Command
+from gearchaos.command_line import OK, Command, number
 from gearchaos.errors import ConfigurationError
 
 if TYPE_CHECKING:
@@ -52,13 +53,10 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def _width(text: str) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
-    if not (math.isfinite(value) and value > 0.0):
+    width = number(text)
+    if width <= 0.0:
         raise argparse.ArgumentTypeError(f"{text!r} is not a positive number")
-    return value
+    return width
 
 
 def _stages(options: argparse.Namespace) -> int:
@@ -104,16 +102,14 @@ def _coordinates(texts: Sequence[str], result: Result) -> dict[str, float]:
     for text in texts:
         key, _, value = text.rpartition("=")
         name = axis_name(key.strip()) or (others[0] if len(others) == 1 else "")
-        try:
-            number = float(value)
-        except ValueError:
-            number = math.nan
-        if not name or name in coordinates or not math.isfinite(number):
-            raise ConfigurationError(
-                f"--at {text}: must be NAME=VALUE with a number, each of the axes "
-                f"{', '.join(result.axes)} once"
-            )
-        coordinates[name] = number
+        with suppress(argparse.ArgumentTypeError):
+            if name and name not in coordinates:
+                coordinates[name] = number(value)
+                continue
+        raise ConfigurationError(
+            f"--at {text}: must be NAME=VALUE with a number, each of the axes "
+            f"{', '.join(result.axes)} once"
+        )
     return coordinates
 
 
@@ -185,35 +181,29 @@ def boundary_list(boundaries: Sequence[Boundary]) -> list[str]:
     return lines
 
 
+_NAMES = {
+    "start": "from",
+    "end": "to",
+    "label": "motion",
+    "narrower": "narrower_stages",
+    "label_below": "motion_below",
+    "label_above": "motion_above",
+    "loss": "loss_of_stability",
+}
+"""Names in JSON of what stages and boundaries have, where they differ."""
+
+
 def _facts(stages: Sequence[Stage], boundaries: Sequence[Boundary] | None) -> dict[str, Any]:
-    facts: dict[str, Any] = {
-        "stages": [
-            {
-                "from": stage.start,
-                "to": stage.end,
-                "motion": stage.label,
-                "period": stage.period,
-                "lanes": stage.lanes,
-                "narrower_stages": stage.narrower,
-                "lowest_exponent": stage.lowest_exponent,
-                "highest_exponent": stage.highest_exponent,
-            }
-            for stage in stages
-        ],
-    }
+    def named(record: Stage | Boundary) -> dict[str, Any]:
+        return {_NAMES.get(name, name): value for name, value in record._asdict().items()}
+
+    facts = {"stages": [{**named(stage), "lanes": stage.lanes} for stage in stages]}
     if boundaries is not None:
-        facts["boundaries"] = [
-            {
-                "below": boundary.below,
-                "above": boundary.above,
-                "motion_below": boundary.label_below,
-                "motion_above": boundary.label_above,
-                "loss_of_stability": boundary.loss or None,
-                "multiplier_real": boundary.multiplier.real,
-                "multiplier_imaginary": boundary.multiplier.imag,
-            }
-            for boundary in boundaries
-        ]
+        facts["boundaries"] = [named(boundary) for boundary in boundaries]
+    for fact in facts.get("boundaries", ()):
+        multiplier = fact.pop("multiplier")
+        fact |= {"multiplier_real": multiplier.real, "multiplier_imaginary": multiplier.imag}
+        fact["loss_of_stability"] = fact["loss_of_stability"] or None
     return facts
 
 

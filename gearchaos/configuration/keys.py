@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import types
 import typing
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Annotated, Any, TypeAlias, Union
+from typing import Annotated, Any, TypeAlias
 
 from pydantic import BaseModel, ConfigDict, Field
 from pydantic.fields import FieldInfo
@@ -46,20 +45,10 @@ TeethPair: TypeAlias = Annotated[tuple[_Teeth, _Teeth], _AS_LIST]
 def key(
     description: str, units: str = "", example: Any = None, *, default: Any = ..., **rules: Any
 ) -> Any:
-    """Declare a key: what it is, its unit, its default and the rules its value obeys.
+    """Declare a key: what it is without its unit, its unit, an example, and its default.
 
-    Parameters
-    ----------
-    description : str
-        The meaning, without the unit.
-    units : str
-        Empty where there is none; ``"1"`` for a dimensionless number.
-    example : object
-        A value to show where a fault is reported.
-    default : object
-        ``...`` makes the key required.
-    **rules
-        Constraints of `pydantic.Field`, such as ``gt=0``.
+    The unit is empty where there is none and ``"1"`` for a dimensionless number, ``...`` as default
+    makes the key required, and the rules are constraints of `pydantic.Field`, such as ``gt=0``.
     """
     return Field(
         default,
@@ -120,6 +109,5 @@ def keys_of(model: type[Table], path: str = "") -> Iterator[Key]:
 def _tables(annotation: Any) -> Iterator[type[Table]]:
     if isinstance(annotation, type) and issubclass(annotation, Table):
         yield annotation
-    elif typing.get_origin(annotation) in (Union, types.UnionType, Annotated):
-        for part in typing.get_args(annotation):
-            yield from _tables(part)
+    for part in typing.get_args(annotation):
+        yield from _tables(part)

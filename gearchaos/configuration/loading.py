@@ -16,11 +16,7 @@ LARGEST_FILE = 4 * 1024 * 1024
 def load_config(path: str | os.PathLike[str], overrides: Iterable[str] = ()) -> Configuration:
     """Read a configuration from a TOML file.
 
-    Parameters
-    ----------
-    path : path
-    overrides : iterable of str
-        Such as ``"integration.steps_per_period=100"``; what is not TOML is taken as text.
+    Overrides are such as ``"integration.steps_per_period=100"``; what is not TOML is taken as text.
 
     Raises
     ------

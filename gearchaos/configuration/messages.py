@@ -104,16 +104,10 @@ def suggestion(word: str, words: Iterable[str]) -> str:
 
 
 def fault_of(error: ErrorDetails, tables: Mapping[str, Any], keys: Mapping[str, Key]) -> Fault:
-    """Word one error of pydantic.
+    """Word one error that `ValidationError.errors` lists.
 
-    Parameters
-    ----------
-    error : dict
-        As `ValidationError.errors` lists it.
-    tables : mapping
-        What was validated: it tells the keys in an error's location from names that pydantic adds.
-    keys : mapping of str to Key
-        Every key by its path.
+    ``tables``, what was validated, tells the keys in the error's location from names that pydantic
+    adds; ``keys`` are all of a configuration by their paths.
     """
     kind, value, rule = error["type"], error["input"], _rule(error)
     names = _names(error["loc"], tables)

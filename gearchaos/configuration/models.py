@@ -106,12 +106,8 @@ class Configuration(Table):
     ) -> Configuration:
         """Make a configuration from TOML text, which messages call ``source``.
 
-        ``overrides`` are those of `load_config`.
-
-        Raises
-        ------
-        ConfigurationError
-            With one message per fault, all faults at once.
+        ``overrides`` are those of `load_config`. Raises ConfigurationError with one message per
+        fault, all faults at once.
         """
         tables = with_overrides(tables_from_toml(text, source), overrides, source)
         config = cls.from_tables(tables, source)
@@ -122,10 +118,7 @@ class Configuration(Table):
     def from_tables(cls, tables: Mapping[str, Any], source: str = "<python>") -> Configuration:
         """Make a configuration from nested mappings with the keys of the TOML file.
 
-        Raises
-        ------
-        ConfigurationError
-            With one message per fault, all faults at once.
+        Raises ConfigurationError with one message per fault, all faults at once.
         """
         try:
             config = cls.model_validate(dict(tables), context={"source": source})
@@ -143,12 +136,8 @@ class Configuration(Table):
     def replace(self, path: str, value: Any) -> Configuration:
         """Return a copy in which one key, or table, at its dotted path has another value.
 
-        A value of a table is a mapping; None removes the key.
-
-        Raises
-        ------
-        ConfigurationError
-            If the changed configuration breaks a rule.
+        A value of a table is a mapping; None removes the key. Raises ConfigurationError if the
+        changed configuration breaks a rule.
         """
         try:
             tables = with_value(self.tables(), path.split("."), value)
@@ -157,18 +146,10 @@ class Configuration(Table):
         return type(self).from_tables(tables, self.source)
 
     def at(self, values: Mapping[str, float]) -> Configuration:
-        """Return a copy in which parameters are fixed at values.
+        """Return a copy in which parameters, by name, are fixed at values in their units.
 
-        Parameters
-        ----------
-        values : mapping of str to float
-            By parameter, as `Sweep.parameter` names it and in its unit. Where [sweep] swept it,
-            that becomes a sweep of this one value; where [second_sweep] did, that goes.
-
-        Raises
-        ------
-        ConfigurationError
-            If a parameter cannot be swept, or the changed configuration breaks a rule.
+        Where [sweep] swept one, that becomes a sweep of this one value; where [second_sweep] did,
+        that goes. Raises ConfigurationError if a parameter cannot be swept, or if a rule is broken.
         """
         unknown = [fault for name in values for fault in unknown_parameter("parameter", name)]
         if unknown:

@@ -47,14 +47,8 @@ def _table(name: str, keys: list[Key]) -> str:
     title = f"### `[{name}]`" if name else "### Top level"
     lines = [title, "", "| key | unit | range | default | meaning |", "|---|---|---|---|---|"]
     for key in keys:
-        unit = "" if key.units == "1" else key.units
-        cells = [
-            f"`{key.path.rpartition('.')[2]}`",
-            unit,
-            key.valid.bounds,
-            _default(key),
-            key.wording,
-        ]
+        column, unit = key.path.rpartition(".")[2], "" if key.units == "1" else key.units
+        cells = [f"`{column}`", unit, key.valid.bounds, _default(key), key.wording]
         lines.append(f"| {' | '.join(cells)} |")
     return "\n".join(lines)
 

@@ -50,25 +50,11 @@ def axis_values(config: Configuration) -> dict[str, FloatArray]:
 def groups_at(config: Configuration, values: Mapping[str, npt.ArrayLike]) -> Groups:
     """Resolve the groups for given values of parameters.
 
-    Parameters
-    ----------
-    config : Configuration
-    values : mapping of str to array_like
-        By parameter, in its own unit, of shapes that broadcast against each other. A group
-        replaces the one in the file; a physical quantity takes part in the derivation of every
-        group that is not given. What is not in it is as the file gives it.
-
-    Returns
-    -------
-    Groups
-        Each in the broadcast shape of the values on which it depends; a float where on none.
-
-    Raises
-    ------
-    ConfigurationError
-        If the harmonics of the mesh stiffness would differ between lanes.
-    KeyError
-        If a parameter cannot be swept.
+    ``values``, by parameter and in its unit, are arrays that broadcast against each other. A group
+    replaces the one in the file; a physical quantity takes part in the derivation of every group
+    that is not given. Each group comes in the broadcast shape of the values on which it depends,
+    as a float where on none. Raises ConfigurationError if the harmonics of the mesh stiffness would
+    differ between lanes, KeyError if a parameter cannot be swept.
     """
     physical: dict[str, Any] = config.physical()
     given: dict[str, Any] = dict(config.groups.given())

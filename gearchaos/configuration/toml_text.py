@@ -23,13 +23,7 @@ def quoted_key(name: str) -> str:
 
 
 def tables_from_toml(text: str, source: str) -> dict[str, Any]:
-    """Parse TOML text.
-
-    Raises
-    ------
-    ConfigurationError
-        With the line and the column where the text stops being TOML.
-    """
+    """Parse TOML text; ConfigurationError with the line and column where it stops being TOML."""
     try:
         if _ENDLESS_KEY.search(text):
             raise RecursionError
@@ -52,12 +46,8 @@ def with_overrides(
     """Return the tables with ``key.path=value`` overrides applied, later ones over earlier ones.
 
     A value is read as TOML; what is not TOML is taken as text, so that ``start.kind=rest`` needs
-    no quotes. ``source`` is the name of the file, for messages.
-
-    Raises
-    ------
-    ConfigurationError
-        One message per override that is not of this form or goes through a value.
+    no quotes. Raises ConfigurationError with one message, which calls the file ``source``, per
+    override that is not of this form or goes through a value.
     """
     result = dict(tables)
     problems = []
@@ -85,10 +75,7 @@ def with_overrides(
 def with_value(tables: Mapping[str, Any], names: list[str], value: Any) -> dict[str, Any]:
     """Return a copy of nested tables in which one value is replaced, or removed by None.
 
-    Raises
-    ------
-    KeyError
-        With the path that would have to be a table and is a value.
+    Raises KeyError with the path that would have to be a table and is a value.
     """
     head, *rest = names
     result = dict(tables)

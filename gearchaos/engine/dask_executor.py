@@ -13,14 +13,13 @@ from typing import Any, NamedTuple, Self
 
 import distributed
 from gearchaos_kernels import current_threads, most_threads, use_threads
-from gearchaos_kernels.compilation import CACHE_FOLDER, source_hash
+from gearchaos_kernels.compilation import source_hash
 
 from gearchaos.configuration import Configuration
 from gearchaos.engine.executors import ExecutionError
 from gearchaos.engine.simulation import Arrays, Bounds, Simulation
 from gearchaos.errors import ConfigurationError
 from gearchaos.progress import say
-from gearchaos.results.store_lock import waiting_lock
 from gearchaos.version import software_version
 
 # Its constructors carry no annotations.
@@ -37,14 +36,8 @@ _IGNORE_INTERRUPTS = "import signal; signal.signal(signal.SIGINT, signal.SIG_IGN
 class Recipe(NamedTuple):
     """All that a worker must know to compute blocks of a sweep.
 
-    Attributes
-    ----------
-    configuration : str
-        The resolved configuration in TOML.
-    steps_per_period : int
-        Where a tolerance was given it is chosen once, not on every worker.
-    software : tuple of str
-        Versions that decide the numbers; see `software`.
+    ``configuration`` is the resolved one in TOML; the steps are chosen once, not on every worker;
+    ``software`` are the versions that decide the numbers.
     """
 
     configuration: str
@@ -55,19 +48,9 @@ class Recipe(NamedTuple):
 class DaskExecutor:
     """Hands blocks to the workers of a cluster; blocks of a lost worker are run again.
 
-    Parameters
-    ----------
-    simulation : Simulation
-        Not carried; its number of steps has been chosen.
-    address : str
-        Of a scheduler, such as ``tcp://node7:8786``, or ``local:N`` for N processes here.
-
-    Raises
-    ------
-    ConfigurationError
-        If a local cluster of no workers is asked for.
-    ExecutionError
-        If there is no scheduler at the address.
+    The simulation is not carried and its number of steps has been chosen; the address is that of a
+    scheduler, such as ``tcp://node7:8786``, or ``local:N`` for N processes here. Raises
+    ConfigurationError if N is no number of workers, ExecutionError if no scheduler answers.
     """
 
     def __init__(self, simulation: Simulation, address: str) -> None:
@@ -151,13 +134,7 @@ def software() -> tuple[str, str]:
 
 
 def compute_block(recipe: Recipe, block: Bounds) -> dict[str, Any]:
-    """Compute a block; this runs on a worker.
-
-    Raises
-    ------
-    ExecutionError
-        If the software of the worker is not that of the client.
-    """
+    """Compute a block on a worker; ExecutionError if its software is not that of the client."""
     if software() != recipe.software:
         here, wanted = (
             f"{version} (kernels {kernels})" for version, kernels in (software(), recipe.software)
@@ -180,9 +157,6 @@ _ONE_AT_A_TIME = Lock()
 def _simulation(recipe: Recipe) -> Simulation:
     simulation = Simulation(Configuration.from_toml(recipe.configuration, "<client>"))
     simulation.plan = simulation.plan._replace(steps_per_period=recipe.steps_per_period)
-    # The first process of a node compiles; the others wait, and load what it has compiled.
-    with waiting_lock(CACHE_FOLDER / "compiling.lock"):
-        simulation.rehearse()
     return simulation
 
 

@@ -14,6 +14,9 @@ NOT_CHECKED, SAME, CHANGED = 0, 1, 2
 MEANINGS = ("not_checked", "same", "changed")
 """Meanings of the values of ``motion_changed``."""
 
+CHECKED = ("section_error", "exponent_error", "motion_changed")
+"""Variables that the check yields."""
+
 
 def checked_lanes(first: int, last: int, share: float) -> NDArray[np.intp]:
     """Return which of the lanes ``first`` to ``last - 1`` are checked, counted from the first.
@@ -27,24 +30,16 @@ def checked_lanes(first: int, last: int, share: float) -> NDArray[np.intp]:
 def check_arrays(
     lanes: int, checked: NDArray[np.intp], difference: Difference
 ) -> dict[str, NDArray[Any]]:
-    """Return what the check says of every lane of a block, by the name of the variable.
+    """Return what the check says of so many lanes of a block, by the name of the variable.
 
-    Parameters
-    ----------
-    lanes : int
-        Lanes of the block.
-    checked : ndarray of int
-        Those that were computed twice, see `checked_lanes`.
-    difference : Difference
-        Of the checked lanes.
+    The difference is that of the checked lanes, see `checked_lanes`.
     """
-    section = np.full(lanes, np.nan)
-    exponent = np.full(lanes, np.nan)
+    section, exponent = np.full((2, lanes), np.nan)
     motion = np.full(lanes, NOT_CHECKED, dtype=np.uint8)
     section[checked] = difference.section_error
     exponent[checked] = difference.exponent_error
     motion[checked] = np.where(difference.changed, CHANGED, SAME)
-    return {"section_error": section, "exponent_error": exponent, "motion_changed": motion}
+    return dict(zip(CHECKED, (section, exponent, motion), strict=True))
 
 
 class Tally:
@@ -54,9 +49,7 @@ class Tally:
         self.diverged = 0
         self._unsplit_lanes = 0
         self._unsplit_steps = 0
-        self._section: list[NDArray[np.float64]] = []
-        self._exponent: list[NDArray[np.float64]] = []
-        self._motion: list[NDArray[np.uint8]] = []
+        self._checked = {name: [np.zeros(0)] for name in CHECKED}
 
     def add(self, arrays: Mapping[str, NDArray[Any]]) -> None:
         """Count the lanes of one block."""
@@ -65,10 +58,9 @@ class Tally:
             self._unsplit_lanes += int(np.count_nonzero(arrays["unsplit_steps"]))
             self._unsplit_steps += int(np.sum(arrays["unsplit_steps"]))
         if "motion_changed" in arrays:
-            periodic = np.isfinite(arrays["section_error"])
-            self._section.append(arrays["section_error"][periodic])
-            self._exponent.append(arrays["exponent_error"][periodic])
-            self._motion.append(arrays["motion_changed"])
+            checked = arrays["motion_changed"] != NOT_CHECKED
+            for name, blocks in self._checked.items():
+                blocks.append(arrays[name][checked])
 
     @property
     def remarks(self) -> list[str]:
@@ -85,20 +77,17 @@ class Tally:
     @property
     def errors(self) -> str:
         """The errors in one line; empty where no lane was checked."""
-        motion = np.concatenate(self._motion) if self._motion else np.zeros(0)
-        checked = np.count_nonzero(motion != NOT_CHECKED)
-        if checked == 0:
+        section, exponent, motion = map(np.concatenate, self._checked.values())
+        if motion.size == 0:
             return ""
-        changed = np.count_nonzero(motion == CHANGED)
-        text = f"{checked} lanes computed again with half the step: "
-        section = np.concatenate(self._section)
-        if section.size:
-            text += f"section of {section.size} periodic ones off by {_spread(section)}"
-            exponent = np.concatenate(self._exponent)
-            if np.isfinite(exponent).any():
-                text += f", their exponent by {_spread(exponent)}"
+        text = f"{motion.size} lanes computed again with half the step: "
+        periodic = np.isfinite(section)
+        if periodic.any():
+            text += f"section of {periodic.sum()} periodic ones off by {_spread(section[periodic])}"
+            if np.isfinite(exponent[periodic]).any():
+                text += f", their exponent by {_spread(exponent[periodic])}"
             text += "; "
-        return f"{text}{changed} move in another way"
+        return f"{text}{np.count_nonzero(motion == CHANGED)} move in another way"
 
 
 def _spread(errors: NDArray[np.float64]) -> str:

@@ -45,13 +45,8 @@ class LocalExecutor:
     """Computes in this process, one block at a time: all threads work within a block.
 
     The thread of its own leaves the main one free to write what is finished, and an interrupt,
-    which the main thread receives, does not cost the block that is running.
-
-    Parameters
-    ----------
-    simulation : Simulation
-    finished : mapping, optional
-        Blocks that are finished, with a way to read them; a carried sweep goes on from them.
+    which the main thread receives, does not cost the block that is running. A carried sweep goes on
+    from ``finished``: blocks, with a way to read them.
     """
 
     width = 2
@@ -94,17 +89,10 @@ class LocalExecutor:
 def compute_blocks(
     executor: BlockExecutor, blocks: Sequence[Bounds], keep: Callable[[Bounds, Arrays], None]
 ) -> None:
-    """Have blocks computed and keep each as soon as it is there.
+    """Have blocks computed, handed out in this order, and keep each as soon as it is there.
 
-    An interrupt lets the blocks that are running end and keeps them.
-
-    Parameters
-    ----------
-    executor : BlockExecutor
-    blocks : sequence of (first, last)
-        In the order in which they are handed out.
-    keep : callable
-        ``keep(block, arrays)``; called in this thread.
+    ``keep(block, arrays)`` is called in this thread. An interrupt lets the blocks that are running
+    end and keeps them.
     """
     waiting = list(reversed(blocks))
     futures: dict[Future[Arrays], Bounds] = {}

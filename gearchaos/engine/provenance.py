@@ -14,15 +14,7 @@ from gearchaos.version import software_version
 
 
 def provenance(threads: int, seconds: float) -> dict[str, str | int | float]:
-    """Return what a result file says about the run that made it.
-
-    Parameters
-    ----------
-    threads : int
-        Threads that computed.
-    seconds : float
-        Wall time of the computation in s.
-    """
+    """Return what a result file says about the run that made it in so many seconds."""
     facts: dict[str, str | int | float] = {
         "created": datetime.now(UTC).isoformat(timespec="seconds"),
         "software": f"gearchaos {software_version()}",

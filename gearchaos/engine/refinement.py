@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -58,43 +57,11 @@ class Boundary(NamedTuple):
     multiplier: complex
 
 
-class _Edges(NamedTuple):
-    """Lanes: their value, label, period and end state (lanes, states)."""
-
-    values: Floats
-    labels: NDArray[np.str_]
-    period: NDArray[np.int32]
-    states: Floats
-
-    def at(self, lanes: Sequence[int] | NDArray[np.intp]) -> _Edges:
-        return _Edges(
-            self.values[lanes], self.labels[lanes], self.period[lanes], self.states[lanes]
-        )
-
-    def moved(self, chosen: NDArray[np.bool_], to: _Edges) -> _Edges:
-        return _Edges(
-            np.where(chosen, to.values, self.values),
-            np.where(chosen, to.labels, self.labels),
-            np.where(chosen, to.period, self.period),
-            np.where(chosen[:, np.newaxis], to.states, self.states),
-        )
-
-
 def refinable(result: Result, name: str) -> Configuration:
     """Return the configuration with which single lanes of a result can be computed again.
 
-    Parameters
-    ----------
-    result : Result
-    name : str
-        What messages call the result.
-
-    Raises
-    ------
-    FileError
-        If the result does not hold its configuration.
-    ConfigurationError
-        If its lanes do not stand for themselves.
+    Messages call the result ``name``. Raises FileError if it does not hold its configuration,
+    ConfigurationError if its lanes do not stand for themselves.
     """
     text = str(result.metadata.get("configuration_resolved", ""))
     if not text:
@@ -136,75 +103,58 @@ def refined_boundaries(
 ) -> list[Boundary]:
     """Bisect every boundary between two stages, and tell what the orbits beside it do.
 
-    All boundaries are bisected side by side, with one batch of lanes per round. A boundary is
-    where the label of the lane below ends: where bisection meets a third motion, that counts as
-    the other side.
-
-    Parameters
-    ----------
-    config : Configuration
-        From `refinable`.
-    result : Result
-    stages : list of Stage
-        From `stage_table` of the lanes of this result.
-    width : float
-        Wanted distance of the two lanes on either side of a boundary.
-    threads : int, optional
-        Threads to use; by default all that there are.
+    All boundaries are bisected side by side, with one batch of lanes per round, until the two lanes
+    on either side are no farther apart than ``width``. A boundary is where the label of the lane
+    below ends: where bisection meets a third motion, that counts as the other side. ``config`` is
+    from `refinable`, the stages are those of this result.
     """
     if len(stages) < 2:
         return []
     every = _edges(result)
-    below = every.at([stage.last for stage in stages[:-1]])
-    above = every.at([stage.first for stage in stages[1:]])
-    spacing = above.values - below.values
+    below = every[[stage.last for stage in stages[:-1]]]
+    above = every[[stage.first for stage in stages[1:]]]
+    spacing = above["value"] - below["value"]
     for _ in range(MOST_ROUNDS):
-        middle = (below.values + above.values) / 2.0
-        wide = above.values - below.values > width
-        wide &= (below.values < middle) & (middle < above.values)
+        middle = (below["value"] + above["value"]) / 2.0
+        wide = above["value"] - below["value"] > width
+        wide &= (below["value"] < middle) & (middle < above["value"])
         if not wide.any():
             break
-        found = run(
-            config.replace(
-                "sweep", {"parameter": config.sweep.parameter, "values": middle[wide].tolist()}
-            ),
-            threads,
-        )
-        # Lanes that are not wide any more are filled with any other.
-        tried = _edges(found).at(np.maximum(np.cumsum(wide) - 1, 0))
-        same = tried.labels == below.labels
-        below, above = below.moved(wide & same, tried), above.moved(wide & ~same, tried)
+        values = {"parameter": config.sweep.parameter, "values": middle[wide].tolist()}
+        tried = _edges(run(config.replace("sweep", values), threads))
+        same = tried["label"] == below["label"][wide]
+        numbers = np.flatnonzero(wide)
+        below[numbers[same]], above[numbers[~same]] = tried[same], tried[~same]
     losses = _losses(config, below, above, spacing)
     return [
-        Boundary(
-            float(below.values[number]),
-            float(above.values[number]),
-            str(below.labels[number]),
-            str(above.labels[number]),
-            *losses[number],
-        )
-        for number in range(spacing.size)
+        Boundary(float(one["value"]), float(other["value"]), one["label"], other["label"], *loss)
+        for one, other, loss in zip(below, above, losses, strict=True)
     ]
 
 
-def _edges(result: Result) -> _Edges:
-    lanes = labelled_lanes(result)
-    return _Edges(lanes.values, lanes.labels, lanes.period, result["end_state"])
+def _edges(result: Result) -> NDArray[Any]:
+    """Return of each lane its value, label, period and end state."""
+    lanes, states = labelled_lanes(result), result["end_state"]
+    fields = [("value", "f8"), ("label", object), ("period", "i4")]
+    edges = np.empty(lanes.values.size, [*fields, ("state", "f8", states.shape[1:])])
+    edges["value"], edges["label"], edges["period"] = lanes.values, lanes.labels, lanes.period
+    edges["state"] = states
+    return edges
 
 
 def _losses(
-    config: Configuration, below: _Edges, above: _Edges, spacing: Floats
+    config: Configuration, below: NDArray[Any], above: NDArray[Any], spacing: Floats
 ) -> list[tuple[str, complex]]:
     """Follow the orbits below a boundary upwards, and those above it downwards."""
     # Close to a bifurcation the label changes a little before or after it: one lane further.
-    upwards = _followed(config, below, above.values + spacing)
-    downwards = _followed(config, above, below.values - spacing)
+    upwards = _followed(config, below, above["value"] + spacing)
+    downwards = _followed(config, above, below["value"] - spacing)
     told = []
     for number in range(spacing.size):
         sides = [
             (_TELLING.index(StabilityLoss(int(losses.kind[number]))), losses.multiplier[number])
             for losses, edge in ((upwards, below), (downwards, above))
-            if edge.period[number] > 0
+            if edge["period"][number] > 0
         ]
         if sides:
             rank, multiplier = min(sides, key=lambda side: side[0])
@@ -214,13 +164,13 @@ def _losses(
     return told
 
 
-def _followed(config: Configuration, edge: _Edges, last: Floats) -> Losses:
-    first, parameter = edge.values, config.sweep.parameter
+def _followed(config: Configuration, edge: NDArray[Any], last: Floats) -> Losses:
+    first, parameter = edge["value"], config.sweep.parameter
     lowest, highest = swept_values(config.sweep)[[0, -1]]
     followed = follow(
         lambda values: system_of(config, {parameter: values}, config.needed_effects),
-        edge.states,
-        edge.period,
+        edge["state"],
+        edge["period"],
         first,
         np.clip(last, lowest, highest),
         float(np.min(np.abs(last - first))) * FOLLOWED_WIDTH,

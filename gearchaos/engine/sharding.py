@@ -18,28 +18,14 @@ FEWEST_LANES, MOST_LANES = 8 * LANES, 128 * LANES
 
 
 class Shard(NamedTuple):
-    """One of several portions of the blocks of a sweep, each the work of one job.
-
-    Attributes
-    ----------
-    number : int
-        From 1 to `of`.
-    of : int
-        Shards that the sweep has.
-    """
+    """The ``number``-th, from 1, ``of`` several portions of a sweep, each the work of one job."""
 
     number: int
     of: int
 
     @classmethod
     def from_text(cls, text: str) -> Self:
-        """Read ``2/8``.
-
-        Raises
-        ------
-        ConfigurationError
-            If it is no shard.
-        """
+        """Read ``2/8``; ConfigurationError if it is no shard."""
         found = re.fullmatch(r"(\d{1,9})/(\d{1,9})", text, re.ASCII)
         shard = cls(*map(int, found.groups())) if found else cls(0, 0)
         if not 1 <= shard.number <= shard.of:
@@ -55,15 +41,7 @@ class Shard(NamedTuple):
 
 
 def shared_blocks(lanes: int, shards: int) -> list[Bounds]:
-    """Cut a sweep into blocks that do not depend on the machine on which this is asked.
-
-    Parameters
-    ----------
-    lanes : int
-        Lanes of the sweep.
-    shards : int
-        How many jobs or workers share it.
-    """
+    """Cut a sweep into blocks, whatever the machine, that so many jobs or workers share."""
     size = shared_block_lanes(lanes, shards)
     return [(first, min(first + size, lanes)) for first in range(0, lanes, size)]
 

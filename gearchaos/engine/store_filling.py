@@ -17,18 +17,7 @@ from gearchaos.results.block_store import BlockStore
 def open_store(
     simulation: Simulation, output: str, *, resume: bool, shard: Shard | None = None
 ) -> BlockStore:
-    """Open the store of a sweep whose number of steps has been chosen, see `BlockStore`.
-
-    Parameters
-    ----------
-    simulation : Simulation
-    output : str
-        The result file to be.
-    resume : bool
-        Whether there may be blocks of an earlier run.
-    shard : Shard, optional
-        The blocks that this process computes; by default all.
-    """
+    """Open the store of a sweep whose number of steps has been chosen, see `BlockStore`."""
     return BlockStore(
         output,
         simulation.variables,
@@ -45,21 +34,9 @@ def fill(
 ) -> tuple[Tally, dict[str, int]]:
     """Compute the blocks that are missing, and keep each of them as soon as it is there.
 
-    Parameters
-    ----------
-    simulation : Simulation
-        Compiled, unless a cluster computes; its number of steps has been chosen.
-    store : BlockStore
-        With what is finished already.
-    cluster : str or None
-        Where dask workers are, see `DaskExecutor`; None computes in this process.
-
-    Returns
-    -------
-    tally : Tally
-        Of all own blocks, the finished ones too.
-    performed_by : dict
-        What the result file says about who has computed.
+    The simulation is compiled and its number of steps chosen; ``cluster`` says where dask workers
+    are, see `DaskExecutor`, and None computes in this process. Returns the tally of all own blocks,
+    the finished ones too, and what the result file says about who has computed.
     """
     tally = Tally()
     finished, problems = store.finished(tally.add)

@@ -50,19 +50,16 @@ def writing(path: str | os.PathLike[str]) -> Iterator[None]:
         if isinstance(error, RuntimeError) and "errno = " not in str(error):
             raise
         text = reason(error)
-        remedies = (remedy for code, remedy in _REMEDIES.items() if os.strerror(code) == text)
-        remedy = next(remedies, "choose another place")
+        by_text = {os.strerror(code): remedy for code, remedy in _REMEDIES.items()}
+        remedy = by_text.get(text, "choose another place")
         raise FileError(f"{path}: cannot be written: {text}; {remedy}") from error
 
 
 def check_output(path: str | os.PathLike[str], overwrite: bool = False) -> None:
     """Make sure that a file can be written, before anything is computed for it.
 
-    Raises
-    ------
-    FileError
-        If it exists and must not be overwritten, is a directory or a device, or if its folder
-        is missing or cannot be written to.
+    Raises FileError if it exists and must not be overwritten, is a directory or a device, or if
+    its folder is missing or cannot be written to.
     """
     with writing(path):
         target = _checked_target(path, overwrite)
@@ -86,26 +83,10 @@ def replacing(
 ) -> Iterator[Path]:
     """Write a file under a temporary name; it gets its own name once it is complete on the disk.
 
-    Parameters
-    ----------
-    path : path
-        The file to be.
-    overwrite : bool
-        Whether an existing file is replaced.
-    scratch : path, optional
-        Folder on the same file system for the temporary name; by default that of the file.
-    through_links : bool
-        Whether symbolic links are followed, and not replaced themselves.
-
-    Yields
-    ------
-    Path
-        The temporary name, an empty file to be filled. It goes away if the block raises.
-
-    Raises
-    ------
-    FileError
-        If the file cannot be written; one that existed before is left as it was.
+    The temporary name, of an empty file to be filled, lies in ``scratch``, a folder on the same
+    file system, or beside the file, and goes away if the block raises. Without ``through_links``
+    a symbolic link is replaced itself. Raises FileError if the file cannot be written; one that
+    existed before is left as it was.
     """
     with writing(path):
         target = _checked_target(path, overwrite) if through_links else Path(path)

@@ -5,8 +5,7 @@ from __future__ import annotations
 import math
 import os
 import re
-from bisect import bisect_right
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Any, NamedTuple, Self
@@ -16,23 +15,25 @@ from numpy.typing import NDArray
 
 from gearchaos.errors import FileError
 from gearchaos.results.atomic_file import PARTIAL
-from gearchaos.results.block_file import BlockFormat
-from gearchaos.results.manifest import MANIFEST, Manifest, folder_of, read_manifest
+from gearchaos.results.block_file import read_block, write_block
+from gearchaos.results.lane_ranges import Bounds, lanes_text, uncovered
+from gearchaos.results.manifest import (
+    MANIFEST,
+    decisive_facts,
+    fingerprint,
+    folder_of,
+    read_manifest,
+    settle_manifest,
+)
 from gearchaos.results.result_file import Metadata, Parameter, write_result
 from gearchaos.results.store_lock import LOCK, StoreLock
 from gearchaos.results.variables import Variable, lane_axes
 
-_NAME = re.compile(r"(\d{12})-(\d{12})\.block")
-
-Bounds = tuple[int, int]
+_NAME = re.compile(r"\d{12}-\d{12}\.block")
 
 
 class Finished(NamedTuple):
-    """What `BlockStore.finished` has found.
-
-    ``bounds``: of the blocks that are complete and verified, by lane, last exclusive, without
-    overlap; ``problems``: a sentence for each that is bad and has to be computed again.
-    """
+    """Bounds of the sound blocks, without overlap, and a sentence for each that is not."""
 
     bounds: list[Bounds]
     problems: list[str]
@@ -41,25 +42,18 @@ class Finished(NamedTuple):
 class BlockStore:
     """The finished blocks of one sweep, in the folder ``<output>.blocks``.
 
-    Use it as a context manager: it holds a lock that keeps a second sweep away from the same
-    output, and leaves no empty folder behind. `merge` makes the result file and removes the
-    folder; before that, nothing that was written is ever removed.
+    As long as its context lasts, a lock keeps other sweeps away from the same output. `merge` makes
+    the result file and removes the folder; before that, nothing that was written is ever removed.
 
     Parameters
     ----------
-    output : path
-        The result file to be.
-    variables : sequence of Variable
-        What the sweep yields.
-    configuration : str
-        The resolved configuration in TOML. Blocks of another one are refused.
-    text : str
-        The configuration as it was written, for the result file.
+    configuration, text : str
+        The configuration in TOML: resolved, of which others are refused, and as it was written.
     resume : bool
         Whether there may be blocks of an earlier run, to be continued.
     blocks : sequence of (first, last), optional
-        The blocks of one's own shard, by lane; others may compute other shards in the same folder
-        meanwhile. By default all lanes are one's own.
+        The blocks of one's own shard, by lane, while others may compute other shards in the same
+        folder; by default all lanes are one's own.
     shards : int, optional
         Into how many shards the sweep is divided.
 
@@ -88,33 +82,33 @@ class BlockStore:
         sizes = {v.name: len(v.values) for v in variables if v.values is not None}
         axes = lane_axes(variables)
         self.lanes = math.prod(sizes[axis] for axis in axes)
-        record = np.dtype(
+        self._record = np.dtype(
             [
                 (v.name, np.dtype(v.dtype), tuple(sizes[dim] for dim in v.dims[len(axes) :]))
                 for v in variables
                 if v.values is None
             ]
         ).newbyteorder("<")
-        decisive = {"lanes": self.lanes, "variables": record.descr, "configuration": configuration}
-        manifest = Manifest(self.folder, decisive, {"text": text, "shards": shards})
-        self._format = BlockFormat(manifest.fingerprint, self.lanes, record)
+        decisive = decisive_facts(
+            lanes=self.lanes, variables=self._record.descr, configuration=configuration
+        )
+        self._fingerprint = fingerprint(decisive)
         self._blocks = [(0, self.lanes)] if blocks is None else list(blocks)
         self._lock = StoreLock(self.folder, self.output, shared=blocks is not None)
         try:
-            own = list(self._own_blocks())
+            own = self._own_blocks()
             if own and not resume:
                 raise FileError(
                     f"{self.folder}: holds {len(own)} finished blocks of an earlier run; continue "
                     "it with --resume, or delete this folder"
                 )
-            if blocks is None:
-                # Those of other shards may be about to get their names.
-                for partial in self.folder.glob(f".*{PARTIAL}"):
-                    partial.unlink(missing_ok=True)
-            if blocks is not None or not own:
-                # Of several shards, whoever comes first writes it.
-                manifest.write(overwrite=blocks is None)
-            manifest.compare()
+            # Those of other shards may be about to get their names.
+            for partial in self.folder.glob(f".*{PARTIAL}") if blocks is None else ():
+                partial.unlink(missing_ok=True)
+            # Of several shards, whoever comes first writes it.
+            shared, beside = blocks is not None, {"text": text, "shards": shards}
+            how = {"write": shared or not own, "overwrite": not shared}
+            settle_manifest(self.folder, decisive, beside, **how)
         except BaseException:
             self.close()
             raise
@@ -182,12 +176,24 @@ class BlockStore:
         ]
 
     def write(self, first: int, last: int, arrays: Mapping[str, NDArray[Any]]) -> None:
-        """Keep the lanes first to last - 1 of every computed variable, see `BlockFormat.write`."""
-        self._format.write(self._path(first, last), first, last, arrays)
+        """Keep the lanes first to last - 1 of every computed variable.
+
+        Raises FileError if they cannot be kept, ValueError if an array has a wrong shape.
+        """
+        records = np.empty(last - first, self._record)
+        for name in self._record.names or ():
+            if (shape := np.shape(arrays[name])) != records[name].shape:
+                raise ValueError(f"{name} of lanes {first} to {last - 1} has shape {shape}")
+            records[name] = arrays[name]
+        write_block(self._path(first, last), self._owner(first, last), records)
 
     def read(self, first: int, last: int) -> dict[str, NDArray[Any]]:
-        """Give the arrays of one block, verified, see `BlockFormat.read`."""
-        return self._format.read(self._path(first, last), first, last)
+        """Give the arrays of one block; FileError if it is missing, damaged or of another sweep."""
+        path = self._path(first, last)
+        if not 0 <= first < last <= self.lanes:
+            raise FileError(f"{path}: its lanes are none of the {self.lanes} of this sweep")
+        records = read_block(path, self._owner(first, last), self._record, last - first)
+        return {name: records[name] for name in self._record.names or ()}
 
     def merge(
         self,
@@ -199,17 +205,8 @@ class BlockStore:
     ) -> Path:
         """Make the result file of all blocks, one block in memory at a time, and tidy up.
 
-        Parameters
-        ----------
-        parameters, metadata, overwrite
-            As for `write_result`.
-        found : Finished, optional
-            What `finished` has just given.
-
-        Raises
-        ------
-        FileError
-            If blocks are missing or the file cannot be written; the blocks stay.
+        The first three are those of `write_result`; ``found`` is what `finished` has just given.
+        Raises FileError if blocks are missing or the file cannot be written; the blocks stay.
         """
         bounds, problems = found or self.finished()
         if gaps := self.missing(bounds, self.lanes):
@@ -226,36 +223,17 @@ class BlockStore:
         self.remove()
         return self.output
 
-    def _own_blocks(self) -> Iterator[Bounds]:
-        for name in self._names():
-            first, last = (int(number) for number in name.removesuffix(".block").split("-"))
-            if list(uncovered((first, last), self._blocks)) != [(first, last)]:
-                yield first, last
+    def _own_blocks(self) -> list[Bounds]:
+        every = ((int(name[:12]), int(name[13:25])) for name in self._names())
+        return [one for one in every if list(uncovered(one, self._blocks)) != [one]]
 
     def _names(self) -> list[str]:
         with suppress(OSError):
             return sorted(filter(_NAME.fullmatch, os.listdir(self.folder)))
         return []
 
+    def _owner(self, first: int, last: int) -> dict[str, Any]:
+        return {"fingerprint": self._fingerprint, "first": first, "last": last}
+
     def _path(self, first: int, last: int) -> Path:
         return self.folder / f"{first:012d}-{last:012d}.block"
-
-
-def uncovered(block: Bounds, finished: Sequence[Bounds]) -> Iterator[Bounds]:
-    """Give what finished blocks, sorted and without overlap, leave out of a block."""
-    first, last = block
-    for begin, end in finished[bisect_right(finished, first, key=lambda bounds: bounds[1]) :]:
-        if begin >= last:
-            break
-        if first < begin:
-            yield first, begin
-        first = end
-    if first < last:
-        yield first, last
-
-
-def lanes_text(gaps: Sequence[Bounds], most: int = 3) -> str:
-    """Word which lanes there are not: "lanes 0 to 255, 512 to 767 and 4 more blocks are"."""
-    names = ", ".join(f"{first} to {last - 1}" for first, last in gaps[:most])
-    more = f" and {len(gaps) - most} more ranges" if len(gaps) > most else ""
-    return f"lanes {names}{more} are"

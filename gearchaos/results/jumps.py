@@ -32,12 +32,8 @@ def jumps(result: Result) -> list[Jump]:
     """Find where a sweep jumps from one motion to another of the same period.
 
     On one branch the points of the section move little from lane to lane, and steadily so: towards
-    a fold, where they move fastest, each step is less than three times the one before.
-
-    Parameters
-    ----------
-    result : Result
-        With one axis and labels; without a section nothing is found.
+    a fold, where they move fastest, each step is less than three times the one before. The result
+    has one axis and labels; without a section nothing is found.
     """
     lanes = labelled_lanes(result)
     names = section_variables(result)
@@ -55,12 +51,8 @@ def jumps(result: Result) -> list[Jump]:
 def jumps_at(period: NDArray[np.int32], section: Floats) -> NDArray[np.intp]:
     """Return the lanes whose upper neighbour has the same period and moves on another branch.
 
-    Parameters
-    ----------
-    period : ndarray of int, shape (lanes,)
-        0 where the motion is not periodic.
-    section : ndarray, shape (lanes, points, states)
-        Relative to the size of each state over the sweep.
+    ``period`` (lanes,) is 0 where the motion is not periodic; ``section`` (lanes, points, states)
+    is relative to the size of each state over the sweep.
     """
     enough = (period[1:] > 0) & (period[1:] <= section.shape[1])
     common = np.where(enough & (period[1:] == period[:-1]), period[1:], 0).astype(np.int32)

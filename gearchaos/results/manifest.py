@@ -20,54 +20,51 @@ MANIFEST = "manifest.json"
 _LARGEST = 64 << 20
 
 
-class Manifest:
-    """What decides the numbers of a sweep, and with it whose blocks are whose.
+def decisive_facts(**facts: Any) -> dict[str, Any]:
+    """Return what decides the numbers of a sweep, and with them whose blocks are whose.
 
-    Parameters
-    ----------
-    folder : Path
-        Where the manifest is.
-    decisive : mapping
-        ``lanes``, ``variables`` and ``configuration``, the resolved one in TOML.
-    beside : mapping
-        What decides nothing: ``text``, the configuration as it was written, and ``shards``, into
-        how many the sweep was divided by whoever began it.
+    That is ``lanes``, ``variables`` and ``configuration``, the resolved one in TOML.
     """
+    versions = {"schema": STORE_SCHEMA, "schema_version": BLOCK_SCHEMA_VERSION}
+    # As it is read again: with lists for tuples.
+    return dict(json.loads(json.dumps({**versions, **facts})))
 
-    def __init__(
-        self, folder: Path, decisive: Mapping[str, Any], beside: Mapping[str, Any]
-    ) -> None:
-        self._folder, self._path, self._beside = folder, folder / MANIFEST, beside
-        versions = {"schema": STORE_SCHEMA, "schema_version": BLOCK_SCHEMA_VERSION}
-        # As it is read again: with lists for tuples.
-        self._decisive = json.loads(json.dumps({**versions, **decisive}))
 
-    @property
-    def fingerprint(self) -> str:
-        """A hash of all that decides the numbers."""
-        return hashlib.sha256(json.dumps(self._decisive, sort_keys=True).encode()).hexdigest()
+def fingerprint(decisive: Mapping[str, Any]) -> str:
+    """Return a hash of all that decides the numbers."""
+    return hashlib.sha256(json.dumps(decisive, sort_keys=True).encode()).hexdigest()
 
-    def write(self, overwrite: bool = True) -> None:
-        """Write the manifest; one that somebody else has just written may be left as it is."""
-        text = json.dumps({**self._decisive, **self._beside}, indent=1)
-        try:
-            with replacing(self._path, overwrite=overwrite, through_links=False) as partial:
-                partial.write_text(text, encoding="utf-8")
-        except FileError:
-            if overwrite or not self._path.exists():
-                raise
 
-    def compare(self) -> None:
-        """Raise a FileError that names the keys that differ if the folder is of another sweep."""
-        earlier = read_manifest(self._folder)
-        keys = differing_keys(earlier["configuration"], self._decisive["configuration"])
-        keys = keys or [key for key in self._decisive if self._decisive[key] != earlier.get(key)]
-        if keys:
-            raise FileError(
-                f"{self._folder}: holds blocks of another configuration, which differs in "
-                f"{', '.join(keys)}; restore these values, delete the folder or choose another "
-                "--output"
-            )
+def settle_manifest(
+    folder: Path,
+    decisive: Mapping[str, Any],
+    beside: Mapping[str, Any],
+    *,
+    write: bool,
+    overwrite: bool,
+) -> None:
+    """Write the manifest of a folder, and refuse a folder of another sweep.
+
+    ``beside`` decides nothing: ``text``, the configuration as it was written, and ``shards``, into
+    how many whoever began divided the sweep. A manifest that somebody else has just written stays
+    unless `overwrite` is set. Raises a FileError that names the keys that differ.
+    """
+    path = folder / MANIFEST
+    try:
+        if write:
+            with replacing(path, overwrite=overwrite, through_links=False) as partial:
+                partial.write_text(json.dumps({**decisive, **beside}, indent=1), encoding="utf-8")
+    except FileError:
+        if overwrite or not path.exists():
+            raise
+    earlier = read_manifest(folder)
+    keys = differing_keys(earlier["configuration"], decisive["configuration"])
+    if keys := keys or [key for key in decisive if decisive[key] != earlier.get(key)]:
+        raise FileError(
+            f"{folder}: holds blocks of another configuration, which differs in "
+            f"{', '.join(keys)}; restore these values, delete the folder or choose another "
+            "--output"
+        )
 
 
 def folder_of(output: str | os.PathLike[str]) -> Path:

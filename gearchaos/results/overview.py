@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+import json
 import math
 import os
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -24,63 +24,44 @@ _CANDIDATE = "candidate_"
 def overview(path: str | os.PathLike[str]) -> dict[str, Any]:
     """Sum up a result file without reading more than one number of each lane and variable.
 
-    Returns
-    -------
-    dict
-        Axes, parameters, counts and variables are by name; ``errors`` are the measured ones,
-        ``stages`` those of the first slice along the swept parameter. What is not finite is None.
+    Axes, parameters, counts and variables are by name; ``errors`` are the measured ones, ``stages``
+    those of the first slice along the swept parameter. What is not finite is None.
 
-    Raises
-    ------
-    FileError
-        If the file is missing, damaged, of another kind or of another major format version.
+    Raises FileError if the file is missing, damaged, of another kind or another major version.
     """
     variables, data, parameters, metadata = read_result(path, rows=False)
     read = [variable for variable in variables if variable.name in data]
     result = Result(str(metadata["axes"]).split(), read, data, parameters, metadata)
-    axes = result.axes
     sizes = {dim: size for v in read for dim, size in zip(v.dims, data[v.name].shape, strict=True)}
-    of_the_lanes = {v.name: v for v in read if v.dims == axes and v.name not in axes}
-    part, stages = _stages(result)
-    summary = {
+    summary: dict[str, Any] = {
         "file": os.fspath(path),
         "bytes": Path(path).stat().st_size,
-        "lanes": math.prod(sizes[axis] for axis in axes),
+        "lanes": math.prod(sizes[axis] for axis in result.axes),
         "axes": {
             axis: {"values": sizes[axis], **_range(data[axis]), **_wording(result.variables[axis])}
-            for axis in axes
+            for axis in result.axes
         },
         "metadata": metadata,
         "parameters": {name: _parameter(entry) for name, entry in parameters.items()},
-        "counts": {
-            name: _counts(variable, data[name])
-            for name, variable in of_the_lanes.items()
-            if variable.flags and variable.dtype == "uint8"
-        },
-        "errors": {
-            name: _spread(data[name])
-            for name in ERRORS
-            if name in of_the_lanes and of_the_lanes[name].dtype == "float64"
-        },
-        "step_choice": {
-            v.name.removeprefix(_CANDIDATE): data[v.name].tolist()
-            for v in read
-            if v.dims == (f"{_CANDIDATE}steps",) and v.dtype in ("float64", "int32")
-        },
-        "slice": part,
-        "stages": stages,
-        "variables": {
-            v.name: {
-                "dims": list(v.dims),
-                "shape": [sizes.get(dim) for dim in v.dims],
-                "dtype": v.dtype,
-                **_wording(v),
-            }
-            for v in variables
-        },
+        "counts": {},
+        "errors": {},
+        "step_choice": {},
+        "variables": {},
     }
-    known: dict[str, Any] = finite(summary)
-    return known
+    # What bears a known name may be something else in a file that others have changed.
+    for v in read:
+        of_the_lanes = v.dims == result.axes and v.name not in result.axes
+        if of_the_lanes and v.flags and v.dtype == "uint8":
+            summary["counts"][v.name] = _counts(v, data[v.name])
+        elif of_the_lanes and v.name in ERRORS and v.dtype == "float64":
+            summary["errors"][v.name] = _spread(data[v.name])
+        elif v.dims == (f"{_CANDIDATE}steps",) and v.dtype in ("float64", "int32"):
+            summary["step_choice"][v.name.removeprefix(_CANDIDATE)] = data[v.name].tolist()
+    for v in variables:
+        shape = {"dims": list(v.dims), "shape": [sizes.get(dim) for dim in v.dims]}
+        summary["variables"][v.name] = {**shape, "dtype": v.dtype, **_wording(v)}
+    summary["slice"], summary["stages"] = _stages(result)
+    return dict(finite(summary))
 
 
 def _stages(result: Result) -> tuple[dict[str, Any], list[dict[str, Any]]]:
@@ -121,10 +102,4 @@ def _spread(values: NDArray[Any]) -> dict[str, Any]:
 
 def finite(value: Any) -> Any:
     """Replace what is not finite in nested tables and lists by None."""
-    if isinstance(value, Mapping):
-        return {key: finite(entry) for key, entry in value.items()}
-    if isinstance(value, list):
-        return [finite(entry) for entry in value]
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    return value
+    return json.loads(json.dumps(value), parse_constant=lambda _: None)

@@ -11,39 +11,28 @@ from gearchaos.results.stage_table import slice_lines
 
 WIDTH = 80
 _LABEL = 18
-_SETTINGS = ("title", "effects", "formulation", "start", "carry", "fixed")
+_SETTINGS = "title effects formulation start carry fixed"
 _INTEGRATION = (
-    "method",
-    "steps_per_period",
-    "crossings",
-    "tolerance",
-    "unstable",
-    "transient_periods",
-    "recorded_periods",
+    "method steps_per_period crossings tolerance unstable transient_periods recorded_periods"
 )
-_RUN = ("wall_time_seconds", "threads", "processor", "system", "software", "git_commit", "created")
+_RUN = "wall_time_seconds threads processor system software git_commit created"
+"""Names of metadata that are shown together."""
+
 MOST_STAGES = 20
 """Of more stages, the first and the last ones are shown."""
 
-_ORIGINS = {
-    "swept": "differ from lane to lane",
-    "given": "given",
-    "derived": "derived from physical quantities",
-    "default": "by default",
-}
-
 
 def overview_page(
-    overview: Mapping[str, Any], settings: Mapping[str, list[str]], verified: Iterable[str]
+    overview: Mapping[str, Any], settings: Iterable[str], verified: Iterable[str]
 ) -> str:
-    """Write an overview as text, with the keys of the configuration by origin and what fits."""
+    """Write an overview as text, with the keys of the configuration and what fits, a line each."""
     sections = {
         "": _file(overview),
         "Accuracy": _accuracy(overview),
         "Run": _metadata(overview, _RUN),
         "Stages": _stages(overview),
         "Dimensionless groups": _groups(overview["parameters"]),
-        "Configuration": _settings_by_origin(settings),
+        "Configuration": (_wrapped(line, "  ") for line in settings),
         "Variables": _variables(overview["variables"]),
         "Verified": (_wrapped(line, "  ") for line in verified),
     }
@@ -78,11 +67,8 @@ def _accuracy(overview: Mapping[str, Any]) -> Iterator[str]:
     yield from _metadata(overview, _INTEGRATION)
     for name, spread in overview["errors"].items():
         if spread["lanes"]:
-            text = (
-                f"{spread['median']:.1e} (median) to {spread['greatest']:.1e} in {spread['lanes']} "
-                "lanes when the step is halved"
-            )
-            yield _entry(name, text)
+            span = f"{spread['median']:.1e} (median) to {spread['greatest']:.1e}"
+            yield _entry(name, f"{span} in {spread['lanes']} lanes when the step is halved")
     choice = overview["step_choice"]
     for row, steps in enumerate(choice.get("steps", [])):
         measured = (
@@ -99,42 +85,25 @@ def _stages(overview: Mapping[str, Any]) -> Iterator[str]:
     ]
     half = MOST_STAGES // 2
     if len(lines) > MOST_STAGES:
-        lines = [
-            f"{len(lines)} stages: the first {half} and the last {half}",
-            *lines[:half],
-            *lines[-half:],
-        ]
-    for line in [*slice_lines(overview["slice"]), *lines]:
-        yield _wrapped(line, "  ")
+        more = f"{len(lines)} stages: the first {half} and the last {half}"
+        lines = [more, *lines[:half], *lines[-half:]]
+    yield from (_wrapped(line, "  ") for line in [*slice_lines(overview["slice"]), *lines])
 
 
-def _metadata(overview: Mapping[str, Any], names: Iterable[str]) -> Iterator[str]:
-    for name in names:
+def _metadata(overview: Mapping[str, Any], names: str) -> Iterator[str]:
+    for name in names.split():
         value = overview["metadata"].get(name)
         if value not in (None, ""):
             yield _entry(name.replace("_", " "), value if isinstance(value, str) else number(value))
 
 
-def _settings_by_origin(settings: Mapping[str, list[str]]) -> Iterator[str]:
-    for origin, keys in settings.items():
-        yield f"  {origin}:"
-        yield from (_wrapped(key, "    ", "      ") for key in keys)
-
-
 def _groups(parameters: Mapping[str, Any]) -> Iterator[str]:
-    for origin, wording in _ORIGINS.items():
-        mine = {name: entry for name, entry in parameters.items() if entry["origin"] == origin}
-        if mine:
-            yield f"  {wording}:"
-        for name, entry in mine.items():
-            values = entry.get("value")
-            if isinstance(values, list):
-                text = ", ".join(map(number, values))
-            elif "least" in entry:
-                text = f"{number(entry['least'])} to {number(entry['greatest'])}"
-            else:
-                text = number(values)
-            yield _wrapped(f"{name:26} {text}{_units(entry)}", "    ", " " * 31)
+    for name, entry in parameters.items():
+        ends = (entry["least"], entry["greatest"]) if "least" in entry else None
+        values = entry.get("value")
+        text = ", ".join(map(number, values if isinstance(values, list) else [values]))
+        text = " to ".join(map(number, ends)) if ends else text
+        yield _wrapped(f"{name:26} {text}{_units(entry)} ({entry['origin']})", "  ", " " * 29)
 
 
 def _variables(variables: Mapping[str, Any]) -> Iterator[str]:
@@ -155,10 +124,7 @@ def _entry(label: str, text: str) -> str:
 
 
 def _wrapped(text: str, first: str, further: str = "    ") -> str:
+    text = printable(text)
     return textwrap.fill(
-        printable(text),
-        WIDTH,
-        initial_indent=first,
-        subsequent_indent=further,
-        break_on_hyphens=False,
+        text, WIDTH, initial_indent=first, subsequent_indent=further, break_on_hyphens=False
     )

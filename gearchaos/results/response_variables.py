@@ -30,16 +30,7 @@ def response_variables(
 ) -> list[Variable]:
     """List the variables that a response adds to those of a sweep, in the order of the file.
 
-    Parameters
-    ----------
-    axes : sequence of Axis
-        As for `sweep_variables`.
-    states : sequence of str
-        In the order of the scene's states.
-    periods, steps_per_period : int
-        Mesh periods of the record, and steps of each.
-    axial : bool
-        Whether the scene has axial motion, and so an axial mesh force.
+    Axes and states are those of the sweep; ``axial`` tells whether there is an axial mesh force.
     """
     lane = tuple(axis.name for axis in axes)
     instants = np.arange(periods * steps_per_period + 1) / steps_per_period

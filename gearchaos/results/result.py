@@ -5,13 +5,16 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
+from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gearchaos.errors import ConfigurationError, FileError
+from gearchaos.results.checksum_line import checksum_fits
 from gearchaos.results.result_file import Parameter, own_metadata, write_result
 from gearchaos.results.result_reader import fixed_coordinates, is_coordinate, read_result
 from gearchaos.results.variables import SECTION, SECTION_POINT, Variable, diagram_axis
@@ -34,10 +37,8 @@ class Result:
     data : mapping of str to ndarray
         The values of each variable, of the shape of its dimensions or with all axes flattened
         into the first one; those that carry their own ``values`` may be left out.
-    parameters : mapping of str to Parameter
-        Dimensionless groups of the model, with their origin.
-    metadata : mapping of str to str, int or float
-        Title, formulation, effects, configuration, provenance.
+    parameters, metadata : mapping by name
+        Dimensionless groups with their origin; title, formulation, configuration, provenance.
 
     Raises
     ------
@@ -103,10 +104,7 @@ class Result:
     def __getitem__(self, name: str) -> NDArray[Any]:
         """Give the values of a variable, of the shape of its dimensions.
 
-        Raises
-        ------
-        KeyError
-            If there is no such variable; the message lists those there are.
+        Raises KeyError if there is no such variable; the message lists those there are.
         """
         return self._data[self._known(name)]
 
@@ -132,17 +130,10 @@ class Result:
     def sel(self, method: Literal["nearest"] | None = None, **coordinates: float) -> Result:
         """Fix axes at one of their values each; what is left runs over the other axes.
 
-        Parameters
-        ----------
-        method : "nearest", optional
-            Take the nearest value, the larger of two; by default a value must be met exactly.
-        **coordinates : float
-            The value by the name of its axis; those that were met are in `fixed`.
-
-        Raises
-        ------
-        ConfigurationError
-            If there is no such axis or value; the message names the nearest.
+        Coordinates are by the name of their axis; those that were met are in `fixed`. With
+        ``"nearest"`` the nearest value is taken, the larger of two; by default a value must be met
+        exactly. Raises ConfigurationError if there is no such axis or value; the message names the
+        nearest.
         """
         index: dict[str, int] = {}
         for name, wanted in coordinates.items():
@@ -187,11 +178,8 @@ class Result:
     def save(self, path: str | os.PathLike[str], overwrite: bool = False) -> None:
         """Write the result to an HDF5 file, which appears complete or not at all.
 
-        Raises
-        ------
-        FileError
-            If the file exists and may not be overwritten, cannot be written, or if no axis is
-            left.
+        Raises FileError if the file exists and may not be overwritten, cannot be written, or if no
+        axis is left.
         """
         if not self.axes:
             raise FileError(f"{path}: a single lane is no result file; leave one axis in sel")
@@ -235,20 +223,18 @@ def section_variables(result: Result) -> tuple[str, ...]:
 
 
 def open_result(path: str | os.PathLike[str], *, rows: bool = True) -> Result:
-    """Read a result file into memory.
+    """Read a result file into memory; without ``rows`` only variables over axes alone, in a moment.
 
-    Parameters
-    ----------
-    path : path
-    rows : bool
-        Whether to read the variables that have dimensions beside the axes; without them a large
-        file is read in a moment.
-
-    Raises
-    ------
-    FileError
-        If the file is missing, damaged, of another kind or of another major format version.
+    Raises FileError if the file is missing, damaged, of another kind or another major version.
     """
     variables, data, parameters, metadata = read_result(path, rows=rows)
     there = [variable for variable in variables if variable.name in data]
     return Result(str(metadata["axes"]).split(), there, data, parameters, metadata)
+
+
+def completed(path: str | os.PathLike[str]) -> Result | None:
+    """Open a result without its rows; None if there is none, or it is not as it was written."""
+    with suppress(OSError, ValueError, FileError):
+        if checksum_fits(Path(path)):
+            return open_result(path, rows=False)
+    return None

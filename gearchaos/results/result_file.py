@@ -44,20 +44,9 @@ _PACKED = {"compression": "gzip", "compression_opts": 4, "shuffle": True, "fletc
 class Parameter:
     """One dimensionless group of the model.
 
-    Parameters
-    ----------
-    value : float or ndarray
-    origin : str
-        One of `ORIGINS`; ``"swept"`` differs from lane to lane.
-    units, long_name, symbol : str
-        As of a variable.
-    dims : tuple of str
-        Dimensions of the value: none, ``harmonic``, or the axes along which it differs.
-
-    Raises
-    ------
-    ValueError
-        If the value has another number of dimensions.
+    The origin is one of `ORIGINS`, of which ``"swept"`` differs from lane to lane; the dimensions
+    of the value are none, ``harmonic``, or the axes along which it differs; the rest is as of a
+    variable.
     """
 
     value: float | NDArray[np.float64]
@@ -94,28 +83,15 @@ def write_result(
 ) -> None:
     """Write a result block by block; the file appears complete or not at all.
 
-    Parameters
-    ----------
-    path : path
-        The file to be.
-    variables : sequence of Variable
-        What the file holds, in this order.
-    blocks : iterable of (first, last, arrays)
-        The lanes first to last - 1, in C order over the axes, of every variable without values
-        of its own, by name: shape (last - first, own dimensions).
-    parameters : mapping of str to Parameter
-        Dimensionless groups of the model.
-    metadata : mapping of str to str, int or float
-        Root attributes.
-    overwrite : bool
-        Whether an existing file is replaced.
-    scratch : path, optional
-        Folder for the temporary file, on the same file system; by default that of the file.
+    The variables come in this order. Of every one without values of its own, by name, a block
+    (first, last, arrays) holds the lanes first to last - 1, in C order over the axes: shape
+    (last - first, own dimensions). ``scratch`` is a folder for the temporary file, on the same file
+    system; by default that of the file.
 
     Raises
     ------
     FileError
-        If the file cannot be written.
+        If the file cannot be written, or exists and is not to be overwritten.
     """
     axes = lane_axes(variables)
     everything = [*variables, *_harmonics(parameters)]

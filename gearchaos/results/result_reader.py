@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import os
 import stat
-from collections.abc import Iterator, Mapping
-from contextlib import suppress
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import h5py
 import numpy as np
@@ -18,6 +17,15 @@ from gearchaos.results.atomic_file import reason
 from gearchaos.results.checksum_line import checksum_fits
 from gearchaos.results.global_heap import heaps_end
 from gearchaos.results.result_file import ORIGINS, PARAMETERS, SCHEMA, SCHEMA_VERSION, Parameter
+from gearchaos.results.stored_dataset import (
+    UnfitError,
+    dims_of,
+    dtype_of,
+    hard_linked,
+    own_dataset,
+    scalars_of,
+    values_of,
+)
 from gearchaos.results.variables import (
     ALL_EXPONENTS,
     HARMONIC,
@@ -33,49 +41,21 @@ from gearchaos.results.variables import (
 )
 
 Contents = tuple[
-    list[Variable],
-    dict[str, NDArray[Any]],
-    dict[str, Parameter],
-    dict[str, str | int | float],
+    list[Variable], dict[str, NDArray[Any]], dict[str, Parameter], dict[str, str | int | float]
 ]
+"""Variables, data, parameters and metadata, as for `Result`."""
 
-_DTYPES = {"f8": "float64", "i4": "int32", "u1": "uint8"}
 SOON_HASHED = 1 << 30
 """Bytes whose checksum takes about a second."""
-_LARGEST_CHUNK = 64 << 20
-_HIGHEST_COMPRESSION = 1100
-"""Deflate packs at best 1032 bytes into one; a dataset that claims more is not a real one."""
-
-
-class _UnfitError(Exception):
-    """What is wrong with the file, in words; becomes a FileError, by default with one remedy."""
-
-    def __init__(self, fault: str, remedy: str = "run the sweep again") -> None:
-        super().__init__(f"{fault}; {remedy}")
 
 
 def read_result(path: str | os.PathLike[str], *, rows: bool = True) -> Contents:
     """Read a whole result file, or all but what makes it large.
 
     Links to other files are not followed, and nothing larger than what the file can hold is
-    allocated.
-
-    Parameters
-    ----------
-    path : path
-    rows : bool
-        Whether variables with dimensions beside the axes are read; without them `data` lacks
-        their values, and the checksum of a file above 1 GiB is left unchecked.
-
-    Returns
-    -------
-    variables, data, parameters, metadata
-        As for `Result`.
-
-    Raises
-    ------
-    FileError
-        If the file is missing, damaged, of another kind or of another major format version.
+    allocated. Without ``rows`` the values of variables with dimensions beside the axes are left
+    out, and the checksum of a file above 1 GiB is left unchecked. Raises FileError if the file is
+    missing, damaged, of another kind or of another major format version.
     """
     name = os.fspath(path)
     try:
@@ -94,7 +74,7 @@ def read_result(path: str | os.PathLike[str], *, rows: bool = True) -> Contents:
     try:
         with h5py.File(name, "r") as file:
             return _read(file, rows)
-    except _UnfitError as error:
+    except UnfitError as error:
         raise FileError(f"{name}: {printable(str(error))}") from error
     except Exception as error:
         # Damage surfaces in h5py as nearly any kind of exception.
@@ -103,32 +83,8 @@ def read_result(path: str | os.PathLike[str], *, rows: bool = True) -> Contents:
         raise FileError(f"{name}: {what} ({why}); run the sweep again") from error
 
 
-class Completed(NamedTuple):
-    """What a finished sweep has computed: resolved TOML, lanes, and how many of them diverged."""
-
-    configuration: str
-    lanes: int
-    diverged: int
-
-
-def completed(path: str | os.PathLike[str]) -> Completed | None:
-    """Look into a result file; None if there is none, or if it is not as it was written."""
-    with suppress(OSError, ValueError, FileError):
-        if checksum_fits(Path(path)):
-            _, data, _, metadata = read_result(path, rows=False)
-            status, text = data[STATUS], str(metadata.get("configuration_resolved", ""))
-            return Completed(text, status.size, int(np.count_nonzero(status)))
-    return None
-
-
 def fixed_coordinates(metadata: Mapping[str, Any]) -> dict[str, float]:
-    """Read the root attribute ``fixed``, such as ``start=1.0``: where a slice was taken.
-
-    Raises
-    ------
-    ValueError
-        If it is no list of coordinates.
-    """
+    """Read the root attribute ``fixed``, such as ``start=1.0``; ValueError if it is none."""
     pairs = (entry.rpartition("=") for entry in str(metadata.get("fixed", "")).split())
     return {name: float(value) for name, _, value in pairs}
 
@@ -144,18 +100,8 @@ def printable(text: str) -> str:
     return "".join(c if c.isprintable() else "\N{REPLACEMENT CHARACTER}" for c in text)
 
 
-def own_datasets(file: h5py.File) -> Iterator[h5py.Dataset]:
-    """Give the datasets of a result file that lie in it and are no larger than it can hold."""
-    names = list(file)
-    with suppress(_UnfitError):
-        names += [f"{PARAMETERS}/{name}" for name in _hard_linked(file, PARAMETERS)]
-    for name in names:
-        with suppress(_UnfitError):
-            yield _dataset(file, name)
-
-
 def _read(file: h5py.File, rows: bool) -> Contents:
-    metadata = _scalars(file)
+    metadata = scalars_of(file)
     _check_schema(metadata)
     axes = tuple(str(metadata.get("axes", "")).split())
     variables: list[Variable] = []
@@ -164,16 +110,19 @@ def _read(file: h5py.File, rows: bool) -> Contents:
     for name in file:
         if name == PARAMETERS:
             continue
-        dataset = _dataset(file, name)
+        dataset = own_dataset(file, name)
         if dataset.shape == ():
             if h5py.check_string_dtype(dataset.dtype):
                 metadata[name] = dataset.asstr()[()]
             continue
-        dims = _dims(file, dataset, sizes)
+        dims = dims_of(file, dataset, sizes)
         if name != HARMONIC:
             if rows or len(dims) == 1 or set(dims) <= set(axes):
-                data[name] = _values(dataset)
-            variables.append(_variable(dataset, dims))
+                data[name] = values_of(dataset)
+            notes = scalars_of(dataset)
+            flags = tuple(str(notes.get("flag_meanings", "")).split())
+            more: dict[str, Any] = {"fill_value": notes.get("_FillValue"), "flags": flags}
+            variables.append(Variable(name, dims, dtype_of(dataset), **_wording(notes), **more))
     _check_variables(axes, {variable.name: variable for variable in variables}, data)
     fixed_coordinates(metadata)
     return variables, data, _read_parameters(file, axes, sizes), metadata
@@ -181,13 +130,13 @@ def _read(file: h5py.File, rows: bool) -> Contents:
 
 def _check_schema(metadata: Mapping[str, Any]) -> None:
     if metadata.get("schema") != SCHEMA:
-        raise _UnfitError(
+        raise UnfitError(
             f'is not a gearchaos result: it lacks the attribute schema = "{SCHEMA}"',
             "give the name of a file that a sweep has written",
         )
     version, own = str(metadata.get("schema_version", "")), SCHEMA_VERSION.split(".")[0]
     if version.split(".")[0] != own:
-        raise _UnfitError(
+        raise UnfitError(
             f"has version {version!r} of the file format, of which this gearchaos reads {own}.x",
             "run the sweep again, or use the gearchaos that wrote it",
         )
@@ -198,12 +147,11 @@ def _check_variables(
 ) -> None:
     """Compare what a sweep must yield with what there is; more than that is welcome."""
     if not axes or len(set(axes)) < len(axes):
-        raise _UnfitError("does not name its axes, each once")
+        raise UnfitError("does not name its axes, each once")
     if STATE not in data:
-        raise _UnfitError(f"lacks the variable {STATE}")
-    types = {name: np.dtype("i4" if name == START else "f8") for name in axes}
+        raise UnfitError(f"lacks the variable {STATE}")
     expected = sweep_variables(
-        [Axis(name, "", "", "", np.zeros(1, dtype)) for name, dtype in types.items()],
+        [Axis(name, "", "", "", np.zeros(1, "i4" if name == START else "f8")) for name in axes],
         states=tuple(data[STATE].ravel()),
         section=[n.removeprefix(SECTION) for n in found if n.startswith(f"{SECTION}delta_")],
         section_points=np.size(data.get(SECTION_POINT, ())),
@@ -217,127 +165,39 @@ def _check_variables(
     for due in expected:
         got = found.get(due.name)
         if got is None:
-            raise _UnfitError(f"lacks the variable {due.name}")
+            raise UnfitError(f"lacks the variable {due.name}")
         if (got.dims, got.dtype) != (due.dims, due.dtype):
-            raise _UnfitError(
+            raise UnfitError(
                 f"holds {due.name} as {got.dtype} over ({', '.join(got.dims)}), which should be "
                 f"{due.dtype} over ({', '.join(due.dims)})"
             )
     for name in axes:
         if not is_coordinate(data[name]):
-            raise _UnfitError(f"holds values of {name} that do not ascend, each once")
+            raise UnfitError(f"holds values of {name} that do not ascend, each once")
     for name in {STATUS, "motion"} & found.keys():
         if data[name].max() >= max(1, len(found[name].flags)):
-            raise _UnfitError(f"holds a {name} without a meaning")
+            raise UnfitError(f"holds a {name} without a meaning")
 
 
 def _read_parameters(
     file: h5py.File, axes: tuple[str, ...], sizes: dict[str, int]
 ) -> dict[str, Parameter]:
-    if not isinstance(_hard_linked(file, PARAMETERS), h5py.Group):
-        raise _UnfitError(f"lacks the group {PARAMETERS}")
+    if not isinstance(hard_linked(file, PARAMETERS), h5py.Group):
+        raise UnfitError(f"lacks the group {PARAMETERS}")
     parameters = {}
     for name in file[PARAMETERS]:
-        dataset = _dataset(file, f"{PARAMETERS}/{name}")
-        notes = _scalars(dataset)
-        dims = _dims(file, dataset, sizes) if dataset.shape else ()
+        dataset = own_dataset(file, f"{PARAMETERS}/{name}")
+        notes = scalars_of(dataset)
+        dims = dims_of(file, dataset, sizes) if dataset.shape else ()
         origin = str(notes.get("origin"))
-        number = _DTYPES.get(dataset.dtype.str[1:]) == "float64"
+        number = dataset.dtype.str[1:] == "f8"
         of_the_model = dims == (HARMONIC,) or dims == tuple(a for a in axes if a in dims)
         if not number or not of_the_model or origin not in ORIGINS:
-            raise _UnfitError(f"holds a parameter {name} that is none")
-        values = dataset[()]
-        value = values if dims else float(values)
+            raise UnfitError(f"holds a parameter {name} that is none")
+        value = dataset[()] if dims else float(dataset[()])
         parameters[name] = Parameter(value, origin, **_wording(notes), dims=dims)
     return parameters
 
 
-def _hard_linked(file: h5py.File, name: str) -> Any:
-    # A soft or an external link could lead anywhere.
-    if not isinstance(file.get(name, getlink=True), h5py.HardLink):
-        raise _UnfitError(f"holds no {name}, or a link in its place")
-    return file[name]
-
-
-def _dataset(file: h5py.File, name: str) -> h5py.Dataset:
-    """Open a dataset that lies in this file, is compressed in known ways and fits into it."""
-    dataset = _hard_linked(file, name)
-    if not isinstance(dataset, h5py.Dataset) or dataset.is_virtual or dataset.external:
-        raise _UnfitError(f"keeps {name} outside of itself or not as an array")
-    known = {h5py.h5z.FILTER_DEFLATE, h5py.h5z.FILTER_SHUFFLE, h5py.h5z.FILTER_FLETCHER32}
-    layout = dataset.id.get_create_plist()
-    filters = {layout.get_filter(index)[0] for index in range(layout.get_nfilters())}
-    stored = min(dataset.id.get_storage_size(), file.id.get_filesize())
-    chunk = int(np.prod(dataset.chunks or (1,), dtype=object)) * dataset.dtype.itemsize
-    size = int(np.prod(dataset.shape, dtype=object)) * dataset.dtype.itemsize
-    packed = _HIGHEST_COMPRESSION if filters else 1
-    # Chunks that nobody has written cost no bytes, but each of them costs time.
-    pieces = dataset.id.get_num_chunks() if dataset.chunks else 0
-    if dataset.chunks and size > pieces * chunk:
-        packed = 0
-    if filters - known or chunk > _LARGEST_CHUNK or not 0 < size <= packed * stored:
-        raise _UnfitError(f"declares {size} bytes for {name} that it does not hold in a known way")
-    return dataset
-
-
-def _dims(file: h5py.File, dataset: h5py.Dataset, sizes: dict[str, int]) -> tuple[str, ...]:
-    name = dataset.name.lstrip("/")
-    dims = []
-    for dim, size in zip(dataset.dims, dataset.shape, strict=True):
-        scale = name if dataset.is_scale else dim[0].name.lstrip("/") if len(dim) == 1 else ""
-        if scale not in file or sizes.setdefault(scale, size) != size:
-            raise _UnfitError(f"holds {name} with dimensions that do not fit")
-        dims.append(scale)
-    return tuple(dims)
-
-
-def _values(dataset: h5py.Dataset) -> NDArray[Any]:
-    if h5py.check_string_dtype(dataset.dtype) is None:
-        kind = _dtype(dataset)
-        try:
-            values: NDArray[Any] = dataset[...]
-        except OSError as error:
-            raise _UnfitError(f"is damaged in {dataset.name} ({reason(error)})") from error
-        return values.astype(kind, copy=False)
-    words = dataset.asstr()[...]
-    if max(map(len, words.flat)) > np.iinfo(np.uint8).max:
-        raise _UnfitError(f"holds no plain words in {dataset.name}")
-    return np.asarray(words, dtype="str")
-
-
-def _dtype(dataset: h5py.Dataset) -> str:
-    if h5py.check_string_dtype(dataset.dtype):
-        return "str"
-    if dataset.dtype.str[1:] not in _DTYPES:
-        raise _UnfitError(f"holds {dataset.name} as {dataset.dtype}, which no variable is")
-    return _DTYPES[dataset.dtype.str[1:]]
-
-
-def _variable(dataset: h5py.Dataset, dims: tuple[str, ...]) -> Variable:
-    notes = _scalars(dataset)
-    return Variable(
-        dataset.name.lstrip("/"),
-        dims,
-        _dtype(dataset),
-        **_wording(notes),
-        fill_value=notes.get("_FillValue"),
-        flags=tuple(str(notes.get("flag_meanings", "")).split()),
-    )
-
-
 def _wording(notes: Mapping[str, Any]) -> dict[str, Any]:
     return {key: str(notes.get(key, "")) for key in ("units", "long_name", "symbol")}
-
-
-def _scalars(item: h5py.HLObject) -> dict[str, Any]:
-    """Give the attributes that are a text or a number, and leave the bookkeeping of HDF5."""
-    scalars: dict[str, Any] = {}
-    for name in item.attrs:
-        if item.attrs.get_id(name).shape not in ((), (1,)):
-            continue
-        value = np.ravel(item.attrs[name])[0]
-        if isinstance(value, str):
-            scalars[name] = str(value)
-        elif isinstance(value, np.integer | np.floating):
-            scalars[name] = value.item()
-    return scalars

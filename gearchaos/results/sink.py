@@ -14,13 +14,7 @@ from typing import Any
 
 
 class Sink(FileIO):
-    """A file that is open for writing, without the failures.
-
-    Parameters
-    ----------
-    path : Path
-        The file; it is emptied.
-    """
+    """A file that is emptied and open for writing, without the failures."""
 
     def __init__(self, path: Path) -> None:
         self._error: BaseException | None = None

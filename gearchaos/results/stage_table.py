@@ -65,12 +65,7 @@ class _Stretch(NamedTuple):
 def labelled_lanes(result: Result, *, name: str = "the result") -> LabelledLanes:
     """Take the labels out of a result with one axis, which messages call by a name.
 
-    Raises
-    ------
-    FileError
-        If the result has no labels.
-    ConfigurationError
-        If it has several axes, or none.
+    Raises FileError if the result has no labels, ConfigurationError if it has not one axis.
     """
     if not all(variable in result for variable in LABELS):
         raise FileError(
@@ -94,12 +89,8 @@ def labelled_lanes(result: Result, *, name: str = "the result") -> LabelledLanes
 def one_axis(result: Result, **coordinates: float) -> Result:
     """Take the slice of a result along one swept parameter, at the coordinates nearest to these.
 
-    Other axes are fixed at their first value.
-
-    Raises
-    ------
-    ConfigurationError
-        If there is no such axis, or if no swept parameter is left.
+    Other axes are fixed at their first value. Raises ConfigurationError if there is no such axis,
+    or if no swept parameter is left.
     """
     part = result.sel("nearest", **coordinates)
     if part.axis in ("", START):
@@ -138,13 +129,9 @@ def label_text(meaning: str, period: int) -> str:
 def stage_table(lanes: LabelledLanes, narrowest: float = 0.0) -> list[Stage]:
     """List the stages of a sweep in ascending order.
 
-    Parameters
-    ----------
-    lanes : LabelledLanes
-    narrowest : float
-        Stages narrower than this go into what surrounds them: the narrowest first, into both
-        neighbours where these are alike and otherwise into the wider one; of two alike the lower
-        one. A stage reaches halfway to the lanes beside it.
+    Stages narrower than ``narrowest`` go into what surrounds them: the narrowest first, into both
+    neighbours where these are alike and otherwise into the wider one; of two alike the lower one. A
+    stage reaches halfway to the lanes beside it.
     """
     changes = np.flatnonzero(lanes.labels[1:] != lanes.labels[:-1]) + 1
     edges = [0, *changes.tolist(), lanes.values.size]

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 from pathlib import Path
 
 from gearchaos.errors import FileError
@@ -23,19 +22,8 @@ class StoreLock:
 
     A sweep that takes all blocks has the folder to itself. Shards share it among each other; two
     that are the same do the same work and write the same bits. Where the system has no such locks,
-    two sweeps on one output are not noticed.
-
-    Parameters
-    ----------
-    folder, output : Path
-        The folder of the blocks, and the result file to be, for the message.
-    shared : bool
-        Whether others may hold the lock as well.
-
-    Raises
-    ------
-    FileError
-        If another process holds the lock, or if the folder cannot be made.
+    two sweeps on one output are not noticed. Raises FileError if another process holds the lock, or
+    if the folder cannot be made.
     """
 
     def __init__(self, folder: Path, output: Path, shared: bool = False) -> None:
@@ -73,24 +61,6 @@ class StoreLock:
         if self._descriptor is not None:
             os.close(self._descriptor)
             self._descriptor = None
-
-
-@contextmanager
-def waiting_lock(path: Path) -> Iterator[None]:
-    """Hold the lock of a file, which is made if need be, once nobody else does.
-
-    Where there are no locks or no such file can be made, nobody waits.
-    """
-    descriptor = None
-    with suppress(OSError):
-        descriptor = os.open(path, os.O_RDWR | os.O_CREAT | NO_LINK, 0o600)
-        if fcntl is not None:
-            fcntl.flock(descriptor, fcntl.LOCK_EX)
-    try:
-        yield
-    finally:
-        if descriptor is not None:
-            os.close(descriptor)
 
 
 def _lock(descriptor: int, shared: bool) -> None:

@@ -44,22 +44,11 @@ STATE_WORDING: dict[str, tuple[str, str]] = {
 class Variable:
     """One named array of a result.
 
-    Parameters
-    ----------
-    name : str
-    dims : tuple of str
-        Names of the dimensions; those of what differs from lane to lane begin with all axes.
-    dtype : str
-        ``"float64"``, ``"int32"``, ``"uint8"`` or ``"str"``.
-    units, long_name, symbol : str
-        Unit (``"1"`` where dimensionless), wording and mathtext symbol for axis labels.
-    fill_value : float or int, optional
-        The value that stands for "none here"; ``None`` where every value means something.
-    flags : tuple of str
-        Meanings of the values 0, 1, 2, ... of an enumeration, one word each.
-    values : ndarray, optional
-        The values themselves, of the shape of `dims`, where they are known before the sweep, as
-        those of coordinates are; ``None`` for what every lane has to be computed for.
+    The dimensions of what differs from lane to lane begin with all axes; the type is ``"float64"``,
+    ``"int32"``, ``"uint8"`` or ``"str"``, the unit ``"1"`` where dimensionless, the symbol
+    mathtext. The fill value stands for "none here", None where every value means something; flags
+    are the meanings of 0, 1, 2, ... of an enumeration, one word each. Values, of the shape of the
+    dimensions, are there where they are known before the sweep, as those of coordinates are.
     """
 
     name: str
@@ -86,16 +75,9 @@ class Variable:
 
 @dataclass(frozen=True, eq=False)
 class Axis:
-    """One dimension of the lanes of a sweep.
+    """One dimension of the lanes of a sweep; values of shape (values,) ascend, none of them twice.
 
-    Parameters
-    ----------
-    name : str
-        See `axis_name`.
-    units, long_name, symbol : str
-        As of a variable.
-    values : ndarray, shape (values,)
-        Ascending, none of them twice.
+    For the name see `axis_name`; the other texts are as of a variable.
     """
 
     name: str
@@ -141,19 +123,10 @@ def sweep_variables(
 ) -> list[Variable]:
     """List the variables of a sweep in the order of the file.
 
-    Parameters
-    ----------
-    axes : sequence of Axis
-        Second swept parameter, first swept parameter, start; those that there are.
-    states, section : sequence of str
-        Those of the scene, in its order, and those recorded at the section.
-    section_points : int
-        Mesh periods recorded.
-    lyapunov, exponents, crossings : bool
-        Whether the largest exponent, all exponents, and crossings of clearance boundaries are kept.
-    status_meanings, check_meanings, motion_meanings : sequence of str
-        Meanings of 0, 1, ... in ``status``, in ``motion_changed`` where lanes are computed twice
-        to measure their error, and in ``motion`` where lanes are labelled.
+    The axes are second swept parameter, first swept parameter, start, those that there are;
+    ``states`` those of the scene in its order, ``section`` those recorded at so many section
+    points. Meanings are those of 0, 1, ...: of ``status``, of ``motion_changed`` where lanes are
+    computed twice to measure their error, and of ``motion`` where lanes are labelled.
     """
     names = tuple(axis.name for axis in axes)
 
@@ -168,8 +141,7 @@ def sweep_variables(
         return Variable(name, names, "uint8", "1", text, flags=flags)
 
     variables = [
-        _coordinate(axis.name, axis.values, axis.long_name, axis.symbol, axis.units)
-        for axis in axes
+        _coordinate(one.name, one.values, one.long_name, one.symbol, one.units) for one in axes
     ]
     if section and section_points > 0:
         text = "number of the section point, one mesh period apart; the last one ends the lane"
@@ -234,12 +206,7 @@ def step_choice_variables(
 ) -> list[Variable]:
     """List what was measured to choose the number of steps, one value per candidate.
 
-    Parameters
-    ----------
-    steps : sequence of int
-        Numbers of steps per period that were tried; the last one was taken.
-    measured : mapping of str to sequence of float
-        Keys as below.
+    The last candidate was taken; ``measured`` has the keys below.
     """
     name = "candidate_steps"
     wording = {

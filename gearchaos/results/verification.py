@@ -12,16 +12,14 @@ from gearchaos.errors import FileError
 from gearchaos.results.checksum_line import checksum_fits
 from gearchaos.results.global_heap import heaps_end
 from gearchaos.results.result_file import PARAMETERS
-from gearchaos.results.result_reader import own_datasets, read_result
+from gearchaos.results.result_reader import read_result
+from gearchaos.results.stored_dataset import own_datasets
 
 
 def verify(path: str | os.PathLike[str]) -> list[str]:
     """Read all of a result file, piece by piece, and say what was found sound, a phrase each.
 
-    Raises
-    ------
-    FileError
-        If anything is damaged or contradicts the format; the sentences name the arrays and rows.
+    Raises FileError if anything is damaged or contradicts the format; it names arrays and rows.
     """
     try:
         variables, _, parameters, metadata = read_result(path, rows=False)
