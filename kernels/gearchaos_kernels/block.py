@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from gearchaos_kernels.block_memory import (
     BEFORE,
     COEFFICIENTS,
+    CROSSINGS,
     GROWTH,
     LANES,
     STATE,
@@ -24,6 +25,7 @@ from gearchaos_kernels.block_memory import (
     SUSPECT,
     TANGENT,
     Block,
+    Crossings,
     Lane,
     aligned_memory,
     fill,
@@ -31,6 +33,7 @@ from gearchaos_kernels.block_memory import (
     load,
     read_branches,
     read_state,
+    store,
     take,
     write_branches,
     write_state,
@@ -70,7 +73,9 @@ def integrate_block(first, batch, plan, outcome, present):
     """Integrate the lanes from ``first`` on that a block holds, and write what comes of them."""
     align_stack()
     lanes = min(LANES, outcome.status.shape[0] - first)
-    block = Block(aligned_memory(), first, lanes)
+    memory = aligned_memory()
+    table = batch.table
+    block = Block(memory, first, lanes)
     interval = begin(block, batch, present)
     periods = plan.transient_periods + plan.recorded_periods
     for period in range(periods):
@@ -78,11 +83,17 @@ def integrate_block(first, batch, plan, outcome, present):
             if period >= periods - plan.history_periods:
                 sample = (period - periods + plan.history_periods) * plan.steps_per_period + number
                 keep_state(block, batch, outcome.history, sample)
-            suspects = step_block(block.memory, batch.table, number, present)
+            # Not in the loop over slots: nobody tells the compiler that its stores spare the table.
+            phases = During(
+                phase_on_grid(table, 2 * number),
+                phase_on_grid(table, 2 * number + 1),
+                phase_on_grid(table, 2 * number + 2),
+            )
+            suspects = step_block(memory, phases, present)
             if present.resolved is not None:
                 if suspects > 0:
                     recorded = period >= plan.transient_periods
-                    split(block, batch.table, number, recorded, outcome, present)
+                    split(memory, table, lanes, number, recorded, present)
             if present.tangent is not None:
                 last = number == plan.steps_per_period - 1
                 if (number + 1) % interval == 0 or last:
@@ -105,6 +116,7 @@ def begin(block, batch, present):
         fill(memory, STATE, slot, batch.scales[index], batch.start[index])
         fill(memory, TANGENT, slot, batch.scales[index], batch.tangent_start[index])
         memory[GROWTH * STRIDE + slot] = 0.0
+        store(memory, CROSSINGS, slot, Crossings(0.0, math.inf, 0.0))
         if present.resolved is not None:
             lane = load(memory, COEFFICIENTS, slot, Lane)
             forcing = forcing_at(lane, phase_on_grid(batch.table, 0), present)
@@ -115,21 +127,17 @@ def begin(block, batch, present):
 
 
 @scalar
-def step_block(memory, table, number, present):
+def step_block(memory, phases, present):
     """Take one step in every slot; return how many may have left a contact branch."""
-    # Not in the loop over slots: nobody tells the compiler that its stores spare the table.
-    begin_phase = phase_on_grid(table, 2 * number)
-    middle_phase = phase_on_grid(table, 2 * number + 1)
-    end_phase = phase_on_grid(table, 2 * number + 2)
     # A sum of integers, which the compiler knows how to vectorise; it does not know a flag.
     suspects = 0
     for slot in range(LANES):
         lane = load(memory, COEFFICIENTS, slot, Lane)
         state = read_state(memory, STATE, slot, present)
         during = During(
-            forcing_at(lane, begin_phase, present),
-            forcing_at(lane, middle_phase, present),
-            forcing_at(lane, end_phase, present),
+            forcing_at(lane, phases.begin, present),
+            forcing_at(lane, phases.middle, present),
+            forcing_at(lane, phases.end, present),
         )
         if present.resolved is None:
             after, slopes = step(state, 1.0, lane, during, None, present)
@@ -153,18 +161,21 @@ def step_block(memory, table, number, present):
 
 
 @scalar
-def split(block, table, number, recorded, outcome, present):
+def split(memory, table, lanes, number, recorded, present):
     """Split the step of every lane that may have left a contact branch."""
-    memory, first, lanes = block
+    # No array of the outcome here: passing one means counting references to it at every step.
     for slot in range(lanes):
         if memory[SUSPECT * STRIDE + slot] == 0.0:
             continue
-        index = first + slot
-        crossings, slowest, overflow = split_step(memory, slot, table, number, present)
-        outcome.overflows[index] += overflow
-        if recorded:
-            outcome.crossings[index] += crossings
-            outcome.slowest_crossing[index] = min(outcome.slowest_crossing[index], slowest)
+        before = load(memory, CROSSINGS, slot, Crossings)
+        count, slowest, overflow = split_step(memory, slot, table, number, present)
+        if not recorded:
+            count = 0
+            slowest = math.inf
+        after = Crossings(
+            before.count + count, min(before.slowest, slowest), before.overflows + overflow
+        )
+        store(memory, CROSSINGS, slot, after)
 
 
 @scalar
@@ -214,13 +225,17 @@ def end_period(block, batch, period, plan, outcome, present):
 
 @scalar
 def end(block, batch, plan, outcome):
-    """Write the last state and tangent vector of every lane."""
+    """Write the last state and tangent vector of every lane, and what it has crossed."""
     memory, first, lanes = block
     for slot in range(lanes):
         index = first + slot
         scale = batch.scales[index]
         take(memory, STATE, slot, scale, outcome.end_state[index])
         take(memory, TANGENT, slot, scale, outcome.end_tangent[index])
+        crossings = load(memory, CROSSINGS, slot, Crossings)
+        outcome.crossings[index] = int(crossings.count)
+        outcome.slowest_crossing[index] = crossings.slowest
+        outcome.overflows[index] = int(crossings.overflows)
     if plan.history_periods > 0:
         keep_state(block, batch, outcome.history, plan.history_periods * plan.steps_per_period)
 

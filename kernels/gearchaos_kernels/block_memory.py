@@ -116,6 +116,14 @@ class Branches(NamedTuple):
     axial: Branch
 
 
+class Crossings(NamedTuple):
+    """Clearance boundaries that a lane crossed: how many, the slowest one, steps with too many."""
+
+    count: float
+    slowest: float
+    overflows: float
+
+
 STATE = 0
 TANGENT = STATE + len(STATES)
 BEFORE = TANGENT + len(STATES)
@@ -127,7 +135,8 @@ SUSPECT = AXIAL_BRANCH + len(Branch._fields)
 """Row that marks the lanes whose step may have left a contact branch."""
 GROWTH = SUSPECT + 1
 """Row of the logarithm of the tangent vector's growth since the period began."""
-ROWS = GROWTH + 1
+CROSSINGS = GROWTH + 1
+ROWS = CROSSINGS + len(Crossings._fields)
 
 _ITEM = np.dtype(np.float64).itemsize
 
