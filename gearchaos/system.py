@@ -185,16 +185,9 @@ class System:
     def integrate(
         self, periods: int, transient: int = 0, start: Floats | None = None
     ) -> Trajectory:
-        """Integrate the motion and keep every step.
+        """Integrate the motion and keep every step of so many mesh periods after the transient.
 
-        Parameters
-        ----------
-        periods : int
-            Mesh periods that are kept.
-        transient : int
-            Mesh periods before them.
-        start : ndarray, shape (states,), optional
-            At mesh phase 0; by default `state`.
+        ``start`` (states,) is the state at mesh phase 0, by default `state`.
 
         Raises
         ------
@@ -224,15 +217,10 @@ class System:
         return respond(self.config.replace("start", start), periods)
 
     def orbit(self, period: int = 1, guess: Floats | None = None) -> Orbit:
-        """Find the periodic orbit that a motion settles on, or the one next to a guess.
+        """Find the orbit of so many mesh periods that a motion settles on, or that next to a guess.
 
-        Parameters
-        ----------
-        period : int
-            In mesh periods.
-        guess : ndarray, shape (states,), optional
-            A state close to the orbit at mesh phase 0; by default the state after the configured
-            transient.
+        ``guess`` (states,) is a state close to the orbit at mesh phase 0, by default the one after
+        the configured transient.
 
         Raises
         ------
@@ -257,16 +245,9 @@ class System:
     ) -> Branch:
         """Follow an orbit along a parameter to where it loses stability.
 
-        Parameters
-        ----------
-        orbit : Orbit
-            At the first value.
-        parameter : str
-            A group by its name, or a physical key by its path.
-        first, last : float
-            Values of the parameter at both ends of the way, in either order.
-        width : float
-            Wanted distance of the last stable value and the one beyond it.
+        The way leads from the first value, that of the orbit, to the last one; ``parameter`` is a
+        group by its name or a physical key by its path, and ``width`` the wanted distance of the
+        last stable value and the one beyond it.
         """
         period = np.array([orbit.period], np.int32)
         followed = follow(
@@ -304,12 +285,7 @@ class System:
     def spectrum(self, state: str = "delta_5", periods: int = 64) -> SpectralLines:
         """Return the amplitude spectrum of a state after the configured transient.
 
-        Parameters
-        ----------
-        state : str
-            One of `states`.
-        periods : int
-            Mesh periods of the record: lines are one over so many mesh frequencies apart.
+        Over a record of so many mesh periods: its lines are one mesh frequency over them apart.
         """
         motion = self.integrate(periods, transient=self.config.integration.transient_periods)
         values = motion.states[:-1, self.states.index(state)]

@@ -44,20 +44,10 @@ def exponents(system: System, start: Floats, plan: Plan) -> Exponents:
     the recorded periods are averaged as those of a single vector are, see `largest_exponent`; the
     first vector of the frame is that single vector.
 
-    Parameters
-    ----------
-    system : System
-    start : ndarray, shape (lanes, states)
-        At tau = 0.
-    plan : Plan
-        Steps and periods; what it says of the section and of the tangent is ignored.
-
-    Returns
-    -------
-    Exponents
-        Not a number in lanes that diverged, and from the first exponent on that the numbers do not
-        resolve: two directions whose exponents times the mesh period differ by more than about 18
-        are parallel in double precision after one period. `sum_of_exponents` is an exact check.
+    ``start`` (lanes, states) at tau = 0; of the plan only steps and periods count. Exponents are
+    not a number in lanes that diverged, and from the first one on that the numbers do not resolve:
+    two directions whose exponents times the mesh period differ by more than about 18 are parallel
+    in double precision after one period. `sum_of_exponents` is an exact check.
     """
     once = plan._replace(transient_periods=0, recorded_periods=1)
     lanes, states = start.shape
@@ -99,12 +89,8 @@ def period_jacobian(system: System, start: Floats, plan: Plan) -> Floats:
     """Return the Jacobian of the map over the recorded mesh periods, taken after the transient.
 
     On a periodic orbit over its own number of periods this is the monodromy matrix, whose
-    eigenvalues are the Floquet multipliers. Parameters are those of `exponents`.
-
-    Returns
-    -------
-    ndarray, shape (lanes, states, states)
-        Column j is the derivative with respect to state j; not a number in lanes that diverged.
+    eigenvalues are the Floquet multipliers. Of shape (lanes, states, states), column j the
+    derivative with respect to state j; not a number in lanes that diverged.
     """
     if plan.transient_periods:
         before = plan._replace(

@@ -80,18 +80,11 @@ class Followed(NamedTuple):
 def loss_of_stability(stable: Complex, beyond: Complex) -> Losses:
     """Tell from the multipliers on either side of a boundary how the orbit loses stability.
 
-    Parameters
-    ----------
-    stable, beyond : ndarray, shape (lanes, states)
-        Multipliers of the same orbit, largest modulus first, where it is stable and as near as
-        possible beyond; not a number where there is no such orbit. An orbit that ends by itself
-        meets an unstable one, so that only a real multiplier near +1 explains its end.
-
-    Returns
-    -------
-    Losses
-        The multiplier is the largest one beyond, or where there is no orbit the largest positive
-        one before; not a number where the orbit was not followed.
+    ``stable``, ``beyond`` (lanes, states): those of the same orbit, largest modulus first, where it
+    is stable and as near as possible beyond; not a number where there is no such orbit. An orbit
+    that ends by itself meets an unstable one, so that only a real multiplier near +1 explains its
+    end. The multiplier that tells is the largest one beyond, or where there is no orbit the largest
+    positive one before; not a number where the orbit was not followed.
     """
     positive = np.where((stable.imag == 0.0) & (stable.real > 0.0), stable.real, 0.0).max(axis=1)
     leading = beyond[:, 0]
@@ -135,21 +128,11 @@ def follow(
     sixteenth of the way, are halved where no orbit is found, and end in a bisection where one is
     unstable. All lanes are followed side by side.
 
-    Parameters
-    ----------
-    system_at : callable
-        Returns the system of all lanes for a value of the parameter in each, shape (lanes,).
-    guess : ndarray, shape (lanes, states)
-        States close to the orbits at the first values, as for `polish`.
-    period : ndarray of int, shape (lanes,)
-        In mesh periods; 0 where there is no orbit to follow.
-    first, last : ndarray, shape (lanes,)
-        Values of the parameter at both ends of the way, in either order.
-    width : float
-        Wanted distance of the stable value and the one beyond. Towards a fold a multiplier nears
-        +1 like the root of the distance: with too large a width it is not yet `NEAR_FOLD`.
-    steps_per_period : int
-        Resolved steps per mesh period.
+    ``system_at`` gives the system of all lanes for a value of the parameter in each, (lanes,);
+    ``first``, ``last`` (lanes,): the values at both ends of the way, in either order; ``guess``,
+    ``period`` and ``steps_per_period`` as for `polish` at the first values; ``width``: wanted
+    distance of the stable value and the one beyond. Towards a fold a multiplier nears +1 like the
+    root of the distance: with too large a width it is not yet `NEAR_FOLD`.
     """
 
     def orbits(share: Floats, guess: Floats, followed: NDArray[np.bool_]) -> Orbits:

@@ -35,13 +35,7 @@ WHOLE = 0.25
 def labels_of(system: System, outcome: Outcome, plan: Plan) -> Labels:
     """Label lanes by their record, which should hold `MOST_POINTS` section points or all there are.
 
-    Parameters
-    ----------
-    system : System
-    outcome : Outcome
-        Of these lanes.
-    plan : Plan
-        By which they were integrated.
+    ``plan`` is that by which they were integrated.
     """
     record = _record(system, outcome, MOST_POINTS)
     labels = label(record)

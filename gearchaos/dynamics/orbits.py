@@ -55,22 +55,10 @@ def polish(
     coordinate is measured by its largest magnitude on the section of the guess, or by a thousandth
     of that of the largest coordinate where this is more.
 
-    Parameters
-    ----------
-    system : System
-    guess : ndarray, shape (lanes, states)
-        States of eq. 13 at tau = 0.
-    period : ndarray of int, shape (lanes,)
-        In mesh periods; 0 where there is no orbit to look for.
-    steps_per_period : int
-        Resolved steps per mesh period.
-
-    Returns
-    -------
-    Orbits
-        ``converged`` is false where Newton's method does not close the orbit, where it leads out
-        of the neighbourhood of the guess, where the orbit found repeats after a divisor of
-        ``period`` already, and where the period is 0.
+    ``guess`` (lanes, states): states of eq. 13 at tau = 0; ``period`` (lanes,) in mesh periods, 0
+    where there is no orbit to look for; ``steps_per_period``: resolved ones. Not converged is a
+    lane in which Newton's method does not close the orbit or leads out of the neighbourhood of the
+    guess, in which the orbit found repeats after a divisor of the period, or whose period is 0.
     """
     found = Orbits(
         points=np.full(guess.shape, np.nan),
@@ -90,16 +78,10 @@ def polish(
 def orbit_exponent(
     multipliers: NDArray[np.complex128], period: NDArray[np.int32], mesh_period: Floats
 ) -> Floats:
-    """Return the largest Lyapunov exponent of periodic orbits, per unit of tau, shape (lanes,).
+    """Return the largest Lyapunov exponent of `Orbits`, per unit of tau, shape (lanes,).
 
-    Parameters
-    ----------
-    multipliers : ndarray, shape (lanes, states)
-        As in `Orbits`; where they are not a number the exponent is not either.
-    period : ndarray of int, shape (lanes,)
-        Period of the orbit in mesh periods; 0 only where there is no orbit.
-    mesh_period : ndarray, shape (lanes,)
-        In units of tau.
+    ``period`` (lanes,) in mesh periods, ``mesh_period`` (lanes,) in units of tau; not a number
+    where the multipliers are not.
     """
     exponent: Floats = np.log(np.abs(multipliers[:, 0])) / (np.maximum(period, 1) * mesh_period)
     return exponent

@@ -7,7 +7,7 @@ the computed motion grows where the true one decays.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from gearchaos_kernels import Groups, System, jacobian
@@ -34,20 +34,12 @@ _BEYOND_MEASURE = 1e150
 _POINTS_PER_WAVE = 64
 
 
-@dataclass(frozen=True, eq=False)
-class StabilityLimit:
+class StabilityLimit(NamedTuple):
     """Why a number of steps per period is unstable.
 
-    Attributes
-    ----------
-    lanes : ndarray, shape (unstable lanes,)
-        Numbers of the lanes in which it is.
-    fewest : ndarray, shape (unstable lanes,)
-        Fewest stable steps per period of each.
-    eigenvalue : complex
-        The one that asks for the most steps, per unit of tau.
-    owner : str
-        What moves most in its mode.
+    ``lanes``, ``fewest`` (unstable lanes,): their numbers, and the fewest stable steps of each;
+    ``eigenvalue``: the one that asks for the most steps, per unit of tau; ``owner``: what moves
+    most in its mode.
     """
 
     lanes: NDArray[np.intp]
@@ -84,12 +76,7 @@ def fewest_stable_steps(system: System) -> Integers:
     The branches are those with and without contact in either direction, with the mesh stiffness
     held at its smallest and at its largest value. A motion that stays on one branch for some of the
     time only may survive with fewer steps. Eigenvalues whose real part is positive grow by
-    themselves and set no limit.
-
-    Returns
-    -------
-    ndarray, shape (lanes,)
-        Whole numbers of at least 1. Every larger number of steps is stable too.
+    themselves and set no limit. Every larger number of steps, shape (lanes,), is stable too.
     """
     system = _measurable(system)
     demand = np.zeros(system.lanes)
@@ -106,11 +93,7 @@ def sufficient_steps(system: System) -> Integers:
     tangential and of the axial motion are symmetric. A mode u of unit length then satisfies
     lambda^2 + lambda u*Cu + u*Ku = 0, hence abs(lambda) <= c/2 + sqrt(c^2/4 + k) with the norms c
     and k of C and K, themselves at most the largest bearing plus the mesh. The step reaches as
-    far as the shortest of all rays.
-
-    Returns
-    -------
-    ndarray, shape (lanes,)
+    far as the shortest of all rays. Shape (lanes,).
     """
     system = _measurable(system)
     effects, groups = system.effects, system.groups

@@ -185,19 +185,10 @@ class Simulation:
         return sorted(blocks, reverse=self.downwards)
 
     def compute(self, first: int, last: int, carried: Floats | None = None) -> dict[str, Any]:
-        """Compute the lanes ``first`` to ``last - 1``.
+        """Compute the lanes ``first`` to ``last - 1``: every variable over lanes by its name.
 
-        Parameters
-        ----------
-        first, last : int
-            Bounds of the block.
-        carried : ndarray, shape (lanes of the block before, states), optional
-            End states of the block before this one, from which a carried sweep goes on.
-
-        Returns
-        -------
-        dict
-            The lanes' values of every variable that runs over lanes, by name.
+        ``carried`` (lanes of the block before, states): end states of the block before this one,
+        from which a carried sweep goes on.
         """
         lanes = np.arange(first, last)
         return self.arrays(lanes, *self.integrate(lanes, self.recording, carried))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -80,7 +79,7 @@ def _limits(lanes: Lanes, steps: int) -> Iterator[StabilityLimit]:
         some = every[first : first + LANES_AT_ONCE]
         limit = stability_limit(lanes.system_of(some), steps)
         if limit is not None:
-            yield replace(limit, lanes=some[limit.lanes])
+            yield limit._replace(lanes=some[limit.lanes])
 
 
 def _fault(lanes: Lanes, worst: StabilityLimit, unstable: NDArray[np.intp], steps: int) -> Fault:
@@ -116,23 +115,10 @@ def pilot(
 ) -> tuple[int, Callable[[int, bool], Solution]]:
     """Prepare to integrate some lanes of a sweep on several grids, to compare them.
 
-    Parameters
-    ----------
-    lanes : Lanes
-    plan : Plan
-        Of the sweep.
-    count : int
-        Lanes wanted, spread evenly over the sweep.
-    finest : int
-        Steps per period of the transient that all grids go on from, so that a lane comes to
-        the same one of several coexisting motions on each of them.
-
-    Returns
-    -------
-    count : int
-        Number of lanes that there are.
-    solution : callable
-        ``solution(steps, resolved)`` settles on that grid and returns the `Solution`.
+    ``count``: lanes wanted, spread evenly over the sweep; ``finest``: steps per period of the
+    transient that all grids go on from, so that a lane comes to the same one of several coexisting
+    motions on each of them. Returned are the number of lanes that there are, and a function that
+    settles with ``(steps, resolved)`` and gives the `Solution`.
     """
     numbers = lanes.spread(count)
     system = lanes.system_of(numbers)
@@ -159,16 +145,8 @@ def choose_steps(
 ) -> list[Candidate]:
     """Double the steps until the error is small enough; the last candidate is the one to take.
 
-    Parameters
-    ----------
-    solution : callable
-        Integrates the pilot lanes with so many steps per period, from one common state.
-    coarsest : int
-        First number of steps tried.
-    tolerance : float
-        Largest error of section and exponent.
-    source : str
-        What a message calls the configuration.
+    ``solution`` integrates the pilot lanes with so many steps per period, from one common state;
+    ``tolerance``: of section and exponent; ``source``: what a message calls the configuration.
 
     Raises
     ------

@@ -24,18 +24,9 @@ _N_PER_UM_MM = 1e9  # stiffness per unit face width: 1 N/(um mm) = 1e9 N/m^2
 def derive_groups(physical: Mapping[str, Any], without: Collection[str] = ()) -> dict[str, Value]:
     """Compute every group for which the physical data suffice.
 
-    Parameters
-    ----------
-    physical : mapping
-        Every key of the physical tables of a configuration by its path, such as ``pair.teeth``,
-        with its value; None is not known. A number may be an array over lanes, which broadcasts.
-    without : collection of str
-        Names of groups that are not wanted.
-
-    Returns
-    -------
-    dict
-        Group name to value; a group whose inputs are not all known is absent.
+    ``physical`` holds every key of the physical tables of a configuration by its path, such as
+    ``pair.teeth``, with its value; None is not known, and a number may be an array over lanes,
+    which broadcasts. A group whose inputs are not all known is absent, as are those ``without``.
 
     Raises
     ------

@@ -53,23 +53,11 @@ ANY_NUMBER = Range()
 class GroupRow:
     """One dimensionless group: its names, what needs it, which values it may take.
 
-    Attributes
-    ----------
-    name : str
-        Key in ``[groups]``, attribute of `Groups`, name in the result file.
-    mathtext : str
-        The symbol as matplotlib mathtext.
-    long_name, units : str
-        For people and for files; ``"1"`` is dimensionless.
-    valid : Range
-    default : float or None
-        Value where the group is neither given nor derivable; None: it has to be known.
-    effects : frozenset of str
-        The group is needed when any of these effects is on; empty: always.
-    derived_from : tuple of str
-        Configuration keys from which the group is derived when it is not given.
-    is_list : bool
-        Whether it is a list with one entry per harmonic, which a sweep cannot vary.
+    ``name``: key in ``[groups]``, attribute of `Groups`, name in the result file; ``mathtext``: its
+    symbol; ``long_name``, ``units``: for people and files, ``"1"`` is dimensionless; ``default``:
+    where the group is neither given nor derivable, None: it has to be known; ``effects``: it is
+    needed when any of these is on, empty: always; ``derived_from``: configuration keys from which
+    it follows; ``is_list``: one entry per harmonic, which a sweep cannot vary.
     """
 
     name: str

@@ -22,14 +22,9 @@ HARMONICS = tuple(row.name for row in GROUP_TABLE if row.is_list)
 class Groups:
     """The dimensionless groups of the rows of `GROUP_TABLE`, each also an attribute by its name.
 
-    Attributes
-    ----------
-    values : mapping of str to float or ndarray
-        Every group that is known: a number, or an array over lanes; the stiffness harmonics are
-        arrays of shape (harmonics,), common to all lanes. The attribute of a group that is not
-        known is None.
-    origin : mapping of str to str
-        Whether each of them was given, derived or taken by default.
+    ``values``: every group that is known, a number or an array over lanes; the stiffness harmonics
+    are arrays of shape (harmonics,), common to all lanes. The attribute of a group that is not
+    known is None. ``origin``: whether each was given, derived or taken by default.
     """
 
     values: Mapping[str, Value]
@@ -53,12 +48,8 @@ def resolve_groups(physical: Mapping[str, Any], given: Mapping[str, Any]) -> Gro
     harmonics of the stiffness are one thing: where only one of cosine and sine is given, the
     other is zero, and the shorter one continues with zeros.
 
-    Parameters
-    ----------
-    physical : mapping
-        As `derive_groups` takes it.
-    given : mapping
-        Group name to a number, an array over lanes, or a list of harmonics.
+    ``physical`` is as `derive_groups` takes it; ``given`` maps names of groups to a number, an
+    array over lanes, or a list of harmonics.
 
     Raises
     ------

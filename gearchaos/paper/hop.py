@@ -87,21 +87,8 @@ def find_hop(
 ) -> Hop | None:
     """Follow both motions, bisect the ends of their interval, and find where starts change over.
 
-    Parameters
-    ----------
-    config : Configuration
-        A sweep over ``pitch_error``.
-    starts : tuple of str
-        Kinds of start states whose hop is looked for.
-    step : float
-        Step of the carried sweeps.
-    threads : int, optional
-        Threads to use; by default all that there are.
-
-    Returns
-    -------
-    Hop or None
-        None where the sweeps upwards and downwards agree everywhere.
+    ``config`` sweeps the pitch error; ``starts``: kinds of start states whose hop is looked for;
+    ``step``: of the carried sweeps. None where the sweeps upwards and downwards agree everywhere.
     """
     config = config.replace("outputs", {"section": config.scene.states, "section_points": 1})
     config = config.replace("outputs.lyapunov", False).replace("outputs.motion", False)

@@ -28,16 +28,7 @@ def subsequence_spread(section: Floats) -> Floats:
     A torus may cut the section in up to 16 curves, which are visited in turn. For each number of
     curves and each stride the points of a curve fall into subsequences; their averages are weighted
     by exp(-1/(t(1-t))) and differ by so many standard deviations of the curve. The number of curves
-    with the smallest difference counts.
-
-    Parameters
-    ----------
-    section : ndarray, shape (lanes, points, states)
-
-    Returns
-    -------
-    ndarray, shape (lanes,)
-        Infinite with too few points to tell.
+    with the smallest difference counts; infinite, shape (lanes,), with too few points to tell.
     """
     lanes, points, states = section.shape
     smallest = np.full(lanes, np.inf)

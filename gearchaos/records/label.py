@@ -104,12 +104,8 @@ def settling_periods(record: Record, labels: Labels) -> NDArray[np.int32]:
     period doubling a motion approaches its orbit from alternating sides, and returns after twice
     the period long before it does after one. A chaotic lane may settle at the very end of its
     record: there the return of the last 16 points counts alone. Whether there is such an orbit, of
-    the period or a divisor of it, and whether it is stable is for Newton's method to tell.
-
-    Returns
-    -------
-    ndarray of int, shape (lanes,)
-        Smaller than the label's period in periodic lanes.
+    the period or a divisor of it, and whether it is stable is for Newton's method to tell. In
+    periodic lanes the period returned is smaller than that of the label.
     """
     found = np.zeros(labels.motion.shape, dtype=np.int32)
     chaotic = np.flatnonzero(labels.motion == CHAOTIC)
@@ -143,12 +139,8 @@ def may_rotate_slowly(record: Record, labels: Labels) -> Mask:
     """Whether an unresolved lane may be on a torus that a longer record would show.
 
     Next to a resonance one turn may take more than a hundred periods. Then the halves of a record
-    differ, and its exponent is further from zero than that of many turns.
-
-    Returns
-    -------
-    ndarray of bool, shape (lanes,)
-        Where the scene admits tori, and a disturbance changes by less than exp(2) over the record.
+    differ, and its exponent is further from zero than that of many turns. It may where the scene
+    admits tori, and a disturbance changes by less than exp(2) over the record.
     """
     found = np.zeros(record.torus.shape, dtype=np.bool_)
     lanes = np.flatnonzero((labels.motion == UNRESOLVED) & record.torus)
@@ -164,16 +156,7 @@ def halves_differ_by(section: Floats) -> Floats:
     Averaged are every coordinate, centred and scaled to variance 1, and its square, with the
     weight exp(-1/(t(1-t))) over each half. On a quasi-periodic motion these averages converge
     faster than any power of the number of points, on a chaotic one like its square root, and on a
-    transient not at all (Das, Sander, Yorke 2017).
-
-    Parameters
-    ----------
-    section : ndarray, shape (lanes, points, states)
-
-    Returns
-    -------
-    ndarray, shape (lanes,)
-        Largest difference of all averages; NaN with fewer than two points.
+    transient not at all (Das, Sander, Yorke 2017). NaN with fewer than two points.
     """
     half = section.shape[1] // 2
     if half == 0:

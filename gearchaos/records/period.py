@@ -43,13 +43,7 @@ def motion_period(section: NDArray[np.float64]) -> NDArray[np.int32]:
 
 
 def period_of(distances: NDArray[np.float64]) -> NDArray[np.int32]:
-    """Return the smallest period whose return distance is within the tolerance, 0 for none.
-
-    Parameters
-    ----------
-    distances : ndarray, shape (lanes, 16)
-        From `return_distances`.
-    """
+    """Return the smallest period whose return distance (lanes, 16) is within tolerance, or 0."""
     returns = distances <= TOLERANCE
     first = np.argmax(returns, axis=1) + 1
     return np.where(returns.any(axis=1), first, 0).astype(np.int32)
@@ -58,17 +52,9 @@ def period_of(distances: NDArray[np.float64]) -> NDArray[np.int32]:
 def return_distances(section: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return how far from itself every section comes back after 1, 2, ... 16 mesh periods.
 
-    Parameters
-    ----------
-    section : ndarray, shape (lanes, points, states)
-        Once a mesh period, in the order of time; the last 48 points are looked at.
-
-    Returns
-    -------
-    ndarray, shape (lanes, 16)
-        Largest distance over all points and coordinates, each coordinate measured as in
-        `motion_period`; NaN for periods that the section does not hold three times, and in lanes
-        with NaN.
+    Of the last 48 points of a section (lanes, points, states) the largest distance, (lanes, 16),
+    over all points and coordinates, each measured as in `motion_period`; NaN for periods that the
+    section does not hold three times, and in lanes with NaN.
     """
     points = section[:, -POINTS_NEEDED:]
     distances = np.full((points.shape[0], LONGEST_PERIOD), np.nan)
@@ -81,18 +67,10 @@ def return_distances(section: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def coordinate_scale(section: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return what distances in every coordinate are measured by.
+    """Return what distances in every coordinate are measured by, shape (lanes, states).
 
-    Parameters
-    ----------
-    section : ndarray, shape (lanes, points, states)
-        With at least one point and one state.
-
-    Returns
-    -------
-    ndarray, shape (lanes, states)
-        The largest magnitude of the coordinate, or a thousandth of that of the largest coordinate
-        where this is more; positive.
+    The largest magnitude of the coordinate on the section (lanes, points, states), or a thousandth
+    of that of the largest coordinate where this is more; positive.
     """
     scale: NDArray[np.float64] = np.max(np.abs(section), axis=1)
     scale = np.maximum(scale, _SMALLEST_SCALE * np.max(scale, axis=1, keepdims=True))
@@ -104,19 +82,9 @@ def section_distance(
 ) -> NDArray[np.float64]:
     """Return the largest distance between the sections of two periodic motions.
 
-    Two motions of period n may pass the points of their orbit n mesh periods apart; of the n
-    ways to align them the one with the smallest distance counts.
-
-    Parameters
-    ----------
-    one, other : ndarray, shape (lanes, points, states)
-    period : ndarray of int, shape (lanes,)
-        The common period in mesh periods; 0 where there is none.
-
-    Returns
-    -------
-    ndarray, shape (lanes,)
-        Largest absolute difference over one period and all states; NaN where the period is 0.
+    Over one common period (lanes,) and all states of both sections (lanes, points, states); NaN
+    where the period is 0. Two motions of period n may pass the points of their orbit n mesh periods
+    apart; of the n ways to align them the one with the smallest distance counts.
     """
     distance = np.full(period.shape, np.nan)
     for n in np.unique(period[period > 0]):

@@ -173,7 +173,7 @@ def split(memory, table, lanes, number, recorded, present):
             count = 0
             slowest = math.inf
         after = Crossings(
-            before.count + count, min(before.slowest, slowest), before.overflows + overflow
+            before.crossed + count, min(before.slowest, slowest), before.overflows + overflow
         )
         store(memory, CROSSINGS, slot, after)
 
@@ -233,7 +233,7 @@ def end(block, batch, plan, outcome):
         take(memory, STATE, slot, scale, outcome.end_state[index])
         take(memory, TANGENT, slot, scale, outcome.end_tangent[index])
         crossings = load(memory, CROSSINGS, slot, Crossings)
-        outcome.crossings[index] = int(crossings.count)
+        outcome.crossings[index] = int(crossings.crossed)
         outcome.slowest_crossing[index] = crossings.slowest
         outcome.overflows[index] = int(crossings.overflows)
     if plan.history_periods > 0:

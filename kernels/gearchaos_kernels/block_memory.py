@@ -119,7 +119,7 @@ class Branches(NamedTuple):
 class Crossings(NamedTuple):
     """Clearance boundaries that a lane crossed: how many, the slowest one, steps with too many."""
 
-    count: float
+    crossed: float
     slowest: float
     overflows: float
 

@@ -39,18 +39,10 @@ _ALONE = Plan(1, 0, 0, 0, resolved=False)
 
 
 def jacobian(system: System, tangential: Floats, axial: Floats) -> Floats:
-    """Return the Jacobian of eq. 13 on one contact branch of either direction.
+    """Return the Jacobian of eq. 13 per unit of tau, shape (lanes, states, states).
 
-    Parameters
-    ----------
-    system : System
-    tangential, axial : ndarray, shape (lanes,)
-        kappa f' in N_y and in N_z: the relative mesh stiffness in contact, 0 without contact.
-
-    Returns
-    -------
-    ndarray, shape (lanes, states, states)
-        Per unit of tau.
+    On one contact branch of either direction: ``tangential``, ``axial`` (lanes,) are kappa f' in
+    N_y and in N_z, the relative mesh stiffness in contact and 0 without contact.
     """
     per_tau = np.ones(system.lanes)
     scales = state_scales(system, per_tau)

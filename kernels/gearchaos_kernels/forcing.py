@@ -54,19 +54,10 @@ def phase_table(
 ) -> NDArray[np.float64]:
     """Return sine, cosine and stiffness variation at every half step of a mesh period.
 
-    Parameters
-    ----------
-    cosine, sine : ndarray, shape (harmonics,)
-        Fourier coefficients of the mesh stiffness relative to its mean (eq. 19).
-    steps_per_period : int
-        Steps of one mesh period.
-
-    Returns
-    -------
-    ndarray, shape (2 steps + 1, 2 + terms)
-        The last row repeats the first: the phase begins anew with every period. The terms are the
-        variation and its further Taylor coefficients in the mesh phase, as many as it takes to
-        reach halfway to the next row.
+    From the Fourier coefficients (harmonics,) of the mesh stiffness relative to its mean (eq. 19),
+    as an array of shape (2 steps + 1, 2 + terms). The last row repeats the first: the phase begins
+    anew with every period. The terms are the variation and its further Taylor coefficients in the
+    mesh phase, as many as it takes to reach halfway to the next row.
     """
     half_steps = np.arange(2 * steps_per_period + 1) % (2 * steps_per_period)
     angle = np.pi * half_steps / steps_per_period
