@@ -16,9 +16,8 @@ from gearchaos.figures.lanes import Between, Floats, Mask, diagram_lanes
 from gearchaos.figures.panel import close_panel
 from gearchaos.figures.style import BLUE, GREY, ORANGE
 from gearchaos.results.result import Result
+from gearchaos.results.variables import LARGEST_EXPONENT, STANDARD_ERROR
 
-VARIABLE = "lyapunov_exponent"
-ERROR_VARIABLE = "lyapunov_exponent_standard_error"
 BAND_STANDARD_ERRORS = 2.0
 
 
@@ -64,14 +63,16 @@ def lyapunov(
     FigureError
         If the result has no Lyapunov exponents, no lane in the range, or two swept parameters.
     """
-    if VARIABLE not in result:
+    if LARGEST_EXPONENT not in result:
         raise FigureError("the result has no Lyapunov exponents: the sweep left them out")
     lanes = diagram_lanes(result, between)
     x = lanes.parameter
-    exponent = np.where(lanes.diverged, np.nan, result.lanes(VARIABLE)[lanes.numbers])
+    exponent = np.where(lanes.diverged, np.nan, result.lanes(LARGEST_EXPONENT)[lanes.numbers])
     reach = np.full(x.shape, np.nan)
-    if ERROR_VARIABLE in result:
-        reach = BAND_STANDARD_ERRORS * result.lanes(ERROR_VARIABLE)[lanes.numbers]
+    if LARGEST_EXPONENT + STANDARD_ERROR in result:
+        reach = (
+            BAND_STANDARD_ERRORS * result.lanes(LARGEST_EXPONENT + STANDARD_ERROR)[lanes.numbers]
+        )
     several_starts = bool(np.any(np.diff(x) == 0.0))
     # Several starts may lie on different motions, which no line should join.
     alone = np.isfinite(exponent) if several_starts else _without_neighbours(exponent)
@@ -103,7 +104,7 @@ def lyapunov(
         markeredgewidth=0.0,
         color=BLUE,
     )
-    axes.set_ylabel(axis_label(result, VARIABLE, line_length=20))
+    axes.set_ylabel(axis_label(result, LARGEST_EXPONENT, line_length=20))
     marks = close_panel(
         axes,
         result,

@@ -8,12 +8,12 @@ from gearchaos.errors import FigureError
 from gearchaos.figures.bifurcation import bifurcation
 from gearchaos.figures.labels import in_words
 from gearchaos.figures.lanes import Between
-from gearchaos.figures.lyapunov import VARIABLE as LYAPUNOV_VARIABLE
 from gearchaos.figures.lyapunov import lyapunov
 from gearchaos.figures.page import Page, few_ticks, letter, page
 from gearchaos.figures.stages import shade_stages
 from gearchaos.figures.style import SINGLE_COLUMN_MM, SMALL_FONT_PT
 from gearchaos.results.result import Result, section_variables
+from gearchaos.results.variables import LARGEST_EXPONENT
 
 HEIGHT_RATIOS = (1.6, 1.0)
 MOST_INTERVALS = (7, 8)
@@ -63,7 +63,7 @@ def bifurcation_page(
     """
     # A variable that was asked for and is not there is an error, not a page without it.
     has_section = variable is not None or bool(section_variables(result))
-    has_exponent = LYAPUNOV_VARIABLE in result
+    has_exponent = LARGEST_EXPONENT in result
     panels = has_section + has_exponent
     if not panels:
         raise FigureError(

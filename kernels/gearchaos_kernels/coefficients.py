@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from gearchaos_kernels.block_memory import Lane
 from gearchaos_kernels.system import Floats, System
 
-LARGEST_EXPONENT = 200.0
+LARGEST_GROWTH = 200.0
 """Natural logarithm of the growth or decay allowed between scalings; numbers end near 700."""
 
 
@@ -94,7 +94,7 @@ def steps_between_scalings(system: System, steps_per_period: int) -> NDArray[np.
     mobility = 1.0 + groups.mass_ratio_p + groups.mass_ratio_g
     damping = 2.0 * groups.damping_ratio * mobility + 2.0 * bearings
     rate = damping + np.sqrt(mobility * (1.0 + np.abs(groups.stiffness_variation_scale)))
-    scalings = rate * system.mesh_period / LARGEST_EXPONENT
+    scalings = rate * system.mesh_period / LARGEST_GROWTH
     # Powers of two, so that the shortest interval of a block divides all others.
     interval = np.exp2(np.floor(np.log2(np.maximum(1.0, steps_per_period / scalings))))
     return np.where(scalings > 1.0, interval, steps_per_period).astype(np.intp)

@@ -128,7 +128,7 @@ def _decorate(function: Callable[..., Any], **flags: Any) -> Any:
 
 def scalar(function: Callable[..., Any]) -> Any:
     """Compile a formula of plain numbers that is inlined wherever it is used."""
-    return _decorate(function, forceinline=True, no_cfunc_wrapper=True)
+    return _decorate(function, forceinline=True, no_cfunc_wrapper=True, no_cpython_wrapper=True)
 
 
 def driver(function: Callable[..., Any], parallel: bool = True) -> Any:

@@ -7,9 +7,11 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import numba
 import numpy as np
 from gearchaos_kernels import STATES, Effects, Groups, Outcome, Plan, System, integrate
 
@@ -31,6 +33,12 @@ NO_AXIAL = Effects(axial=False)
 TORSION_ONLY = Effects(transverse=False, axial=False)
 NO_BACKLASH = Effects(backlash=False)
 LINEAR = Effects(stiffness_variation=False, backlash=False)
+
+
+def from_python(formula: Any) -> Callable[..., Any]:
+    """Return a compiled function that calls a formula, which only compiled code can call."""
+    compiled: Callable[..., Any] = numba.njit(lambda *arguments: formula(*arguments))
+    return compiled
 
 
 def pan2021(pitch_error: Any, **groups: Any) -> Groups:

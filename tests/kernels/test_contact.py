@@ -5,18 +5,20 @@ import math
 
 import numpy as np
 import pytest
+from gearchaos_kernels import contact
 from gearchaos_kernels.block_memory import Branch
-from gearchaos_kernels.contact import (
-    NEVER,
-    branch_at,
-    first_fall,
-    leaving_fraction,
-    may_leave,
-    next_branch,
-)
+from gearchaos_kernels.contact import NEVER
 from gearchaos_kernels.equations import Gap
 from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
+
+from .reference import from_python
+
+branch_at = from_python(contact.branch_at)
+first_fall = from_python(contact.first_fall)
+leaving_fraction = from_python(contact.leaving_fraction)
+may_leave = from_python(contact.may_leave)
+next_branch = from_python(contact.next_branch)
 
 settings.register_profile("contact", derandomize=True, deadline=None, max_examples=150)
 PROPERTY = settings.get_profile("contact")

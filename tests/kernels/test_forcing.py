@@ -4,8 +4,15 @@ import math
 
 import numpy as np
 import pytest
+from gearchaos_kernels import forcing
 from gearchaos_kernels.block_memory import Lane, Present
-from gearchaos_kernels.forcing import forcing_at, phase_on_grid, phase_table, phase_within
+from gearchaos_kernels.forcing import phase_table
+
+from .reference import from_python
+
+forcing_at = from_python(forcing.forcing_at)
+phase_on_grid = from_python(forcing.phase_on_grid)
+phase_within = from_python(forcing.phase_within)
 
 ROUNDING = 1e-14
 FEW_STEPS = [8, 9, 12, 16]
