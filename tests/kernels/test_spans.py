@@ -152,7 +152,7 @@ def test_plain_steps_gain_and_lose_energy_at_every_impact():
 @pytest.mark.slow
 @pytest.mark.parametrize("resolved", [False, True], ids=["plain", "resolved"])
 @pytest.mark.parametrize(("steps", "multiple"), [(24, 0.5), (32, 5.86), (101, 5.86)])
-def test_a_periodic_motion_stays_where_it_is_for_a_hundred_thousand_periods(
+def test_a_periodic_motion_stays_where_it_is_for_twenty_thousand_periods(
     resolved, steps, multiple
 ):
     outcome = run(
@@ -160,17 +160,16 @@ def test_a_periodic_motion_stays_where_it_is_for_a_hundred_thousand_periods(
         TORSION_ONLY,
         steps=steps,
         transient=2000,
-        periods=100_000,
-        points=100_000,
+        periods=20_000,
+        points=20_000,
         resolved=resolved,
     )
     assert outcome.status.tolist() == [Status.OK]
     # Neither the place nor the phase of the motion drifts: both coordinates keep their digits.
     assert np.ptp(outcome.section, axis=1).max() < 1e-13
-    assert np.ptp(outcome.growth[0].reshape(100, 1000).mean(axis=1)) < 1e-2
+    assert np.ptp(outcome.growth[0].reshape(20, 1000).mean(axis=1)) < 1e-2
     if resolved:
-        assert outcome.crossings[0] % 100_000 == 0
-        assert outcome.crossings[0] == (200_000 if multiple > 1.0 else 0)
+        assert outcome.crossings[0] == (40_000 if multiple > 1.0 else 0)
 
 
 def test_a_hundred_thousand_periods_of_free_oscillation_keep_the_phase_of_the_method():
