@@ -21,7 +21,7 @@ from gearchaos.paper.our_numbers import (
     printed_series,
 )
 from gearchaos.paper.published import published
-from gearchaos.paper.stages import counterparts, motion_at
+from gearchaos.paper.stages import WINDOW, counterparts, motion_at
 from gearchaos.paper.sweep_files import sweep_file
 from gearchaos.paper.verdict import (
     OVERLAP,
@@ -31,6 +31,7 @@ from gearchaos.paper.verdict import (
     motion_verdict,
     overlap_verdict,
 )
+from gearchaos.results.stage_table import labelled_lanes, stage_table
 
 from .commands import run_module
 
@@ -399,8 +400,13 @@ def labels_of(result) -> list[str]:
     ]
 
 
+def ends_of(motion, result):
+    stages = stage_table(labelled_lanes(result), WINDOW)
+    return [(round(s.start, 2), round(s.end, 2)) for s in stages if s.label == motion]
+
+
 @pytest.mark.slow
-def test_every_stage_in_the_report_ends_at_lanes_with_its_motion(report, found):
+def test_every_stage_in_the_report_is_one_of_the_stage_table(report, found):
     printed, labels = published().stages, labels_of(found.sweep)
     values = found.sweep["pitch_error"].round(2).tolist()
     rows = tables(report)["Figure 7: stages"]
@@ -419,7 +425,10 @@ def test_every_stage_in_the_report_ends_at_lanes_with_its_motion(report, found):
             ]
             assert row[4:] == ["–", "**does not agree**"]
         else:
-            assert [labels[values.index(end)] for end in (first, last)] == [stage.motion] * 2
+            # The lanes at its ends may lie in windows; all but windows have its motion.
+            inside = labels[values.index(first) : values.index(last) + 1]
+            assert inside.count(stage.motion) > len(inside) / 2.0
+            assert (first, last) in ends_of(stage.motion, found.sweep)
             assert numbers(row[4]) == pytest.approx(
                 [first - stage.first, last - stage.last], abs=0.006
             )

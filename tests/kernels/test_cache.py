@@ -93,9 +93,9 @@ def test_an_edited_formula_in_another_file_is_never_served_from_the_cache(cache,
     assert copy["ends"] == first["ends"]
     equations = package / "equations.py"
     source = equations.read_text()
-    line = "return stiffness * gap + damping * rate, stiffness"
+    line = "return stiffness * gap.value + damping * gap.rate, stiffness"
     assert source.count(line) == 1
-    changed = source.replace(line, line.replace("stiffness * gap", "stiffness * gap * 2.0"))
+    changed = source.replace(line, line.replace("stiffness * gap", "stiffness * 2.0 * gap"))
     equations.write_text(changed)
     edited = integrate(cache, LINEAR, package=package)
     assert edited["misses"] == 1

@@ -152,9 +152,7 @@ def test_plain_steps_gain_and_lose_energy_at_every_impact():
 @pytest.mark.slow
 @pytest.mark.parametrize("resolved", [False, True], ids=["plain", "resolved"])
 @pytest.mark.parametrize(("steps", "multiple"), [(24, 0.5), (32, 5.86), (101, 5.86)])
-def test_a_periodic_motion_stays_where_it_is_for_twenty_thousand_periods(
-    resolved, steps, multiple
-):
+def test_a_periodic_motion_stays_where_it_is_for_twenty_thousand_periods(resolved, steps, multiple):
     outcome = run(
         pan2021(multiple),
         TORSION_ONLY,
