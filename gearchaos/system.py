@@ -24,6 +24,7 @@ from gearchaos.dynamics.following import (
     follow,
     loss_of_stability,
 )
+from gearchaos.dynamics.orbit import Branch, Orbit
 from gearchaos.dynamics.orbits import Orbits, orbit_exponent, polish
 from gearchaos.dynamics.stability import fewest_stable_steps
 from gearchaos.dynamics.systems import system_of
@@ -38,7 +39,6 @@ from gearchaos.results.result import Result
 from gearchaos.results.variables import axis_name
 
 Floats = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 
 
 class Trajectory(NamedTuple):
@@ -46,42 +46,6 @@ class Trajectory(NamedTuple):
 
     time: Floats
     states: Floats
-
-
-class Orbit(NamedTuple):
-    """A periodic orbit.
-
-    ``period`` in mesh periods; ``point`` (states,) at mesh phase 0; ``multipliers`` (states,): the
-    Floquet multipliers, largest modulus first; ``exponent``: the largest Lyapunov exponent per unit
-    of tau; ``residual``: distance after one period, relative to the scale of each coordinate.
-    """
-
-    period: int
-    point: Floats
-    multipliers: Complex
-    exponent: float
-    residual: float
-
-    @property
-    def stable(self) -> bool:
-        """Whether all multipliers lie inside the unit circle."""
-        return bool(abs(self.multipliers[0]) < 1.0)
-
-
-class Branch(NamedTuple):
-    """How far an orbit goes along a parameter.
-
-    ``value``, ``orbit``: the last value at which it is stable, and the orbit there; ``beyond``: the
-    first value at which it is unstable or not found, the end of the way if it stays stable;
-    ``loss``, ``text``: how it loses stability; ``multiplier``: the one that tells.
-    """
-
-    value: float
-    orbit: Orbit
-    beyond: float
-    loss: StabilityLoss
-    text: str
-    multiplier: complex
 
 
 class System:
