@@ -151,7 +151,7 @@ def test_the_clearance_is_crossed_as_often_as_in_the_stored_solution(number):
 
 
 @stored([solution for solution in RUNS + ORBITS if solution["crossings"] == 0])
-def test_plain_steps_predict_their_error_only_where_nothing_is_crossed(number):
+def test_plain_steps_predict_their_error_where_nothing_is_crossed(number):
     solution = (RUNS + ORBITS)[number]
     outcomes = [follow(solution, DEFAULT * by, resolved=False) for by in (1, 2, 4)]
     found, missed = predicted(*(states(solution, outcome) for outcome in outcomes))
