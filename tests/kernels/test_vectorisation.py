@@ -26,8 +26,8 @@ ARITHMETIC = re.compile(r"v(add|sub|mul|fn?m(add|sub)\d+)pd$")
 SCALAR = re.compile(r"v(add|sub|mul|fn?m(add|sub)\d+)sd$")
 LABEL = re.compile(r"^\.LBB\w+:", re.MULTILINE)
 INSTRUCTION = re.compile(r"^\s+(v\w+)\s+(.*)$", re.MULTILINE)
-STORE = re.compile(r"%[yz]mm\d+, -?\d*\((?!%r[sb]p)")
-"""A wide register into memory that is not the stack, where spilled registers go."""
+STORE = re.compile(r"%[yz]mm\d+, -?\d*\(%r\w+,\s*%r\w+")
+"""A wide register into memory at an index: spilled registers go to the stack, which has none."""
 
 WIDE = ("ymm", "zmm")
 TORSION = Effects(*[False] * len(Effects._fields))
@@ -85,7 +85,7 @@ class Loop(NamedTuple):
 
 
 def stores_of(instructions: list[tuple[str, str]]) -> int:
-    """Return how many wide registers are stored in memory that is not the stack."""
+    """Return how many wide registers are stored at an index."""
     return sum(name.startswith("vmov") and bool(STORE.match(to)) for name, to in instructions)
 
 
@@ -103,14 +103,16 @@ def loop_of(scene: Effects, tangent: bool, resolved: bool, /) -> Loop:
     given = arguments(scene, tangent, resolved)
     loop(*given)
     assembly = loop.inspect_asm(loop.signatures[-1])
-    found = INSTRUCTION.findall(assembly)
-    body = max(map(INSTRUCTION.findall, LABEL.split(assembly)), key=stores_of)
+    rows = rows_written(scene, tangent, resolved)
+    blocks = map(INSTRUCTION.findall, LABEL.split(assembly))
+    # What begins and ends a block of lanes has wide stores of its own, but fewer.
+    body = [one for block in blocks if stores_of(block) >= rows for one in block]
     scalars = sum(bool(SCALAR.match(name)) for name, _ in body)
     counts: Counter[tuple[str, str]] = Counter()
-    for mnemonic, operands in found:
+    for mnemonic, operands in body:
         width = next((name for name in ("zmm", "ymm", "xmm") if name in operands), "")
         counts[mnemonic, width] += 1
-    return Loop(counts, stores_of(found) / rows_written(scene, tangent, resolved), scalars)
+    return Loop(counts, stores_of(body) / rows, scalars)
 
 
 SPLIT = pytest.mark.parametrize("resolved", [False, True], ids=["whole", "split"])
