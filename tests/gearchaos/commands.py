@@ -1,7 +1,9 @@
 """A small sweep, and the means to run commands on it as a user does."""
 
+import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
 from typing import NamedTuple
 
@@ -117,3 +119,21 @@ def same_data(one: gearchaos.Result, other: gearchaos.Result) -> bool:
         for name, parameter in one.parameters.items()
     ]
     return all(a.dtype == b.dtype and a.tobytes() == b.tobytes() for a, b in arrays)
+
+
+def signalled(folder: Path, blocks: str, number: int, *arguments: str) -> Ended:
+    """Run a sweep, send it a signal once a block is finished; return exit code, stdout, stderr."""
+    with subprocess.Popen(
+        [sys.executable, "-m", "gearchaos.sweep", *arguments],
+        cwd=folder,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        # A test run in the background may have been told to ignore Ctrl-C, and hands that on.
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
+    ) as process:
+        while process.poll() is None and not list((folder / blocks).glob("*.block")):
+            time.sleep(0.005)
+        process.send_signal(number)
+        out, err = process.communicate(timeout=60)
+    return Ended(process.returncode, out, err)

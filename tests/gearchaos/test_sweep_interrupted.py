@@ -17,7 +17,7 @@ import gearchaos
 from gearchaos.results.manifest import folder_of
 from gearchaos.results.store_lock import LOCK
 
-from .commands import names_in, same_data, small_config, sweep
+from .commands import names_in, same_data, signalled, small_config, sweep
 
 HELD_LOCKS = Path("/proc/locks")
 
@@ -43,23 +43,11 @@ def undisturbed(tmp_path_factory):
 def stop_half_way(folder, number, *arguments):
     """Start the long sweep, send it a signal once a block is finished, and return how it ended."""
     small_config(folder)
-    with subprocess.Popen(
-        [sys.executable, "-m", "gearchaos.sweep", "gears.toml", *LONG, *arguments],
-        cwd=folder,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        # A test run in the background may have been told to ignore Ctrl-C, and hands that on.
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
-    ) as process:
-        while process.poll() is None and not list((folder / BLOCKS).glob("*.block")):
-            time.sleep(0.005)
-        process.send_signal(number)
-        out, err = process.communicate(timeout=60)
+    code, out, err = signalled(folder, BLOCKS, number, "gears.toml", *LONG, *arguments)
     assert "Traceback" not in err
     assert out == ""
     assert names_in(folder) == [BLOCKS, "gears.toml"]
-    return process.returncode, err
+    return code, err
 
 
 @pytest.mark.parametrize(

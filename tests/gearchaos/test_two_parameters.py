@@ -2,9 +2,6 @@
 
 import json
 import signal
-import subprocess
-import sys
-import time
 
 import numpy as np
 import pytest
@@ -12,7 +9,7 @@ import xarray as xr
 
 import gearchaos
 
-from .commands import SMALL, names_in, run_module, same_data
+from .commands import SMALL, names_in, run_module, same_data, signalled
 
 LOADS = np.linspace(0.1, 0.5, 9)
 ERRORS = np.linspace(0.0, 5.0, 40)
@@ -104,20 +101,8 @@ def test_python_gives_the_same_bits(result):
 
 
 def test_stopped_half_way_and_resumed_it_is_the_same(folder, result):
-    with subprocess.Popen(
-        [sys.executable, "-m", "gearchaos.sweep", "both.toml", "--threads", "1"],
-        cwd=folder,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        # A test run in the background may have been told to ignore Ctrl-C, and hands that on.
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
-    ) as process:
-        while process.poll() is None and not list((folder / BLOCKS).glob("*.block")):
-            time.sleep(0.005)
-        process.send_signal(signal.SIGINT)
-        out, err = process.communicate(timeout=60)
-    assert (process.returncode, out) == (130, ""), err
+    code, out, err = signalled(folder, BLOCKS, signal.SIGINT, "both.toml", "--threads", "1")
+    assert (code, out) == (130, ""), err
     assert " of 1080 lanes are kept" in err
     kept = len(list((folder / BLOCKS).glob("*.block")))
     assert 0 < kept < 5
