@@ -81,11 +81,6 @@ class KernelCache(NullCache):  # type: ignore[misc]
         """Read and write nothing yet."""
         self._function, self._folder = function, folder
 
-    @property
-    def cache_path(self) -> str:
-        """The folder, for Numba's statistics."""
-        return str(self._folder)
-
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """Return the code that was kept for a signature, or None where it has to be compiled."""
         target_context.refresh()

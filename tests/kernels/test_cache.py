@@ -19,9 +19,10 @@ PACKAGE = Path(gearchaos_kernels.__file__).parent
 # What is asked for are expressions. The Jacobian is the kernel that compiles fastest; `double`, of
 # which every type of argument is compiled for itself, is faster still and cached in the same way.
 PROGRAM = """
-import json, resource, sys
+import json, sys
 limit, *expressions = json.loads(sys.argv[1])
 if limit:
+    import resource
     resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit))
 import numpy as np
 from gearchaos_kernels import Effects, Groups, System, evaluation
