@@ -4,12 +4,14 @@ import signal
 import subprocess
 import sys
 import time
+from contextlib import chdir
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
 import gearchaos
+from gearchaos.sweep import main
 
 SMALL = """\
 # every effect, so that every parameter can be swept with one kernel
@@ -71,6 +73,13 @@ section_points = 5
 lyapunov = true
 """
 
+LINEAR = (
+    *("--set", 'scene.effects=["pitch_error"]'),
+    *("--set", 'outputs.section=["delta_5"]'),
+    *("--set", "outputs.lyapunov=false"),
+)
+"""The smallest scene, two states of a linear pair, where it does not matter what is computed."""
+
 DIVERGING = ("--set", "groups.load=1e150")
 """A load that drives every lane beyond every length scale."""
 
@@ -102,6 +111,16 @@ def sweep(folder: Path, *arguments: str, **options) -> Ended:
     """Run the sweep command on the small sweep in a folder."""
     small_config(folder)
     return run_module("gearchaos.sweep", "gears.toml", *arguments, cwd=folder, **options)
+
+
+def computed(folder: Path, *arguments: str) -> int:
+    """Run the sweep command on the small sweep in this process, which has imported it already.
+
+    For what a test needs and does not look at.
+    """
+    small_config(folder)
+    with chdir(folder):
+        return main(["gears.toml", *arguments])
 
 
 def names_in(folder: Path) -> list[str]:

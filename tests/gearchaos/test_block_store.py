@@ -174,6 +174,27 @@ def test_a_store_of_another_configuration_is_refused_with_the_keys(output: Path)
         assert store.finished().bounds == BLOCKS
 
 
+def test_a_store_of_another_gearchaos_is_refused_with_both_values(output: Path) -> None:
+    with open_store(output) as store:
+        fill(store)
+    newer = SOFTWARE._replace(software="gearchaos 2.0.0")
+    other = newer._replace(kernels="fedcba9876543210")
+    for software, resume, configuration, words in (
+        (
+            newer,
+            True,
+            CONFIGURATION,
+            r"differs in software \(gearchaos 1\.2\.3, now \S+ 2\.0\.0\); go",
+        ),
+        (other, False, CONFIGURATION, r"kernels \(0123456789abcdef, now fedcba9876543210\); go on"),
+        (newer, True, "title = 't'", r"2\.0\.0\), integration\.steps_per_period \(288, now absent"),
+    ):
+        with pytest.raises(FileError, match=f"blocks of another gearchaos, which .*{words}"):
+            open_store(output, software=software, resume=resume, configuration=configuration)
+    with open_store(output, resume=True) as store:
+        assert store.finished().bounds == BLOCKS
+
+
 def test_types_and_nans_are_told_apart_where_they_matter() -> None:
     assert differing_keys("a = 1", "a = 1.0") == ["a (1, now 1.0)"]
     assert differing_keys("a = nan", "a = nan") == []
@@ -442,6 +463,7 @@ def test_a_refused_shard_leaves_nothing_behind(output: Path) -> None:
             open_shard(output, 1)
         fill(store, BLOCKS[:1])
         assert names() == sorted([*before, "000000000000-000000000030.block"])
+    (output.with_name("sweep.h5.blocks") / "lock").unlink()
     before = names()
     for options in ({"configuration": "title = 'other'"}, {"resume": False}):
         given = {"configuration": CONFIGURATION, "resume": True, **options}
@@ -471,6 +493,40 @@ def test_links_in_the_folder_are_not_followed(output: Path, tmp_path: Path) -> N
         manifest.symlink_to(victim)
     with pytest.raises(FileError, match=r"manifest\.json: is damaged or missing"):
         open_store(output, resume=True)
+
+
+def test_a_folder_that_is_a_link_or_of_another_user_is_refused(output: Path) -> None:
+    folder, elsewhere = output.with_name("sweep.h5.blocks"), output.with_name("elsewhere")
+    folder.symlink_to(elsewhere)
+    for make in (lambda: None, elsewhere.mkdir):
+        make()
+        with pytest.raises(FileError, match=r"blocks: is a link, no folder or another user's"):
+            open_store(output)
+    assert list(elsewhere.iterdir()) == []
+    folder.unlink()
+    folder.mkdir()
+    try:
+        os.chown(folder, 12_345, -1)
+    except PermissionError:
+        pytest.skip("only root can give a folder away")
+    with pytest.raises(FileError, match=r"blocks: is a link, no folder or another user's"):
+        open_store(output)
+    assert list(folder.iterdir()) == []
+
+
+@pytest.mark.parametrize("name", ["lock", "manifest.json"])
+@pytest.mark.parametrize("kind", ["pipe", "link"])
+def test_a_shard_refuses_what_is_no_file_and_leaves_it(name: str, kind: str, output: Path) -> None:
+    path = output.with_name("sweep.h5.blocks") / name
+    path.parent.mkdir()
+    if kind == "pipe":
+        os.mkfifo(path)
+    else:
+        path.symlink_to("nowhere")
+    with pytest.raises(FileError, match=r"regular file; delete it|symbolic links|is damaged or"):
+        open_shard(output, 0)
+    assert list(path.parent.iterdir()) == [path]
+    assert not path.is_file()
 
 
 @pytest.mark.parametrize("target", ["nowhere/lock", "victim"])

@@ -9,11 +9,12 @@ from gearchaos.errors import ConfigurationError
 from gearchaos.results.manifest import folder_of
 from gearchaos.results.store_lock import StoreLock
 
-from .commands import names_in, run_module, same_data, sweep
+from .commands import LINEAR, computed, names_in, run_module, same_data, sweep
 
 BLOCKS = "gears.h5.blocks"
 # Four blocks of lanes.
-COUNT = ("--set", "sweep.count=1000", "--quiet")
+LANES = (*LINEAR, "--set", "sweep.count=1000")
+COUNT = (*LANES, "--quiet")
 
 
 @pytest.mark.parametrize("lanes", [1, 255, 256, 1000, 123_456, 1_000_000])
@@ -50,7 +51,7 @@ def test_shards_computed_with_other_threads_join_to_the_undisturbed_result(tmp_p
         assert names_in(tmp_path) == [BLOCKS, "gears.toml"]
     assert run_module("gearchaos.merge", "gears.h5", "-q", cwd=tmp_path) == (0, "gears.h5\n", "")
     assert names_in(tmp_path) == ["gears.h5", "gears.toml"]
-    assert sweep(tmp_path, *COUNT, "--output", "one.h5").code == 0
+    assert computed(tmp_path, *COUNT, "--output", "one.h5") == 0
     one, joined = (gearchaos.open_result(tmp_path / name) for name in ("one.h5", "gears.h5"))
     assert same_data(joined, one)
     assert joined.names == one.names
@@ -59,7 +60,7 @@ def test_shards_computed_with_other_threads_join_to_the_undisturbed_result(tmp_p
 
 
 def test_a_shard_says_what_is_next_and_is_not_computed_twice(tmp_path):
-    told = ("--set", "sweep.count=1000", "--shard", "2/2")
+    told = (*LANES, "--shard", "2/2")
     first = sweep(tmp_path, *told)
     assert first.code == 0
     assert "488 lanes, 0 diverged" in first.err
@@ -83,7 +84,7 @@ def test_a_shard_says_what_is_next_and_is_not_computed_twice(tmp_path):
 
 
 def test_shards_of_another_configuration_are_refused_with_the_key(tmp_path):
-    assert sweep(tmp_path, *COUNT, "--shard", "1/2").code == 0
+    assert computed(tmp_path, *COUNT, "--shard", "1/2") == 0
     other = sweep(tmp_path, *COUNT, "--shard", "2/2", "--set", "groups.damping_ratio=0.06")
     assert other.code == 4
     assert "which differs in groups.damping_ratio (0.05, now 0.06)" in other.err
