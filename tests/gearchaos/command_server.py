@@ -29,7 +29,9 @@ def main() -> None:
         process = os.fork()
         if process == 0:
             run(*json.loads(line))
-        print(os.waitstatus_to_exitcode(os.waitpid(process, 0)[1]), flush=True)
+        ended = os.waitstatus_to_exitcode(os.waitpid(process, 0)[1])
+        sys.stdout.write(f"{ended}\n")
+        sys.stdout.flush()
 
 
 def run(module: str, arguments: list[str], folder: str, out: str, err: str) -> None:

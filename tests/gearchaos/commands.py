@@ -77,6 +77,13 @@ section_points = 5
 lyapunov = true
 """
 
+LINEAR = (
+    *("--set", 'scene.effects=["pitch_error"]'),
+    *("--set", 'outputs.section=["delta_5"]'),
+    *("--set", "outputs.lyapunov=false"),
+)
+"""The smallest scene, two states of a linear pair, where it does not matter what is computed."""
+
 DIVERGING = ("--set", "groups.load=1e150")
 """A load that drives every lane beyond every length scale."""
 
@@ -114,7 +121,8 @@ def _forked(module: str, arguments: Sequence[str], cwd: Path) -> Ended:
         for file in (out, err):
             file.touch()
         words = [module, arguments, str(cwd), str(out), str(err)]
-        print(json.dumps(words), file=server.stdin, flush=True)
+        server.stdin.write(json.dumps(words) + "\n")
+        server.stdin.flush()
         ended = Ended(int(server.stdout.readline()), out.read_text(), err.read_text())
     assert "Traceback" not in ended.err, ended.err
     return ended
