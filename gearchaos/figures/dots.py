@@ -98,7 +98,7 @@ class DenseDots(Line2D):
         gc.restore()
 
     def _dot(self, renderer: Any) -> Floats:
-        """Draw one dot by itself, and give the opacity of the pixels around it."""
+        """Draw one dot by itself, and give the opacity of the pixels around it, from the bottom."""
         reach = ceil(renderer.points_to_pixels(self.get_markersize()) / 2.0) + 1
         size = 2 * reach + 1
         paper: Any = RendererAgg(size, size, 72.0 * renderer.points_to_pixels(1.0))  # type: ignore[no-untyped-call]
@@ -106,11 +106,11 @@ class DenseDots(Line2D):
         dot.update_from(self)
         dot.set(transform=IdentityTransform(), clip_on=False)
         dot.draw(paper)
-        return np.minimum(np.asarray(paper.buffer_rgba())[..., 3] / 255.0, 1.0 - 1e-6)
+        return np.minimum(np.asarray(paper.buffer_rgba())[::-1, :, 3] / 255.0, 1.0 - 1e-6)
 
 
 def counts(axes: Axes, lanes: Lanes, rows: Floats, margin: int = 0) -> NDArray[np.uint32]:
-    """Count the points in each pixel of the axes and of a margin around them, from the top.
+    """Count the points in each pixel of the axes and of a margin around them, from the bottom.
 
     Returns an array of shape (rows, columns) of pixels; a point lies in that pixel which a marker
     is placed on.
@@ -123,7 +123,7 @@ def counts(axes: Axes, lanes: Lanes, rows: Floats, margin: int = 0) -> NDArray[n
         x = np.repeat(lanes.parameter[part], values.shape[1])
         place = axes.transData.transform(np.column_stack([x, values.ravel()]))
         column = np.floor(place[:, 0] + 0.5) - left
-        row = height - 1 - (np.ceil(place[:, 1] - 0.5) - bottom)
+        row = np.ceil(place[:, 1] - 0.5) - bottom
         inside = (column >= 0) & (column < width) & (row >= 0) & (row < height)
         pixel = row[inside].astype(np.intp) * width + column[inside].astype(np.intp)
         np.add.at(counted, pixel, np.uint32(1))
