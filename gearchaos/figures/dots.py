@@ -104,9 +104,10 @@ class DenseDots(Line2D):
         paper: Any = RendererAgg(size, size, 72.0 * renderer.points_to_pixels(1.0))  # type: ignore[no-untyped-call]
         dot = Line2D([reach], [reach])
         dot.update_from(self)
-        dot.set(transform=IdentityTransform(), clip_on=False)
+        dot.set(transform=IdentityTransform(), clip_on=False, alpha=1.0)
         dot.draw(paper)
-        return np.minimum(np.asarray(paper.buffer_rgba())[::-1, :, 3] / 255.0, 1.0 - 1e-6)
+        alpha = self.get_alpha() or 1.0
+        return np.asarray(paper.buffer_rgba())[::-1, :, 3] * min(alpha, 1.0 - 1e-6) / 255.0
 
 
 def counts(axes: Axes, lanes: Lanes, rows: Floats, margin: int = 0) -> NDArray[np.uint32]:

@@ -87,20 +87,20 @@ def select_lanes(result: Result, between: Between = (None, None)) -> Lanes:
     return Lanes(numbers, parameter, diverged, (left, right))
 
 
-def columns(lanes: Lanes, parameter: Floats) -> NDArray[np.intp]:
-    """Return where in an ascending parameter each column of the axis begins.
+def columns(parameter: Floats, limits: tuple[float, float]) -> NDArray[np.intp]:
+    """Return where in an ascending parameter each column of an axis begins.
 
     If there are not several values for each of the `COLUMNS`, every one begins a column.
     """
     if parameter.size <= 2 * COLUMNS:
         return np.arange(parameter.size)
-    low, high = lanes.limits
-    return np.flatnonzero(np.diff(np.floor((parameter - low) / (high - low) * COLUMNS), prepend=-1))
+    number = np.floor((parameter - limits[0]) / (limits[1] - limits[0]) * COLUMNS)
+    return np.flatnonzero(np.diff(number, prepend=-1.0))
 
 
 def outermost(lanes: Lanes, values: Floats) -> NDArray[np.intp]:
     """Return which lanes have the lowest or the highest value of their column, or none in a gap."""
-    first = columns(lanes, lanes.parameter)
+    first = columns(lanes.parameter, lanes.limits)
     sizes = np.diff(first, append=values.size)
     low, high = np.fmin.reduceat(values, first), np.fmax.reduceat(values, first)
     shown = (values == np.repeat(low, sizes)) | (values == np.repeat(high, sizes))

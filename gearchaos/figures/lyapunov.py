@@ -25,7 +25,7 @@ BAND_STANDARD_ERRORS = 2.0
 class LyapunovArtists(NamedTuple):
     """What `lyapunov` has drawn, beside its `Marks`.
 
-    ``line``: the exponent in the order of the parameter, not a number where a lane diverged;
+    ``line``: the exponents drawn, by the parameter, not a number where a lane diverged;
     ``points``: exponents without a neighbour to draw a line to, between diverged lanes, or all of
     them where a parameter value has several starts; ``band``, ``bars``: two standard errors to
     either side, of the line and of the points; ``positive``: between a positive exponent and zero.
@@ -53,6 +53,8 @@ def lyapunov(
 
     Diverged lanes are gaps with a red tick at the bottom; a positive exponent is shaded down
     to zero; the vertical axis always holds zero, and lanes beyond robust limits get a triangle.
+    Of more lanes than a page can tell apart (`figures.lanes.COLUMNS`), line, shades and bars are
+    those of the lowest and the highest exponent in each column.
 
     Parameters
     ----------
