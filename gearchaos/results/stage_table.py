@@ -137,7 +137,6 @@ def stage_table(lanes: LabelledLanes, narrowest: float = 0.0) -> list[Stage]:
     edges = [0, *changes.tolist(), lanes.values.size]
     middles = (lanes.values[1:] + lanes.values[:-1]) / 2.0
     borders = np.concatenate([lanes.values[:1], middles, lanes.values[-1:]]).tolist()
-    labels = lanes.labels.tolist()
 
     def width(stretch: _Stretch) -> float:
         return float(borders[stretch.after] - borders[stretch.first])
@@ -152,8 +151,8 @@ def stage_table(lanes: LabelledLanes, narrowest: float = 0.0) -> list[Stage]:
             continue  # It has become part of another one since.
         beside = [by_after.get(stretch.first), by_first.get(stretch.after)]
         there = [neighbour for neighbour in beside if neighbour is not None]
-        label = labels[max(there, key=width).own]
-        merged = [near for near in there if labels[near.own] == label] + [stretch]
+        label = lanes.labels[max(there, key=width).own]
+        merged = [near for near in there if lanes.labels[near.own] == label] + [stretch]
         whole = _Stretch(
             min(old.first for old in merged),
             max(old.after for old in merged),
