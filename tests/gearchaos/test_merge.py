@@ -2,7 +2,7 @@
 
 import gearchaos
 
-from .commands import DIVERGING, LINEAR, SMALL, names_in, run_module, same_data
+from .commands import DIVERGING, LINEAR, SMALL, names_in, run_module, same_data, sweep
 
 BLOCKS = "gears.h5.blocks"
 COUNT = (*LINEAR, "--set", "sweep.count=1000", "--quiet")
