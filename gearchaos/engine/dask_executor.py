@@ -83,7 +83,7 @@ class DaskExecutor:
     def workers(self) -> int:
         """How many workers there are now."""
         try:
-            return len(_answer(self._address, self._client.nthreads))
+            return len(_answer(self._client.nthreads, _patience()))
         except OSError as error:
             raise self._worded(error) from None
 
@@ -133,9 +133,8 @@ class DaskExecutor:
     def _require_software(self) -> None:
         # Blocks cannot even be sent to a worker without it; versions are compared with the blocks.
         try:
-            _answer(
-                self._address, lambda: self._client.run(find_spec, __name__), _SECONDS_TO_IMPORT
-            )
+            with notice(f"{self._address}: waits up to {_SECONDS_TO_IMPORT:g} s for the workers"):
+                _answer(lambda: self._client.run(find_spec, __name__), _SECONDS_TO_IMPORT)
         except (ImportError, OSError) as error:
             raise self._worded(error) from None
 
@@ -189,10 +188,13 @@ def _simulation(recipe: Recipe) -> Simulation:
     return simulation
 
 
-def _answer(address: str, question: Callable[[], Any], seconds: float | None = None) -> Any:
-    """Ask in a thread, for dask's connect timeout by default, and heed interrupts meanwhile."""
-    if seconds is None:
-        seconds = parse_timedelta(dask.config.get("distributed.comm.timeouts.connect"))
+def _patience() -> float:
+    """Return for how many seconds a scheduler may be silent."""
+    return float(parse_timedelta(dask.config.get("distributed.comm.timeouts.connect")))
+
+
+def _answer(question: Callable[[], Any], seconds: float) -> Any:
+    """Ask in a thread, and heed interrupts meanwhile."""
     future: Future[Any] = Future()
 
     def ask() -> None:
@@ -203,12 +205,11 @@ def _answer(address: str, question: Callable[[], Any], seconds: float | None = N
 
     Thread(target=ask, daemon=True).start()
     began = time.monotonic()
-    with notice(f"{address}: waits up to {seconds:g} s for an answer"):
-        while not wait([future], _SECONDS_BETWEEN_LOOKS).done:
-            check()
-            # What dask has to say itself once the time is up goes before this.
-            if time.monotonic() - began > seconds + 1.0:
-                raise TimeoutError(f"silent for {seconds:g} s")
+    while not wait([future], _SECONDS_BETWEEN_LOOKS).done:
+        check()
+        # What dask has to say itself once the time is up goes before this.
+        if time.monotonic() - began > seconds + 1.0:
+            raise TimeoutError(f"silent for {seconds:g} s")
     return future.result()
 
 
@@ -216,7 +217,8 @@ def _connected(stack: ExitStack, address: str) -> Any:
     local = re.fullmatch(r"local:(.*)", address)
     if local is None:
         try:
-            return _answer(address, lambda: _Client(address))
+            with notice(f"{address}: waits up to {_patience():g} s for an answer"):
+                return _answer(lambda: _Client(address), _patience())
         # What is raised is up to the transport that the address names.
         except Exception as error:
             raise ExecutionError(

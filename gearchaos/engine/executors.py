@@ -118,7 +118,9 @@ def compute_blocks(
         raise
 
 
-def _ended(executor: BlockExecutor, futures: Mapping[Future[Arrays], Bounds]) -> set[Future[Arrays]]:
+def _ended(
+    executor: BlockExecutor, futures: Mapping[Future[Arrays], Bounds]
+) -> set[Future[Arrays]]:
     """Wait until some blocks have ended, as long as the executor has somebody to compute them."""
     while not (ended := wait(futures, SECONDS_BETWEEN_LOOKS, FIRST_COMPLETED).done):
         _ = executor.width
