@@ -8,6 +8,16 @@
 
 from __future__ import annotations
 
+import signal
+import sys
+
+# Where a command was started, by -m or as the console script, Ctrl-C ends it without a traceback
+# of its imports until it heeds interrupts itself. Whoever else imports this is left alone.
+if "".join(sys.orig_argv[-len(sys.argv) :][:1]).split("/")[-1].split(".")[0] == __name__ and (
+    signal.getsignal(signal.SIGINT) is signal.default_int_handler
+):
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
