@@ -8,13 +8,15 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import sys
 
-# Where a command was started, by -m or as the console script, Ctrl-C ends it without a traceback
-# of its imports until it heeds interrupts itself. Whoever else imports this is left alone.
-if "".join(sys.orig_argv[-len(sys.argv) :][:1]).split("/")[-1].split(".")[0] == __name__ and (
-    signal.getsignal(signal.SIGINT) is signal.default_int_handler
+# Started as `-m gearchaos.NAME` or as the console script, a command ends on Ctrl-C without a
+# traceback of its imports until it heeds interrupts itself. Who else imports this is left alone.
+if (
+    os.path.basename(*(sys.orig_argv[-len(sys.argv) :][:1] or [""])).split(".")[0] == __name__
+    and signal.getsignal(signal.SIGINT) is signal.default_int_handler
 ):
     signal.signal(signal.SIGINT, signal.SIG_DFL)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import time
 from collections.abc import Mapping, Sequence
@@ -114,7 +115,9 @@ def prepare(simulation: Simulation, *, compile_now: bool = True, history_periods
 
 def _check_memory(simulation: Simulation) -> None:
     wanted = simulation.block_memory(current_threads())
-    memory = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
+    # Windows does not tell.
+    known = hasattr(os, "sysconf")
+    memory = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE") if known else math.inf
     if wanted > memory:
         plan = simulation.plan
         raise ConfigurationError(
