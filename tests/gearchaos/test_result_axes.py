@@ -217,7 +217,7 @@ def test_chunks_follow_the_order_of_the_lanes(tmp_path: Path) -> None:
         ("axes", "load load", "does not name its axes"),
         ("axes", "pitch_error load", r"should be float64 over \(pitch_error, load"),
         ("axes", "load", "float64 over"),
-        ("schema_version", "1.0", r"has version '1\.0' .* reads 2\.x; run the sweep again"),
+        ("schema_version", "1.0", r"has version '1\.0' .* reads 3\.x; run the sweep again"),
     ],
 )
 def test_axes_that_contradict_the_arrays_are_refused(attribute, value, words, tmp_path) -> None:
