@@ -149,10 +149,10 @@ def _read(file: h5py.File, rows: bool) -> Contents:
 
 
 def _wording(notes: Mapping[str, Any]) -> dict[str, Any]:
-    wording = {key: str(notes.get(key, "")) for key in ("units", "long_name", "symbol")}
-    # Of a long formula, matplotlib would reach the depth of its recursion.
-    wording["symbol"] *= len(wording["symbol"]) <= LONGEST_SYMBOL
-    return wording
+    wording = {key: str(notes.get(key, ""))[:MOST_PRINTED] for key in ("units", "long_name")}
+    symbol = str(notes.get("symbol", ""))
+    # In a long formula, matplotlib would come to the end of its recursion.
+    return wording | {"symbol": symbol if len(symbol) <= LONGEST_SYMBOL else ""}
 
 
 def _check_schema(metadata: Mapping[str, Any]) -> None:
