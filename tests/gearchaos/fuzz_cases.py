@@ -6,7 +6,7 @@ import selectors
 import subprocess
 import sys
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple, Self
 
@@ -185,12 +185,12 @@ def result_cases(numbers: Iterable[int], folder: Path) -> Iterator[Case]:
             path.unlink(missing_ok=True)
 
 
-def forged_cases(folder: Path) -> Iterator[Case]:
-    """Give every forgery to every command that reads result files."""
+def forged_cases(folder: Path, readers: Sequence[str] = READERS) -> Iterator[Case]:
+    """Give every forgery to every command that reads result files, or to some of them."""
     (good, *_), path = _good_results(folder), folder / "forged.h5"
     for number, name in enumerate(FORGERIES):
         forged_result(name, good, path)
-        for command, *options in map(str.split, READERS):
+        for command, *options in map(str.split, readers):
             yield Case(name, number, command, [str(path), *options], path)
     path.unlink()
 

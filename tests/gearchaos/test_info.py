@@ -2,6 +2,7 @@
 
 import json
 import re
+from pathlib import Path
 
 import h5py
 import numpy as np
@@ -102,6 +103,14 @@ def test_a_newer_format_is_refused_in_a_sentence(good):
     ended = info(good)
     assert ended.code == 4
     assert "has version '4.0' of the file format, of which this gearchaos reads 3.x" in ended.err
+
+
+@pytest.mark.skipif(not Path("/proc/self/mem").is_file(), reason="there is no such file")
+def test_a_file_that_cannot_be_read_is_named_in_our_own_words(tmp_path):
+    # Not even the superuser reads the beginning of this one.
+    ended = run_module("gearchaos.info", "--verify", "/proc/self/mem", cwd=tmp_path)
+    assert ended.code == 4
+    assert "error: /proc/self/mem: cannot be read: " in ended.err.splitlines()[-1]
 
 
 def test_control_characters_do_not_reach_the_terminal(good):

@@ -117,6 +117,7 @@ def test_a_slice_is_that_of_xarray(engine, result, tmp_path) -> None:
     # One axis, some of them, all of them; beyond the ends; halfway between two values.
     places = [{name: wanted[name] for name in names[:n]} for n in range(1, len(names) + 1)]
     places += [{"pitch_error": 99.0}, {"pitch_error": -5.0}, {"pitch_error": 0.75}]
+    places += [{"pitch_error": -1e308}, {"pitch_error": 1e308}]
     with (
         xr.open_dataset(tmp_path / "r.h5", engine=engine, mask_and_scale=False) as whole,
         xr.open_dataset(tmp_path / "r.h5", engine=engine, group="parameters") as groups,

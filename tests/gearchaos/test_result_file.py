@@ -296,6 +296,23 @@ def test_another_program_may_change_the_file(path: Path, tmp_path: Path) -> None
     assert again["reference"].tolist() == [0, 1, 2]
 
 
+@pytest.mark.parametrize("engine", ["netcdf4", "h5netcdf"])
+def test_xarray_may_write_the_file_anew(engine: Any, tmp_path: Path) -> None:
+    # Both engines give some texts a variable length, netcdf4 those beyond ASCII only.
+    small = make_result(swept(count=8), configuration="# é\n")
+    small.save(tmp_path / "sweep.h5")
+    with xr.open_datatree(tmp_path / "sweep.h5", engine=engine) as tree:
+        tree.load().to_netcdf(tmp_path / "anew.h5", engine=engine)
+    anew = open_result(tmp_path / "anew.h5")
+    assert anew.metadata.items() >= small.metadata.items()
+    for name in small:
+        np.testing.assert_array_equal(anew[name], small[name], strict=True)
+        assert anew.dims(name) == small.dims(name)
+        assert anew.variables[name].flags == small.variables[name].flags
+    # To a tree, the swept one is the coordinate of the whole.
+    assert anew.parameters.keys() == small.parameters.keys() - {"pitch_error"}
+
+
 def test_every_state_has_a_wording_of_its_own() -> None:
     assert len(set(STATE_WORDING.values())) == len(STATE_WORDING) == 10
 
