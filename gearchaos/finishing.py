@@ -47,22 +47,22 @@ def complete_already(simulation: Simulation, output: str) -> int | None:
     """Go on with a sweep whose result exists: nothing is left to be done.
 
     Returns the exit code that the sweep had, None if the file is no undamaged result. Raises
-    FileError if it is the result of another configuration.
+    FileError if it is the result of another configuration or of another gearchaos.
     """
+    from gearchaos.engine.provenance import SOFTWARE
     from gearchaos.engine.store_filling import open_store
-    from gearchaos.results.manifest import differing_keys, folder_of
+    from gearchaos.results.manifest import folder_of, require_same
     from gearchaos.results.result import completed
 
     found = completed(output)
     if found is None:
         return None
+    # A file that another program has changed may not say who computed it.
+    now = {key: fact for key, fact in SOFTWARE._asdict().items() if key in found.metadata}
+    now["configuration"] = simulation.config.resolved_toml()
     resolved = str(found.metadata.get("configuration_resolved", ""))
-    if keys := differing_keys(resolved, simulation.config.resolved_toml()):
-        raise FileError(
-            f"{output}: is the result of another configuration, which differs in "
-            f"{', '.join(keys)}; restore these values, replace it with --overwrite or choose "
-            "another --output"
-        )
+    earlier = {**found.metadata, "configuration": resolved}
+    require_same(f"{output}: is the result", earlier, now, "replace it with --overwrite")
     if folder_of(output).is_dir():
         # A process that was killed while it tidied up has left its blocks.
         with suppress(FileError), open_store(simulation, output, resume=True) as store:

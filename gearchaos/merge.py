@@ -32,36 +32,40 @@ def _arguments(parser: ArgumentParser) -> None:
 def _merge(options: Namespace) -> int:
     output: str = options.output
     from gearchaos.results.atomic_file import check_output
-    from gearchaos.results.manifest import folder_of, stored_configuration
+    from gearchaos.results.manifest import folder_of, require_same, stored_manifest
     from gearchaos.results.result import completed
 
     finished_before = not options.overwrite and completed(output) is not None
     if finished_before and not folder_of(output).is_dir():
         print(output, flush=True)
         return OK
-    resolved, text = stored_configuration(output)
+    manifest, folder = stored_manifest(output), folder_of(output)
     from gearchaos.configuration import Configuration
     from gearchaos.engine.error_check import Tally
+    from gearchaos.engine.provenance import SOFTWARE
     from gearchaos.engine.running import metadata, prepare
     from gearchaos.engine.simulation import Simulation
     from gearchaos.engine.store_filling import open_store
 
-    config = Configuration.from_toml(resolved, f"{folder_of(output)}: configuration")
+    # Another gearchaos may have other keys.
+    require_same(f"{folder}: holds blocks", manifest, SOFTWARE._asdict())
+    config = Configuration.from_toml(manifest["configuration"], f"{folder}: configuration")
     simulation = Simulation(config)
     if finished_before:
         code = complete_already(simulation, output)
         if code is not None:
             return code
     check_output(output, options.overwrite)
-    prepare(simulation, compile_now=False)
     with open_store(simulation, output, resume=True) as store:
+        prepare(simulation, compile_now=False)
         tally = Tally()
         found = store.finished(tally.add)
         _require_all(store, found)
-        facts = {**metadata(simulation, 0.0), "configuration": text}
+        facts = {**metadata(simulation, 0.0), "configuration": manifest["text"] or config.text}
         # Who computed for how long is known to the shards alone.
         del facts["threads"], facts["wall_time_seconds"]
-        store.merge(simulation.lanes.parameters, facts, overwrite=options.overwrite, found=found)
+        told = simulation.variables, simulation.lanes.parameters, facts
+        store.merge(*told, overwrite=options.overwrite, found=found)
     print(output, flush=True)
     say(f"{store.lanes} lanes, {tally.diverged} diverged", *tally.remarks)
     return ending(simulation, tally.diverged)

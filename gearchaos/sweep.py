@@ -11,6 +11,7 @@ from __future__ import annotations
 import sys
 import time
 from argparse import ArgumentParser, Namespace
+from contextlib import suppress
 from typing import TYPE_CHECKING
 
 from gearchaos.command_line import OK, Command
@@ -98,20 +99,24 @@ def _compute(simulation: Simulation, output: str, shard: Shard | None, options: 
 
     check_output(output, options.overwrite)
     began = time.monotonic()
-    # Workers compile for themselves: this may be another kind of machine.
-    prepare(simulation, compile_now=options.dask is None)
     with open_store(simulation, output, resume=options.resume, shard=shard) as store:
+        # Workers compile for themselves: this may be another kind of machine.
+        prepare(simulation, compile_now=options.dask is None)
         try:
             tally, performed_by = fill(simulation, store, options.dask)
             seconds = time.monotonic() - began
             if shard is None:
                 facts = {**metadata(simulation, seconds), **performed_by}
-                store.merge(simulation.lanes.parameters, facts, overwrite=options.overwrite)
+                told = simulation.variables, simulation.lanes.parameters, facts
+                store.merge(*told, overwrite=options.overwrite)
         except (KeyboardInterrupt, FileError, ExecutionError, OSError) as fault:
             kept = sum(last - first for first, last in store.finished().bounds)
             fault.add_note(f"{kept} of {store.own_lanes} lanes are kept")
             again = [argument for argument in options.arguments if argument != "--resume"]
-            fault.add_note(f"go on with: {_command('sweep', *again, '--resume')}")
+            # With this it begins, and may be refused at once.
+            with suppress(FileError):
+                check_output(output, options.overwrite)
+                fault.add_note(f"go on with: {_command('sweep', *again, '--resume')}")
             raise
     print(output if shard is None else store.folder, flush=True)
     say(f"{store.own_lanes} lanes, {tally.diverged} diverged, {seconds:.1f} s", *tally.remarks)

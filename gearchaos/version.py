@@ -2,6 +2,18 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
+
+class Software(NamedTuple):
+    """What decides the numbers of a sweep beside its configuration, by its name in files."""
+
+    software: str
+    kernels: str
+
+    def __str__(self) -> str:
+        return f"{self.software} (kernels {self.kernels})"
+
 
 def software_version() -> str:
     """Return the installed version of gearchaos, "0+unknown" in a clone never installed."""

@@ -13,14 +13,14 @@ from typing import Any, NamedTuple, Self
 
 import distributed
 from gearchaos_kernels import current_threads, most_threads, use_threads
-from gearchaos_kernels.compilation import source_hash
 
 from gearchaos.configuration import Configuration
 from gearchaos.engine.executors import ExecutionError
+from gearchaos.engine.provenance import SOFTWARE
 from gearchaos.engine.simulation import Arrays, Bounds, Simulation
 from gearchaos.errors import ConfigurationError
 from gearchaos.progress import say
-from gearchaos.version import software_version
+from gearchaos.version import Software, software_version
 
 # Its constructors carry no annotations.
 _Client: Any = distributed.Client
@@ -37,12 +37,12 @@ class Recipe(NamedTuple):
     """All that a worker must know to compute blocks of a sweep.
 
     ``configuration`` is the resolved one in TOML; the steps are chosen once, not on every worker;
-    ``software`` are the versions that decide the numbers.
+    ``software`` is what decides the numbers beside it.
     """
 
     configuration: str
     steps_per_period: int
-    software: tuple[str, str]
+    software: Software
 
 
 class DaskExecutor:
@@ -56,7 +56,7 @@ class DaskExecutor:
     def __init__(self, simulation: Simulation, address: str) -> None:
         self._address = address
         self._recipe = Recipe(
-            simulation.config.resolved_toml(), simulation.plan.steps_per_period, software()
+            simulation.config.resolved_toml(), simulation.plan.steps_per_period, SOFTWARE
         )
         for name in ("distributed", "distributed.client"):
             # What goes wrong comes as an exception.
@@ -128,20 +128,12 @@ class DaskExecutor:
         return error
 
 
-def software() -> tuple[str, str]:
-    """Return the versions that decide the numbers: of gearchaos, and a hash of the kernels."""
-    return software_version(), source_hash()
-
-
 def compute_block(recipe: Recipe, block: Bounds) -> dict[str, Any]:
     """Compute a block on a worker; ExecutionError if its software is not that of the client."""
-    if software() != recipe.software:
-        here, wanted = (
-            f"{version} (kernels {kernels})" for version, kernels in (software(), recipe.software)
-        )
+    if recipe.software != SOFTWARE:
         raise ExecutionError(
-            f"the worker {distributed.get_worker().address} has gearchaos {here}, this process "
-            f"{wanted}: install the same on both"
+            f"the worker {distributed.get_worker().address} has {SOFTWARE}, this process "
+            f"{recipe.software}: install the same on both"
         )
     # A worker of several task threads is one of as many cores: its blocks take turns.
     with _ONE_AT_A_TIME:

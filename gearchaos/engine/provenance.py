@@ -8,16 +8,19 @@ from datetime import UTC, datetime
 from importlib.metadata import version
 from pathlib import Path
 
-from gearchaos_kernels import processor
+from gearchaos_kernels import processor, source_hash
 
-from gearchaos.version import software_version
+from gearchaos.version import Software, software_version
+
+SOFTWARE = Software(f"gearchaos {software_version()}", source_hash())
+"""That of this process. Not asked for later: somebody may edit a source that was imported."""
 
 
 def provenance(threads: int, seconds: float) -> dict[str, str | int | float]:
     """Return what a result file says about the run that made it in so many seconds."""
     facts: dict[str, str | int | float] = {
         "created": datetime.now(UTC).isoformat(timespec="seconds"),
-        "software": f"gearchaos {software_version()}",
+        **SOFTWARE._asdict(),
         "python_version": platform.python_version(),
         "numpy_version": version("numpy"),
         "numba_version": version("numba"),

@@ -8,6 +8,7 @@ from gearchaos_kernels import current_threads
 
 from gearchaos.engine.error_check import Tally
 from gearchaos.engine.executors import BlockExecutor, LocalExecutor, compute_blocks
+from gearchaos.engine.provenance import SOFTWARE
 from gearchaos.engine.sharding import Shard, shared_block_lanes
 from gearchaos.engine.simulation import Arrays, Bounds, Simulation
 from gearchaos.progress import Progress, complain
@@ -17,11 +18,12 @@ from gearchaos.results.block_store import BlockStore
 def open_store(
     simulation: Simulation, output: str, *, resume: bool, shard: Shard | None = None
 ) -> BlockStore:
-    """Open the store of a sweep whose number of steps has been chosen, see `BlockStore`."""
+    """Open the store of a sweep, see `BlockStore`; it needs not be compiled for that."""
     return BlockStore(
         output,
         simulation.variables,
         simulation.config.resolved_toml(),
+        SOFTWARE,
         text=simulation.config.text,
         resume=resume,
         blocks=shard and shard.blocks(len(simulation.lanes)),

@@ -10,6 +10,7 @@ from matplotlib.legend import Legend
 from matplotlib.lines import Line2D
 
 from gearchaos.errors import FigureError
+from gearchaos.figures.dots import MOST_DOTS, dots, portions
 from gearchaos.figures.labels import axis_label
 from gearchaos.figures.lanes import Between, diagram_lanes
 from gearchaos.figures.panel import close_panel
@@ -38,8 +39,10 @@ def bifurcation(
 
     Every section point is a small translucent dot: a periodic motion, whose points coincide,
     shows as a crisp black line, and chaos as grey whose depth is the density of visits. The
-    dots are rasterised, so that a PDF stays small. Diverged lanes get a red tick at the
-    bottom, lanes beyond robust limits a triangle at the edge, and a legend above says so.
+    dots are rasterised, so that a PDF stays small. Above `figures.dots.MOST_DOTS` they are counted
+    by pixel, and fainter the more there are, so that chaos stays grey.
+    Diverged lanes get a red tick at the bottom, lanes beyond robust limits a triangle at the edge,
+    and a legend above says so.
 
     Parameters
     ----------
@@ -60,23 +63,22 @@ def bifurcation(
     """
     variable = _known_variable(result, variable)
     lanes = diagram_lanes(result, between)
-    values = np.asarray(result.lanes(variable), dtype=np.float64)[lanes.numbers]
-    values = np.where(lanes.diverged[:, np.newaxis], np.nan, values)
-    finite = np.isfinite(values)
-    (points,) = axes.plot(
-        np.broadcast_to(lanes.parameter[:, np.newaxis], values.shape)[finite],
-        values[finite],
-        linestyle="none",
-        marker=".",
+    rows = result.lanes(variable)
+    total = max(1, lanes.numbers.size * rows.shape[1])
+    points = dots(
+        axes,
+        lanes,
+        rows,
         markersize=float(np.clip(200.0 / lanes.numbers.size, 0.8, 1.8)),
-        markeredgewidth=0.0,
         color=BLACK,
-        alpha=min(1.0, 4.0 / max(1, values.shape[1]) ** 0.5),
         rasterized=True,
+        alpha=min(1.0, 4.0 / max(1, rows.shape[1]) ** 0.5) * min(1.0, MOST_DOTS / total),
     )
     axes.set_ylabel(axis_label(result, variable, line_length=34))
-    known = np.ma.masked_invalid(values)
-    low, high = (extreme.filled(np.nan) for extreme in (known.min(axis=1), known.max(axis=1)))
+    low, high = np.full((2, lanes.numbers.size), np.nan)
+    for part, values in portions(lanes, rows):
+        np.fmin.reduce(values, axis=1, out=low[part])
+        np.fmax.reduce(values, axis=1, out=high[part])
     return BifurcationArtists(
         points, *close_panel(axes, result, lanes, low, high, full_range=full_range)
     )

@@ -17,6 +17,9 @@ Between = tuple[float | None, float | None]
 PAD = 0.05
 """What is added to either end of an axis of one value, in parts of the value."""
 
+COLUMNS = 4000
+"""Columns of an axis that a page can tell apart: two of a journal at 600 dpi."""
+
 
 class Lanes(NamedTuple):
     """Lanes in ascending order of the swept parameter, and the ends of its axis.
@@ -82,3 +85,24 @@ def select_lanes(result: Result, between: Between = (None, None)) -> Lanes:
         pad = abs(left) * PAD or 0.5
         left, right = left - pad, right + pad
     return Lanes(numbers, parameter, diverged, (left, right))
+
+
+def columns(parameter: Floats, limits: tuple[float, float]) -> NDArray[np.intp]:
+    """Return where in an ascending parameter each column of an axis begins.
+
+    If there are not several values for each of the `COLUMNS`, every one begins a column.
+    """
+    if parameter.size <= 2 * COLUMNS:
+        return np.arange(parameter.size)
+    number = np.floor((parameter - limits[0]) / (limits[1] - limits[0]) * COLUMNS)
+    return np.flatnonzero(np.diff(number, prepend=-1.0))
+
+
+def outermost(lanes: Lanes, values: Floats) -> NDArray[np.intp]:
+    """Return which lanes have the lowest or the highest value of their column, or none in a gap."""
+    first = columns(lanes.parameter, lanes.limits)
+    sizes = np.diff(first, append=values.size)
+    low, high = np.fmin.reduceat(values, first), np.fmax.reduceat(values, first)
+    shown = (values == np.repeat(low, sizes)) | (values == np.repeat(high, sizes))
+    shown[first[np.isnan(low)]] = True
+    return np.flatnonzero(shown)

@@ -11,8 +11,9 @@ from matplotlib.legend import Legend
 from matplotlib.lines import Line2D
 
 from gearchaos.errors import FigureError
+from gearchaos.figures.dots import dots
 from gearchaos.figures.labels import axis_label
-from gearchaos.figures.lanes import Between, Floats, Mask, diagram_lanes
+from gearchaos.figures.lanes import Between, Floats, Mask, diagram_lanes, outermost
 from gearchaos.figures.panel import close_panel
 from gearchaos.figures.style import BLUE, GREY, ORANGE
 from gearchaos.results.result import Result
@@ -24,7 +25,7 @@ BAND_STANDARD_ERRORS = 2.0
 class LyapunovArtists(NamedTuple):
     """What `lyapunov` has drawn, beside its `Marks`.
 
-    ``line``: the exponent in the order of the parameter, not a number where a lane diverged;
+    ``line``: the exponents drawn, by the parameter, not a number where a lane diverged;
     ``points``: exponents without a neighbour to draw a line to, between diverged lanes, or all of
     them where a parameter value has several starts; ``band``, ``bars``: two standard errors to
     either side, of the line and of the points; ``positive``: between a positive exponent and zero.
@@ -52,6 +53,8 @@ def lyapunov(
 
     Diverged lanes are gaps with a red tick at the bottom; a positive exponent is shaded down
     to zero; the vertical axis always holds zero, and lanes beyond robust limits get a triangle.
+    Of more lanes than a page can tell apart (`figures.lanes.COLUMNS`), line, shades and bars are
+    those of the lowest and the highest exponent in each column.
 
     Parameters
     ----------
@@ -66,16 +69,17 @@ def lyapunov(
     if LARGEST_EXPONENT not in result:
         raise FigureError("the result has no Lyapunov exponents: the sweep left them out")
     lanes = diagram_lanes(result, between)
-    x = lanes.parameter
-    exponent = np.where(lanes.diverged, np.nan, result.lanes(LARGEST_EXPONENT)[lanes.numbers])
-    reach = np.full(x.shape, np.nan)
+    whole = np.where(lanes.diverged, np.nan, result.lanes(LARGEST_EXPONENT)[lanes.numbers])
+    spread = np.full(whole.shape, np.nan)
     if LARGEST_EXPONENT + STANDARD_ERROR in result:
-        reach = (
+        spread = (
             BAND_STANDARD_ERRORS * result.lanes(LARGEST_EXPONENT + STANDARD_ERROR)[lanes.numbers]
         )
-    several_starts = bool(np.any(np.diff(x) == 0.0))
+    several_starts = bool(np.any(np.diff(lanes.parameter) == 0.0))
     # Several starts may lie on different motions, which no line should join.
-    alone = np.isfinite(exponent) if several_starts else _without_neighbours(exponent)
+    lonely = np.isfinite(whole) if several_starts else _without_neighbours(whole)
+    drawn = outermost(lanes, whole)
+    x, exponent, reach, alone = (a[drawn] for a in (lanes.parameter, whole, spread, lonely))
     joined = np.where(alone, np.nan, exponent)
 
     zero = axes.axhline(0.0, color=GREY, linewidth=0.5, linestyle=(0, (4, 2)), zorder=1)
@@ -95,13 +99,11 @@ def lyapunov(
     bars = axes.vlines(x[alone], *ends, colors=BLUE, lw=0.6, alpha=0.5)
     line_style = "none" if several_starts and alone.any() else "-"
     (line,) = axes.plot(x, exponent, color=BLUE, linewidth=0.6, linestyle=line_style)
-    (points,) = axes.plot(
-        x[alone],
-        exponent[alone],
-        linestyle="none",
-        marker=".",
-        markersize=float(np.clip(300.0 / x.size, 1.0, 3.0)),
-        markeredgewidth=0.0,
+    points = dots(
+        axes,
+        lanes._replace(diverged=~lonely),
+        result.lanes(LARGEST_EXPONENT)[:, np.newaxis],
+        markersize=float(np.clip(300.0 / lanes.numbers.size, 1.0, 3.0)),
         color=BLUE,
     )
     axes.set_ylabel(axis_label(result, LARGEST_EXPONENT, line_length=20))
@@ -109,12 +111,12 @@ def lyapunov(
         axes,
         result,
         lanes,
-        exponent,
-        exponent,
-        spread=np.nan_to_num(reach),
+        whole,
+        whole,
+        spread=np.nan_to_num(spread),
         hold_zero=True,
         full_range=full_range,
-        also=[band] if np.isfinite(exponent + reach).any() else [],
+        also=[band] if np.isfinite(whole + spread).any() else [],
     )
     return LyapunovArtists(line, points, band, bars, positive, zero, *marks)
 

@@ -12,7 +12,7 @@ from matplotlib.legend import Legend
 from matplotlib.lines import Line2D
 
 from gearchaos.figures.labels import axis_label, number, plain
-from gearchaos.figures.lanes import Floats, Lanes
+from gearchaos.figures.lanes import Floats, Lanes, columns
 from gearchaos.figures.style import GREY, LEGEND, VERMILION
 from gearchaos.results.result import Result
 
@@ -129,7 +129,8 @@ def _mark_off_scale(axes: Axes, parameter: Floats, low: Floats, high: Floats) ->
 def _marks(
     axes: Axes, parameter: Floats, height: float, label: str, look: dict[str, Any]
 ) -> Line2D:
-    """Draw marks at some height of the axes, in parts of it."""
+    """Draw marks at some height of the axes, in parts of it, one in each column."""
+    parameter = parameter[columns(parameter, axes.get_xlim())]
     heights, place = np.full(parameter.size, height), axes.get_xaxis_transform()
     (line,) = axes.plot(
         parameter, heights, linestyle="none", transform=place, zorder=4, label=label, **look

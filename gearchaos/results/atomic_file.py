@@ -16,8 +16,8 @@ from gearchaos.errors import FileError
 PARTIAL = ".partial"
 """Ending of the names of unfinished files; nothing reads them and they can be deleted."""
 
-NO_LINK: int = getattr(os, "O_NOFOLLOW", 0)
-"""Flag with which a file in a folder of ours is opened."""
+UNDISTURBED: int = getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0)
+"""Flags with which a file in a folder of ours is opened: no link, and no waiting for a writer."""
 
 _REMEDIES = {
     errno.ENOSPC: "free some space or choose another place",
@@ -68,7 +68,7 @@ def check_output(path: str | os.PathLike[str], overwrite: bool = False) -> None:
 
 def unlinked_content(path: Path, most: int) -> bytes:
     """Read a file, unless it is a link: at most so many bytes, and without waiting for any."""
-    descriptor = os.open(path, os.O_RDONLY | NO_LINK | getattr(os, "O_NONBLOCK", 0))
+    descriptor = os.open(path, os.O_RDONLY | UNDISTURBED)
     with open(descriptor, "rb") as file:
         return file.read(min(most, os.fstat(descriptor).st_size))
 
@@ -85,14 +85,21 @@ def replacing(
 
     The temporary name, of an empty file to be filled, lies in ``scratch``, a folder on the same
     file system, or beside the file, and goes away if the block raises. Without ``through_links``
-    a symbolic link is replaced itself. Raises FileError if the file cannot be written; one that
-    existed before is left as it was.
+    a symbolic link is replaced itself. A file that is replaced hands on its rights. Raises
+    FileError if the file cannot be written; one that existed before is left as it was.
     """
     with writing(path):
         target = _checked_target(path, overwrite) if through_links else Path(path)
-        partial = _create_partial(Path(scratch or target.parent), target.name)
+        mode = _mode(target) if overwrite else None
+        # What others may not read is not shown to them half-written either.
+        partial = _create_partial(
+            Path(scratch or target.parent), target.name, 0o666 if mode is None else 0o600
+        )
         try:
             yield partial
+            if mode is not None:
+                with suppress(OSError):  # A file system without rights.
+                    partial.chmod(mode)
             _synchronise(partial)
             if overwrite:
                 partial.replace(target)
@@ -136,10 +143,19 @@ def _exists(path: str | os.PathLike[str]) -> FileError:
     )
 
 
-def _create_partial(folder: Path, name: str) -> Path:
+def _mode(path: Path) -> int | None:
+    """Return the rights of a regular file, None if there is none."""
+    with suppress(FileNotFoundError):
+        found = path.lstat()
+        if stat.S_ISREG(found.st_mode):
+            return found.st_mode & 0o777
+    return None
+
+
+def _create_partial(folder: Path, name: str, mode: int = 0o666) -> Path:
     partial = folder / f".{name[:40]}.{secrets.token_hex(8)}{PARTIAL}"
     # Not by the tempfile module: its files are readable by their owner only, and stay so.
-    os.close(os.open(partial, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666))
+    os.close(os.open(partial, os.O_CREAT | os.O_EXCL | os.O_WRONLY, mode))
     return partial
 
 

@@ -28,6 +28,7 @@ from gearchaos.results.manifest import (
 from gearchaos.results.result_file import Metadata, Parameter, write_result
 from gearchaos.results.store_lock import LOCK, StoreLock
 from gearchaos.results.variables import Variable, lane_axes
+from gearchaos.version import Software
 
 _NAME = re.compile(r"\d{12}-\d{12}\.block")
 
@@ -49,6 +50,8 @@ class BlockStore:
     ----------
     configuration, text : str
         The configuration in TOML: resolved, of which others are refused, and as it was written.
+    software : Software
+        Who computes; blocks of another one are refused too.
     resume : bool
         Whether there may be blocks of an earlier run, to be continued.
     blocks : sequence of (first, last), optional
@@ -61,8 +64,8 @@ class BlockStore:
     ------
     FileError
         If there are own blocks and `resume` is not set, if they belong to another configuration
-        (the message names the keys that differ), if another sweep is writing to the same output,
-        or if the folder cannot be made.
+        or software (the message names what differs), if another sweep is writing to the same
+        output, or if the folder cannot be made. What was there before stays, and nothing else.
     """
 
     def __init__(
@@ -70,6 +73,7 @@ class BlockStore:
         output: str | os.PathLike[str],
         variables: Sequence[Variable],
         configuration: str,
+        software: Software,
         *,
         text: str = "",
         resume: bool = False,
@@ -78,7 +82,6 @@ class BlockStore:
     ) -> None:
         self.output = Path(output)
         self.folder = folder_of(output)
-        self.variables = list(variables)
         sizes = {v.name: len(v.values) for v in variables if v.values is not None}
         axes = lane_axes(variables)
         self.lanes = math.prod(sizes[axis] for axis in axes)
@@ -90,28 +93,34 @@ class BlockStore:
             ]
         ).newbyteorder("<")
         decisive = decisive_facts(
-            lanes=self.lanes, variables=self._record.descr, configuration=configuration
+            software,
+            lanes=self.lanes,
+            variables=self._record.descr,
+            configuration=configuration,
         )
         self._fingerprint = fingerprint(decisive)
         self._blocks = [(0, self.lanes)] if blocks is None else list(blocks)
         self._lock = StoreLock(self.folder, self.output, shared=blocks is not None)
         try:
             own = self._own_blocks()
+            # Of several shards, whoever comes first writes it.
+            shared, beside = blocks is not None, {"text": text, "shards": shards}
+            how = {"write": shared or not own, "overwrite": not shared}
+            settle_manifest(self.folder, decisive, beside, **how)
             if own and not resume:
                 raise FileError(
                     f"{self.folder}: holds {len(own)} finished blocks of an earlier run; continue "
                     "it with --resume, or delete this folder"
                 )
-            # Those of other shards may be about to get their names.
-            for partial in self.folder.glob(f".*{PARTIAL}") if blocks is None else ():
-                partial.unlink(missing_ok=True)
-            # Of several shards, whoever comes first writes it.
-            shared, beside = blocks is not None, {"text": text, "shards": shards}
-            how = {"write": shared or not own, "overwrite": not shared}
-            settle_manifest(self.folder, decisive, beside, **how)
         except BaseException:
-            self.close()
+            if self._lock.new and self._lock.alone():
+                self._remove([LOCK])
+            self._lock.release()
             raise
+        # Those of other shards may be about to get their names.
+        for partial in self.folder.glob(f".*{PARTIAL}") if blocks is None else ():
+            with suppress(OSError):
+                partial.unlink()
 
     def __enter__(self) -> Self:
         return self
@@ -128,11 +137,7 @@ class BlockStore:
     def remove(self) -> None:
         """Remove the blocks, the folder if nothing else is in it, and let go of the lock."""
         # Only what the store has made: the folder may hold files of the user.
-        for name in [*self._names(), MANIFEST, LOCK]:
-            with suppress(OSError):
-                (self.folder / name).unlink()
-        with suppress(OSError):
-            self.folder.rmdir()
+        self._remove([*self._names(), MANIFEST, LOCK])
         # What comes to be there from now on is another sweep's.
         self._lock.release()
 
@@ -197,6 +202,7 @@ class BlockStore:
 
     def merge(
         self,
+        variables: Sequence[Variable],
         parameters: Mapping[str, Parameter],
         metadata: Metadata,
         *,
@@ -205,7 +211,7 @@ class BlockStore:
     ) -> Path:
         """Make the result file of all blocks, one block in memory at a time, and tidy up.
 
-        The first three are those of `write_result`; ``found`` is what `finished` has just given.
+        The first four are those of `write_result`; ``found`` is what `finished` has just given.
         Raises FileError if blocks are missing or the file cannot be written; the blocks stay.
         """
         bounds, problems = found or self.finished()
@@ -213,7 +219,7 @@ class BlockStore:
             raise FileError([*problems, f"{self.folder}: {lanes_text(gaps)} missing; use --resume"])
         write_result(
             self.output,
-            self.variables,
+            variables,
             ((first, last, self.read(first, last)) for first, last in bounds),
             parameters,
             metadata,
@@ -222,6 +228,13 @@ class BlockStore:
         )
         self.remove()
         return self.output
+
+    def _remove(self, names: Sequence[str]) -> None:
+        for name in names:
+            with suppress(OSError):
+                (self.folder / name).unlink()
+        with suppress(OSError):
+            self.folder.rmdir()
 
     def _own_blocks(self) -> list[Bounds]:
         every = ((int(name[:12]), int(name[13:25])) for name in self._names())

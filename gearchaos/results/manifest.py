@@ -14,18 +14,20 @@ from gearchaos.configuration.toml_text import flat_tables
 from gearchaos.errors import FileError
 from gearchaos.results.atomic_file import reason, replacing, unlinked_content
 from gearchaos.results.block_file import BLOCK_SCHEMA_VERSION
+from gearchaos.version import Software
 
 STORE_SCHEMA = "gearchaos-blocks"
 MANIFEST = "manifest.json"
 _LARGEST = 64 << 20
 
 
-def decisive_facts(**facts: Any) -> dict[str, Any]:
+def decisive_facts(software: Software, **facts: Any) -> dict[str, Any]:
     """Return what decides the numbers of a sweep, and with them whose blocks are whose.
 
-    That is ``lanes``, ``variables`` and ``configuration``, the resolved one in TOML.
+    That is who computes, ``lanes``, ``variables`` and ``configuration``, the resolved one in TOML.
     """
     versions = {"schema": STORE_SCHEMA, "schema_version": BLOCK_SCHEMA_VERSION}
+    facts |= software._asdict()
     # As it is read again: with lists for tuples.
     return dict(json.loads(json.dumps({**versions, **facts})))
 
@@ -47,7 +49,7 @@ def settle_manifest(
 
     ``beside`` decides nothing: ``text``, the configuration as it was written, and ``shards``, into
     how many whoever began divided the sweep. A manifest that somebody else has just written stays
-    unless `overwrite` is set. Raises a FileError that names the keys that differ.
+    unless `overwrite` is set. Raises FileError as `require_same` does.
     """
     path = folder / MANIFEST
     try:
@@ -55,16 +57,40 @@ def settle_manifest(
             with replacing(path, overwrite=overwrite, through_links=False) as partial:
                 partial.write_text(json.dumps({**decisive, **beside}, indent=1), encoding="utf-8")
     except FileError:
-        if overwrite or not path.exists():
+        if overwrite or not os.path.lexists(path):
             raise
-    earlier = read_manifest(folder)
-    keys = differing_keys(earlier["configuration"], decisive["configuration"])
-    if keys := keys or [key for key in decisive if decisive[key] != earlier.get(key)]:
-        raise FileError(
-            f"{folder}: holds blocks of another configuration, which differs in "
-            f"{', '.join(keys)}; restore these values, delete the folder or choose another "
-            "--output"
-        )
+    require_same(f"{folder}: holds blocks", read_manifest(folder), decisive)
+
+
+def require_same(
+    what: str,
+    earlier: Mapping[str, Any],
+    now: Mapping[str, Any],
+    otherwise: str = "delete the folder",
+) -> None:
+    """Refuse what was computed for another configuration or by another gearchaos.
+
+    ``earlier`` and ``now`` are decisive facts, of which those are compared that there are now;
+    ``what`` says where what was found, and ``otherwise`` what to do unless one goes back to it.
+    Raises a FileError that names what differs, with both values.
+    """
+    differing = [key for key in now if earlier.get(key) != now[key]]
+    if not differing:
+        return
+    named = [
+        f"{key} ({earlier.get(key, 'absent')}, now {now[key]})"
+        for key in Software._fields
+        if key in differing
+    ]
+    whose, restore = "gearchaos", "go on with that one"
+    if not named:
+        whose, restore = "configuration", "restore these values"
+    if "configuration" in differing:
+        named += differing_keys(earlier["configuration"], now["configuration"])
+    raise FileError(
+        f"{what} of another {whose}, which differs in {', '.join(named or differing)}; {restore}, "
+        f"{otherwise} or choose another --output"
+    )
 
 
 def folder_of(output: str | os.PathLike[str]) -> Path:
@@ -72,8 +98,8 @@ def folder_of(output: str | os.PathLike[str]) -> Path:
     return Path(os.path.realpath(output) + ".blocks")
 
 
-def stored_configuration(output: str | os.PathLike[str]) -> tuple[str, str]:
-    """Return the configuration of the blocks beside an output: resolved, and as it was written.
+def stored_manifest(output: str | os.PathLike[str]) -> dict[str, Any]:
+    """Return the manifest of the blocks beside an output, whoever computed them.
 
     Raises FileError if there are no blocks, or if what describes them is damaged.
     """
@@ -82,18 +108,24 @@ def stored_configuration(output: str | os.PathLike[str]) -> tuple[str, str]:
         raise FileError(
             f"{folder}: no such folder; name the result file to be, beside which the blocks are"
         )
-    manifest = read_manifest(folder)
-    return manifest["configuration"], manifest["text"] or manifest["configuration"]
+    return read_manifest(folder)
 
 
 def differing_keys(one: str, other: str) -> list[str]:
     """List the dotted keys in which two TOML texts differ, with both values."""
-    first, second = (flat_tables(tomllib.loads(text)) for text in (one, other))
+    first, second = (_tables(text) for text in (one, other))
     return [
         f"{key} ({first.get(key, 'absent')}, now {second.get(key, 'absent')})"
         for key in {**first, **second}
         if key not in first or key not in second or repr(first[key]) != repr(second[key])
     ]
+
+
+def _tables(text: str) -> dict[str, Any]:
+    try:
+        return flat_tables(tomllib.loads(text))
+    except (ValueError, RecursionError):  # Not from us: all keys are absent.
+        return {}
 
 
 def read_manifest(folder: Path) -> dict[str, Any]:

@@ -15,7 +15,7 @@ _SETTINGS = "title effects formulation start carry fixed"
 _INTEGRATION = (
     "method steps_per_period crossings tolerance unstable transient_periods recorded_periods"
 )
-_RUN = "wall_time_seconds threads processor system software git_commit created"
+_RUN = "wall_time_seconds threads processor system software kernels git_commit created"
 """Names of metadata that are shown together."""
 
 MOST_STAGES = 20

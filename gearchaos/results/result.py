@@ -237,6 +237,7 @@ def open_result(path: str | os.PathLike[str], *, rows: bool = True) -> Result:
 def completed(path: str | os.PathLike[str]) -> Result | None:
     """Open a result without its rows; None if there is none, or it is not as it was written."""
     with suppress(OSError, ValueError, FileError):
-        if checksum_fits(Path(path)):
+        # Whoever opened a pipe would wait for its writer.
+        if os.path.isfile(path) and checksum_fits(Path(path)):
             return open_result(path, rows=False)
     return None

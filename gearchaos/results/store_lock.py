@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import os
+import stat
 from contextlib import suppress
 from pathlib import Path
 
 from gearchaos.errors import FileError
-from gearchaos.results.atomic_file import NO_LINK, writing
+from gearchaos.results.atomic_file import UNDISTURBED, writing
 
 try:
     import fcntl
@@ -22,8 +23,9 @@ class StoreLock:
 
     A sweep that takes all blocks has the folder to itself. Shards share it among each other; two
     that are the same do the same work and write the same bits. Where the system has no such locks,
-    two sweeps on one output are not noticed. Raises FileError if another process holds the lock, or
-    if the folder cannot be made.
+    two sweeps on one output are not noticed. `new` tells whether there was no such file before.
+    Raises FileError if another process holds the lock, if the folder is another user's or a link,
+    or if it cannot be made.
     """
 
     def __init__(self, folder: Path, output: Path, shared: bool = False) -> None:
@@ -31,11 +33,16 @@ class StoreLock:
         self._descriptor: int | None = None
         with writing(folder):
             while self._descriptor is None:
-                folder.mkdir(mode=0o700, exist_ok=True)
+                with suppress(FileExistsError):
+                    folder.mkdir(mode=0o700)
                 # A sweep that finishes may remove the folder, or the file that was just opened.
                 with suppress(FileNotFoundError):
-                    descriptor = os.open(path, os.O_RDWR | os.O_CREAT | NO_LINK, 0o600)
+                    _require_own(folder)
+                    self.new = not os.path.lexists(path)
+                    descriptor = os.open(path, os.O_RDWR | os.O_CREAT | UNDISTURBED, 0o600)
                     try:
+                        if not stat.S_ISREG(os.fstat(descriptor).st_mode):
+                            raise FileError(f"{path}: is not a regular file; delete it")
                         _lock(descriptor, shared)
                         if os.path.samestat(os.fstat(descriptor), path.lstat()):
                             self._descriptor = descriptor
@@ -61,6 +68,17 @@ class StoreLock:
         if self._descriptor is not None:
             os.close(self._descriptor)
             self._descriptor = None
+
+
+def _require_own(folder: Path) -> None:
+    """Refuse a link, which leads who knows where, and what another user can put files into."""
+    found = folder.lstat()
+    ours = fcntl is None or found.st_uid == os.geteuid()
+    if not (ours and stat.S_ISDIR(found.st_mode)):
+        raise FileError(
+            f"{folder}: is a link, no folder or another user's; delete it or choose another "
+            "--output"
+        )
 
 
 def _lock(descriptor: int, shared: bool) -> None:

@@ -1,20 +1,16 @@
-"""How the kernels are compiled: flags, vector width, stack alignment and the on-disk cache.
+"""How the kernels are compiled: flags, vector width, stack alignment and what is cached.
 
 Every flag is named here and nowhere else. Two facts about Numba shape this file:
 
-* the cache of a function is keyed by its own source file only, so a cached caller would keep the
-  old code of a callee edited in another file. The cache folder is therefore named after a hash of
-  all kernel sources;
+* a cached caller contains the code of its callees, and would keep it when one is edited in another
+  file. The cache folder is therefore named after a hash of all kernel sources;
 * LLVM prefers 256-bit vectors on some AVX-512 processors, and it spills vector registers to an
   unaligned stack. Both cost up to half of the speed of the lane loop.
 """
 
 from __future__ import annotations
 
-import atexit
 import hashlib
-import shutil
-import tempfile
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -22,7 +18,7 @@ from typing import Any
 import llvmlite.binding
 import numba
 from llvmlite import ir
-from numba import config, types
+from numba import _dynfunc, config, types
 from numba.core import cgutils
 from numba.core import ir as numba_ir
 from numba.core.compiler import CompilerBase, DefaultPassBuilder
@@ -30,7 +26,8 @@ from numba.core.compiler_machinery import FunctionPass, register_pass
 from numba.core.ir_utils import get_definition, guard
 from numba.core.untyped_passes import RewriteSemanticConstants
 from numba.extending import intrinsic
-from numba.misc.appdirs import user_cache_dir
+
+from gearchaos_kernels.cache import KernelCache, cache_folder
 
 FASTMATH = {"contract", "nsz"}
 """Fused multiply-add and unsigned zeros only: NaN and infinity keep their meaning."""
@@ -50,30 +47,12 @@ def source_hash() -> str:
     return digest.hexdigest()[:16]
 
 
-def cache_folder() -> Path:
-    """Return a writable folder for compiled code, named after the sources it was compiled from.
-
-    Numba's own setting (``NUMBA_CACHE_DIR``) is the parent folder where it is set, otherwise the
-    user's cache folder. Where that cannot be written, a private temporary folder serves one process
-    (a cache holds code: nobody else must be able to write it).
-    """
-    folder = Path(config.CACHE_DIR or user_cache_dir("gearchaos"), source_hash())
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryFile(dir=folder):
-            return folder
-    except OSError:
-        private = Path(tempfile.mkdtemp(prefix="gearchaos-"))
-        atexit.register(shutil.rmtree, private, ignore_errors=True)
-        return private
-
-
 def widest_vectors() -> str:
     """Return the processor's features without the preference for 256-bit vectors."""
     return str(llvmlite.binding.get_host_cpu_features().flatten()) + ",-prefer-256-bit"
 
 
-CACHE_FOLDER = cache_folder()
+CACHE_FOLDER = cache_folder(source_hash())
 if config.CPU_FEATURES is None:
     config.CPU_FEATURES = widest_vectors()
 
@@ -122,24 +101,37 @@ class _Compiler(CompilerBase):  # type: ignore[misc]
         return [passes]
 
 
-def _decorate(function: Callable[..., Any], **flags: Any) -> Any:
-    return numba.njit(pipeline_class=_Compiler, **_SHARED_FLAGS, **flags)(function)
+class _InlinedCompiler(_Compiler):
+    """The same, but without machine code of its own, which Numba generates for every function."""
+
+    def define_pipelines(self) -> list[Any]:
+        """Return the one list of passes."""
+        self.state.targetctx = self.state.targetctx.subtarget(get_executable=_without_address)
+        return super().define_pipelines()
+
+
+def _without_address(library: Any, function: Any, environment: Any) -> Any:
+    module, name = function.lookup_module(), function.qualname
+    return _dynfunc.make_function(module, name, "inlined", 0, environment, (library,))
+
+
+def _decorate(
+    function: Callable[..., Any], compiler: type[CompilerBase] = _Compiler, **flags: Any
+) -> Any:
+    return numba.njit(pipeline_class=compiler, **_SHARED_FLAGS, **flags)(function)
 
 
 def scalar(function: Callable[..., Any]) -> Any:
     """Compile a formula of plain numbers that is inlined wherever it is used."""
-    return _decorate(function, forceinline=True, no_cfunc_wrapper=True, no_cpython_wrapper=True)
+    wrappers = {"no_cfunc_wrapper": True, "no_cpython_wrapper": True}
+    return _decorate(function, _InlinedCompiler, forceinline=True, **wrappers)
 
 
 def driver(function: Callable[..., Any], parallel: bool = True) -> Any:
     """Compile a function that only splits, calls and merges, in parallel and cached on disk."""
-    user_setting = config.CACHE_DIR
-    # The cache folder is read once, at decoration: other users of Numba keep their own.
-    config.CACHE_DIR = str(CACHE_FOLDER)
-    try:
-        return _decorate(function, parallel=parallel, nogil=True, cache=True)
-    finally:
-        config.CACHE_DIR = user_setting
+    dispatcher = _decorate(function, parallel=parallel, nogil=True)
+    dispatcher._cache = KernelCache(function, CACHE_FOLDER)
+    return dispatcher
 
 
 def evaluator(function: Callable[..., Any]) -> Any:
@@ -149,7 +141,8 @@ def evaluator(function: Callable[..., Any]) -> Any:
 
 def block(function: Callable[..., Any]) -> Any:
     """Compile a function that integrates one block of lanes on one thread."""
-    return _decorate(function, nogil=True)
+    wrappers = {"no_cfunc_wrapper": True, "no_cpython_wrapper": True}
+    return _decorate(function, _InlinedCompiler, nogil=True, **wrappers)
 
 
 @intrinsic

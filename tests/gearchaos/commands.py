@@ -1,10 +1,16 @@
 """A small sweep, and the means to run commands on it as a user does."""
 
+import atexit
+import json
+import os
 import signal
 import subprocess
 import sys
 import time
+from collections.abc import Sequence
+from functools import cache
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import NamedTuple
 
 import numpy as np
@@ -71,6 +77,13 @@ section_points = 5
 lyapunov = true
 """
 
+LINEAR = (
+    *("--set", 'scene.effects=["pitch_error"]'),
+    *("--set", 'outputs.section=["delta_5"]'),
+    *("--set", "outputs.lyapunov=false"),
+)
+"""The smallest scene, two states of a linear pair, where it does not matter what is computed."""
+
 DIVERGING = ("--set", "groups.load=1e150")
 """A load that drives every lane beyond every length scale."""
 
@@ -92,10 +105,43 @@ def small_config(folder: Path) -> Path:
 
 def run_module(module: str, *arguments: str, cwd: Path, **options) -> Ended:
     """Run ``python -m module`` in a folder."""
+    if not options and _environment() == _ENVIRONMENT:
+        return _forked(module, arguments, cwd)
     command = [sys.executable, "-m", module, *arguments]
     done = subprocess.run(command, cwd=cwd, capture_output=True, text=True, timeout=300, **options)
     assert "Traceback" not in done.stderr, done.stderr
     return Ended(done.returncode, done.stdout, done.stderr)
+
+
+def _forked(module: str, arguments: Sequence[str], cwd: Path) -> Ended:
+    """Run the command in a process that need not import what it needs."""
+    server = _server()
+    with TemporaryDirectory() as folder:
+        out, err = Path(folder, "out"), Path(folder, "err")
+        for file in (out, err):
+            file.touch()
+        words = [module, arguments, str(cwd), str(out), str(err)]
+        server.stdin.write(json.dumps(words) + "\n")
+        server.stdin.flush()
+        ended = Ended(int(server.stdout.readline()), out.read_text(), err.read_text())
+    assert "Traceback" not in ended.err, ended.err
+    return ended
+
+
+@cache
+def _server() -> subprocess.Popen:
+    pipe = subprocess.PIPE
+    script = Path(__file__).with_name("command_server.py")
+    server = subprocess.Popen([sys.executable, str(script)], stdin=pipe, stdout=pipe, text=True)
+    atexit.register(server.communicate)
+    return server
+
+
+def _environment() -> dict[str, str]:
+    return {name: os.environ[name] for name in os.environ if name != "PYTEST_CURRENT_TEST"}
+
+
+_ENVIRONMENT = _environment()
 
 
 def sweep(folder: Path, *arguments: str, **options) -> Ended:

@@ -130,7 +130,7 @@ def test_an_interrupt_keeps_what_local_workers_have_and_any_machine_goes_on(tmp_
         (
             "import gearchaos.version as v; v.software_version = lambda: '0.0.9'",
             r"the worker tcp://\S+ has gearchaos 0\.0\.9 \(kernels \w+\), this process "
-            r"\S+ \(kernels \w+\): install the same",
+            r"gearchaos \S+ \(kernels \w+\): install the same",
         ),
         ("import sys; sys.modules['gearchaos'] = None", "a worker lacks the software"),
     ],

@@ -10,6 +10,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
+from gearchaos_kernels import source_hash
 
 import gearchaos
 from gearchaos.engine.provenance import commit_of
@@ -63,6 +64,7 @@ def test_values_of_the_groups_are_those_that_were_integrated(result):
 def test_the_result_names_software_machine_threads_and_time(result):
     facts = result.metadata
     assert facts["software"] == f"gearchaos {gearchaos.software_version()}"
+    assert facts["kernels"] == source_hash()
     assert facts["python_version"] == platform.python_version()
     assert facts["numpy_version"] == np.__version__
     assert facts["h5py_version"] == h5py.__version__

@@ -135,6 +135,17 @@ def test_a_result_has_the_rights_of_any_new_file(result: Result, tmp_path: Path)
     assert path.stat().st_mode == (tmp_path / "other").stat().st_mode
 
 
+def test_a_result_that_is_replaced_hands_on_its_rights(result: Result, tmp_path: Path) -> None:
+    path = tmp_path / "sweep.h5"
+    for mode in (0o600, 0o444, 0o664):
+        path.touch()
+        path.chmod(mode)
+        with replacing(path, overwrite=True) as partial:
+            assert partial.stat().st_mode & 0o077 == 0
+        result.save(path, overwrite=True)
+        assert path.stat().st_mode & 0o777 == mode
+
+
 def test_a_disk_that_fills_up_loses_nothing(tmp_path: Path) -> None:
     path = tmp_path / "sweep.h5"
     path.write_bytes(b"earlier")

@@ -9,11 +9,12 @@ from gearchaos.errors import ConfigurationError
 from gearchaos.results.manifest import folder_of
 from gearchaos.results.store_lock import StoreLock
 
-from .commands import names_in, run_module, same_data, sweep
+from .commands import LINEAR, names_in, run_module, same_data, sweep
 
 BLOCKS = "gears.h5.blocks"
 # Four blocks of lanes.
-COUNT = ("--set", "sweep.count=1000", "--quiet")
+LANES = (*LINEAR, "--set", "sweep.count=1000")
+COUNT = (*LANES, "--quiet")
 
 
 @pytest.mark.parametrize("lanes", [1, 255, 256, 1000, 123_456, 1_000_000])
@@ -59,7 +60,7 @@ def test_shards_computed_with_other_threads_join_to_the_undisturbed_result(tmp_p
 
 
 def test_a_shard_says_what_is_next_and_is_not_computed_twice(tmp_path):
-    told = ("--set", "sweep.count=1000", "--shard", "2/2")
+    told = (*LANES, "--shard", "2/2")
     first = sweep(tmp_path, *told)
     assert first.code == 0
     assert "488 lanes, 0 diverged" in first.err

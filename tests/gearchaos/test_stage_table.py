@@ -1,6 +1,6 @@
 """Stages are the stretches of equal labels; narrow ones go into what surrounds them."""
 
-import time
+from heapq import heappop
 from itertools import pairwise
 
 import numpy as np
@@ -9,6 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gearchaos.errors import ConfigurationError, FileError
+from gearchaos.results import stage_table as table_module
 from gearchaos.results.result import Result
 from gearchaos.results.stage_table import (
     LabelledLanes,
@@ -148,11 +149,31 @@ def test_the_stages_are_those_of_the_rule_taken_step_by_step(labels, steps, narr
     ]
 
 
-def test_twenty_thousand_alternating_stages_take_no_time():
-    began = time.perf_counter()
-    stages = stage_table(lanes("1c" * 10_000), narrowest=1.5)
+@pytest.mark.parametrize("narrowest", [0.0, 1.5, 40.0, 1e9])
+def test_each_lane_is_looked_at_a_few_times_however_many_stages_alternate(narrowest, monkeypatch):
+    looked_at = 0
+
+    class Counting(np.ndarray):
+        def __getitem__(self, key):
+            nonlocal looked_at
+            part = super().__getitem__(key)
+            looked_at += np.size(part)
+            return part
+
+    pops = 0
+
+    def counting_pop(heap):
+        nonlocal pops
+        pops += 1
+        return heappop(heap)
+
+    monkeypatch.setattr(table_module, "heappop", counting_pop)
+    some = lanes("1c" * 10_000)
+    stages = stage_table(some._replace(labels=some.labels.view(Counting)), narrowest)
     assert sum(stage.lanes for stage in stages) == 20_000
-    assert time.perf_counter() - began < 5.0
+    assert looked_at <= 5 * 20_000
+    # Each merger takes at least one of the stretches away, and puts one back.
+    assert pops <= 2 * 20_000
 
 
 def test_stages_lie_along_one_axis_only():

@@ -1,5 +1,6 @@
 """A sweep that is stopped half-way: what is kept, what is said, and how it goes on."""
 
+import multiprocessing
 import os
 import random
 import re
@@ -11,24 +12,33 @@ import sys
 import time
 from pathlib import Path
 
+import gearchaos_kernels
 import pytest
+from gearchaos_kernels import source_hash
 
 import gearchaos
 from gearchaos.results.manifest import folder_of
 from gearchaos.results.store_lock import LOCK
+from gearchaos.sweep import main
 
-from .commands import names_in, same_data, signalled, small_config, sweep
+from .commands import (
+    LINEAR,
+    names_in,
+    run_module,
+    same_data,
+    signalled,
+    small_config,
+    sweep,
+)
 
 HELD_LOCKS = Path("/proc/locks")
 
-# Four blocks of lanes that take seconds together.
+# Four blocks of lanes that take a second together.
 LONG = (
-    "--threads",
-    "1",
-    "--set",
-    "sweep.count=1000",
-    "--set",
-    "integration.transient_periods=2000",
+    *("--threads", "1"),
+    *LINEAR,
+    *("--set", "sweep.count=1000"),
+    *("--set", "integration.transient_periods=4000"),
 )
 BLOCKS = "gears.h5.blocks"
 
@@ -84,6 +94,7 @@ def test_a_killed_sweep_leaves_nothing_that_looks_like_a_result_and_can_be_resum
     # Neither lost by accident nor mixed with another sweep.
     refused = sweep(tmp_path, *LONG)
     assert refused.code == 4
+    assert "go on with: " not in refused.err
     assert re.search(r"holds \d finished blocks? of an earlier run; continue it with", refused.err)
     other = sweep(tmp_path, *LONG, "--resume", "--set", "groups.damping_ratio=0.06")
     assert other.code == 4
@@ -110,13 +121,13 @@ def test_a_carried_sweep_goes_on_from_the_end_states_of_the_finished_blocks(tmp_
     assert ended == 130
     assert sweep(tmp_path, *LONG, *carried, "--resume", "--quiet") == (0, "gears.h5\n", "")
     pieces = gearchaos.open_result(tmp_path / "gears.h5")
-    overrides = [*LONG[3::2], *carried[1::2]]
+    overrides = [*LONG[3::2], *carried[1::2]]  # Without --threads.
     at_once = gearchaos.run(gearchaos.load_config(tmp_path / "gears.toml", overrides))
     assert same_data(pieces, at_once)
 
 
 def test_resume_without_an_earlier_run_simply_computes(tmp_path):
-    assert sweep(tmp_path, "--resume", "--quiet") == (0, "gears.h5\n", "")
+    assert sweep(tmp_path, *LINEAR, "--resume", "--quiet") == (0, "gears.h5\n", "")
 
 
 def test_two_sweeps_do_not_write_to_the_same_output(tmp_path):
@@ -125,7 +136,9 @@ def test_two_sweeps_do_not_write_to_the_same_output(tmp_path):
     with subprocess.Popen(command, cwd=tmp_path, stderr=subprocess.DEVNULL) as first:
         while first.poll() is None and not list((tmp_path / BLOCKS).glob("*.block")):
             time.sleep(0.005)
+        first.send_signal(signal.SIGSTOP)  # It shall not end before.
         second = sweep(tmp_path, *LONG, "--resume")
+        first.send_signal(signal.SIGCONT)
         assert second.code == 4
         assert "gears.h5: another sweep is writing to it; wait for its end" in second.err
         first.terminate()
@@ -143,29 +156,36 @@ def is_locked(output):
 @pytest.mark.skipif(not HELD_LOCKS.exists(), reason="the system does not tell which locks are held")
 def test_twenty_kills_at_random_moments_cost_no_bit(tmp_path):
     # Thirty-two blocks, of which every attempt finishes a few; the last ones meet the merging.
-    wide = ("--threads", "1", "--set", "sweep.count=8000", "--quiet")
+    wide = ("--threads", "1", *LINEAR, "--set", "sweep.count=8000", "--quiet")
+    wide += ("--set", "integration.transient_periods=100")
     (tmp_path / "undisturbed").mkdir()
     assert sweep(tmp_path / "undisturbed", *wide).code == 0
-    small_config(tmp_path)
-    moments = random.Random(20)
-    command = [sys.executable, "-m", "gearchaos.sweep", "gears.toml", *wide, "--resume"]
+    output, moments = tmp_path / "gears.h5", random.Random(20)
+    command = [str(small_config(tmp_path)), *wide, "--resume", "--output", str(output)]
+    # Not the import of packages, but what a sweep does, is to be met.
+    processes = multiprocessing.get_context("forkserver")
+    processes.set_forkserver_preload(["gearchaos.sweep", "gearchaos.engine.store_filling"])
     finished = []
     for _ in range(20):
-        with subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.DEVNULL) as process:
-            # Not the import of packages, but what a sweep does, is to be met.
-            while process.poll() is None and not is_locked(tmp_path / "gears.h5"):
-                time.sleep(0.005)
-            before = blocks_in(tmp_path)
-            enough = min(before + moments.randint(0, 6), 32)
-            while process.poll() is None and blocks_in(tmp_path) < enough:
-                time.sleep(0.001)
-            time.sleep(moments.uniform(0.0, 0.03))
-            process.kill()
-        assert process.returncode == -signal.SIGKILL
+        process = processes.Process(target=main, args=(command,))
+        process.start()
+        while process.is_alive() and not is_locked(output):
+            time.sleep(0.005)
+        before = blocks_in(tmp_path)
+        enough = min(before + moments.randint(0, 6), 32)
+        while process.is_alive() and blocks_in(tmp_path) < enough:
+            time.sleep(0.001)
+        # The result to be is begun beside the blocks.
+        while process.is_alive() and enough == 32 and not list((tmp_path / BLOCKS).glob(".gears*")):
+            time.sleep(0.001)
+        time.sleep(moments.uniform(0.0, 0.03))
+        process.kill()
+        process.join()
+        assert process.exitcode == -signal.SIGKILL
         finished.append(blocks_in(tmp_path))
         # What was there before is there still.
         assert finished[-1] >= before
-        assert not (tmp_path / "gears.h5").exists()
+        assert not output.exists()
     assert len({count for count in finished if 0 < count < 32}) > 5, finished
     assert finished.count(32) > 1, finished
     assert sweep(tmp_path, *wide, "--resume") == (0, "gears.h5\n", "")
@@ -182,7 +202,7 @@ def test_damaged_foreign_and_ill_dated_blocks_are_told_and_computed_again(tmp_pa
     (tmp_path / "other").mkdir()
     all_blocks = (*LONG, "--shard", "1/1", "--quiet")
     assert sweep(tmp_path, *all_blocks).code == 0
-    other = (*all_blocks[2:], "--set", "integration.transient_periods=1", "--threads", "1")
+    other = (*all_blocks, "--set", "integration.transient_periods=1")
     assert sweep(tmp_path / "other", *other).code == 0
     cut, foreign, flipped, sound = sorted((tmp_path / BLOCKS).glob("*.block"))
     cut.write_bytes(cut.read_bytes()[:1000])
@@ -222,14 +242,66 @@ def test_an_output_folder_that_is_removed_meanwhile_is_code_4(tmp_path):
     assert "cannot be written: No such file or directory; create the folder first" in err
 
 
+def other_kernels(folder):
+    """Copy the kernels, change a source, and return the environment of who computes with them."""
+    original = Path(gearchaos_kernels.__file__).parent
+    copy = Path(shutil.copytree(original, folder / "other" / original.name))
+    with (copy / "rk4.py").open("a") as source:
+        source.write("# changed\n")
+    path = os.pathsep.join([str(copy.parent), *filter(None, [os.environ.get("PYTHONPATH")])])
+    return {**os.environ, "PYTHONPATH": path, "NUMBA_CACHE_DIR": str(folder / "other")}
+
+
+def test_neither_blocks_nor_a_result_of_other_kernels_are_gone_on_with(tmp_path):
+    differs = rf"another gearchaos, which differs in kernels \({source_hash()}, now \w+\); go on "
+    changed = {"env": other_kernels(tmp_path)}
+    assert sweep(tmp_path, *LINEAR, "--shard", "1/1", "--quiet").code == 0
+    before = names_in(tmp_path / BLOCKS)
+    for ended in (
+        sweep(tmp_path, *LINEAR, "--resume", **changed),
+        run_module("gearchaos.merge", "gears.h5", cwd=tmp_path, **changed),
+    ):
+        assert (ended.code, ended.out) == (4, "")
+        assert re.search(f"{BLOCKS}: holds blocks of {differs}.* delete the folder", ended.err)
+        # Nor is anything compiled for that.
+        assert len(ended.err.splitlines()) == 1
+        assert names_in(tmp_path / BLOCKS) == before
+    assert sweep(tmp_path, *LINEAR, "--resume", "--quiet").code == 0
+    ended = sweep(tmp_path, *LINEAR, "--resume", **changed)
+    assert (ended.code, ended.out) == (4, "")
+    assert re.search(f"gears.h5: is the result of {differs}.* with --overwrite", ended.err)
+
+
+def test_a_pipe_in_the_place_of_the_result_is_refused_at_once(tmp_path):
+    os.mkfifo(tmp_path / "gears.h5")
+    ended = sweep(tmp_path, *LINEAR, "--resume")
+    assert ended.code == 4
+    assert "gears.h5: is not a regular file" in ended.err
+
+
+def test_the_same_command_is_not_recommended_where_it_must_fail_again(tmp_path):
+    small_config(tmp_path)
+    command = [sys.executable, "-m", "gearchaos.sweep", "gears.toml", *LONG]
+    with subprocess.Popen(command, cwd=tmp_path, stderr=subprocess.PIPE, text=True) as process:
+        while process.poll() is None and not (tmp_path / BLOCKS / "manifest.json").exists():
+            time.sleep(0.005)
+        (tmp_path / "gears.h5").write_bytes(b"precious")
+        _, err = process.communicate(timeout=60)
+    assert process.returncode == 4
+    assert "gears.h5: exists already; replace it with --overwrite" in err
+    assert "1000 of 1000 lanes are kept" in err
+    assert "go on with" not in err
+    assert (tmp_path / "gears.h5").read_bytes() == b"precious"
+
+
 def test_resuming_a_complete_sweep_succeeds_and_says_so(tmp_path):
-    assert sweep(tmp_path, "--quiet").code == 0
+    assert sweep(tmp_path, *LINEAR, "--quiet").code == 0
     before = (tmp_path / "gears.h5").read_bytes()
     # What a process leaves that is killed while it tidies up.
-    assert sweep(tmp_path, "--shard", "1/1", "--output", "again.h5").code == 0
+    assert sweep(tmp_path, *LINEAR, "--shard", "1/1", "--output", "again.h5").code == 0
     (tmp_path / "again.h5.blocks").rename(tmp_path / BLOCKS)
     for arguments in ([], ["--shard", "1/2"]):
-        again = sweep(tmp_path, "--resume", *arguments)
+        again = sweep(tmp_path, *LINEAR, "--resume", *arguments)
         assert (again.code, again.out) == (0, "gears.h5\n")
         assert "complete already: 40 lanes, 0 diverged" in again.err
         assert names_in(tmp_path) == ["gears.h5", "gears.toml"]
@@ -237,9 +309,9 @@ def test_resuming_a_complete_sweep_succeeds_and_says_so(tmp_path):
 
 
 def test_resuming_into_the_result_of_another_configuration_is_refused_with_the_key(tmp_path):
-    assert sweep(tmp_path, "--quiet").code == 0
+    assert sweep(tmp_path, *LINEAR, "--quiet").code == 0
     before = (tmp_path / "gears.h5").read_bytes()
-    other = sweep(tmp_path, "--resume", "--set", "groups.damping_ratio=0.06")
+    other = sweep(tmp_path, *LINEAR, "--resume", "--set", "groups.damping_ratio=0.06")
     assert other.code == 4
     assert "which differs in groups.damping_ratio (0.05, now 0.06); restore" in other.err
     assert (tmp_path / "gears.h5").read_bytes() == before

@@ -1,4 +1,4 @@
-"""The cache of compiled code: a second process compiles nothing, and never runs stale code."""
+"""The cache of compiled code: a second process compiles nothing, and runs only what fits."""
 
 import json
 import os
@@ -11,44 +11,62 @@ from pathlib import Path
 
 import gearchaos_kernels
 import pytest
+from gearchaos_kernels.cache import cache_folder
+from gearchaos_kernels.compilation import CACHE_FOLDER, source_hash
 
 PACKAGE = Path(gearchaos_kernels.__file__).parent
 
+# What is asked for are expressions. The Jacobian is the kernel that compiles fastest; `double`, of
+# which every type of argument is compiled for itself, is faster still and cached in the same way.
 PROGRAM = """
 import json, sys
+limit, *expressions = json.loads(sys.argv[1])
+if limit:
+    import resource
+    resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit))
 import numpy as np
-from gearchaos_kernels import Effects, Groups, Plan, System, integrate
-from gearchaos_kernels.batch import _integrate_blocks
-from gearchaos_kernels.compilation import CACHE_FOLDER
+from gearchaos_kernels import Effects, Groups, System, evaluation
+from gearchaos_kernels.compilation import CACHE_FOLDER, evaluator
 
-groups = Groups(*[np.full(1, 0.1) for _ in Groups._fields])
-ends = []
-for backlash in json.loads(sys.argv[1]):
-    effects = Effects(False, False, backlash, False, False)
-    nothing = np.zeros(0)
-    system = System(effects, groups, nothing, nothing)
-    ends.append(integrate(system, np.ones((1, 2)), Plan(50, 0, 1, 0)).end_state[0, 0])
-stats = _integrate_blocks.stats
+@evaluator
+def double(number):
+    return 2 * number
+
+def jacobian(transverse):
+    groups = Groups(*[np.full(1, 0.1) for _ in Groups._fields])
+    effects = Effects(False, False, False, transverse, False)
+    system = System(effects, groups, np.zeros(0), np.zeros(0))
+    return evaluation.jacobian(system, np.ones(1), np.ones(1)).tolist()
+
+values = [eval(expression) for expression in expressions]
+stats = [function.stats for function in (evaluation._differentiate, double)]
 print(json.dumps({
-    "hits": sum(stats.cache_hits.values()),
-    "misses": sum(stats.cache_misses.values()),
+    "hits": sum(sum(counted.cache_hits.values()) for counted in stats),
+    "misses": sum(sum(counted.cache_misses.values()) for counted in stats),
     "folder": str(CACHE_FOLDER),
-    "ends": ends,
+    "values": values,
 }))
 """
-LINEAR, CLEARANCE = False, True
+TORSIONAL, TRANSVERSE = "jacobian(False)", "jacobian(True)"
+REAL, COMPLEX = "double(1.5)", "double(1.5j).imag"
 
 
-def integrate(cache: Path, *scenes: bool, package: Path = PACKAGE, home: Path | None = None):
-    """Integrate scenes in a new process and return what it says of its cache."""
+def compute(
+    cache: Path,
+    *expressions: str,
+    package: Path = PACKAGE,
+    largest_file: int = 0,
+    complaint: str | None = None,
+    **variables: str,
+) -> dict:
+    """Evaluate expressions in a new process and return what it says of its cache.
+
+    It says nothing on stderr, or one line that contains the complaint.
+    """
     environment = {**os.environ, "PYTHONPATH": str(package.parent), "PYTHONDONTWRITEBYTECODE": "1"}
-    environment.pop("NUMBA_CACHE_DIR", None)
-    if home is None:
-        environment["NUMBA_CACHE_DIR"] = str(cache)
-    else:
-        environment.update(HOME=str(home), XDG_CACHE_HOME=str(home / ".cache"))
+    environment |= {"NUMBA_CACHE_DIR": str(cache), **variables}
     done = subprocess.run(
-        [sys.executable, "-W", "error", "-c", PROGRAM, json.dumps(scenes)],
+        [sys.executable, "-W", "error", "-c", PROGRAM, json.dumps([largest_file, *expressions])],
         env=environment,
         capture_output=True,
         text=True,
@@ -56,55 +74,87 @@ def integrate(cache: Path, *scenes: bool, package: Path = PACKAGE, home: Path | 
         check=False,
     )
     assert done.returncode == 0, done.stderr
-    assert done.stderr == ""
+    if complaint is None:
+        assert done.stderr == ""
+    else:
+        assert done.stderr.startswith("gearchaos: ")
+        assert complaint in done.stderr
+        assert done.stderr.count("\n") == 1
     return json.loads(done.stdout)
 
 
 @pytest.fixture(scope="module")
 def cache(tmp_path_factory) -> Path:
-    return tmp_path_factory.mktemp("cache")
+    return tmp_path_factory.mktemp("caches") / "cache"
 
 
 @pytest.fixture(scope="module")
 def first(cache) -> dict:
     """What the first process, with an empty cache, says."""
-    return integrate(cache, LINEAR)
+    return compute(cache, TORSIONAL)
 
 
 @pytest.mark.slow
 def test_a_second_process_compiles_only_scenes_that_none_has_seen(cache, first):
     assert (first["hits"], first["misses"]) == (0, 1)
-    second = integrate(cache, LINEAR)
-    assert (second["hits"], second["misses"]) == (1, 0)
-    assert second["ends"] == first["ends"]
-    third = integrate(cache, CLEARANCE)
-    assert (third["hits"], third["misses"]) == (0, 1)
-    assert third["ends"] != first["ends"]
-    fourth = integrate(cache, CLEARANCE, LINEAR)
-    assert (fourth["hits"], fourth["misses"]) == (2, 0)
-    assert fourth["ends"] == third["ends"] + first["ends"]
+    both = compute(cache, TORSIONAL, TRANSVERSE)
+    assert (both["hits"], both["misses"]) == (1, 1)
+    assert both["values"][:1] == first["values"]
+    assert both["values"][1:] != first["values"]
+    again = compute(cache, TRANSVERSE, TORSIONAL)
+    assert (again["hits"], again["misses"]) == (2, 0)
+    assert again["values"] == both["values"][::-1]
 
 
 @pytest.mark.slow
 def test_an_edited_formula_in_another_file_is_never_served_from_the_cache(cache, first, tmp_path):
     package = tmp_path / "gearchaos_kernels"
     shutil.copytree(PACKAGE, package, ignore=shutil.ignore_patterns("__pycache__"))
-    copy = integrate(cache, LINEAR, package=package)
-    assert copy["ends"] == first["ends"]
     equations = package / "equations.py"
     source = equations.read_text()
-    line = "return stiffness * gap.value + damping * gap.rate, stiffness"
+    line = "return Directions(slopes.tangential * gap + lane.mesh_damping * rate, force_z)"
     assert source.count(line) == 1
-    changed = source.replace(line, line.replace("stiffness * gap", "stiffness * 2.0 * gap"))
-    equations.write_text(changed)
-    edited = integrate(cache, LINEAR, package=package)
+    equations.write_text(source.replace(line, line.replace("* gap", "* 2.0 * gap")))
+    edited = compute(cache, TORSIONAL, package=package)
     assert edited["misses"] == 1
-    assert edited["ends"] != first["ends"]
-    assert edited["folder"] != copy["folder"]
+    assert edited["values"] != first["values"]
+    assert edited["folder"] != first["folder"]
     equations.write_text(source)
-    restored = integrate(cache, LINEAR, package=package)
-    assert restored["ends"] == first["ends"]
-    assert restored["folder"] == copy["folder"]
+    restored = compute(cache, TORSIONAL, package=package)
+    assert restored == first | {"hits": 1, "misses": 0}
+
+
+@pytest.mark.slow
+def test_damaged_code_is_never_run_but_named_in_one_line_and_replaced(tmp_path):
+    folder = Path(compute(tmp_path, REAL, COMPLEX)["folder"])
+    one, other = files = sorted(folder.iterdir())
+
+    def computed(**options: str) -> tuple[int, int]:
+        outcome = compute(tmp_path, REAL, COMPLEX, **options)
+        assert outcome["values"] == [3.0, 3.0]
+        assert sorted(folder.iterdir()) == files
+        return outcome["hits"], outcome["misses"]
+
+    os.truncate(one, one.stat().st_size // 2)
+    content = bytearray(other.read_bytes())
+    content[len(content) // 2] ^= 1
+    other.write_bytes(content)
+    assert computed(complaint=f"{folder}: damaged") == (0, 2)
+
+    exchanged = one.read_bytes(), other.read_bytes()
+    other.write_bytes(exchanged[0])
+    one.write_bytes(exchanged[1])
+    assert computed(complaint=f"{folder}: damaged") == (0, 2)
+    assert computed() == (2, 0)
+
+
+@pytest.mark.slow
+def test_a_full_disk_does_not_stop_a_computation(tmp_path):
+    folder = tmp_path / source_hash()
+    complaint = f"{folder}: cannot keep compiled code"
+    outcome = compute(tmp_path, REAL, COMPLEX, largest_file=999, complaint=complaint)
+    assert outcome["values"] == [3.0, 3.0]
+    assert list(folder.iterdir()) == []
 
 
 @pytest.mark.parametrize("name", sorted(path.name for path in PACKAGE.glob("*.py")))
@@ -113,9 +163,8 @@ def test_the_name_of_the_cache_folder_depends_on_every_kernel_source(name, tmp_p
     shutil.copytree(PACKAGE, package, ignore=shutil.ignore_patterns("__pycache__"))
 
     def source_hash() -> str:
-        # compilation.py imports nothing of its package: it can be run as a file of its own.
         namespace = {"__file__": str(package / "compilation.py"), "__name__": "copied"}
-        text = (package / "compilation.py").read_text().split("CACHE_FOLDER = cache_folder()")[0]
+        text = (package / "compilation.py").read_text().split("CACHE_FOLDER = ")[0]
         exec(compile(text, "compilation.py", "exec"), namespace)
         return namespace["source_hash"]()
 
@@ -127,41 +176,94 @@ def test_the_name_of_the_cache_folder_depends_on_every_kernel_source(name, tmp_p
 
 def test_compiled_code_lies_outside_the_installed_packages(cache, first):
     assert Path(first["folder"]).parent == cache
-    from gearchaos_kernels.compilation import CACHE_FOLDER
-
     installed = [Path(folder) for folder in (*site.getsitepackages(), PACKAGE.parent)]
     assert not any(CACHE_FOLDER.is_relative_to(folder) for folder in installed)
-    assert list(PACKAGE.rglob("*.nbi")) == []
+    assert list(PACKAGE.rglob("*.nb?")) == []
 
 
+@pytest.mark.skipif(sys.platform != "linux", reason="other systems have other cache folders")
 def test_without_a_setting_the_cache_lies_in_the_users_cache_folder(tmp_path, monkeypatch):
-    from gearchaos_kernels import compilation
+    monkeypatch.setattr("numba.config.CACHE_DIR", "")
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("HOME", str(tmp_path / "home"))
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "xdg"))
+    assert cache_folder("name") == tmp_path / "xdg" / "gearchaos" / "name"
+    for unset in ("", "relative"):
+        monkeypatch.setenv("XDG_CACHE_HOME", unset)
+        assert cache_folder("name") == tmp_path / "home" / ".cache" / "gearchaos" / "name"
+    assert {path.name for path in tmp_path.iterdir()} == {"home", "xdg"}
 
-    monkeypatch.setattr(compilation.config, "CACHE_DIR", "")
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    if sys.platform == "linux":
-        assert compilation.cache_folder() == tmp_path / "gearchaos" / compilation.source_hash()
+
+def test_folders_that_are_made_are_private(tmp_path, monkeypatch):
+    monkeypatch.setattr("numba.config.CACHE_DIR", str(tmp_path / "parent" / "cache"))
+    folder = cache_folder("name")
+    assert folder == tmp_path / "parent" / "cache" / "name"
+    for made in (folder, folder.parent, folder.parent.parent):
+        assert stat.S_IMODE(made.stat().st_mode) == 0o700
 
 
-def test_a_cache_folder_that_cannot_be_made_gives_way_to_a_private_temporary_one(
-    tmp_path, monkeypatch
-):
-    from gearchaos_kernels import compilation
-
-    blocked = tmp_path / "file"
-    blocked.write_text("not a folder")
-    monkeypatch.setattr(compilation.config, "CACHE_DIR", str(blocked))
-    monkeypatch.setattr(compilation.tempfile, "tempdir", str(tmp_path))
-    folder = compilation.cache_folder()
+def _refused(tmp_path, monkeypatch, caplog) -> str:
+    """Return why a folder is not used; a private temporary one is used instead."""
+    monkeypatch.setattr("numba.config.CACHE_DIR", str(tmp_path / "parent" / "cache"))
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    folder = cache_folder("name")
     assert folder.parent == tmp_path
     assert stat.S_IMODE(folder.stat().st_mode) == 0o700
+    (record,) = caplog.records
+    text = record.getMessage()
+    assert text.startswith(f"gearchaos: {tmp_path / 'parent' / 'cache' / 'name'} is not used")
+    assert "set NUMBA_CACHE_DIR" in text
+    assert "\n" not in text
+    return text
+
+
+def test_a_cache_folder_that_cannot_be_made_is_not_used(tmp_path, monkeypatch, caplog):
+    (tmp_path / "parent").write_text("not a folder")
+    assert f"File exists: '{tmp_path / 'parent'}'" in _refused(tmp_path, monkeypatch, caplog)
+
+
+@pytest.mark.skipif(not hasattr(os, "geteuid"), reason="modes and owners are those of POSIX")
+@pytest.mark.parametrize(
+    ("name", "mode"),
+    [
+        ("parent/cache/name", 0o770),
+        ("parent/cache/name", 0o1777),
+        ("parent/cache", 0o777),
+        ("parent", 0o775),
+        ("parent", 0o702),
+    ],
+)
+def test_a_cache_folder_that_others_can_write_or_replace_is_not_used(
+    name, mode, tmp_path, monkeypatch, caplog
+):
+    (tmp_path / "parent" / "cache" / "name").mkdir(parents=True)
+    (tmp_path / name).chmod(mode)
+    assert f"others can write in {tmp_path / name}" in _refused(tmp_path, monkeypatch, caplog)
+
+
+@pytest.mark.skipif(not hasattr(os, "geteuid"), reason="modes and owners are those of POSIX")
+def test_a_sticky_parent_such_as_tmp_is_fine(tmp_path, monkeypatch, caplog):
+    (tmp_path / "parent").mkdir()
+    (tmp_path / "parent").chmod(0o1777)
+    monkeypatch.setattr("numba.config.CACHE_DIR", str(tmp_path / "parent"))
+    assert cache_folder("name") == tmp_path / "parent" / "name"
+    assert caplog.records == []
+
+
+@pytest.mark.skipif(os.name != "posix" or os.geteuid() != 0, reason="only root gives files away")
+@pytest.mark.parametrize("name", ["parent/cache/name", "parent"])
+def test_a_cache_folder_of_another_user_is_not_used(name, tmp_path, monkeypatch, caplog):
+    (tmp_path / "parent" / "cache" / "name").mkdir(parents=True)
+    os.chown(tmp_path / name, 65534, 65534)
+    assert f"{tmp_path / name} belongs to another user" in _refused(tmp_path, monkeypatch, caplog)
 
 
 @pytest.mark.slow
-def test_an_unwritable_home_does_not_stop_a_computation(tmp_path, first):
+def test_an_unwritable_home_does_not_stop_a_computation(tmp_path):
     blocked = tmp_path / "home"
     blocked.write_text("not a folder")
-    outcome = integrate(tmp_path, LINEAR, home=blocked)
-    assert outcome["ends"] == first["ends"]
+    home = {"NUMBA_CACHE_DIR": "", "HOME": str(blocked), "XDG_CACHE_HOME": ""}
+    outcome = compute(tmp_path, REAL, complaint=str(blocked), **home)
+    assert outcome["values"] == [3.0]
     # What cannot be kept does not litter.
     assert not Path(outcome["folder"]).exists()

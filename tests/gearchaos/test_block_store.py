@@ -19,6 +19,7 @@ from gearchaos.results.manifest import differing_keys
 from gearchaos.results.result import Parameter, Result, open_result
 from gearchaos.results.store_lock import StoreLock
 from gearchaos.results.variables import Axis, Variable, start_axis, sweep_variables
+from gearchaos.version import Software
 
 LANES = 100
 POINTS = 7
@@ -43,6 +44,7 @@ def variables(lanes: int = LANES) -> list[Variable]:
 
 
 VARIABLES = variables()
+SOFTWARE = Software("gearchaos 1.2.3", "0123456789abcdef")
 PARAMETERS = {"damping_ratio": Parameter(0.1, "given", "1", "damping", "$d$")}
 BLOCKS = [(0, 30), (30, 60), (60, 90), (90, 100)]
 
@@ -68,9 +70,14 @@ def block(first: int, last: int) -> dict[str, np.ndarray]:
 
 
 def open_store(
-    output: Path, *, resume: bool = False, configuration: str = CONFIGURATION, lanes: int = LANES
+    output: Path,
+    *,
+    resume: bool = False,
+    configuration: str = CONFIGURATION,
+    lanes: int = LANES,
+    software: Software = SOFTWARE,
 ) -> BlockStore:
-    return BlockStore(output, variables(lanes), configuration, resume=resume)
+    return BlockStore(output, variables(lanes), configuration, software, resume=resume)
 
 
 def fill(store: BlockStore, blocks: Sequence[tuple[int, int]] = BLOCKS) -> None:
@@ -94,7 +101,7 @@ def test_blocks_in_any_order_become_the_file_of_the_whole_sweep(output: Path) ->
     with open_store(output) as store:
         fill(store, BLOCKS[::-1])
         assert not output.exists()
-        assert store.merge(PARAMETERS, {"title": "t"}) == output
+        assert store.merge(VARIABLES, PARAMETERS, {"title": "t"}) == output
     assert list(output.parent.iterdir()) == [output]
     whole = output.with_name("whole.h5")
     Result(["load"], VARIABLES, DATA, PARAMETERS, {"title": "t"}).save(whole)
@@ -115,7 +122,7 @@ def test_a_later_run_goes_on_from_what_is_finished(output: Path) -> None:
         assert missing == [(30, 50), (50, 60), (90, 100)]
         np.testing.assert_array_equal(store.read(0, 30)["end_state"], DATA["end_state"][:30])
         fill(store, missing)
-        store.merge(PARAMETERS, {})
+        store.merge(VARIABLES, PARAMETERS, {})
     assert_whole(output)
 
 
@@ -137,7 +144,7 @@ def test_files_of_the_user_in_the_folder_stay(output: Path) -> None:
     (folder / "notes.txt").write_text("mine", encoding="utf-8")
     with open_store(output) as store:
         fill(store)
-        store.merge(PARAMETERS, {})
+        store.merge(VARIABLES, PARAMETERS, {})
     assert [path.name for path in folder.iterdir()] == ["notes.txt"]
 
 
@@ -163,6 +170,27 @@ def test_a_store_of_another_configuration_is_refused_with_the_keys(output: Path)
     assert "sweep.values" not in message
     with pytest.raises(FileError, match="differs in lanes"):
         open_store(output, resume=True, lanes=LANES + 1)
+    with open_store(output, resume=True) as store:
+        assert store.finished().bounds == BLOCKS
+
+
+def test_a_store_of_another_gearchaos_is_refused_with_both_values(output: Path) -> None:
+    with open_store(output) as store:
+        fill(store)
+    newer = SOFTWARE._replace(software="gearchaos 2.0.0")
+    other = newer._replace(kernels="fedcba9876543210")
+    for software, resume, configuration, words in (
+        (
+            newer,
+            True,
+            CONFIGURATION,
+            r"differs in software \(gearchaos 1\.2\.3, now \S+ 2\.0\.0\); go",
+        ),
+        (other, False, CONFIGURATION, r"kernels \(0123456789abcdef, now fedcba9876543210\); go on"),
+        (newer, True, "title = 't'", r"2\.0\.0\), integration\.steps_per_period \(288, now absent"),
+    ):
+        with pytest.raises(FileError, match=f"blocks of another gearchaos, which .*{words}"):
+            open_store(output, software=software, resume=resume, configuration=configuration)
     with open_store(output, resume=True) as store:
         assert store.finished().bounds == BLOCKS
 
@@ -221,10 +249,10 @@ def test_bad_blocks_are_named_and_left_out(output: Path, tmp_path: Path) -> None
             assert problem.startswith(str(folder))
             assert word in problem
         with pytest.raises(FileError, match="lanes 0 to 89 are missing") as caught:
-            store.merge(PARAMETERS, {})
+            store.merge(VARIABLES, PARAMETERS, {})
         assert len(caught.value.problems) == len(reasons) + 1
         fill(store, store.missing(bounds, block=30))
-        store.merge(PARAMETERS, {})
+        store.merge(VARIABLES, PARAMETERS, {})
     assert_whole(output)
 
 
@@ -247,7 +275,7 @@ def test_a_second_sweep_on_the_same_output_is_refused_at_once(output: Path) -> N
             with pytest.raises(FileError, match="another sweep is writing to it"):
                 open_store(path, resume=True)
         fill(store)
-        store.merge(PARAMETERS, {})
+        store.merge(VARIABLES, PARAMETERS, {})
     assert_whole(output)
 
 
@@ -255,7 +283,7 @@ PROGRAM = """
 import sys
 sys.path.insert(0, sys.argv[2])
 from pathlib import Path
-from test_shards import BLOCKS, PARAMETERS, FileError, fill, open_store
+from test_block_store import BLOCKS, PARAMETERS, VARIABLES, FileError, fill, open_store
 output = Path(sys.argv[1])
 """
 
@@ -288,7 +316,7 @@ def test_a_killed_sweep_neither_blocks_nor_loses_anything(output: Path) -> None:
         bounds, problems = store.finished()
         assert (bounds, problems) == (BLOCKS[:2], [])
         fill(store, store.missing(bounds, block=50))
-        store.merge(PARAMETERS, {})
+        store.merge(VARIABLES, PARAMETERS, {})
     assert_whole(output)
 
 
@@ -297,7 +325,7 @@ def test_a_full_disk_keeps_what_is_finished(output: Path) -> None:
 with open_store(output) as store:
     try:
         fill(store)
-        store.merge(PARAMETERS, {})
+        store.merge(VARIABLES, PARAMETERS, {})
     except FileError as error:
         print(error)
 """
@@ -309,10 +337,10 @@ with open_store(output) as store:
     with open_store(output, resume=True) as store:
         fill(store, store.missing(store.finished().bounds, block=30))
         with pytest.raises(FileError, match="exists already"):
-            store.merge(PARAMETERS, {})
+            store.merge(VARIABLES, PARAMETERS, {})
         assert output.read_bytes() == b"earlier"
         assert store.finished().bounds == BLOCKS
-        store.merge(PARAMETERS, {}, overwrite=True)
+        store.merge(VARIABLES, PARAMETERS, {}, overwrite=True)
     assert_whole(output)
 
 
@@ -322,7 +350,7 @@ def test_a_merge_on_a_full_disk_can_be_repeated(output: Path) -> None:
     program = """
 with open_store(output, resume=True) as store:
     try:
-        store.merge(PARAMETERS, {})
+        store.merge(VARIABLES, PARAMETERS, {})
     except FileError as error:
         print(error)
 """
@@ -332,7 +360,7 @@ with open_store(output, resume=True) as store:
     assert process.returncode == 0
     assert not output.exists()
     with open_store(output, resume=True) as store:
-        store.merge(PARAMETERS, {})
+        store.merge(VARIABLES, PARAMETERS, {})
     assert_whole(output)
 
 
@@ -361,7 +389,7 @@ def test_arrays_of_another_shape_are_refused(output: Path) -> None:
 def test_merging_takes_the_memory_of_a_block(output: Path) -> None:
     program = """
 import numpy as np
-from test_shards import CONFIGURATION, POINTS
+from test_block_store import CONFIGURATION, POINTS, SOFTWARE
 from gearchaos.results.block_store import BlockStore
 from gearchaos.results.variables import Axis, sweep_variables
 points, size, count = 500, 250, 80
@@ -377,11 +405,11 @@ one = {
 }
 memory = lambda: resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
 import resource
-with BlockStore(output, variables, CONFIGURATION) as store:
+with BlockStore(output, variables, CONFIGURATION, SOFTWARE) as store:
     for number in range(count):
         store.write(number * size, (number + 1) * size, one)
     before = memory()
-    store.merge({}, {})
+    store.merge(variables, {}, {})
 print(memory() - before)
 """
     with start(program, output) as process:
@@ -395,8 +423,9 @@ HALVES = [[(0, 30), (60, 90)], [(30, 60), (90, 100)]]
 
 def open_shard(output: Path, number: int, **options: Any) -> BlockStore:
     return BlockStore(
-        output, VARIABLES, CONFIGURATION, blocks=HALVES[number], shards=2, resume=True, **options
-    )
+        output, VARIABLES, CONFIGURATION, SOFTWARE, blocks=HALVES[number], shards=2, resume=True,
+        **options,
+    )  # fmt: skip
 
 
 def test_shards_share_the_folder_and_a_whole_sweep_does_not(output: Path) -> None:
@@ -419,7 +448,7 @@ def test_shards_share_the_folder_and_a_whole_sweep_does_not(output: Path) -> Non
         with pytest.raises(FileError, match="another sweep is writing to it"):
             open_shard(output, 0)
         assert store.shards == 2
-        store.merge(PARAMETERS, {})
+        store.merge(VARIABLES, PARAMETERS, {})
     assert_whole(output)
     assert list(output.parent.iterdir()) == [output]
 
@@ -434,11 +463,12 @@ def test_a_refused_shard_leaves_nothing_behind(output: Path) -> None:
             open_shard(output, 1)
         fill(store, BLOCKS[:1])
         assert names() == sorted([*before, "000000000000-000000000030.block"])
+    (output.with_name("sweep.h5.blocks") / "lock").unlink()
     before = names()
     for options in ({"configuration": "title = 'other'"}, {"resume": False}):
         given = {"configuration": CONFIGURATION, "resume": True, **options}
         with pytest.raises(FileError):
-            BlockStore(output, VARIABLES, **given, blocks=HALVES[0], shards=2)
+            BlockStore(output, VARIABLES, software=SOFTWARE, **given, blocks=HALVES[0], shards=2)
         assert names() == before
 
 
@@ -463,6 +493,40 @@ def test_links_in_the_folder_are_not_followed(output: Path, tmp_path: Path) -> N
         manifest.symlink_to(victim)
     with pytest.raises(FileError, match=r"manifest\.json: is damaged or missing"):
         open_store(output, resume=True)
+
+
+def test_a_folder_that_is_a_link_or_of_another_user_is_refused(output: Path) -> None:
+    folder, elsewhere = output.with_name("sweep.h5.blocks"), output.with_name("elsewhere")
+    folder.symlink_to(elsewhere)
+    for make in (lambda: None, elsewhere.mkdir):
+        make()
+        with pytest.raises(FileError, match=r"blocks: is a link, no folder or another user's"):
+            open_store(output)
+    assert list(elsewhere.iterdir()) == []
+    folder.unlink()
+    folder.mkdir()
+    try:
+        os.chown(folder, 12_345, -1)
+    except PermissionError:
+        pytest.skip("only root can give a folder away")
+    with pytest.raises(FileError, match=r"blocks: is a link, no folder or another user's"):
+        open_store(output)
+    assert list(folder.iterdir()) == []
+
+
+@pytest.mark.parametrize("name", ["lock", "manifest.json"])
+@pytest.mark.parametrize("kind", ["pipe", "link"])
+def test_a_shard_refuses_what_is_no_file_and_leaves_it(name: str, kind: str, output: Path) -> None:
+    path = output.with_name("sweep.h5.blocks") / name
+    path.parent.mkdir()
+    if kind == "pipe":
+        os.mkfifo(path)
+    else:
+        path.symlink_to("nowhere")
+    with pytest.raises(FileError, match=r"regular file; delete it|symbolic links|is damaged or"):
+        open_shard(output, 0)
+    assert list(path.parent.iterdir()) == [path]
+    assert not path.is_file()
 
 
 @pytest.mark.parametrize("target", ["nowhere/lock", "victim"])
@@ -494,10 +558,10 @@ def test_several_axes_become_one_file_from_blocks_that_cut_them(output: Path) ->
         axes, states=["delta_5", "delta_5_rate"], section=["delta_5"], section_points=POINTS,
         lyapunov=True, status_meanings=["ok", "diverged"],
     )  # fmt: skip
-    with BlockStore(output, several, CONFIGURATION) as store:
+    with BlockStore(output, several, CONFIGURATION, SOFTWARE) as store:
         assert store.lanes == LANES
         fill(store)
-        store.merge(PARAMETERS, {})
+        store.merge(several, PARAMETERS, {})
     result = open_result(output)
     assert result["status"].shape == (4, 5, 5)
     for name, values in DATA.items():
@@ -507,7 +571,7 @@ def test_several_axes_become_one_file_from_blocks_that_cut_them(output: Path) ->
 def test_what_was_merged_leaves_the_next_sweep_alone(output: Path) -> None:
     with open_store(output) as store:
         fill(store)
-        store.merge(PARAMETERS, {})
+        store.merge(VARIABLES, PARAMETERS, {})
         following = open_store(output)
     assert following.folder.is_dir()
     with pytest.raises(FileError, match="another sweep is writing to it"):

@@ -1,0 +1,60 @@
+"""A process that has imported what commands import, and forks to run each of them as a process.
+
+It reads one JSON list a line: module, arguments, folder, and the files for stdout and stderr. It
+answers with the exit code on a line. Everything but the imports happens as in a process of its own.
+"""
+
+import atexit
+import json
+import os
+import runpy
+import signal
+import sys
+
+import matplotlib.pyplot as plt  # noqa: F401
+
+import gearchaos.engine.refinement
+import gearchaos.engine.running
+import gearchaos.engine.store_filling
+import gearchaos.figures.response_page
+import gearchaos.figures.sweep_page  # noqa: F401
+
+LONGEST = 300
+"""Seconds after which a command is killed."""
+
+
+def main() -> None:
+    """Serve until the input ends."""
+    for line in sys.stdin:
+        process = os.fork()
+        if process == 0:
+            run(*json.loads(line))
+        ended = os.waitstatus_to_exitcode(os.waitpid(process, 0)[1])
+        sys.stdout.write(f"{ended}\n")
+        sys.stdout.flush()
+
+
+def run(module: str, arguments: list[str], folder: str, out: str, err: str) -> None:
+    """Become the process of one command, and end as it ends."""
+    signal.alarm(LONGEST)
+    os.chdir(folder)
+    for name, descriptor in ((os.devnull, 0), (out, 1), (err, 2)):
+        os.dup2(os.open(name, os.O_RDWR), descriptor)
+    sys.argv[1:] = arguments
+    sys.orig_argv[1:] = ["-m", module, *arguments]
+    code = 1
+    try:
+        runpy.run_module(module, run_name="__main__", alter_sys=True)
+    except SystemExit as leaving:
+        code = leaving.code if isinstance(leaving.code, int) else int(leaving.code is not None)
+    except BaseException:
+        sys.excepthook(*sys.exc_info())
+    finally:
+        atexit._run_exitfuncs()
+        sys.stdout.flush()
+        sys.stderr.flush()
+        os._exit(code)
+
+
+if __name__ == "__main__":
+    main()
