@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+import re
 import sys
 from argparse import ArgumentParser, ArgumentTypeError, Namespace
 from collections.abc import Callable, Sequence
@@ -91,7 +92,9 @@ class Command(NamedTuple):
 
     def _code(self, arguments: list[str]) -> int:
         try:
-            options = self._parser().parse_args(arguments, Namespace(arguments=arguments))
+            # Of negative numbers, argparse takes those with an exponent for options.
+            given = [re.sub(r"^-(?=\.?\d)", " -", text) for text in arguments]
+            options = self._parser().parse_args(given, Namespace(arguments=arguments))
             # Matplotlib would refuse to be imported where the environment names an unknown backend.
             os.environ["MPLBACKEND"] = "agg"
             with speaking(quiet=options.quiet):

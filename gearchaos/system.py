@@ -123,7 +123,7 @@ class System:
         )
         parameters = (sweep.parameter for sweep in config.sweeps.values())
         system = cls(config, {p: lane.fixed[axis_name(p)] for p in parameters})
-        ended = dict(zip(lane["state"].tolist(), lane["end_state"], strict=True))
+        ended = dict(zip(lane.variables["state"].flags, lane["end_state"], strict=True))
         system.state = np.array([ended.get(name, 0.0) for name in system.states])
         return system
 

@@ -82,9 +82,11 @@ def shade_stages(
     stages = stage_table(lanes, NARROWEST_SHARE * (high - low) if narrowest is None else narrowest)
     # Neighbours meet halfway between their lanes, and the outermost reach to the ends of the axis.
     edges = [low, *((one.end + other.start) / 2.0 for one, other in pairwise(stages)), high]
+    # A later version of the file format may know motions that this one does not.
+    colours = {**SHADES, **dict.fromkeys({*map(_kind, stages)} - {*SHADES}, SHADES["unresolved"])}
     shades = [
         axes.axvspan(
-            max(left, low), min(right, high), color=SHADES[_kind(stage)], linewidth=0.0, zorder=0.0
+            max(left, low), min(right, high), color=colours[_kind(stage)], linewidth=0.0, zorder=0.0
         )
         for stage, left, right in zip(stages, edges[:-1], edges[1:], strict=True)
         if left < high and right > low
@@ -93,7 +95,7 @@ def shade_stages(
     drawn = {_kind(stage) for stage in stages if stage.start <= high and stage.end >= low}
     handles = [
         Patch(facecolor=shade, edgecolor="0.6", linewidth=0.3, label=kind)
-        for kind, shade in SHADES.items()
+        for kind, shade in colours.items()
         if kind in drawn
     ]
     title = f"stages of start {result.fixed['start']:g}" if "start" in result.fixed else None

@@ -16,6 +16,10 @@ _LENGTH = ("mesh.length_scale_um or mesh.half_backlash_um",)
 _GEARS = (("p", 1, "driving"), ("g", 2, "driven"))
 
 
+LARGEST_VALUE = 1e100
+"""What sweeps reach at most: sums and squares of such values are numbers, too."""
+
+
 class Range(NamedTuple):
     """The valid numbers: finite, and greater than, at least, less than, at most these bounds."""
 

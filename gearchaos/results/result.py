@@ -143,7 +143,9 @@ class Result:
             values = self[name]
             if not math.isfinite(wanted):
                 raise ConfigurationError(f"{name} = {wanted}: must be a number")
-            number = values.size - 1 - int(np.argmin(np.abs(values - wanted)[::-1]))
+            # Far from all of them, every difference would be the same number.
+            near = np.clip(wanted, values[0], values[-1])
+            number = values.size - 1 - int(np.argmin(np.abs(values - near)[::-1]))
             if method != "nearest" and values[number] != wanted:
                 raise ConfigurationError(
                     f"{name} = {wanted:g}: is none of the {values.size} values of the result; the "

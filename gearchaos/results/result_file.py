@@ -20,15 +20,12 @@ from gearchaos.results.sink import Sink
 from gearchaos.results.variables import HARMONIC, Variable, diagram_axis, lane_axes
 
 SCHEMA = "gearchaos-sweep"
-SCHEMA_VERSION = "2.0"
+SCHEMA_VERSION = "3.0"
 PARAMETERS = "parameters"
-ORIGINS = ("given", "derived", "default", "swept")
-TEXTS = {
-    "configuration": "configuration as it was written, in TOML",
-    "configuration_resolved": "configuration with everything filled in, in TOML",
-}
-"""Metadata that are datasets with these long names: an attribute cannot exceed 64 kB."""
+DIMS = "dims"
+"""Attribute with the names of dimensions: HDF5 keeps its own list of them in the global heap."""
 
+ORIGINS = ("given", "derived", "default", "swept")
 Block: TypeAlias = tuple[int, int, Mapping[str, NDArray[Any]]]
 Metadata: TypeAlias = Mapping[str, str | int | float]
 Box: TypeAlias = tuple[slice, ...]
@@ -36,7 +33,6 @@ Box: TypeAlias = tuple[slice, ...]
 _CHUNK_BYTES = 1 << 19
 _LONGEST_ATTRIBUTE = 32_000
 _CACHE_BYTES = 4 << 20
-_STRING = h5py.string_dtype("utf-8")
 _PACKED = {"compression": "gzip", "compression_opts": 4, "shuffle": True, "fletcher32": True}
 
 
@@ -140,13 +136,12 @@ def hyperslabs(first: int, last: int, shape: Sequence[int]) -> Iterator[Box]:
 
 def _write_metadata(file: h5py.File, metadata: Metadata) -> None:
     for name, value in metadata.items():
-        if not isinstance(value, str):
-            file.attrs[name] = value
-        elif name in TEXTS or len(value.encode("utf-8", "replace")) > _LONGEST_ATTRIBUTE:
-            text = file.create_dataset(name, data=_plain(value), dtype=_STRING, track_order=True)
-            _describe(text, {"units": "1", "long_name": TEXTS.get(name, name)})
+        if isinstance(value, str) and len(content := _plain(value)) > _LONGEST_ATTRIBUTE:
+            # As ASCII, which Octave insists on.
+            text = file.create_dataset(name, data=np.bytes_(content), track_order=True)
+            _describe(text, {"units": "1", "long_name": name})
         else:
-            file.attrs[name] = _plain(value)
+            _describe(file, {name: value})
 
 
 def _harmonics(parameters: Mapping[str, Parameter]) -> list[Variable]:
@@ -158,18 +153,16 @@ def _harmonics(parameters: Mapping[str, Parameter]) -> list[Variable]:
 
 
 def _create(file: h5py.File, variable: Variable, shape: tuple[int, ...]) -> None:
-    options: dict[str, Any] = {"track_order": True}
-    if variable.dtype == "str":
-        assert variable.values is not None
-        words = [_plain(str(word)) for word in variable.values.flat]
-        options |= {"data": np.reshape(words, shape).astype(object), "dtype": _STRING}
-    else:
-        chunks = _chunks(shape, np.dtype(variable.dtype).itemsize)
-        options |= {"dtype": variable.dtype, "fillvalue": variable.fill_value, "chunks": chunks}
-        options |= _PACKED
-    dataset = file.create_dataset(variable.name, shape, **options)
-    if variable.values is not None and variable.dtype != "str":
-        dataset[...] = variable.values
+    dataset = file.create_dataset(
+        variable.name,
+        shape,
+        variable.dtype,
+        data=variable.values,
+        fillvalue=variable.fill_value,
+        chunks=_chunks(shape, np.dtype(variable.dtype).itemsize),
+        track_order=True,
+        **_PACKED,
+    )
     if variable.dims == (variable.name,):
         dataset.make_scale(variable.name)
     _describe(dataset, variable.attributes)
@@ -187,7 +180,8 @@ def _chunks(shape: tuple[int, ...], itemsize: int) -> tuple[int, ...]:
 
 
 def _attach_scales(file: h5py.File, name: str, dims: tuple[str, ...]) -> None:
-    if dims != (name,):
+    if dims not in ((), (name,)):
+        _describe(file[name], {DIMS: " ".join(dims)})
         for index, dim in enumerate(dims):
             file[name].dims[index].attach_scale(file[dim])
 
@@ -202,11 +196,15 @@ def _write_parameters(file: h5py.File, parameters: Mapping[str, Parameter]) -> N
         _describe(dataset, {**wording, "symbol": parameter.symbol, "origin": parameter.origin})
 
 
-def _describe(dataset: h5py.Dataset, notes: Mapping[str, Any]) -> None:
+def _describe(item: h5py.HLObject, notes: Mapping[str, Any]) -> None:
     for name, note in notes.items():
-        dataset.attrs[name] = _plain(note) if isinstance(note, str) else note
+        if isinstance(note, str):
+            content = _plain(note) or b"\0"
+            item.attrs.create(name, content, dtype=h5py.string_dtype("utf-8", len(content)))
+        else:
+            item.attrs[name] = note
 
 
-def _plain(text: str) -> str:
+def _plain(text: str) -> bytes:
     """Replace what an HDF5 string cannot hold: NUL, and the lone surrogates of odd file names."""
-    return text.encode("utf-8", "replace").decode("utf-8").replace("\0", "\ufffd")
+    return text.encode("utf-8", "replace").replace(b"\0", "\ufffd".encode())

@@ -13,17 +13,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gearchaos.errors import FileError
+from gearchaos.gear.group_table import LARGEST_VALUE
 from gearchaos.results.atomic_file import reason
 from gearchaos.results.checksum_line import checksum_fits
-from gearchaos.results.global_heap import heaps_end
 from gearchaos.results.result_file import ORIGINS, PARAMETERS, SCHEMA, SCHEMA_VERSION, Parameter
 from gearchaos.results.stored_dataset import (
+    Allowance,
     UnfitError,
+    datasets_of,
     dims_of,
     dtype_of,
-    hard_linked,
-    own_dataset,
     scalars_of,
+    text_of,
     values_of,
 )
 from gearchaos.results.variables import (
@@ -48,6 +49,10 @@ Contents = tuple[
 SOON_HASHED = 1 << 30
 """Bytes whose checksum takes about a second."""
 
+LONGEST_SYMBOL = 60
+MOST_PRINTED = 1000
+"""Characters of a symbol, and of a text on the terminal."""
+
 
 def read_result(path: str | os.PathLike[str], *, rows: bool = True) -> Contents:
     """Read a whole result file, or all but what makes it large.
@@ -65,8 +70,6 @@ def read_result(path: str | os.PathLike[str], *, rows: bool = True) -> Contents:
         soon = rows or found.st_size <= SOON_HASHED
         if soon and checksum_fits(Path(name)) is False:
             raise FileError(f"{name}: is damaged (its checksum does not fit); run the sweep again")
-        if soon and not heaps_end(name):
-            raise FileError(f"{name}: is damaged where its texts are kept; run the sweep again")
     except (OSError, ValueError) as error:
         raise FileError(
             f"{name}: cannot be read: {reason(error)}; give the name of a result file"
@@ -90,42 +93,66 @@ def fixed_coordinates(metadata: Mapping[str, Any]) -> dict[str, float]:
 
 
 def is_coordinate(values: NDArray[Any]) -> bool:
-    """Tell whether values are those of an axis: numbers that ascend, none of them twice."""
+    """Tell whether values are those of an axis: numbers that ascend, none twice, none too large."""
     numbers = values.ndim == 1 and values.size > 0 and values.dtype.kind in "if"
-    return numbers and bool(np.isfinite(values).all() and (np.diff(values) > 0).all())
+    within = numbers and bool((np.abs(values) <= LARGEST_VALUE).all())
+    return within and bool((np.diff(values) > 0).all())
 
 
 def printable(text: str) -> str:
-    """Return a text of a file without the control characters that act on a terminal."""
+    """Return a text of a file, if long its start, without what acts on a terminal."""
+    text = text if len(text) <= MOST_PRINTED else f"{text[:MOST_PRINTED]}..."
     return "".join(c if c.isprintable() else "\N{REPLACEMENT CHARACTER}" for c in text)
 
 
 def _read(file: h5py.File, rows: bool) -> Contents:
-    metadata = scalars_of(file)
+    allowance = Allowance(file)
+    metadata = scalars_of(file, allowance)
     _check_schema(metadata)
     axes = tuple(str(metadata.get("axes", "")).split())
-    variables: list[Variable] = []
+    datasets = datasets_of(file, allowance)
+    grouped = {name: datasets.pop(name) for name in list(datasets) if "/" in name}
+    variables: dict[str, Variable] = {}
     data: dict[str, NDArray[Any]] = {}
     sizes: dict[str, int] = {}
-    for name in file:
-        if name == PARAMETERS:
+    for name, dataset in datasets.items():
+        text = text_of(name, dataset, allowance)
+        if text is not None:
+            metadata[name] = text
             continue
-        dataset = own_dataset(file, name)
-        if dataset.shape == ():
-            if h5py.check_string_dtype(dataset.dtype):
-                metadata[name] = dataset.asstr()[()]
-            continue
-        dims = dims_of(file, dataset, sizes)
+        notes = scalars_of(dataset, allowance)
+        dims = dims_of(name, dataset, notes, sizes)
         if name != HARMONIC:
             if rows or len(dims) == 1 or set(dims) <= set(axes):
-                data[name] = values_of(dataset)
-            notes = scalars_of(dataset)
+                data[name] = values_of(name, dataset)
             flags = tuple(str(notes.get("flag_meanings", "")).split())
             more: dict[str, Any] = {"fill_value": notes.get("_FillValue"), "flags": flags}
-            variables.append(Variable(name, dims, dtype_of(dataset), **_wording(notes), **more))
-    _check_variables(axes, {variable.name: variable for variable in variables}, data)
+            wording, dtype = _wording(notes), dtype_of(name, dataset)
+            variables[name] = Variable(name, dims, dtype, **wording, **more)
+    _check_variables(axes, variables, data)
+    for dim in sizes.keys() - {HARMONIC}:
+        if dim not in variables or variables[dim].dims != (dim,):
+            raise UnfitError(f"lacks the variable {dim}, whose dimension others have")
     fixed_coordinates(metadata)
-    return variables, data, _read_parameters(file, axes, sizes), metadata
+    parameters = {}
+    for name, dataset in grouped.items():
+        notes = scalars_of(dataset, allowance)
+        dims, name = dims_of(name, dataset, notes, sizes), name.removeprefix(f"{PARAMETERS}/")
+        origin = str(notes.get("origin"))
+        of_the_model = dims == (HARMONIC,) or dims == tuple(a for a in axes if a in dims)
+        if dataset.dtype.str[1:] != "f8" or not of_the_model or origin not in ORIGINS:
+            raise UnfitError(f"holds a parameter {name} that is none")
+        values = values_of(name, dataset)
+        value = values if dims else float(values)
+        parameters[name] = Parameter(value, origin, **_wording(notes), dims=dims)
+    return list(variables.values()), data, parameters, metadata
+
+
+def _wording(notes: Mapping[str, Any]) -> dict[str, Any]:
+    wording = {key: str(notes.get(key, ""))[:MOST_PRINTED] for key in ("units", "long_name")}
+    symbol = str(notes.get("symbol", ""))
+    # In a long formula, matplotlib would come to the end of its recursion.
+    return wording | {"symbol": symbol if len(symbol) <= LONGEST_SYMBOL else ""}
 
 
 def _check_schema(metadata: Mapping[str, Any]) -> None:
@@ -152,7 +179,7 @@ def _check_variables(
         raise UnfitError(f"lacks the variable {STATE}")
     expected = sweep_variables(
         [Axis(name, "", "", "", np.zeros(1, "i4" if name == START else "f8")) for name in axes],
-        states=tuple(data[STATE].ravel()),
+        states=found[STATE].flags,
         section=[n.removeprefix(SECTION) for n in found if n.startswith(f"{SECTION}delta_")],
         section_points=np.size(data.get(SECTION_POINT, ())),
         lyapunov=LARGEST_EXPONENT in found,
@@ -173,31 +200,8 @@ def _check_variables(
             )
     for name in axes:
         if not is_coordinate(data[name]):
-            raise UnfitError(f"holds values of {name} that do not ascend, each once")
-    for name in {STATUS, "motion"} & found.keys():
+            rule = f"do not ascend, each once, between -{LARGEST_VALUE:g} and {LARGEST_VALUE:g}"
+            raise UnfitError(f"holds values of {name} that {rule}")
+    for name in {STATUS, STATE, "motion"} & found.keys():
         if data[name].max() >= max(1, len(found[name].flags)):
             raise UnfitError(f"holds a {name} without a meaning")
-
-
-def _read_parameters(
-    file: h5py.File, axes: tuple[str, ...], sizes: dict[str, int]
-) -> dict[str, Parameter]:
-    if not isinstance(hard_linked(file, PARAMETERS), h5py.Group):
-        raise UnfitError(f"lacks the group {PARAMETERS}")
-    parameters = {}
-    for name in file[PARAMETERS]:
-        dataset = own_dataset(file, f"{PARAMETERS}/{name}")
-        notes = scalars_of(dataset)
-        dims = dims_of(file, dataset, sizes) if dataset.shape else ()
-        origin = str(notes.get("origin"))
-        number = dataset.dtype.str[1:] == "f8"
-        of_the_model = dims == (HARMONIC,) or dims == tuple(a for a in axes if a in dims)
-        if not number or not of_the_model or origin not in ORIGINS:
-            raise UnfitError(f"holds a parameter {name} that is none")
-        value = dataset[()] if dims else float(dataset[()])
-        parameters[name] = Parameter(value, origin, **_wording(notes), dims=dims)
-    return parameters
-
-
-def _wording(notes: Mapping[str, Any]) -> dict[str, Any]:
-    return {key: str(notes.get(key, "")) for key in ("units", "long_name", "symbol")}

@@ -1,9 +1,13 @@
-"""Datasets of a file that may hold anything: only what lies in it, fits into it and is ours."""
+"""What is read of a file that may hold anything: plain numbers and texts in it, within bounds.
+
+The global heap, where HDF5 keeps what has no fixed length and over which its library can walk for
+ever, is read for texts of other programs only: those of our own files have a fixed length.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import suppress
+import math
+from collections.abc import Mapping
 from typing import Any
 
 import h5py
@@ -11,13 +15,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gearchaos.results.atomic_file import reason
-from gearchaos.results.result_file import PARAMETERS
+from gearchaos.results.result_file import DIMS, PARAMETERS
 
 _DTYPES = {"f8": "float64", "i4": "int32", "u1": "uint8"}
-_LARGEST_CHUNK = 64 << 20
-_HIGHEST_COMPRESSION = 1100
-"""Deflate packs at best 1032 bytes into one; a dataset that claims more is not a real one."""
-_FILTERS = {h5py.h5z.FILTER_DEFLATE, h5py.h5z.FILTER_SHUFFLE, h5py.h5z.FILTER_FLETCHER32}
+_PACKED, _ROOM = 128, 1 << 20
+"""A file may declare so many bytes for each of its own and of this room: sections of lanes that
+have come to rest are packed to a twentieth, labels to a thousandth."""
+
+_MOST_NAMES = 1000
+_LEAST_PIECE = 4096
+"""Bytes for which a chunk counts at least: each costs time, even one that nobody has written."""
 
 
 class UnfitError(Exception):
@@ -27,87 +34,102 @@ class UnfitError(Exception):
         super().__init__(f"{fault}; {remedy}")
 
 
-def hard_linked(file: h5py.File, name: str) -> Any:
-    """Open what a file itself holds: a soft or an external link could lead anywhere."""
+class Allowance:
+    """The bytes that may still be read of a file; UnfitError where it asks for more."""
+
+    def __init__(self, file: h5py.File) -> None:
+        self._left = _PACKED * (file.id.get_filesize() + _ROOM)
+
+    def take(self, size: int, name: str) -> None:
+        """Take the bytes of what has this name."""
+        self._left -= size
+        if self._left < 0:
+            raise UnfitError(f"declares more than a file of its size holds, in {name}")
+
+
+def datasets_of(file: h5py.File, allowance: Allowance) -> dict[str, h5py.Dataset]:
+    """Open all that is ever read of a result file, by name, ``parameters/load`` for a parameter.
+
+    Raises UnfitError unless all of it are arrays in this file and within its allowance.
+    """
+    if not isinstance(_hard_linked(file, PARAMETERS), h5py.Group):
+        raise UnfitError(f"lacks the group {PARAMETERS}")
+    names = [name for name in _names(file) if name != PARAMETERS]
+    names += [f"{PARAMETERS}/{name}" for name in _names(file[PARAMETERS])]
+    datasets = {name: _hard_linked(file, name) for name in names}
+    for name, dataset in datasets.items():
+        if not isinstance(dataset, h5py.Dataset) or dataset.is_virtual or dataset.external:
+            raise UnfitError(f"keeps {name} outside of itself or not as an array")
+        chunk = dataset.chunks or dataset.shape
+        pieces = (-(-size // max(1, side)) for size, side in zip(dataset.shape, chunk, strict=True))
+        piece = max(_LEAST_PIECE, math.prod(chunk) * dataset.dtype.itemsize)
+        allowance.take(math.prod(pieces) * piece, name)
+    return datasets
+
+
+def _hard_linked(file: h5py.File, name: str) -> Any:
+    # A soft or an external link could lead anywhere.
     if not isinstance(file.get(name, getlink=True), h5py.HardLink):
         raise UnfitError(f"holds no {name}, or a link in its place")
     return file[name]
 
 
-def own_dataset(file: h5py.File, name: str) -> h5py.Dataset:
-    """Open a dataset that lies in this file, is compressed in known ways and fits into it."""
-    dataset = hard_linked(file, name)
-    if not isinstance(dataset, h5py.Dataset) or dataset.is_virtual or dataset.external:
-        raise UnfitError(f"keeps {name} outside of itself or not as an array")
-    layout = dataset.id.get_create_plist()
-    filters = {layout.get_filter(index)[0] for index in range(layout.get_nfilters())}
-    stored = min(dataset.id.get_storage_size(), file.id.get_filesize())
-    chunk = int(np.prod(dataset.chunks or (1,), dtype=object)) * dataset.dtype.itemsize
-    size = int(np.prod(dataset.shape, dtype=object)) * dataset.dtype.itemsize
-    packed = _HIGHEST_COMPRESSION if filters else 1
-    # Chunks that nobody has written cost no bytes, but each of them costs time.
-    if dataset.chunks and size > dataset.id.get_num_chunks() * chunk:
-        packed = 0
-    if filters - _FILTERS or chunk > _LARGEST_CHUNK or not 0 < size <= packed * stored:
-        raise UnfitError(f"declares {size} bytes for {name} that it does not hold in a known way")
-    return dataset
+def _names(of: Any) -> list[str]:
+    if len(of) > _MOST_NAMES:
+        raise UnfitError(f"holds {len(of)} names in one place, where a result has some dozens")
+    return list(of)
 
 
-def own_datasets(file: h5py.File) -> Iterator[h5py.Dataset]:
-    """Give the datasets of a result file that can be opened, those of its parameters too."""
-    names = list(file)
-    with suppress(UnfitError):
-        names += [f"{PARAMETERS}/{name}" for name in hard_linked(file, PARAMETERS)]
-    for name in names:
-        with suppress(UnfitError):
-            yield own_dataset(file, name)
-
-
-def dims_of(file: h5py.File, dataset: h5py.Dataset, sizes: dict[str, int]) -> tuple[str, ...]:
+def dims_of(
+    name: str, dataset: h5py.Dataset, notes: Mapping[str, Any], sizes: dict[str, int]
+) -> tuple[str, ...]:
     """Name the dimensions of a dataset; their sizes are those met before, or noted."""
-    name = dataset.name.lstrip("/")
-    dims = []
-    for dim, size in zip(dataset.dims, dataset.shape, strict=True):
-        scale = name if dataset.is_scale else dim[0].name.lstrip("/") if len(dim) == 1 else ""
-        if scale not in file or sizes.setdefault(scale, size) != size:
-            raise UnfitError(f"holds {name} with dimensions that do not fit")
-        dims.append(scale)
-    return tuple(dims)
+    # A coordinate is a dimension of its own.
+    dims = tuple(str(notes.get(DIMS, name if dataset.shape else "")).split())
+    if len(dims) != dataset.ndim or any(
+        sizes.setdefault(dim, size) != size for dim, size in zip(dims, dataset.shape, strict=True)
+    ):
+        raise UnfitError(f"holds {name} with dimensions that do not fit")
+    return dims
 
 
-def dtype_of(dataset: h5py.Dataset) -> str:
+def dtype_of(name: str, dataset: h5py.Dataset) -> str:
     """Name the type of a dataset as a variable does."""
-    if h5py.check_string_dtype(dataset.dtype):
-        return "str"
     if dataset.dtype.str[1:] not in _DTYPES:
-        raise UnfitError(f"holds {dataset.name} as {dataset.dtype}, which no variable is")
+        raise UnfitError(f"holds {name} as {dataset.dtype}, which no variable is")
     return _DTYPES[dataset.dtype.str[1:]]
 
 
-def values_of(dataset: h5py.Dataset) -> NDArray[Any]:
-    """Read the whole of a dataset, numbers in the byte order of this machine."""
-    dtype = dtype_of(dataset)
-    if dtype != "str":
-        try:
-            values: NDArray[Any] = dataset[...]
-        except OSError as error:
-            raise UnfitError(f"is damaged in {dataset.name} ({reason(error)})") from error
-        return values.astype(dtype, copy=False)
-    words = dataset.asstr()[...]
-    if max(map(len, words.flat)) > np.iinfo(np.uint8).max:
-        raise UnfitError(f"holds no plain words in {dataset.name}")
-    return np.asarray(words, dtype="str")
+def values_of(name: str, dataset: h5py.Dataset) -> NDArray[Any]:
+    """Read the whole of a dataset, in the byte order of this machine."""
+    try:
+        return np.asarray(dataset[...], dtype=dtype_of(name, dataset))
+    except OSError as error:
+        raise UnfitError(f"is damaged in {name} ({reason(error)})") from error
 
 
-def scalars_of(item: h5py.HLObject) -> dict[str, Any]:
+def text_of(name: str, dataset: h5py.Dataset, allowance: Allowance) -> str | None:
+    """Read a dataset that is one text; None if it is none."""
+    if dataset.shape or h5py.check_string_dtype(dataset.dtype) is None:
+        return None
+    text: str = _plain(name, dataset[()], allowance)
+    return text
+
+
+def scalars_of(item: h5py.HLObject, allowance: Allowance) -> dict[str, Any]:
     """Give the attributes that are a text or a number, and leave the bookkeeping of HDF5."""
-    scalars: dict[str, Any] = {}
-    for name in item.attrs:
-        if item.attrs.get_id(name).shape not in ((), (1,)):
-            continue
-        value = np.ravel(item.attrs[name])[0]
-        if isinstance(value, str):
-            scalars[name] = str(value)
-        elif isinstance(value, np.integer | np.floating):
-            scalars[name] = value.item()
+    scalars = {}
+    for name in _names(item.attrs):
+        stored = item.attrs.get_id(name)
+        known = stored.dtype.kind in "iuf" or h5py.check_string_dtype(stored.dtype)
+        if known and stored.shape in ((), (1,)):
+            allowance.take(stored.dtype.itemsize, name)
+            scalars[name] = _plain(name, np.ravel(item.attrs[name])[0], allowance)
     return scalars
+
+
+def _plain(name: str, value: Any, allowance: Allowance) -> Any:
+    if not isinstance(value, str | bytes):
+        return value.item()
+    allowance.take(len(value), name)
+    return str(value) if isinstance(value, str) else value.decode("utf-8", "replace")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -45,7 +45,7 @@ class Variable:
     """One named array of a result.
 
     The dimensions of what differs from lane to lane begin with all axes; the type is ``"float64"``,
-    ``"int32"``, ``"uint8"`` or ``"str"``, the unit ``"1"`` where dimensionless, the symbol
+    ``"int32"`` or ``"uint8"``, the unit ``"1"`` where dimensionless, the symbol
     mathtext. The fill value stands for "none here", None where every value means something; flags
     are the meanings of 0, 1, 2, ... of an enumeration, one word each. Values, of the shape of the
     dimensions, are there where they are known before the sweep, as those of coordinates are.
@@ -191,11 +191,12 @@ def sweep_variables(
             kind("motion_changed", motion, check_meanings),
         ]
     diverged = "mesh period in which the lane diverged, -1 where it did not"
+    text = "number of the state variable, which its meaning names"
     return [
         *variables,
         kind(STATUS, "status of the lane", status_meanings),
         count("diverged_period", diverged, fill_value=-1),
-        _coordinate(STATE, np.array(states, dtype=str), "name of the state variable"),
+        replace(_coordinate(STATE, np.arange(len(states)), text), flags=tuple(states)),
         real("start_state", "state at the start of the lane", "", STATE),
         real("end_state", "state at the end of the lane", "", STATE),
     ]
@@ -227,5 +228,5 @@ def step_choice_variables(
 def _coordinate(
     name: str, values: NDArray[Any], long_name: str, symbol: str = "", units: str = "1"
 ) -> Variable:
-    dtype = {"U": "str", "i": "int32", "f": "float64"}[values.dtype.kind]
+    dtype = {"i": "int32", "f": "float64"}[values.dtype.kind]
     return Variable(name, (name,), dtype, units, long_name, symbol, values=values)

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 
 import h5py
 
 from gearchaos.errors import FileError
 from gearchaos.results.checksum_line import checksum_fits
-from gearchaos.results.global_heap import heaps_end
 from gearchaos.results.result_file import PARAMETERS
 from gearchaos.results.result_reader import read_result
-from gearchaos.results.stored_dataset import own_datasets
+from gearchaos.results.stored_dataset import Allowance, datasets_of
 
 
 def verify(path: str | os.PathLike[str]) -> list[str]:
@@ -33,7 +33,8 @@ def verify(path: str | os.PathLike[str]) -> list[str]:
     if problems:
         raise FileError(problems)
     with h5py.File(path, "r") as file:
-        summed = sum(d.id.get_num_chunks() for d in own_datasets(file) if d.fletcher32)
+        datasets = datasets_of(file, Allowance(file)).values()
+        summed = sum(dataset.id.get_num_chunks() for dataset in datasets if dataset.fletcher32)
     foreign = "there is no checksum of the file: another program than gearchaos has written to it"
     return [
         foreign if fits is None else "the checksum of the file fits",
@@ -45,16 +46,12 @@ def verify(path: str | os.PathLike[str]) -> list[str]:
 
 def damaged_pieces(path: str | os.PathLike[str]) -> Iterator[str]:
     """Name the arrays, and the rows of them, that cannot be read; one sentence each."""
-    if not Path(path).is_file() or not h5py.is_hdf5(path) or not heaps_end(path):
-        return
-    try:
-        with h5py.File(path, "r") as file:
-            for dataset in own_datasets(file):
+    # Where the damage has reached further, the reader has said so already.
+    if Path(path).is_file():
+        with suppress(Exception), h5py.File(path, "r") as file:
+            for name, dataset in datasets_of(file, Allowance(file)).items():
                 for rows in _unreadable(dataset):
-                    yield f"{path}: is damaged in {dataset.name.lstrip('/')}{rows}"
-    except Exception:
-        # Where the damage has reached the structure, the reader has said so already.
-        return
+                    yield f"{path}: is damaged in {name}{rows}"
 
 
 def _unreadable(dataset: h5py.Dataset) -> Iterator[str]:

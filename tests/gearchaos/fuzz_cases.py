@@ -6,16 +6,31 @@ import selectors
 import subprocess
 import sys
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
-from typing import NamedTuple, Self
+from typing import Any, NamedTuple, Self
 
 from .fuzz_configurations import configuration, large_configuration
-from .fuzz_results import damaged_result, good_result
+from .fuzz_forgeries import FORGERIES, forged_result
+from .fuzz_results import GOOD_AXES, damaged_result, good_result
 
 WORKER = Path(__file__).with_name("fuzz_worker.py")
 STARTING_SECONDS = 60.0
 """Added to the time limit of the first case of a process, which imports and compiles."""
+
+BUSY = 4.0
+"""Seconds in which a process is given one second of the processor, at least."""
+
+
+READERS = (
+    "info",
+    "stages",
+    "info --verify --json",
+    "plot --output figure.png --dpi 50",
+    "stages --json --at -1e308",
+    "plot --stages --output stages.png --dpi 50 --overwrite",
+)
+"""Commands that read a result file, and their options."""
 
 
 class Case(NamedTuple):
@@ -42,21 +57,36 @@ class Case(NamedTuple):
 
 
 class Ending(NamedTuple):
-    """How a case ended: exit code, fault ("" where there is none), what was said, and the time."""
+    """How a case ended.
+
+    Attributes
+    ----------
+    code : int or None
+    fault : str
+        "" where there is none.
+    said : str
+    seconds : float
+        Of the processor, where it answered.
+    megabytes : int
+        The most that its process has had so far.
+    """
 
     code: int | None
     fault: str
     said: str
     seconds: float
+    megabytes: int = 0
 
 
 class Watch:
-    """A worker process with a time limit for each case; it is replaced where it hangs or dies."""
+    """A worker process with limits for each case; it is replaced where it hangs, dies or grows.
 
-    def __init__(self, folder: Path, seconds: float = 20.0) -> None:
-        self._folder, self._seconds = folder, seconds
+    Seconds are those of the processor; an answer may take longer on a machine that is busy.
+    """
+
+    def __init__(self, folder: Path, seconds: float = 5.0, megabytes: int = 500) -> None:
+        self._folder, self._seconds, self._megabytes = folder, seconds, megabytes
         self._worker: subprocess.Popen[str] | None = None
-        self._fresh = True
 
     def __enter__(self) -> Self:
         return self
@@ -72,16 +102,23 @@ class Watch:
     def _run(self, case: Case) -> Ending:
         before = _state(case.path)
         began = time.monotonic()
-        answer = self._ask([case.command, *case.arguments])
-        seconds = time.monotonic() - began
+        allowed = self._seconds + STARTING_SECONDS * (self._worker is None)
+        answer = self._ask([case.command, *case.arguments], BUSY * allowed)
         if isinstance(answer, str):
-            return Ending(None, answer, "", seconds)
+            return Ending(None, answer, "", time.monotonic() - began)
+        seconds, megabytes = answer["seconds"], answer["megabytes"]
         fault = answer["escaped"] or _fault(case.command, answer)
+        if seconds > allowed:
+            fault = f"takes {seconds:.1f} s"
+        if megabytes > self._megabytes:
+            fault = f"takes {megabytes} MB"
+            self._end()
         if _state(case.path) != before:
             fault = "the input has changed"
-        return Ending(answer["code"], fault, answer["err"] or answer["out"], seconds)
+        said = answer["err"] or answer["out"]
+        return Ending(answer["code"], fault, said, seconds, megabytes)
 
-    def _ask(self, command: list[str]) -> dict[str, str] | str:
+    def _ask(self, command: list[str], limit: float) -> dict[str, Any] | str:
         if self._worker is None:
             self._worker = subprocess.Popen(
                 [sys.executable, str(WORKER)],
@@ -91,9 +128,6 @@ class Watch:
                 cwd=self._folder,
                 text=True,
             )
-            self._fresh = True
-        limit = self._seconds + STARTING_SECONDS * self._fresh
-        self._fresh = False
         self._worker.stdin.write(json.dumps(command) + "\n")
         self._worker.stdin.flush()
         with selectors.DefaultSelector() as selector:
@@ -137,26 +171,39 @@ def configuration_cases(
 
 def result_cases(numbers: Iterable[int], folder: Path) -> Iterator[Case]:
     """Give result files to every command that reads them, in turn."""
-    good_path, figure, pipe = folder / "good.h5", folder / "figure.png", folder / "pipe"
-    good_result(good_path)
+    goods = _good_results(folder)
     # Whatever opens it waits for ever.
-    os.mkfifo(pipe)
-    good = good_path.read_bytes()
+    os.mkfifo(folder / "pipe")
     for number in numbers:
         path = folder / f"{number}.h5"
-        kind = damaged_result(number, good, path)
-        commands = [
-            ("info", []),
-            ("stages", []),
-            ("info", ["--verify", "--json"]),
-            ("plot", ["--output", str(figure), "--dpi", "50"]),
-        ]
-        command, options = commands[number % len(commands)]
+        kind = damaged_result(number, goods[number // len(READERS) % len(goods)], path)
+        command, *options = READERS[number % len(READERS)].split()
         yield Case(kind, number, command, [str(path), *options], path)
         if path.is_dir():
             path.rmdir()
         else:
             path.unlink(missing_ok=True)
+
+
+def forged_cases(folder: Path, readers: Sequence[str] = READERS) -> Iterator[Case]:
+    """Give every forgery to every command that reads result files, or to some of them."""
+    (good, *_), path = _good_results(folder), folder / "forged.h5"
+    for number, name in enumerate(FORGERIES):
+        forged_result(name, good, path)
+        for command, *options in map(str.split, readers):
+            yield Case(name, number, command, [str(path), *options], path)
+    path.unlink()
+
+
+def _good_results(folder: Path) -> list[bytes]:
+    # What is damaged may point to this one.
+    path = folder / "good.h5"
+    contents = []
+    for axes in reversed(GOOD_AXES):
+        path.unlink(missing_ok=True)
+        good_result(path, axes)
+        contents.insert(0, path.read_bytes())
+    return contents
 
 
 def _fault(command: str, answer: dict) -> str:

@@ -15,6 +15,7 @@ from gearchaos.results.result import Parameter, Result
 from gearchaos.results.variables import (
     STATE_WORDING,
     Axis,
+    start_axis,
     step_choice_variables,
     sweep_variables,
 )
@@ -25,14 +26,17 @@ Random = random.Random
 
 CHECKSUM_LINE = 82
 LANES, POINTS = 20, 5
+LOAD = Axis("load", "1", "static load", "$f_n$", np.linspace(0.0, 1.0, LANES))
+ERRORS = Axis("pitch_error", "1", "pitch error", "$P$", np.linspace(0.0, 3.0, 4))
+GOOD_AXES = ((LOAD,), (ERRORS, LOAD, start_axis(2)), (ERRORS, LOAD), (LOAD, start_axis(3)))
 
 
-def good_result(path: Path) -> None:
+def good_result(path: Path, axes: tuple[Axis, ...] = GOOD_AXES[0]) -> None:
     """Write a sound result file with every kind of variable that a sweep has."""
     states = list(STATE_WORDING)[:2]
     choice = dict.fromkeys(("section_error", "exponent_error", "changed_share"), (1e-3, 1e-7))
     variables = sweep_variables(
-        [Axis("load", "1", "static load", "$f_n$", np.linspace(0.0, 1.0, LANES))],
+        axes,
         states=states,
         section=["delta_5"],
         section_points=POINTS,
@@ -44,20 +48,20 @@ def good_result(path: Path) -> None:
         motion_meanings=["periodic", "quasi_periodic", "chaotic", "unresolved", "diverged"],
     )
     variables += step_choice_variables([50, 100], choice)
-    sizes = {"section_point": POINTS, "state": 2, "exponent": 2}
+    sizes = {axis.name: axis.values.size for axis in axes}
+    sizes |= {"section_point": POINTS, "state": 2, "exponent": 2}
     numbers = np.random.default_rng(5)
     data = {}
     for variable in variables:
         if variable.values is None:
-            shape = (LANES, *(sizes[dim] for dim in variable.dims[1:]))
+            shape = tuple(sizes[dim] for dim in variable.dims)
             data[variable.name] = (
                 numbers.normal(size=shape)
                 if variable.dtype == "float64"
                 else numbers.integers(0, max(1, len(variable.flags)), size=shape)
             )
-    load = np.linspace(0.0, 1.0, LANES)
     parameters = {
-        "load": Parameter(load, "swept", dims=("load",)),
+        "load": Parameter(LOAD.values, "swept", dims=("load",)),
         "damping_ratio": Parameter(0.1, "given"),
         "stiffness_cosine": Parameter(np.array([0.1, 0.2]), "derived", dims=("harmonic",)),
     }
@@ -69,7 +73,7 @@ def good_result(path: Path) -> None:
         "configuration": SMALL,
         "configuration_resolved": SMALL,
     }
-    Result(["load"], variables, data, parameters, metadata).save(path)
+    Result([axis.name for axis in axes], variables, data, parameters, metadata).save(path)
 
 
 def damaged_result(number: int, good: bytes, path: Path) -> str:
@@ -144,17 +148,11 @@ def _edited(source: Random, good: bytes, path: Path) -> None:
 
 
 def _exchange(source: Random, file: h5py.File, name: str) -> None:
-    old = file[name]
-    shape = getattr(old, "shape", ())
-    scales = [dim[0] if len(dim) else None for dim in old.dims] if shape else []
-    notes = dict(old.attrs)
+    shape, notes = getattr(file[name], "shape", ()), dict(file[name].attrs)
     del file[name]
     shape = source.choice((shape, shape, (), shape[::-1], (*shape, 2), (3,), (0,)))
     new = file.create_dataset(name, data=_array(source, shape))
-    for index, scale in enumerate(scales[: len(shape)]):
-        if scale is not None and scale.name is not None and scale.name != f"/{name}":
-            new.dims[index].attach_scale(scale)
-    for key in ("units", "long_name", "symbol", "origin", "flag_meanings"):
+    for key in ("units", "long_name", "symbol", "origin", "flag_meanings", "dims"):
         if key in notes:
             new.attrs[key] = notes[key]
 
@@ -195,7 +193,7 @@ def _describe(source: Random, file: h5py.File, name: str) -> None:
         (
             "", "x" * 20_000, "\x1b[2J\x07\n\r", "\u202egnp.exe", "$\\frac{1$", "$" * 7, "a " * 99,
             r"$\input{/etc/passwd}$", "%s%n{0}", 7, -1, 2.5, float("nan"), 10**18, file[name].ref,
-            np.arange(3), np.zeros(0), b"\xff\xfe", "3.0", "2.9", h5py.Empty("f8"),
+            np.arange(3), np.zeros(0), b"\xff\xfe", "4.0", "3.9", h5py.Empty("f8"),
         )
     )  # fmt: skip
     item.attrs[key] = value
@@ -255,19 +253,9 @@ def _declare_too_much(source: Random, file: h5py.File, name: str) -> None:
         dataset[...] = 1
 
 
-def _exchange_scales(source: Random, file: h5py.File, name: str) -> None:
-    dataset = file[name]
-    scales = [file[other] for other in file if other in ("load", "state", "section_point", name)]
-    if isinstance(dataset, h5py.Dataset) and dataset.ndim and not dataset.is_scale and scales:
-        dim = source.choice(list(dataset.dims))
-        for old in list(dim.values()):
-            if source.random() < 0.7:
-                dim.detach_scale(old)
-        scale = source.choice(scales)
-        if scale != dataset:
-            dim.attach_scale(scale)
-    else:
-        file[name].attrs["DIMENSION_LIST"] = source.choice((1, "x", file.ref))
+def _exchange_dims(source: Random, file: h5py.File, name: str) -> None:
+    names = source.choices(("load", "state", "section_point", "status", "x", name), k=3)
+    file[name].attrs["dims"] = source.choice((1, file.ref, *map(" ".join, (names, names[1:], ""))))
 
 
 def _add(source: Random, file: h5py.File, name: str) -> None:
@@ -281,7 +269,7 @@ def _add(source: Random, file: h5py.File, name: str) -> None:
 
 EDITS: tuple[Callable[[Random, h5py.File, str], None], ...] = (
     _exchange, _exchange, _exchange, _describe, _describe, _describe, _delete, _link,
-    _kept_elsewhere, _declare_too_much, _exchange_scales, _add,
+    _kept_elsewhere, _declare_too_much, _exchange_dims, _add,
 )  # fmt: skip
 
 
@@ -289,7 +277,7 @@ def _another_hdf5_file(source: Random, _: bytes, path: Path) -> None:
     with h5py.File(path, "w", userblock_size=source.choice((0, 512))) as file:
         if source.random() < 0.7:
             file.attrs["schema"] = source.choice(("gearchaos-sweep", "other", 3))
-            file.attrs["schema_version"] = source.choice(("1.0", "2.0", "", 2.0))
+            file.attrs["schema_version"] = source.choice(("2.0", "3.0", "", 3.0))
             file.attrs["axes"] = source.choice(("load", "state", "", "/", "..", "parameters"))
         for name in ("load", "state", "status", "parameters", "x/y"):
             if source.random() < 0.6:

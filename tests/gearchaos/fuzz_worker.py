@@ -11,16 +11,18 @@ import json
 import os
 import resource
 import sys
+import time
 import traceback
 from argparse import ArgumentParser, Namespace
 from collections.abc import Callable
 
-MEMORY = 6 << 30
+MEMORY = 1 << 30
 
 
 def main() -> None:
     """Serve until the input ends."""
-    resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
+    # More than is allowed: what is asked for and not used does not count.
+    resource.setrlimit(resource.RLIMIT_DATA, (MEMORY, MEMORY))
     answers = os.fdopen(os.dup(sys.stdout.fileno()), "w", encoding="utf-8")
     for line in sys.stdin:
         command, *arguments = json.loads(line)
@@ -30,7 +32,7 @@ def main() -> None:
 def run(command: str, arguments: list[str]) -> dict[str, object]:
     """Run one command in this process: its exit code, what it wrote, and an escaped exception."""
     out, err = io.StringIO(), io.StringIO()
-    code, escaped = None, ""
+    code, escaped, began = None, "", time.process_time()
     with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
         try:
             code = _main(command)(arguments)
@@ -41,6 +43,8 @@ def run(command: str, arguments: list[str]) -> dict[str, object]:
         "out": out.getvalue()[:1000],
         "err": err.getvalue(),
         "escaped": escaped[-3_000:],
+        "seconds": time.process_time() - began,
+        "megabytes": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss >> 10,
     }
 
 

@@ -89,7 +89,7 @@ def assert_whole(path: Path) -> None:
     result = open_result(path)
     for name, values in DATA.items():
         np.testing.assert_array_equal(result[name], values)
-    assert result["state"].tolist() == ["delta_5", "delta_5_rate"]
+    assert result.variables["state"].flags == ("delta_5", "delta_5_rate")
 
 
 @pytest.fixture

@@ -2,6 +2,7 @@
 
 import json
 import re
+from pathlib import Path
 
 import h5py
 import numpy as np
@@ -71,10 +72,9 @@ def test_what_is_not_finite_becomes_null(good):
 def test_what_bears_a_known_name_but_is_something_else_is_left_out(good):
     without_checksum(good)
     with h5py.File(good, "r+") as file:
-        scale = file["candidate_steps"]
         del file["candidate_section_error"]
-        file["candidate_section_error"] = ["a", "b"]
-        file["candidate_section_error"].dims[0].attach_scale(scale)
+        file["candidate_section_error"] = np.zeros(2, "u1")
+        file["candidate_section_error"].attrs["dims"] = "candidate_steps"
     assert overview(good)["step_choice"].keys() == {"steps", "exponent_error", "changed_share"}
     assert info(good).code == 0
 
@@ -99,10 +99,18 @@ def test_rows_that_are_damaged_are_named(good):
 def test_a_newer_format_is_refused_in_a_sentence(good):
     without_checksum(good)
     with h5py.File(good, "r+") as file:
-        file.attrs["schema_version"] = "3.0"
+        file.attrs["schema_version"] = "4.0"
     ended = info(good)
     assert ended.code == 4
-    assert "has version '3.0' of the file format, of which this gearchaos reads 2.x" in ended.err
+    assert "has version '4.0' of the file format, of which this gearchaos reads 3.x" in ended.err
+
+
+@pytest.mark.skipif(not Path("/proc/self/mem").is_file(), reason="there is no such file")
+def test_a_file_that_cannot_be_read_is_named_in_our_own_words(tmp_path):
+    # Not even the superuser reads the beginning of this one.
+    ended = run_module("gearchaos.info", "--verify", "/proc/self/mem", cwd=tmp_path)
+    assert ended.code == 4
+    assert "error: /proc/self/mem: cannot be read: " in ended.err.splitlines()[-1]
 
 
 def test_control_characters_do_not_reach_the_terminal(good):

@@ -113,7 +113,7 @@ def test_the_axial_motion_is_there_where_a_sweep_would_leave_it_out():
     config = load_config(FULL, (*at(0.2), "outputs.lyapunov=false", 'outputs.section=["delta_5"]'))
     assert "axial" not in config.needed_effects
     found = respond(config, 1)
-    assert tuple(found["state"]) == STATES
+    assert found.variables["state"].flags == STATES
     assert {"delta_3_acceleration", "mesh_force_axial"} <= set(found.names)
 
 

@@ -117,6 +117,7 @@ def test_a_slice_is_that_of_xarray(engine, result, tmp_path) -> None:
     # One axis, some of them, all of them; beyond the ends; halfway between two values.
     places = [{name: wanted[name] for name in names[:n]} for n in range(1, len(names) + 1)]
     places += [{"pitch_error": 99.0}, {"pitch_error": -5.0}, {"pitch_error": 0.75}]
+    places += [{"pitch_error": -1e308}, {"pitch_error": 1e308}]
     with (
         xr.open_dataset(tmp_path / "r.h5", engine=engine, mask_and_scale=False) as whole,
         xr.open_dataset(tmp_path / "r.h5", engine=engine, group="parameters") as groups,
@@ -217,7 +218,7 @@ def test_chunks_follow_the_order_of_the_lanes(tmp_path: Path) -> None:
         ("axes", "load load", "does not name its axes"),
         ("axes", "pitch_error load", r"should be float64 over \(pitch_error, load"),
         ("axes", "load", "float64 over"),
-        ("schema_version", "1.0", r"has version '1\.0' .* reads 2\.x; run the sweep again"),
+        ("schema_version", "1.0", r"has version '1\.0' .* reads 3\.x; run the sweep again"),
     ],
 )
 def test_axes_that_contradict_the_arrays_are_refused(attribute, value, words, tmp_path) -> None:

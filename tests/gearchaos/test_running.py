@@ -85,7 +85,7 @@ def test_a_carried_sweep_begins_where_its_neighbour_ended(config):
     alone = gearchaos.run(config())
     assert np.array_equal(upwards["end_state"][0], alone["end_state"][0])
     assert not np.array_equal(upwards["end_state"][1], alone["end_state"][1])
-    names = [str(name) for name in upwards["state"]]
+    names = list(upwards.variables["state"].flags)
     ended = dict(zip(names, upwards["end_state"][0].tolist(), strict=True))
     given = "{" + ", ".join(f"{name}={value!r}" for name, value in ended.items()) + "}"
     value = float(upwards["pitch_error"][1])

@@ -79,7 +79,7 @@ def test_each_axis_is_a_dimension_with_a_coordinate_of_its_own(result):
 @pytest.mark.parametrize(("row", "column", "start"), [(0, 39, 0), (4, 7, 2), (8, 0, 1)])
 def test_a_lane_is_what_its_coordinates_and_its_start_state_give(result, row, column, start):
     place = (row, column, start)
-    names = [str(name) for name in result["state"]]
+    names = list(result.variables["state"].flags)
     state = dict(zip(names, result["start_state"][place].tolist(), strict=True))
     given = "{" + ", ".join(f"{name}={value!r}" for name, value in state.items()) + "}"
     values = {

@@ -1,0 +1,134 @@
+"""Result files that once took minutes, gigabytes or a traceback, each made again in a few lines."""
+
+import re
+import zlib
+from collections.abc import Callable
+from pathlib import Path
+
+import h5py
+import numpy as np
+
+from .fuzz_results import CHECKSUM_LINE
+
+
+def forged_result(name: str, good: bytes, path: Path) -> None:
+    """Write the forgery of this name, made from a sound result file over one axis."""
+    path.write_bytes(good[:-CHECKSUM_LINE])
+    edit, damage = FORGERIES[name]
+    with h5py.File(path, "r+", track_order=True) as file:
+        edit(file)
+    path.write_bytes(damage(path.read_bytes()))
+
+
+def _damaged_heaps(content: bytes) -> bytes:
+    # Over free space of no size the HDF5 library walks for ever.
+    place = content.index(b"GCOL") + 16
+    head = b"GCOL\x01\x00\x00\x00" + (1 << 40).to_bytes(8, "little")
+    within_one_another = (head + bytes([1, 0]) + bytes(14)) * 30_000
+    return content[:place] + bytes(16) + content[place + 16 :] + within_one_another
+
+
+def _one_heap_object(content: bytes) -> bytes:
+    """Let all texts of 7 bytes be the one of a million."""
+    place = content.index((1_000_000).to_bytes(4, "little"))
+    # The length of a text is followed by the place of its heap and its number there.
+    heaps = (found.start().to_bytes(8, "little") for found in re.finditer(b"GCOL", content))
+    small = re.compile(rb"\x07\0\0\0(" + b"|".join(map(re.escape, heaps)) + rb")....", re.DOTALL)
+    return small.sub(lambda _: content[place : place + 16], content)
+
+
+def _texts(file: h5py.File) -> None:
+    file["text"] = "x" * 1_000_000
+    for number in range(400):
+        file[f"text {number}"] = "1234567"
+
+
+def _later_words(file: h5py.File) -> None:
+    for name, word, lanes in (("motion", "intermittent", [3, 4, 5]), ("status", "lost", [7])):
+        words = file[name].attrs["flag_meanings"].decode().split()
+        file[name][lanes] = len(words)
+        file[name].attrs["flag_meanings"] = " ".join([*words, word])
+        file[name].attrs["flag_values"] = np.arange(len(words) + 1, dtype="u1")
+    file["period"][...] = 0
+    file.attrs["schema_version"] = "3.1"
+
+
+def _axis(*ends: float) -> Callable[[h5py.File], None]:
+    def change(file: h5py.File) -> None:
+        file["load"][[0, -1] if len(ends) > 1 else -1] = ends
+
+    return change
+
+
+def _close_values(file: h5py.File) -> None:
+    file["load"][...] = np.arange(file["load"].size) * 5e-324
+
+
+def _symbols(depth: int, length: int) -> Callable[[h5py.File], None]:
+    def change(file: h5py.File) -> None:
+        file["load"].attrs["symbol"] = "$" + r"\frac{" * depth + "1" + "}2" * depth + "$"
+        file["section_delta_5"].attrs["symbol"] = "$" + "{" * length + "x" + "}" * length + "$"
+        file["lyapunov_exponent"].attrs["symbol"] = "$" + "x^{" * depth + "x" + "}" * depth + "$"
+
+    return change
+
+
+def _long_texts(file: h5py.File) -> None:
+    file.attrs["title"] = file["load"].attrs["long_name"] = "x" * 60_000
+    file["load"].attrs["units"] = "$y" * 30_000
+    file.create_dataset("z" * 60_000, data=np.zeros(3))
+
+
+def _packed(file: h5py.File) -> None:
+    chunk, number = 1 << 22, 256
+    zeros = zlib.compress(bytes(chunk), 9)
+    options = {"chunks": (chunk // 8,), "compression": "gzip"}
+    dataset = file.create_dataset("bomb", (number * chunk // 8,), "f8", **options)
+    for place in range(number):
+        dataset.id.write_direct_chunk((place * chunk // 8,), zeros)
+
+
+def _many_datasets(file: h5py.File) -> None:
+    for number in range(10_000):
+        file.id.links.create_hard(b"x%d" % number, file.id, b"candidate_steps")
+
+
+def _many_attributes(file: h5py.File) -> None:
+    for number in range(1001):
+        file["status"].attrs[f"a{number}"] = number
+
+
+def _many_texts(file: h5py.File) -> None:
+    file.create_dataset("x", data=["y"] * 20_000, dtype=h5py.string_dtype())
+
+
+def _unwritten(file: h5py.File) -> None:
+    file.create_dataset("x", (10**7,), "f8", chunks=(1,), compression="gzip")
+
+
+def _nothing(_: object) -> None:
+    pass
+
+
+def _as_it_is(content: bytes) -> bytes:
+    return content
+
+
+FORGERIES: dict[str, tuple[Callable[[h5py.File], None], Callable[[bytes], bytes]]] = {
+    "damaged heaps": (_nothing, _damaged_heaps),
+    "many texts on one heap object": (_texts, _one_heap_object),
+    "20,000 texts": (_many_texts, _as_it_is),
+    "a gigabyte in a megabyte": (_packed, _as_it_is),
+    "chunks that nobody has written": (_unwritten, _as_it_is),
+    "10,000 datasets": (_many_datasets, _as_it_is),
+    "1001 attributes": (_many_attributes, _as_it_is),
+    "words of a later version": (_later_words, _as_it_is),
+    "an infinite axis": (_axis(np.inf), _as_it_is),
+    "an axis to 1.7e308": (_axis(1.7e308), _as_it_is),
+    "an axis of both signs to 1.7e308": (_axis(-1.7e308, 1.7e308), _as_it_is),
+    "an axis of both signs to 1e100": (_axis(-1e100, 1e100), _as_it_is),
+    "an axis of the smallest numbers": (_close_values, _as_it_is),
+    "forty nested fractions": (_symbols(40, 40), _as_it_is),
+    "nested symbols of sixty characters": (_symbols(7, 28), _as_it_is),
+    "long texts": (_long_texts, _as_it_is),
+}
