@@ -18,7 +18,6 @@ from gearchaos.results.atomic_file import reason
 from gearchaos.results.checksum_line import checksum_fits
 from gearchaos.results.result_file import ORIGINS, PARAMETERS, SCHEMA, SCHEMA_VERSION, Parameter
 from gearchaos.results.stored_dataset import (
-    Allowance,
     UnfitError,
     datasets_of,
     dims_of,
@@ -106,21 +105,20 @@ def printable(text: str) -> str:
 
 
 def _read(file: h5py.File, rows: bool) -> Contents:
-    allowance = Allowance(file)
-    metadata = scalars_of(file, allowance)
+    metadata = scalars_of(file)
     _check_schema(metadata)
     axes = tuple(str(metadata.get("axes", "")).split())
-    datasets = datasets_of(file, allowance)
+    datasets = datasets_of(file)
     grouped = {name: datasets.pop(name) for name in list(datasets) if "/" in name}
     variables: dict[str, Variable] = {}
     data: dict[str, NDArray[Any]] = {}
     sizes: dict[str, int] = {}
     for name, dataset in datasets.items():
-        text = text_of(name, dataset, allowance)
+        text = text_of(dataset)
         if text is not None:
             metadata[name] = text
             continue
-        notes = scalars_of(dataset, allowance)
+        notes = scalars_of(dataset)
         dims = dims_of(name, dataset, notes, sizes)
         if name != HARMONIC:
             if rows or len(dims) == 1 or set(dims) <= set(axes):
@@ -136,7 +134,7 @@ def _read(file: h5py.File, rows: bool) -> Contents:
     fixed_coordinates(metadata)
     parameters = {}
     for name, dataset in grouped.items():
-        notes = scalars_of(dataset, allowance)
+        notes = scalars_of(dataset)
         dims, name = dims_of(name, dataset, notes, sizes), name.removeprefix(f"{PARAMETERS}/")
         origin = str(notes.get("origin"))
         of_the_model = dims == (HARMONIC,) or dims == tuple(a for a in axes if a in dims)
