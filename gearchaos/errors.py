@@ -25,7 +25,7 @@ class GearchaosError(Exception):
 
 def _cut(text: str) -> str:
     # A key or value of 100 kB stands in the middle, between the file and the remedy.
-    return text if len(text) <= 1500 else f"{text[:500]} [...] {text[-800:]}"
+    return text if len(text) <= 1200 else f"{text[:500]} [...] {text[-690:]}"
 
 
 class ConfigurationError(GearchaosError):
