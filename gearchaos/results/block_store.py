@@ -78,12 +78,8 @@ class BlockStore:
                 if v.values is None
             ]
         ).newbyteorder("<")
-        decisive = decisive_facts(
-            software,
-            lanes=self.lanes,
-            variables=self._record.descr,
-            configuration=configuration,
-        )
+        facts = {"lanes": self.lanes, "variables": self._record.descr}
+        decisive = decisive_facts(software, **facts, configuration=configuration)
         self._fingerprint = fingerprint(decisive)
         self._blocks = [(0, self.lanes)] if blocks is None else list(blocks)
         self._lock = StoreLock(self.folder, self.output, shared=blocks is not None)
@@ -104,9 +100,8 @@ class BlockStore:
             self._lock.release()
             raise
         # Those of other shards may be about to get their names.
-        for partial in self.folder.glob(f".*{PARTIAL}") if blocks is None else ():
-            with suppress(OSError):
-                partial.unlink()
+        if blocks is None:
+            self._remove([partial.name for partial in self.folder.glob(f".*{PARTIAL}")])
 
     def __enter__(self) -> Self:
         return self

@@ -66,8 +66,7 @@ def read_result(path: str | os.PathLike[str], *, rows: bool = True) -> Contents:
         found = Path(name).stat()
         if not stat.S_ISREG(found.st_mode):
             raise FileError(f"{name}: is not a regular file; give the name of a result file")
-        soon = rows or found.st_size <= SOON_HASHED
-        if soon and checksum_fits(Path(name)) is False:
+        if (rows or found.st_size <= SOON_HASHED) and checksum_fits(Path(name)) is False:
             raise FileError(f"{name}: is damaged (its checksum does not fit); run the sweep again")
     except (OSError, ValueError) as error:
         raise FileError(
@@ -94,8 +93,8 @@ def fixed_coordinates(metadata: Mapping[str, Any]) -> dict[str, float]:
 def is_coordinate(values: NDArray[Any]) -> bool:
     """Tell whether values are those of an axis: numbers that ascend, none twice, none too large."""
     numbers = values.ndim == 1 and values.size > 0 and values.dtype.kind in "if"
-    within = numbers and bool((np.abs(values) <= LARGEST_VALUE).all())
-    return within and bool((np.diff(values) > 0).all())
+    small = numbers and (np.abs(values) <= LARGEST_VALUE).all()
+    return bool(small and (np.diff(values) > 0).all())
 
 
 def printable(text: str) -> str:

@@ -22,7 +22,7 @@ _PACKED, _ROOM = 128, 1 << 20
 """A file may declare so many bytes for each of its own and of this room: sections of lanes that
 have come to rest are packed to a twentieth, labels to a thousandth."""
 
-_MOST_NAMES = 1000
+_MOST_NAMES, _LONGEST = 1000, 1 << 16
 _LEAST_PIECE = 4096
 """Bytes for which a chunk counts at least: each costs time, even one that nobody has written."""
 
@@ -44,13 +44,16 @@ def datasets_of(file: h5py.File) -> dict[str, h5py.Dataset]:
     names = [name for name in _names(file) if name != PARAMETERS]
     names += [f"{PARAMETERS}/{name}" for name in _names(file[PARAMETERS])]
     datasets = {name: _hard_linked(file, name) for name in names}
-    left = _PACKED * (file.id.get_filesize() + _ROOM)
+    whole = file.id.get_filesize()
+    left = _PACKED * (whole + _ROOM)
     for name, dataset in datasets.items():
         if not isinstance(dataset, h5py.Dataset) or dataset.is_virtual or dataset.external:
             raise UnfitError(f"keeps {name} outside of itself or not as an array")
         chunk = dataset.chunks or dataset.shape
         pieces = (-(-size // max(1, side)) for size, side in zip(dataset.shape, chunk, strict=True))
-        piece = max(_LEAST_PIECE, math.prod(chunk) * dataset.dtype.itemsize)
+        # What has no fixed length may be as long as the file.
+        item = whole if dataset.dtype.hasobject else dataset.dtype.itemsize
+        piece = max(_LEAST_PIECE, math.prod(chunk) * item)
         left -= math.prod(pieces) * piece
         if left < 0:
             raise UnfitError(f"declares more than a file of its size holds, in {name}")
@@ -112,7 +115,9 @@ def scalars_of(item: h5py.HLObject) -> dict[str, Any]:
         stored = item.attrs.get_id(name)
         known = stored.dtype.kind in "iuf" or h5py.check_string_dtype(stored.dtype)
         if known and stored.shape in ((), (1,)):
-            scalars[name] = _plain(np.ravel(item.attrs[name])[0])
+            value = _plain(np.ravel(item.attrs[name])[0])
+            # Many names may share one text of the global heap.
+            scalars[name] = value[:_LONGEST] if isinstance(value, str) else value
     return scalars
 
 
