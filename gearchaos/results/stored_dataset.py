@@ -64,7 +64,17 @@ def datasets_of(file: h5py.File, allowance: Allowance) -> dict[str, h5py.Dataset
         pieces = (-(-size // max(1, side)) for size, side in zip(dataset.shape, chunk, strict=True))
         piece = max(_LEAST_PIECE, math.prod(chunk) * dataset.dtype.itemsize)
         allowance.take(math.prod(pieces) * piece, name)
+        # Of a chunk of no bytes the library dies; one of too many swells beyond what is declared.
+        if not all(0 < size <= 2 * piece for size in _chunk_sizes(dataset)):
+            raise UnfitError(f"is damaged in {name}")
     return datasets
+
+
+def _chunk_sizes(dataset: h5py.Dataset) -> list[int]:
+    sizes: list[int] = []
+    if dataset.chunks:
+        dataset.id.chunk_iter(lambda chunk: sizes.append(chunk.size))
+    return sizes
 
 
 def _hard_linked(file: h5py.File, name: str) -> Any:
