@@ -3,9 +3,9 @@
     python benchmarks/fuzz.py [--cases 12000] [--output fuzz.json]
 
 Configuration files are given to `load_config` and some of them to `sweep --dry-run`, result files
-to `plot`, `info`, `info --verify` and `stages`, forgeries to all of them. Each case runs with 5 s of
-the processor and 500 MB in a process that is watched. A case is right if the command succeeds, or says in one line what is wrong and exits
-with 2 or 4, and leaves its input as it was.
+to `plot`, `info`, `info --verify` and `stages`, forgeries to all of them. Each case runs with 5 s
+of the processor and 500 MB in a process that is watched. A case is right if the command succeeds,
+or says in one line what is wrong and exits with 2 or 4, and leaves its input as it was.
 """
 
 import argparse
