@@ -3,9 +3,9 @@
     python benchmarks/fuzz.py [--cases 12000] [--output fuzz.json]
 
 Configuration files are given to `load_config` and some of them to `sweep --dry-run`, result files
-to `plot`, `info`, `info --verify` and `stages`. Each case runs under a time limit in a process that
-is watched. A case is right if the command succeeds, or says in one line what is wrong and exits
-with 2 or 4, and leaves its input as it was.
+to `plot`, `info`, `info --verify` and `stages`, forgeries to all of them. Each case runs with 5 s
+of the processor and 500 MB in a process that is watched. A case is right if the command succeeds,
+or says in one line what is wrong and exits with 2 or 4, and leaves its input as it was.
 """
 
 import argparse
@@ -21,7 +21,13 @@ from machine import machine_facts, print_machine
 
 sys.path.insert(0, str(Path(__file__).parent.parent))
 
-from tests.gearchaos.fuzz_cases import Case, Watch, configuration_cases, result_cases
+from tests.gearchaos.fuzz_cases import (
+    Case,
+    Watch,
+    configuration_cases,
+    forged_cases,
+    result_cases,
+)
 
 
 def main() -> int:
@@ -61,6 +67,7 @@ def main() -> int:
 def _cases(first: int, number: int, folder: Path) -> Iterator[Case]:
     yield from configuration_cases(range(first, first + number // 2), folder, dry_run_every=25)
     yield from result_cases(range(first, first + number - number // 2), folder)
+    yield from forged_cases(folder)
 
 
 def _print(endings: dict[str, Counter[str]], slowest: float, seconds: float) -> None:

@@ -16,8 +16,8 @@ _LENGTH = ("mesh.length_scale_um or mesh.half_backlash_um",)
 _GEARS = (("p", 1, "driving"), ("g", 2, "driven"))
 
 
-LARGEST_VALUE = 1e100
-"""What sweeps reach at most: sums and squares of such values are numbers, too."""
+LARGEST_VALUE = 1e300
+"""What sweeps reach at most: sums and differences of such values are numbers, too."""
 
 
 class Range(NamedTuple):

@@ -36,7 +36,7 @@ OPTIONS = {
     "[outputs]": ("motion = false", "exponents = true", "allowed_diverged_share = 1.0"),
     "[start]": (
         'kind = "contact"', 'carry = "upwards"', 'carry = "downwards"',
-        *(f'kind = "random"\n{more}' for more in ("count = 3", "spread = 1e-300", "spread = 1e300")),
+        *(f'kind = "random"\n{more}' for more in ("count = 3", "spread = 1e-9", "spread = 1e300")),
         'kind = "given"\nstate = { delta_5 = -1e9, delta_3_rate = 1e-320 }',
     ),
 }  # fmt: skip

@@ -1,5 +1,6 @@
 """Result files that once took minutes, gigabytes or a traceback, each made again in a few lines."""
 
+import io
 import re
 import zlib
 from collections.abc import Callable
@@ -26,6 +27,14 @@ def _damaged_heaps(content: bytes) -> bytes:
     head = b"GCOL\x01\x00\x00\x00" + (1 << 40).to_bytes(8, "little")
     within_one_another = (head + bytes([1, 0]) + bytes(14)) * 30_000
     return content[:place] + bytes(16) + content[place + 16 :] + within_one_another
+
+
+def _chunk_of_no_bytes(content: bytes) -> bytes:
+    with h5py.File(io.BytesIO(content)) as file:
+        chunk = file["motion"].id.get_chunk_info(0)
+    # Before its place are its size, the filters left out and where it begins along each axis.
+    place = content.index(chunk.byte_offset.to_bytes(8, "little"))
+    return content[: place - 24] + bytes(32) + content[place + 8 :]
 
 
 def _one_heap_object(content: bytes) -> bytes:
@@ -88,6 +97,11 @@ def _packed(file: h5py.File) -> None:
         dataset.id.write_direct_chunk((place * chunk // 8,), zeros)
 
 
+def _swelling(file: h5py.File) -> None:
+    dataset = file.create_dataset("x", (8,), "f8", chunks=(8,), compression="gzip")
+    dataset.id.write_direct_chunk((0,), zlib.compress(bytes(1 << 28)))
+
+
 def _many_datasets(file: h5py.File) -> None:
     for number in range(10_000):
         file.id.links.create_hard(b"x%d" % number, file.id, b"candidate_steps")
@@ -119,6 +133,8 @@ FORGERIES: dict[str, tuple[Callable[[h5py.File], None], Callable[[bytes], bytes]
     "many texts on one heap object": (_texts, _one_heap_object),
     "20,000 texts": (_many_texts, _as_it_is),
     "a gigabyte in a megabyte": (_packed, _as_it_is),
+    "a chunk that swells to 256 MB": (_swelling, _as_it_is),
+    "a chunk of no bytes": (_nothing, _chunk_of_no_bytes),
     "chunks that nobody has written": (_unwritten, _as_it_is),
     "10,000 datasets": (_many_datasets, _as_it_is),
     "1001 attributes": (_many_attributes, _as_it_is),
@@ -126,7 +142,7 @@ FORGERIES: dict[str, tuple[Callable[[h5py.File], None], Callable[[bytes], bytes]
     "an infinite axis": (_axis(np.inf), _as_it_is),
     "an axis to 1.7e308": (_axis(1.7e308), _as_it_is),
     "an axis of both signs to 1.7e308": (_axis(-1.7e308, 1.7e308), _as_it_is),
-    "an axis of both signs to 1e100": (_axis(-1e100, 1e100), _as_it_is),
+    "an axis of both signs to 1e300": (_axis(-1e300, 1e300), _as_it_is),
     "an axis of the smallest numbers": (_close_values, _as_it_is),
     "forty nested fractions": (_symbols(40, 40), _as_it_is),
     "nested symbols of sixty characters": (_symbols(7, 28), _as_it_is),

@@ -135,7 +135,12 @@ ONE_FAULT = [
         "axial_damping_p",
     ),
     ("sweep.to=-1.0", "sweep.to = -1.0", "greater than sweep.from = 0.0", "start.carry"),
-    ("sweep.to=1e306", "sweep.to = 1e+306", "at most 1e+100 in size", "sweep inside that range"),
+    (
+        "sweep={parameter='load', values=[0.1, 1.7e308]}",
+        "sweep.values = 1.7e+308",
+        "at most 1e+300",
+    ),
+    ("sweep.to=1e306", "sweep.to = 1e+306", "at most 1e+300 in size", "sweep inside that range"),
     ("sweep.to=1e-320", "sweep.count = 1501", "would coincide", "lower the count"),
     ('sweep={parameter="load"}', "sweep.from", "is missing", "`values`"),
     ('sweep={parameter="load", values=[]}', "sweep.values = []", "at least 1 value", "values"),

@@ -254,7 +254,8 @@ def other_kernels(folder):
 
 
 def test_neither_blocks_nor_a_result_of_other_kernels_are_gone_on_with(tmp_path):
-    differs = rf"another gearchaos or configuration, which differs in kernels \({source_hash()}, now \w+\); go back "
+    kernels = rf"differs in kernels \({source_hash()}, now \w+\); go back "
+    differs = f"another gearchaos or configuration, which {kernels}"
     changed = {"env": other_kernels(tmp_path)}
     assert sweep(tmp_path, *LINEAR, "--shard", "1/1", "--quiet").code == 0
     before = names_in(tmp_path / BLOCKS)
