@@ -8,6 +8,18 @@
 
 from __future__ import annotations
 
+import os
+import signal
+import sys
+
+# Started as `-m gearchaos.NAME` or as the console script, a command ends on Ctrl-C without a
+# traceback of its imports until it heeds interrupts itself. Who else imports this is left alone.
+if (
+    os.path.basename(*(sys.orig_argv[-len(sys.argv) :][:1] or [""])).split(".")[0] == __name__
+    and signal.getsignal(signal.SIGINT) is signal.default_int_handler
+):
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:

@@ -46,8 +46,8 @@ class Command(NamedTuple):
 
     That is what the body returns or with which argparse exits. A fault a user can cause becomes
     lines on stderr, its notes after it, and a code: that of a GearchaosError, 4 for an operating
-    system error that nobody has worded and, as the shell says, 130 for an interrupt, 143 for
-    SIGTERM, 141 when the reader of the output has gone.
+    system error that nobody has worded or a lack of memory and, as the shell says, 130 for an
+    interrupt, 143 for SIGTERM, 141 when the reader of the output has gone.
 
     ``name`` follows ``gearchaos``; ``text`` is what --help says before the options and, from the
     first empty line on, after them; ``arguments`` adds the command's own to its parser, ``common``
@@ -86,8 +86,9 @@ class Command(NamedTuple):
             except BrokenPipeError:
                 _discard(sys.stdout)
                 return CLOSED_PIPE
-            except OSError as error:
-                return _report(error, [f"error: {error}"], CANNOT_READ_OR_WRITE)
+            except (OSError, MemoryError) as error:
+                text = str(error) or "out of memory"
+                return _report(error, [f"error: {text}"], CANNOT_READ_OR_WRITE)
 
     def _code(self, arguments: list[str]) -> int:
         try:

@@ -11,14 +11,21 @@ class GearchaosError(Exception):
     Parameters
     ----------
     problems : str or iterable of str
-        One message per fault: what, where, the rule, the remedy.
+        One message per fault: what, where, the rule, the remedy. What is endless in it is cut.
     """
 
     exit_code = 1
 
     def __init__(self, problems: str | Iterable[str]) -> None:
-        self.problems = [problems] if isinstance(problems, str) else list(problems)
+        self.problems = [
+            _cut(text) for text in ([problems] if isinstance(problems, str) else problems)
+        ]
         super().__init__("\n".join(self.problems))
+
+
+def _cut(text: str) -> str:
+    # A key or value of 100 kB stands in the middle, between the file and the remedy.
+    return text if len(text) <= 1200 else f"{text[:500]} [...] {text[-690:]}"
 
 
 class ConfigurationError(GearchaosError):

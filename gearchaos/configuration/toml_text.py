@@ -16,6 +16,9 @@ _PART = r"""(?:[A-Za-z0-9_-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+"""
 _ENDLESS_KEY = re.compile(rf"(?<![A-Za-z0-9_-])(?:{_PART}\.[ \t]*+){{64}}")
 """A key of so many parts that is no key of ours: tomllib takes the square of their number."""
 
+_ENDLESS_INTEGER = re.compile(r"0[xob][0-9A-Fa-f_]{1000}")
+"""An integer that Python reads and refuses to print."""
+
 
 def quoted_key(name: str) -> str:
     """Return a key as TOML writes it: bare where possible, else in quotes."""
@@ -27,12 +30,15 @@ def tables_from_toml(text: str, source: str) -> dict[str, Any]:
     try:
         if _ENDLESS_KEY.search(text):
             raise RecursionError
+        if _ENDLESS_INTEGER.search(text):
+            raise ValueError("an integer of thousands of digits")
+        text.encode()
         return tomllib.loads(text)
     except RecursionError:
         raise ConfigurationError(
             f"{source}: nested too deeply to be a configuration; tables go three levels deep"
         ) from None
-    # Not only TOMLDecodeError: an integer of thousands of digits is a plain ValueError.
+    # Not only TOMLDecodeError: endless integers and what is no Unicode are plain ValueErrors.
     except ValueError as error:
         raise ConfigurationError(
             f"{source}: not valid TOML: {error}; write `key = value`, text in double quotes, "
@@ -61,7 +67,10 @@ def with_overrides(
             )
             continue
         try:
+            override.encode()
             result = with_value(result, names, _value(value))
+        except UnicodeEncodeError:
+            problems.append(f"override {override!r}: is not UTF-8 text; write it as UTF-8")
         except KeyError as error:
             problems.append(
                 f"override {override!r}: {error.args[0]} is not a table in {source}; "

@@ -4,14 +4,18 @@ from __future__ import annotations
 
 import logging
 import re
-from concurrent.futures import CancelledError, Future
+import time
+from collections.abc import Callable
+from concurrent.futures import CancelledError, Future, wait
 from contextlib import ExitStack
 from functools import lru_cache
 from importlib.util import find_spec
-from threading import Lock
+from threading import Lock, Thread
 from typing import Any, NamedTuple, Self
 
+import dask
 import distributed
+from dask.utils import parse_timedelta
 from gearchaos_kernels import current_threads, most_threads, use_threads
 
 from gearchaos.configuration import Configuration
@@ -19,7 +23,8 @@ from gearchaos.engine.executors import ExecutionError
 from gearchaos.engine.provenance import SOFTWARE
 from gearchaos.engine.simulation import Arrays, Bounds, Simulation
 from gearchaos.errors import ConfigurationError
-from gearchaos.progress import say
+from gearchaos.interrupts import check
+from gearchaos.progress import notice, say
 from gearchaos.version import Software, software_version
 
 # Its constructors carry no annotations.
@@ -28,6 +33,11 @@ _LocalCluster: Any = distributed.LocalCluster
 
 BLOCKS_PER_WORKER = 2
 """One that is computed, and one that waits, so that a worker need not wait."""
+
+_HOURS_WITHOUT_WORKERS = 24.0
+"""Their jobs may stand in a queue."""
+_SECONDS_TO_IMPORT = 300.0
+_SECONDS_BETWEEN_LOOKS = 0.2
 
 # Ctrl-C in a terminal reaches the workers too: they finish the blocks that they have.
 _IGNORE_INTERRUPTS = "import signal; signal.signal(signal.SIGINT, signal.SIG_IGN)"
@@ -63,9 +73,7 @@ class DaskExecutor:
             logging.getLogger(name).setLevel(logging.CRITICAL)
         with ExitStack() as stack:
             self._client: Any = stack.enter_context(_connected(stack, address))
-            if not self.workers:
-                say(f"{address}: waits for the first worker to join")
-                self._client.wait_for_workers(1)
+            self._wait_for_workers()
             self._require_software()
             self._executor = self._client.get_executor(pure=False)
             self._closing = stack.pop_all()
@@ -75,14 +83,19 @@ class DaskExecutor:
     def workers(self) -> int:
         """How many workers there are now."""
         try:
-            return len(self._client.nthreads())
+            return len(_answer(self._client.nthreads, _patience()))
         except OSError as error:
             raise self._worded(error) from None
 
     @property
     def width(self) -> int:
-        """How many blocks to hand out at a time."""
-        return BLOCKS_PER_WORKER * max(1, self.workers)
+        """How many blocks to hand out at a time; waits where no worker is left."""
+        try:
+            return BLOCKS_PER_WORKER * self._wait_for_workers()
+        except KeyboardInterrupt:
+            # Nobody computes what has been handed out.
+            self._closing.close()
+            raise
 
     def submit(self, block: Bounds) -> Future[Arrays]:
         """Hand a block to the cluster and return the future of its arrays."""
@@ -105,14 +118,29 @@ class DaskExecutor:
     def __exit__(self, *_: object) -> None:
         self._closing.close()
 
+    def _wait_for_workers(self) -> int:
+        workers, began = self.workers, time.monotonic()
+        if not workers:
+            say(f"{self._address}: waits up to {_HOURS_WITHOUT_WORKERS:g} h for a worker to join")
+        while not workers:
+            if time.monotonic() - began > 3600 * _HOURS_WITHOUT_WORKERS:
+                raise ExecutionError(f"{self._address}: no worker has joined; start some")
+            check()
+            time.sleep(_SECONDS_BETWEEN_LOOKS)
+            workers = self.workers
+        return workers
+
     def _require_software(self) -> None:
         # Blocks cannot even be sent to a worker without it; versions are compared with the blocks.
         try:
-            self._client.run(find_spec, __name__)
-        except ImportError as error:
+            with notice(f"{self._address}: waits up to {_SECONDS_TO_IMPORT:g} s for the workers"):
+                _answer(lambda: self._client.run(find_spec, __name__), _SECONDS_TO_IMPORT)
+        except (ImportError, OSError) as error:
             raise self._worded(error) from None
 
     def _worded(self, error: BaseException) -> BaseException:
+        if isinstance(error, TimeoutError):
+            return ExecutionError(f"{self._address}: {error}; are scheduler and workers alive?")
         if isinstance(error, CancelledError | OSError):
             return ExecutionError(f"{self._address}: the connection to the scheduler was lost")
         if isinstance(error, distributed.KilledWorker):
@@ -152,12 +180,39 @@ def _simulation(recipe: Recipe) -> Simulation:
     return simulation
 
 
+def _patience() -> float:
+    """Return for how many seconds a scheduler may be silent."""
+    return float(parse_timedelta(dask.config.get("distributed.comm.timeouts.connect")))
+
+
+def _answer(question: Callable[[], Any], seconds: float) -> Any:
+    """Ask in a thread, and heed interrupts meanwhile."""
+    future: Future[Any] = Future()
+
+    def ask() -> None:
+        try:
+            future.set_result(question())
+        except BaseException as error:
+            future.set_exception(error)
+
+    Thread(target=ask, daemon=True).start()
+    began = time.monotonic()
+    while not wait([future], _SECONDS_BETWEEN_LOOKS).done:
+        check()
+        # What dask has to say itself once the time is up goes before this.
+        if time.monotonic() - began > seconds + 1.0:
+            raise TimeoutError(f"silent for {seconds:g} s")
+    return future.result()
+
+
 def _connected(stack: ExitStack, address: str) -> Any:
     local = re.fullmatch(r"local:(.*)", address)
     if local is None:
         try:
-            return _Client(address)
-        except (OSError, ValueError) as error:
+            with notice(f"{address}: waits up to {_patience():g} s for an answer"):
+                return _answer(lambda: _Client(address), _patience())
+        # What is raised is up to the transport that the address names.
+        except Exception as error:
             raise ExecutionError(
                 f"{address}: no dask scheduler answers ({error}); start one with `dask scheduler` "
                 "or give its address"

@@ -19,6 +19,9 @@ from gearchaos.engine.simulation import Arrays, Bounds, Simulation
 from gearchaos.errors import FileError, GearchaosError
 from gearchaos.interrupts import check
 
+SECONDS_BETWEEN_LOOKS = 1.0
+"""How often it is looked whether somebody is there to compute, while no block ends."""
+
 
 class ExecutionError(GearchaosError):
     """Blocks cannot be computed where they should be."""
@@ -101,16 +104,24 @@ def compute_blocks(
             while waiting and len(futures) < executor.width:
                 block = waiting.pop()
                 futures[executor.submit(block)] = block
-            for future in wait(futures, return_when=FIRST_COMPLETED).done:
+            for future in _ended(executor, futures):
                 keep(futures[future], future.result())
                 del futures[future]
             check()
     except KeyboardInterrupt:
-        for future in futures:
-            future.cancel()
-        for future, block in futures.items():
-            if not future.cancelled():
+        running = {future: block for future, block in futures.items() if not future.cancel()}
+        while running:
+            for future in _ended(executor, running):
                 # What cannot be computed or kept is missing afterwards, and counted as such.
                 with suppress(GearchaosError):
-                    keep(block, future.result())
+                    keep(running.pop(future), future.result())
         raise
+
+
+def _ended(
+    executor: BlockExecutor, futures: Mapping[Future[Arrays], Bounds]
+) -> set[Future[Arrays]]:
+    """Wait until some blocks have ended, as long as the executor has somebody to compute them."""
+    while not (ended := wait(futures, SECONDS_BETWEEN_LOOKS, FIRST_COMPLETED).done):
+        _ = executor.width
+    return ended

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+import os
 import time
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -94,14 +96,36 @@ def result_of(
 
 
 def prepare(simulation: Simulation, *, compile_now: bool = True, history_periods: int = 0) -> None:
-    """Compile the kernel, choose the steps where a tolerance is wanted, and say what was found."""
+    """Compile the kernel, choose the steps where a tolerance is wanted, and say what was found.
+
+    Raises
+    ------
+    ConfigurationError
+        If a block of lanes, where they are computed here, does not fit into memory.
+    """
     check()  # Imports take a while.
     if compile_now:
+        _check_memory(simulation)
         with notice(COMPILING):
             simulation.rehearse(periods=history_periods, history_periods=history_periods)
         check()
     simulation.choose_steps()
     say(*simulation.notes)
+
+
+def _check_memory(simulation: Simulation) -> None:
+    wanted = simulation.block_memory(current_threads())
+    # Windows does not tell.
+    known = hasattr(os, "sysconf")
+    memory = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE") if known else math.inf
+    if wanted > memory:
+        plan = simulation.plan
+        raise ConfigurationError(
+            f"{simulation.config.source}: integration.recorded_periods = {plan.recorded_periods}, "
+            f"outputs.section_points = {plan.section_points}: a block of lanes takes {wanted:.3g} "
+            f"bytes, more than the {memory:.3g} of this machine; record fewer periods, keep fewer "
+            "points"
+        )
 
 
 def pilot_rate(simulation: Simulation) -> float:

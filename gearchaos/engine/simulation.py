@@ -167,7 +167,9 @@ class Simulation:
             numbers += self.plan.recorded_periods
             # Lanes that a first record leaves unresolved are looked at again, a share at a time.
             numbers *= 2 if self.config.outputs.motion else 1
-        return 8 * self.block_lanes(threads) * numbers
+        if self.config.outputs.exponents:
+            numbers += self.plan.recorded_periods * states
+        return 8 * min(len(self.lanes), self.block_lanes(threads)) * numbers
 
     def block_lanes(self, threads: int) -> int:
         """Return how many lanes make a block: work for every thread, and progress to be seen."""

@@ -17,7 +17,7 @@ _GEARS = (("p", 1, "driving"), ("g", 2, "driven"))
 
 
 LARGEST_VALUE = 1e300
-"""What sweeps reach at most: sums and squares of such values are numbers, too."""
+"""What sweeps reach at most: sums and differences of such values are numbers, too."""
 
 
 class Range(NamedTuple):

@@ -10,6 +10,7 @@ import stat
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from shutil import copymode
 
 from gearchaos.errors import FileError
 
@@ -90,16 +91,15 @@ def replacing(
     """
     with writing(path):
         target = _checked_target(path, overwrite) if through_links else Path(path)
-        mode = _mode(target) if overwrite else None
+        replaced = overwrite and target.exists()
         # What others may not read is not shown to them half-written either.
-        partial = _create_partial(
-            Path(scratch or target.parent), target.name, 0o666 if mode is None else 0o600
-        )
+        rights = 0o600 if replaced else 0o666
+        partial = _create_partial(Path(scratch or target.parent), target.name, rights)
         try:
             yield partial
-            if mode is not None:
-                with suppress(OSError):  # A file system without rights.
-                    partial.chmod(mode)
+            with suppress(OSError):  # A file system without rights.
+                if replaced:
+                    copymode(target, partial)
             _synchronise(partial)
             if overwrite:
                 partial.replace(target)
@@ -141,15 +141,6 @@ def _exists(path: str | os.PathLike[str]) -> FileError:
         f"{path}: exists already; replace it with --overwrite (overwrite=True in Python) or "
         "choose another name"
     )
-
-
-def _mode(path: Path) -> int | None:
-    """Return the rights of a regular file, None if there is none."""
-    with suppress(FileNotFoundError):
-        found = path.lstat()
-        if stat.S_ISREG(found.st_mode):
-            return found.st_mode & 0o777
-    return None
 
 
 def _create_partial(folder: Path, name: str, mode: int = 0o666) -> Path:

@@ -46,26 +46,12 @@ class BlockStore:
     As long as its context lasts, a lock keeps other sweeps away from the same output. `merge` makes
     the result file and removes the folder; before that, nothing that was written is ever removed.
 
-    Parameters
-    ----------
-    configuration, text : str
-        The configuration in TOML: resolved, of which others are refused, and as it was written.
-    software : Software
-        Who computes; blocks of another one are refused too.
-    resume : bool
-        Whether there may be blocks of an earlier run, to be continued.
-    blocks : sequence of (first, last), optional
-        The blocks of one's own shard, by lane, while others may compute other shards in the same
-        folder; by default all lanes are one's own.
-    shards : int, optional
-        Into how many shards the sweep is divided.
-
-    Raises
-    ------
-    FileError
-        If there are own blocks and `resume` is not set, if they belong to another configuration
-        or software (the message names what differs), if another sweep is writing to the same
-        output, or if the folder cannot be made. What was there before stays, and nothing else.
+    The configuration is the resolved one in TOML; one's own blocks of another one, or of other
+    software, are refused, and without ``resume`` all of them. ``text`` is the configuration as it
+    was written. With ``blocks``, those of one's own shard of so many ``shards``, by lane, others
+    may compute other shards in the same folder; by default all lanes are one's own. Raises
+    FileError if blocks are refused (the message names what differs), if another sweep is writing to
+    the same output, or if the folder cannot be made; what was there before stays, and nothing else.
     """
 
     def __init__(
@@ -92,12 +78,8 @@ class BlockStore:
                 if v.values is None
             ]
         ).newbyteorder("<")
-        decisive = decisive_facts(
-            software,
-            lanes=self.lanes,
-            variables=self._record.descr,
-            configuration=configuration,
-        )
+        facts = {"lanes": self.lanes, "variables": self._record.descr}
+        decisive = decisive_facts(software, **facts, configuration=configuration)
         self._fingerprint = fingerprint(decisive)
         self._blocks = [(0, self.lanes)] if blocks is None else list(blocks)
         self._lock = StoreLock(self.folder, self.output, shared=blocks is not None)
@@ -118,9 +100,8 @@ class BlockStore:
             self._lock.release()
             raise
         # Those of other shards may be about to get their names.
-        for partial in self.folder.glob(f".*{PARTIAL}") if blocks is None else ():
-            with suppress(OSError):
-                partial.unlink()
+        if blocks is None:
+            self._remove([partial.name for partial in self.folder.glob(f".*{PARTIAL}")])
 
     def __enter__(self) -> Self:
         return self

@@ -7,6 +7,7 @@ import json
 import os
 import tomllib
 from collections.abc import Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -74,23 +75,30 @@ def require_same(
     ``what`` says where what was found, and ``otherwise`` what to do unless one goes back to it.
     Raises a FileError that names what differs, with both values.
     """
-    differing = [key for key in now if earlier.get(key) != now[key]]
-    if not differing:
-        return
-    named = [
-        f"{key} ({earlier.get(key, 'absent')}, now {now[key]})"
-        for key in Software._fields
-        if key in differing
+    if keys := [key for key in now if earlier.get(key) != now[key]]:
+        facts = ({key: said[key] for key in keys if key in said} for said in (earlier, now))
+        raise FileError(
+            f"{what} of another gearchaos or configuration, which differs in "
+            f"{', '.join(_differing(*facts)) or keys[0]}; go back to that one, {otherwise} or "
+            "choose another --output"
+        )
+
+
+def _differing(*facts: Mapping[str, Any]) -> list[str]:
+    """Word software and keys of the configuration in which two rows of facts differ."""
+    first, second = map(_flat, facts)
+    return [
+        f"{key} ({first.get(key, 'absent')}, now {second.get(key, 'absent')})"
+        for key in {**first, **second}
+        if key not in first or key not in second or repr(first[key]) != repr(second[key])
     ]
-    whose, restore = "gearchaos", "go on with that one"
-    if not named:
-        whose, restore = "configuration", "restore these values"
-    if "configuration" in differing:
-        named += differing_keys(earlier["configuration"], now["configuration"])
-    raise FileError(
-        f"{what} of another {whose}, which differs in {', '.join(named or differing)}; {restore}, "
-        f"{otherwise} or choose another --output"
-    )
+
+
+def _flat(facts: Mapping[str, Any]) -> dict[str, Any]:
+    flat = {key: facts[key] for key in (*Software._fields, "schema_version") if key in facts}
+    with suppress(ValueError, RecursionError):  # Not written by us: all keys are absent.
+        flat |= flat_tables(tomllib.loads(facts.get("configuration", "")))
+    return flat
 
 
 def folder_of(output: str | os.PathLike[str]) -> Path:
@@ -111,35 +119,11 @@ def stored_manifest(output: str | os.PathLike[str]) -> dict[str, Any]:
     return read_manifest(folder)
 
 
-def differing_keys(one: str, other: str) -> list[str]:
-    """List the dotted keys in which two TOML texts differ, with both values."""
-    first, second = (_tables(text) for text in (one, other))
-    return [
-        f"{key} ({first.get(key, 'absent')}, now {second.get(key, 'absent')})"
-        for key in {**first, **second}
-        if key not in first or key not in second or repr(first[key]) != repr(second[key])
-    ]
-
-
-def _tables(text: str) -> dict[str, Any]:
-    try:
-        return flat_tables(tomllib.loads(text))
-    except (ValueError, RecursionError):  # Not from us: all keys are absent.
-        return {}
-
-
 def read_manifest(folder: Path) -> dict[str, Any]:
-    """Read the manifest of a folder; FileError if there is none, or none of this version."""
+    """Read the manifest of a folder; FileError if there is none."""
     path = folder / MANIFEST
     try:
         manifest: dict[str, Any] = json.loads(unlinked_content(path, _LARGEST))
-        version, own = str(manifest.get("schema_version", "")), BLOCK_SCHEMA_VERSION.split(".")[0]
-        if version.split(".")[0] != own:
-            raise FileError(
-                f"{folder}: has version {version!r} of the format of blocks, of which this "
-                f"gearchaos reads {own}.x; finish it with the gearchaos that began it, or delete "
-                "the folder"
-            )
         tomllib.loads(manifest["configuration"])
         manifest["text"] = str(manifest["text"])
     except (OSError, ValueError, LookupError, TypeError, AttributeError, RecursionError) as error:

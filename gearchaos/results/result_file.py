@@ -82,12 +82,8 @@ def write_result(
     The variables come in this order. Of every one without values of its own, by name, a block
     (first, last, arrays) holds the lanes first to last - 1, in C order over the axes: shape
     (last - first, own dimensions). ``scratch`` is a folder for the temporary file, on the same file
-    system; by default that of the file.
-
-    Raises
-    ------
-    FileError
-        If the file cannot be written, or exists and is not to be overwritten.
+    system; by default that of the file. Raises FileError if the file cannot be written, or exists
+    and is not to be overwritten.
     """
     axes = lane_axes(variables)
     everything = [*variables, *_harmonics(parameters)]

@@ -18,7 +18,6 @@ from gearchaos.results.atomic_file import reason
 from gearchaos.results.checksum_line import checksum_fits
 from gearchaos.results.result_file import ORIGINS, PARAMETERS, SCHEMA, SCHEMA_VERSION, Parameter
 from gearchaos.results.stored_dataset import (
-    Allowance,
     UnfitError,
     datasets_of,
     dims_of,
@@ -67,8 +66,7 @@ def read_result(path: str | os.PathLike[str], *, rows: bool = True) -> Contents:
         found = Path(name).stat()
         if not stat.S_ISREG(found.st_mode):
             raise FileError(f"{name}: is not a regular file; give the name of a result file")
-        soon = rows or found.st_size <= SOON_HASHED
-        if soon and checksum_fits(Path(name)) is False:
+        if (rows or found.st_size <= SOON_HASHED) and checksum_fits(Path(name)) is False:
             raise FileError(f"{name}: is damaged (its checksum does not fit); run the sweep again")
     except (OSError, ValueError) as error:
         raise FileError(
@@ -95,8 +93,8 @@ def fixed_coordinates(metadata: Mapping[str, Any]) -> dict[str, float]:
 def is_coordinate(values: NDArray[Any]) -> bool:
     """Tell whether values are those of an axis: numbers that ascend, none twice, none too large."""
     numbers = values.ndim == 1 and values.size > 0 and values.dtype.kind in "if"
-    within = numbers and bool((np.abs(values) <= LARGEST_VALUE).all())
-    return within and bool((np.diff(values) > 0).all())
+    small = numbers and (np.abs(values) <= LARGEST_VALUE).all()
+    return bool(small and (np.diff(values) > 0).all())
 
 
 def printable(text: str) -> str:
@@ -106,21 +104,20 @@ def printable(text: str) -> str:
 
 
 def _read(file: h5py.File, rows: bool) -> Contents:
-    allowance = Allowance(file)
-    metadata = scalars_of(file, allowance)
+    metadata = scalars_of(file)
     _check_schema(metadata)
     axes = tuple(str(metadata.get("axes", "")).split())
-    datasets = datasets_of(file, allowance)
+    datasets = datasets_of(file)
     grouped = {name: datasets.pop(name) for name in list(datasets) if "/" in name}
     variables: dict[str, Variable] = {}
     data: dict[str, NDArray[Any]] = {}
     sizes: dict[str, int] = {}
     for name, dataset in datasets.items():
-        text = text_of(name, dataset, allowance)
+        text = text_of(dataset)
         if text is not None:
             metadata[name] = text
             continue
-        notes = scalars_of(dataset, allowance)
+        notes = scalars_of(dataset)
         dims = dims_of(name, dataset, notes, sizes)
         if name != HARMONIC:
             if rows or len(dims) == 1 or set(dims) <= set(axes):
@@ -136,7 +133,7 @@ def _read(file: h5py.File, rows: bool) -> Contents:
     fixed_coordinates(metadata)
     parameters = {}
     for name, dataset in grouped.items():
-        notes = scalars_of(dataset, allowance)
+        notes = scalars_of(dataset)
         dims, name = dims_of(name, dataset, notes, sizes), name.removeprefix(f"{PARAMETERS}/")
         origin = str(notes.get("origin"))
         of_the_model = dims == (HARMONIC,) or dims == tuple(a for a in axes if a in dims)

@@ -22,7 +22,7 @@ _PACKED, _ROOM = 128, 1 << 20
 """A file may declare so many bytes for each of its own and of this room: sections of lanes that
 have come to rest are packed to a twentieth, labels to a thousandth."""
 
-_MOST_NAMES = 1000
+_MOST_NAMES, _LONGEST = 1000, 1 << 16
 _LEAST_PIECE = 4096
 """Bytes for which a chunk counts at least: each costs time, even one that nobody has written."""
 
@@ -34,37 +34,30 @@ class UnfitError(Exception):
         super().__init__(f"{fault}; {remedy}")
 
 
-class Allowance:
-    """The bytes that may still be read of a file; UnfitError where it asks for more."""
-
-    def __init__(self, file: h5py.File) -> None:
-        self._left = _PACKED * (file.id.get_filesize() + _ROOM)
-
-    def take(self, size: int, name: str) -> None:
-        """Take the bytes of what has this name."""
-        self._left -= size
-        if self._left < 0:
-            raise UnfitError(f"declares more than a file of its size holds, in {name}")
-
-
-def datasets_of(file: h5py.File, allowance: Allowance) -> dict[str, h5py.Dataset]:
+def datasets_of(file: h5py.File) -> dict[str, h5py.Dataset]:
     """Open all that is ever read of a result file, by name, ``parameters/load`` for a parameter.
 
-    Raises UnfitError unless all of it are arrays in this file and within its allowance.
+    Raises UnfitError unless all of it are arrays in this file, which may have so many bytes.
     """
     if not isinstance(_hard_linked(file, PARAMETERS), h5py.Group):
         raise UnfitError(f"lacks the group {PARAMETERS}")
     names = [name for name in _names(file) if name != PARAMETERS]
     names += [f"{PARAMETERS}/{name}" for name in _names(file[PARAMETERS])]
     datasets = {name: _hard_linked(file, name) for name in names}
+    whole = file.id.get_filesize()
+    left = _PACKED * (whole + _ROOM)
     for name, dataset in datasets.items():
         if not isinstance(dataset, h5py.Dataset) or dataset.is_virtual or dataset.external:
             raise UnfitError(f"keeps {name} outside of itself or not as an array")
         chunk = dataset.chunks or dataset.shape
         pieces = (-(-size // max(1, side)) for size, side in zip(dataset.shape, chunk, strict=True))
-        piece = max(_LEAST_PIECE, math.prod(chunk) * dataset.dtype.itemsize)
-        allowance.take(math.prod(pieces) * piece, name)
-        # Of a chunk of no bytes the library dies; one of too many swells beyond what is declared.
+        # What has no fixed length may be as long as the file.
+        item = whole if dataset.dtype.hasobject else dataset.dtype.itemsize
+        piece = max(_LEAST_PIECE, math.prod(chunk) * item)
+        left -= math.prod(pieces) * piece
+        if left < 0:
+            raise UnfitError(f"declares more than a file of its size holds, in {name}")
+        # Of a chunk of no bytes the library dies, one of too many may swell beyond all bounds.
         if not all(0 < size <= 2 * piece for size in _chunk_sizes(dataset)):
             raise UnfitError(f"is damaged in {name}")
     return datasets
@@ -118,28 +111,27 @@ def values_of(name: str, dataset: h5py.Dataset) -> NDArray[Any]:
         raise UnfitError(f"is damaged in {name} ({reason(error)})") from error
 
 
-def text_of(name: str, dataset: h5py.Dataset, allowance: Allowance) -> str | None:
+def text_of(dataset: h5py.Dataset) -> str | None:
     """Read a dataset that is one text; None if it is none."""
     if dataset.shape or h5py.check_string_dtype(dataset.dtype) is None:
         return None
-    text: str = _plain(name, dataset[()], allowance)
-    return text
+    return str(_plain(dataset[()]))
 
 
-def scalars_of(item: h5py.HLObject, allowance: Allowance) -> dict[str, Any]:
+def scalars_of(item: h5py.HLObject) -> dict[str, Any]:
     """Give the attributes that are a text or a number, and leave the bookkeeping of HDF5."""
     scalars = {}
     for name in _names(item.attrs):
         stored = item.attrs.get_id(name)
         known = stored.dtype.kind in "iuf" or h5py.check_string_dtype(stored.dtype)
         if known and stored.shape in ((), (1,)):
-            allowance.take(stored.dtype.itemsize, name)
-            scalars[name] = _plain(name, np.ravel(item.attrs[name])[0], allowance)
+            value = _plain(np.ravel(item.attrs[name])[0])
+            # Many names may share one text of the global heap.
+            scalars[name] = value[:_LONGEST] if isinstance(value, str) else value
     return scalars
 
 
-def _plain(name: str, value: Any, allowance: Allowance) -> Any:
-    if not isinstance(value, str | bytes):
-        return value.item()
-    allowance.take(len(value), name)
-    return str(value) if isinstance(value, str) else value.decode("utf-8", "replace")
+def _plain(value: Any) -> Any:
+    if isinstance(value, bytes):
+        return value.decode("utf-8", "replace")
+    return str(value) if isinstance(value, str) else value.item()

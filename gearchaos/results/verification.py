@@ -13,7 +13,7 @@ from gearchaos.errors import FileError
 from gearchaos.results.checksum_line import checksum_fits
 from gearchaos.results.result_file import PARAMETERS
 from gearchaos.results.result_reader import read_result
-from gearchaos.results.stored_dataset import Allowance, datasets_of
+from gearchaos.results.stored_dataset import datasets_of
 
 
 def verify(path: str | os.PathLike[str]) -> list[str]:
@@ -33,7 +33,7 @@ def verify(path: str | os.PathLike[str]) -> list[str]:
     if problems:
         raise FileError(problems)
     with h5py.File(path, "r") as file:
-        datasets = datasets_of(file, Allowance(file)).values()
+        datasets = datasets_of(file).values()
         summed = sum(dataset.id.get_num_chunks() for dataset in datasets if dataset.fletcher32)
     foreign = "there is no checksum of the file: another program than gearchaos has written to it"
     return [
@@ -49,7 +49,7 @@ def damaged_pieces(path: str | os.PathLike[str]) -> Iterator[str]:
     # Where the damage has reached further, the reader has said so already.
     if Path(path).is_file():
         with suppress(Exception), h5py.File(path, "r") as file:
-            for name, dataset in datasets_of(file, Allowance(file)).items():
+            for name, dataset in datasets_of(file).items():
                 for rows in _unreadable(dataset):
                     yield f"{path}: is damaged in {name}{rows}"
 

@@ -1,4 +1,4 @@
-"""Configuration files with a fault in them, each made again by its number."""
+"""Configuration files, a third of them with a fault in them, each made again by its number."""
 
 import random
 import re
@@ -28,13 +28,26 @@ NUMBERS = (
     "1" + "0" * 400, "1" + "0" * 5000, "0x" + "f" * 6000, "1_000_000_000", "1e400", "0.1e-999",
 )  # fmt: skip
 
+COMPUTED = "values moved"
+"""What is done to files that are to be computed: most of them are sound still."""
+FACTORS = (0.5, 0.9, 1.1, 2.0, 0.0, -1.0, 1e-3, 1e3, 1e-9, 1e9, 1e-200, 1e150)
+OPTIONS = {
+    "[integration]": ("error_check = 1.0", 'unstable = "raise"', "tolerance = 0.3"),
+    "[outputs]": ("motion = false", "exponents = true", "allowed_diverged_share = 1.0"),
+    "[start]": (
+        'kind = "contact"', 'carry = "upwards"', 'carry = "downwards"',
+        *(f'kind = "random"\n{more}' for more in ("count = 3", "spread = 1e-300", "spread = 1e300")),
+        'kind = "given"\nstate = { delta_5 = -1e9, delta_3_rate = 1e-320 }',
+    ),
+}  # fmt: skip
+
 
 def configuration(number: int) -> tuple[str, bytes]:
-    """Return what was done to a configuration file, and the file."""
+    """Return what was done to a configuration file, and the file: two in three are computed."""
     source = random.Random(f"configuration {number}")
-    kind = list(KINDS)[number % len(KINDS)]
+    kind = COMPUTED if number % 3 else list(KINDS)[number // 3 % len(KINDS)]
     text = source.choice((SMALL, SMALL, *SECOND_SWEEPS))
-    return kind, KINDS[kind](source, text)
+    return kind, _values_moved(source, text) if number % 3 else KINDS[kind](source, text)
 
 
 def large_configuration(path: Path) -> None:
@@ -78,10 +91,31 @@ def _lines_shuffled(source: Random, text: str) -> bytes:
 
 
 def _numbers_replaced(source: Random, text: str) -> bytes:
-    places = list(re.finditer(r"(?<![\w.])-?\d+(?:\.\d+)?(?:e-?\d+)?", text))
-    for place in sorted(source.sample(places, source.choice((1, 2))), key=lambda m: -m.start()):
-        text = text[: place.start()] + source.choice(NUMBERS) + text[place.end() :]
+    return _with_numbers(source, text, (1, 2), lambda _: source.choice(NUMBERS)).encode()
+
+
+def _values_moved(source: Random, text: str) -> bytes:
+    text = text.replace("count = 40", "count = 4")
+    text = _with_numbers(source, text, (0, 1, 2), lambda number: _moved(source, number))
+    for table in source.sample(sorted(OPTIONS), source.choice((0, 1, 1, 2))):
+        text = text if table in text else f"{text}\n{table}"
+        text = text.replace(table, f"{table}\n{source.choice(OPTIONS[table])}")
     return text.encode()
+
+
+def _moved(source: Random, number: str) -> str:
+    if number.isdecimal():
+        return str(int(number) * source.choice((1, 2, 3)) + source.choice((-1, 0, 0)))
+    return repr(float(number) * source.choice(FACTORS[: source.choice((4, 4, len(FACTORS)))]))
+
+
+def _with_numbers(
+    source: Random, text: str, counts: tuple[int, ...], new: Callable[[str], str]
+) -> str:
+    places = list(re.finditer(r"(?<![\w.])-?\d+(?:\.\d+)?(?:e-?\d+)?", text))
+    for place in sorted(source.sample(places, source.choice(counts)), key=lambda m: -m.start()):
+        text = text[: place.start()] + new(place[0]) + text[place.end() :]
+    return text
 
 
 def _values_exchanged(source: Random, text: str) -> bytes:

@@ -49,19 +49,21 @@ def run(command: str, arguments: list[str]) -> dict[str, object]:
 
 
 def _main(command: str) -> Callable[[list[str]], int]:
-    if command != "load_config":
+    if command not in ("load_config", "run"):
         return importlib.import_module(f"gearchaos.{command}").main
-    from gearchaos import load_config
+    import gearchaos
     from gearchaos.command_line import OK, Command
 
     def body(options: Namespace) -> int:
-        load_config(*options.paths)
+        config = gearchaos.load_config(*options.paths)
+        if command == "run":
+            gearchaos.run(config)
         return OK
 
     def paths(parser: ArgumentParser) -> None:
         parser.add_argument("paths", nargs="*")
 
-    return Command("load_config", "Load a configuration.", paths, body)
+    return Command(command, "Load a configuration.", paths, body)
 
 
 if __name__ == "__main__":

@@ -15,7 +15,7 @@ import pytest
 
 from gearchaos.errors import FileError
 from gearchaos.results.block_store import BlockStore
-from gearchaos.results.manifest import differing_keys
+from gearchaos.results.manifest import require_same
 from gearchaos.results.result import Parameter, Result, open_result
 from gearchaos.results.store_lock import StoreLock
 from gearchaos.results.variables import Axis, Variable, start_axis, sweep_variables
@@ -186,18 +186,27 @@ def test_a_store_of_another_gearchaos_is_refused_with_both_values(output: Path) 
             CONFIGURATION,
             r"differs in software \(gearchaos 1\.2\.3, now \S+ 2\.0\.0\); go",
         ),
-        (other, False, CONFIGURATION, r"kernels \(0123456789abcdef, now fedcba9876543210\); go on"),
+        (
+            other,
+            False,
+            CONFIGURATION,
+            r"kernels \(0123456789abcdef, now fedcba9876543210\); go back",
+        ),
         (newer, True, "title = 't'", r"2\.0\.0\), integration\.steps_per_period \(288, now absent"),
     ):
-        with pytest.raises(FileError, match=f"blocks of another gearchaos, which .*{words}"):
+        with pytest.raises(
+            FileError, match=f"blocks of another gearchaos or configuration, .*{words}"
+        ):
             open_store(output, software=software, resume=resume, configuration=configuration)
     with open_store(output, resume=True) as store:
         assert store.finished().bounds == BLOCKS
 
 
 def test_types_and_nans_are_told_apart_where_they_matter() -> None:
-    assert differing_keys("a = 1", "a = 1.0") == ["a (1, now 1.0)"]
-    assert differing_keys("a = nan", "a = nan") == []
+    earlier, now = ({"configuration": f"a = nan\nb = {b}"} for b in ("1", "1.0"))
+    require_same("this", earlier, earlier)
+    with pytest.raises(FileError, match=r"differs in b \(1, now 1\.0\); go back"):
+        require_same("this", earlier, now)
 
 
 @pytest.mark.parametrize(
@@ -220,7 +229,7 @@ def test_blocks_of_a_newer_format_are_refused_in_a_clear_sentence(output: Path) 
     manifest = output.with_name("sweep.h5.blocks") / "manifest.json"
     newer = manifest.read_text(encoding="utf-8").replace('"2.0"', '"3.0"')
     manifest.write_text(newer, encoding="utf-8")
-    with pytest.raises(FileError, match=r"has version '3\.0' .* reads 2\.x; finish it with"):
+    with pytest.raises(FileError, match=r"differs in schema_version \(3\.0, now 2\.0\); go back"):
         open_store(output, resume=True)
 
 

@@ -4,8 +4,10 @@ import json
 import os
 import re
 import signal
+import socket
 import subprocess
 import sys
+import threading
 import time
 from contextlib import contextmanager
 
@@ -19,8 +21,8 @@ from .commands import names_in, same_data, small_config, sweep
 pytest.importorskip("distributed")
 
 BLOCKS = "gears.h5.blocks"
-# Six blocks of lanes that take a second or so each.
-LONG = ("--set", "sweep.count=1500", "--set", "integration.transient_periods=700")
+# Eight blocks of lanes that take a quarter of a second or so each.
+LONG = ("--set", "sweep.count=2000", "--set", "integration.transient_periods=200")
 SCHEDULER = "from distributed.cli.dask_scheduler import main; main()"
 WORKER = "from distributed.cli.dask_worker import main; main()"
 
@@ -98,7 +100,7 @@ def test_the_blocks_of_a_killed_worker_are_run_again(tmp_path, undisturbed):
         out, err = process.communicate(timeout=60)
     assert (process.returncode, out) == (0, "gears.h5\n"), err
     assert "Traceback" not in err
-    assert "1500 of 1500 lanes" in err
+    assert "2000 of 2000 lanes" in err
     assert names_in(tmp_path) == ["cluster", "gears.h5", "gears.toml"]
     result = gearchaos.open_result(tmp_path / "gears.h5")
     assert same_data(result, undisturbed)
@@ -115,7 +117,7 @@ def test_an_interrupt_keeps_what_local_workers_have_and_any_machine_goes_on(tmp_
         out, err = process.communicate(timeout=60)
     assert (process.returncode, out) == (130, ""), err
     assert "Traceback" not in err
-    assert 0 < int(re.search(r"(\d+) of 1500 lanes are kept", err)[1]) < 1500
+    assert 0 < int(re.search(r"(\d+) of 2000 lanes are kept", err)[1]) < 2000
     _, alive = psutil.wait_procs(workers, timeout=10)
     assert alive == []
     assert names_in(tmp_path) == [BLOCKS, "gears.toml"]
@@ -169,13 +171,83 @@ def begun_and_lost(cluster, folder):
         yield process
 
 
+@contextmanager
+def port(answer):
+    """Listen on a port, say something to whoever connects, None for silence; yield its address."""
+    with socket.create_server(("127.0.0.1", 0)) as server:
+
+        def speak():
+            connection, _ = server.accept()
+            with connection:
+                connection.recv(1000)
+                connection.sendall(answer)
+
+        if answer is not None:
+            threading.Thread(target=speak, daemon=True).start()
+        yield f"tcp://127.0.0.1:{server.getsockname()[1]}"
+
+
 def test_a_scheduler_that_does_not_answer_is_code_4(tmp_path):
     environment = {**os.environ, "DASK_DISTRIBUTED__COMM__TIMEOUTS__CONNECT": "1s"}
-    for address in ("tcp://127.0.0.1:9", "nonsense://x"):
-        ended = sweep(tmp_path, "--dask", address, env=environment)
-        assert (ended.code, ended.out) == (4, "")
-        assert f"error: {address}: no dask scheduler answers" in ended.err
-        assert names_in(tmp_path) == ["gears.toml"]
+    with port(None) as silent, port(b"HTTP/1.0 400 Bad Request\r\n\r\n") as other:
+        for address, reason in {
+            "tcp://127.0.0.1:9": "Timed out",
+            "nonsense://x": "unknown address scheme",
+            "tls://127.0.0.1:9": "check your TLS configuration",
+            silent: "silent for 1 s",
+            other: "",
+        }.items():
+            ended = sweep(tmp_path, "--dask", address, env=environment)
+            assert (ended.code, ended.out) == (4, "")
+            assert f"error: {address}: no dask scheduler answers ({reason}" in ended.err.replace(
+                "TLS expects a `ssl_context` argument of type ssl.SSLContext (perhaps ", ""
+            )
+            assert names_in(tmp_path) == ["gears.toml"]
+
+
+def signalled_while_it_waits(folder, address, number):
+    small_config(folder)
+    with subprocess.Popen(
+        [sys.executable, "-m", "gearchaos.sweep", "gears.toml", "--dask", address],
+        cwd=folder,
+        stderr=subprocess.PIPE,
+        text=True,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
+    ) as process:
+        said = process.stderr.readline()
+        process.send_signal(number)
+        _, err = process.communicate(timeout=10)
+    assert "Traceback" not in err
+    return process.returncode, said
+
+
+def test_a_port_that_is_silent_is_waited_for_until_a_signal_comes(tmp_path):
+    with port(None) as address:
+        code, said = signalled_while_it_waits(tmp_path, address, signal.SIGTERM)
+    assert (code, said) == (143, f"gearchaos sweep: {address}: waits up to 30 s for an answer\n")
+
+
+def test_workers_that_do_not_come_are_waited_for_until_a_signal_comes(tmp_path):
+    with scheduler(tmp_path) as address:
+        code, said = signalled_while_it_waits(tmp_path, address, signal.SIGINT)
+    assert code == 130
+    assert "for a worker to join" in said or "for an answer" in said
+
+
+@pytest.mark.slow
+def test_an_interrupt_does_not_wait_for_workers_that_are_gone(tmp_path):
+    cluster = tmp_path / "cluster"
+    cluster.mkdir()
+    with (
+        scheduler(cluster) as address,
+        worker(address, cluster) as only,
+        begun(tmp_path, "--dask", address) as process,
+    ):
+        only.kill()
+        process.send_signal(signal.SIGINT)
+        out, err = process.communicate(timeout=30)
+    assert (process.returncode, out) == (130, ""), err
+    assert "lanes are kept" in err
 
 
 @pytest.mark.parametrize(

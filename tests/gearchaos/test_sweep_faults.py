@@ -18,6 +18,15 @@ FAULTS = {
     "unknown effect": ('scene.effects=["backlsh"]', "did you mean `backlash`?"),
     "swept effect off": ("scene.effects=[]", 'add "pitch_error" to scene.effects'),
     "no number": ("sweep.count=many", 'sweep.count = "many": must be a whole number'),
+    "no text": ("title=\udcff", "override 'title=\\udcff': is not UTF-8 text"),
+    "no text in the key": ("\udcff=3", "is not UTF-8 text"),
+    "endless key": ("k" * 100_000 + "=3", "unknown key; the keys of the top level are title"),
+    "endless name": ("sweep.parameter=" + "k" * 100_000, "is not a parameter that can be swept"),
+    "more periods than memory": (
+        "integration.recorded_periods=1_000_000_000",
+        "integration.recorded_periods = 1000000000, outputs.section_points = 5: a block of lanes "
+        "takes ",
+    ),
     "no key": ("garbage", "override 'garbage': must have the form key.path=value"),
 }
 
@@ -31,6 +40,7 @@ def test_a_fault_of_the_configuration_is_one_line_and_code_2(tmp_path, fault):
     (line,) = ended.err.splitlines()
     assert line.startswith("gearchaos sweep: error: ")
     assert message in line
+    assert len(line) < 1300
     assert names_in(tmp_path) == ["gears.toml"]
 
 
@@ -181,6 +191,17 @@ def test_a_disk_that_was_full_from_the_start_leaves_nothing_behind(tmp_path):
     assert (ended.code, ended.out) == (4, "")
     assert "File too large; raise the limit on the size of files" in ended.err
     assert names_in(tmp_path) == ["gears.toml"]
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="limits of memory differ elsewhere")
+def test_memory_that_does_not_suffice_is_code_4(tmp_path):
+    periods = ("--set", "integration.recorded_periods=50_000_000", "--set", "sweep.count=8")
+    limit = (3 << 30, 3 << 30)
+    ended = sweep(
+        tmp_path, *periods, preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_AS, limit)
+    )
+    assert (ended.code, ended.out) == (4, "")
+    assert "error: Unable to allocate" in ended.err
 
 
 def _limit_file_size(size):

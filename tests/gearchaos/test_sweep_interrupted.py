@@ -98,8 +98,9 @@ def test_a_killed_sweep_leaves_nothing_that_looks_like_a_result_and_can_be_resum
     assert re.search(r"holds \d finished blocks? of an earlier run; continue it with", refused.err)
     other = sweep(tmp_path, *LONG, "--resume", "--set", "groups.damping_ratio=0.06")
     assert other.code == 4
-    assert "another configuration, which differs in groups.damping_ratio (0.05, now 0.06)" in (
-        other.err
+    assert (
+        "another gearchaos or configuration, which differs in groups.damping_ratio (0.05, now 0.06)"
+        in (other.err)
     )
     assert names_in(tmp_path) == [BLOCKS, "gears.toml"]
     # A block that was damaged is told and computed again.
@@ -253,7 +254,7 @@ def other_kernels(folder):
 
 
 def test_neither_blocks_nor_a_result_of_other_kernels_are_gone_on_with(tmp_path):
-    differs = rf"another gearchaos, which differs in kernels \({source_hash()}, now \w+\); go on "
+    differs = rf"another gearchaos or configuration, which differs in kernels \({source_hash()}, now \w+\); go back "
     changed = {"env": other_kernels(tmp_path)}
     assert sweep(tmp_path, *LINEAR, "--shard", "1/1", "--quiet").code == 0
     before = names_in(tmp_path / BLOCKS)
@@ -313,5 +314,5 @@ def test_resuming_into_the_result_of_another_configuration_is_refused_with_the_k
     before = (tmp_path / "gears.h5").read_bytes()
     other = sweep(tmp_path, *LINEAR, "--resume", "--set", "groups.damping_ratio=0.06")
     assert other.code == 4
-    assert "which differs in groups.damping_ratio (0.05, now 0.06); restore" in other.err
+    assert "which differs in groups.damping_ratio (0.05, now 0.06); go back" in other.err
     assert (tmp_path / "gears.h5").read_bytes() == before
