@@ -75,10 +75,7 @@ def _require_own(folder: Path) -> None:
     found = folder.lstat()
     ours = fcntl is None or found.st_uid == os.geteuid()
     if not (ours and stat.S_ISDIR(found.st_mode)):
-        raise FileError(
-            f"{folder}: is a link, no folder or another user's; delete it or choose another "
-            "--output"
-        )
+        raise FileError(f"{folder}: is a link or not your folder; choose another --output")
 
 
 def _lock(descriptor: int, shared: bool) -> None:

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from functools import partial
 from typing import Any
 
 import h5py
@@ -59,13 +58,11 @@ def datasets_of(file: h5py.File) -> dict[str, h5py.Dataset]:
         if left < 0:
             raise UnfitError(f"declares more than a file of its size holds, in {name}")
         # Of a chunk of no bytes the library dies; one of too many swells beyond what is declared.
-        if dataset.chunks and dataset.id.chunk_iter(partial(_unfit_chunk, 2 * piece)):
+        if dataset.chunks and dataset.id.chunk_iter(
+            lambda chunk, most=2 * piece: None if 0 < chunk.size <= most else chunk
+        ):
             raise UnfitError(f"is damaged in {name}")
     return datasets
-
-
-def _unfit_chunk(most: int, chunk: Any) -> bool | None:
-    return None if 0 < chunk.size <= most else True
 
 
 def _hard_linked(file: h5py.File, name: str) -> Any:
