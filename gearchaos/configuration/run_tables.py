@@ -12,6 +12,7 @@ from gearchaos.gear.group_table import GROUP_TABLE, GroupRow
 
 MOST_LANES = 100_000_000
 """Lanes of one run: what a file and a machine can still hold."""
+MOST_STEPS_PER_PERIOD = 1_000_000
 _MOST_VALUES = 10_000_000
 _MOST_STARTS = 1_000_000
 
@@ -148,7 +149,9 @@ class Sweep(Table):
 class Integration(Table):
     """Runge-Kutta of order 4 on a fixed grid over the mesh period."""
 
-    steps_per_period: int = key("steps per mesh period", default=200, ge=1, le=1_000_000)
+    steps_per_period: int = key(
+        "steps per mesh period", default=200, ge=1, le=MOST_STEPS_PER_PERIOD
+    )
     tolerance: float | None = key(
         "largest error of section and exponent; the steps are then doubled, from steps_per_period "
         "on, until lanes of the sweep that are tried beforehand reach it",

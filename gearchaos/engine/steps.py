@@ -10,6 +10,7 @@ from gearchaos_kernels import Outcome, Plan, Status, System, integrate
 from numpy.typing import NDArray
 
 from gearchaos.configuration.messages import Fault
+from gearchaos.configuration.run_tables import MOST_STEPS_PER_PERIOD
 from gearchaos.dynamics.stability import StabilityLimit, stability_limit
 from gearchaos.engine.lanes import Lanes
 from gearchaos.errors import ConfigurationError
@@ -57,14 +58,14 @@ def stable_steps(lanes: Lanes, steps: int) -> tuple[int, str]:
     Raises
     ------
     ConfigurationError
-        If so many steps are unstable in some lanes and may not be raised.
+        If so many steps are unstable in some lanes and may not be raised, or not far enough.
     """
     limits = list(_limits(lanes, steps))
     if not limits:
         return steps, ""
     worst = max(limits, key=lambda limit: limit.steps)
     unstable = np.concatenate([limit.lanes for limit in limits])
-    if lanes.config.integration.unstable == "refuse":
+    if lanes.config.integration.unstable == "refuse" or worst.steps > MOST_STEPS_PER_PERIOD:
         raise ConfigurationError(_fault(lanes, worst, unstable, steps).text(lanes.config.source))
     return worst.steps, (
         f"integration.steps_per_period raised from {steps} to {worst.steps}, the stability limit "
@@ -91,12 +92,15 @@ def _fault(lanes: Lanes, worst: StabilityLimit, unstable: NDArray[np.intp], step
         )
     imaginary = abs(worst.eigenvalue.imag)
     pair = f" ± {imaginary:.3g}i" if imaginary > 0.0 else ""
+    remedy = f'raise it to {worst.steps} or more, or set integration.unstable = "raise"'
+    if worst.steps > MOST_STEPS_PER_PERIOD:
+        remedy = f"check the magnitudes behind it: there are at most {MOST_STEPS_PER_PERIOD} steps"
     return Fault(
         "integration.steps_per_period",
         f"RK4 is unstable below {worst.steps} steps per period for {unstable.size * lanes.starts} "
         f"of {len(lanes)} lanes ({', '.join(places)}), because of the eigenvalue "
         f"{worst.eigenvalue.real:.3g}{pair} of the {worst.owner}",
-        f'raise it to {worst.steps} or more, or set integration.unstable = "raise"',
+        remedy,
         steps,
     )
 

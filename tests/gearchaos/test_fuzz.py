@@ -21,7 +21,7 @@ def endings(tmp_path_factory):
 
 
 def _some_cases(folder: Path, watch: Watch):
-    yield from watch.run(configuration_cases(range(100_000, 100_108), folder))
+    yield from watch.run(configuration_cases(range(100_000, 100_072), folder))
     yield from watch.run(result_cases(range(100_000, 100_099), folder))
     readers = "info --verify", "plot --stages --output stages.png --dpi 50 --overwrite"
     forged = forged_cases(folder, readers)
@@ -36,7 +36,7 @@ def test_bad_input_ends_in_a_message_and_code_2_or_4(endings):
 @pytest.mark.slow
 def test_most_of_the_bad_input_is_noticed(endings):
     codes = Counter((case.command, ending.code) for case, ending in endings)
-    assert codes["load_config", 2] > 27
+    assert codes["load_config", 2] > 18
     assert codes["info", 4] > 25
     assert codes["plot", 4] > 10
 

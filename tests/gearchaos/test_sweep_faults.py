@@ -27,6 +27,10 @@ FAULTS = {
         "integration.recorded_periods = 1000000000, outputs.section_points = 5: a block of lanes "
         "takes ",
     ),
+    "more steps than there are": (
+        "bearings.axial_stiffness_N_per_m=[3e7, 4e157]",
+        "check the magnitudes behind it: there are at most 1000000 steps",
+    ),
     "no key": ("garbage", "override 'garbage': must have the form key.path=value"),
 }
 
