@@ -211,7 +211,12 @@ def _connected(stack: ExitStack, address: str) -> Any:
         try:
             with notice(f"{address}: waits up to {_patience():g} s for an answer"):
                 return _answer(lambda: _Client(address), _patience())
-        # What is raised is up to the transport that the address names.
+        except (ValueError, TypeError) as error:
+            raise ConfigurationError(
+                f"--dask {address}: cannot be the address of a scheduler here ({error}); give one "
+                "such as tcp://node7:8786"
+            ) from None
+        # What else is raised is up to the transport that the address names.
         except Exception as error:
             raise ExecutionError(
                 f"{address}: no dask scheduler answers ({error}); start one with `dask scheduler` "

@@ -192,17 +192,30 @@ def test_a_scheduler_that_does_not_answer_is_code_4(tmp_path):
     with port(None) as silent, port(b"HTTP/1.0 400 Bad Request\r\n\r\n") as other:
         for address, reason in {
             "tcp://127.0.0.1:9": "Timed out",
-            "nonsense://x": "unknown address scheme",
-            "tls://127.0.0.1:9": "check your TLS configuration",
             silent: "silent for 1 s",
             other: "",
         }.items():
             ended = sweep(tmp_path, "--dask", address, env=environment)
             assert (ended.code, ended.out) == (4, "")
-            assert f"error: {address}: no dask scheduler answers ({reason}" in ended.err.replace(
-                "TLS expects a `ssl_context` argument of type ssl.SSLContext (perhaps ", ""
-            )
+            assert f"error: {address}: no dask scheduler answers ({reason}" in ended.err
             assert names_in(tmp_path) == ["gears.toml"]
+
+
+@pytest.mark.parametrize(
+    ("address", "reason"),
+    [
+        ("nonsense://x", "unknown address scheme"),
+        ("tls://127.0.0.1:9", "TLS expects a `ssl_context`.* check your TLS configuration"),
+    ],
+)
+def test_an_address_that_can_be_none_is_refused_and_nothing_goes_on_from_it(
+    tmp_path, address, reason
+):
+    ended = sweep(tmp_path, "--dask", address)
+    assert (ended.code, ended.out) == (2, "")
+    assert re.search(rf"--dask {address}: cannot be .* here \({reason}", ended.err)
+    assert "go on with" not in ended.err
+    assert names_in(tmp_path) == ["gears.toml"]
 
 
 def signalled_while_it_waits(folder, address, number):
