@@ -28,8 +28,7 @@ def lane_faults(config: Configuration) -> Iterator[Fault]:
     by_parameter = {one.parameter: _some_values(one) for one in reversed(sweeps.values())}
     some = dict(zip(by_parameter, np.ix_(*by_parameter.values()), strict=True))
     try:
-        with np.errstate(all="ignore"):
-            groups = groups_at(config, some)
+        groups = groups_at(config, some)
     except ConfigurationError as error:
         for table in _refused(config, some):
             key = f"{table}.parameter"
@@ -65,8 +64,7 @@ def _refused(config: Configuration, some: Mapping[str, FloatArray]) -> list[str]
     tables = []
     for table, sweep in config.sweeps.items():
         try:
-            with np.errstate(all="ignore"):
-                groups_at(config, {sweep.parameter: some[sweep.parameter]})
+            groups_at(config, {sweep.parameter: some[sweep.parameter]})
         except ConfigurationError:
             tables.append(table)
     return tables or list(config.sweeps)

@@ -41,6 +41,8 @@ class Groups:
         return [row for row in GROUP_TABLE if row.needed_by(active) and row.name not in self.values]
 
 
+# What is not finite is refused with its key, by the rules of the lanes.
+@np.errstate(all="ignore")
 def resolve_groups(physical: Mapping[str, Any], given: Mapping[str, Any]) -> Groups:
     """Combine groups given directly with those that follow from physical data.
 

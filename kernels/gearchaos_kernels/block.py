@@ -49,6 +49,9 @@ from gearchaos_kernels.status import Status
 LARGEST_STATE = 1e100
 """A state beyond this has left every length scale: the lane is stopped as diverged."""
 
+LOST = 1e-150
+"""A part of a tangent vector of length 1 that is smaller is 0: its square is hardly a number."""
+
 _OK = int(Status.OK)
 _DIVERGED = int(Status.DIVERGED)
 
@@ -182,8 +185,9 @@ def split(memory, table, lanes, number, recorded, present):
 def scale_tangents(block, batch, steps_done, last):
     """Scale tangent vectors whose turn it is to length 1; keep the logarithm of their growth."""
     memory, first, lanes = block
-    for slot in range(lanes):
-        index = first + slot
+    # Those of repeated lanes, too: they would become denormal, and cost all others their speed.
+    for slot in range(LANES):
+        index = first + min(slot, lanes - 1)
         if steps_done % batch.steps_between_scalings[index] != 0 and not last:
             continue
         scale = batch.scales[index]
@@ -192,7 +196,9 @@ def scale_tangents(block, batch, steps_done, last):
             square += (memory[(TANGENT + column) * STRIDE + slot] * scale[column]) ** 2
         length = math.sqrt(square)
         for column in range(scale.shape[0]):
-            memory[(TANGENT + column) * STRIDE + slot] /= length
+            part = memory[(TANGENT + column) * STRIDE + slot] / length
+            # So would in time what decays faster than the rest.
+            memory[(TANGENT + column) * STRIDE + slot] = part if abs(part) > LOST else 0.0
         memory[GROWTH * STRIDE + slot] += math.log(length)
 
 

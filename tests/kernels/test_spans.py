@@ -198,3 +198,11 @@ def test_the_exponent_of_the_full_scene_does_not_depend_on_how_the_run_is_cut():
     second = run(model, FULL, first.end_state, steps=100, periods=250, resolved=True)
     assert second.section == pytest.approx(whole.section[:, 150:], rel=0, abs=1e-9)
     assert (first.crossings + second.crossings).tolist() == whole.crossings.tolist()
+
+
+def test_what_a_tangent_vector_loses_never_becomes_denormal():
+    # The torsion decays faster than the axial pair: after so long by more than a number can hold.
+    tangent = run(pan2021(0.5), FULL, steps=40, periods=40_000, points=1, resolved=True).end_tangent
+    assert not np.any((tangent != 0.0) & (np.abs(tangent) < 1e-160))
+    assert np.linalg.norm(tangent) == pytest.approx(1.0)
+    assert tangent[0, 0] == 0.0 != tangent[0, -1]
