@@ -18,7 +18,7 @@ from typing import Any
 import llvmlite.binding
 import numba
 from llvmlite import ir
-from numba import _dynfunc, config, types
+from numba import config, types
 from numba.core import cgutils
 from numba.core import ir as numba_ir
 from numba.core.compiler import CompilerBase, DefaultPassBuilder
@@ -101,30 +101,13 @@ class _Compiler(CompilerBase):  # type: ignore[misc]
         return [passes]
 
 
-class _InlinedCompiler(_Compiler):
-    """The same, but without machine code of its own, which Numba generates for every function."""
-
-    def define_pipelines(self) -> list[Any]:
-        """Return the one list of passes."""
-        self.state.targetctx = self.state.targetctx.subtarget(get_executable=_without_address)
-        return super().define_pipelines()
-
-
-def _without_address(library: Any, function: Any, environment: Any) -> Any:
-    module, name = function.lookup_module(), function.qualname
-    return _dynfunc.make_function(module, name, "inlined", 0, environment, (library,))
-
-
-def _decorate(
-    function: Callable[..., Any], compiler: type[CompilerBase] = _Compiler, **flags: Any
-) -> Any:
-    return numba.njit(pipeline_class=compiler, **_SHARED_FLAGS, **flags)(function)
+def _decorate(function: Callable[..., Any], **flags: Any) -> Any:
+    return numba.njit(pipeline_class=_Compiler, **_SHARED_FLAGS, **flags)(function)
 
 
 def scalar(function: Callable[..., Any]) -> Any:
     """Compile a formula of plain numbers that is inlined wherever it is used."""
-    wrappers = {"no_cfunc_wrapper": True, "no_cpython_wrapper": True}
-    return _decorate(function, _InlinedCompiler, forceinline=True, **wrappers)
+    return _decorate(function, forceinline=True, no_cfunc_wrapper=True, no_cpython_wrapper=True)
 
 
 def driver(function: Callable[..., Any], parallel: bool = True) -> Any:
@@ -141,8 +124,7 @@ def evaluator(function: Callable[..., Any]) -> Any:
 
 def block(function: Callable[..., Any]) -> Any:
     """Compile a function that integrates one block of lanes on one thread."""
-    wrappers = {"no_cfunc_wrapper": True, "no_cpython_wrapper": True}
-    return _decorate(function, _InlinedCompiler, nogil=True, **wrappers)
+    return _decorate(function, nogil=True)
 
 
 @intrinsic
