@@ -111,6 +111,10 @@ class Watch:
         seconds, megabytes = answer["seconds"], answer["megabytes"]
         fault = answer["escaped"] or _fault(case.command, answer)
         if seconds > allowed:
+            # It may have compiled a kernel, which it need not do twice.
+            again = self._ask([case.command, *case.arguments], BUSY * allowed)
+            seconds = seconds if isinstance(again, str) else again["seconds"]
+        if seconds > allowed:
             fault = f"takes {seconds:.1f} s"
         if megabytes > self._megabytes:
             fault = f"takes {megabytes} MB"
