@@ -93,7 +93,7 @@ class Command(NamedTuple):
     def _code(self, arguments: list[str]) -> int:
         try:
             # Of negative numbers, argparse takes those with an exponent for options.
-            given = [re.sub(r"^-(?=\.?\d)", " -", text) for text in arguments]
+            given = [re.sub(r"^-(?=[\d.]+[eE][-+]?\d+$)", " -", text) for text in arguments]
             options = self._parser().parse_args(given, Namespace(arguments=arguments))
             # Matplotlib would refuse to be imported where the environment names an unknown backend.
             os.environ["MPLBACKEND"] = "agg"
