@@ -50,9 +50,9 @@ class Configuration(Table):
     """
 
     title: str = key("title of the sweep, for figures and files", default="")
-    formulation: Literal["published", "rederived"] = key(
-        'y_1 as printed in Pan 2021 ("published") or as its equations of motion give it',
-        default="published",
+    formulation: Literal["physical", "published"] = key(
+        'gaps as the equations of motion give them, or as Pan 2021 prints them ("published")',
+        default="physical",
     )
     pair: Pair | None = key("catalogue data of the two gears", default=None)
     operation: Operation | None = key("the point of operation", default=None)

@@ -52,5 +52,5 @@ def system_of(
         Groups(**groups),
         np.zeros(0) if cosine is None else cosine,
         np.zeros(0) if sine is None else sine,
-        rederived=config.formulation == "rederived",
+        physical=config.formulation == "physical",
     )

@@ -186,6 +186,7 @@ def metadata(simulation: Simulation, seconds: float) -> Mapping[str, Any]:
         "method": "classical Runge-Kutta of order 4 with fixed steps",
         **config.integration.model_dump(exclude_none=True),
         "steps_per_period": simulation.plan.steps_per_period,
+        "notes": "\n".join(simulation.notes),
         **provenance(current_threads(), seconds),
         "configuration": config.text,
         "configuration_resolved": config.resolved_toml(),

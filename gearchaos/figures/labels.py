@@ -47,6 +47,12 @@ def place_of(result: Result, lane: int) -> dict[str, float]:
     return {**result.fixed, **{axis: result.along(axis)[lane] for axis in result.axes}}
 
 
+def form_in_words(result: Result) -> str:
+    """Name the form of the gaps where it is not the physical one, for the foot of a page."""
+    published = result.metadata.get("formulation") == "published"
+    return "gaps as printed in Pan 2021 (eqs 6 and 7), not the physical ones" if published else ""
+
+
 def in_words(result: Result, place: Mapping[str, float]) -> str:
     """Word a place on the axes of a result, such as ``$P$ = 5.86, start 0``."""
     texts = []

@@ -59,6 +59,12 @@ def remark(axes: Axes, text: str) -> None:
     axes.set_title(text, loc="right", fontsize=SMALL_FONT_PT, fontweight="normal")
 
 
+def footnote(figure: Figure, text: str) -> None:
+    """Write a line at the foot of a page; nothing where there is no text."""
+    if text:
+        figure.supxlabel(text, fontsize=SMALL_FONT_PT, color="0.4", x=0.99, ha="right")
+
+
 def few_ticks(axes: Axes, x: int | None = 5, y: int | None = 4) -> None:
     """Leave so many intervals at most on the axes of a panel; None leaves an axis alone."""
     for axis, most in ((axes.xaxis, x), (axes.yaxis, y)):

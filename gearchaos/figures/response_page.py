@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from gearchaos.errors import FigureError
-from gearchaos.figures.labels import in_words, place_of
-from gearchaos.figures.page import Page, few_ticks, letter, page, remark
+from gearchaos.figures.labels import form_in_words, in_words, place_of
+from gearchaos.figures.page import Page, few_ticks, footnote, letter, page, remark
 from gearchaos.figures.response import (
     amplitude_spectrum,
     phase_portrait,
@@ -89,5 +89,6 @@ def response_page(
         ):
             few_ticks(axes, 6, 6)
             remark(axes, words)
+        footnote(figure, form_in_words(result))
         figure.align_ylabels(panels)
     return figure

@@ -6,10 +6,10 @@ from matplotlib.axes import Axes
 
 from gearchaos.errors import FigureError
 from gearchaos.figures.bifurcation import bifurcation
-from gearchaos.figures.labels import in_words
+from gearchaos.figures.labels import form_in_words, in_words
 from gearchaos.figures.lanes import Between
 from gearchaos.figures.lyapunov import lyapunov
-from gearchaos.figures.page import Page, few_ticks, letter, page
+from gearchaos.figures.page import Page, few_ticks, footnote, letter, page
 from gearchaos.figures.stages import shade_stages
 from gearchaos.figures.style import SINGLE_COLUMN_MM, SMALL_FONT_PT
 from gearchaos.results.result import Result, section_variables
@@ -91,5 +91,6 @@ def bifurcation_page(
                 shade_stages(axes, one, legend=axes is stack[0])
         if result.fixed:
             figure.suptitle(in_words(result, result.fixed), fontsize=SMALL_FONT_PT)
+        footnote(figure, form_in_words(result))
         figure.align_ylabels(stack)
     return figure

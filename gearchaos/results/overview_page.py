@@ -61,6 +61,8 @@ def _file(overview: Mapping[str, Any]) -> Iterator[str]:
     yield _entry("lanes", f"{overview['lanes']}")
     for name, counts in overview["counts"].items():
         yield _entry(name, ", ".join(f"{n} {flag}" for flag, n in counts.items() if n))
+    for note in str(metadata.get("notes", "")).splitlines():
+        yield _entry("note", note)
 
 
 def _accuracy(overview: Mapping[str, Any]) -> Iterator[str]:

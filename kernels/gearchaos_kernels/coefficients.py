@@ -40,7 +40,7 @@ def lane_coefficients(system: System, step: Floats) -> Floats:
     groups = system.groups
     cosine, sine = np.cos(groups.base_helix_angle), np.sin(groups.base_helix_angle)
     # y_1 = q - e cos(beta_b) as printed in eq. 6, or q + e - e cos(beta_b) as eq. 1 gives.
-    share = 1.0 - 1.0 / cosine if system.rederived else np.ones_like(cosine)
+    share = 1.0 - 1.0 / cosine if system.physical else np.ones_like(cosine)
     phase_step = groups.mesh_frequency * step
     lane = Lane(
         mass_ratio_p=groups.mass_ratio_p,

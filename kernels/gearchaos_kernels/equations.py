@@ -6,7 +6,7 @@ accelerations and forces per step and per step squared. There (with q = approach
     gap_y = q - e,            y_1 = cos(beta_b) gap_y
     gap_z = p - gap_y - 2 e,  y_2 = sin(beta_b) gap_z,   p = mu_p axial_p + mu_g axial_g
 
-for the published formulation; the rederived one multiplies the first e by 1 - 1/cos(beta_b) and
+for the published formulation; the physical one multiplies the first e by 1 - 1/cos(beta_b) and
 leaves the second line as it is. The clearance of both directions is then the same half backlash.
 """
 

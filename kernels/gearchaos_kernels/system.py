@@ -61,15 +61,15 @@ class System(NamedTuple):
     """Everything that defines the right-hand side of eq. 13 for a batch of lanes.
 
     ``stiffness_cosine`` and ``stiffness_sine``, shape (harmonics,), are the Fourier coefficients of
-    the mesh stiffness relative to its mean (eq. 19); ``rederived`` says whether delta_5 + e enters
-    the gaps, as eq. 1 gives, instead of delta_5 as eq. 6 is printed.
+    the mesh stiffness relative to its mean (eq. 19); ``physical`` says whether delta_5 + e enters
+    the gaps, as eq. 1 gives, instead of delta_5 as eqs 6 and 7 are printed.
     """
 
     effects: Effects
     groups: Groups
     stiffness_cosine: Floats
     stiffness_sine: Floats
-    rederived: bool = False
+    physical: bool = True
 
     @property
     def states(self) -> tuple[str, ...]:

@@ -57,7 +57,7 @@ ONE_FAULT = [
     # words
     ('scene.effects=["backlsh"]', '[0] = "backlsh"', "must be one of", "did you mean `backlash`?"),
     ("start.kind=rset", 'start.kind = "rset"', "must be one of", "did you mean `rest`?"),
-    ("formulation=printed", 'formulation = "printed"', "'published'", "Pan 2021"),
+    ("formulation=printed", 'formulation = "printed"', "'physical'", "Pan 2021"),
     ('mesh.stiffness.shape="fourrier"', '"fourrier"', "must be one of", "`fourier`"),
     ('outputs.section=["delta5"]', '"delta5"', "must be one of", "did you mean `delta_5`?"),
     ("start={kind='given', state={delta5=1.0}}", "start.state.delta5", "one of", "`delta_5`"),

@@ -79,9 +79,9 @@ def lanes_of(model: Groups, chosen: Any) -> Groups:
     return Groups(*(group[chosen] for group in model))
 
 
-def system_of(groups: Groups, effects: Effects = FULL, rederived: bool = False) -> System:
+def system_of(groups: Groups, effects: Effects = FULL, physical: bool = False) -> System:
     """Return a system with the mesh stiffness of Pan 2021."""
-    return System(effects, groups, COSINE, SINE, rederived)
+    return System(effects, groups, COSINE, SINE, physical)
 
 
 def columns(effects: Effects) -> list[int]:
@@ -110,7 +110,7 @@ def run(
     periods: int = 1,
     points: int | None = None,
     tangent: bool = True,
-    rederived: bool = False,
+    physical: bool = False,
     resolved: bool = False,
 ) -> Outcome:
     """Integrate Pan 2021's mesh stiffness, by default keeping every state after every period.
@@ -123,7 +123,7 @@ def run(
     start = rest if start is None else np.broadcast_to(start, rest.shape)
     points = transient + periods if points is None else points
     plan = Plan(steps, transient, periods, points, tangent, resolved)
-    return integrate(system_of(model, scene, rederived), start[:, columns(scene)], plan)
+    return integrate(system_of(model, scene, physical), start[:, columns(scene)], plan)
 
 
 def assert_same_bits(one: Outcome, other: Outcome) -> None:

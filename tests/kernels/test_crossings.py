@@ -182,8 +182,8 @@ FAST = START + np.stack(
 
 @pytest.mark.parametrize("scene", CLEARANCES, ids=named)
 def test_resolved_steps_agree_with_plain_ones_so_fine_that_crossings_do_not_matter(scene):
-    for rederived in (False, True):
-        how = {"periods": 3, "rederived": rederived}
+    for physical in (False, True):
+        how = {"periods": 3, "physical": physical}
         fine = run(MODEL, scene, FAST, steps=25_600, **how)
         for steps, tolerance in ((400, 2e-5), (800, 1.5e-6)):
             resolved = run(MODEL, scene, FAST, steps=steps, **how, resolved=True)

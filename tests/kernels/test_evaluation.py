@@ -78,11 +78,11 @@ def test_accelerations_are_those_of_the_twin(scene):
     kept = columns(scene)
     full = np.random.default_rng(1).normal(0.0, 2.0, (3, SAMPLES, len(STATES)))
     full[..., [column for column in range(len(STATES)) if column not in kept]] = 0.0
-    for rederived in (False, True):
-        motion = mesh_motion(system_of(groups, scene, rederived), full[..., kept], STEPS)
+    for physical in (False, True):
+        motion = mesh_motion(system_of(groups, scene, physical), full[..., kept], STEPS)
         assert motion.accelerations.shape == (3, SAMPLES, len(kept) // 2)
         for number in range(3):
-            twin = Twin(lane(groups, number), scene, rederived)
+            twin = Twin(lane(groups, number), scene, physical)
             tau = 2.0 * np.pi / groups.mesh_frequency[number] / STEPS * np.arange(SAMPLES)
             instants = zip(tau, full[number], strict=True)
             wanted = np.array([accelerations(twin, *instant) for instant in instants])

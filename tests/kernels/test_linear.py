@@ -41,12 +41,12 @@ def system(model: Groups) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return matrix, np.kron(row_y, [0.0, 1.0]), np.kron(row_z, [0.0, 1.0])
 
 
-def steady_state(model: Groups, rederived: bool) -> np.ndarray:
+def steady_state(model: Groups, physical: bool) -> np.ndarray:
     """Return the periodic response at tau = 0: a constant and one harmonic."""
     matrix, row_y, row_z = system(model)
     beta, omega = one(model, "base_helix_angle"), one(model, "mesh_frequency")
     torsion = state(delta_5_rate=1.0)
-    if rederived:
+    if physical:
         in_y, in_z = 1.0 - np.cos(beta), -np.tan(beta) - np.sin(beta)
     else:
         in_y, in_z = -np.cos(beta), -np.sin(beta)
@@ -67,18 +67,18 @@ def exponent_of(model: Groups, scene, start=None, **how) -> float:
     return float(largest_exponent(outcome.growth, period)[0][0])
 
 
-@pytest.mark.parametrize("rederived", [False, True])
-def test_motion_from_rest_settles_on_the_analytic_response(rederived):
-    outcome = run(MODEL, LINEAR, steps=400, transient=600, periods=1, points=1, rederived=rederived)
-    wanted = steady_state(MODEL, rederived)
+@pytest.mark.parametrize("physical", [False, True])
+def test_motion_from_rest_settles_on_the_analytic_response(physical):
+    outcome = run(MODEL, LINEAR, steps=400, transient=600, periods=1, points=1, physical=physical)
+    wanted = steady_state(MODEL, physical)
     assert np.abs(wanted).max() > 0.3
     assert outcome.section[0, 0] == pytest.approx(wanted, rel=0, abs=1e-8)
 
 
-@pytest.mark.parametrize("rederived", [False, True])
-def test_analytic_response_repeats_every_period(rederived):
-    wanted = steady_state(MODEL, rederived)
-    outcome = run(MODEL, LINEAR, wanted, steps=1600, periods=5, rederived=rederived)
+@pytest.mark.parametrize("physical", [False, True])
+def test_analytic_response_repeats_every_period(physical):
+    wanted = steady_state(MODEL, physical)
+    outcome = run(MODEL, LINEAR, wanted, steps=1600, periods=5, physical=physical)
     assert outcome.section[0] == pytest.approx(np.tile(wanted, (5, 1)), rel=0, abs=1e-10)
 
 

@@ -62,7 +62,7 @@ def follow(solution: dict, steps: int, model: Groups | None = None, **how) -> Ou
         scene_of(solution),
         stored_state(solution["section_points"][0] if orbit else solution["start"]),
         steps=steps,
-        rederived=solution.get("formulation") == "rederived",
+        physical=solution.get("formulation") == "rederived",
         **{"resolved": True, **how},
     )
 

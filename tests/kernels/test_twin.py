@@ -60,12 +60,12 @@ def scene_cases() -> list:
 
 @pytest.mark.parametrize("scene", scene_cases())
 def test_kernels_follow_the_printed_equations(scene):
-    for rederived in (False, True):
+    for physical in (False, True):
         outcome = run(
-            MODEL, scene, START, steps=STEPS, periods=PERIODS, tangent=True, rederived=rederived
+            MODEL, scene, START, steps=STEPS, periods=PERIODS, tangent=True, physical=physical
         )
         for number in range(2):
-            twin = Twin(lane(number), scene, rederived).integrate(START[number], STEPS, PERIODS)
+            twin = Twin(lane(number), scene, physical).integrate(START[number], STEPS, PERIODS)
             assert outcome.section[number] == pytest.approx(
                 twin.states[:, columns(scene)], rel=0, abs=ROUNDING
             )
@@ -89,14 +89,14 @@ def test_the_lanes_of_the_twin_test_visit_every_branch_of_the_clearance():
     assert visited == {(direction, branch) for direction in "yz" for branch in (-1, 0, 1)}
 
 
-@pytest.mark.parametrize("rederived", [False, True])
-def test_a_spur_pair_has_an_axial_motion_of_its_bearings_alone(rederived):
+@pytest.mark.parametrize("physical", [False, True])
+def test_a_spur_pair_has_an_axial_motion_of_its_bearings_alone(physical):
     spur = MODEL._replace(base_helix_angle=np.zeros(2))
-    outcome = run(spur, Effects(), START, steps=STEPS, periods=PERIODS, rederived=rederived)
+    outcome = run(spur, Effects(), START, steps=STEPS, periods=PERIODS, physical=physical)
     for number in range(2):
         groups = lane(number)
         groups.base_helix_angle = 0.0
-        twin = Twin(groups, Effects(), rederived).integrate(START[number], STEPS, PERIODS)
+        twin = Twin(groups, Effects(), physical).integrate(START[number], STEPS, PERIODS)
         assert outcome.section[number] == pytest.approx(twin.states, rel=0, abs=ROUNDING)
         assert outcome.growth[number] == pytest.approx(twin.growth, rel=0, abs=ROUNDING)
 

@@ -26,10 +26,10 @@ class Motion(NamedTuple):
 class Twin:
     """One lane: groups are plain numbers, named as in `Groups`."""
 
-    def __init__(self, groups, scene: Effects, rederived: bool = False) -> None:
+    def __init__(self, groups, scene: Effects, physical: bool = False) -> None:
         self.groups = groups
         self.scene = scene
-        self.rederived = rederived
+        self.physical = physical
         self.present = np.tile(np.repeat([True, scene.transverse, scene.axial], [1, 2, 2]), 2)
 
     def stiffness(self, tau):
@@ -53,7 +53,7 @@ class Twin:
         """y_1 and y_2, eqs 6 and 7; with rates instead of displacements, their rates."""
         beta = self.groups.base_helix_angle
         along_mesh = delta[DELTA_1] - delta[DELTA_2] + delta[DELTA_5]
-        if self.rederived:
+        if self.physical:
             along_mesh = along_mesh + error
         y_1 = along_mesh - error * np.cos(beta)
         y_2 = delta[DELTA_3] - delta[DELTA_4] - np.tan(beta) * along_mesh - error * np.sin(beta)
