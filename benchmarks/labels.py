@@ -120,6 +120,44 @@ TUNED = {
         LONG,
     ),
     "transient chaos": Lanes("pitch_error", 14.003, 14.993, 100),
+    "soft bearings, short record": Lanes(
+        "mesh_frequency",
+        0.403,
+        2.603,
+        111,
+        {"pitch_error": 3.4, "damping_ratio": 0.0022, **_bearings(0.14, 0.042, 0.0013, 0.0017)},
+    ),
+    "loads on soft bearings": Lanes(
+        "load",
+        0.043,
+        1.243,
+        81,
+        {
+            "mesh_frequency": 1.17,
+            "pitch_error": 2.4,
+            "damping_ratio": 0.0027,
+            **_bearings(0.31, 0.088, 0.0019, 0.0013),
+        },
+        ("integration.transient_periods=1500",),
+    ),
+    "stiffer bearings": Lanes(
+        "mesh_frequency",
+        0.353,
+        2.453,
+        106,
+        {
+            "pitch_error": 1.1,
+            "load": 0.15,
+            "half_backlash": 0.6,
+            "damping_ratio": 0.004,
+            **_bearings(1.31, 0.52, 0.0037, 0.0022),
+        },
+        ("integration.transient_periods=1500",),
+    ),
+    "errors on softer bearings": Lanes(
+        "pitch_error", 0.07, 14.07, 101, _bearings(2.3, 0.9, 0.017, 0.006)
+    ),
+    "errors at weak damping": Lanes("pitch_error", 0.11, 14.96, 100, {"damping_ratio": 0.013}),
 }
 """On these the rules were chosen, or have been looked at while they were."""
 
@@ -167,6 +205,35 @@ UNSEEN = {
         30,
         {"pitch_error": 4.1, "damping_ratio": 0.0021, **_bearings(0.21, 0.055, 0.0011, 0.0009)},
         ("integration.transient_periods=2000",),
+    ),
+    "tori 1": Lanes(
+        "mesh_frequency",
+        0.531,
+        2.297,
+        40,
+        {"pitch_error": 1.7, "damping_ratio": 0.0017, **_bearings(0.46, 0.15, 0.0012, 0.0019)},
+        ("integration.transient_periods=1000",),
+    ),
+    "tori 2": Lanes(
+        "pitch_error",
+        0.23,
+        7.93,
+        40,
+        {"mesh_frequency": 1.31, "damping_ratio": 0.0024, **_bearings(0.095, 0.29, 0.0016, 0.0011)},
+        ("integration.transient_periods=1000",),
+    ),
+    "tori 3": Lanes(
+        "load",
+        0.061,
+        0.931,
+        40,
+        {
+            "mesh_frequency": 1.07,
+            "pitch_error": 3.3,
+            "damping_ratio": 0.0019,
+            **_bearings(0.17, 0.071, 0.001, 0.0014),
+        },
+        ("integration.transient_periods=1000",),
     ),
     "no helix": Lanes(
         "pitch_error",
