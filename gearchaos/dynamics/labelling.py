@@ -10,7 +10,6 @@ from gearchaos.dynamics.exponents import sum_of_exponents
 from gearchaos.dynamics.orbits import polish
 from gearchaos.records.bands import subsequence_spread
 from gearchaos.records.label import (
-    CHAOTIC,
     DIVERGED,
     MOST_POINTS,
     PERIODIC,
@@ -19,14 +18,14 @@ from gearchaos.records.label import (
     UNRESOLVED,
     Labels,
     Record,
+    doubtful,
     label,
-    may_rotate_slowly,
     settling_periods,
 )
 from gearchaos.records.period import coordinate_scale, return_distances
 
-LONGER = 4
-"""How many times the record a lane that may be on a torus goes on, to be looked at once more."""
+LOOKS = (4, 16)
+"""How many times the record doubtful lanes go on, and then those that are doubtful still."""
 
 WHOLE = 0.25
 """Largest difference of the subsequences of a curve, see `subsequence_spread`."""
@@ -35,19 +34,45 @@ WHOLE = 0.25
 def labels_of(system: System, outcome: Outcome, plan: Plan) -> Labels:
     """Label lanes by their record, which should hold `MOST_POINTS` section points or all there are.
 
-    ``plan`` is that by which they were integrated.
+    ``plan`` is that by which they were integrated. `doubtful` lanes are labelled by a longer record
+    that begins where theirs ended, and what that does not tell by a still longer one.
     """
     record = _record(system, outcome, MOST_POINTS)
     labels = label(record)
     _settle(system, outcome, plan, labels, settling_periods(record, labels))
-    rotating = np.flatnonzero((labels.motion == QUASI_PERIODIC) | may_rotate_slowly(record, labels))
-    # In portions whose longer records take no more memory than those of all lanes.
-    for lanes in np.array_split(rotating, LONGER):
-        if lanes.size:
-            start = outcome.end_state[lanes]
-            again = _second_look(system.of(lanes), start, plan, labels.motion[lanes])
-            labels.motion[lanes] = again
+    lanes = np.flatnonzero(doubtful(record, labels))
+    state, tangent = outcome.end_state.copy(), outcome.end_tangent.copy()
+    for longer in LOOKS:
+        # In portions whose longer records take no more memory than those of all lanes.
+        size = max(1, system.lanes // longer)
+        for first in range(0, lanes.size, size):
+            some = lanes[first : first + size]
+            further = plan._replace(
+                transient_periods=0,
+                recorded_periods=longer * plan.recorded_periods,
+                section_points=longer * min(MOST_POINTS, plan.recorded_periods),
+            )
+            again = integrate(system.of(some), state[some], further, tangent_start=tangent[some])
+            state[some], tangent[some] = again.end_state, again.end_tangent
+            motion, period = _told(system.of(some), again, further, labels.motion[some])
+            labels.motion[some], labels.period[some] = motion, period
+        lanes = lanes[np.isin(labels.motion[lanes], (UNRESOLVED, ))]
     return labels
+
+
+def _told(
+    system: System, outcome: Outcome, plan: Plan, motion: NDArray[np.uint8]
+) -> tuple[NDArray[np.uint8], NDArray[np.int32]]:
+    """Return motion and period that a longer record tells of lanes, and what was known before."""
+    record = _record(system, outcome, plan.section_points)
+    labels = label(record)
+    _settle(system, outcome, plan, labels, settling_periods(record, labels))
+    seen = (motion == QUASI_PERIODIC) | (labels.motion == QUASI_PERIODIC)
+    torus = seen & np.isin(labels.motion, (UNRESOLVED, QUASI_PERIODIC))
+    labels.motion[torus] = np.where(
+        subsequence_spread(outcome.section[torus]) <= WHOLE, QUASI_PERIODIC, UNRESOLVED
+    )
+    return labels.motion, labels.period
 
 
 def _record(system: System, outcome: Outcome, most_points: int) -> Record:
@@ -57,25 +82,6 @@ def _record(system: System, outcome: Outcome, most_points: int) -> Record:
         outcome.status != Status.OK,
         _admits_tori(system),
     )
-
-
-def _second_look(
-    system: System, start: NDArray[np.float64], plan: Plan, motion: NDArray[np.uint8]
-) -> NDArray[np.uint8]:
-    """Tell by a longer record, which begins where theirs ended, whether lanes are on a torus."""
-    longer = plan._replace(
-        transient_periods=0,
-        recorded_periods=LONGER * plan.recorded_periods,
-        section_points=LONGER * min(MOST_POINTS, plan.recorded_periods),
-    )
-    again = integrate(system, start, longer)
-    found = label(_record(system, again, longer.section_points)).motion
-    seen = (motion == QUASI_PERIODIC) | (found == QUASI_PERIODIC)
-    contradicted = np.isin(found, (PERIODIC, CHAOTIC, DIVERGED))
-    torus = seen & ~contradicted & (subsequence_spread(again.section) <= WHOLE)
-    told = np.where(torus, QUASI_PERIODIC, UNRESOLVED)
-    told[found == CHAOTIC] = CHAOTIC
-    return told.astype(np.uint8)
 
 
 def _admits_tori(system: System) -> NDArray[np.bool_]:
