@@ -54,25 +54,21 @@ def labels_of(system: System, outcome: Outcome, plan: Plan) -> Labels:
             )
             again = integrate(system.of(some), state[some], further, tangent_start=tangent[some])
             state[some], tangent[some] = again.end_state, again.end_tangent
-            motion, period = _told(system.of(some), again, further, labels.motion[some])
-            labels.motion[some], labels.period[some] = motion, period
-        lanes = lanes[np.isin(labels.motion[lanes], (UNRESOLVED, ))]
+            told = _told(system.of(some), again, further)
+            labels.motion[some], labels.period[some] = told.motion, told.period
+        lanes = lanes[labels.motion[lanes] == UNRESOLVED]
     return labels
 
 
-def _told(
-    system: System, outcome: Outcome, plan: Plan, motion: NDArray[np.uint8]
-) -> tuple[NDArray[np.uint8], NDArray[np.int32]]:
-    """Return motion and period that a longer record tells of lanes, and what was known before."""
+def _told(system: System, outcome: Outcome, plan: Plan) -> Labels:
+    """Return what a longer record tells; also of a torus, that it is one rather than a cascade."""
     record = _record(system, outcome, plan.section_points)
     labels = label(record)
     _settle(system, outcome, plan, labels, settling_periods(record, labels))
-    seen = (motion == QUASI_PERIODIC) | (labels.motion == QUASI_PERIODIC)
-    torus = seen & np.isin(labels.motion, (UNRESOLVED, QUASI_PERIODIC))
-    labels.motion[torus] = np.where(
-        subsequence_spread(outcome.section[torus]) <= WHOLE, QUASI_PERIODIC, UNRESOLVED
-    )
-    return labels.motion, labels.period
+    torus = np.flatnonzero(labels.motion == QUASI_PERIODIC)
+    hopping = subsequence_spread(outcome.section[torus]) > WHOLE
+    labels.motion[torus[hopping]] = UNRESOLVED
+    return labels
 
 
 def _record(system: System, outcome: Outcome, most_points: int) -> Record:
