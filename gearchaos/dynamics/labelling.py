@@ -8,8 +8,9 @@ from numpy.typing import NDArray
 
 from gearchaos.dynamics.exponents import sum_of_exponents
 from gearchaos.dynamics.orbits import polish
-from gearchaos.records.bands import subsequence_spread
+from gearchaos.records.bands import band_count, subsequence_spread
 from gearchaos.records.label import (
+    CHAOTIC,
     DIVERGED,
     MOST_POINTS,
     PERIODIC,
@@ -38,36 +39,49 @@ def labels_of(system: System, outcome: Outcome, plan: Plan) -> Labels:
     that begins where theirs ended, and what that does not tell by a still longer one.
     """
     record = _record(system, outcome, MOST_POINTS)
-    labels = label(record)
-    _settle(system, outcome, plan, labels, settling_periods(record, labels))
+    labels = _told(system, outcome, plan, record)
     lanes = np.flatnonzero(doubtful(record, labels))
     state, tangent = outcome.end_state.copy(), outcome.end_tangent.copy()
     for longer in LOOKS:
+        further = plan._replace(
+            transient_periods=0,
+            recorded_periods=longer * plan.recorded_periods,
+            section_points=longer * min(MOST_POINTS, plan.recorded_periods),
+            history_periods=0,
+        )
         # In portions whose longer records take no more memory than those of all lanes.
         size = max(1, system.lanes // longer)
         for first in range(0, lanes.size, size):
             some = lanes[first : first + size]
-            further = plan._replace(
-                transient_periods=0,
-                recorded_periods=longer * plan.recorded_periods,
-                section_points=longer * min(MOST_POINTS, plan.recorded_periods),
-            )
-            again = integrate(system.of(some), state[some], further, tangent_start=tangent[some])
+            part = system.of(some)
+            again = integrate(part, state[some], further, tangent_start=tangent[some])
             state[some], tangent[some] = again.end_state, again.end_tangent
-            told = _told(system.of(some), again, further)
+            told = _told_again(part, again, further)
             labels.motion[some], labels.period[some] = told.motion, told.period
-        lanes = lanes[labels.motion[lanes] == UNRESOLVED]
+            labels.bands[some] = told.bands
+            _measure_return(labels, record.section, some[told.period > 0])
+        sound = np.isfinite(state[lanes]).all(axis=1)
+        lanes = lanes[sound & (labels.motion[lanes] == UNRESOLVED)]
     return labels
 
 
-def _told(system: System, outcome: Outcome, plan: Plan) -> Labels:
-    """Return what a longer record tells; also of a torus, that it is one rather than a cascade."""
-    record = _record(system, outcome, plan.section_points)
+def _told(system: System, outcome: Outcome, plan: Plan, record: Record) -> Labels:
+    """Return what one record tells."""
     labels = label(record)
     _settle(system, outcome, plan, labels, settling_periods(record, labels))
-    torus = np.flatnonzero(labels.motion == QUASI_PERIODIC)
-    hopping = subsequence_spread(outcome.section[torus]) > WHOLE
-    labels.motion[torus[hopping]] = UNRESOLVED
+    lanes = np.flatnonzero(np.isin(labels.motion, (CHAOTIC, QUASI_PERIODIC)))
+    labels.bands[lanes] = band_count(record.section[lanes])
+    return labels
+
+
+def _told_again(system: System, outcome: Outcome, plan: Plan) -> Labels:
+    """Return what a longer record tells; also of a torus, that it is not a cascade."""
+    labels = _told(system, outcome, plan, _record(system, outcome, plan.section_points))
+    tori = np.flatnonzero(labels.motion == QUASI_PERIODIC)
+    hopping = tori[subsequence_spread(outcome.section[tori]) > WHOLE]
+    # What diverges only now has not done so in what is kept.
+    refused = np.concatenate([hopping, np.flatnonzero(labels.motion == DIVERGED)])
+    labels.motion[refused], labels.bands[refused] = UNRESOLVED, 0
     return labels
 
 
@@ -78,6 +92,12 @@ def _record(system: System, outcome: Outcome, most_points: int) -> Record:
         outcome.status != Status.OK,
         _admits_tori(system),
     )
+
+
+def _measure_return(labels: Labels, section: NDArray[np.float64], lanes: NDArray[np.intp]) -> None:
+    """Keep how near their own period brings the record of some lanes back to itself."""
+    distances = return_distances(section[lanes])
+    labels.return_distance[lanes] = distances[np.arange(lanes.size), labels.period[lanes] - 1]
 
 
 def _admits_tori(system: System) -> NDArray[np.bool_]:
@@ -108,4 +128,4 @@ def _settle(
         searched[settled] = False
         labels.motion[settled] = PERIODIC
         labels.period[settled] = n
-        labels.return_distance[settled] = return_distances(outcome.section[settled])[:, n - 1]
+        _measure_return(labels, outcome.section, settled)

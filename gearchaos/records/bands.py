@@ -79,13 +79,13 @@ def band_count(section: Floats) -> NDArray[np.int32]:
 
 def _may_have_bands(section: Floats) -> NDArray[np.bool_]:
     """Whether subsequences explain much of a coordinate's variance: looking at pairs is dear."""
-    lanes, points, _ = section.shape
+    lanes, points, states = section.shape
     found = np.zeros(lanes, dtype=np.bool_)
     for stride in (2, 3, 5, 7, 11, 13):
         turns = points // stride
         if turns < FEWEST:
             break
-        dealt = section[:, -turns * stride :].reshape(lanes, turns, stride, -1)
+        dealt = section[:, -turns * stride :].reshape(lanes, turns, stride, states)
         variance = np.var(dealt, axis=(1, 2))
         between = np.var(np.mean(dealt, axis=1), axis=1)
         found |= np.any(between > EXPLAINED * variance, axis=1)

@@ -64,12 +64,15 @@ class Labels(NamedTuple):
     """Labels of some lanes.
 
     ``motion`` (lanes,) of `MEANINGS`; ``period`` (lanes,) in mesh periods, 0 where the motion is
-    not periodic; ``return_distance`` (lanes,): that of the period, or else the smallest one.
+    not periodic; ``return_distance`` (lanes,): that of the period, or else the smallest one;
+    ``bands`` (lanes,): on how many a chaotic or quasi-periodic section lies, see `band_count`, 0
+    where it is neither or has not been looked at.
     """
 
     motion: NDArray[np.uint8]
     period: NDArray[np.int32]
     return_distance: Floats
+    bands: NDArray[np.int32]
 
 
 def label(record: Record) -> Labels:
@@ -95,7 +98,7 @@ def label(record: Record) -> Labels:
     own = distances[np.arange(period.size), np.maximum(period, 1) - 1]
     distance = np.where(period > 0, own, np.where(np.isfinite(smallest), smallest, np.nan))
     distance[record.diverged] = np.nan
-    return Labels(motion, period, distance)
+    return Labels(motion, period, distance, np.zeros_like(period))
 
 
 def settling_periods(record: Record, labels: Labels) -> NDArray[np.int32]:

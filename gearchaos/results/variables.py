@@ -23,6 +23,7 @@ LARGEST_EXPONENT = "lyapunov_exponent"
 ALL_EXPONENTS = "lyapunov_exponents"
 STANDARD_ERROR = "_standard_error"
 LABELS = ("motion", "period")
+BANDS = "bands"
 STATUS = "status"
 
 STATE_WORDING: dict[str, tuple[str, str]] = {
@@ -158,10 +159,14 @@ def sweep_variables(
     if motion_meanings:
         period = "mesh periods after which the motion repeats, 0 where it is not periodic"
         text = "smallest distance after which the motion returns, of all states, scaled"
+        bands = (
+            "bands a chaotic or quasi-periodic section hops between in turn, 0 for other motions"
+        )
         variables += [
             kind("motion", "kind of motion", motion_meanings),
             count("period", period, "$n$"),
             real("return_distance", text),
+            count(BANDS, bands),
         ]
     if exponents:
         name, error = ALL_EXPONENTS, "standard error of each Lyapunov exponent"

@@ -83,8 +83,10 @@ def bands(section: np.ndarray) -> int:
 @pytest.mark.parametrize(
     ("r", "count"),
     # Bands merge at 3.5748, 3.5925722 and 3.6785735; in the window of period 3 at 3.85680.
-    [(3.573, 8), (3.58, 4), (3.5915, 4), (3.594, 2), (3.677, 2), (3.68, 1), (4.0, 1)]
-    + [(3.8531, 3), (3.8575, 1)],
+    [
+        *((3.573, 8), (3.58, 4), (3.5915, 4), (3.594, 2), (3.677, 2), (3.68, 1), (4.0, 1)),
+        *((3.8531, 3), (3.8575, 1)),
+    ],
 )
 def test_the_bands_of_the_logistic_map_merge_where_they_are_known_to(r, count):
     assert bands(logistic(r, 512)) == count

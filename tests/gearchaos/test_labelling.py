@@ -83,7 +83,7 @@ def test_labels_change_nothing_else_of_a_result(overrides):
     # Without an odd lane out: labels come on top.
     with_labels = computed(simulation(*overrides))
     without = computed(simulation(*overrides, "outputs.motion=false"))
-    labels = {"motion", "period", "return_distance"}
+    labels = {"motion", "period", "return_distance", "bands"}
     assert with_labels.keys() - without.keys() == labels
     assert_same({n: a for n, a in with_labels.items() if n not in labels}, without)
 

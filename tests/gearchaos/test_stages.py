@@ -125,7 +125,7 @@ def test_lanes_that_do_not_stand_for_themselves_are_not_refined(
 
 
 def test_a_file_without_labels_or_without_its_configuration_is_told(result, tmp_path):
-    labels = ("motion", "period", "return_distance")
+    labels = ("motion", "period", "return_distance", "bands")
     without = Result(
         result.axes,
         [variable for name, variable in result.variables.items() if name not in labels],
