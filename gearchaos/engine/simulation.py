@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from gearchaos.configuration import Configuration
 from gearchaos.dynamics.exponents import exponents, sum_of_exponents
-from gearchaos.dynamics.labelling import labels_of
+from gearchaos.dynamics.labelling import LOOKS, labels_of
 from gearchaos.engine.error_check import MEANINGS, check_arrays, checked_lanes
 from gearchaos.engine.lanes import Lanes
 from gearchaos.engine.steps import (
@@ -161,15 +161,15 @@ class Simulation:
 
     def block_memory(self, threads: int) -> int:
         """Return about how many bytes the arrays of one block take while it is computed."""
-        states = len(self.lanes.states)
-        numbers = (self.recording.section_points + 4) * states
+        states, lanes = len(self.lanes.states), min(len(self.lanes), self.block_lanes(threads))
+        numbers, records = (self.recording.section_points + 4) * states, lanes
         if self.plan.tangent:
             numbers += self.plan.recorded_periods
-            # Lanes that a first record leaves unresolved are looked at again, a share at a time.
-            numbers *= 2 if self.config.outputs.motion else 1
+            # Doubtful lanes are looked at again, a share at a time, but a whole lane at least.
+            records += max(lanes, LOOKS[-1]) if self.config.outputs.motion else 0
         if self.config.outputs.exponents:
             numbers += self.plan.recorded_periods * states
-        return 8 * min(len(self.lanes), self.block_lanes(threads)) * numbers
+        return 8 * records * numbers
 
     def block_lanes(self, threads: int) -> int:
         """Return how many lanes make a block: work for every thread, and progress to be seen."""
