@@ -1,18 +1,47 @@
-"""The stages of a sweep beside those that the paper prints."""
+"""The stages of a sweep beside those that the paper prints.
+
+The paper's "two-times quasi-periodic" motion (its figure 10: two closed bands of curves, two sets of
+section points) is read as one that visits two sets in turn, be it periodic or chaotic on them: what
+a cascade of period doublings leaves behind, until a crisis widens the attractor.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gearchaos.paper.published import PrintedStage
 from gearchaos.paper.verdict import RULES
 from gearchaos.results.result import Result
-from gearchaos.results.stage_table import Stage, labelled_lanes, stage_table
+from gearchaos.results.stage_table import LabelledLanes, Stage, labelled_lanes, stage_table
 
 WINDOW = 0.1
 """Narrowest stage, in multiples of e(tau): narrower ones are windows in what surrounds them."""
+
+
+TWO_BANDS = "two bands"
+
+EXCEPTIONS = 0.05
+"""Share of its section points that may follow one from the same band: the bands may touch."""
+
+
+def lanes_as_printed(result: Result) -> LabelledLanes:
+    """Label the lanes as the paper does: motions of more than two points on two bands by these."""
+    lanes = labelled_lanes(result)
+    longer = (lanes.period > 2) | np.isin(lanes.labels, ("chaotic", "quasi-periodic", "unresolved"))
+    on_two = longer & (exceptions_to_turns(result["section_delta_5"]) <= EXCEPTIONS)
+    return lanes._replace(labels=np.where(on_two, TWO_BANDS, lanes.labels))
+
+
+def exceptions_to_turns(section: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the share of points, shape (lanes,), on the same side of the median as the one before.
+
+    None on two bands that are visited in turn, half of them where the next point could be any.
+    """
+    above = section > np.median(section, axis=1, keepdims=True)
+    return np.asarray(np.mean(above[:, 1:] == above[:, :-1], axis=1))
 
 
 def counterparts(printed: Sequence[PrintedStage], result: Result) -> list[Stage | None]:
@@ -21,23 +50,29 @@ def counterparts(printed: Sequence[PrintedStage], result: Result) -> list[Stage 
     Of the stages with the printed motion, the one that has most in common with the printed one; if
     there is none that overlaps, the nearest one within reach of the rule for boundaries, or None.
     """
-    stages = stage_table(labelled_lanes(result), WINDOW)
+    stages = stage_table(lanes_as_printed(result), WINDOW)
     return [_counterpart(one, [s for s in stages if s.label == one.motion]) for one in printed]
 
 
 def motion_at(result: Result, value: float) -> str:
-    """Return the label of the lane next to a value, such as ``period 2`` or ``chaotic``."""
-    lanes = labelled_lanes(result)
+    """Return the motion of the lane next to a value, such as ``period 2`` or ``two bands``."""
+    lanes = lanes_as_printed(result)
     return str(lanes.labels[np.argmin(np.abs(lanes.values - value))])
 
 
 def motions_between(result: Result, first: float, last: float) -> list[str]:
-    """Return the labels of the lanes from one value to another, both included."""
-    lanes = labelled_lanes(result)
+    """Return the motions of the lanes from one value to another, both included."""
+    lanes = lanes_as_printed(result)
     # A value that is the first or the last but for rounding is inside.
     margin = 1e-9 * (abs(first) + abs(last))
     inside = (lanes.values >= first - margin) & (lanes.values <= last + margin)
     return [str(label) for label in lanes.labels[inside]]
+
+
+def own_share(result: Result, stage: Stage) -> float:
+    """Return the share of the lanes of a stage that have its own motion."""
+    labels = lanes_as_printed(result).labels[stage.first : stage.last + 1]
+    return float(np.mean(labels == stage.label))
 
 
 def _counterpart(printed: PrintedStage, alike: Sequence[Stage]) -> Stage | None:
