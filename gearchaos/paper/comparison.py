@@ -102,9 +102,7 @@ def _stages(
         yield Row(printed.printed, "figure 7", kind, theirs, mine, difference, verdict)
 
 
-def _boundaries(
-    paper: Published, pairs: list[tuple[PrintedStage, Stage | None]]
-) -> Iterator[Row]:
+def _boundaries(paper: Published, pairs: list[tuple[PrintedStage, Stage | None]]) -> Iterator[Row]:
     kind = paper.kinds["boundaries"]
     for (before, ended), (after, begun) in pairwise(pairs):
         # A boundary has two sides.

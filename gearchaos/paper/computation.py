@@ -25,10 +25,10 @@ class Reproduction:
     """What was computed to answer the paper.
 
     ``config``: of the torsional diagram, figure 7; ``sweep``: that diagram; ``hop``: the hop in it,
-    with the interval in which two motions coexist; ``exponents``: the largest ones of all ten states
-    before and after it, for a start at rest, None without a hop; ``response``: all effects, at rest at the start,
-    without pitch error and at those of figures 5, 6, 14 and 15 and of Table 3; ``motions``,
-    ``motions_from_contact``: at the pitch errors of figures 8 to 13, by the start.
+    with the interval in which two motions coexist; ``exponents``: the largest ones of all ten
+    states before and after it, starting at rest, None without a hop; ``response``: all effects, at
+    rest at the start, without pitch error and at those of figures 5, 6, 14 and 15 and of Table 3;
+    ``motions``, ``motions_from_contact``: at the pitch errors of figures 8 to 13, by the start.
     """
 
     config: Configuration

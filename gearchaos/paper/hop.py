@@ -48,7 +48,7 @@ class Change(NamedTuple):
 
     ``before``, ``after``: last pitch error on the motion of the upward sweep, first one on the
     other; ``returns``: how often the start comes back to the first motion at higher pitch errors;
-    ``exponents``: the largest Lyapunov exponents before and after, as `exponents_beside` finds them.
+    ``exponents``: the largest Lyapunov exponents before and after, those of the periodic orbits.
     """
 
     before: float

@@ -1,8 +1,8 @@
 """The stages of a sweep beside those that the paper prints.
 
-The paper's "two-times quasi-periodic" motion (its figure 10: two closed bands of curves, two sets of
-section points) is read as one that visits two sets in turn, be it periodic or chaotic on them: what
-a cascade of period doublings leaves behind, until a crisis widens the attractor.
+The paper's "two-times quasi-periodic" motion (its figure 10: two closed bands of curves, two sets
+of section points) is read as one that visits two bands in turn, be it periodic or chaotic on them:
+what a cascade of period doublings leaves behind, until a crisis widens the attractor.
 """
 
 from __future__ import annotations
@@ -32,7 +32,9 @@ def lanes_as_printed(result: Result) -> LabelledLanes:
     lanes = labelled_lanes(result)
     longer = (lanes.period > 2) | np.isin(lanes.labels, ("chaotic", "quasi-periodic", "unresolved"))
     on_two = longer & (exceptions_to_turns(result["section_delta_5"]) <= EXCEPTIONS)
-    return lanes._replace(labels=np.where(on_two, TWO_BANDS, lanes.labels))
+    return lanes._replace(
+        labels=np.where(on_two, TWO_BANDS, lanes.labels), period=np.where(on_two, 0, lanes.period)
+    )
 
 
 def exceptions_to_turns(section: NDArray[np.float64]) -> NDArray[np.float64]:
