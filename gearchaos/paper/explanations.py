@@ -10,30 +10,29 @@ import numpy as np
 from gearchaos.paper.comparison import short, signed
 from gearchaos.paper.computation import Reproduction, lane_of
 from gearchaos.paper.hop_figure import STARTS
+from gearchaos.paper.our_numbers import NAN
 from gearchaos.paper.published import Published
-from gearchaos.paper.stages import motions_between
+from gearchaos.paper.stages import (
+    EXCEPTIONS,
+    TWO_BANDS,
+    motions_between,
+    on_two_bands,
+)
 from gearchaos.results.result import Result
 
 
 def stages_in_words(printed: Published, found: Reproduction) -> str:
-    """Tell what lies in the stages that do not agree, and in the last one."""
+    """Tell what lies in the stages that the paper calls chaotic or by a name of its own."""
     texts = []
     for stage in printed.stages:
-        if stage.printed != stage.motion or stage is printed.stages[-1]:
+        if stage.printed != stage.motion or stage.motion == "chaotic":
             counts = Counter(motions_between(found.sweep, stage.first, stage.last))
             worded = ", ".join(f"{count} {label}" for label, count in counts.most_common(6))
             texts.append(
                 f'In the paper\'s stage "{stage.printed}", {stage.first:g} to {stage.last:g} e(τ), '
                 f"the {counts.total()} lanes of the sweep are: {worded}."
             )
-    if "quasi-periodic" not in motions_between(
-        found.sweep, *found.sweep[found.sweep.axis][[0, -1]]
-    ):
-        texts.append(
-            "A motion is called quasi-periodic if its largest exponent is zero within its error "
-            "and its averages converge as those on a torus do. None was found: between period 2 "
-            "and chaos lie motions of longer periods."
-        )
+    texts.append(_third_stage_in_words(printed, found))
     last = printed.stages[-1]
     escaped = motions_between(found.sweep, last.first, last.last).count("period 1")
     if escaped:
@@ -42,6 +41,36 @@ def stages_in_words(printed: Published, found: Reproduction) -> str:
             "coexisting motion of period 1."
         )
     return " ".join(texts)
+
+
+def _third_stage_in_words(printed: Published, found: Reproduction) -> str:
+    """Tell how the bands merge, where the attractor widens at once, and what its exponents are."""
+    sweep = found.sweep
+    (stage,) = [stage for stage in printed.stages if stage.motion == TWO_BANDS]
+    values, width = sweep[sweep.axis], np.ptp(sweep["section_delta_5"], axis=1)
+    near = (values > stage.first - 0.5) & (values < stage.last + 0.5)
+    on_two = near & on_two_bands(sweep)
+    if not on_two.any():
+        return ""
+    ends = [
+        f"{values[near & on_two_bands(sweep, share)].max():.2f} with {share:.0%}"
+        for share in (0.02, EXCEPTIONS, 0.1)
+    ]
+    apart = values[near & on_two_bands(sweep, 0.0)]
+    begun = int(np.argmax(on_two))
+    widest = np.maximum.accumulate(width[begun : int(np.flatnonzero(near)[-1]) + 1])
+    crisis = int(np.argmax(widest[1:] / widest[:-1]))
+    exponents = sweep["lyapunov_exponent"][on_two]
+    return (
+        f"Up to {apart.max(initial=np.nan):.2f} the bands are visited strictly in turn; then they "
+        "touch, and a growing share of the section points follows one from the same side. The last "
+        f"lane on two bands depends on the share that is allowed: {', '.join(ends)}. Its end is an "
+        f"interior crisis: the section, no wider than {widest[crisis]:.2f} up to there, spans "
+        f"{widest[crisis + 1]:.2f} at once at {values[begun + crisis + 1]:.2f} e(τ). The exponents "
+        f"of the lanes on two bands, {signed(exponents.min(), 3)} to {signed(exponents.max(), 3)}, "
+        "are those of periodic motions first and of chaos then; the paper's are about zero, as on "
+        "a torus, and no torus was found here."
+    )
 
 
 def hop_in_words(printed: Published, found: Reproduction) -> str:
@@ -80,13 +109,16 @@ def hop_in_words(printed: Published, found: Reproduction) -> str:
         values = found.sweep[found.sweep.axis]
         exponents = found.sweep["lyapunov_exponent"][values <= rest.before]
         before, after = (signed(exponent, 5) for exponent in rest.exponents)
+        whole, later = (signed(exponent, 5) for exponent in found.exponents or (NAN, NAN))
         texts.append(
-            f"From the Floquet multipliers of the two orbits the largest exponent is {before} "
-            f"before the hop and {after} after it, where the paper prints {signed(theirs, 4)}. "
-            "While the teeth stay in contact the model is linear, so the pitch error is a mere "
-            "forcing and does not enter the exponent: over all lanes before the hop it varies by "
-            f"{np.ptp(exponents):.0e}. With these groups no pitch error before the hop can have "
-            "the printed exponent."
+            "From the Floquet multipliers of the two orbits the largest exponent of all ten states "
+            f"is {whole} before the hop and {later} after it, where the paper prints "
+            f"{signed(theirs, 4)}. The paper integrates all of eq. 13, and the axial pair, driven "
+            "one way, brings exponents of its own: with such axial bearings the largest one is "
+            "theirs, whatever torsion does. The six states of torsion and transverse "
+            f"motion alone have {before} and {after}. While the teeth stay in contact the model is "
+            "linear, so the pitch error is a mere forcing and does not enter the exponent: over "
+            f"all lanes before the hop it varies by {np.ptp(exponents):.0e}."
         )
     return "\n\n".join(texts)
 

@@ -29,21 +29,23 @@ EXCEPTIONS = 0.05
 
 def lanes_as_printed(result: Result) -> LabelledLanes:
     """Label the lanes as the paper does: motions of more than two points on two bands by these."""
-    lanes = labelled_lanes(result)
-    longer = (lanes.period > 2) | np.isin(lanes.labels, ("chaotic", "quasi-periodic", "unresolved"))
-    on_two = longer & (exceptions_to_turns(result["section_delta_5"]) <= EXCEPTIONS)
+    lanes, on_two = labelled_lanes(result), on_two_bands(result)
     return lanes._replace(
         labels=np.where(on_two, TWO_BANDS, lanes.labels), period=np.where(on_two, 0, lanes.period)
     )
 
 
-def exceptions_to_turns(section: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the share of points, shape (lanes,), on the same side of the median as the one before.
+def on_two_bands(result: Result, exceptions: float = EXCEPTIONS) -> NDArray[np.bool_]:
+    """Return which motions of more than two points change sides at every point, shape (lanes,).
 
-    None on two bands that are visited in turn, half of them where the next point could be any.
+    The sides are those of the median of the section; ``exceptions`` is the share of points that may
+    be on the same side as the one before, which is half of them where the next could be any.
     """
+    lanes, section = labelled_lanes(result), result["section_delta_5"]
+    longer = (lanes.period > 2) | np.isin(lanes.labels, ("chaotic", "quasi-periodic", "unresolved"))
     above = section > np.median(section, axis=1, keepdims=True)
-    return np.asarray(np.mean(above[:, 1:] == above[:, :-1], axis=1))
+    stays = np.mean(above[:, 1:] == above[:, :-1], axis=1)
+    return np.asarray(longer & (stays <= exceptions))
 
 
 def counterparts(printed: Sequence[PrintedStage], result: Result) -> list[Stage | None]:
