@@ -36,16 +36,22 @@ def lanes_as_printed(result: Result) -> LabelledLanes:
 
 
 def on_two_bands(result: Result, exceptions: float = EXCEPTIONS) -> NDArray[np.bool_]:
-    """Return which motions of more than two points change sides at every point, shape (lanes,).
+    """Return which motions of more than two points visit two bands in turn, shape (lanes,).
 
-    The sides are those of the median of the section; ``exceptions`` is the share of points that may
-    be on the same side as the one before, which is half of them where the next could be any.
+    ``exceptions`` is the largest share of their section points that may be `out_of_turn`.
     """
-    lanes, section = labelled_lanes(result), result["section_delta_5"]
+    lanes, stays = labelled_lanes(result), out_of_turn(result["section_delta_5"])
     longer = (lanes.period > 2) | np.isin(lanes.labels, ("chaotic", "quasi-periodic", "unresolved"))
-    above = section > np.median(section, axis=1, keepdims=True)
-    stays = np.mean(above[:, 1:] == above[:, :-1], axis=1)
     return np.asarray(longer & (stays <= exceptions))
+
+
+def out_of_turn(section: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the share of points on the same side of the median as the one before, (lanes,).
+
+    It is zero for two bands in turn, and a half where the next point could be on either side.
+    """
+    above = section > np.median(section, axis=1, keepdims=True)
+    return np.asarray(np.mean(above[:, 1:] == above[:, :-1], axis=1))
 
 
 def counterparts(printed: Sequence[PrintedStage], result: Result) -> list[Stage | None]:
