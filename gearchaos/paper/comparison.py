@@ -44,7 +44,9 @@ def compare(printed: Published, found: Reproduction) -> dict[str, list[Row]]:
         )
         for key, number in printed.numbers.items()
     }
-    pairs = list(zip(printed.stages, counterparts(printed.stages, found.sweep), strict=True))
+    pairs = list(
+        zip(printed.stages, counterparts(printed.stages, found.labelled(found.sweep)), strict=True)
+    )
     peak = numbers.pop("spectral_peak")
     added, hop = (
         [numbers.pop(key) for key in list(numbers) if key.startswith(group)]
@@ -89,7 +91,7 @@ def _stages(
         mine = difference = NONE
         verdict = Verdict.DOES_NOT
         if stage is not None:
-            share = own_share(found.sweep, stage)
+            share = own_share(found.labelled(found.sweep), stage)
             mine = f"{stage.start:.2f} – {stage.end:.2f}"
             if share < 1.0:
                 mine += f", in {share:.0%} of its lanes"
@@ -114,11 +116,12 @@ def _boundaries(paper: Published, pairs: list[tuple[PrintedStage, Stage | None]]
 
 
 def _motions(printed: Published, found: Reproduction) -> Iterator[Row]:
-    reach = RULES["boundary"].in_kind
+    reach, sweep = RULES["boundary"].in_kind, found.labelled(found.sweep)
+    starts = found.labelled(found.motions), found.labelled(found.motions_from_contact)
     for shown in printed.motions:
         p = shown.pitch_error
-        mine, other = motion_at(found.motions, p), motion_at(found.motions_from_contact, p)
-        near = motions_between(found.sweep, p - reach, p + reach)
+        mine, other = (motion_at(lanes, p) for lanes in starts)
+        near = motions_between(sweep, p - reach, p + reach)
         yield Row(
             f"motion at {p:g} e(τ)",
             f"figure {shown.figure}",

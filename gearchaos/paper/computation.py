@@ -10,9 +10,11 @@ import numpy as np
 from gearchaos.configuration import Configuration
 from gearchaos.engine.response import respond
 from gearchaos.engine.running import run
+from gearchaos.paper.bands import Crisis, crisis_of, lanes_as_printed
 from gearchaos.paper.hop import STEP, Hop, exponents_beside, find_hop
 from gearchaos.paper.published import published
 from gearchaos.results.result import Result
+from gearchaos.results.stage_table import LabelledLanes
 
 KEPT_PERIODS = 64
 """Mesh periods of a response: lines of a spectrum 1/64 of the mesh frequency apart."""
@@ -38,6 +40,15 @@ class Reproduction:
     response: Result
     motions: Result
     motions_from_contact: Result
+
+    @property
+    def crisis(self) -> Crisis | None:
+        """Where the diagram of figure 7 widens at once."""
+        return crisis_of(self.sweep)
+
+    def labelled(self, result: Result) -> LabelledLanes:
+        """Label the lanes of one of these results as the paper does."""
+        return lanes_as_printed(result, self.crisis)
 
     def group(self, name: str) -> float:
         """Return a group that all lanes of the sweep share."""

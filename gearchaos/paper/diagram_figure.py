@@ -8,7 +8,6 @@ from gearchaos.figures import bifurcation_page
 from gearchaos.figures.page import Page
 from gearchaos.paper.computation import Reproduction
 from gearchaos.paper.published import Published
-from gearchaos.paper.stages import lanes_as_printed
 
 
 def diagram_page(printed: Published, found: Reproduction) -> Page:
@@ -16,5 +15,5 @@ def diagram_page(printed: Published, found: Reproduction) -> Page:
     boundaries = [after.first for _, after in pairwise(printed.stages)]
     places = [printed.numbers["hop"].value, *boundaries]
     return bifurcation_page(
-        found.sweep, stages=lanes_as_printed(found.sweep), marked=("changes in Pan 2021", places)
+        found.sweep, stages=found.labelled(found.sweep), marked=("changes in Pan 2021", places)
     )

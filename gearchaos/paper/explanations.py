@@ -7,34 +7,30 @@ from itertools import pairwise
 
 import numpy as np
 
+from gearchaos.paper.bands import OUT_OF_TURN, TWO_BANDS, out_of_turn
 from gearchaos.paper.comparison import short, signed
 from gearchaos.paper.computation import Reproduction, lane_of
 from gearchaos.paper.hop_figure import STARTS
 from gearchaos.paper.our_numbers import NAN
 from gearchaos.paper.published import Published
-from gearchaos.paper.stages import (
-    EXCEPTIONS,
-    TWO_BANDS,
-    motions_between,
-    on_two_bands,
-)
+from gearchaos.paper.stages import motions_between
 from gearchaos.results.result import Result
 
 
 def stages_in_words(printed: Published, found: Reproduction) -> str:
     """Tell what lies in the stages that the paper calls chaotic or by a name of its own."""
-    texts = []
+    texts, lanes = [], found.labelled(found.sweep)
     for stage in printed.stages:
         if stage.printed != stage.motion or stage.motion == "chaotic":
-            counts = Counter(motions_between(found.sweep, stage.first, stage.last))
+            counts = Counter(motions_between(lanes, stage.first, stage.last))
             worded = ", ".join(f"{count} {label}" for label, count in counts.most_common(6))
             texts.append(
                 f'In the paper\'s stage "{stage.printed}", {stage.first:g} to {stage.last:g} e(τ), '
                 f"the {counts.total()} lanes of the sweep are: {worded}."
             )
-    texts.append(_third_stage_in_words(printed, found))
+    texts.append(_third_stage_in_words(found))
     last = printed.stages[-1]
-    escaped = motions_between(found.sweep, last.first, last.last).count("period 1")
+    escaped = motions_between(lanes, last.first, last.last).count("period 1")
     if escaped:
         texts.append(
             f"Towards the end of the sweep chaos is transient: {escaped} lanes have escaped to a "
@@ -43,33 +39,23 @@ def stages_in_words(printed: Published, found: Reproduction) -> str:
     return " ".join(texts)
 
 
-def _third_stage_in_words(printed: Published, found: Reproduction) -> str:
+def _third_stage_in_words(found: Reproduction) -> str:
     """Tell how the bands merge, where the attractor widens at once, and what its exponents are."""
-    sweep = found.sweep
-    (stage,) = [stage for stage in printed.stages if stage.motion == TWO_BANDS]
-    values, width = sweep[sweep.axis], np.ptp(sweep["section_delta_5"], axis=1)
-    near = (values > stage.first - 0.5) & (values < stage.last + 0.5)
-    on_two = near & on_two_bands(sweep)
-    if not on_two.any():
-        return ""
-    ends = [
-        f"{values[near & on_two_bands(sweep, share)].max():.2f} with {share:.0%}"
-        for share in (0.02, EXCEPTIONS, 0.1)
-    ]
-    apart = values[near & on_two_bands(sweep, 0.0)]
-    begun = int(np.argmax(on_two))
-    widest = np.maximum.accumulate(width[begun : int(np.flatnonzero(near)[-1]) + 1])
-    crisis = int(np.argmax(widest[1:] / widest[:-1]))
-    exponents = sweep["lyapunov_exponent"][on_two]
+    lanes, crisis = found.labelled(found.sweep), found.crisis
+    on_two = lanes.labels == TWO_BANDS
+    if crisis is None or not on_two.any():
+        return "No motion on two bands was found that a crisis ends."
+    shares = out_of_turn(found.sweep["section_delta_5"])
+    apart, last = (lanes.values[on_two & (shares <= most)].max() for most in (0.0, OUT_OF_TURN))
+    lowest, highest = (signed(f(lanes.exponent[on_two]), 3) for f in (np.min, np.max))
     return (
-        f"Up to {apart.max(initial=np.nan):.2f} the bands are visited strictly in turn; then they "
-        "touch, and a growing share of the section points follows one from the same side. The last "
-        f"lane on two bands depends on the share that is allowed: {', '.join(ends)}. Its end is an "
-        f"interior crisis: the section, no wider than {widest[crisis]:.2f} up to there, spans "
-        f"{widest[crisis + 1]:.2f} at once at {values[begun + crisis + 1]:.2f} e(τ). The exponents "
-        f"of the lanes on two bands, {signed(exponents.min(), 3)} to {signed(exponents.max(), 3)}, "
-        "are those of periodic motions first and of chaos then; the paper's are about zero, as on "
-        "a torus, and no torus was found here."
+        f"Up to {apart:.2f} e(τ) the two bands are visited strictly in turn; then they touch, and "
+        f"some points, {shares[on_two].max():.0%} of them at most, follow one from the same side, "
+        f"up to the last lane on two bands, {last:.2f}. An interior crisis ends it: the section, "
+        f"no wider than {crisis.before:.2f} up to there, spans {crisis.after:.2f} at once at "
+        f"{crisis.value:.2f}. The exponents of the lanes on two bands go from {lowest} to "
+        f"{highest}: those of periodic motions, and of chaos then. The paper's are about zero, as "
+        "on a torus; no torus was found here."
     )
 
 

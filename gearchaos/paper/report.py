@@ -10,12 +10,13 @@ from importlib.resources import files
 import numpy as np
 
 from gearchaos.figures.response_lane import coordinates_of
+from gearchaos.paper.bands import OUT_OF_TURN
 from gearchaos.paper.comparison import NONE, Row, compare, short
 from gearchaos.paper.computation import Reproduction, largest_acceleration
 from gearchaos.paper.explanations import hop_in_words, increments_in_words, stages_in_words
 from gearchaos.paper.our_numbers import our_numbers, pair_of
 from gearchaos.paper.published import CITATION, Kind, Published
-from gearchaos.paper.stages import EXCEPTIONS, WINDOW
+from gearchaos.paper.stages import WINDOW
 from gearchaos.paper.verdict import OVERLAP, RULES, Verdict
 from gearchaos.results.response_variables import acceleration_of
 from gearchaos.results.result import Result
@@ -56,7 +57,7 @@ def report(printed: Published, found: Reproduction, names: dict[str, str]) -> st
         rules=RULES,
         overlap=OVERLAP,
         window=WINDOW,
-        exceptions=EXCEPTIONS,
+        out_of_turn=OUT_OF_TURN,
         tables={name: _table(table) for name, table in tables.items()},
         printed=values,
         ours=our_numbers(printed, found),

@@ -10,6 +10,7 @@ import pytest
 
 from gearchaos import FileError, load_config, open_result
 from gearchaos.figures.response_lane import coordinates_of
+from gearchaos.paper.bands import OUT_OF_TURN, out_of_turn
 from gearchaos.paper.comparison import compare
 from gearchaos.paper.computation import compute, lane_of, largest_acceleration
 from gearchaos.paper.gallery import check_folder, pictures, write_gallery
@@ -21,14 +22,7 @@ from gearchaos.paper.our_numbers import (
     printed_series,
 )
 from gearchaos.paper.published import Kind, published
-from gearchaos.paper.stages import (
-    EXCEPTIONS,
-    WINDOW,
-    counterparts,
-    lanes_as_printed,
-    motion_at,
-    out_of_turn,
-)
+from gearchaos.paper.stages import WINDOW, counterparts, motion_at
 from gearchaos.paper.sweep_files import sweep_file
 from gearchaos.paper.verdict import (
     OVERLAP,
@@ -306,9 +300,9 @@ def test_the_exponent_before_the_hop_is_that_of_the_sweep(found):
 
 @pytest.mark.slow
 def test_stages_are_found_where_the_labels_are(found):
-    first = counterparts(published().stages, found.sweep)[0]
+    first = counterparts(published().stages, found.labelled(found.sweep))[0]
     assert first is not None and first.start == 0.0
-    assert motion_at(found.sweep, first.end) == "period 1"
+    assert motion_at(found.labelled(found.sweep), first.end) == "period 1"
 
 
 @pytest.fixture(scope="module")
@@ -423,8 +417,9 @@ def test_the_hop_in_the_report_is_where_the_carried_sweeps_part(report, found):
     )
 
 
-def labels_of(result) -> list[str]:
+def labels_of(result, crisis) -> list[str]:
     """The label of every lane, from the arrays: two bands if points take turns about the median."""
+    widest = math.inf if crisis is None else (crisis.before + crisis.after) / 2.0
     meanings = result.variables["motion"].flags
     labels = []
     for kind, n, section in zip(
@@ -433,18 +428,19 @@ def labels_of(result) -> list[str]:
         label = f"period {n}" if n else meanings[kind].replace("_", "-")
         turns = np.diff(np.sign(section - np.median(section))) != 0
         longer = n > 2 or label in ("chaotic", "quasi-periodic", "unresolved")
-        labels.append("two bands" if longer and np.mean(turns) >= 1.0 - EXCEPTIONS else label)
+        on_two = longer and np.mean(turns) >= 1.0 - OUT_OF_TURN and np.ptp(section) < widest
+        labels.append("two bands" if on_two else label)
     return labels
 
 
-def ends_of(motion, result):
-    stages = stage_table(lanes_as_printed(result), WINDOW)
+def ends_of(motion, lanes):
+    stages = stage_table(lanes, WINDOW)
     return [(round(s.start, 2), round(s.end, 2)) for s in stages if s.label == motion]
 
 
 @pytest.mark.slow
 def test_every_stage_in_the_report_is_one_of_the_stage_table(report, found):
-    printed, labels = published().stages, labels_of(found.sweep)
+    printed, labels = published().stages, labels_of(found.sweep, found.crisis)
     values = found.sweep["pitch_error"].round(2).tolist()
     rows = tables(report)["Figure 7: stages"]
     assert [row[0] for row in rows] == [stage.printed for stage in printed]
@@ -468,7 +464,7 @@ def test_every_stage_in_the_report_is_one_of_the_stage_table(report, found):
             own = inside.count(stage.motion) / len(inside)
             assert own > 0.5
             assert share == ("" if own == 1.0 else f"{own:.0%} of its lanes")
-            assert (first, last) in ends_of(stage.motion, found.sweep)
+            assert (first, last) in ends_of(stage.motion, found.labelled(found.sweep))
             assert numbers(row[5]) == pytest.approx(
                 [first - stage.first, last - stage.last], abs=0.006
             )
@@ -482,7 +478,8 @@ def test_every_stage_in_the_report_is_one_of_the_stage_table(report, found):
 @pytest.mark.slow
 def test_every_motion_in_the_report_is_the_label_of_its_lane(report, found):
     rows = tables(report)["Figures 8 to 13: the motion at six pitch errors"]
-    rest, contact = labels_of(found.motions), labels_of(found.motions_from_contact)
+    rest = labels_of(found.motions, found.crisis)
+    contact = labels_of(found.motions_from_contact, found.crisis)
     assert found.motions["pitch_error"].tolist() == [m.pitch_error for m in published().motions]
     for row, shown, mine, other in zip(rows, published().motions, rest, contact, strict=True):
         assert row[:4] == [
