@@ -6,12 +6,13 @@ import numpy as np
 from gearchaos_kernels import Outcome, Plan, Status, System, integrate
 from numpy.typing import NDArray
 
-from gearchaos.dynamics.exponents import sum_of_exponents
+from gearchaos.dynamics.exponents import period_jacobian, sum_of_exponents
 from gearchaos.dynamics.orbits import polish
 from gearchaos.records.bands import subsequence_spread
 from gearchaos.records.label import (
     CHAOTIC,
     DIVERGED,
+    GROWS,
     MOST_POINTS,
     PERIODIC,
     QUASI_PERIODIC,
@@ -39,6 +40,8 @@ def labels_of(system: System, outcome: Outcome, plan: Plan) -> Labels:
     """
     record = _record(system, outcome, MOST_POINTS)
     labels = label(record)
+    if not system.effects.backlash:
+        _tell_linear(system, plan, labels)
     _settle(system, outcome, plan, labels, settling_periods(record, labels))
     rotating = np.flatnonzero((labels.motion == QUASI_PERIODIC) | may_rotate_slowly(record, labels))
     # In portions whose longer records take no more memory than those of all lanes.
@@ -48,6 +51,18 @@ def labels_of(system: System, outcome: Outcome, plan: Plan) -> Labels:
             again = _second_look(system.of(lanes), start, plan, labels.motion[lanes])
             labels.motion[lanes] = again
     return labels
+
+
+def _tell_linear(system: System, plan: Plan, labels: Labels) -> None:
+    """Tell growth without bound by the multipliers, in place: what is linear is never chaotic."""
+    once = Plan(plan.steps_per_period, 0, 1, section_points=0, tangent=True)
+    jacobian = period_jacobian(system, np.zeros((system.lanes, len(system.states))), once)
+    with np.errstate(invalid="ignore"):
+        grows = np.max(np.abs(np.linalg.eigvals(np.nan_to_num(jacobian))), axis=1) > 1.0
+    labels.motion[grows] = GROWS
+    labels.period[grows] = 0
+    others = np.isin(labels.motion, (CHAOTIC, QUASI_PERIODIC)) & ~grows
+    labels.motion[others] = UNRESOLVED
 
 
 def _record(system: System, outcome: Outcome, most_points: int) -> Record:
