@@ -79,5 +79,5 @@ def out_of_turn(section: Floats) -> Floats:
 
 
 def _longer(lanes: LabelledLanes) -> NDArray[np.bool_]:
-    other = np.isin(lanes.labels, ("chaotic", "quasi-periodic", "unresolved"))
-    return np.asarray((lanes.period > 2) | other)
+    # What is unresolved may be a period 2 that is slow to settle.
+    return np.asarray((lanes.period > 2) | np.isin(lanes.labels, ("chaotic", "quasi-periodic")))

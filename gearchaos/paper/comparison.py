@@ -94,7 +94,8 @@ def _stages(
             share = own_share(found.labelled(found.sweep), stage)
             mine = f"{stage.start:.2f} – {stage.end:.2f}"
             if share < 1.0:
-                mine += f", in {share:.0%} of its lanes"
+                # Rounded downwards: all of them are never said to be where one is not.
+                mine += f", in {math.floor(100.0 * share)} % of its lanes"
             difference = (
                 f"{signed(stage.start - printed.first)}, {signed(stage.end - printed.last)}"
             )
