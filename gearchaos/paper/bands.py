@@ -19,6 +19,7 @@ from gearchaos.results.stage_table import LabelledLanes, labelled_lanes
 Floats = NDArray[np.float64]
 
 TWO_BANDS = "two bands"
+TOUCHING = "two bands that touch"
 
 OUT_OF_TURN = 0.25
 """Largest share of points out of turn: half of that of a coin, below the third of a period 3."""
@@ -67,6 +68,16 @@ def lanes_as_printed(result: Result, crisis: Crisis | None = None) -> LabelledLa
     return lanes._replace(
         labels=np.where(on_two, TWO_BANDS, lanes.labels), period=np.where(on_two, 0, lanes.period)
     )
+
+
+def motions_shown(result: Result, crisis: Crisis | None = None) -> LabelledLanes:
+    """Label as `lanes_as_printed`, but call bands that are not visited strictly in turn touching.
+
+    For a single motion: the two sets of section points of figure 10 lie apart.
+    """
+    lanes = lanes_as_printed(result, crisis)
+    touch = (lanes.labels == TWO_BANDS) & (out_of_turn(result["section_delta_5"]) > 0.0)
+    return lanes._replace(labels=np.where(touch, TOUCHING, lanes.labels))
 
 
 def out_of_turn(section: Floats) -> Floats:

@@ -118,7 +118,7 @@ def _boundaries(paper: Published, pairs: list[tuple[PrintedStage, Stage | None]]
 
 def _motions(printed: Published, found: Reproduction) -> Iterator[Row]:
     reach, sweep = RULES["boundary"].in_kind, found.labelled(found.sweep)
-    starts = found.labelled(found.motions), found.labelled(found.motions_from_contact)
+    starts = found.shown(found.motions), found.shown(found.motions_from_contact)
     for shown in printed.motions:
         p = shown.pitch_error
         mine, other = (motion_at(lanes, p) for lanes in starts)

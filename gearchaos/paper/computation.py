@@ -10,7 +10,7 @@ import numpy as np
 from gearchaos.configuration import Configuration
 from gearchaos.engine.response import respond
 from gearchaos.engine.running import run
-from gearchaos.paper.bands import Crisis, crisis_of, lanes_as_printed
+from gearchaos.paper.bands import Crisis, crisis_of, lanes_as_printed, motions_shown
 from gearchaos.paper.hop import STEP, Hop, exponents_beside, find_hop
 from gearchaos.paper.published import published
 from gearchaos.results.result import Result
@@ -49,6 +49,10 @@ class Reproduction:
     def labelled(self, result: Result) -> LabelledLanes:
         """Label the lanes of one of these results as the paper does."""
         return lanes_as_printed(result, self.crisis)
+
+    def shown(self, result: Result) -> LabelledLanes:
+        """Label the lanes of one of these results as their figures show them, each by itself."""
+        return motions_shown(result, self.crisis)
 
     def group(self, name: str) -> float:
         """Return a group that all lanes of the sweep share."""

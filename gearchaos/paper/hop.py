@@ -39,6 +39,9 @@ WIDTH = 1e-4
 FOLLOWING_PERIODS = 100
 """Mesh periods of a carried sweep per value: its motion changes little from one to the next."""
 
+SETTLING_PERIODS = 500
+"""Fewest mesh periods in which a soft axial bearing comes to rest."""
+
 APART = 1e-3
 """Distance of the section points, relative to the larger one, from which on motions differ."""
 
@@ -100,8 +103,10 @@ def find_hop(
     both = np.flatnonzero(_apart(upwards, downwards))
     if not both.size:
         return None
-    first, falls = _end(config, downwards, int(both[0]), -step)
-    last, rises = _end(config, upwards, int(both[-1]), step)
+    # Next to an end a lane may still be on its way: the orbit is followed from the lane before.
+    inner = (both[min(1, both.size - 1)], both[max(-2, -both.size)])
+    first, falls = _end(config, downwards, int(inner[0]), -2.0 * step)
+    last, rises = _end(config, upwards, int(inner[1]), 2.0 * step)
     fine = step / FINENESS
     low, high = math.ceil(first / fine), math.floor(last / fine)
     changes = {}
@@ -172,7 +177,9 @@ def exponents_beside(
     sides = config.replace(
         "sweep", {"parameter": PITCH_ERROR, "values": [change.before, change.after]}
     )
-    found = run(_states_only(sides), threads)
+    settling = max(SETTLING_PERIODS, config.integration.transient_periods)
+    sides = _states_only(sides).replace("integration.transient_periods", settling)
+    found = run(sides, threads)
     return _exponents(sides, found[found.axis], found["end_state"])
 
 

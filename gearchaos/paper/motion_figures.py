@@ -86,7 +86,7 @@ def motion_page(printed: Published, found: Reproduction, shown: ShownMotion) -> 
     del printed
     result, begun = shown_response(found, shown)
     lane = lane_of(result, shown.pitch_error)
-    label = motion_at(found.labelled(result), shown.pitch_error)
+    label = motion_at(found.shown(result), shown.pitch_error)
     with column(86.0) as figure:
         grid = figure.add_gridspec(2, 2, height_ratios=(0.8, 1.0))
         history = figure.add_subplot(grid[0, :])
@@ -113,7 +113,7 @@ def shown_response(found: Reproduction, shown: ShownMotion) -> tuple[Result, str
     the paper shows.
     """
     at_rest, from_contact = (
-        motion_at(found.labelled(result), shown.pitch_error)
+        motion_at(found.shown(result), shown.pitch_error)
         for result in (found.motions, found.motions_from_contact)
     )
     if at_rest != shown.motion == from_contact:
