@@ -12,7 +12,12 @@ from numpy.typing import NDArray
 from gearchaos.configuration.messages import Fault
 from gearchaos.configuration.run_tables import MOST_STEPS_PER_PERIOD
 from gearchaos.dynamics.largest_exponents import largest_exponents
-from gearchaos.dynamics.stability import StabilityLimit, exponent_bias, stability_limit
+from gearchaos.dynamics.stability import (
+    StabilityLimit,
+    exponent_bias,
+    stability_limit,
+    sufficient_steps,
+)
 from gearchaos.engine.lanes import Lanes
 from gearchaos.errors import ConfigurationError
 from gearchaos.interrupts import check
@@ -28,6 +33,9 @@ PILOT_LANES = 48
 
 MOST_BIAS = 0.05
 """Largest shift of an exponent by the step alone that is passed over, in parts of the exponent."""
+
+SURELY_FINE = 8
+"""So many times the steps that are surely stable shift no exponent that matters."""
 
 PILOT_PERIODS = 150
 """Mesh periods in which a lane settles on its grid, and as many that are compared."""
@@ -82,8 +90,10 @@ def coarse_steps(lanes: Lanes, steps: int) -> str:
 
     A standard error does not show it: it speaks of the length of the record.
     """
-    numbers = lanes.spread(PILOT_LANES)
-    bias, true = exponent_bias(lanes.system_of(numbers), steps)
+    system = lanes.system_of(lanes.spread(PILOT_LANES))
+    if steps >= SURELY_FINE * np.max(sufficient_steps(system)):
+        return ""
+    bias, true = exponent_bias(system, steps)
     worst = int(np.argmax(np.abs(bias) - MOST_BIAS * np.abs(true)))
     if abs(bias[worst]) <= MOST_BIAS * abs(true[worst]):
         return ""
