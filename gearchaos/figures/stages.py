@@ -27,7 +27,7 @@ SHADES = {
     "chaotic": "#FCE5C4",
     "unresolved": "#E2E2E2",
     "diverged": "#F6CDBB",
-    "grows": "#F6CDBB",
+    "grows": "#F3C6DC",
 }
 """Colour of each kind of stage, in the order of the legend."""
 
