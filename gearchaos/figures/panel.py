@@ -149,6 +149,17 @@ def _say_nothing_to_show(axes: Axes, lanes: Lanes) -> None:
     text.set_backgroundcolor("white")
 
 
+def mark_values(panels: Sequence[Axes], label: str, values: Sequence[float]) -> None:
+    """Tick values of the parameter at the upper edge of panels; a legend above the first says so.
+
+    The legend keeps what it has named before.
+    """
+    look = {"marker": "|", "markersize": 8.0, "markeredgewidth": 0.9, "color": VERMILION}
+    ticks = [_marks(axes, np.asarray(values), 1.0, label, look) for axes in panels]
+    before = panels[0].get_legend()
+    legend_above(panels[0], [ticks[0], *(before.legend_handles if before else ())])
+
+
 def legend_above(axes: Axes, handles: Sequence[Artist]) -> Legend | None:
     """Place a legend above the right end of the axes, where it hides nothing."""
     if not handles:

@@ -10,21 +10,24 @@ from matplotlib.legend import Legend
 from matplotlib.patches import Patch, Rectangle
 
 from gearchaos.errors import FigureError
+from gearchaos.figures.labels import form_in_words
 from gearchaos.figures.style import LEGEND, SMALL_FONT_PT
 from gearchaos.results.result import Result
-from gearchaos.results.stage_table import Stage, labelled_lanes, stage_table
+from gearchaos.results.stage_table import LabelledLanes, Stage, labelled_lanes, stage_table
 
-# Blues that darken with the period; the others differ from them in hue, and all are light enough
-# for black points to stand out.
+# Blues that darken with the period, but for period 3, the window in chaos that is looked for; the
+# others differ from them in hue, and all are light enough for black points to stand out.
 SHADES = {
     "period 1": "#E3EEF8",
     "period 2": "#BBD7EF",
+    "period 3": "#D9CCEA",
     "longer period": "#8FBCE2",
+    "two bands": "#C6E6E1",
     "quasi-periodic": "#CDE8CF",
     "chaotic": "#FCE5C4",
     "unresolved": "#E2E2E2",
     "diverged": "#F6CDBB",
-    "grows": "#F6CDBB",
+    "grows": "#F3C6DC",
 }
 """Colour of each kind of stage, in the order of the legend."""
 
@@ -44,6 +47,7 @@ def shade_stages(
     axes: Axes,
     result: Result,
     *,
+    lanes: LabelledLanes | None = None,
     narrowest: float | None = None,
     legend: bool = True,
 ) -> StageArtists:
@@ -55,7 +59,9 @@ def shade_stages(
         With the swept parameter along x, limits set.
     result : Result
         Of one axis, with labels of the motion. Where it was chosen among several starts
-        (``result.sel(start=0)``), the legend names that start.
+        (``result.sel(start=0)``), the legend names that start; so it does the published form.
+    lanes : LabelledLanes, optional
+        Lanes with other labels than those of the result.
     narrowest : float, optional
         Narrower stages go into what surrounds them; default a 150th of the axis.
     legend : bool
@@ -78,7 +84,7 @@ def shade_stages(
             f"stages are those of one axis, but the result has {', '.join(result.axes)}; fix the "
             "others with result.sel"
         )
-    lanes = labelled_lanes(result)
+    lanes = labelled_lanes(result) if lanes is None else lanes
     low, high = sorted(axes.get_xlim())
     stages = stage_table(lanes, NARROWEST_SHARE * (high - low) if narrowest is None else narrowest)
     # Neighbours meet halfway between their lanes, and the outermost reach to the ends of the axis.
@@ -99,7 +105,9 @@ def shade_stages(
         for kind, shade in colours.items()
         if kind in drawn
     ]
-    title = f"stages of start {result.fixed['start']:g}" if "start" in result.fixed else None
+    start = f"stages of start {result.fixed['start']:g}" if "start" in result.fixed else ""
+    # A line at the foot of the page would lie on the legend.
+    title = "\n".join(filter(None, (start, form_in_words(result)))) or None
     if not legend:
         return StageArtists(stages, shades, None)
     assert axes.figure is not None
@@ -116,4 +124,4 @@ def shade_stages(
 
 
 def _kind(stage: Stage) -> str:
-    return "longer period" if stage.period > 2 else stage.label
+    return "longer period" if stage.period > 3 else stage.label

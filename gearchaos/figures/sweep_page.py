@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from matplotlib.axes import Axes
 
 from gearchaos.errors import FigureError
@@ -10,9 +12,11 @@ from gearchaos.figures.labels import form_in_words, in_words
 from gearchaos.figures.lanes import Between
 from gearchaos.figures.lyapunov import lyapunov
 from gearchaos.figures.page import Page, few_ticks, footnote, letter, page
+from gearchaos.figures.panel import mark_values
 from gearchaos.figures.stages import shade_stages
 from gearchaos.figures.style import SINGLE_COLUMN_MM, SMALL_FONT_PT
 from gearchaos.results.result import Result, section_variables
+from gearchaos.results.stage_table import LabelledLanes
 from gearchaos.results.variables import LARGEST_EXPONENT
 
 HEIGHT_RATIOS = (1.6, 1.0)
@@ -26,7 +30,8 @@ def bifurcation_page(
     *,
     between: Between = (None, None),
     full_range: bool = False,
-    stages: bool = False,
+    stages: bool | LabelledLanes = False,
+    marked: tuple[str, Sequence[float]] | None = None,
     width_mm: float = SINGLE_COLUMN_MM,
     height_mm: float | None = None,
 ) -> Page:
@@ -40,9 +45,11 @@ def bifurcation_page(
         Over one swept parameter.
     variable, between, full_range
         As for `bifurcation`.
-    stages : bool
+    stages : bool or LabelledLanes
         Shade the stages behind both panels; of several starts those of the first, as the legend
-        then says.
+        then says. Lanes with other labels than those of the result may be given.
+    marked : (str, sequence of float), optional
+        A few words, and the values of the parameter of which they tell: ticks at the upper edge.
     width_mm, height_mm : float
         Size of the page; 85 mm is one column of a journal and 180 mm two. The default height
         follows from the width and the number of panels.
@@ -85,12 +92,16 @@ def bifurcation_page(
         for axes, intervals in zip(reversed(stack), MOST_INTERVALS, strict=False):
             few_ticks(axes, None, intervals)
             axes.yaxis.label.set_linespacing(1.0)
+        if marked is not None:
+            mark_values(stack, *marked)
         if stages:
+            given = None if isinstance(stages, bool) else stages
             one = result.sel(start=0) if "start" in result.axes else result
             for axes in stack:
-                shade_stages(axes, one, legend=axes is stack[0])
+                shade_stages(axes, one, lanes=given, legend=axes is stack[0])
+        else:
+            footnote(figure, form_in_words(result))
         if result.fixed:
             figure.suptitle(in_words(result, result.fixed), fontsize=SMALL_FONT_PT)
-        footnote(figure, form_in_words(result))
         figure.align_ylabels(stack)
     return figure

@@ -9,8 +9,8 @@ from typing import NamedTuple
 
 from gearchaos.paper.computation import Reproduction, largest_acceleration
 from gearchaos.paper.our_numbers import NAN, contact_line_stiffness, our_numbers
-from gearchaos.paper.published import PrintedStage, Published
-from gearchaos.paper.stages import counterparts, motion_at, motions_between
+from gearchaos.paper.published import Kind, PrintedStage, Published
+from gearchaos.paper.stages import counterparts, motion_at, motions_between, own_share
 from gearchaos.paper.verdict import RULES, Verdict, motion_verdict, overlap_verdict
 from gearchaos.results.stage_table import Stage
 
@@ -22,6 +22,7 @@ class Row(NamedTuple):
 
     quantity: str
     where: str
+    kind: Kind
     published: str
     ours: str
     difference: str
@@ -35,6 +36,7 @@ def compare(printed: Published, found: Reproduction) -> dict[str, list[Row]]:
         key: _judged(
             number.quantity,
             number.where,
+            number.kind,
             number.rule,
             number.value,
             ours[key],
@@ -42,16 +44,21 @@ def compare(printed: Published, found: Reproduction) -> dict[str, list[Row]]:
         )
         for key, number in printed.numbers.items()
     }
-    pairs = list(zip(printed.stages, counterparts(printed.stages, found.sweep), strict=True))
-    added, peak = numbers.pop("added_acceleration"), numbers.pop("spectral_peak")
-    hop = [numbers.pop(key) for key in list(numbers) if key.startswith("hop")]
+    pairs = list(
+        zip(printed.stages, counterparts(printed.stages, found.labelled(found.sweep)), strict=True)
+    )
+    peak = numbers.pop("spectral_peak")
+    added, hop = (
+        [numbers.pop(key) for key in list(numbers) if key.startswith(group)]
+        for group in ("added", "hop")
+    )
     return {
         "derived": [*numbers.values()],
         "harmonics": [*_harmonics(printed)],
-        "accelerations": [added, *_increments(printed, found), peak],
+        "accelerations": [*added, *_increments(printed, found), peak],
         "hop": hop,
-        "stages": [*_stages(pairs)],
-        "boundaries": [*_boundaries(pairs)],
+        "stages": [*_stages(printed, found, pairs)],
+        "boundaries": [*_boundaries(printed, pairs)],
         "motions": [*_motions(printed, found)],
     }
 
@@ -64,7 +71,9 @@ def _harmonics(printed: Published) -> Iterator[Row]:
     for letter, theirs, mine in (("a", table.cosine, ours.real), ("c", table.sine, -ours.imag)):
         for n, (one, other) in enumerate(zip(theirs, mine.tolist(), strict=True), 1):
             name = f"{letter}<sub>{n}</sub>"
-            yield _judged(name, table.where, table.rule, one, other, size=first, digits=4)
+            yield _judged(
+                name, table.where, table.kind, table.rule, one, other, size=first, digits=4
+            )
 
 
 def _increments(printed: Published, found: Reproduction) -> Iterator[Row]:
@@ -72,40 +81,52 @@ def _increments(printed: Published, found: Reproduction) -> Iterator[Row]:
     for (low, high), value in zip(pairwise(table.pitch_errors), table.values, strict=True):
         before, after = (largest_acceleration(found.response, p) for p in (low, high))
         quantity = f"growth of the torsional acceleration from {low:g} to {high:g} e(τ)"
-        yield _judged(quantity, table.where, table.rule, value, after - before)
+        yield _judged(quantity, table.where, table.kind, table.rule, value, after - before)
 
 
-def _stages(pairs: list[tuple[PrintedStage, Stage | None]]) -> Iterator[Row]:
+def _stages(
+    paper: Published, found: Reproduction, pairs: list[tuple[PrintedStage, Stage | None]]
+) -> Iterator[Row]:
     for printed, stage in pairs:
         mine = difference = NONE
         verdict = Verdict.DOES_NOT
         if stage is not None:
+            share = own_share(found.labelled(found.sweep), stage)
             mine = f"{stage.start:.2f} – {stage.end:.2f}"
+            if share < 1.0:
+                # Rounded downwards: all of them are never said to be where one is not.
+                mine += f", in {math.floor(100.0 * share)} % of its lanes"
             difference = (
                 f"{signed(stage.start - printed.first)}, {signed(stage.end - printed.last)}"
             )
             verdict = overlap_verdict((printed.first, printed.last), (stage.start, stage.end))
         theirs = f"{printed.first:.2f} – {printed.last:.2f}"
-        yield Row(printed.printed, "figure 7", theirs, mine, difference, verdict)
+        kind = Kind(paper.kinds["stages"])
+        yield Row(printed.printed, "figure 7", kind, theirs, mine, difference, verdict)
 
 
-def _boundaries(pairs: list[tuple[PrintedStage, Stage | None]]) -> Iterator[Row]:
+def _boundaries(paper: Published, pairs: list[tuple[PrintedStage, Stage | None]]) -> Iterator[Row]:
+    kind = paper.kinds["boundaries"]
     for (before, ended), (after, begun) in pairwise(pairs):
         # A boundary has two sides.
         mine = NAN if ended is None or begun is None else begun.start
         quantity = f"{before.printed} → {after.printed}"
-        yield _judged(quantity, "figure 7", "boundary", after.first, mine, unit=" e(τ)", digits=2)
+        yield _judged(
+            quantity, "figure 7", kind, "boundary", after.first, mine, unit=" e(τ)", digits=2
+        )
 
 
 def _motions(printed: Published, found: Reproduction) -> Iterator[Row]:
-    reach = RULES["boundary"].in_kind
+    reach, sweep = RULES["boundary"].in_kind, found.labelled(found.sweep)
+    starts = found.shown(found.motions), found.shown(found.motions_from_contact)
     for shown in printed.motions:
         p = shown.pitch_error
-        mine, other = motion_at(found.motions, p), motion_at(found.motions_from_contact, p)
-        near = motions_between(found.sweep, p - reach, p + reach)
+        mine, other = (motion_at(lanes, p) for lanes in starts)
+        near = motions_between(sweep, p - reach, p + reach)
         yield Row(
             f"motion at {p:g} e(τ)",
             f"figure {shown.figure}",
+            Kind(printed.kinds["motions"]),
             shown.printed,
             mine if other == mine else f"{mine}; {other} from the contact flank",
             NONE,
@@ -128,6 +149,7 @@ def short(value: float, digits: int = 4, sign: str = "-") -> str:
 def _judged(
     quantity: str,
     where: str,
+    kind: str,
     rule: str,
     published: float,
     ours: float,
@@ -146,7 +168,7 @@ def _judged(
             share = 100.0 * (ours - published) / abs(published if size is None else size)
             difference = f"{signed(share, 1 if abs(share) >= 1.0 else 3)} %"
     verdict = judged.verdict(published, ours, size)
-    return Row(quantity, where, theirs, mine, difference, verdict)
+    return Row(quantity, where, Kind(kind), theirs, mine, difference, verdict)
 
 
 def _number(value: float) -> str:

@@ -10,9 +10,11 @@ import numpy as np
 from gearchaos.configuration import Configuration
 from gearchaos.engine.response import respond
 from gearchaos.engine.running import run
-from gearchaos.paper.hop import STEP, Hop, find_hop
+from gearchaos.paper.bands import Crisis, crisis_of, lanes_as_printed, motions_shown
+from gearchaos.paper.hop import STEP, Hop, exponents_beside, find_hop
 from gearchaos.paper.published import published
 from gearchaos.results.result import Result
+from gearchaos.results.stage_table import LabelledLanes
 
 KEPT_PERIODS = 64
 """Mesh periods of a response: lines of a spectrum 1/64 of the mesh frequency apart."""
@@ -25,17 +27,32 @@ class Reproduction:
     """What was computed to answer the paper.
 
     ``config``: of the torsional diagram, figure 7; ``sweep``: that diagram; ``hop``: the hop in it,
-    with the interval in which two motions coexist; ``response``: all effects, at rest at the start,
-    without pitch error and at those of figures 5, 6, 14 and 15 and of Table 3; ``motions``,
-    ``motions_from_contact``: at the pitch errors of figures 8 to 13, by the start.
+    with the interval in which two motions coexist; ``exponents``: the largest ones of all ten
+    states before and after it, starting at rest, None without a hop; ``response``: all effects, at
+    rest at the start, without pitch error and at those of figures 5, 6, 14 and 15 and of Table 3;
+    ``motions``, ``motions_from_contact``: at the pitch errors of figures 8 to 13, by the start.
     """
 
     config: Configuration
     sweep: Result
     hop: Hop | None
+    exponents: tuple[float, float] | None
     response: Result
     motions: Result
     motions_from_contact: Result
+
+    @property
+    def crisis(self) -> Crisis | None:
+        """Where the diagram of figure 7 widens at once."""
+        return crisis_of(self.sweep)
+
+    def labelled(self, result: Result) -> LabelledLanes:
+        """Label the lanes of one of these results as the paper does."""
+        return lanes_as_printed(result, self.crisis)
+
+    def shown(self, result: Result) -> LabelledLanes:
+        """Label the lanes of one of these results as their figures show them, each by itself."""
+        return motions_shown(result, self.crisis)
 
     def group(self, name: str) -> float:
         """Return a group that all lanes of the sweep share."""
@@ -71,6 +88,8 @@ def compute(
     sweep = run(config, threads)
     notify("the hop of figure 7: both motions, upwards and downwards")
     hop = find_hop(config, step=hop_step, threads=threads)
+    change = None if hop is None else hop.changes.get("rest")
+    exponents = None if change is None else exponents_beside(full, change, threads)
     notify("figures 5, 6, 14 and 15: accelerations of all coordinates")
     response = respond(_at(full, [0.0, *printed.increments.pitch_errors]), periods, threads)
     notify("figures 8 to 13: motions at six pitch errors")
@@ -79,7 +98,7 @@ def compute(
         respond(shown.replace("start", {"kind": kind}), periods, threads)
         for kind in ("rest", "contact")
     )
-    return Reproduction(config, sweep, hop, response, motions, from_contact)
+    return Reproduction(config, sweep, hop, exponents, response, motions, from_contact)
 
 
 def _at(config: Configuration, pitch_errors: list[float]) -> Configuration:

@@ -7,41 +7,56 @@ from itertools import pairwise
 
 import numpy as np
 
+from gearchaos.paper.bands import OUT_OF_TURN, TWO_BANDS, out_of_turn
 from gearchaos.paper.comparison import short, signed
 from gearchaos.paper.computation import Reproduction, lane_of
 from gearchaos.paper.hop_figure import STARTS
+from gearchaos.paper.our_numbers import NAN
 from gearchaos.paper.published import Published
 from gearchaos.paper.stages import motions_between
 from gearchaos.results.result import Result
 
 
 def stages_in_words(printed: Published, found: Reproduction) -> str:
-    """Tell what lies in the stages that do not agree, and in the last one."""
-    texts = []
+    """Tell what lies in the stages that the paper calls chaotic or by a name of its own."""
+    texts, lanes = [], found.labelled(found.sweep)
     for stage in printed.stages:
-        if stage.printed != stage.motion or stage is printed.stages[-1]:
-            counts = Counter(motions_between(found.sweep, stage.first, stage.last))
+        if stage.printed != stage.motion or stage.motion == "chaotic":
+            counts = Counter(motions_between(lanes, stage.first, stage.last))
             worded = ", ".join(f"{count} {label}" for label, count in counts.most_common(6))
             texts.append(
                 f'In the paper\'s stage "{stage.printed}", {stage.first:g} to {stage.last:g} e(τ), '
                 f"the {counts.total()} lanes of the sweep are: {worded}."
             )
-    if "quasi-periodic" not in motions_between(
-        found.sweep, *found.sweep[found.sweep.axis][[0, -1]]
-    ):
-        texts.append(
-            "A motion is called quasi-periodic if its largest exponent is zero within its error "
-            "and its averages converge as those on a torus do. None was found: between period 2 "
-            "and chaos lie motions of longer periods."
-        )
+    texts.append(_third_stage_in_words(found))
     last = printed.stages[-1]
-    escaped = motions_between(found.sweep, last.first, last.last).count("period 1")
+    escaped = motions_between(lanes, last.first, last.last).count("period 1")
     if escaped:
         texts.append(
             f"Towards the end of the sweep chaos is transient: {escaped} lanes have escaped to a "
             "coexisting motion of period 1."
         )
     return " ".join(texts)
+
+
+def _third_stage_in_words(found: Reproduction) -> str:
+    """Tell how the bands merge, where the attractor widens at once, and what its exponents are."""
+    lanes, crisis = found.labelled(found.sweep), found.crisis
+    on_two = lanes.labels == TWO_BANDS
+    if crisis is None or not on_two.any():
+        return "No motion on two bands was found that a crisis ends."
+    shares = out_of_turn(found.sweep["section_delta_5"])
+    apart, last = (lanes.values[on_two & (shares <= most)].max() for most in (0.0, OUT_OF_TURN))
+    lowest, highest = (signed(f(lanes.exponent[on_two]), 3) for f in (np.min, np.max))
+    return (
+        f"Up to {apart:.2f} e(τ) the two bands are visited strictly in turn; then they touch, and "
+        f"some points, {shares[on_two].max():.0%} of them at most, follow one from the same side, "
+        f"up to the last lane on two bands, {last:.2f}. An interior crisis ends it: the section, "
+        f"no wider than {crisis.before:.2f} up to there, spans {crisis.after:.2f} at once at "
+        f"{crisis.value:.2f}. The exponents of the lanes on two bands go from {lowest} to "
+        f"{highest}: those of periodic motions, and of chaos then. The paper's are about zero, as "
+        "on a torus; no torus was found here."
+    )
 
 
 def hop_in_words(printed: Published, found: Reproduction) -> str:
@@ -80,13 +95,16 @@ def hop_in_words(printed: Published, found: Reproduction) -> str:
         values = found.sweep[found.sweep.axis]
         exponents = found.sweep["lyapunov_exponent"][values <= rest.before]
         before, after = (signed(exponent, 5) for exponent in rest.exponents)
+        whole, later = (signed(exponent, 5) for exponent in found.exponents or (NAN, NAN))
         texts.append(
-            f"From the Floquet multipliers of the two orbits the largest exponent is {before} "
-            f"before the hop and {after} after it, where the paper prints {signed(theirs, 4)}. "
-            "While the teeth stay in contact the model is linear, so the pitch error is a mere "
-            "forcing and does not enter the exponent: over all lanes before the hop it varies by "
-            f"{np.ptp(exponents):.0e}. With these groups no pitch error before the hop can have "
-            "the printed exponent."
+            "From the Floquet multipliers of the two orbits the largest exponent of all ten states "
+            f"is {whole} before the hop and {later} after it, where the paper prints "
+            f"{signed(theirs, 4)}. The paper integrates all of eq. 13, and the axial pair, driven "
+            "one way, brings exponents of its own: with such axial bearings the largest one is "
+            "theirs, whatever torsion does. The six states of torsion and transverse "
+            f"motion alone have {before} and {after}. While the teeth stay in contact the model is "
+            "linear, so the pitch error is a mere forcing and does not enter the exponent: over "
+            f"all lanes before the hop it varies by {np.ptp(exponents):.0e}."
         )
     return "\n\n".join(texts)
 

@@ -8,10 +8,10 @@ from pathlib import Path
 from typing import NamedTuple
 
 from gearchaos.errors import FileError
-from gearchaos.figures import bifurcation_page
 from gearchaos.figures.files import FORMATS, save_figure
 from gearchaos.figures.page import Page
 from gearchaos.paper.computation import Notify, Reproduction
+from gearchaos.paper.diagram_figure import diagram_page
 from gearchaos.paper.hop_figure import hop_page
 from gearchaos.paper.mesh_figures import mesh_stiffness_page, pitch_error_page
 from gearchaos.paper.motion_figures import (
@@ -51,7 +51,7 @@ def pictures() -> tuple[Picture, ...]:
         4: mesh_stiffness_page,
         5: accelerations_page,
         6: spectra_page,
-        7: lambda _, found: bifurcation_page(found.sweep, stages=True),
+        7: diagram_page,
         **{shown.figure: partial(motion_page, shown=shown) for shown in published().motions},
         14: growing_accelerations_page,
         15: growing_spectra_page,

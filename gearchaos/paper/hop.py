@@ -39,6 +39,9 @@ WIDTH = 1e-4
 FOLLOWING_PERIODS = 100
 """Mesh periods of a carried sweep per value: its motion changes little from one to the next."""
 
+SETTLING_PERIODS = 500
+"""Fewest mesh periods in which a soft axial bearing comes to rest."""
+
 APART = 1e-3
 """Distance of the section points, relative to the larger one, from which on motions differ."""
 
@@ -48,8 +51,7 @@ class Change(NamedTuple):
 
     ``before``, ``after``: last pitch error on the motion of the upward sweep, first one on the
     other; ``returns``: how often the start comes back to the first motion at higher pitch errors;
-    ``exponents``: the largest Lyapunov exponents before and after, from the Floquet multipliers of
-    the two periodic orbits.
+    ``exponents``: the largest Lyapunov exponents before and after, those of the periodic orbits.
     """
 
     before: float
@@ -90,9 +92,7 @@ def find_hop(
     ``config`` sweeps the pitch error; ``starts``: kinds of start states whose hop is looked for;
     ``step``: of the carried sweeps. None where the sweeps upwards and downwards agree everywhere.
     """
-    config = config.replace("outputs", {"section": config.scene.states, "section_points": 1})
-    config = config.replace("outputs.lyapunov", False).replace("outputs.motion", False)
-    config = config.replace("integration.recorded_periods", 1)
+    config = _states_only(config)
     periods = min(FOLLOWING_PERIODS, config.integration.transient_periods)
     carried = _over(config, LOW, HIGH, round((HIGH - LOW) / step) + 1)
     carried = carried.replace("integration.transient_periods", periods)
@@ -103,8 +103,10 @@ def find_hop(
     both = np.flatnonzero(_apart(upwards, downwards))
     if not both.size:
         return None
-    first, falls = _end(config, downwards, int(both[0]), -step)
-    last, rises = _end(config, upwards, int(both[-1]), step)
+    # Next to an end a lane may still be on its way: the orbit is followed from the lane before.
+    inner = (both[min(1, both.size - 1)], both[max(-2, -both.size)])
+    first, falls = _end(config, downwards, int(inner[0]), -2.0 * step)
+    last, rises = _end(config, upwards, int(inner[1]), 2.0 * step)
     fine = step / FINENESS
     low, high = math.ceil(first / fine), math.floor(last / fine)
     changes = {}
@@ -115,6 +117,12 @@ def find_hop(
         if change is not None:
             changes[kind] = change
     return Hop(upwards, downwards, first, last, (falls, rises), changes)
+
+
+def _states_only(config: Configuration) -> Configuration:
+    config = config.replace("outputs", {"section": config.scene.states, "section_points": 1})
+    config = config.replace("outputs.lyapunov", False).replace("outputs.motion", False)
+    return config.replace("integration.recorded_periods", 1)
 
 
 def _over(config: Configuration, low: float, high: float, count: int) -> Configuration:
@@ -153,13 +161,33 @@ def _change(found: Result, config: Configuration, first: Result, second: Result)
     if not changes.size:
         return None
     lanes = changes[0] + np.arange(2)
-    values, period = found[found.axis][lanes], np.ones(2, dtype=np.int32)
-    system = system_of(config, {PITCH_ERROR: values})
-    steps = config.integration.steps_per_period
-    orbits = polish(system, found["end_state"][lanes], period, steps)
-    exponents = orbit_exponent(orbits.multipliers, period, system.mesh_period)
-    before, after = values.tolist()
-    return Change(before, after, changes.size - 1, (float(exponents[0]), float(exponents[1])))
+    before, after = found[found.axis][lanes].tolist()
+    exponents = _exponents(config, found[found.axis][lanes], found["end_state"][lanes])
+    return Change(before, after, changes.size - 1, exponents)
+
+
+def exponents_beside(
+    config: Configuration, change: Change, threads: int | None = None
+) -> tuple[float, float]:
+    """Return the largest exponents on both sides of a change, of all states of another scene.
+
+    They are those of the periodic orbits to which the start of ``config`` leads, from their Floquet
+    multipliers; not a number where there is no such orbit.
+    """
+    sides = config.replace(
+        "sweep", {"parameter": PITCH_ERROR, "values": [change.before, change.after]}
+    )
+    settling = max(SETTLING_PERIODS, config.integration.transient_periods)
+    sides = _states_only(sides).replace("integration.transient_periods", settling)
+    found = run(sides, threads)
+    return _exponents(sides, found[found.axis], found["end_state"])
+
+
+def _exponents(config: Configuration, values: Floats, states: Floats) -> tuple[float, float]:
+    period, system = np.ones(2, dtype=np.int32), system_of(config, {PITCH_ERROR: values})
+    orbits = polish(system, states, period, config.integration.steps_per_period)
+    before, after = orbit_exponent(orbits.multipliers, period, system.mesh_period).tolist()
+    return before, after
 
 
 def _distance(found: Result, sweep: Result) -> Floats:

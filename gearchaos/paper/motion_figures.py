@@ -85,7 +85,8 @@ def motion_page(printed: Published, found: Reproduction, shown: ShownMotion) -> 
     """Draw history, phase portrait and Poincare section at one pitch error (figures 8 to 13)."""
     del printed
     result, begun = shown_response(found, shown)
-    lane, label = lane_of(result, shown.pitch_error), motion_at(result, shown.pitch_error)
+    lane = lane_of(result, shown.pitch_error)
+    label = motion_at(found.shown(result), shown.pitch_error)
     with column(86.0) as figure:
         grid = figure.add_gridspec(2, 2, height_ratios=(0.8, 1.0))
         history = figure.add_subplot(grid[0, :])
@@ -111,8 +112,11 @@ def shown_response(found: Reproduction, shown: ShownMotion) -> tuple[Result, str
     At rest as everywhere, unless only the start from the contact flank comes to the motion that
     the paper shows.
     """
-    p = shown.pitch_error
-    if motion_at(found.motions, p) != shown.motion == motion_at(found.motions_from_contact, p):
+    at_rest, from_contact = (
+        motion_at(found.shown(result), shown.pitch_error)
+        for result in (found.motions, found.motions_from_contact)
+    )
+    if at_rest != shown.motion == from_contact:
         return found.motions_from_contact, ", from the contact flank"
     return found.motions, ""
 

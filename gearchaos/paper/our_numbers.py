@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from gearchaos.figures.response_lane import samples_per_period
+from gearchaos.figures.response_lane import coordinates_of, samples_per_period
 from gearchaos.gear.derivation import Quantities, derive_groups
 from gearchaos.gear.geometry import HelicalPair
 from gearchaos.gear.mesh_stiffness import FourierStiffness, TrapezoidalStiffness
@@ -28,6 +28,7 @@ def our_numbers(printed: Published, found: Reproduction) -> dict[str, float]:
     whole_width = printed.numbers["mean_stiffness"].value * _N_PER_UM_MM * pair.face_width
     driven = found.config.replace("operation", {"speed_rpm": speed})
     change = None if found.hop is None else found.hop.changes.get("rest")
+    exponents = (NAN, NAN) if found.exponents is None else found.exponents
     numbers = {
         "driven_speed": speed * pair.teeth[0] / pair.teeth[1],
         "mesh_frequency_hz": speed / 60.0 * pair.teeth[0],
@@ -40,12 +41,15 @@ def our_numbers(printed: Published, found: Reproduction) -> dict[str, float]:
         # omega = 2 pi f / omega_h (eq. 9).
         "frequency": derive_groups(driven.physical())["mesh_frequency"],
         "mesh_period": response["mesh_period"][0],
-        "added_acceleration": largest_acceleration(response, 1.0)
-        - largest_acceleration(response, 0.0),
+        **{
+            f"added_{name}": largest_acceleration(response, 1.0, name)
+            - largest_acceleration(response, 0.0, name)
+            for name in coordinates_of(response)
+        },
         "spectral_peak": _highest_order(found) / response["mesh_period"][0],
         "hop": NAN if change is None else change.after,
-        "hop_exponent_before": NAN if change is None else change.exponents[0],
-        "hop_exponent_after": NAN if change is None else change.exponents[1],
+        "hop_exponent_before": exponents[0],
+        "hop_exponent_after": exponents[1],
     }
     return {key: float(number) for key, number in numbers.items()}
 

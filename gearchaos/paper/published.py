@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import tomllib
 from dataclasses import dataclass
+from enum import StrEnum
 from functools import cache
 from importlib.resources import files
 from typing import Any
@@ -14,9 +15,17 @@ CITATION = (
 )
 
 
+class Kind(StrEnum):
+    """What it is worth if a printed number agrees: `published.toml` says which is which."""
+
+    DERIVED = "derived"
+    FITTED = "fitted"
+    PREDICTED = "predicted"
+
+
 @dataclass(frozen=True)
 class Number:
-    """One printed number: its unit (``"1"`` where dimensionless), its place, its rule."""
+    """One printed number: its unit (``"1"`` where dimensionless), place, rule and `Kind`."""
 
     key: str
     quantity: str
@@ -24,6 +33,7 @@ class Number:
     unit: str
     where: str
     rule: str
+    kind: str
 
 
 @dataclass(frozen=True)
@@ -52,6 +62,7 @@ class Harmonics:
 
     where: str
     rule: str
+    kind: str
     cosine: tuple[float, ...]
     sine: tuple[float, ...]
 
@@ -77,19 +88,25 @@ class Increments:
 
     where: str
     rule: str
+    kind: str
     pitch_errors: tuple[float, ...]
     values: tuple[float, ...]
 
 
 @dataclass(frozen=True)
 class Published:
-    """All that the paper prints; ``driving_speed_rpm`` is what other numbers are derived from."""
+    """All that the paper prints.
+
+    ``driving_speed_rpm``: what other numbers are derived from; ``kinds``: the `Kind` of the
+    ``stages``, of the ``boundaries`` between them and of the ``motions``.
+    """
 
     driving_speed_rpm: float
     numbers: dict[str, Number]
     contact_lines: ContactLines
     harmonics: Harmonics
     increments: Increments
+    kinds: dict[str, str]
     stages: tuple[PrintedStage, ...]
     motions: tuple[ShownMotion, ...]
 
@@ -105,6 +122,7 @@ def published() -> Published:
         contact_lines=ContactLines(**_frozen(tables["contact_lines"])),
         harmonics=Harmonics(**_frozen(tables["harmonics"])),
         increments=Increments(**_frozen(tables["increments"])),
+        kinds=tables["kinds"],
         # What the paper calls as this project does is written once.
         stages=tuple(PrintedStage(**{"printed": row["motion"], **row}) for row in tables["stage"]),
         motions=tuple(ShownMotion(**{"printed": row["motion"], **row}) for row in tables["motion"]),

@@ -4,26 +4,30 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from importlib.resources import files
 
 import numpy as np
 
 from gearchaos.figures.response_lane import coordinates_of
+from gearchaos.paper.bands import OUT_OF_TURN
 from gearchaos.paper.comparison import NONE, Row, compare, short
 from gearchaos.paper.computation import Reproduction, largest_acceleration
 from gearchaos.paper.explanations import hop_in_words, increments_in_words, stages_in_words
 from gearchaos.paper.our_numbers import our_numbers, pair_of
-from gearchaos.paper.published import CITATION, Published
+from gearchaos.paper.published import CITATION, Kind, Published
 from gearchaos.paper.stages import WINDOW
 from gearchaos.paper.verdict import OVERLAP, RULES, Verdict
 from gearchaos.results.response_variables import acceleration_of
+from gearchaos.results.result import Result
 from gearchaos.version import software_version
 
 TOLERANCE_MM = 0.011
 """Single pitch deviation of the driving gear in grade 7 (ISO 1328-1)."""
 
-TABLE_HEAD = "| | where | Pan 2021 | here | difference | verdict |\n|---|---|---|---|---|---|\n"
+TABLE_HEAD = (
+    "| | where | kind | Pan 2021 | here | difference | verdict |\n|---|---|---|---|---|---|---|\n"
+)
 
 
 def report(printed: Published, found: Reproduction, names: dict[str, str]) -> str:
@@ -31,12 +35,9 @@ def report(printed: Published, found: Reproduction, names: dict[str, str]) -> st
     tables = compare(printed, found)
     rows = [row for table in tables.values() for row in table]
     counts = Counter(row.verdict for row in rows)
+    zeros = sum(abs(value) < 1e-3 for value in (*printed.harmonics.cosine, *printed.harmonics.sine))
     values = {key: number.value for key, number in printed.numbers.items()}
-    groups = {
-        name: float(parameter.value)
-        for name, parameter in found.sweep.parameters.items()
-        if np.ndim(parameter.value) == 0
-    }
+    groups = _shared(found.sweep)
     pair, lines = pair_of(found), printed.contact_lines
     per_mm, face_width = values["mean_stiffness"], float(pair.face_width) * 1e3
     damping = values["mesh_damping"] / (2.0 * values["damping_ratio"])
@@ -51,14 +52,18 @@ def report(printed: Published, found: Reproduction, names: dict[str, str]) -> st
         agrees=counts[Verdict.AGREES],
         in_kind=counts[Verdict.IN_KIND],
         does_not=counts[Verdict.DOES_NOT],
+        kinds=_kinds(rows, zeros),
         disagreements=_disagreements(rows),
         rules=RULES,
         overlap=OVERLAP,
         window=WINDOW,
+        out_of_turn=OUT_OF_TURN,
         tables={name: _table(table) for name, table in tables.items()},
         printed=values,
         ours=our_numbers(printed, found),
         groups=groups,
+        axial=_shared(found.response),
+        printed_ratio=values["damping_ratio"] / face_width**0.5,
         pair=pair,
         lines=lines,
         inverse_omega=1.0 / values["frequency"],
@@ -78,6 +83,34 @@ def report(printed: Published, found: Reproduction, names: dict[str, str]) -> st
     # Who cannot see a picture is told how its caption begins.
     without_words = r"!\[\](?=\(\S+\)\n\n([^:;\n]+))"
     return re.sub(without_words, lambda picture: f"![{picture[1].replace('*', '')}]", text)
+
+
+def _shared(result: Result) -> dict[str, float]:
+    """Return the groups that all lanes of a result share."""
+    return {
+        name: float(parameter.value)
+        for name, parameter in result.parameters.items()
+        if np.ndim(parameter.value) == 0
+    }
+
+
+KINDS = {
+    Kind.DERIVED: "taken over or derived: {harmonics} of them harmonics of Table 2, {zeros} of "
+    "which are zero but for rounding",
+    Kind.FITTED: "fitted: seen by the search for the groups",
+    Kind.PREDICTED: "predicted: depends on the groups, and no search has seen it",
+}
+
+
+def _kinds(rows: Sequence[Row], zeros: int) -> str:
+    lines = []
+    for kind, words in KINDS.items():
+        counts = Counter(row.verdict for row in rows if row.kind is kind)
+        harmonics = sum(row.where == "Table 2" for row in rows)
+        cells = [words.format(harmonics=harmonics, zeros=zeros), counts.total()]
+        cells += [counts[verdict] for verdict in Verdict]
+        lines.append(f"| {' | '.join(map(str, cells))} |")
+    return "\n".join(lines)
 
 
 def _disagreements(rows: Iterable[Row]) -> str:
@@ -116,7 +149,7 @@ def _table_3(printed: Published, found: Reproduction) -> str:
     lines = []
     for name in coordinates_of(response):
         before, after = (largest_acceleration(response, p, name) for p in (0.0, 1.0))
-        theirs = printed.numbers["added_acceleration"].value if name == "delta_5" else NONE
+        theirs = short(printed.numbers[f"added_{name}"].value)
         wording = response.attributes(acceleration_of(name))["long_name"]
         added = short(after - before, sign="+")
         lines.append(f"| {wording} | {short(before)} | {short(after)} | {added} | {theirs} |")

@@ -9,9 +9,15 @@ from gearchaos.configuration import load_config
 from gearchaos.engine.executors import LocalExecutor, compute_blocks
 from gearchaos.engine.simulation import Simulation
 
-PAN2021 = Path(__file__).resolve().parents[2] / "sweeps" / "pan2021.toml"
+PAN2021 = Path(__file__).resolve().parents[2] / "sweeps" / "pan2021_first.toml"
+"""The pair with the groups of the stored reference solutions, whose motions are well known."""
+
 SPEEDS = PAN2021.with_name("mesh_frequency.toml")
 SOFT_BEARINGS = (
+    "groups.load=0.26762",
+    "groups.half_backlash=0.94518",
+    "groups.pitch_error_amplitude=0.022749",
+    "groups.stiffness_variation_scale=0.6666666666666666",
     "groups.pitch_error=2.3",
     "groups.damping_ratio=0.0013",
     "groups.transverse_stiffness_p=0.112",

@@ -35,11 +35,11 @@ def test_the_table_is_all_that_stdout_holds_and_ends_with_recommendations(ended)
             r"|none of these; give finer --steps\.)",
             line,
         )
-    assert names_in(folder) == [f"pan2021_accuracy.{end}" for end in ("json", "pdf", "png")]
+    assert names_in(folder) == [f"pan2021_first_accuracy.{end}" for end in ("json", "pdf", "png")]
 
 
 def test_the_json_holds_what_the_table_says_and_the_machine(ended):
-    facts = json.loads((ended[1] / "pan2021_accuracy.json").read_text())
+    facts = json.loads((ended[1] / "pan2021_first_accuracy.json").read_text())
     assert [s["steps"] for s in facts["settings"]] == [50, 100, 200] * 2
     assert facts["machine"]["processor"]
     assert all(s["seconds"] > 0 for s in facts["settings"])
@@ -47,11 +47,11 @@ def test_the_json_holds_what_the_table_says_and_the_machine(ended):
 
 def test_existing_files_are_kept_unless_overwriting_is_asked_for(ended):
     folder = ended[1]
-    before = (folder / "pan2021_accuracy.json").read_bytes()
+    before = (folder / "pan2021_first_accuracy.json").read_bytes()
     again = run_module("gearchaos.accuracy", str(PAN2021), *SHORT, cwd=folder)
     assert again.code == 4
     assert "--overwrite" in again.err
-    assert (folder / "pan2021_accuracy.json").read_bytes() == before
+    assert (folder / "pan2021_first_accuracy.json").read_bytes() == before
 
 
 @pytest.mark.parametrize("steps", ["0", "x", "", "100000"])

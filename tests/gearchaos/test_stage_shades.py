@@ -6,12 +6,15 @@ from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 
 from gearchaos.errors import FileError
+from gearchaos.figures.panel import mark_values
 from gearchaos.figures.stages import SHADES, shade_stages
 from gearchaos.records.label import MEANINGS
 from gearchaos.results.result import Result
+from gearchaos.results.stage_table import labelled_lanes
 from gearchaos.results.variables import Axis, sweep_variables
 
-KINDS = {"1": (0, 1), "2": (0, 2), "5": (0, 5), "q": (1, 0), "c": (2, 0), "u": (3, 0), "d": (4, 0)}
+KINDS = {str(n): (0, n) for n in (1, 2, 3, 5)}
+KINDS |= {letter: (kind, 0) for kind, letter in enumerate("qcudg", 1)}
 
 
 def result_of(labels: str, *, labelled: bool = True) -> Result:
@@ -63,7 +66,13 @@ def test_only_what_the_axis_shows_is_shaded_and_named():
 
 
 def test_every_label_has_a_shade_of_its_own():
-    _, artists, _, colours = shaded("125qcud", (0.0, 6.0), narrowest=0.0)
+    letters = "1235bqcudg"
+    labelled = labelled_lanes(result_of(letters.replace("b", "q")))
+    named = np.where(np.array([*letters]) == "b", "two bands", labelled.labels)
+    lanes = labelled._replace(labels=named)
+    _, artists, _, colours = shaded(
+        letters.replace("b", "q"), (0.0, 9.0), narrowest=0.0, lanes=lanes
+    )
     assert colours == list(SHADES.values())
     assert len({*colours}) == len(SHADES)
     assert [text.get_text() for text in artists.legend.get_texts()] == list(SHADES)
@@ -79,3 +88,21 @@ def test_what_is_too_narrow_to_be_seen_is_left_out():
 def test_a_result_without_labels_cannot_be_shaded():
     with pytest.raises(FileError, match=r"outputs\.motion = true"):
         shade_stages(Figure().subplots(), result_of("11", labelled=False))
+
+
+def test_values_of_somebody_else_are_ticked_and_named():
+    """Marks of a paper stand at its values at the upper edge, and the legend keeps its entries."""
+    figure = Figure(layout="constrained")
+    panels = figure.subplots(2)
+    for axes in panels:
+        axes.set(xlim=(0.0, 10.0), ylim=(-1.0, 2.0))
+    panels[0].plot([1.0], [1.0], label="before")
+    panels[0].legend()
+    mark_values(panels, "changes elsewhere", [1.12, 7.5])
+    for axes in panels:
+        assert axes.lines[-1].get_xdata().tolist() == [1.12, 7.5]
+        assert axes.get_xlim() == (0.0, 10.0) and axes.get_ylim() == (-1.0, 2.0)
+        height = axes.lines[-1].get_transform().transform((0.0, 1.0))[1]
+        assert height == pytest.approx(axes.bbox.y1)
+    names = [text.get_text() for text in panels[0].get_legend().get_texts()]
+    assert names == ["changes elsewhere", "before"]

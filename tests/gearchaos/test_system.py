@@ -12,7 +12,7 @@ from gearchaos.dynamics.following import StabilityLoss
 
 from ..kernels.reference import SOLUTIONS
 
-PAN2021 = Path(__file__).resolve().parents[2] / "sweeps" / "pan2021.toml"
+PAN2021 = Path(__file__).resolve().parents[2] / "sweeps" / "pan2021_first.toml"
 ORBITS = [orbit for orbit in SOLUTIONS["periodic_orbits"] if orbit["scene"] == "no_axial"]
 LINEAR = ('scene.effects=["pitch_error", "transverse"]', "outputs.section_points=1")
 
