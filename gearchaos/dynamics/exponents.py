@@ -27,6 +27,13 @@ class Exponents(NamedTuple):
     values: Floats
     standard_errors: Floats
 
+    def given(self, exact: Floats) -> Exponents:
+        """Return them with those that are known exactly (lanes, states), NaN where none is."""
+        known = np.isfinite(exact)
+        return Exponents(
+            np.where(known, exact, self.values), np.where(known, 0.0, self.standard_errors)
+        )
+
 
 class _Carried(NamedTuple):
     """End states (lanes, states), unit tangent vectors as columns, logarithms of their growth."""

@@ -6,12 +6,13 @@ import numpy as np
 from gearchaos_kernels import Outcome, Plan, Status, System, integrate
 from numpy.typing import NDArray
 
-from gearchaos.dynamics.exponents import sum_of_exponents
+from gearchaos.dynamics.exponents import period_jacobian, sum_of_exponents
 from gearchaos.dynamics.orbits import polish
 from gearchaos.records.bands import band_count, subsequence_spread
 from gearchaos.records.label import (
     CHAOTIC,
     DIVERGED,
+    GROWS,
     MOST_POINTS,
     PERIODIC,
     QUASI_PERIODIC,
@@ -68,6 +69,8 @@ def labels_of(system: System, outcome: Outcome, plan: Plan) -> Labels:
 def _told(system: System, outcome: Outcome, plan: Plan, record: Record) -> Labels:
     """Return what one record tells."""
     labels = label(record)
+    if not system.effects.backlash:
+        _tell_linear(system, plan, labels)
     _settle(system, outcome, plan, labels, settling_periods(record, labels))
     lanes = np.flatnonzero(np.isin(labels.motion, (CHAOTIC, QUASI_PERIODIC)))
     labels.bands[lanes] = band_count(record.section[lanes])
@@ -83,6 +86,18 @@ def _told_again(system: System, outcome: Outcome, plan: Plan) -> Labels:
     refused = np.concatenate([hopping, np.flatnonzero(labels.motion == DIVERGED)])
     labels.motion[refused], labels.bands[refused] = UNRESOLVED, 0
     return labels
+
+
+def _tell_linear(system: System, plan: Plan, labels: Labels) -> None:
+    """Tell growth without bound by the multipliers, in place: what is linear is never chaotic."""
+    once = Plan(plan.steps_per_period, 0, 1, section_points=0, tangent=True)
+    jacobian = period_jacobian(system, np.zeros((system.lanes, len(system.states))), once)
+    with np.errstate(invalid="ignore"):
+        grows = np.max(np.abs(np.linalg.eigvals(np.nan_to_num(jacobian))), axis=1) > 1.0
+    labels.motion[grows] = GROWS
+    labels.period[grows] = 0
+    others = np.isin(labels.motion, (CHAOTIC, QUASI_PERIODIC)) & ~grows
+    labels.motion[others] = UNRESOLVED
 
 
 def _record(system: System, outcome: Outcome, most_points: int) -> Record:

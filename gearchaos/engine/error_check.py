@@ -14,8 +14,10 @@ NOT_CHECKED, SAME, CHANGED = 0, 1, 2
 MEANINGS = ("not_checked", "same", "changed")
 """Meanings of the values of ``motion_changed``."""
 
-CHECKED = ("section_error", "exponent_error", "motion_changed")
+CHECKED = ("section_error", "exponent_step_error", "motion_changed")
 """Variables that the check yields."""
+
+_OF_THE_RECORD = "lyapunov_exponent_standard_error"
 
 
 def checked_lanes(first: int, last: int, share: float) -> NDArray[np.intp]:
@@ -28,17 +30,18 @@ def checked_lanes(first: int, last: int, share: float) -> NDArray[np.intp]:
 
 
 def check_arrays(
-    lanes: int, checked: NDArray[np.intp], difference: Difference
+    lanes: int, checked: NDArray[np.intp], difference: Difference | None
 ) -> dict[str, NDArray[Any]]:
     """Return what the check says of so many lanes of a block, by the name of the variable.
 
-    The difference is that of the checked lanes, see `checked_lanes`.
+    The difference is that of the checked lanes, see `checked_lanes`, and None where there are none.
     """
     section, exponent = np.full((2, lanes), np.nan)
     motion = np.full(lanes, NOT_CHECKED, dtype=np.uint8)
-    section[checked] = difference.section_error
-    exponent[checked] = difference.exponent_error
-    motion[checked] = np.where(difference.changed, CHANGED, SAME)
+    if difference is not None:
+        section[checked] = difference.section_error
+        exponent[checked] = difference.exponent_error
+        motion[checked] = np.where(difference.changed, CHANGED, SAME)
     return dict(zip(CHECKED, (section, exponent, motion), strict=True))
 
 
@@ -49,7 +52,8 @@ class Tally:
         self.diverged = 0
         self._unsplit_lanes = 0
         self._unsplit_steps = 0
-        self._checked = {name: [np.zeros(0)] for name in CHECKED}
+        self._mixed = 0
+        self._checked = {name: [np.zeros(0)] for name in (*CHECKED, _OF_THE_RECORD)}
 
     def add(self, arrays: Mapping[str, NDArray[Any]]) -> None:
         """Count the lanes of one block."""
@@ -57,10 +61,13 @@ class Tally:
         if "unsplit_steps" in arrays:
             self._unsplit_lanes += int(np.count_nonzero(arrays["unsplit_steps"]))
             self._unsplit_steps += int(np.sum(arrays["unsplit_steps"]))
+        if "record" in arrays:
+            self._mixed += int(np.count_nonzero(arrays["record"]))
         if "motion_changed" in arrays:
             checked = arrays["motion_changed"] != NOT_CHECKED
             for name, blocks in self._checked.items():
-                blocks.append(arrays[name][checked])
+                known = arrays.get(name, np.full(checked.shape, np.nan))
+                blocks.append(known[checked])
 
     @property
     def remarks(self) -> list[str]:
@@ -72,12 +79,18 @@ class Tally:
                 "boundaries too often to be split at each (unsplit_steps in the file); raise "
                 "integration.steps_per_period"
             )
+        if self._mixed:
+            remarks.append(
+                f"{self._mixed} lanes are periodic in the end, but chaos or another motion came "
+                "before within their records (record in the file); their exponents are those of "
+                "the orbits"
+            )
         return remarks
 
     @property
     def errors(self) -> str:
         """The errors in one line; empty where no lane was checked."""
-        section, exponent, motion = map(np.concatenate, self._checked.values())
+        section, exponent, motion, of_record = map(np.concatenate, self._checked.values())
         if motion.size == 0:
             return ""
         text = f"{motion.size} lanes computed again with half the step: "
@@ -87,6 +100,12 @@ class Tally:
             if np.isfinite(exponent[periodic]).any():
                 text += f", their exponent by {_spread(exponent[periodic])}"
             text += "; "
+        others = np.isfinite(exponent) & np.isfinite(of_record) & ~periodic
+        if others.any():
+            text += (
+                f"exponent of {others.sum()} others by {_spread(exponent[others])} from the step "
+                f"and {_spread(of_record[others])} from the length of the record; "
+            )
         return f"{text}{np.count_nonzero(motion == CHANGED)} move in another way"
 
 

@@ -6,18 +6,21 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
-from gearchaos_kernels import LANES, STATUS_TEXTS, Outcome, Plan, Status, integrate
+from gearchaos_kernels import LANES, STATUS_TEXTS, Outcome, Plan, Status, System, integrate
 from numpy.typing import NDArray
 
 from gearchaos.configuration import Configuration
 from gearchaos.dynamics.exponents import exponents, sum_of_exponents
 from gearchaos.dynamics.labelling import LOOKS, labels_of
+from gearchaos.dynamics.largest_exponents import MEANINGS as RECORD_MEANINGS
+from gearchaos.dynamics.largest_exponents import largest_exponents
 from gearchaos.engine.error_check import MEANINGS, check_arrays, checked_lanes
 from gearchaos.engine.lanes import Lanes
 from gearchaos.engine.steps import (
     PILOT_LANES,
     Candidate,
     choose_steps,
+    coarse_steps,
     pilot,
     solution_of,
     stable_steps,
@@ -26,8 +29,8 @@ from gearchaos.gear.mesh_stiffness import FourierStiffness
 from gearchaos.interrupts import check
 from gearchaos.records.difference import difference
 from gearchaos.records.label import MEANINGS as MOTION_MEANINGS
-from gearchaos.records.label import MOST_POINTS
-from gearchaos.records.lyapunov import largest_exponent
+from gearchaos.records.label import MOST_POINTS, Labels
+from gearchaos.records.period import POINTS_NEEDED
 from gearchaos.results.variables import Variable, step_choice_variables, sweep_variables
 
 Arrays = Mapping[str, NDArray[Any]]
@@ -72,7 +75,8 @@ class Simulation:
             tangent=outputs.lyapunov,
             resolved=integration.crossings == "resolved",
         )
-        self.notes = [note for note in (raised, self._negative_stiffness()) if note]
+        coarse = coarse_steps(self.lanes, steps) if outputs.lyapunov else ""
+        self.notes = [note for note in (raised, coarse, self._negative_stiffness()) if note]
         self._choice: list[Variable] = []
 
     def choose_steps(self) -> None:
@@ -119,7 +123,9 @@ class Simulation:
     @property
     def recording(self) -> Plan:
         """The plan with all that is recorded: what is kept, and what the labels are read off."""
-        enough = min(MOST_POINTS, self.plan.recorded_periods) if self.config.outputs.motion else 0
+        checked = POINTS_NEEDED if self.config.integration.error_check > 0.0 else 0
+        wanted = MOST_POINTS if self.config.outputs.motion else checked
+        enough = min(wanted, self.plan.recorded_periods)
         return self.plan._replace(section_points=max(self.plan.section_points, enough))
 
     @property
@@ -137,6 +143,7 @@ class Simulation:
             status_meanings=[status.name.lower() for status in STATUS_TEXTS],
             check_meanings=MEANINGS if checked else (),
             motion_meanings=MOTION_MEANINGS if outputs.motion else (),
+            record_meanings=RECORD_MEANINGS if outputs.motion and outputs.lyapunov else (),
         )
         return of_the_lanes + self._choice
 
@@ -241,26 +248,53 @@ class Simulation:
             points = outcome.section[:, -plan.section_points :, system.states.index(name)]
             # A copy: a view would keep alive all that was recorded.
             arrays[f"section_{name}"] = points.copy()
+        labels = labels_of(system, outcome, self.recording) if outputs.motion else None
+        if labels is not None:
+            arrays |= labels._asdict()
+        largest = None
         if outcome.growth is not None:
-            exponent, standard_error = largest_exponent(outcome.growth, system.mesh_period)
-            arrays["lyapunov_exponent"] = exponent
-            arrays["lyapunov_exponent_standard_error"] = standard_error
-        if outputs.motion:
-            arrays |= labels_of(system, outcome, self.recording)._asdict()
+            period = labels.period if labels else np.zeros(lanes.size, dtype=np.int32)
+            largest = largest_exponents(system, outcome, self.recording, period)
+            arrays["lyapunov_exponent"] = largest.values
+            arrays["lyapunov_exponent_standard_error"] = largest.standard_errors
+            if labels is not None:
+                arrays["record"] = largest.record
         if outputs.exponents:
-            found = exponents(system, start, plan)
-            arrays["lyapunov_exponents"] = found.values
-            arrays["lyapunov_exponents_standard_error"] = found.standard_errors
+            spectrum = exponents(system, start, plan)
+            if largest is not None:
+                spectrum = spectrum.given(largest.of_orbit)
+            arrays["lyapunov_exponents"] = spectrum.values
+            arrays["lyapunov_exponents_standard_error"] = spectrum.standard_errors
             arrays["lyapunov_sum"] = sum_of_exponents(system)
         share = self.config.integration.error_check
         if share > 0.0:
             checked = checked_lanes(int(lanes[0]), int(lanes[-1]) + 1, share)
-            half = plan._replace(steps_per_period=2 * plan.steps_per_period)
-            some, kept = system.of(checked), outputs.section
-            finer = solution_of(integrate(some, start[checked], half), some, kept)
-            coarser = solution_of(outcome_of(outcome, checked, plan), some, kept)
-            arrays |= check_arrays(lanes.size, checked, difference(coarser, finer))
+            arrays |= self._check(system, start, outcome, labels, checked)
         return arrays
+
+    def _check(
+        self,
+        system: System,
+        start: Floats,
+        outcome: Outcome,
+        labels: Labels | None,
+        checked: NDArray[np.intp],
+    ) -> dict[str, NDArray[Any]]:
+        """Integrate and label the checked lanes of a block again with half the step, and compare.
+
+        Compared is what the labels know: the file may keep fewer section points.
+        """
+        lanes, kept = start.shape[0], self.config.outputs.section
+        if not checked.size:
+            return check_arrays(lanes, checked, None)
+        plan = self.recording
+        half = plan._replace(steps_per_period=2 * plan.steps_per_period)
+        system, finer = system.of(checked), integrate(system.of(checked), start[checked], half)
+        some = labels and labels_of(system, finer, half)
+        fine = solution_of(system, finer, half, kept, some)
+        some = labels and labels.of(checked)
+        coarse = solution_of(system, outcome_of(outcome, checked), plan, kept, some)
+        return check_arrays(lanes, checked, difference(coarse, fine))
 
     def _negative_stiffness(self) -> str:
         """Tell where the variation of the mesh stiffness exceeds its mean."""
@@ -286,8 +320,7 @@ def joined(outcomes: list[Outcome]) -> Outcome:
     return Outcome(*arrays)
 
 
-def outcome_of(outcome: Outcome, lanes: NDArray[np.intp], plan: Plan) -> Outcome:
-    """Return the outcome of some lanes, with the section that a plan keeps."""
+def outcome_of(outcome: Outcome, lanes: NDArray[np.intp]) -> Outcome:
+    """Return the outcome of some lanes."""
     arrays: Any = (None if array is None else array[lanes] for array in outcome)
-    some = Outcome(*arrays)
-    return some._replace(section=some.section[:, -plan.section_points :])
+    return Outcome(*arrays)

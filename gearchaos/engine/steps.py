@@ -11,19 +11,31 @@ from numpy.typing import NDArray
 
 from gearchaos.configuration.messages import Fault
 from gearchaos.configuration.run_tables import MOST_STEPS_PER_PERIOD
-from gearchaos.dynamics.stability import StabilityLimit, stability_limit
+from gearchaos.dynamics.largest_exponents import largest_exponents
+from gearchaos.dynamics.stability import (
+    StabilityLimit,
+    exponent_bias,
+    stability_limit,
+    sufficient_steps,
+)
 from gearchaos.engine.lanes import Lanes
 from gearchaos.errors import ConfigurationError
 from gearchaos.interrupts import check
-from gearchaos.records.difference import Solution, bound, difference
-from gearchaos.records.lyapunov import largest_exponent
-from gearchaos.records.period import POINTS_NEEDED
+from gearchaos.records.difference import Solution, bound, difference, motions_by_period
+from gearchaos.records.label import Labels
+from gearchaos.records.period import POINTS_NEEDED, motion_period
 
 LANES_AT_ONCE = 2**14
 """Lanes whose stability is looked at together."""
 
 PILOT_LANES = 48
 """Lanes on which the error is measured, spread evenly over the sweep."""
+
+MOST_BIAS = 0.05
+"""Largest shift of an exponent by the step alone that is passed over, in parts of the exponent."""
+
+SURELY_FINE = 8
+"""So many times the steps that are surely stable shift no exponent that matters."""
 
 PILOT_PERIODS = 150
 """Mesh periods in which a lane settles on its grid, and as many that are compared."""
@@ -73,6 +85,25 @@ def stable_steps(lanes: Lanes, steps: int) -> tuple[int, str]:
     )
 
 
+def coarse_steps(lanes: Lanes, steps: int) -> str:
+    """Tell where steps that are stable are yet too few to give exponents; empty where they are not.
+
+    A standard error does not show it: it speaks of the length of the record.
+    """
+    system = lanes.system_of(lanes.spread(PILOT_LANES))
+    if steps >= SURELY_FINE * np.max(sufficient_steps(system)):
+        return ""
+    bias, true = exponent_bias(system, steps)
+    worst = int(np.argmax(np.abs(bias) - MOST_BIAS * np.abs(true)))
+    if abs(bias[worst]) <= MOST_BIAS * abs(true[worst]):
+        return ""
+    return (
+        f"{steps} steps per period shift Lyapunov exponents by about {bias[worst]:.1g} (that of "
+        f"the pair in contact is {true[worst]:.2g}), and no standard error shows it; raise "
+        "integration.steps_per_period, or measure it with integration.error_check"
+    )
+
+
 def _limits(lanes: Lanes, steps: int) -> Iterator[StabilityLimit]:
     # The starts of one value share its system.
     every = np.arange(0, len(lanes), lanes.starts)
@@ -105,13 +136,22 @@ def _fault(lanes: Lanes, worst: StabilityLimit, unstable: NDArray[np.intp], step
     )
 
 
-def solution_of(outcome: Outcome, system: System, kept: Sequence[str]) -> Solution:
-    """Return of integrated lanes what tells two grids apart, by the section of the kept states."""
+def solution_of(
+    system: System, outcome: Outcome, plan: Plan, kept: Sequence[str], labels: Labels | None = None
+) -> Solution:
+    """Return of integrated lanes what tells two grids apart.
+
+    Compared is the section of the kept states, or of all where none is kept. Without labels the
+    period is read off the section, and other motions are not told from each other.
+    """
+    period = motion_period(outcome.section) if labels is None else labels.period
+    motion = motions_by_period(period) if labels is None else labels.motion
     exponent = None
     if outcome.growth is not None:
-        exponent, _ = largest_exponent(outcome.growth, system.mesh_period)
-    columns = [system.states.index(name) for name in kept]
-    return Solution(outcome.section[..., columns], exponent, outcome.status != Status.OK)
+        exponent = largest_exponents(system, outcome, plan, period).values
+    columns = [system.states.index(name) for name in kept or system.states]
+    diverged = outcome.status != Status.OK
+    return Solution(outcome.section[..., columns], exponent, diverged, motion, period)
 
 
 def pilot(
@@ -139,7 +179,8 @@ def pilot(
             section_points=min(POINTS_NEEDED, PILOT_PERIODS),
             resolved=resolved,
         )
-        return solution_of(integrate(system, common, grid), system, lanes.config.outputs.section)
+        outcome = integrate(system, common, grid)
+        return solution_of(system, outcome, grid, lanes.config.outputs.section)
 
     return numbers.size, solution
 

@@ -15,9 +15,9 @@ from gearchaos.figures.dots import dots
 from gearchaos.figures.labels import axis_label
 from gearchaos.figures.lanes import Between, Floats, Mask, diagram_lanes, outermost
 from gearchaos.figures.panel import close_panel
-from gearchaos.figures.style import BLUE, GREY, ORANGE
+from gearchaos.figures.style import BLUE, GREY, ORANGE, VERMILION
 from gearchaos.results.result import Result
-from gearchaos.results.variables import LARGEST_EXPONENT, STANDARD_ERROR
+from gearchaos.results.variables import LARGEST_EXPONENT, RECORD, STANDARD_ERROR
 
 BAND_STANDARD_ERRORS = 2.0
 
@@ -28,7 +28,8 @@ class LyapunovArtists(NamedTuple):
     ``line``: the exponents drawn, by the parameter, not a number where a lane diverged;
     ``points``: exponents without a neighbour to draw a line to, between diverged lanes, or all of
     them where a parameter value has several starts; ``band``, ``bars``: two standard errors to
-    either side, of the line and of the points; ``positive``: between a positive exponent and zero.
+    either side, of the line and of the points; ``positive``: between a positive exponent and zero;
+    ``mixed``: around exponents of orbits that were reached within the record, from other motion.
     """
 
     line: Line2D
@@ -36,6 +37,7 @@ class LyapunovArtists(NamedTuple):
     band: PolyCollection
     bars: LineCollection
     positive: PolyCollection
+    mixed: Line2D | None
     zero: Line2D
     diverged: Line2D | None
     off_scale: list[Line2D]
@@ -106,6 +108,20 @@ def lyapunov(
         markersize=float(np.clip(300.0 / lanes.numbers.size, 1.0, 3.0)),
         color=BLUE,
     )
+    mixed = None
+    if RECORD in result and (result.lanes(RECORD)[lanes.numbers] == 1).any():
+        among = result.lanes(RECORD)[lanes.numbers] == 1
+        (mixed,) = axes.plot(
+            lanes.parameter[among],
+            whole[among],
+            linestyle="none",
+            marker="o",
+            markersize=3.0,
+            markerfacecolor="none",
+            markeredgewidth=0.5,
+            color=VERMILION,
+            label="record holds ended chaos",
+        )
     axes.set_ylabel(axis_label(result, LARGEST_EXPONENT, line_length=20))
     marks = close_panel(
         axes,
@@ -116,9 +132,9 @@ def lyapunov(
         spread=np.nan_to_num(spread),
         hold_zero=True,
         full_range=full_range,
-        also=[band] if np.isfinite(whole + spread).any() else [],
+        also=([band] if np.isfinite(whole + spread).any() else []) + ([mixed] if mixed else []),
     )
-    return LyapunovArtists(line, points, band, bars, positive, zero, *marks)
+    return LyapunovArtists(line, points, band, bars, positive, mixed, zero, *marks)
 
 
 def _without_neighbours(exponent: Floats) -> Mask:

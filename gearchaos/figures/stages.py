@@ -24,6 +24,7 @@ SHADES = {
     "chaotic": "#FCE5C4",
     "unresolved": "#E2E2E2",
     "diverged": "#F6CDBB",
+    "grows": "#F6CDBB",
 }
 """Colour of each kind of stage, in the order of the legend."""
 

@@ -7,7 +7,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gearchaos.records.period import motion_period, section_distance
+from gearchaos.records.label import PERIODIC, UNRESOLVED
+from gearchaos.records.period import section_distance
 
 Floats = NDArray[np.float64]
 
@@ -21,12 +22,15 @@ class Solution(NamedTuple):
     """What one grid gives for some lanes.
 
     ``section`` (lanes, points, states), ``exponent`` (lanes,) or None where it was not computed,
-    ``diverged`` (lanes,).
+    ``diverged`` (lanes,), ``motion`` (lanes,) as `records.label` has it, ``period`` (lanes,) in
+    mesh periods, 0 where the motion is not periodic.
     """
 
     section: Floats
     exponent: Floats | None
     diverged: NDArray[np.bool_]
+    motion: NDArray[np.uint8]
+    period: NDArray[np.int32]
 
 
 class Difference(NamedTuple):
@@ -48,11 +52,12 @@ class Difference(NamedTuple):
 def difference(one: Solution, other: Solution) -> Difference:
     """Compare two solutions lane by lane.
 
-    A lane moves in another way if its period is another one, if it diverged in one of the two
-    only, or if the orbits of equal period lie further apart than a tenth of their size: then
-    they are two attractors, and not one attractor and its error.
+    A lane moves in another way if its period is another one, if its motion is of another kind where
+    both are known, if it diverged in one of the two only, or if the orbits of equal period lie
+    further apart than a tenth of their size: then they are two attractors, and not one attractor
+    and its error.
     """
-    first, second = motion_period(one.section), motion_period(other.section)
+    first, second = one.period, other.period
     period = np.where(first == second, first, np.int32(0))
     distance = section_distance(one.section, other.section, period)
     size = np.max(np.abs(other.section), axis=(1, 2), initial=0.0)
@@ -61,12 +66,21 @@ def difference(one: Solution, other: Solution) -> Difference:
     exponent = np.full(period.shape, np.nan)
     if one.exponent is not None and other.exponent is not None:
         exponent = np.abs(one.exponent - other.exponent)
+    told = (one.motion != UNRESOLVED) & (other.motion != UNRESOLVED)
     return Difference(
         period,
         np.where(period > 0, distance, np.nan),
         exponent,
-        (first != second) | apart | (one.diverged != other.diverged),
+        (first != second)
+        | apart
+        | (told & (one.motion != other.motion))
+        | (one.diverged != other.diverged),
     )
+
+
+def motions_by_period(period: NDArray[np.int32]) -> NDArray[np.uint8]:
+    """Return the motion of lanes of which only the period is known, shape (lanes,)."""
+    return np.where(period > 0, PERIODIC, UNRESOLVED).astype(np.uint8)
 
 
 def bound(errors: Floats) -> float:

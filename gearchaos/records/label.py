@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,8 +14,8 @@ from gearchaos.records.period import POINTS_NEEDED, period_of, return_distances
 Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-PERIODIC, QUASI_PERIODIC, CHAOTIC, UNRESOLVED, DIVERGED = range(5)
-MEANINGS = ("periodic", "quasi_periodic", "chaotic", "unresolved", "diverged")
+PERIODIC, QUASI_PERIODIC, CHAOTIC, UNRESOLVED, DIVERGED, GROWS = range(6)
+MEANINGS = ("periodic", "quasi_periodic", "chaotic", "unresolved", "diverged", "grows")
 """Meanings of the values of ``motion``."""
 
 MOST_POINTS = 512
@@ -73,6 +73,11 @@ class Labels(NamedTuple):
     period: NDArray[np.int32]
     return_distance: Floats
     bands: NDArray[np.int32]
+
+    def of(self, lanes: NDArray[np.intp]) -> Labels:
+        """Return the labels of some lanes."""
+        some: Any = (label[lanes] for label in self)
+        return Labels(*some)
 
 
 def label(record: Record) -> Labels:

@@ -21,9 +21,17 @@ from gearchaos.results.stage_table import (
     slice_facts,
     stage_table,
 )
-from gearchaos.results.variables import HARMONIC, LABELS, START, Variable
+from gearchaos.results.variables import (
+    HARMONIC,
+    LABELS,
+    LARGEST_EXPONENT,
+    STANDARD_ERROR,
+    START,
+    STEP_ERROR,
+    Variable,
+)
 
-ERRORS = ("section_error", "exponent_error")
+ERRORS = ("section_error", STEP_ERROR, LARGEST_EXPONENT + STANDARD_ERROR)
 _CANDIDATE = "candidate_"
 
 
@@ -60,7 +68,11 @@ def overview(path: str | os.PathLike[str]) -> dict[str, Any]:
         if of_the_lanes and v.flags and v.dtype == "uint8":
             summary["counts"][v.name] = _counts(v, data[v.name])
         elif of_the_lanes and v.name in ERRORS and v.dtype == "float64":
-            summary["errors"][v.name] = _spread(data[v.name])
+            values = data[v.name]
+            if v.name.endswith(STANDARD_ERROR):
+                # The exponents of orbits have none.
+                values = values[values > 0.0]
+            summary["errors"][v.name] = _spread(values)
         elif v.dims == (f"{_CANDIDATE}steps",) and v.dtype in ("float64", "int32"):
             summary["step_choice"][v.name.removeprefix(_CANDIDATE)] = data[v.name].tolist()
     for v in variables:

@@ -8,6 +8,7 @@ from typing import Any
 
 from gearchaos.results.result_reader import printable
 from gearchaos.results.stage_table import slice_lines
+from gearchaos.results.variables import LARGEST_EXPONENT, STANDARD_ERROR, STEP_ERROR
 
 WIDTH = 80
 _LABEL = 18
@@ -17,6 +18,16 @@ _INTEGRATION = (
 )
 _RUN = "wall_time_seconds threads processor system software kernels git_commit created"
 """Names of metadata that are shown together."""
+
+ERROR_WORDING = {
+    "section_error": ("section error", "when the step is halved"),
+    STEP_ERROR: ("exponent error", "when the step is halved"),
+    LARGEST_EXPONENT + STANDARD_ERROR: (
+        "exponent error",
+        "one standard error of the finite record; orbits of periodic lanes have none",
+    ),
+}
+"""What the errors in an overview are of, and from what they come."""
 
 MOST_STAGES = 20
 """Of more stages, the first and the last ones are shown."""
@@ -70,7 +81,8 @@ def _accuracy(overview: Mapping[str, Any]) -> Iterator[str]:
     for name, spread in overview["errors"].items():
         if spread["lanes"]:
             span = f"{spread['median']:.1e} (median) to {spread['greatest']:.1e}"
-            yield _entry(name, f"{span} in {spread['lanes']} lanes when the step is halved")
+            label, cause = ERROR_WORDING[name]
+            yield _entry(label, f"{span} in {spread['lanes']} lanes, {cause}")
     choice = overview["step_choice"]
     for row, steps in enumerate(choice.get("steps", [])):
         measured = (

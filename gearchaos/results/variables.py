@@ -22,6 +22,8 @@ SECTION = "section_"
 LARGEST_EXPONENT = "lyapunov_exponent"
 ALL_EXPONENTS = "lyapunov_exponents"
 STANDARD_ERROR = "_standard_error"
+STEP_ERROR = "exponent_step_error"
+RECORD = "record"
 LABELS = ("motion", "period")
 BANDS = "bands"
 STATUS = "status"
@@ -121,13 +123,14 @@ def sweep_variables(
     exponents: bool = False,
     check_meanings: Sequence[str] = (),
     motion_meanings: Sequence[str] = (),
+    record_meanings: Sequence[str] = (),
 ) -> list[Variable]:
     """List the variables of a sweep in the order of the file.
 
     The axes are second swept parameter, first swept parameter, start, those that there are;
     ``states`` those of the scene in its order, ``section`` those recorded at so many section
     points. Meanings are those of 0, 1, ...: of ``status``, of ``motion_changed`` where lanes are
-    computed twice to measure their error, and of ``motion`` where lanes are labelled.
+    computed twice to measure their error, and of ``motion`` and ``record`` where they are labelled.
     """
     names = tuple(axis.name for axis in axes)
 
@@ -153,7 +156,7 @@ def sweep_variables(
             variables.append(real(SECTION + state, text, symbol, SECTION_POINT))
     if lyapunov:
         name, text = LARGEST_EXPONENT, "largest Lyapunov exponent"
-        error = f"standard error of the {text}"
+        error = f"standard error of the {text}, 0 where it is that of a periodic orbit"
         variables.append(real(name, text, r"$\lambda_1$"))
         variables.append(real(name + STANDARD_ERROR, error, r"$s_{\lambda_1}$"))
     if motion_meanings:
@@ -168,6 +171,9 @@ def sweep_variables(
             real("return_distance", text),
             count(BANDS, bands),
         ]
+    if record_meanings:
+        text = "whether the record holds one kind of motion, or another one before the labelled one"
+        variables.append(kind(RECORD, text, record_meanings))
     if exponents:
         name, error = ALL_EXPONENTS, "standard error of each Lyapunov exponent"
         text = "number of the Lyapunov exponent, the largest first"
@@ -192,7 +198,7 @@ def sweep_variables(
         motion = "whether the lane moves in another way when the step is halved"
         variables += [
             real("section_error", text),
-            real("exponent_error", exponent),
+            real(STEP_ERROR, exponent),
             kind("motion_changed", motion, check_meanings),
         ]
     diverged = "mesh period in which the lane diverged, -1 where it did not"

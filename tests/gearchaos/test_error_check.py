@@ -48,7 +48,7 @@ def test_the_error_is_the_difference_to_half_the_step():
     assert single.any()
     assert np.allclose(coarse["section_error"][single], distance[single], rtol=0.1, atol=1e-7)
     exponents = np.abs(coarse["lyapunov_exponent"] - fine["lyapunov_exponent"])
-    assert np.array_equal(coarse["exponent_error"], exponents)
+    assert np.array_equal(coarse["exponent_step_error"], exponents)
 
 
 def test_lanes_that_were_not_checked_say_so():
@@ -56,7 +56,7 @@ def test_lanes_that_were_not_checked_say_so():
     unchecked = arrays["motion_changed"] == NOT_CHECKED
     assert 0 < unchecked.sum() < unchecked.size
     assert np.isnan(arrays["section_error"][unchecked]).all()
-    assert np.isnan(arrays["exponent_error"][unchecked]).all()
+    assert np.isnan(arrays["exponent_step_error"][unchecked]).all()
 
 
 def test_a_sweep_without_check_has_no_trace_of_it():
@@ -71,7 +71,7 @@ def test_the_summary_counts_what_was_measured():
         {
             "status": np.zeros(4),
             "section_error": np.array([1e-6, 3e-6, np.nan, np.nan]),
-            "exponent_error": np.array([1e-7, 1e-7, 0.1, np.nan]),
+            "exponent_step_error": np.array([1e-7, 1e-7, 0.1, np.nan]),
             "motion_changed": np.array([SAME, SAME, CHANGED, NOT_CHECKED], dtype=np.uint8),
         }
     )

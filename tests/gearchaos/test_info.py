@@ -39,7 +39,7 @@ def test_the_page_says_what_was_computed_in_80_columns(good):
     assert max(map(len, ended.out.splitlines())) <= 80
     for words in ("a small result", f"load (static load), {LANES} values, 0 to 1", "damping_ratio"):
         assert words in ended.out
-    assert re.search(r"section_error +\S+ \(median\)", ended.out)
+    assert re.search(r"section error +\S+ \(median\)", ended.out)
     assert "section_delta_5 (load: 20, section_point: 5) float64" in ended.out
 
 

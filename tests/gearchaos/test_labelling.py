@@ -2,12 +2,17 @@
 
 import numpy as np
 import pytest
+from gearchaos_kernels import Plan
 
 from gearchaos.configuration import load_config
+from gearchaos.dynamics.exponents import period_jacobian
+from gearchaos.dynamics.largest_exponents import MIXED
+from gearchaos.dynamics.orbits import polish
 from gearchaos.engine.simulation import Simulation
 from gearchaos.records.label import (
     CHAOTIC,
     DIVERGED,
+    GROWS,
     MEANINGS,
     PERIODIC,
     QUASI_PERIODIC,
@@ -16,6 +21,7 @@ from gearchaos.records.label import (
     label,
 )
 
+from ..kernels.reference import PERIOD
 from .short_sweeps import (
     RANDOM,
     SOFT_BEARINGS,
@@ -104,13 +110,75 @@ def test_the_label_looks_at_states_that_are_not_kept():
 
 
 @pytest.mark.parametrize("overrides", [(), RANDOM, ("start.carry=downwards",)])
-def test_labels_change_nothing_else_of_a_result(overrides):
+def test_labels_change_nothing_else_of_a_result_but_exponents_of_orbits(overrides):
     # Without an odd lane out: labels come on top.
     with_labels = computed(simulation(*overrides))
     without = computed(simulation(*overrides, "outputs.motion=false"))
-    labels = {"motion", "period", "return_distance", "bands"}
+    labels = {"motion", "period", "return_distance", "bands", "record"}
     assert with_labels.keys() - without.keys() == labels
-    assert_same({n: a for n, a in with_labels.items() if n not in labels}, without)
+    kept = {n: a for n, a in with_labels.items() if n not in labels}
+    others = with_labels["period"] == 0
+    assert others.any()
+    for name in ("lyapunov_exponent", "lyapunov_exponent_standard_error"):
+        assert np.array_equal(kept.pop(name)[others], without.pop(name)[others])
+    assert_same(kept, without)
+
+
+def test_the_exponent_of_a_periodic_lane_is_that_of_its_orbit():
+    sweep = lanes_at(5.86, 10.75, 12.97)
+    arrays = computed(sweep, 3)
+    multipliers = polish(
+        sweep.lanes.system_of(np.arange(3)), arrays["end_state"], arrays["period"], 200
+    ).multipliers
+    exact = np.log(np.abs(multipliers[:, 0])) / (arrays["period"] * PERIOD)
+    assert arrays["lyapunov_exponent"] == pytest.approx(exact, abs=1e-9)
+    assert (arrays["lyapunov_exponent_standard_error"] == 0.0).all()
+    plain = computed(lanes_at(5.86, overrides=("integration.crossings='plain'",)), 1)
+    assert (plain["lyapunov_exponent_standard_error"] > 0.0).all()
+
+
+ESCAPING = (
+    "groups.load=0.26762",
+    "groups.half_backlash=0.94518",
+    "groups.pitch_error_amplitude=0.022749",
+    "groups.damping_ratio=0.025819888974716113",
+    "groups.transverse_stiffness_p=36.315",
+    "groups.transverse_damping_p=0.084229",
+    "groups.transverse_stiffness_g=6.3545",
+    "groups.transverse_damping_g=0.0058386",
+)
+"""A pair whose chaos at large pitch errors is a transient."""
+
+
+def test_a_record_that_holds_chaos_before_its_orbit_is_mixed():
+    # Chaos that ends within the record: the orbit is far outside of where the chaos was.
+    values = np.arange(14.6, 15.0, 0.01).round(3).tolist()
+    arrays = computed(lanes_at(*values, overrides=ESCAPING), len(values))
+    mixed = arrays["record"] == MIXED
+    assert mixed.any()
+    assert (arrays["motion"][mixed] == PERIODIC).all()
+    assert (arrays["lyapunov_exponent"][arrays["period"] > 0] < 0.0).all()
+
+
+PARAMETRIC = (
+    'scene.effects=["stiffness_variation"]',
+    "groups.stiffness_variation_scale=2.0",
+    "groups.damping_ratio=0.001",
+    "sweep={parameter='mesh_frequency', from=1.0, to=3.0, count=41}",
+)
+
+
+def test_a_linear_scene_grows_or_settles_and_is_never_chaotic():
+    sweep = Simulation(load_config(SPEEDS, PARAMETRIC))
+    arrays = computed(sweep, 41)
+    system, once = sweep.lanes.system_of(np.arange(41)), Plan(200, 0, 1, 0, tangent=True)
+    multipliers = np.linalg.eigvals(period_jacobian(system, np.zeros((41, 2)), once))
+    grows = np.max(np.abs(multipliers), axis=1) > 1.0
+    # About Omega = 2 / n lie the tongues of the Mathieu equation.
+    assert 3 < grows.sum() < 38
+    assert np.array_equal(arrays["motion"] == GROWS, grows)
+    assert not np.isin(arrays["motion"], (CHAOTIC, QUASI_PERIODIC)).any()
+    assert (arrays["period"][grows] == 0).all()
 
 
 def test_a_diverged_lane_is_labelled_as_diverged(tmp_path):

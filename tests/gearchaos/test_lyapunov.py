@@ -36,7 +36,8 @@ def test_a_single_period_gives_an_exponent_without_a_standard_error():
 
 def test_two_periods_give_a_standard_error():
     _, error = estimate(np.array([[0.5, 0.7]]))
-    assert error == pytest.approx([0.1 / PERIOD])
+    # Half their difference, as wide as the quantile of t with one degree of freedom to first order.
+    assert error == pytest.approx([2.25 * 0.1 / PERIOD])
 
 
 def quasi_periodic_error(periods: int) -> float:
@@ -71,14 +72,15 @@ def test_standard_error_of_white_noise_is_calibrated(periods):
     exponent, error = estimate(growth)
     true_spread = np.std(exponent)
     z = (exponent - 0.4 / PERIOD) / error
-    # 9 / 7 would be the mean for a plain average of ten blocks (a t distribution).
-    assert 1.0 < np.mean(z**2) < 9.0 / 7.0 * 1.05
-    assert np.sqrt(np.mean(error**2)) == pytest.approx(true_spread, rel=0.05)
+    # Of a normal distribution 95.4 %; 6000 lanes tell it to 0.3 %.
+    assert np.mean(np.abs(z) < 2.0) == pytest.approx(0.954, abs=0.01)
+    # A little wider than the spread, since it is itself known from few blocks.
+    assert 1.0 < np.sqrt(np.mean(error**2)) / true_spread < 1.15
     # sqrt(3/2) is the price of the smooth weights.
     assert true_spread * PERIOD == pytest.approx(np.sqrt(1.5 / periods), rel=0.05)
 
 
-def test_standard_error_of_correlated_growth_is_not_far_too_small():
+def test_standard_error_of_correlated_growth_covers_it():
     rng = np.random.default_rng(3)
     noise = rng.standard_normal((4000, 1100))
     # A memory of about five periods, as in a chaotic motion near a window.
@@ -86,7 +88,7 @@ def test_standard_error_of_correlated_growth_is_not_far_too_small():
     for period in range(1, noise.shape[1]):
         growth[:, period] = 0.8 * growth[:, period - 1] + noise[:, period]
     exponent, error = estimate(growth[:, 100:])
-    assert np.sqrt(np.mean(error**2)) == pytest.approx(np.std(exponent), rel=0.1)
+    assert 0.93 < np.mean(np.abs(exponent) < 2.0 * error) < 0.97
 
 
 def test_a_lane_that_diverged_has_neither_and_leaves_the_others_alone():

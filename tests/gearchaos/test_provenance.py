@@ -31,7 +31,7 @@ def test_the_configuration_is_there_as_it_was_written_and_with_everything_filled
     again = gearchaos.Configuration.from_toml(resolved, "resolved.toml")
     assert again.sweep.count == 3  # The override is in it.
     assert again.resolved_toml() == resolved
-    assert 'formulation = "published"' in resolved
+    assert 'formulation = "physical"' in resolved
 
 
 def test_the_resolved_configuration_computes_the_same_again(result):
@@ -78,7 +78,7 @@ def test_the_result_names_software_machine_threads_and_time(result):
 def test_the_result_says_what_was_integrated_and_how(result):
     facts = result.metadata
     assert facts["title"] == "a small sweep"
-    assert facts["formulation"] == "published"
+    assert facts["formulation"] == "physical"
     assert facts["effects"] == "pitch_error stiffness_variation backlash transverse axial"
     assert (facts["start"], facts["carry"]) == ("rest", "none")
     assert "Runge-Kutta" in facts["method"]

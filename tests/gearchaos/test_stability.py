@@ -4,11 +4,13 @@ import itertools
 
 import numpy as np
 import pytest
-from gearchaos_kernels import Effects, Groups, Status, System, jacobian
+from gearchaos_kernels import Effects, Groups, Plan, Status, System, jacobian
 
 from gearchaos import ConfigurationError
+from gearchaos.dynamics.exponents import period_jacobian
 from gearchaos.dynamics.stability import (
     MOST_STEPS,
+    exponent_bias,
     fewest_stable_steps,
     stability_limit,
     sufficient_steps,
@@ -258,3 +260,19 @@ def test_groups_beyond_all_measure_ask_for_more_steps_than_there_are(name):
 def test_a_state_at_rest_without_load_stays_there_with_any_number_of_steps():
     outcome = run(pan2021(0.0, load=0.0), LINEAR, state(), steps=2, periods=50)
     assert np.all(outcome.end_state == 0.0)
+
+
+@pytest.mark.parametrize(("steps", "warned"), [(16, True), (25, True), (64, False), (200, False)])
+def test_steps_that_are_stable_but_too_few_for_exponents_are_told(steps, warned):
+    sweep = simulation("integration.unstable='raise'", f"integration.steps_per_period={steps}")
+    assert any("shift Lyapunov exponents" in note for note in sweep.notes) == warned
+
+
+@pytest.mark.parametrize("steps", [20, 25, 40])
+def test_the_shift_of_an_exponent_by_the_step_is_that_of_the_linear_pair(steps):
+    system = simulation("scene.effects=['pitch_error', 'transverse']").lanes.system_of(np.arange(1))
+    bias, true = exponent_bias(system, steps)
+    once = Plan(steps, 0, 1, 0, tangent=True)
+    multipliers = np.linalg.eigvals(period_jacobian(system, np.zeros((1, 6)), once)[0])
+    computed = np.log(np.abs(multipliers).max()) / system.mesh_period[0]
+    assert true[0] + bias[0] == pytest.approx(computed, rel=1e-6)

@@ -6,7 +6,8 @@ import pytest
 import gearchaos
 from gearchaos.engine.steps import choose_steps
 from gearchaos.errors import ConfigurationError
-from gearchaos.records.difference import Solution
+from gearchaos.records.difference import Solution, motions_by_period
+from gearchaos.records.period import motion_period
 
 from .short_sweeps import simulation
 
@@ -23,7 +24,12 @@ def method_of_order_four(steps: int) -> Solution:
     error = 100.0 * steps**-4.0
     lanes = np.linspace(0.5, 1.5, 20)
     section = np.repeat((lanes + error)[:, np.newaxis, np.newaxis], 48, axis=1)
-    return Solution(section, -0.01 + error * np.ones(20), np.zeros(20, dtype=bool))
+    return solution(section, -0.01 + error * np.ones(20))
+
+
+def solution(section: np.ndarray, exponent: np.ndarray | None = None) -> Solution:
+    period = motion_period(section)
+    return Solution(section, exponent, np.zeros(20, dtype=bool), motions_by_period(period), period)
 
 
 @pytest.mark.parametrize("tolerance", [1e-4, 1e-6, 1e-8])
@@ -43,9 +49,7 @@ def test_a_tolerance_out_of_reach_is_refused_with_what_was_reached():
 
 def test_where_nothing_is_periodic_no_error_is_claimed():
     def noise(steps: int) -> Solution:
-        return Solution(
-            np.random.default_rng(steps).uniform(size=(20, 48, 1)), None, np.zeros(20, dtype=bool)
-        )
+        return solution(np.random.default_rng(steps).uniform(size=(20, 48, 1)))
 
     with pytest.raises(ConfigurationError, match="none of the lanes"):
         choose_steps(noise, 10, 1e-3, "x.toml")

@@ -1,0 +1,68 @@
+"""The largest exponent of the motion that lanes have come to: of its orbit where it is periodic."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from gearchaos_kernels import Outcome, Plan, System
+from numpy.typing import NDArray
+
+from gearchaos.dynamics.exponents import SMALLEST_RESOLVED
+from gearchaos.dynamics.orbits import polish
+from gearchaos.records.label import CHAOTIC_GROWTH
+from gearchaos.records.lyapunov import largest_exponent
+
+Floats = NDArray[np.float64]
+
+UNIFORM, MIXED = 0, 1
+MEANINGS = ("uniform", "mixed")
+"""Meanings of the values of ``record``."""
+
+
+class LargestExponents(NamedTuple):
+    """Largest Lyapunov exponents per unit of tau, and what of their errors the record tells.
+
+    ``values``, ``standard_errors`` (lanes,): the standard error is that of a finite record, and
+    thus 0 where the exponent is that of an orbit; ``record`` (lanes,) of `MEANINGS`: mixed where a
+    lane is periodic in the end, but its record holds motion of another kind; ``of_orbit`` (lanes,
+    states): all exponents of the orbit, the largest first, not a number where there is none and
+    where rounding hides them.
+    """
+
+    values: Floats
+    standard_errors: Floats
+    record: NDArray[np.uint8]
+    of_orbit: Floats
+
+
+def largest_exponents(
+    system: System, outcome: Outcome, plan: Plan, period: NDArray[np.int32]
+) -> LargestExponents:
+    """Tell the exponent of lanes from the multipliers of their orbits, or else from their records.
+
+    A lane that is periodic and has its crossings resolved takes the exponent of the stable orbit
+    next to its end state: no finite record enters there, and a transient at its begin does not
+    count. ``outcome``: with growth, integrated by ``plan``; ``period`` (lanes,) in mesh periods, 0
+    where a lane is not periodic.
+    """
+    assert outcome.growth is not None
+    values, errors = largest_exponent(outcome.growth, system.mesh_period)
+    record = np.full(period.shape, UNIFORM, dtype=np.uint8)
+    of_orbit = np.full((period.size, len(system.states)), np.nan)
+    found = LargestExponents(values, errors, record, of_orbit)
+    lanes = np.flatnonzero((period > 0) & np.isfinite(values))
+    if not plan.resolved or not lanes.size:
+        return found
+    guess = outcome.end_state[lanes]
+    orbits = polish(system.of(lanes), guess, period[lanes], plan.steps_per_period)
+    lanes, size = lanes[orbits.stable], np.abs(orbits.multipliers[orbits.stable])
+    duration = period[lanes] * system.mesh_period[lanes]
+    resolved = size > SMALLEST_RESOLVED * size[:, :1]
+    size = np.where(resolved, size, np.nan)
+    of_orbit[lanes] = np.log(size) / duration[:, np.newaxis]
+    over_record = outcome.growth.shape[1] * system.mesh_period[lanes]
+    mixed = np.abs(values[lanes] - of_orbit[lanes, 0]) * over_record > CHAOTIC_GROWTH
+    record[lanes] = np.where(mixed, MIXED, UNIFORM)
+    values[lanes], errors[lanes] = of_orbit[lanes, 0], 0.0
+    return found
