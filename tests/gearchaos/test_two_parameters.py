@@ -196,7 +196,8 @@ def test_a_slice_is_refined_like_the_sweep_of_one_parameter_that_it_is(tmp_path)
     text = BOTH[: BOTH.index("[start]")] + BOTH[BOTH.index("[integration]") :]
     (tmp_path / "both.toml").write_text(text, encoding="utf-8")
     overrides = [f"groups.{way}_damping_{g}=0.05" for way in ("transverse", "axial") for g in "pg"]
-    overrides += ["sweep.from=9.0", "sweep.to=14.0", "sweep.count=5", "second_sweep.count=2"]
+    overrides += ["formulation=published", "sweep.from=9.0", "sweep.to=14.0", "sweep.count=5"]
+    overrides += ["second_sweep.count=2"]
     flags = [word for override in overrides for word in ("--set", override)]
     assert sweep(tmp_path, *flags) == (0, "both.h5\n", "")
     both = gearchaos.load_config(tmp_path / "both.toml", overrides)
