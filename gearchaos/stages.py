@@ -10,7 +10,8 @@ import argparse
 import json
 import math
 import sys
-from collections.abc import Sequence
+import textwrap
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
@@ -19,9 +20,15 @@ from gearchaos.errors import ConfigurationError
 
 if TYPE_CHECKING:
     from gearchaos.engine.refinement import Boundary
+    from gearchaos.engine.survival import Survival
+    from gearchaos.results.crises import Crisis
     from gearchaos.results.jumps import Jump
     from gearchaos.results.result import Result
     from gearchaos.results.stage_table import LabelledLanes, Stage
+
+
+WIDTH = 80
+"""Columns of a terminal."""
 
 
 def _arguments(parser: argparse.ArgumentParser) -> None:
@@ -49,6 +56,13 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
         help="where to fix an axis of a result that has several, at the nearest of its values; may "
         "be repeated (default: the first value of each but the first swept parameter)",
     )
+    add(
+        "--survival",
+        type=_records,
+        metavar="RECORDS",
+        help="let up to 25 chaotic lanes go on for so many records of their own length, and tell "
+        "which share is still chaotic then",
+    )
     add("--json", action="store_true", help="print JSON instead of a table")
 
 
@@ -59,11 +73,20 @@ def _width(text: str) -> float:
     return width
 
 
+def _records(text: str) -> int:
+    records = number(text, 1, 1000)
+    if records % 1.0:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a whole number")
+    return int(records)
+
+
 def _stages(options: argparse.Namespace) -> int:
+    from gearchaos.results.crises import crises
     from gearchaos.results.jumps import jumps
     from gearchaos.results.overview import finite
     from gearchaos.results.result import open_result
     from gearchaos.results.stage_table import (
+        band_counts,
         labelled_lanes,
         one_axis,
         slice_facts,
@@ -76,18 +99,26 @@ def _stages(options: argparse.Namespace) -> int:
     where = slice_facts(whole, result)
     lanes = labelled_lanes(result, name=options.result)
     stages = stage_table(lanes, options.narrowest)
+    bands = band_counts(result, stages)
     boundaries = None
     if options.refine is not None:
         boundaries = _refined(result, stages, options)
         stages = refined_stages(stages, boundaries)
-    found = jumps(result)
+    outlasting = _survival(result, options) if options.survival is not None else None
+    jumping, bursting = jumps(result), crises(result)
     if options.json:
         facts = {"parameter": result.axis, "slice": where, **_facts(stages, boundaries)}
-        facts["jumps"] = [jump._asdict() for jump in found]
+        for stage, counts in zip(facts["stages"], bands, strict=True):
+            stage["bands"] = counts
+        facts["jumps"] = [jump._asdict() for jump in jumping]
+        facts["crises"] = [crisis._asdict() for crisis in bursting]
+        facts["survival"] = outlasting and outlasting._asdict()
         print(json.dumps(finite(facts), indent=1, allow_nan=False))
     else:
         print("\n".join(table(result.axis, stages, slice_lines(where))))
-        for lines in (remarks(found, lanes), boundary_list(boundaries or ())):
+        told = band_lines(stages, bands) + remarks(jumping, bursting, lanes)
+        told += [outlasting.text] if outlasting else []
+        for lines in (told, boundary_list(boundaries or ())):
             if lines:
                 print("\n".join(["", *lines]))
     return OK
@@ -124,6 +155,17 @@ def _refined(result: Result, stages: list[Stage], options: argparse.Namespace) -
         return refined_boundaries(config, result, stages, options.refine, options.threads)
 
 
+def _survival(result: Result, options: argparse.Namespace) -> Survival:
+    from gearchaos.engine.refinement import computable
+    from gearchaos.engine.running import COMPILING
+    from gearchaos.engine.survival import survival
+    from gearchaos.progress import notice
+
+    config = computable(result, options.result)
+    with notice(COMPILING):
+        return survival(config, result, options.survival, options.threads)
+
+
 def refined_stages(stages: list[Stage], boundaries: Sequence[Boundary]) -> list[Stage]:
     """Return the stages with their ends at the refined boundaries."""
     starts = [stages[0].start, *(boundary.above for boundary in boundaries)]
@@ -151,11 +193,29 @@ def table(axis: str, stages: Sequence[Stage], where: Sequence[str] = ()) -> list
     return lines
 
 
-def remarks(found: Sequence[Jump], lanes: LabelledLanes) -> list[str]:
-    """Word what the table does not show: jumps within a stage, and chaos that came to rest."""
+def band_lines(stages: Sequence[Stage], bands: Sequence[Mapping[int, int]]) -> list[str]:
+    """Word on how many bands the sections of a stage lie, where any lies on several."""
+    lines = []
+    for stage, counts in zip(stages, bands, strict=True):
+        several = [f"{lanes} on {count}" for count, lanes in counts.items() if count > 1]
+        if several:
+            line = f"{stage.start:.6g} to {stage.end:.6g}: of {sum(counts.values())} "
+            line += f"{stage.label} lanes {', '.join(several)} bands"
+            lines += textwrap.wrap(line, WIDTH)
+    return lines
+
+
+def remarks(jumping: Sequence[Jump], bursting: Sequence[Crisis], lanes: LabelledLanes) -> list[str]:
+    """Word what the table does not show: jumps and crises in a stage, chaos that came to rest."""
     lines = [
         f"{jump.below:.6g} to {jump.above:.6g}: jumps to another motion of {jump.label}"
-        for jump in found
+        for jump in jumping
+    ]
+    lines += [
+        f"{crisis.below:.6g} to {crisis.above:.6g}: crisis, {crisis.section} spans\n"
+        f"{crisis.lowest_below:.3g} to {crisis.highest_below:.3g} below, "
+        f"{crisis.lowest_above:.3g} to {crisis.highest_above:.3g} above"
+        for crisis in bursting
     ]
     late = int(((lanes.period > 0) & (lanes.exponent > 0.0)).sum())
     if late:

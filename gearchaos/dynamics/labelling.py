@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from gearchaos_kernels import Outcome, Plan, Status, System, integrate
 from numpy.typing import NDArray
 
 from gearchaos.dynamics.exponents import period_jacobian, sum_of_exponents
 from gearchaos.dynamics.orbits import polish
-from gearchaos.records.bands import subsequence_spread
+from gearchaos.records.bands import band_count, subsequence_spread
 from gearchaos.records.label import (
     CHAOTIC,
     DIVERGED,
@@ -20,36 +22,78 @@ from gearchaos.records.label import (
     UNRESOLVED,
     Labels,
     Record,
+    doubtful,
     label,
-    may_rotate_slowly,
     settling_periods,
 )
 from gearchaos.records.period import coordinate_scale, return_distances
 
-LONGER = 4
-"""How many times the record a lane that may be on a torus goes on, to be looked at once more."""
+LOOKS = (4, 16)
+"""How many times the record doubtful lanes go on, and then those that are doubtful still."""
 
 WHOLE = 0.25
 """Largest difference of the subsequences of a curve, see `subsequence_spread`."""
 
 
-def labels_of(system: System, outcome: Outcome, plan: Plan) -> Labels:
+class Told(NamedTuple):
+    """Labels, and the state (lanes, states) at the end of the look that told each."""
+
+    labels: Labels
+    state: NDArray[np.float64]
+
+
+def labels_of(system: System, outcome: Outcome, plan: Plan) -> Told:
     """Label lanes by their record, which should hold `MOST_POINTS` section points or all there are.
 
-    ``plan`` is that by which they were integrated.
+    ``plan`` is that by which they were integrated. `doubtful` lanes are labelled by a longer record
+    that begins where theirs ended, and what that does not tell by a still longer one.
     """
     record = _record(system, outcome, MOST_POINTS)
+    labels = _told(system, outcome, plan, record)
+    lanes = np.flatnonzero(doubtful(record, labels))
+    state, tangent = outcome.end_state.copy(), outcome.end_tangent.copy()
+    for longer in LOOKS:
+        further = plan._replace(
+            transient_periods=0,
+            recorded_periods=longer * plan.recorded_periods,
+            section_points=longer * min(MOST_POINTS, plan.recorded_periods),
+            history_periods=0,
+        )
+        # In portions whose longer records take no more memory than those of all lanes.
+        size = max(1, system.lanes // longer)
+        for first in range(0, lanes.size, size):
+            some = lanes[first : first + size]
+            part = system.of(some)
+            again = integrate(part, state[some], further, tangent_start=tangent[some])
+            state[some], tangent[some] = again.end_state, again.end_tangent
+            told = _told_again(part, again, further)
+            labels.motion[some], labels.period[some] = told.motion, told.period
+            labels.bands[some] = told.bands
+            _measure_return(labels, record.section, some[told.period > 0])
+        sound = np.isfinite(state[lanes]).all(axis=1)
+        lanes = lanes[sound & (labels.motion[lanes] == UNRESOLVED)]
+    return Told(labels, state)
+
+
+def _told(system: System, outcome: Outcome, plan: Plan, record: Record) -> Labels:
+    """Return what one record tells."""
     labels = label(record)
     if not system.effects.backlash:
         _tell_linear(system, plan, labels)
     _settle(system, outcome, plan, labels, settling_periods(record, labels))
-    rotating = np.flatnonzero((labels.motion == QUASI_PERIODIC) | may_rotate_slowly(record, labels))
-    # In portions whose longer records take no more memory than those of all lanes.
-    for lanes in np.array_split(rotating, LONGER):
-        if lanes.size:
-            start = outcome.end_state[lanes]
-            again = _second_look(system.of(lanes), start, plan, labels.motion[lanes])
-            labels.motion[lanes] = again
+    lanes = np.flatnonzero(np.isin(labels.motion, (CHAOTIC, QUASI_PERIODIC)))
+    labels.bands[lanes] = band_count(record.section[lanes])
+    return labels
+
+
+def _told_again(system: System, outcome: Outcome, plan: Plan) -> Labels:
+    """Return what a longer record tells; also of a torus, that it is not a cascade."""
+    labels = _told(system, outcome, plan, _record(system, outcome, plan.section_points))
+    tori = np.flatnonzero(labels.motion == QUASI_PERIODIC)
+    hopping = tori[subsequence_spread(outcome.section[tori]) > WHOLE]
+    # What diverges only now has not done so in what is kept.
+    refused = np.concatenate([hopping, np.flatnonzero(labels.motion == DIVERGED)])
+    labels.motion[refused], labels.bands[refused] = UNRESOLVED, 0
     return labels
 
 
@@ -74,23 +118,10 @@ def _record(system: System, outcome: Outcome, most_points: int) -> Record:
     )
 
 
-def _second_look(
-    system: System, start: NDArray[np.float64], plan: Plan, motion: NDArray[np.uint8]
-) -> NDArray[np.uint8]:
-    """Tell by a longer record, which begins where theirs ended, whether lanes are on a torus."""
-    longer = plan._replace(
-        transient_periods=0,
-        recorded_periods=LONGER * plan.recorded_periods,
-        section_points=LONGER * min(MOST_POINTS, plan.recorded_periods),
-    )
-    again = integrate(system, start, longer)
-    found = label(_record(system, again, longer.section_points)).motion
-    seen = (motion == QUASI_PERIODIC) | (found == QUASI_PERIODIC)
-    contradicted = np.isin(found, (PERIODIC, CHAOTIC, DIVERGED))
-    torus = seen & ~contradicted & (subsequence_spread(again.section) <= WHOLE)
-    told = np.where(torus, QUASI_PERIODIC, UNRESOLVED)
-    told[found == CHAOTIC] = CHAOTIC
-    return told.astype(np.uint8)
+def _measure_return(labels: Labels, section: NDArray[np.float64], lanes: NDArray[np.intp]) -> None:
+    """Keep how near their own period brings the record of some lanes back to itself."""
+    distances = return_distances(section[lanes])
+    labels.return_distance[lanes] = distances[np.arange(lanes.size), labels.period[lanes] - 1]
 
 
 def _admits_tori(system: System) -> NDArray[np.bool_]:
@@ -121,4 +152,4 @@ def _settle(
         searched[settled] = False
         labels.motion[settled] = PERIODIC
         labels.period[settled] = n
-        labels.return_distance[settled] = return_distances(outcome.section[settled])[:, n - 1]
+        _measure_return(labels, outcome.section, settled)

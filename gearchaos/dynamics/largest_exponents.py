@@ -37,14 +37,14 @@ class LargestExponents(NamedTuple):
 
 
 def largest_exponents(
-    system: System, outcome: Outcome, plan: Plan, period: NDArray[np.int32]
+    system: System, outcome: Outcome, plan: Plan, period: NDArray[np.int32], state: Floats
 ) -> LargestExponents:
     """Tell the exponent of lanes from the multipliers of their orbits, or else from their records.
 
     A lane that is periodic and has its crossings resolved takes the exponent of the stable orbit
-    next to its end state: no finite record enters there, and a transient at its begin does not
-    count. ``outcome``: with growth, integrated by ``plan``; ``period`` (lanes,) in mesh periods, 0
-    where a lane is not periodic.
+    next to its state (lanes, states): no finite record enters there, and a transient at its begin
+    does not count. ``outcome``: with growth, integrated by ``plan``; ``period`` (lanes,) in mesh
+    periods, 0 where a lane is not periodic.
     """
     assert outcome.growth is not None
     values, errors = largest_exponent(outcome.growth, system.mesh_period)
@@ -54,8 +54,7 @@ def largest_exponents(
     lanes = np.flatnonzero((period > 0) & np.isfinite(values))
     if not plan.resolved or not lanes.size:
         return found
-    guess = outcome.end_state[lanes]
-    orbits = polish(system.of(lanes), guess, period[lanes], plan.steps_per_period)
+    orbits = polish(system.of(lanes), state[lanes], period[lanes], plan.steps_per_period)
     lanes, size = lanes[orbits.stable], np.abs(orbits.multipliers[orbits.stable])
     duration = period[lanes] * system.mesh_period[lanes]
     resolved = size > SMALLEST_RESOLVED * size[:, :1]

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
+from gearchaos_kernels import Plan, integrate
 from numpy.typing import NDArray
 
 from gearchaos.configuration import Configuration, swept_values
@@ -15,9 +16,11 @@ from gearchaos.dynamics.following import (
     follow,
     loss_of_stability,
 )
+from gearchaos.dynamics.labelling import LOOKS
 from gearchaos.dynamics.systems import system_of
 from gearchaos.engine.running import run
 from gearchaos.errors import ConfigurationError, FileError
+from gearchaos.records.period import TOLERANCE
 from gearchaos.results.result import Result
 from gearchaos.results.stage_table import Stage, labelled_lanes
 from gearchaos.results.variables import axis_name
@@ -57,26 +60,15 @@ class Boundary(NamedTuple):
     multiplier: complex
 
 
-def refinable(result: Result, name: str) -> Configuration:
-    """Return the configuration with which single lanes of a result can be computed again.
+def computable(result: Result, name: str) -> Configuration:
+    """Return the configuration with which lanes of a result can be computed again, or go on.
 
-    Messages call the result ``name``. Raises FileError if it does not hold its configuration,
-    ConfigurationError if its lanes do not stand for themselves.
+    Messages call the result ``name``. Raises FileError if it does not hold its configuration.
     """
     text = str(result.metadata.get("configuration_resolved", ""))
     if not text:
         raise FileError(f"{name}: holds no configuration; run the sweep again")
     config = Configuration.from_toml(text, f"{name} (configuration_resolved)")
-    if config.start.carry != "none":
-        raise ConfigurationError(
-            f'{name}: start.carry = "{config.start.carry}": a lane between two others has no start '
-            'of its own; refine a sweep with start.carry = "none"'
-        )
-    if config.start.kind == "random":
-        raise ConfigurationError(
-            f'{name}: start.kind = "random": a lane between two others has no start of its own; '
-            "refine a sweep that starts otherwise"
-        )
     steps = int(result.metadata.get("steps_per_period", config.integration.steps_per_period))
     parameters = (sweep.parameter for sweep in config.sweeps.values())
     fixed = {p: result.fixed[axis_name(p)] for p in parameters if axis_name(p) in result.fixed}
@@ -91,6 +83,25 @@ def refinable(result: Result, name: str) -> Configuration:
         "outputs.motion": True,
     }.items():
         config = config.replace(key, value)
+    return config
+
+
+def refinable(result: Result, name: str) -> Configuration:
+    """Return the configuration with which lanes between those of a result can be computed.
+
+    As `computable`, and raises ConfigurationError if its lanes do not stand for themselves.
+    """
+    config = computable(result, name)
+    if config.start.carry != "none":
+        raise ConfigurationError(
+            f'{name}: start.carry = "{config.start.carry}": a lane between two others has no start '
+            'of its own; refine a sweep with start.carry = "none"'
+        )
+    if config.start.kind == "random":
+        raise ConfigurationError(
+            f'{name}: start.kind = "random": a lane between two others has no start of its own; '
+            "refine a sweep that starts otherwise"
+        )
     return config
 
 
@@ -133,12 +144,14 @@ def refined_boundaries(
 
 
 def _edges(result: Result) -> NDArray[Any]:
-    """Return of each lane its value, label, period and end state."""
+    """Return of each lane value, label, period, end state, and if that is far from its orbit."""
     lanes, states = labelled_lanes(result), result["end_state"]
-    fields = [("value", "f8"), ("label", object), ("period", "i4")]
+    fields = [("value", "f8"), ("label", object), ("period", "i4"), ("far", "?")]
     edges = np.empty(lanes.values.size, [*fields, ("state", "f8", states.shape[1:])])
     edges["value"], edges["label"], edges["period"] = lanes.values, lanes.labels, lanes.period
-    edges["state"] = states
+    edges["state"], edges["far"] = states, False
+    if "return_distance" in result:
+        edges["far"] = (lanes.period > 0) & ~(result["return_distance"] <= TOLERANCE)
     return edges
 
 
@@ -164,12 +177,33 @@ def _losses(
     return told
 
 
+def _settled(config: Configuration, edge: NDArray[Any]) -> Floats:
+    """Return a state near the orbit of every periodic lane.
+
+    Where a longer look told it, the end of the record may be far away.
+    """
+    state, integration = edge["state"].copy(), config.integration
+    lanes = np.flatnonzero(edge["far"])
+    if lanes.size:
+        further = Plan(
+            integration.steps_per_period,
+            sum(LOOKS) * integration.recorded_periods,
+            0,
+            section_points=0,
+            resolved=integration.crossings == "resolved",
+        )
+        values = {config.sweep.parameter: edge["value"][lanes]}
+        system = system_of(config, values, config.needed_effects)
+        state[lanes] = integrate(system, state[lanes], further).end_state
+    return state
+
+
 def _followed(config: Configuration, edge: NDArray[Any], last: Floats) -> Losses:
     first, parameter = edge["value"], config.sweep.parameter
     lowest, highest = swept_values(config.sweep)[[0, -1]]
     followed = follow(
         lambda values: system_of(config, {parameter: values}, config.needed_effects),
-        edge["state"],
+        _settled(config, edge),
         edge["period"],
         first,
         np.clip(last, lowest, highest),

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from gearchaos.configuration import Configuration
 from gearchaos.dynamics.exponents import exponents, sum_of_exponents
-from gearchaos.dynamics.labelling import labels_of
+from gearchaos.dynamics.labelling import LOOKS, Told, labels_of
 from gearchaos.dynamics.largest_exponents import MEANINGS as RECORD_MEANINGS
 from gearchaos.dynamics.largest_exponents import largest_exponents
 from gearchaos.engine.error_check import MEANINGS, check_arrays, checked_lanes
@@ -29,7 +29,7 @@ from gearchaos.gear.mesh_stiffness import FourierStiffness
 from gearchaos.interrupts import check
 from gearchaos.records.difference import difference
 from gearchaos.records.label import MEANINGS as MOTION_MEANINGS
-from gearchaos.records.label import MOST_POINTS, Labels
+from gearchaos.records.label import MOST_POINTS
 from gearchaos.records.period import POINTS_NEEDED
 from gearchaos.results.variables import Variable, step_choice_variables, sweep_variables
 
@@ -168,15 +168,15 @@ class Simulation:
 
     def block_memory(self, threads: int) -> int:
         """Return about how many bytes the arrays of one block take while it is computed."""
-        states = len(self.lanes.states)
-        numbers = (self.recording.section_points + 4) * states
+        states, lanes = len(self.lanes.states), min(len(self.lanes), self.block_lanes(threads))
+        numbers, records = (self.recording.section_points + 4) * states, lanes
         if self.plan.tangent:
             numbers += self.plan.recorded_periods
-            # Lanes that a first record leaves unresolved are looked at again, a share at a time.
-            numbers *= 2 if self.config.outputs.motion else 1
+            # Doubtful lanes are looked at again, a share at a time, but a whole lane at least.
+            records += max(lanes, LOOKS[-1]) if self.config.outputs.motion else 0
         if self.config.outputs.exponents:
             numbers += self.plan.recorded_periods * states
-        return 8 * min(len(self.lanes), self.block_lanes(threads)) * numbers
+        return 8 * records * numbers
 
     def block_lanes(self, threads: int) -> int:
         """Return how many lanes make a block: work for every thread, and progress to be seen."""
@@ -248,16 +248,17 @@ class Simulation:
             points = outcome.section[:, -plan.section_points :, system.states.index(name)]
             # A copy: a view would keep alive all that was recorded.
             arrays[f"section_{name}"] = points.copy()
-        labels = labels_of(system, outcome, self.recording) if outputs.motion else None
-        if labels is not None:
-            arrays |= labels._asdict()
+        told = labels_of(system, outcome, self.recording) if outputs.motion else None
+        if told is not None:
+            arrays |= told.labels._asdict()
         largest = None
         if outcome.growth is not None:
-            period = labels.period if labels else np.zeros(lanes.size, dtype=np.int32)
-            largest = largest_exponents(system, outcome, self.recording, period)
+            period = told.labels.period if told else np.zeros(lanes.size, dtype=np.int32)
+            state = told.state if told else outcome.end_state
+            largest = largest_exponents(system, outcome, self.recording, period, state)
             arrays["lyapunov_exponent"] = largest.values
             arrays["lyapunov_exponent_standard_error"] = largest.standard_errors
-            if labels is not None:
+            if told is not None:
                 arrays["record"] = largest.record
         if outputs.exponents:
             spectrum = exponents(system, start, plan)
@@ -269,7 +270,7 @@ class Simulation:
         share = self.config.integration.error_check
         if share > 0.0:
             checked = checked_lanes(int(lanes[0]), int(lanes[-1]) + 1, share)
-            arrays |= self._check(system, start, outcome, labels, checked)
+            arrays |= self._check(system, start, outcome, told, checked)
         return arrays
 
     def _check(
@@ -277,7 +278,7 @@ class Simulation:
         system: System,
         start: Floats,
         outcome: Outcome,
-        labels: Labels | None,
+        told: Told | None,
         checked: NDArray[np.intp],
     ) -> dict[str, NDArray[Any]]:
         """Integrate and label the checked lanes of a block again with half the step, and compare.
@@ -290,9 +291,9 @@ class Simulation:
         plan = self.recording
         half = plan._replace(steps_per_period=2 * plan.steps_per_period)
         system, finer = system.of(checked), integrate(system.of(checked), start[checked], half)
-        some = labels and labels_of(system, finer, half)
+        some = told and labels_of(system, finer, half)
         fine = solution_of(system, finer, half, kept, some)
-        some = labels and labels.of(checked)
+        some = told and Told(told.labels.of(checked), told.state[checked])
         coarse = solution_of(system, outcome_of(outcome, checked), plan, kept, some)
         return check_arrays(lanes, checked, difference(coarse, fine))
 

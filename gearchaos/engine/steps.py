@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from gearchaos.configuration.messages import Fault
 from gearchaos.configuration.run_tables import MOST_STEPS_PER_PERIOD
+from gearchaos.dynamics.labelling import Told
 from gearchaos.dynamics.largest_exponents import largest_exponents
 from gearchaos.dynamics.stability import (
     StabilityLimit,
@@ -22,7 +23,6 @@ from gearchaos.engine.lanes import Lanes
 from gearchaos.errors import ConfigurationError
 from gearchaos.interrupts import check
 from gearchaos.records.difference import Solution, bound, difference, motions_by_period
-from gearchaos.records.label import Labels
 from gearchaos.records.period import POINTS_NEEDED, motion_period
 
 LANES_AT_ONCE = 2**14
@@ -137,18 +137,21 @@ def _fault(lanes: Lanes, worst: StabilityLimit, unstable: NDArray[np.intp], step
 
 
 def solution_of(
-    system: System, outcome: Outcome, plan: Plan, kept: Sequence[str], labels: Labels | None = None
+    system: System, outcome: Outcome, plan: Plan, kept: Sequence[str], told: Told | None = None
 ) -> Solution:
     """Return of integrated lanes what tells two grids apart.
 
     Compared is the section of the kept states, or of all where none is kept. Without labels the
     period is read off the section, and other motions are not told from each other.
     """
-    period = motion_period(outcome.section) if labels is None else labels.period
-    motion = motions_by_period(period) if labels is None else labels.motion
+    if told is None:
+        period, state = motion_period(outcome.section), outcome.end_state
+        motion = motions_by_period(period)
+    else:
+        period, state, motion = told.labels.period, told.state, told.labels.motion
     exponent = None
     if outcome.growth is not None:
-        exponent = largest_exponents(system, outcome, plan, period).values
+        exponent = largest_exponents(system, outcome, plan, period, state).values
     columns = [system.states.index(name) for name in kept or system.states]
     diverged = outcome.status != Status.OK
     return Solution(outcome.section[..., columns], exponent, diverged, motion, period)

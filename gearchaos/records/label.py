@@ -24,6 +24,9 @@ MOST_POINTS = 512
 STANDARD_ERRORS = 3.0
 """An exponent within so many of its standard errors is not told from zero."""
 
+CERTAIN = 6.0
+"""Standard errors beyond which a positive exponent is not doubted."""
+
 CHAOTIC_GROWTH = 2.0
 """Logarithm of the growth over the record beyond which a disturbance counts as growing."""
 
@@ -61,12 +64,15 @@ class Labels(NamedTuple):
     """Labels of some lanes.
 
     ``motion`` (lanes,) of `MEANINGS`; ``period`` (lanes,) in mesh periods, 0 where the motion is
-    not periodic; ``return_distance`` (lanes,): that of the period, or else the smallest one.
+    not periodic; ``return_distance`` (lanes,): that of the period, or else the smallest one;
+    ``bands`` (lanes,): on how many a chaotic or quasi-periodic section lies, see `band_count`, 0
+    where it is neither or has not been looked at.
     """
 
     motion: NDArray[np.uint8]
     period: NDArray[np.int32]
     return_distance: Floats
+    bands: NDArray[np.int32]
 
     def of(self, lanes: NDArray[np.intp]) -> Labels:
         """Return the labels of some lanes."""
@@ -97,7 +103,7 @@ def label(record: Record) -> Labels:
     own = distances[np.arange(period.size), np.maximum(period, 1) - 1]
     distance = np.where(period > 0, own, np.where(np.isfinite(smallest), smallest, np.nan))
     distance[record.diverged] = np.nan
-    return Labels(motion, period, distance)
+    return Labels(motion, period, distance, np.zeros_like(period))
 
 
 def settling_periods(record: Record, labels: Labels) -> NDArray[np.int32]:
@@ -140,18 +146,20 @@ def settling_periods(record: Record, labels: Labels) -> NDArray[np.int32]:
     return found
 
 
-def may_rotate_slowly(record: Record, labels: Labels) -> Mask:
-    """Whether an unresolved lane may be on a torus that a longer record would show.
+def doubtful(record: Record, labels: Labels) -> Mask:
+    """Whether a longer record may tell another motion than this one did.
 
-    Next to a resonance one turn may take more than a hundred periods. Then the halves of a record
-    differ, and its exponent is further from zero than that of many turns. It may where the scene
-    admits tori, and a disturbance changes by less than exp(2) over the record.
+    Next to a resonance one turn of a torus may take more than a hundred periods, next to a
+    bifurcation an orbit attracts by less than a factor e over the record, and weak chaos takes long
+    to show: such lanes are unresolved. A period beyond 16 may pass for a torus, a torus or chaos
+    that is about to end for chaos as long as the exponent is within six standard errors of zero.
     """
-    found = np.zeros(record.torus.shape, dtype=np.bool_)
-    lanes = np.flatnonzero((labels.motion == UNRESOLVED) & record.torus)
-    if record.growth is not None and lanes.size:
-        exponent, _ = largest_exponent(record.growth[lanes], np.ones(lanes.size))
-        found[lanes] = np.abs(exponent) * record.growth.shape[1] <= CHAOTIC_GROWTH
+    found = np.zeros(labels.motion.shape, dtype=np.bool_)
+    if record.growth is not None:
+        exponent, error = largest_exponent(record.growth, np.ones(found.size))
+        weak = ~(exponent > CERTAIN * error)
+        found = np.isin(labels.motion, (UNRESOLVED, QUASI_PERIODIC))
+        found |= (labels.motion == CHAOTIC) & weak
     return found
 
 

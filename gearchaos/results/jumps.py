@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gearchaos.records.period import section_distance
+from gearchaos.records.period import TOLERANCE, section_distance
 from gearchaos.results.result import Result, section_variables
 from gearchaos.results.stage_table import labelled_lanes
 
@@ -41,7 +41,10 @@ def jumps(result: Result) -> list[Jump]:
         return []
     sections = np.stack([result[name] for name in names], axis=2)
     size = np.nanmax(np.abs(sections), axis=(0, 1), initial=0.0)
-    found = jumps_at(lanes.period, sections / np.where(size > 0.0, size, 1.0))
+    # A lane still on its way to its orbit lies anywhere.
+    arrived = ~(result["return_distance"] > TOLERANCE) if "return_distance" in result else True
+    period = np.where(arrived, lanes.period, 0)
+    found = jumps_at(period, sections / np.where(size > 0.0, size, 1.0))
     return [
         Jump(float(lanes.values[at]), float(lanes.values[at + 1]), str(lanes.labels[at]))
         for at in found

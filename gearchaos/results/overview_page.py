@@ -94,7 +94,7 @@ def _accuracy(overview: Mapping[str, Any]) -> Iterator[str]:
 def _stages(overview: Mapping[str, Any]) -> Iterator[str]:
     lines = [
         f"{stage['label']}: {stage['start']:.6g} to {stage['end']:.6g}, "
-        f"{stage['lanes']} lane{'s' if stage['lanes'] != 1 else ''}"
+        f"{stage['lanes']} lane{'s' if stage['lanes'] != 1 else ''}{_bands(stage['bands'])}"
         for stage in overview["stages"]
     ]
     half = MOST_STAGES // 2
@@ -102,6 +102,11 @@ def _stages(overview: Mapping[str, Any]) -> Iterator[str]:
         more = f"{len(lines)} stages: the first {half} and the last {half}"
         lines = [more, *lines[:half], *lines[-half:]]
     yield from (_wrapped(line, "  ") for line in [*slice_lines(overview["slice"]), *lines])
+
+
+def _bands(counts: Mapping[str, int]) -> str:
+    most = max(map(int, counts), default=1)
+    return f", on up to {most} bands" if most > 1 else ""
 
 
 def _metadata(overview: Mapping[str, Any], names: str) -> Iterator[str]:

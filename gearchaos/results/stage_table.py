@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from heapq import heapify, heappop, heappush
 from itertools import pairwise
 from typing import NamedTuple
@@ -11,7 +12,7 @@ from numpy.typing import NDArray
 
 from gearchaos.errors import ConfigurationError, FileError
 from gearchaos.results.result import Result
-from gearchaos.results.variables import LABELS, LARGEST_EXPONENT, START
+from gearchaos.results.variables import BANDS, LABELS, LARGEST_EXPONENT, START
 
 Floats = NDArray[np.float64]
 
@@ -164,6 +165,22 @@ def stage_table(lanes: LabelledLanes, narrowest: float = 0.0) -> list[Stage]:
         by_first[whole.first] = by_after[whole.after] = whole
         heappush(heap, (width(whole), whole))
     return [_stage(lanes, *by_first[first]) for first in sorted(by_first)]
+
+
+def band_counts(result: Result, stages: Sequence[Stage]) -> list[dict[int, int]]:
+    """Count in every stage the lanes with its own label by the number of their bands.
+
+    Empty where the motion has none, or the result, which has one axis, does not tell.
+    """
+    if BANDS not in result:
+        return [{} for _ in stages]
+    labels, counts = labelled_lanes(result).labels, []
+    for stage in stages:
+        inside = slice(stage.first, stage.last + 1)
+        bands = result[BANDS][inside][labels[inside] == stage.label]
+        numbers, lanes = np.unique(bands[bands > 0], return_counts=True)
+        counts.append(dict(zip(numbers.tolist(), lanes.tolist(), strict=True)))
+    return counts
 
 
 def _stage(lanes: LabelledLanes, first: int, after: int, own: int, narrower: int) -> Stage:

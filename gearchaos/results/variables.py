@@ -25,6 +25,7 @@ STANDARD_ERROR = "_standard_error"
 STEP_ERROR = "exponent_step_error"
 RECORD = "record"
 LABELS = ("motion", "period")
+BANDS = "bands"
 STATUS = "status"
 
 STATE_WORDING: dict[str, tuple[str, str]] = {
@@ -161,10 +162,14 @@ def sweep_variables(
     if motion_meanings:
         period = "mesh periods after which the motion repeats, 0 where it is not periodic"
         text = "smallest distance after which the motion returns, of all states, scaled"
+        bands = (
+            "bands a chaotic or quasi-periodic section hops between in turn, 0 for other motions"
+        )
         variables += [
             kind("motion", "kind of motion", motion_meanings),
             count("period", period, "$n$"),
             real("return_distance", text),
+            count(BANDS, bands),
         ]
     if record_meanings:
         text = "whether the record holds one kind of motion, or another one before the labelled one"

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from gearchaos.records.bands import subsequence_spread
+from gearchaos.records.bands import band_count, subsequence_spread
 from gearchaos.records.period import LONGEST_PERIOD
 
 POINTS = 2000
@@ -74,3 +74,48 @@ def test_too_few_points_tell_nothing():
 def test_a_coordinate_at_rest_does_not_matter():
     section = torus(GOLDEN)
     assert apart(np.insert(section, 1, 0.3, axis=1)) == apart(section)
+
+
+def bands(section: np.ndarray) -> int:
+    return int(band_count(section[np.newaxis])[0])
+
+
+@pytest.mark.parametrize(
+    ("r", "count"),
+    # Bands merge at 3.5748, 3.5925722 and 3.6785735; in the window of period 3 at 3.85680.
+    [
+        *((3.573, 8), (3.58, 4), (3.5915, 4), (3.594, 2), (3.677, 2), (3.68, 1), (4.0, 1)),
+        *((3.8531, 3), (3.8575, 1)),
+    ],
+)
+def test_the_bands_of_the_logistic_map_merge_where_they_are_known_to(r, count):
+    assert bands(logistic(r, 512)) == count
+
+
+@pytest.mark.parametrize("curves", [1, 2, 3, 5])
+@pytest.mark.parametrize("rotation", [GOLDEN, 0.01 * GOLDEN, np.pi / 10.0, 0.25 + 0.004 * GOLDEN])
+def test_every_curve_of_a_torus_is_a_band(rotation, curves):
+    section = torus(rotation, curves)
+    # Some of these curves lie on top of each other but for one coordinate.
+    apart = np.sin(2.0 * np.pi * np.arange(POINTS) / curves)
+    assert bands(np.insert(section, 1, 5.0 * apart, axis=1)) == curves
+
+
+def test_bands_may_surround_each_other():
+    number = np.arange(512)
+    radius, angle = 1.0 + number % 2, 2.0 * np.pi * GOLDEN * (number // 2)
+    rings = radius[:, np.newaxis] * np.stack([np.cos(angle), np.sin(angle), radius], axis=1)
+    assert bands(rings) == 2
+
+
+def test_noise_a_point_at_rest_and_too_few_points_are_one_band():
+    noise = np.random.default_rng(7).normal(size=(512, 6))
+    assert bands(noise) == 1
+    assert bands(np.ones((512, 2))) == 1
+    assert bands(logistic(3.6, 31)) == 1
+    assert bands(logistic(3.6, 32)) == 2
+    assert bands(np.full((512, 2), np.nan)) == 1
+
+
+def test_more_bands_than_are_counted_are_told_as_a_divisor():
+    assert bands(logistic(3.5701, 512)) == 16  # There are 32.

@@ -47,6 +47,7 @@ def test_the_motions_of_figure_7_are_labelled():
     arrays = computed(lanes_at(5.86, 10.75, 12.47, 12.97, 13.4), 5)
     assert arrays["motion"].tolist() == [PERIODIC, PERIODIC, CHAOTIC, PERIODIC, CHAOTIC]
     assert arrays["period"].tolist() == [1, 2, 0, 3, 0]
+    assert arrays["bands"].tolist() == [0, 0, 1, 0, 1]
     assert (arrays["return_distance"][[0, 1, 3]] < 1e-9).all()
     assert (arrays["return_distance"][[2, 4]] > 1e-2).all()
 
@@ -61,6 +62,30 @@ def test_a_lane_that_settles_slowly_is_labelled_by_the_stable_orbit_it_comes_clo
     for found in (arrays, patient):
         assert found["motion"].tolist() == [PERIODIC, PERIODIC]
         assert found["period"].tolist() == [1, 2]
+
+
+@pytest.mark.parametrize(("multiplier", "motion"), [(0.995, PERIODIC), (0.99999, UNRESOLVED)])
+def test_an_orbit_that_hardly_attracts_is_found_by_a_longer_record(multiplier, motion):
+    # A linear oscillator: every disturbance shrinks by |mu| = exp(-zeta T) a period.
+    period = 2.0 * np.pi / 1.3717
+    sweep = simulation(
+        "sweep={parameter='load', values=[0.1, 0.2]}",
+        f"groups.damping_ratio={-np.log(multiplier) / period:.17g}",
+        "groups.mesh_frequency=1.3717",
+        "pair.helix_angle_deg=0.0",
+        "scene.effects=['pitch_error']",
+        "integration.transient_periods=0",
+        "integration.recorded_periods=60",
+        "outputs.section_points=60",
+    )
+    lanes = np.arange(2)
+    _, outcome = sweep.integrate(lanes, sweep.recording)
+    record = Record(outcome.section, outcome.growth, lanes < 0, lanes < 0)
+    assert label(record).motion.tolist() == [UNRESOLVED] * 2
+    arrays = computed(sweep, 2)
+    assert arrays["motion"].tolist() == [motion] * 2
+    assert (arrays["return_distance"] > 1e-3).all()
+    assert_same(arrays, computed(sweep, 1))
 
 
 SLOW_TORI = "sweep={parameter='mesh_frequency', values=[1.121, 1.15, 1.424]}"
@@ -89,7 +114,7 @@ def test_labels_change_nothing_else_of_a_result_but_exponents_of_orbits(override
     # Without an odd lane out: labels come on top.
     with_labels = computed(simulation(*overrides))
     without = computed(simulation(*overrides, "outputs.motion=false"))
-    labels = {"motion", "period", "return_distance", "record"}
+    labels = {"motion", "period", "return_distance", "bands", "record"}
     assert with_labels.keys() - without.keys() == labels
     kept = {n: a for n, a in with_labels.items() if n not in labels}
     others = with_labels["period"] == 0

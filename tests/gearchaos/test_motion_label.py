@@ -11,11 +11,12 @@ from gearchaos.records.label import (
     QUASI_PERIODIC,
     UNRESOLVED,
     Record,
+    doubtful,
     halves_differ_by,
     label,
-    may_rotate_slowly,
     settling_periods,
 )
+from gearchaos.records.lyapunov import largest_exponent
 from gearchaos.records.period import LONGEST_PERIOD, TOLERANCE, return_distances
 
 GOLDEN = (np.sqrt(5.0) - 1.0) / 2.0
@@ -192,21 +193,36 @@ def test_a_record_too_short_for_anything_is_unresolved_without_a_distance():
     assert np.isnan(labels.return_distance).all()
 
 
-def slowly(one: Record) -> np.ndarray:
-    return may_rotate_slowly(one, label(one))
+def in_doubt(section: np.ndarray, growth: np.ndarray | None = None) -> bool:
+    one = record(section, growth)
+    return bool(doubtful(one, label(one))[0])
 
 
 def test_a_turn_as_long_as_the_record_is_for_a_longer_one_to_tell():
     slow = GOLDEN / POINTS
     assert labelled(circle(slow))[0] == UNRESOLVED
-    assert slowly(record(circle(slow))).all()
+    assert in_doubt(circle(slow))
     assert labelled(circle(slow, 40 * POINTS))[0] == QUASI_PERIODIC
 
 
-@pytest.mark.parametrize(("growth", "slow"), [(1.9, True), (-1.9, True), (2.1, False), (-9, False)])
-def test_a_slow_rotation_neither_gains_nor_loses_a_disturbance(growth, slow):
-    each = np.full(POINTS, growth / POINTS)
-    section = circle(GOLDEN / POINTS)
-    assert slowly(record(section, each)).tolist() == [slow]
-    assert not slowly(record(section, each, torus=False)).any()
-    assert not slowly(record(section)._replace(growth=None)).any()
+def test_a_torus_is_doubted_and_a_period_is_not():
+    assert in_doubt(circle(GOLDEN))
+    assert not in_doubt(circle(0.25))
+    broken = record(np.full((POINTS, 2), np.nan), np.full(POINTS, np.nan))
+    assert not doubtful(broken, label(broken)).any()
+
+
+@pytest.mark.parametrize(("errors", "doubted"), [(4.0, True), (8.0, False)])
+def test_chaos_is_doubted_as_long_as_it_is_within_six_standard_errors(errors, doubted):
+    section, _ = logistic(4.0)
+    noise = np.repeat(np.resize([1.0, -1.0], 10), POINTS // 10)
+    growth = 0.1 + noise
+    _, error = largest_exponent(growth[np.newaxis], np.ones(1))
+    growth = noise + errors * error[0]
+    assert labelled(section, growth)[0] == CHAOTIC
+    assert in_doubt(section, growth) is doubted
+
+
+def test_without_an_exponent_a_longer_record_would_tell_nothing_of_chaos():
+    without = record(circle(GOLDEN / POINTS))._replace(growth=None)
+    assert not doubtful(without, label(without)).any()

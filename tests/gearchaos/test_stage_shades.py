@@ -33,6 +33,7 @@ def result_of(labels: str, *, labelled: bool = True) -> Result:
         "motion": [KINDS[letter][0] for letter in labels],
         "period": [KINDS[letter][1] for letter in labels],
         "return_distance": np.zeros(lanes),
+        "bands": np.zeros(lanes),
         "status": np.zeros(lanes),
         "diverged_period": np.full(lanes, -1),
         "start_state": np.zeros((lanes, 2)),

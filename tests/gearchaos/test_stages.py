@@ -45,7 +45,8 @@ def test_the_table_lists_every_stage_within_80_columns(folder, result):
     words = [line.split() for line in lines[2:]]
     assert words[0][:5] == ["9.8", "10.2", "period", "1", "5"]
     assert words[1][:4] == ["10.3", "11.3", "period", "2"]
-    assert sum(int(line[39:46]) for line in lines[2:]) == result["motion"].size
+    rows = lines[2 : lines.index("")]
+    assert sum(int(row[39:46]) for row in rows) == result["motion"].size
 
 
 def test_narrow_stages_are_counted_in_their_surroundings(folder):
@@ -125,7 +126,7 @@ def test_lanes_that_do_not_stand_for_themselves_are_not_refined(
 
 
 def test_a_file_without_labels_or_without_its_configuration_is_told(result, tmp_path):
-    labels = ("motion", "period", "return_distance")
+    labels = ("motion", "period", "return_distance", "bands")
     without = Result(
         result.axes,
         [variable for name, variable in result.variables.items() if name not in labels],

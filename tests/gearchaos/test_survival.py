@@ -1,0 +1,66 @@
+"""Chaos that ends is told from chaos that lasts by letting it go on."""
+
+import json
+
+import pytest
+
+import gearchaos
+from gearchaos.engine.survival import Survival
+from gearchaos.records.label import CHAOTIC
+
+from .commands import run_module
+from .short_sweeps import PAN2021
+
+LASTING = 13.4
+FADING = (14.82, 14.87, 14.9)
+"""Here chaos lives for a thousand periods or so: within 6000 it comes to rest on a period 1."""
+
+SHORT = ("integration.transient_periods=100", "integration.recorded_periods=200")
+GROUPS = (
+    "groups.load=0.26762",
+    "groups.half_backlash=0.94518",
+    "groups.pitch_error_amplitude=0.022749",
+    "groups.damping_ratio=0.025819888974716113",
+    "groups.transverse_stiffness_p=36.315",
+    "groups.transverse_damping_p=0.084229",
+    "groups.transverse_stiffness_g=6.3545",
+    "groups.transverse_damping_g=0.0058386",
+)
+
+
+def saved(folder, values):
+    result = gearchaos.run(
+        gearchaos.load_config(
+            PAN2021, [f"sweep={{parameter='pitch_error', values={[*values]}}}", *GROUPS, *SHORT]
+        )
+    )
+    result.save(folder / "chaos.h5")
+    return int((result["motion"] == CHAOTIC).sum())
+
+
+def stages(folder, *arguments: str):
+    return run_module("gearchaos.stages", "chaos.h5", "--quiet", *arguments, cwd=folder)
+
+
+def test_the_share_of_chaotic_lanes_that_outlast_many_records_is_told(tmp_path):
+    chaotic = saved(tmp_path, [LASTING, *FADING])
+    assert chaotic > 1
+    told = json.loads(stages(tmp_path, "--survival", "30", "--json").out)["survival"]
+    assert told == {"records": 30, "lanes": chaotic, "outlasting": 1}
+
+
+def test_the_share_is_worded_in_one_line():
+    assert Survival(10, 25, 22).text == "chaotic: 88 % of lanes outlast 10 records (25 tried)"
+
+
+def test_without_chaos_there_is_nothing_to_outlast(tmp_path):
+    assert saved(tmp_path, [5.86]) == 0
+    assert "nothing to outlast" in stages(tmp_path, "--survival", "2").out
+    assert json.loads(stages(tmp_path, "--json").out)["survival"] is None
+
+
+@pytest.mark.parametrize("records", ["0", "1.5", "-1", "x", "1e9"])
+def test_a_number_of_records_that_is_none_is_refused(tmp_path, records):
+    ended = stages(tmp_path, "--survival", records)
+    assert (ended.code, ended.out) == (2, "")
+    assert "--survival" in ended.err
