@@ -16,8 +16,8 @@ from gearchaos.results.jumps import SMALLEST, STEEPEST
 Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-GROWTH = 1.1
-"""Least factor by which a section grows in a crisis."""
+GROWTH = 1.2
+"""Least factor by which the section of a chaotic motion grows where there is a crisis."""
 
 NOWHERE = 100.0
 """Widths that a number is off which a candidate does not have."""
@@ -120,13 +120,20 @@ class JumpPlace(Observation):
 
 
 class CrisisPlace(JumpPlace):
-    """Where the section of a chaotic motion grows at once."""
+    """Where the section of a motion first passes half of all that it grows within the span.
+
+    Next to a crisis the motion leaves its former part of the section seldom, and the record of a
+    single lane may miss it: so the growth is that over the span, and not from lane to lane.
+    """
 
     def _steps(self, records: Records) -> Floats:
-        extent = np.ptp(records.section, axis=2)
+        extent = np.ptp(np.where(records.sound[..., np.newaxis], records.section, 0.0), axis=2)
         chaotic = has_motion(records, "chaotic")
-        grows = chaotic[:, 1:] & (extent[:, 1:] > GROWTH * extent[:, :-1]) & (extent[:, :-1] > 0.0)
-        return np.where(grows, extent[:, 1:] / np.where(grows, extent[:, :-1], 1.0), 0.0)
+        least = np.min(np.where(chaotic, extent, np.inf), axis=1, keepdims=True)
+        most = np.max(np.where(chaotic, extent, 0.0), axis=1, keepdims=True)
+        beyond = (most > GROWTH * least) & chaotic & (extent > (least + most) / 2.0)
+        first = beyond & (np.cumsum(beyond, axis=1) == 1)
+        return first[:, 1:].astype(np.float64)
 
 
 class ExponentAt(Observation):

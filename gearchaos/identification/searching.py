@@ -23,7 +23,7 @@ from gearchaos.interrupts import check
 Floats = NDArray[np.float64]
 
 SECONDS_BETWEEN_SNAPSHOTS = 20.0
-LANES_AT_ONCE = 2**14
+LANES_AT_ONCE = 2**13
 """Lanes of one batch: enough for all threads, and little memory."""
 
 Keep = Callable[[Tried], None]
