@@ -60,10 +60,11 @@ def _identify(options: Namespace) -> int:
 def _scored(judge: Judge, path: str) -> Tried:
     import numpy as np
 
-    from gearchaos.configuration import groups_at, load_config
+    from gearchaos.configuration import groups_at
     from gearchaos.configuration.sweep_values import SWEEPABLE_GROUPS
+    from gearchaos.identification.loading import observed_configuration
 
-    config = load_config(path)
+    config = observed_configuration(judge.targets, path)
     groups, physical = groups_at(config, {}), config.physical()
     known = {}
     for one in judge.targets.parameter:

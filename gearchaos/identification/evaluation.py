@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from gearchaos_kernels import Outcome, Plan, Status, System, integrate, mesh_motion
@@ -44,7 +44,8 @@ class Records(NamedTuple):
 
     def at(self, values: NDArray[np.intp]) -> Records:
         """Return what there is at some of the swept values, by their numbers."""
-        return Records(*(array[:, values] for array in self))
+        arrays: Any = (array[:, values] for array in self)
+        return Records(*arrays)
 
 
 def evaluate(
@@ -85,9 +86,10 @@ def evaluate(
         before = outcome.end_state
         looked_at = np.flatnonzero(np.tile(accelerated[line], candidates))
         found = _records(system, outcome, looked_at, plan.steps_per_period)
-        parts.append(Records(*(a.reshape(candidates, line.size, *a.shape[1:]) for a in found)))
+        arrays: Any = (array.reshape(candidates, line.size, *array.shape[1:]) for array in found)
+        parts.append(Records(*arrays))
     order = np.argsort(np.ravel(lines))
-    joined = (np.concatenate(arrays, axis=1) for arrays in zip(*parts, strict=True))
+    joined: Any = (np.concatenate(arrays, axis=1) for arrays in zip(*parts, strict=True))
     return Records(*joined).at(order)
 
 

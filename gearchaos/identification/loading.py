@@ -57,8 +57,7 @@ def load_targets(file: str | os.PathLike[str], overrides: Iterable[str] = ()) ->
     faults = list(_faults(targets))
     if faults:
         raise ConfigurationError(texts(faults, source))
-    path = Path(source).parent / targets.configuration
-    config = load_config(path, [*targets.set, _outputs(targets)])
+    config = observed_configuration(targets, Path(source).parent / targets.configuration)
     if problems := list(_unfit(config, targets, source)):
         raise ConfigurationError(problems)
     return Problem(targets, config, text)
@@ -108,10 +107,11 @@ def _faults(targets: Targets) -> Iterator[Fault]:
         yield Fault("search.drawn", rule, "it is a part of the candidates", search.drawn)
 
 
-def _outputs(targets: Targets) -> str:
-    """Return the override with which a configuration keeps what the targets observe, and no more.
+def observed_configuration(targets: Targets, path: str | os.PathLike[str]) -> Configuration:
+    """Read a configuration, to be integrated as the targets say.
 
-    The axial pair is driven one way: it is computed only where somebody looks at it.
+    It keeps what is observed, and no more: the axial pair, which is driven one way, is computed
+    only where somebody looks at it.
     """
     coordinates = dict.fromkeys(("delta_5", *(one.coordinate for one in targets.increment)))
     outputs = {
@@ -119,7 +119,7 @@ def _outputs(targets: Targets) -> str:
         "section_points": 1,
         "lyapunov": bool(targets.exponent),
     }
-    return f"outputs={toml_literal(outputs)}"
+    return load_config(path, [*targets.set, f"outputs={toml_literal(outputs)}"])
 
 
 def _unfit(config: Configuration, targets: Targets, source: str) -> Iterator[str]:

@@ -96,7 +96,8 @@ class JumpPlace(Observation):
         steps = self._steps(records)
         at = np.argmax(steps, axis=1)
         middle = (self.values[1:] + self.values[:-1]) / 2.0
-        return np.where(np.max(steps, axis=1) > 0.0, middle[at], np.nan)
+        place: Floats = np.where(np.max(steps, axis=1) > 0.0, middle[at], np.nan)
+        return place
 
     def _steps(self, records: Records) -> Floats:
         """Return by how much motions beside each other differ, 0 where this is no jump."""
@@ -133,7 +134,8 @@ class CrisisPlace(JumpPlace):
         most = np.max(np.where(chaotic, extent, 0.0), axis=1, keepdims=True)
         beyond = (most > GROWTH * least) & chaotic & (extent > (least + most) / 2.0)
         first = beyond & (np.cumsum(beyond, axis=1) == 1)
-        return first[:, 1:].astype(np.float64)
+        steps: Floats = first[:, 1:].astype(np.float64)
+        return steps
 
 
 class ExponentAt(Observation):
@@ -190,14 +192,17 @@ def has_motion(records: Records, motion: str) -> Mask:
     on, and chaos.
     """
     kind, _, number = motion.partition(" ")
+    period, has = records.period, records.sound.copy()
     if kind == "period":
-        return records.sound & (records.period == int(number))
-    if kind == "bands":
-        count = int(number)
-        shorter = (records.period > 0) & (count % np.maximum(records.period, 1) == 0)
-        return records.sound & ~shorter & _on_bands(records.section, count)
-    aperiodic = records.sound & (records.period == 0)
-    return aperiodic & (records.exponent > 0.0) if kind == "chaotic" else aperiodic
+        has &= period == int(number)
+    elif kind == "bands":
+        has &= (period == 0) | (int(number) % np.maximum(period, 1) > 0)
+        has &= _on_bands(records.section, int(number))
+    else:
+        has &= period == 0
+    if kind == "chaotic":
+        has &= records.exponent > 0.0
+    return has
 
 
 def misfit(residuals: Floats) -> Floats:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -18,24 +18,25 @@ Floats = NDArray[np.float64]
 ONE_UNIT = 1.0
 """By how much the misfit grows where a parameter counts as moved too far."""
 
-LABEL = 34
-COLUMN = 11
+NEAREST = 3
+"""Steps in each direction whose misfits tell how even the best set's surroundings are."""
+
+LABEL, COLUMN = 34, 11
 
 
 class Reach(NamedTuple):
-    """How far a parameter can move before the fit is worse by one unit.
+    """How far parameters can move before the fit is worse by one unit, each of shape (parameters,).
 
-    ``alone_low``, ``alone_high``: moved alone from the best set, the others held; ``low``,
-    ``high``: among all candidates that were tried, the others moved too. NaN where it was not
-    looked at.
+    ``alone_low``, ``alone_high``: one moved away from the centre of the last steps, the others
+    held, NaN where no steps were tried; ``low``, ``high``: among all candidates that were tried.
+    ``surroundings``: misfit of the sets next to that centre, the median.
     """
 
-    key: str
-    best: float
-    alone_low: float
-    alone_high: float
-    low: float
-    high: float
+    alone_low: Floats
+    alone_high: Floats
+    low: Floats
+    high: Floats
+    surroundings: float
 
 
 def best_sets(judge: Judge, tried: Tried, most: int) -> list[int]:
@@ -45,60 +46,67 @@ def best_sets(judge: Judge, tried: Tried, most: int) -> list[int]:
     return distinct(points, tried.misfit, judge.targets.search.apart, most)
 
 
-def reaches(judge: Judge, tried: Tried) -> list[Reach]:
-    """Return how far each parameter can move; `steps_alone` were tried last."""
-    best = int(np.argmin(tried.misfit))
-    alike = tried.values[tried.misfit <= tried.misfit[best] + ONE_UNIT]
-    alone = np.full((tried.values.shape[1], 2), np.nan)
-    steps = np.flatnonzero(tried.run == STEPS_ALONE)[-1 - 2 * RUNGS * len(alone) :]
-    if steps.size:
-        centre, *others = steps
-        limit = tried.misfit[centre] + ONE_UNIT
-        worse = np.reshape(tried.misfit[others] > limit, (-1, 2, RUNGS))
-        for number, ways in enumerate(worse):
-            moved = np.reshape(tried.values[others, number], worse.shape)[number]
-            for way, too_far in enumerate(ways):
-                # The last step before the first one that is too far.
-                last = int(np.argmax(too_far)) if too_far.any() else RUNGS
-                alone[number, way] = np.append(tried.values[centre, number], moved[way])[last]
-    return [
-        Reach(
-            one.name, float(tried.values[best, n]), *alone[n], alike[:, n].min(), alike[:, n].max()
-        )
-        for n, one in enumerate(judge.targets.parameter)
-    ]
+def reach(tried: Tried) -> Reach:
+    """Return how far each parameter can move.
+
+    A label changes at once, and chaos is judged by a short record: the misfit is uneven on the
+    smallest scale. So a parameter is too far where the median of three neighbouring steps exceeds
+    that of the sets next to the best one, or the misfit of the best one if this is more, by one.
+    """
+    parameters = tried.values.shape[1]
+    alike = tried.values[tried.misfit <= np.min(tried.misfit) + ONE_UNIT]
+    steps = np.flatnonzero(tried.run == STEPS_ALONE)[-1 - 2 * RUNGS * parameters :]
+    if not steps.size:
+        unknown = np.full(parameters, np.nan)
+        return Reach(unknown, unknown, alike.min(axis=0), alike.max(axis=0), np.nan)
+    centre, others = tried.values[steps[0]], tried.values[steps[1:]]
+    misfit = tried.misfit[steps[1:]].reshape(parameters, 2, RUNGS)
+    surroundings = float(np.median(misfit[..., :NEAREST]))
+    padded = np.concatenate([misfit[..., :1], misfit, misfit[..., -1:]], axis=2)
+    median = np.median(np.stack([padded[..., :-2], misfit, padded[..., 2:]]), axis=0)
+    too_far = median > max(surroundings, tried.misfit[steps[0]]) + ONE_UNIT
+    # The last step before the first one that is too far; 0 is the centre.
+    last = np.where(too_far.any(axis=2), np.argmax(too_far, axis=2), RUNGS)
+    number = np.arange(parameters)
+    moved = others.reshape(parameters, 2, RUNGS, parameters)[number, :, :, number]
+    moved = np.concatenate([np.broadcast_to(centre[:, None, None], (parameters, 2, 1)), moved], 2)
+    low, high = (moved[number, way, last[:, way]] for way in range(2))
+    return Reach(low, high, alike.min(axis=0), alike.max(axis=0), surroundings)
 
 
 def report(judge: Judge, tried: Tried, most: int = 4) -> Iterator[str]:
     """Word the best sets, what they come to, and how well the targets determine them."""
     sets, keys = best_sets(judge, tried, most), [one.name for one in judge.targets.parameter]
-    yield f"{len(tried)} candidates; the best sets that differ"
+    titles = [f"set {number}" for number in range(1, len(sets) + 1)]
+    yield f"{len(tried)} candidates; the best sets that differ:"
+    yield _row("", titles)
+    yield _row("misfit", tried.misfit[sets])
+    for key, values in zip(keys, tried.values[sets].T, strict=True):
+        yield _row(key, values)
     yield ""
-    yield from _table("misfit", [tried.misfit[sets]], ["misfit"])
-    yield ""
-    yield from _table("parameter", tried.values[sets].T, keys)
-    yield ""
-    head = f"{'observed':{LABEL}}{'wanted':>{COLUMN}}{'width':>{COLUMN}}"
-    yield head + "".join(f"{f'set {n}':>{COLUMN}}" for n in range(1, len(sets) + 1))
+    yield _row("observed", ["wanted", "width", *titles])
     for one, row in zip(judge.observations, tried.computed[sets].T, strict=True):
-        numbers = [one.wanted, one.width, *row]
-        yield f"{one.name:{LABEL}}" + "".join(f"{number:{COLUMN}.5g}" for number in numbers)
+        yield _row(one.name, [one.wanted, one.width, *row])
+    if len(tried) > 1:
+        yield ""
+        yield from _determined(keys, tried)
     yield ""
-    yield "how far each can move before the misfit grows by one:"
-    yield "alone from set 1, and with the others among all that were tried"
-    names = ("alone from", "to", "all from", "to")
-    yield f"{'parameter':{LABEL}}" + "".join(f"{name:>{COLUMN}}" for name in ("set 1", *names))
-    for reach in reaches(judge, tried):
-        yield f"{reach.key:{LABEL}}" + "".join(f"{number:{COLUMN}.5g}" for number in reach[1:])
-    yield ""
-    yield "set 1 in full, for a configuration"
+    yield "set 1 in full, for a configuration:"
     for key, value in zip(keys, tried.values[sets[0]].tolist(), strict=True):
         yield f"{'groups.' if key in SWEEPABLE_GROUPS else ''}{key} = {value!r}"
 
 
-def _table(first: str, rows: Sequence[Floats], names: Sequence[str]) -> Iterator[str]:
-    yield f"{first:{LABEL}}" + "".join(
-        f"{f'set {n}':>{COLUMN}}" for n in range(1, len(rows[0]) + 1)
+def _determined(keys: Iterable[str], tried: Tried) -> Iterator[str]:
+    found = reach(tried)
+    yield "how far each can move before the misfit grows by one, alone and with the others:"
+    yield _row("", ["alone from", "to", "all from", "to"])
+    for key, *ends in zip(keys, *found[:4], strict=True):
+        yield _row(key, ends)
+    yield f"(sets a thousandth of the bounds beside set 1: misfit {found.surroundings:.4g})"
+
+
+def _row(name: str, entries: Iterable[str | float]) -> str:
+    cells = (
+        f"{one:>{COLUMN}}" if isinstance(one, str) else f"{one:{COLUMN}.5g}" for one in entries
     )
-    for name, row in zip(names, rows, strict=True):
-        yield f"{name:{LABEL}}" + "".join(f"{number:{COLUMN}.5g}" for number in row)
+    return f"{name:{LABEL}}{''.join(cells)}"

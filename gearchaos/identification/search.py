@@ -86,7 +86,9 @@ def steps_alone(centre: Floats) -> Floats:
     points = np.tile(centre, (centre.size, 2, RUNGS, 1))
     for number in range(centre.size):
         points[number, :, :, number] += np.outer([-1.0, 1.0], steps)
-    return np.clip(np.concatenate([centre[np.newaxis], points.reshape(-1, centre.size)]), 0.0, 1.0)
+    rows = np.concatenate([centre[np.newaxis], points.reshape(-1, centre.size)])
+    clipped: Floats = np.clip(rows, 0.0, 1.0)
+    return clipped
 
 
 def distinct(points: Floats, misfits: Floats, apart: float, most: int) -> list[int]:

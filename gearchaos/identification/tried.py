@@ -47,12 +47,14 @@ class Tried(NamedTuple):
 
     def part(self, first: int, last: int) -> Tried:
         """Return the candidates first to last - 1."""
-        return Tried(*(array[first:last] for array in self))
+        arrays: Any = (array[first:last] for array in self)
+        return Tried(*arrays)
 
 
 def joined(parts: Sequence[Tried]) -> Tried:
     """Join candidates that were tried one after the other."""
-    return Tried(*(np.concatenate(arrays) for arrays in zip(*parts, strict=True)))
+    arrays: Any = (np.concatenate(some) for some in zip(*parts, strict=True))
+    return Tried(*arrays)
 
 
 def write_tried(
@@ -66,7 +68,7 @@ def write_tried(
 
     ``keys`` are those of the parameters. Raises FileError if it cannot be written.
     """
-    arrays = {
+    arrays: dict[str, NDArray[Any]] = {
         "run": tried.run,
         **{axis_name(key): tried.values[:, number] for number, key in enumerate(keys)},
         "computed": tried.computed,
