@@ -97,12 +97,16 @@ def _searched(problem: Problem, judge: Judge, options: Namespace) -> Tried:
     if options.resume and not options.overwrite and os.path.exists(output):
         known, earlier = read_tried(output, keys)
         require_same(f"{output}: is the result", earlier, facts, "replace it with --overwrite")
+        if earlier.get("complete"):
+            say(f"complete already: {output}, {len(known)} candidates")
+            return known
     else:
         check_output(output, options.overwrite)
     began = time.monotonic()
 
-    def keep(tried: Tried) -> None:
+    def keep(tried: Tried, complete: bool = False) -> None:
         told = {
+            "complete": int(complete),
             **provenance(current_threads(), time.monotonic() - began),
             **facts,
             "title": problem.targets.title,
@@ -116,10 +120,10 @@ def _searched(problem: Problem, judge: Judge, options: Namespace) -> Tried:
         with Progress(most, tried_before, unit="candidate") as bar:
             tried = search(judge, known, keep, bar.advance, output)
     except (KeyboardInterrupt, FileError) as fault:
-        fault.add_note(f"the candidates that {output} holds are kept; go on with --resume")
+        if os.path.exists(output):
+            fault.add_note(f"the candidates in {output} are kept; go on with --resume")
         raise
-    if len(tried) > tried_before:
-        keep(tried)
+    keep(tried, complete=True)
     say(f"{output}: {len(tried)} candidates, {time.monotonic() - began:.1f} s")
     return tried
 

@@ -12,6 +12,7 @@ from gearchaos.identification.loading import load_targets
 from gearchaos.identification.report import reach
 from gearchaos.identification.searching import Judge, decisive_facts, search
 from gearchaos.identification.tried import read_tried, write_tried
+from gearchaos.identify import main
 
 from .commands import run_module
 
@@ -180,7 +181,7 @@ class TestALinearPair:
 
 
 class TestASearchThatWasStopped:
-    def test_goes_on_to_the_same_candidates(self, identified, tmp_path):
+    def test_goes_on_to_the_same_candidates(self, identified, tmp_path, monkeypatch, capsys):
         problem, (whole, _) = problem_of(identified), tried_of(identified)
         keys, judge = [one.name for one in problem.targets.parameter], Judge(problem)
         for name in ("pair.toml", "targets.toml"):
@@ -189,9 +190,9 @@ class TestASearchThatWasStopped:
         first = whole.part(0, 40 + 12 * 7)
         facts = decisive_facts(problem)
         write_tried(tmp_path / "targets.h5", first, keys, judge.observations, facts)
-        ended = run_module("gearchaos.identify", "targets.toml", "--resume", cwd=tmp_path)
-        assert ended.code == 0
-        assert ended.out == identified.out
+        monkeypatch.chdir(tmp_path)
+        assert main(["targets.toml", "--resume", "--quiet"]) == 0
+        assert capsys.readouterr().out == identified.out
         assert numbers(tmp_path / "targets.h5") == numbers(identified.file)
 
     def test_keeps_its_candidates_when_it_is_interrupted(self, identified):
@@ -215,6 +216,7 @@ class TestASearchThatWasStopped:
         before = identified.file.stat().st_mtime_ns
         ended = run_module("gearchaos.identify", "targets.toml", "--resume", cwd=identified.folder)
         assert (ended.code, ended.out) == (0, identified.out)
+        assert "complete already" in ended.err
         assert identified.file.stat().st_mtime_ns == before
 
     def test_is_not_replaced_unasked(self, identified):
