@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass
+from pathlib import Path
 
 import h5py
 import numpy as np
@@ -91,7 +92,7 @@ width = {INCREMENT_WIDTH}
 
 @dataclass
 class Identified:
-    folder: object
+    folder: Path
     out: str
     err: str
 
@@ -276,3 +277,8 @@ def test_targets_without_observations_are_refused(tmp_path):
     (tmp_path / "targets.toml").write_text(TARGETS[: TARGETS.index("[[stage]]")])
     with pytest.raises(ConfigurationError, match="give at least one of stage, jump, crisis"):
         load_targets(tmp_path / "targets.toml")
+
+
+@pytest.mark.parametrize("name", ["pan2021_targets.toml", "pan2021_axial_targets.toml"])
+def test_the_targets_of_the_paper_are_sound(name):
+    Judge(load_targets(Path(__file__).resolve().parents[2] / "sweeps" / name))
