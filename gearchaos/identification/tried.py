@@ -11,7 +11,7 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from gearchaos.configuration.sweep_values import SWEEPABLE_GROUPS, SWEEPABLE_KEYS
+from gearchaos.engine.lanes import axis_of
 from gearchaos.errors import FileError
 from gearchaos.identification.observations import Observation
 from gearchaos.results.atomic_file import reason
@@ -46,7 +46,7 @@ class Tried(NamedTuple):
         return int(self.run.size)
 
     def part(self, first: int, last: int) -> Tried:
-        """Return the candidates first to last - 1."""
+        """Return the candidates ``first`` to ``last - 1``."""
         arrays: Any = (array[first:last] for array in self)
         return Tried(*arrays)
 
@@ -109,12 +109,9 @@ def _variables(
 
 
 def _parameter(key: str) -> Variable:
-    if key in SWEEPABLE_GROUPS:
-        row = SWEEPABLE_GROUPS[key]
-        return Variable(key, (CANDIDATE,), "float64", row.units, row.long_name, row.mathtext)
-    physical = SWEEPABLE_KEYS[key]
-    name, units = axis_name(key), physical.units or "1"
-    return Variable(name, (CANDIDATE,), "float64", units, physical.wording)
+    axis = axis_of(key, np.zeros(0))
+    wording = axis.units, axis.long_name, axis.symbol
+    return Variable(axis.name, (CANDIDATE,), "float64", *wording)
 
 
 def read_tried(path: str | os.PathLike[str], keys: Sequence[str]) -> tuple[Tried, dict[str, Any]]:

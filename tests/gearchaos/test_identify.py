@@ -8,7 +8,7 @@ import h5py
 import numpy as np
 import pytest
 
-from gearchaos.errors import ConfigurationError
+from gearchaos.errors import ConfigurationError, FileError
 from gearchaos.identification.loading import load_targets
 from gearchaos.identification.report import reach
 from gearchaos.identification.searching import Judge, decisive_facts, search
@@ -232,6 +232,18 @@ class TestASearchThatWasStopped:
         )
         assert ended.code == 4
         assert "targets.search.seed (3, now 4)" in ended.err
+
+    @pytest.mark.parametrize("damage", ["cut", "changed", "other"])
+    def test_is_not_continued_from_a_damaged_file(self, identified, tmp_path, damage):
+        content = bytearray(identified.file.read_bytes())
+        if damage == "changed":
+            content[len(content) // 2] ^= 1
+        file = tmp_path / "damaged.h5"
+        file.write_bytes({"cut": content[:-40], "other": b"notes"}.get(damage, content))
+        before = file.read_bytes()
+        with pytest.raises(FileError, match="damaged"):
+            read_tried(file, ["damping_ratio", "pitch_error_amplitude"])
+        assert file.read_bytes() == before
 
 
 FAULTS = {
