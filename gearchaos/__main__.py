@@ -15,6 +15,7 @@ COMMANDS = {
     "response": "compute a motion at every step of some mesh periods",
     "reproduce": "compute, draw and compare everything that a paper shows",
     "info": "tell what a result file holds, and verify it",
+    "identify": "fit parameters of a pair to what was observed of its diagram",
     "accuracy": "measure what accuracy costs on some lanes of a sweep",
     "merge": "join what several jobs have computed of one sweep",
     "configuration": "print the JSON Schema of a configuration file",

@@ -55,16 +55,17 @@ def notice(text: str) -> Iterator[None]:
 class Progress:
     """Lanes done of so many: a bar on a terminal, a plain line now and then elsewhere."""
 
-    def __init__(self, lanes: int, done: int = 0) -> None:
+    def __init__(self, lanes: int, done: int = 0, unit: str = "lane") -> None:
         from tqdm import tqdm
 
+        self._unit = unit
         self._lanes, self._done, self._began_with = lanes, done, done
         self._lines = not sys.stderr.isatty()
         self._began = self._spoke = time.monotonic()
         self._bar = tqdm(
             total=lanes,
             initial=done,
-            unit="lane",
+            unit=unit,
             disable=_quiet.get() or self._lines,
             dynamic_ncols=True,
         )
@@ -78,7 +79,8 @@ class Progress:
             self._spoke = now
             rate = (self._done - self._began_with) / max(now - self._began, 1e-9)
             left = (self._lanes - self._done) / rate
-            say(f"{self._done} of {self._lanes} lanes, {rate:.0f} lanes/s, {left:.0f} s left")
+            done = f"{self._done} of {self._lanes} {self._unit}s"
+            say(f"{done}, {rate:.0f} {self._unit}s/s, {left:.0f} s left")
 
     def __enter__(self) -> Self:
         return self

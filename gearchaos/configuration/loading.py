@@ -26,10 +26,11 @@ def load_config(path: str | os.PathLike[str], overrides: Iterable[str] = ()) -> 
         If it is not a sound configuration: one message per fault, all faults at once.
     """
     source = os.fspath(path)
-    return Configuration.from_toml(_text(source), source, overrides)
+    return Configuration.from_toml(text_of_file(source), source, overrides)
 
 
-def _text(source: str) -> str:
+def text_of_file(source: str) -> str:
+    """Read the text of a file at a path; FileError or ConfigurationError if it cannot be read."""
     if not source:
         raise FileError("no configuration file: the path is empty; name a TOML file")
     try:

@@ -45,7 +45,7 @@ class Lanes:
     def __init__(self, config: Configuration) -> None:
         self.config = config
         self._values = axis_values(config)
-        self.axes = [_axis(parameter, values) for parameter, values in self._values.items()]
+        self.axes = [axis_of(parameter, values) for parameter, values in self._values.items()]
         self.starts = config.start.count
         if self.starts > 1:
             self.axes.append(start_axis(self.starts))
@@ -112,7 +112,8 @@ class Lanes:
         return parameters
 
 
-def _axis(parameter: str, values: Floats) -> Axis:
+def axis_of(parameter: str, values: Floats) -> Axis:
+    """Return the axis of a swept parameter with values (values,), as files name and word it."""
     name = axis_name(parameter)
     if parameter in SWEEPABLE_GROUPS:
         row = SWEEPABLE_GROUPS[parameter]

@@ -34,7 +34,8 @@ def lane_groups(config):
 
 
 ROOT = Path(__file__).resolve().parents[2]
-SWEEPS = sorted((ROOT / "sweeps").glob("*.toml"))
+TARGETS = set((ROOT / "sweeps").glob("*_targets.toml"))
+SWEEPS = sorted(set((ROOT / "sweeps").glob("*.toml")) - TARGETS)
 PAN2021 = ROOT / "sweeps" / "pan2021.toml"
 
 SMALLEST = """

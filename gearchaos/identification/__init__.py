@@ -1,0 +1,1 @@
+"""Unknown parameters of a pair, fitted to what was observed of its bifurcation diagram."""

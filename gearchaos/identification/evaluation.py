@@ -1,0 +1,139 @@
+"""What the lanes of many candidates come to: all of a generation are one batch."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from gearchaos_kernels import Outcome, Plan, Status, System, integrate, mesh_motion
+from numpy.typing import NDArray
+
+from gearchaos.configuration import Configuration
+from gearchaos.configuration.run_tables import states_of
+from gearchaos.dynamics.systems import system_of
+from gearchaos.engine.starts import start_states
+from gearchaos.records.lyapunov import largest_exponent
+from gearchaos.records.period import return_distances
+
+Floats = NDArray[np.float64]
+
+RETURN = 1e-3
+"""Return distance that counts as periodic: what is compared are short runs on coarse grids."""
+
+KEPT_PERIODS = 8
+"""Mesh periods after the recorded ones over which the largest acceleration is looked for."""
+
+FINER = 4
+"""How many times finer that motion is, so that its largest acceleration is not stepped over."""
+
+
+class Records(NamedTuple):
+    """What the lanes of some candidates came to, candidates first and swept values second.
+
+    ``section`` (candidates, values, points): delta_5 once a mesh period; ``period``: in mesh
+    periods, 0 where the motion is not periodic; ``exponent``: per unit of tau; both are
+    (candidates, values); ``acceleration`` (candidates, values, coordinates): the largest one, not a
+    number at values where nobody looks at it; ``sound`` (candidates, values): not diverged.
+    """
+
+    section: Floats
+    period: NDArray[np.int32]
+    exponent: Floats
+    acceleration: Floats
+    sound: NDArray[np.bool_]
+
+    def at(self, values: NDArray[np.intp]) -> Records:
+        """Return what there is at some of the swept values, by their numbers."""
+        arrays: Any = (array[:, values] for array in self)
+        return Records(*arrays)
+
+
+def evaluate(
+    config: Configuration,
+    values: Floats,
+    parameters: dict[str, Floats],
+    accelerated: NDArray[np.bool_],
+) -> Records:
+    """Integrate every candidate at every swept value.
+
+    Parameters
+    ----------
+    config : Configuration
+        Gives the scene, the start, and how long and how finely is integrated.
+    values : ndarray, shape (values,)
+        Of the swept parameter, ascending.
+    parameters : mapping of str to ndarray, shape (candidates,)
+        The free parameters by their keys.
+    accelerated : ndarray of bool, shape (values,)
+        Where the largest acceleration is looked for.
+    """
+    lines = np.arange(values.size)[np.newaxis]
+    if config.start.carry != "none":
+        # One value after the other, each from where the one before it ended.
+        lines = lines.T[::-1] if config.start.carry == "downwards" else lines.T
+    candidates = len(next(iter(parameters.values())))
+    before = None
+    parts = []
+    for line in lines:
+        swept = {config.sweep.parameter: np.tile(values[line], candidates)}
+        fixed = {key: np.repeat(value, line.size) for key, value in parameters.items()}
+        system = system_of(config, swept | fixed, config.needed_effects)
+        start = start_states(config, system, np.tile(line, candidates))
+        if before is not None:
+            start = np.where(np.isfinite(before).all(axis=1, keepdims=True), before, start)
+        plan = _plan(config)
+        outcome = integrate(system, start, plan)
+        before = outcome.end_state
+        looked_at = np.flatnonzero(np.tile(accelerated[line], candidates))
+        found = _records(system, outcome, looked_at, plan.steps_per_period)
+        arrays: Any = (array.reshape(candidates, line.size, *array.shape[1:]) for array in found)
+        parts.append(Records(*arrays))
+    order = np.argsort(np.ravel(lines))
+    joined: Any = (np.concatenate(arrays, axis=1) for arrays in zip(*parts, strict=True))
+    return Records(*joined).at(order)
+
+
+def coordinates_of(config: Configuration) -> tuple[str, ...]:
+    """Return the coordinates whose accelerations `Records` hold, in their order."""
+    return states_of(config.needed_effects)[::2]
+
+
+def _plan(config: Configuration) -> Plan:
+    integration = config.integration
+    return Plan(
+        integration.steps_per_period,
+        integration.transient_periods,
+        integration.recorded_periods,
+        section_points=integration.recorded_periods,
+        tangent=True,
+        resolved=integration.crossings == "resolved",
+    )
+
+
+def _records(system: System, outcome: Outcome, looked_at: NDArray[np.intp], steps: int) -> Records:
+    """Return what lanes came to, each array with the lanes first."""
+    assert outcome.growth is not None
+    sound = outcome.status == Status.OK
+    # The torsion and its rate: the other coordinates follow them.
+    distances = return_distances(outcome.section[..., :2])
+    returns = distances <= RETURN
+    period = np.where(returns.any(axis=1), np.argmax(returns, axis=1) + 1, 0)
+    exponent, _ = largest_exponent(outcome.growth, system.mesh_period)
+    acceleration = np.full((sound.size, len(system.states) // 2), np.nan)
+    if looked_at.size:
+        finer = FINER * steps
+        plan = Plan(
+            finer, 0, KEPT_PERIODS, section_points=0, tangent=True, history_periods=KEPT_PERIODS
+        )
+        some = system.of(looked_at)
+        motion = integrate(some, outcome.end_state[looked_at], plan)
+        assert motion.history is not None
+        found = mesh_motion(some, motion.history, finer).accelerations
+        acceleration[looked_at] = np.max(found, axis=1)
+    return Records(
+        outcome.section[..., 0],
+        np.where(sound, period, 0).astype(np.int32),
+        exponent,
+        acceleration,
+        sound,
+    )

@@ -1,0 +1,147 @@
+"""Reading a targets file, with one message for every fault."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections import Counter
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from typing import NamedTuple
+
+from pydantic import ValidationError
+
+from gearchaos.configuration import Configuration, load_config
+from gearchaos.configuration.keys import keys_of
+from gearchaos.configuration.loading import text_of_file
+from gearchaos.configuration.messages import MOST_SHOWN, Fault, fault_of, texts
+from gearchaos.configuration.toml_text import tables_from_toml, toml_literal, with_overrides
+from gearchaos.errors import ConfigurationError
+from gearchaos.identification.targets import Targets
+from gearchaos.records.period import LONGEST_PERIOD, POINTS_NEEDED
+
+MOTION = re.compile(r"(?P<kind>period|bands) (?P<number>[1-9]\d?)|chaotic|aperiodic")
+"""The motions that a stage may have."""
+
+
+class Problem(NamedTuple):
+    """What is to be found: the targets, and the configuration that computes them."""
+
+    targets: Targets
+    config: Configuration
+    text: str
+
+
+def load_targets(file: str | os.PathLike[str], overrides: Iterable[str] = ()) -> Problem:
+    """Read a targets file and the configuration that it names.
+
+    ``overrides`` replace keys of the targets file, such as ``search.seed=2``.
+
+    Raises
+    ------
+    FileError
+        If one of the two cannot be read.
+    ConfigurationError
+        If one of them is not sound: one message per fault.
+    """
+    source = os.fspath(file)
+    text = text_of_file(source)
+    tables = with_overrides(tables_from_toml(text, source), overrides, source)
+    try:
+        targets = Targets.model_validate(tables)
+    except ValidationError as error:
+        found = error.errors(include_url=False)
+        keys = {one.path: one for one in keys_of(Targets)}
+        worded = [fault_of(one, tables, keys) for one in found[:MOST_SHOWN]]
+        raise ConfigurationError(texts(worded, source, len(found) - len(worded))) from None
+    faults = list(_faults(targets))
+    if faults:
+        raise ConfigurationError(texts(faults, source))
+    config = observed_configuration(targets, Path(source).parent / targets.configuration)
+    if problems := list(_unfit(config, targets, source)):
+        raise ConfigurationError(problems)
+    return Problem(targets, config, text)
+
+
+def _faults(targets: Targets) -> Iterator[Fault]:
+    for name, times in Counter(one.name for one in targets.parameter).items():
+        if times > 1:
+            yield Fault("parameter.name", f"comes {times} times", "name it once", name)
+    for number, free in enumerate(targets.parameter):
+        here = f"parameter[{number}]"
+        if free.high <= free.low:
+            rule = f"must be greater than {here}.low = {free.low}"
+            yield Fault(f"{here}.high", rule, "exchange the two", free.high)
+        elif free.logarithmic and free.low <= 0.0:
+            remedy = "raise it, or drop logarithmic"
+            yield Fault(f"{here}.low", "has no logarithm", remedy, free.low)
+    for number, stage in enumerate(targets.stage):
+        here, motion = f"stage[{number}]", MOTION.fullmatch(stage.motion)
+        if motion is None or int(motion["number"] or 1) > LONGEST_PERIOD:
+            rule = 'must be "period n" or "bands n" with n up to 16, "chaotic" or "aperiodic"'
+            yield Fault(f"{here}.motion", rule, 'such as "period 2"', stage.motion)
+        if stage.to <= stage.from_:
+            rule = f"must be greater than {here}.from = {stage.from_}"
+            yield Fault(f"{here}.to", rule, "exchange the two", stage.to)
+    for table in ("jump", "crisis"):
+        for number, place in enumerate(getattr(targets, table)):
+            if not place.within[0] < place.at < place.within[1]:
+                rule = f"must hold {table}.at = {place.at}, low end first"
+                remedy = "widen it"
+                yield Fault(f"{table}[{number}].within", rule, remedy, place.within)
+    for number, increment in enumerate(targets.increment):
+        if increment.coordinate.endswith("_rate"):
+            remedy = f'such as "{increment.coordinate.removesuffix("_rate")}"'
+            key = f"increment[{number}].coordinate"
+            yield Fault(key, "must be a displacement", remedy, increment.coordinate)
+    tables = ("stage", "jump", "crisis", "exponent", "increment")
+    if not any(getattr(targets, table) for table in tables):
+        rule = "is missing, and so are the other observations"
+        yield Fault("stage", rule, f"give at least one of {', '.join(tables)}")
+    search = targets.search
+    if not search.population <= search.drawn <= search.candidates:
+        rule = (
+            f"must be at least search.population = {search.population} and at most "
+            f"search.candidates = {search.candidates}"
+        )
+        yield Fault("search.drawn", rule, "it is a part of the candidates", search.drawn)
+
+
+def observed_configuration(targets: Targets, path: str | os.PathLike[str]) -> Configuration:
+    """Read a configuration, to be integrated as the targets say.
+
+    It keeps what is observed, and no more: the axial pair, which is driven one way, is computed
+    only where somebody looks at it.
+    """
+    coordinates = dict.fromkeys(("delta_5", *(one.coordinate for one in targets.increment)))
+    outputs = {
+        "section": list(coordinates),
+        "section_points": 1,
+        "lyapunov": bool(targets.exponent),
+    }
+    return load_config(path, [*targets.set, f"outputs={toml_literal(outputs)}"])
+
+
+def _unfit(config: Configuration, targets: Targets, source: str) -> Iterator[str]:
+    if config.second_sweep is not None or config.start.count > 1:
+        key = "second_sweep" if config.second_sweep is not None else "start.count"
+        yield f"{source}: configuration: {config.source} has {key}; observations have one axis"
+    if config.integration.recorded_periods < POINTS_NEEDED:
+        yield (
+            f"{source}: integration.recorded_periods = {config.integration.recorded_periods}: must "
+            f"be at least {POINTS_NEEDED}, to tell every period; raise it in `set`"
+        )
+    if config.second_sweep is not None:
+        return
+    # A second sweep over the bounds obeys the rules that a free parameter must obey.
+    for number, free in enumerate(targets.parameter):
+        bounds = {"parameter": free.name, "from": free.low, "to": free.high, "count": 2}
+        try:
+            config.replace("second_sweep", bounds)
+        except ConfigurationError as error:
+            own_names = {"parameter": "name", "from": "low", "to": "high"}
+            for problem in error.problems:
+                told = problem.removeprefix(f"{config.source}: ")
+                for name, own in own_names.items():
+                    told = told.replace(f"second_sweep.{name}", f"parameter[{number}].{own}")
+                yield f"{source}: {told}"

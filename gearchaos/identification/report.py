@@ -1,0 +1,112 @@
+"""What a search has found, in words: the best sets that differ, and what the targets determine."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gearchaos.configuration.sweep_values import SWEEPABLE_GROUPS
+from gearchaos.identification.search import RUNGS, STEPS_ALONE, distinct
+from gearchaos.identification.searching import Judge
+from gearchaos.identification.tried import Tried
+
+Floats = NDArray[np.float64]
+
+ONE_UNIT = 1.0
+"""By how much the misfit grows where a parameter counts as moved too far."""
+
+NEAREST = 3
+"""Steps in each direction whose misfits tell how even the best set's surroundings are."""
+
+LABEL, COLUMN = 34, 11
+
+
+class Reach(NamedTuple):
+    """How far parameters can move before the fit is worse by one unit, each of shape (parameters,).
+
+    ``alone_low``, ``alone_high``: one moved away from the centre of the last steps, the others
+    held, NaN where no steps were tried; ``low``, ``high``: among all candidates that were tried.
+    ``surroundings``: misfit of the sets next to that centre, the median.
+    """
+
+    alone_low: Floats
+    alone_high: Floats
+    low: Floats
+    high: Floats
+    surroundings: float
+
+
+def best_sets(judge: Judge, tried: Tried, most: int) -> list[int]:
+    """Return the numbers of the best candidates that differ, the best one first."""
+    columns = zip(judge.targets.parameter, tried.values.T, strict=True)
+    points = np.stack([[one.share(v) for v in values.tolist()] for one, values in columns], axis=1)
+    return distinct(points, tried.misfit, judge.targets.search.apart, most)
+
+
+def reach(tried: Tried) -> Reach:
+    """Return how far each parameter can move.
+
+    A label changes at once, and chaos is judged by a short record: the misfit is uneven on the
+    smallest scale. So a parameter is too far where the median of three neighbouring steps exceeds
+    that of the sets next to the best one, or the misfit of the best one if this is more, by one.
+    """
+    parameters = tried.values.shape[1]
+    alike = tried.values[tried.misfit <= np.min(tried.misfit) + ONE_UNIT]
+    steps = np.flatnonzero(tried.run == STEPS_ALONE)[-1 - 2 * RUNGS * parameters :]
+    if not steps.size:
+        unknown = np.full(parameters, np.nan)
+        return Reach(unknown, unknown, alike.min(axis=0), alike.max(axis=0), np.nan)
+    centre, others = tried.values[steps[0]], tried.values[steps[1:]]
+    misfit = tried.misfit[steps[1:]].reshape(parameters, 2, RUNGS)
+    surroundings = float(np.median(misfit[..., :NEAREST]))
+    padded = np.concatenate([misfit[..., :1], misfit, misfit[..., -1:]], axis=2)
+    median = np.median(np.stack([padded[..., :-2], misfit, padded[..., 2:]]), axis=0)
+    too_far = median > max(surroundings, tried.misfit[steps[0]]) + ONE_UNIT
+    # The last step before the first one that is too far; 0 is the centre.
+    last = np.where(too_far.any(axis=2), np.argmax(too_far, axis=2), RUNGS)
+    number = np.arange(parameters)
+    moved = others.reshape(parameters, 2, RUNGS, parameters)[number, :, :, number]
+    moved = np.concatenate([np.broadcast_to(centre[:, None, None], (parameters, 2, 1)), moved], 2)
+    low, high = (moved[number, way, last[:, way]] for way in range(2))
+    return Reach(low, high, alike.min(axis=0), alike.max(axis=0), surroundings)
+
+
+def report(judge: Judge, tried: Tried, most: int = 4) -> Iterator[str]:
+    """Word the best sets, what they come to, and how well the targets determine them."""
+    sets, keys = best_sets(judge, tried, most), [one.name for one in judge.targets.parameter]
+    titles = [f"set {number}" for number in range(1, len(sets) + 1)]
+    yield f"{len(tried)} candidates; the best sets that differ:"
+    yield _row("", titles)
+    yield _row("misfit", tried.misfit[sets])
+    for key, values in zip(keys, tried.values[sets].T, strict=True):
+        yield _row(key, values)
+    yield ""
+    yield _row("observed", ["wanted", "width", *titles])
+    for one, row in zip(judge.observations, tried.computed[sets].T, strict=True):
+        yield _row(one.name, [one.wanted, one.width, *row])
+    if len(tried) > 1:
+        yield ""
+        yield from _determined(keys, tried)
+    yield ""
+    yield "set 1 in full, for a configuration:"
+    for key, value in zip(keys, tried.values[sets[0]].tolist(), strict=True):
+        yield f"{'groups.' if key in SWEEPABLE_GROUPS else ''}{key} = {value!r}"
+
+
+def _determined(keys: Iterable[str], tried: Tried) -> Iterator[str]:
+    found = reach(tried)
+    yield "how far each can move before the misfit grows by one, alone and with the others:"
+    yield _row("", ["alone from", "to", "all from", "to"])
+    for key, *ends in zip(keys, *found[:4], strict=True):
+        yield _row(key, ends)
+    yield f"(sets a thousandth of the bounds beside set 1: misfit {found.surroundings:.4g})"
+
+
+def _row(name: str, entries: Iterable[str | float]) -> str:
+    cells = (
+        f"{one:>{COLUMN}}" if isinstance(one, str) else f"{one:{COLUMN}.5g}" for one in entries
+    )
+    return f"{name:{LABEL}}{''.join(cells)}"

@@ -1,0 +1,129 @@
+"""The targets file: what was observed, which parameters are free, and how they are searched."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Any, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+
+from gearchaos.configuration.keys import Table, key
+from gearchaos.configuration.run_tables import State
+
+Floats = NDArray[np.float64]
+Pair: TypeAlias = Annotated[tuple[float, float], Field(strict=False)]
+
+
+class Parameter(Table):
+    """A parameter that is free within bounds."""
+
+    name: str = key("a group by its name, or the path of a physical key", example="load")
+    low: float = key("lower bound", example=0.1)
+    high: float = key("upper bound", example=1.0)
+    logarithmic: bool = key("whether steps are taken in its logarithm", default=False)
+
+    def value(self, share: Floats) -> Floats:
+        """Return the values at shares of the way from the lower to the upper bound."""
+        if not self.logarithmic:
+            return self.low + share * (self.high - self.low)
+        # Not by NumPy, whose powers differ from one processor to the next.
+        way = math.log(self.high / self.low)
+        return np.array([self.low * math.exp(part * way) for part in share.tolist()])
+
+    def share(self, value: float) -> float:
+        """Return at which share of the way from the lower to the upper bound a value lies."""
+        if not self.logarithmic:
+            return (value - self.low) / (self.high - self.low)
+        return math.log(value / self.low) / math.log(self.high / self.low) if value > 0 else -1.0
+
+
+class _Observed(Table):
+    width: float = key("how far off counts as one unit of misfit", example=0.05, gt=0)
+
+
+class Stage(_Observed):
+    """A span of the swept parameter in which the motion is of one kind."""
+
+    motion: str = key('"period n", "bands n", "chaotic" or "aperiodic"', example="period 2")
+    from_: float = key("where it begins", example=10.08, alias="from")
+    to: float = key("where it ends", example=11.16)
+
+
+class _Place(_Observed):
+    at: float = key("where, on the axis of the sweep", example=1.12)
+    within: Pair = key("the span in which it is looked for, and must be alone", example=[0.6, 2.0])
+
+
+class Jump(_Place):
+    """A place where the sweep jumps from one motion to another of the same period."""
+
+
+class Crisis(_Place):
+    """A place from which on a chaotic motion fills a larger part of its section."""
+
+
+class Exponent(_Observed):
+    """The largest Lyapunov exponent of the whole scene at one value of the swept parameter."""
+
+    at: float = key("value of the swept parameter", example=1.11)
+    value: float = key("the exponent, per unit of dimensionless time", example=-0.0043)
+
+
+class Increment(_Observed):
+    """Growth of the largest acceleration of a coordinate between two values."""
+
+    coordinate: State = key("whose acceleration", example="delta_5", default="delta_5")
+    from_: float = key("the one value of the swept parameter", example=1.0, alias="from")
+    to: float = key("the other one", example=3.0)
+    value: float = key("by how much the largest acceleration grows", example=0.2163)
+
+
+class Search(Table):
+    """How much is tried."""
+
+    seed: int = key("of the random numbers", default=0, ge=0, le=2**32 - 1)
+    candidates: int = key("sets that are tried", default=20_000, ge=8, le=10_000_000)
+    drawn: int = key("as many of them drawn evenly within the bounds, to begin with", default=2000)
+    runs: int = key("searches that share the others, from the best drawn sets", default=4, ge=1)
+    population: int = key("sets of one generation", default=32, ge=4, le=10_000)
+    apart: float = key(
+        "largest difference, as a share of its bounds, that a parameter must have for two sets to "
+        "differ",
+        default=0.1,
+        gt=0,
+        le=1,
+    )
+
+
+def _many(description: str) -> Any:
+    return key(description, default=())
+
+
+class Targets(Table):
+    """A targets file; one that exists is sound."""
+
+    title: str = key("title, for people", default="")
+    configuration: str = key("file with all that is known, beside this one", example="pair.toml")
+    set: Annotated[tuple[str, ...], Field(strict=False)] = key(
+        "keys of it that are replaced, as by --set", default=()
+    )
+    search: Search = key("how much is tried", default=Search())
+    parameter: Annotated[tuple[Parameter, ...], Field(strict=False, min_length=1)] = key(
+        "what is free"
+    )
+    stage: Annotated[tuple[Stage, ...], Field(strict=False)] = _many("observed stages")
+    jump: Annotated[tuple[Jump, ...], Field(strict=False)] = _many("observed jumps")
+    crisis: Annotated[tuple[Crisis, ...], Field(strict=False)] = _many("observed crises")
+    exponent: Annotated[tuple[Exponent, ...], Field(strict=False)] = _many("observed exponents")
+    increment: Annotated[tuple[Increment, ...], Field(strict=False)] = _many("observed increments")
+
+    def values(self, points: Floats) -> dict[str, Floats]:
+        """Return the free parameters, each of shape (candidates,), at points of the unit cube.
+
+        ``points``, shape (candidates, parameters), are shares of the way between the bounds.
+        """
+        return {
+            one.name: one.value(part) for one, part in zip(self.parameter, points.T, strict=True)
+        }

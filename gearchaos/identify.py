@@ -1,0 +1,136 @@
+"""Fit parameters of a pair to what was observed of its bifurcation diagram.
+
+A targets file names stages, jumps, crises, exponents and increments that were observed, and the
+parameters that are free within bounds. The best sets that differ go to stdout, with how far each
+parameter can move before the fit is worse by one unit; every candidate that was tried goes to a
+file. Exit codes: 0 done, 2 the command line or the targets ask for what cannot be, 4 a file
+cannot be read or written, 130 interrupted and 143 terminated: candidates are kept and --resume
+goes on from them.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+import time
+from argparse import ArgumentParser, Namespace
+from importlib.util import find_spec
+from typing import TYPE_CHECKING
+
+from gearchaos.command_line import OK, Command
+from gearchaos.errors import ConfigurationError, FileError
+from gearchaos.finishing import output_of
+from gearchaos.progress import Progress, notice, say
+
+if TYPE_CHECKING:
+    from gearchaos.identification.loading import Problem
+    from gearchaos.identification.searching import Judge
+    from gearchaos.identification.tried import Tried
+
+
+def _arguments(parser: ArgumentParser) -> None:
+    add = parser.add_argument
+    add("config", metavar="TARGETS.toml", help="what was observed, and what is free")
+    add("--resume", action="store_true", help="go on with a search that was stopped")
+    add(
+        "--score",
+        metavar="config.toml",
+        help="search nothing, but judge the parameters of this configuration by the targets",
+    )
+
+
+def _identify(options: Namespace) -> int:
+    from gearchaos.engine.running import COMPILING, choose_threads
+    from gearchaos.identification.loading import load_targets
+    from gearchaos.identification.report import report
+    from gearchaos.identification.searching import Judge
+
+    problem = load_targets(options.config, options.set)
+    choose_threads(options.threads)
+    judge = Judge(problem)
+    if options.score is not None:
+        with notice(COMPILING):
+            tried = _scored(judge, options.score)
+    else:
+        tried = _searched(problem, judge, options)
+    print("\n".join(report(judge, tried)), flush=True)
+    return OK
+
+
+def _scored(judge: Judge, path: str) -> Tried:
+    import numpy as np
+
+    from gearchaos.configuration import groups_at
+    from gearchaos.configuration.sweep_values import SWEEPABLE_GROUPS
+    from gearchaos.identification.loading import observed_configuration
+
+    config = observed_configuration(judge.targets, path)
+    groups, physical = groups_at(config, {}), config.physical()
+    known = {}
+    for one in judge.targets.parameter:
+        value = groups.values.get(one.name) if one.name in SWEEPABLE_GROUPS else physical[one.name]
+        if value is None:
+            raise ConfigurationError(
+                f"--score {path}: has no {one.name}, which the targets leave free"
+            )
+        known[one.name] = np.array([value])
+    return judge.judge_values(0, known)
+
+
+def _searched(problem: Problem, judge: Judge, options: Namespace) -> Tried:
+    from gearchaos_kernels import current_threads
+
+    from gearchaos.engine.provenance import provenance
+    from gearchaos.identification.search import MOST_CENTRES, RUNGS
+    from gearchaos.identification.searching import decisive_facts, search
+    from gearchaos.identification.tried import read_tried, write_tried
+    from gearchaos.results.atomic_file import check_output
+    from gearchaos.results.manifest import require_same
+
+    if find_spec("cma") is None:
+        raise ConfigurationError(
+            "the package cma, which searches, is not installed; pip install gearchaos[identify]"
+        )
+    output, keys = output_of(options), [one.name for one in problem.targets.parameter]
+    known = None
+    facts = decisive_facts(problem)
+    if options.resume and not options.overwrite and os.path.exists(output):
+        known, earlier = read_tried(output, keys)
+        require_same(f"{output}: is the result", earlier, facts, "replace it with --overwrite")
+        if earlier.get("complete"):
+            say(f"complete already: {output}, {len(known)} candidates")
+            return known
+    else:
+        check_output(output, options.overwrite)
+    began = time.monotonic()
+
+    def keep(tried: Tried, complete: bool = False) -> None:
+        told = {
+            "complete": int(complete),
+            **provenance(current_threads(), time.monotonic() - began),
+            **facts,
+            "title": problem.targets.title,
+            "targets": problem.text,
+        }
+        write_tried(output, tried, keys, judge.observations, told)
+
+    tried_before = 0 if known is None else len(known)
+    most = problem.targets.search.candidates + MOST_CENTRES * (1 + 2 * RUNGS * len(keys))
+    try:
+        with Progress(most, tried_before, unit="candidate") as bar:
+            tried = search(judge, known, keep, bar.advance, output)
+    except (KeyboardInterrupt, FileError) as fault:
+        if os.path.exists(output):
+            fault.add_note(f"the candidates in {output} are kept; go on with --resume")
+        raise
+    keep(tried, complete=True)
+    say(f"{output}: {len(tried)} candidates, {time.monotonic() - began:.1f} s")
+    return tried
+
+
+main = Command(
+    "identify", __doc__, _arguments, _identify, common=("output", "overwrite", "threads", "set")
+)
+
+if __name__ == "__main__":
+    sys.exit(main())

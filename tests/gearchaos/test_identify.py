@@ -1,0 +1,296 @@
+"""Parameters are found again from what was observed, also after a search was stopped."""
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+
+from gearchaos.errors import ConfigurationError, FileError
+from gearchaos.identification.loading import load_targets
+from gearchaos.identification.report import reach
+from gearchaos.identification.searching import Judge, decisive_facts, search
+from gearchaos.identification.tried import read_tried, write_tried
+from gearchaos.identify import main
+
+from .commands import run_module
+
+DAMPING, AMPLITUDE, FREQUENCY, LOAD = 0.05, 0.02, 0.5, 0.1
+
+PAIR = f"""\
+[groups]
+mesh_frequency = {FREQUENCY}
+load = {LOAD}
+damping_ratio = 0.3
+base_helix_angle_deg = 0.0
+pitch_error_amplitude = 1.0
+
+[scene]
+effects = ["pitch_error"]
+
+[sweep]
+parameter = "pitch_error"
+values = [0.0, 1.0]
+
+[integration]
+steps_per_period = 60
+transient_periods = 40
+recorded_periods = 48
+"""
+
+
+def acceleration(pitch_error: float) -> float:
+    """Amplitude of the acceleration of a linear oscillator, which the pitch error drives."""
+    drive = FREQUENCY**2 * pitch_error * AMPLITUDE
+    return FREQUENCY**2 * drive / abs(1.0 - FREQUENCY**2 + 2j * DAMPING * FREQUENCY)
+
+
+EXPONENT_WIDTH, INCREMENT_WIDTH = 1e-3, 1e-4
+
+TARGETS = f"""\
+title = "a linear pair"
+configuration = "pair.toml"
+
+[search]
+seed = 3
+candidates = 400
+drawn = 40
+runs = 1
+population = 12
+
+[[parameter]]
+name = "damping_ratio"
+low = 0.01
+high = 0.5
+logarithmic = true
+
+[[parameter]]
+name = "pitch_error_amplitude"
+low = 0.0
+high = 0.1
+
+[[stage]]
+motion = "period 1"
+from = 0.5
+to = 3.0
+width = 0.1
+
+[[exponent]]
+at = 1.0
+value = {-DAMPING}
+width = {EXPONENT_WIDTH}
+
+[[increment]]
+from = 1.0
+to = 3.0
+value = {acceleration(3.0) - acceleration(1.0)!r}
+width = {INCREMENT_WIDTH}
+"""
+
+
+@dataclass
+class Identified:
+    folder: Path
+    out: str
+    err: str
+
+    @property
+    def file(self):
+        return self.folder / "targets.h5"
+
+
+@pytest.fixture(scope="module")
+def identified(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("identify")
+    (folder / "pair.toml").write_text(PAIR)
+    (folder / "targets.toml").write_text(TARGETS)
+    ended = run_module("gearchaos.identify", "targets.toml", cwd=folder)
+    assert ended.code == 0, ended.err
+    return Identified(folder, ended.out, ended.err)
+
+
+def numbers(path):
+    """All arrays of a file as bytes."""
+    with h5py.File(path) as file:
+        names = [name for name in file if isinstance(file[name], h5py.Dataset) and file[name].shape]
+        return {name: file[name][...].tobytes() for name in names}
+
+
+def problem_of(identified):
+    return load_targets(identified.folder / "targets.toml")
+
+
+def tried_of(identified):
+    keys = [one.name for one in problem_of(identified).targets.parameter]
+    return read_tried(identified.file, keys)
+
+
+class TestALinearPair:
+    def test_its_damping_and_its_error_are_found_again(self, identified):
+        tried, _ = tried_of(identified)
+        best = int(np.argmin(tried.misfit))
+        # 2 (sqrt(1 + r^2) - 1) of each observation is at most the misfit.
+        widths = math.sqrt((1.0 + tried.misfit[best] / 2.0) ** 2 - 1.0)
+        assert widths < 1.0
+        # The length of a tangent vector goes up and down by less than the damping, as a share; the
+        # weights of the 48 periods, at most 2/48, rise to that and fall again.
+        swinging = DAMPING * 2.0 * (2.0 / 48.0) / (2.0 * math.pi / FREQUENCY)
+        off = widths * EXPONENT_WIDTH + swinging
+        assert tried.values[best, 0] == pytest.approx(DAMPING, abs=off)
+        # The largest of 240 samples a period is at most this share below the crest; the gain
+        # changes with the damping by less than the damping does.
+        crest = 1.0 - math.cos(math.pi / 240.0)
+        share = crest + off / DAMPING
+        share += widths * INCREMENT_WIDTH / (acceleration(3.0) - acceleration(1.0))
+        assert tried.values[best, 1] == pytest.approx(AMPLITUDE, rel=share)
+
+    def test_every_candidate_is_kept(self, identified):
+        tried, facts = tried_of(identified)
+        judge = Judge(problem_of(identified))
+        some = {"damping_ratio": tried.values[:5, 0], "pitch_error_amplitude": tried.values[:5, 1]}
+        again = judge.judge_values(0, some)
+        assert np.array_equal(again.misfit, tried.misfit[:5])
+        assert np.array_equal(again.computed, tried.computed[:5])
+        assert (tried.run == 0).sum() == 40
+        assert facts["targets"] == TARGETS
+
+    def test_the_report_tells_what_the_targets_determine(self, identified):
+        tried, _ = tried_of(identified)
+        found = reach(tried)
+        best = tried.values[np.argmin(tried.misfit)]
+        assert np.all(found.alone_low < best) and np.all(best < found.alone_high)
+        # The misfit is 2 (sqrt(1 + r^2) - 1) of the exponent at least, and may grow by one.
+        limit = 1.0 + max(found.surroundings, tried.misfit.min())
+        most = EXPONENT_WIDTH * math.sqrt((1.0 + limit / 2.0) ** 2 - 1.0)
+        assert found.alone_high[0] - best[0] < 2.0 * most
+        for word in ("damping_ratio", "set 1", "exponent at 1", "groups.pitch_error_amplitude = "):
+            assert word in identified.out
+
+    def test_a_configuration_is_scored_by_the_targets(self, identified):
+        given = PAIR.replace("damping_ratio = 0.3", f"damping_ratio = {DAMPING}").replace(
+            "amplitude = 1.0", f"amplitude = {AMPLITUDE}"
+        )
+        (identified.folder / "known.toml").write_text(given)
+        ended = run_module(
+            *("gearchaos.identify", "targets.toml", "--score", "known.toml"), cwd=identified.folder
+        )
+        assert ended.code == 0
+        misfit = next(line for line in ended.out.splitlines() if line.startswith("misfit"))
+        assert float(misfit.split()[1]) < 1.0
+
+
+class TestASearchThatWasStopped:
+    def test_goes_on_to_the_same_candidates(self, identified, tmp_path, monkeypatch, capsys):
+        problem, (whole, _) = problem_of(identified), tried_of(identified)
+        keys, judge = [one.name for one in problem.targets.parameter], Judge(problem)
+        for name in ("pair.toml", "targets.toml"):
+            (tmp_path / name).write_text((identified.folder / name).read_text())
+        # As a killed process leaves it: whole pieces, in the middle of a run.
+        first = whole.part(0, 40 + 12 * 7)
+        facts = decisive_facts(problem)
+        write_tried(tmp_path / "targets.h5", first, keys, judge.observations, facts)
+        monkeypatch.chdir(tmp_path)
+        assert main(["targets.toml", "--resume", "--quiet"]) == 0
+        assert capsys.readouterr().out == identified.out
+        assert numbers(tmp_path / "targets.h5") == numbers(identified.file)
+
+    def test_keeps_its_candidates_when_it_is_interrupted(self, identified):
+        whole, _ = tried_of(identified)
+        kept = []
+
+        def advance(_):
+            if len(kept) == 0 and next(done) == 9:
+                raise KeyboardInterrupt
+
+        done = iter(range(100))
+        judge = Judge(problem_of(identified))
+        with pytest.raises(KeyboardInterrupt):
+            search(judge, None, kept.append, advance, "-")
+        (part,) = kept
+        again = search(judge, part, kept.append, lambda _: None, "-")
+        assert np.array_equal(again.misfit, whole.misfit)
+        assert np.array_equal(again.values, whole.values)
+
+    def test_is_complete_where_nothing_is_left(self, identified):
+        before = identified.file.stat().st_mtime_ns
+        ended = run_module("gearchaos.identify", "targets.toml", "--resume", cwd=identified.folder)
+        assert (ended.code, ended.out) == (0, identified.out)
+        assert "complete already" in ended.err
+        assert identified.file.stat().st_mtime_ns == before
+
+    def test_is_not_replaced_unasked(self, identified):
+        ended = run_module("gearchaos.identify", "targets.toml", cwd=identified.folder)
+        assert ended.code == 4
+        assert "exists already; replace it with --overwrite" in ended.err
+
+    def test_is_not_continued_with_other_targets(self, identified):
+        ended = run_module(
+            *("gearchaos.identify", "targets.toml", "--resume", "--set", "search.seed=4"),
+            cwd=identified.folder,
+        )
+        assert ended.code == 4
+        assert "targets.search.seed (3, now 4)" in ended.err
+
+    @pytest.mark.parametrize("damage", ["cut", "changed", "other"])
+    def test_is_not_continued_from_a_damaged_file(self, identified, tmp_path, damage):
+        content = bytearray(identified.file.read_bytes())
+        if damage == "changed":
+            content[len(content) // 2] ^= 1
+        file = tmp_path / "damaged.h5"
+        file.write_bytes({"cut": content[:-40], "other": b"notes"}.get(damage, content))
+        before = file.read_bytes()
+        with pytest.raises(FileError, match="damaged"):
+            read_tried(file, ["damping_ratio", "pitch_error_amplitude"])
+        assert file.read_bytes() == before
+
+
+FAULTS = {
+    'configuration = "pair.toml"': ('configuration = "other.toml"', "other.toml: no such file"),
+    'name = "damping_ratio"': (
+        'name = "dampng_ratio"',
+        'parameter[0].name = "dampng_ratio": is not a parameter that can be swept; did you mean',
+    ),
+    "low = 0.01": ("low = 0.0", "parameter[0].low = 0.0: has no logarithm"),
+    "high = 0.5": ("high = 0.005", "parameter[0].high = 0.005: must be greater than"),
+    'name = "pitch_error_amplitude"': ('name = "damping_ratio"', "comes 2 times; name it once"),
+    'motion = "period 1"': ('motion = "period 0"', 'stage[0].motion = "period 0": must be'),
+    "to = 3.0\nwidth": ("to = 0.5\nwidth", "stage[0].to = 0.5: must be greater than"),
+    f"width = {EXPONENT_WIDTH}": ("width = 0.0", "exponent[0].width = 0.0: must be greater than 0"),
+    "drawn = 40": ("drawn = 4", "search.drawn = 4: must be at least search.population = 12"),
+    "[[increment]]": (
+        '[[increment]]\ncoordinate = "delta_1"',
+        'outputs.section = ["delta_5", "delta_1"]: the scene has no state `delta_1`',
+    ),
+    "[[exponent]]": (
+        "[[jump]]\nat = 1.0\nwithin = [2.0, 3.0]\nwidth = 0.1\n[[exponent]]",
+        "jump[0].within = [2.0, 3.0]: must hold jump.at = 1.0",
+    ),
+    "seed = 3": ("sed = 3", "search.sed = 3: unknown key; did you mean `seed`?"),
+}
+
+
+@pytest.mark.parametrize("sound", FAULTS)
+def test_a_fault_of_the_targets_is_one_clear_message(sound, tmp_path):
+    (tmp_path / "pair.toml").write_text(PAIR)
+    faulty, message = FAULTS[sound]
+    assert TARGETS.count(sound) == 1
+    (tmp_path / "targets.toml").write_text(TARGETS.replace(sound, faulty))
+    with pytest.raises(Exception) as raised:
+        load_targets(tmp_path / "targets.toml")
+    (problem,) = raised.value.problems
+    assert message in problem
+    assert raised.value.exit_code in (2, 4)
+
+
+def test_targets_without_observations_are_refused(tmp_path):
+    (tmp_path / "pair.toml").write_text(PAIR)
+    (tmp_path / "targets.toml").write_text(TARGETS[: TARGETS.index("[[stage]]")])
+    with pytest.raises(ConfigurationError, match="give at least one of stage, jump, crisis"):
+        load_targets(tmp_path / "targets.toml")
+
+
+@pytest.mark.parametrize("name", ["pan2021_targets.toml", "pan2021_axial_targets.toml"])
+def test_the_targets_of_the_paper_are_sound(name):
+    Judge(load_targets(Path(__file__).resolve().parents[2] / "sweeps" / name))
