@@ -30,8 +30,8 @@ STARTS, PERIODS = 200, 500
 
 TORSION = 'scene.effects=["pitch_error", "stiffness_variation", "backlash"]'
 BOUNDS = {
-    "torsion": ("pan2021", [TORSION, "sweep.from=0.11", "sweep.to=14.91", "sweep.count=75"]),
-    "six states": ("pan2021", ["sweep.from=0.07", "sweep.to=13.77", "sweep.count=75"]),
+    "torsion": ("pan2021_first", [TORSION, "sweep.from=0.11", "sweep.to=14.91", "sweep.count=75"]),
+    "six states": ("pan2021_first", ["sweep.from=0.07", "sweep.to=13.77", "sweep.count=75"]),
     "frequency": (
         "mesh_frequency",
         ["groups.pitch_error=4.3", "sweep.from=0.31", "sweep.to=1.93", "sweep.count=75"],
@@ -46,8 +46,8 @@ BOUNDS = {
 }
 STEPS = (25, 50, 100, 200, 400)
 CHAOTIC = {
-    "six states": ("pan2021", [], (12.2, 12.47, 12.7)),
-    "torsion": ("pan2021", [TORSION], (12.0, 12.6)),
+    "six states": ("pan2021_first", [], (12.2, 12.47, 12.7)),
+    "torsion": ("pan2021_first", [TORSION], (12.0, 12.6)),
 }
 
 
