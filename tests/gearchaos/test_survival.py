@@ -16,22 +16,12 @@ FADING = (14.82, 14.87, 14.9)
 """Here chaos lives for a thousand periods or so: within 6000 it comes to rest on a period 1."""
 
 SHORT = ("integration.transient_periods=100", "integration.recorded_periods=200")
-GROUPS = (
-    "groups.load=0.26762",
-    "groups.half_backlash=0.94518",
-    "groups.pitch_error_amplitude=0.022749",
-    "groups.damping_ratio=0.025819888974716113",
-    "groups.transverse_stiffness_p=36.315",
-    "groups.transverse_damping_p=0.084229",
-    "groups.transverse_stiffness_g=6.3545",
-    "groups.transverse_damping_g=0.0058386",
-)
 
 
 def saved(folder, values):
     result = gearchaos.run(
         gearchaos.load_config(
-            PAN2021, [f"sweep={{parameter='pitch_error', values={[*values]}}}", *GROUPS, *SHORT]
+            PAN2021, [f"sweep={{parameter='pitch_error', values={[*values]}}}", *SHORT]
         )
     )
     result.save(folder / "chaos.h5")
