@@ -49,6 +49,7 @@ class Present(NamedTuple):
     axial: tuple[()] | None
     resolved: tuple[()] | None
     tangent: tuple[()] | None
+    flow_map: tuple[()] | None
 
 
 class Coordinates(NamedTuple):
@@ -136,7 +137,11 @@ SUSPECT = AXIAL_BRANCH + len(Branch._fields)
 GROWTH = SUSPECT + 1
 """Row of the logarithm of the tangent vector's growth since the period began."""
 CROSSINGS = GROWTH + 1
-ROWS = CROSSINGS + len(Crossings._fields)
+FORCES = CROSSINGS + len(Crossings._fields)
+"""First row of what forces a lane where a step is a map; see `flow_map`."""
+MARGINS = FORCES + 5
+"""Rows of how far either gap may stray from its cubic in a step that is a map."""
+ROWS = MARGINS + 2
 
 _ITEM = np.dtype(np.float64).itemsize
 
