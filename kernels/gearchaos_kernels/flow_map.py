@@ -27,7 +27,6 @@ from collections import OrderedDict
 from typing import NamedTuple
 
 import numpy as np
-from numba import prange
 from numpy.polynomial import chebyshev
 from numpy.typing import NDArray
 
@@ -46,14 +45,13 @@ from gearchaos_kernels.block_memory import (
     write_state,
 )
 from gearchaos_kernels.coefficients import lane_coefficients
-from gearchaos_kernels.compilation import driver, scalar
+from gearchaos_kernels.compilation import block, evaluator, scalar
 from gearchaos_kernels.equations import (
     Directions,
     accelerations,
     gaps_at,
-    tangent_forces,
 )
-from gearchaos_kernels.forcing import Forcing, Phase, forcing_at
+from gearchaos_kernels.forcing import Phase, forcing_at
 from gearchaos_kernels.system import Floats, System
 
 TERMS = 16
@@ -99,7 +97,8 @@ class Layout(NamedTuple):
 
     ``columns``: those of x and then those of c: load, offset of the tangential and of the axial
     flank, sine and cosine part of the pitch error, as far as the scene has them; ``width``: of a
-    state, so that it fills vector registers; ``pairs``: of branches.
+    state, so that it fills vector registers; ``pairs``: of branches; ``ways``:
+    directions of the mesh; ``varies``: whether its stiffness does.
     """
 
     states: int
@@ -112,6 +111,8 @@ class Layout(NamedTuple):
     switch_z: int
     size: int
     pairs: int
+    ways: int
+    varies: bool
 
 
 @scalar
@@ -153,6 +154,8 @@ def layout(present):
         switch_z,
         size,
         pairs,
+        1 + z,
+        present.stiffness_variation is not None,
     )
 
 
@@ -239,7 +242,17 @@ def _make(system: System, steps: int, present: Present) -> Floats:
         coefficients = lane_coefficients(system, system.mesh_period / count)[0]
         table = np.zeros((count, HEADER + place.pairs * place.size))
         tails = np.zeros(count)
-        _fill_maps(coefficients, waves, table, tails, _KEPT, _DROPPED, *present)
+        right_side = RightSide(
+            np.zeros((place.states, place.states)),
+            np.zeros((place.states, 3)),
+            np.zeros((2, place.states)),
+            np.zeros((2, place.states)),
+            np.zeros((2, 3)),
+        )
+        _differentiate(coefficients, right_side, present)
+        stiffness = Lane(*coefficients)
+        size = stiffness.mean_stiffness, stiffness.stiffness_variation
+        _fill_maps(right_side, size, waves, table, tails, _KEPT, _DROPPED, place)
         if tails.max() < TAIL:
             return table
         if 2 * count > MOST_STEPS or not np.isfinite(coefficients).all():
@@ -249,59 +262,89 @@ def _make(system: System, steps: int, present: Present) -> Floats:
         count *= 2
 
 
-@driver
-def _fill_maps(
-    coefficients,
-    waves,
-    table,
-    tails,
-    kept,
-    dropped,
-    pitch_error,
-    phase,
-    stiffness_variation,
-    backlash,
-    transverse,
-    axial,
-    resolved,
-    tangent,
-    flow_map,
-):
-    """Fill the maps of every step, shape (steps, size of a step)."""
-    for number in prange(table.shape[0]):
-        present = Present(
-            pitch_error,
-            phase,
-            stiffness_variation,
-            backlash,
-            transverse,
-            axial,
-            resolved,
-            tangent,
-            flow_map,
-        )
-        tails[number] = fill_step(coefficients, waves, number, table, kept, dropped, present)
+class RightSide(NamedTuple):
+    """Eq. 13 as matrices: what every state and every forcing adds to rates and gaps.
+
+    ``constant`` (states, states), ``forced`` (states, 3): rates without mesh stiffness, by state
+    and by drive, sine and cosine of the error; ``mobility`` (2, states): what a force of one in the
+    mesh takes away, the axial one with its share of the stiffness; ``gaps`` (2, states),
+    ``gaps_forced`` (2, 3): both gaps, by the same.
+    """
+
+    constant: Floats
+    forced: Floats
+    mobility: Floats
+    gaps: Floats
+    gaps_forced: Floats
 
 
-@scalar
-def fill_step(coefficients, waves, number, table, kept, dropped, present):
-    """Fill the maps of one step; return what is left of the series."""
-    row = table[number]
-    steps = table.shape[0]
-    place = layout(present)
+@evaluator
+def _differentiate(coefficients, right_side, present):
+    """Apply the formulas of eq. 13 to one unit after the other."""
+    states = right_side.constant.shape[0]
     memory = aligned_memory()
-    memory[:] = 0.0
     fill_lane(memory, 0, coefficients)
     lane = load(memory, COEFFICIENTS, 0, Lane)
-    right_side = differentiated(memory, lane, present)
-    half = np.pi / steps
+    zero = Coordinates(0.0, 0.0, 0.0, 0.0, 0.0)
+    rest = State(zero, zero)
+    for column in range(states + 3):
+        for line in range(states):
+            memory[(STATE + line) * STRIDE] = 1.0 if line == column else 0.0
+        drive = 1.0 if column == states else 0.0
+        sine = 1.0 if column == states + 1 else 0.0
+        cosine = 1.0 if column == states + 2 else 0.0
+        state = read_state(memory, STATE, 0, present)
+        acting = forcing_at(lane, Phase(0.0, sine, cosine), present)
+        both = gaps_at(state, lane, acting, present)
+        gaps = right_side.gaps
+        rates = right_side.constant
+        at = column
+        if column >= states:
+            gaps = right_side.gaps_forced
+            rates = right_side.forced
+            at = column - states
+        gaps[0, at] = both.tangential.value
+        gaps[1, at] = both.axial.value
+        forces = Directions(
+            lane.mesh_damping * both.tangential.rate,
+            lane.axial_share * lane.mesh_damping * both.axial.rate,
+        )
+        result = State(
+            state.rate, accelerations(state, forces, drive + acting.drive, lane, present)
+        )
+        write_state(memory, STATE, 0, result, present)
+        for line in range(states):
+            rates[line, at] = memory[(STATE + line) * STRIDE]
+    for way in range(2):
+        forces = Directions(1.0 - way, lane.axial_share * way)
+        result = State(zero, accelerations(rest, forces, 0.0, lane, present))
+        write_state(memory, STATE, 0, result, present)
+        for line in range(states):
+            right_side.mobility[way, line] = memory[(STATE + line) * STRIDE]
+
+
+@evaluator
+def _fill_maps(right_side, size, waves, table, tails, kept, dropped, place):
+    """Fill the maps of every step, shape (steps, size of a step)."""
+    for number in range(table.shape[0]):
+        tails[number] = fill_step(
+            right_side, size, waves, number, table, kept, dropped, place
+        )
+
+
+@block
+def fill_step(right_side, size, waves, number, table, kept, dropped, place):
+    """Fill the maps of one step; return what is left of the series."""
+    row = table[number]
+    half = np.pi / table.shape[0]
     middle = (2 * number + 1) * half
     # Taylor coefficients of mesh stiffness, sine and cosine about the middle of the step.
     forcing = np.zeros((3, ORDER))
-    forcing[0, 0] = lane.mean_stiffness
-    if present.stiffness_variation is not None:
+    mean, variation = size
+    forcing[0, 0] = mean
+    if place.varies:
         for harmonic in range(1, waves.shape[1] + 1):
-            wave = lane.stiffness_variation * (waves[0, harmonic - 1] - 1j * waves[1, harmonic - 1])
+            wave = variation * (waves[0, harmonic - 1] - 1j * waves[1, harmonic - 1])
             wave *= np.exp(1j * harmonic * middle)
             for term in range(ORDER):
                 forcing[0, term] += wave.real
@@ -318,147 +361,69 @@ def fill_step(coefficients, waves, number, table, kept, dropped, present):
     row[3] = np.cos(begin + 2.0 * half)
     tail = 0.0
     for pair in range(place.pairs):
-        engaged_y = 1.0 - pair % 2
-        engaged_z = 1.0 - pair // 2
+        engaged = np.array([[1.0 - pair % 2], [1.0 - pair // 2]])
         at = HEADER + pair * place.size
         part = row[at : at + place.size]
-        found = fill_pair(
-            part, row, right_side, forcing, engaged_y, engaged_z, kept, dropped, place, present
-        )
-        # Also where it is not a number.
-        tail = tail if found <= tail else found
+        left = fill_pair(part, row, right_side, forcing, engaged, kept, dropped, place)
+        tail = larger(tail, left)
     return tail
 
 
-@scalar
-def differentiated(memory, lane, present):
-    """Return eq. 13 as a matrix: what every state and every forcing adds to rates and gaps.
-
-    ``constant`` (states, states + 3): without mesh stiffness, by state, drive, sine and cosine of
-    the error; ``mobility`` (2, states): what a force of one in the mesh takes away, the axial one
-    with its share of the stiffness; ``gaps`` (2, states + 3): rows of both gaps.
-    """
-    place = layout(present)
-    states = place.states
-    constant = np.zeros((states, states + 3))
-    mobility = np.zeros((2, states))
-    gaps = np.zeros((2, states + 3))
-    zero = Coordinates(0.0, 0.0, 0.0, 0.0, 0.0)
-    rest = State(zero, zero)
-    for column in range(states + 3):
-        memory[: states * STRIDE] = 0.0
-        phase = Phase(0.0, 0.0, 0.0)
-        drive = 0.0
-        if column < states:
-            memory[(STATE + column) * STRIDE] = 1.0
-        elif column == states:
-            drive = 1.0
-        elif column == states + 1:
-            phase = Phase(0.0, 1.0, 0.0)
-        else:
-            phase = Phase(0.0, 0.0, 1.0)
-        state = read_state(memory, STATE, 0, present)
-        acting = forcing_at(lane, phase, present)
-        both = gaps_at(state, lane, acting, present)
-        gaps[0, column] = both.tangential.value
-        gaps[1, column] = both.axial.value
-        forces = Directions(
-            lane.mesh_damping * both.tangential.rate,
-            lane.axial_share * lane.mesh_damping * both.axial.rate,
-        )
-        result = State(state.rate, accelerations(state, forces, drive + acting.drive, lane, present))
-        write_state(memory, STATE, 0, result, present)
-        for line in range(states):
-            constant[line, column] = memory[(STATE + line) * STRIDE]
-    for way in range(2):
-        forces = Directions(1.0 - way, lane.axial_share * way)
-        result = State(zero, accelerations(rest, forces, 0.0, lane, present))
-        write_state(memory, STATE, 0, result, present)
-        for line in range(states):
-            mobility[way, line] = memory[(STATE + line) * STRIDE]
-    return constant, mobility, gaps
-
-
-@scalar
-def fill_pair(part, row, right_side, forcing, engaged_y, engaged_z, kept, dropped, place, present):
+@block
+def fill_pair(part, row, right_side, forcing, engaged, kept, dropped, place):
     """Fill the maps of one step on one pair of branches; return what is left of the series."""
-    constant, mobility, rows = right_side
     states = place.states
     columns = place.columns
-    ways = 1
-    offset_z = -1
-    error = states + 2
-    if present.axial is not None:
-        ways = 2
-        offset_z = states + 2
-        error = states + 3
-    engaged = (engaged_y, engaged_z)
-    offset = (states + 1, offset_z)
+    stiffness = forcing[0]
+    mobility = np.ascontiguousarray(right_side.mobility.T)
+    rows = right_side.gaps
+    engaged_rows = engaged * rows
+    error = states + 1 + place.ways
 
-    # The motion by column: psi_k of the state, gap_k and with K the force of each direction.
+    # The motion by column, and what acts on it: gaps, forces times K, drive and error.
     psi = np.zeros((ORDER + 1, states, columns))
     gap = np.zeros((ORDER, 2, columns))
-    force = np.zeros((ORDER, 2, columns))
+    force = np.zeros((2, columns))
     inputs = np.zeros((3, columns))
     for column in range(states):
         psi[0, column, column] = 1.0
     for k in range(ORDER):
-        inputs[:] = 0.0
+        scale = 0.5 / (k + 1)
         inputs[0, states] = 1.0 if k == 0 else 0.0
-        if present.pitch_error is not None:
+        if columns > error:
             inputs[1, error] = forcing[1, k]
             inputs[2, error] = forcing[2, k]
-            if present.phase is not None:
-                inputs[1, error + 1] = forcing[2, k]
-                inputs[2, error + 1] = -forcing[1, k]
-        for way in range(ways):
+        if columns > error + 1:
+            inputs[1, error + 1] = forcing[2, k]
+            inputs[2, error + 1] = -forcing[1, k]
+        add_product(1.0, rows, psi[k], gap[k])
+        add_product(1.0, right_side.gaps_forced, inputs, gap[k])
+        for way in range(place.ways):
             for column in range(columns):
                 value = 0.0
-                for line in range(states):
-                    value += rows[way, line] * psi[k, line, column]
-                gap[k, way, column] = value + rows[way, states + 1] * inputs[1, column]
-            for j in range(k + 1):
-                stiffness = engaged[way] * forcing[0, k - j]
-                for column in range(columns):
-                    force[k, way, column] += stiffness * gap[j, way, column]
-            force[k, way, offset[way]] -= forcing[0, k]
-        scale = 0.5 / (k + 1)
-        for line in range(states):
-            for column in range(columns):
-                value = mobility[0, line] * force[k, 0, column]
-                value += mobility[1, line] * force[k, 1, column]
-                for source in range(3):
-                    value += constant[line, states + source] * inputs[source, column]
-                for source in range(states):
-                    value += constant[line, source] * psi[k, source, column]
-                psi[k + 1, line, column] = scale * value
+                for j in range(k + 1):
+                    value += stiffness[k - j] * gap[j, way, column]
+                force[way, column] = engaged[way, 0] * value
+            force[way, states + 1 + way] -= stiffness[k]
+        add_product(scale, right_side.constant, psi[k], psi[k + 1])
+        add_product(scale, right_side.forced, inputs, psi[k + 1])
+        add_product(scale, mobility, force, psi[k + 1])
 
     # The inverse flow, and with K what it makes of the mobilities.
     inverse = np.zeros((ORDER + 1, states, states))
-    moved = np.zeros((ORDER, 2, states))
-    switch = np.zeros((ORDER, 2, states))
+    moved = np.zeros((ORDER, states, 2))
+    switch = np.zeros((ORDER, states, 2))
     for line in range(states):
         inverse[0, line, line] = 1.0
     for k in range(ORDER):
-        for way in range(ways):
-            for line in range(states):
-                value = 0.0
-                for source in range(states):
-                    value += inverse[k, line, source] * mobility[way, source]
-                moved[k, way, line] = value
-                value = 0.0
-                for j in range(k + 1):
-                    value += forcing[0, k - j] * moved[j, way, line]
-                switch[k, way, line] = value
         scale = -0.5 / (k + 1)
-        for line in range(states):
-            for column in range(states):
-                value = 0.0
-                for way in range(ways):
-                    value += engaged[way] * switch[k, way, line] * rows[way, column]
-                for source in range(states):
-                    value += inverse[k, line, source] * constant[source, column]
-                inverse[k + 1, line, column] = scale * value
+        add_product(1.0, inverse[k], mobility, moved[k])
+        for j in range(k + 1):
+            for line in range(states):
+                for way in range(place.ways):
+                    switch[k, line, way] += stiffness[k - j] * moved[j, line, way]
+        add_product(scale, inverse[k], right_side.constant, inverse[k + 1])
+        add_product(scale, switch[k], engaged_rows, inverse[k + 1])
 
     first = np.zeros((states, columns))
     last = np.zeros((states, columns))
@@ -466,50 +431,43 @@ def fill_pair(part, row, right_side, forcing, engaged_y, engaged_z, kept, droppe
     tail = 0.0
     for k in range(ORDER, -1, -1):
         sign = 1.0 - 2.0 * (k % 2)
-        first += sign * psi[k]
-        last += psi[k]
-        back += sign * inverse[k]
+        for line in range(states):
+            for column in range(columns):
+                first[line, column] += sign * psi[k, line, column]
+                last[line, column] += psi[k, line, column]
+            for column in range(states):
+                back[line, column] += sign * inverse[k, line, column]
     for line in range(states):
         for column in range(states):
             tail = larger(tail, abs(psi[ORDER, line, column]))
             tail = larger(tail, abs(inverse[ORDER, line, column]))
 
-    # From the middle of the step to its beginning.
-    end = part[place.end : place.end + columns * place.width].reshape((columns, place.width))
+    # From the middle of the step to its beginning; a step is 2 long in s.
+    end = over_beginning(last, first, back)
     for line in range(states):
-        begun(last[line], first, back, states, columns, end[:, line])
-    cut = np.zeros((ORDER, columns))
-    for way in range(ways):
+        for column in range(columns):
+            part[place.end + column * place.width + line] = end[line, column]
+    along = over_beginning(gap.reshape((2 * ORDER, columns)), first, back)
+    cut, left = economised(along.reshape((ORDER, 2 * columns)), kept, dropped)
+    tail = larger(tail, left)
+    traced = np.zeros((ORDER, states, 2))
+    start = np.ascontiguousarray(first[:, :states])
+    for k in range(ORDER):
+        add_product(0.5, start, switch[k], traced[k])
+    thrown, left = economised(traced.reshape((ORDER, 2 * states)), kept, dropped)
+    tail = larger(tail, left)
+    for way in range(place.ways):
         at = place.gap_y if way == 0 else place.gap_z
-        target = part[at : at + columns * TERMS].reshape((columns, TERMS))
-        for k in range(ORDER):
-            begun(gap[k, way], first, back, states, columns, cut[k])
-        largest = 0.0
-        lost = 0.0
+        bound = BOUND_Y if way == 0 else BOUND_Z
         for column in range(columns):
-            left = economise(cut[:, column], kept, dropped, target[column])
-            lost = larger(lost, left)
-            largest = larger(largest, np.max(np.abs(cut[:, column])))
-        tail = larger(tail, lost / largest)
-        at = BOUND_Y if way == 0 else BOUND_Z
-        for column in range(columns):
-            row[at + column] = max(row[at + column], beyond_cubic(target[column]))
+            terms = part[at + column * TERMS : at + (column + 1) * TERMS]
+            for term in range(TERMS):
+                terms[term] = cut[term, way * columns + column]
+            row[bound + column] = max(row[bound + column], beyond_cubic(terms))
         at = place.switch_y if way == 0 else place.switch_z
-        target = part[at : at + TERMS * place.width].reshape((TERMS, place.width))
-        traced = np.zeros((states, ORDER))
-        largest = 1e-300
-        lost = 0.0
-        for line in range(states):
-            for k in range(ORDER):
-                value = 0.0
-                for source in range(states):
-                    value += first[line, source] * switch[k, way, source]
-                # Half of it: the step is 2 long in s.
-                traced[line, k] = 0.5 * value
-            left = economise(traced[line], kept, dropped, target[:, line])
-            lost = larger(lost, left)
-            largest = larger(largest, np.max(np.abs(traced[line])))
-        tail = larger(tail, lost / largest)
+        for term in range(TERMS):
+            for line in range(states):
+                part[at + term * place.width + line] = thrown[term, 2 * line + way]
     return tail
 
 
@@ -519,39 +477,54 @@ def larger(a, b):
     return a if a > b or a != a else b
 
 
-@scalar
-def begun(row, first, back, states, columns, target):
-    """Turn a row over state in the middle and forcing into one over the state at the beginning."""
-    for column in range(states):
-        value = 0.0
+@block
+def add_product(scale, a, b, target):
+    """Add the product of two small matrices, many of whose elements are 0, times a number."""
+    for line in range(a.shape[0]):
+        for source in range(b.shape[0]):
+            factor = scale * a[line, source]
+            if factor != 0.0:
+                for column in range(b.shape[1]):
+                    target[line, column] += factor * b[source, column]
+
+
+@block
+def over_beginning(rows, first, back):
+    """Turn rows over the middle state and forcing into ones over the state at the beginning."""
+    states = back.shape[0]
+    target = np.zeros(rows.shape)
+    for line in range(rows.shape[0]):
         for source in range(states):
-            value += row[source] * back[source, column]
-        target[column] = value
-    for column in range(states, columns):
-        value = row[column]
+            for column in range(states):
+                target[line, column] += rows[line, source] * back[source, column]
+        for column in range(states, rows.shape[1]):
+            target[line, column] = rows[line, column]
         for source in range(states):
-            value -= target[source] * first[source, column]
-        target[column] = value
+            for column in range(states, rows.shape[1]):
+                target[line, column] -= target[line, source] * first[source, column]
+    return target
 
 
-@scalar
-def economise(series, kept, dropped, target):
-    """Cut a Taylor series to fewer terms; return the sum of the Chebyshev terms that are lost."""
-    for term in range(TERMS):
-        value = 0.0
-        for k in range(ORDER):
-            value += kept[term, k] * series[k]
-        target[term] = value
-    lost = 0.0
-    for term in range(ORDER - TERMS):
-        value = 0.0
-        for k in range(ORDER):
-            value += dropped[term, k] * series[k]
-        lost += abs(value)
-    return lost
+@block
+def economised(series, kept, dropped):
+    """Cut Taylor series to fewer terms; return them, and the largest share that is lost."""
+    target = np.zeros((TERMS, series.shape[1]))
+    lost = np.zeros((dropped.shape[0], series.shape[1]))
+    add_product(1.0, kept, series, target)
+    add_product(1.0, dropped, series, lost)
+    largest = 1e-300
+    most = 0.0
+    for column in range(series.shape[1]):
+        left = 0.0
+        for term in range(lost.shape[0]):
+            left += abs(lost[term, column])
+        most = larger(most, left)
+        for term in range(TERMS):
+            largest = larger(largest, abs(target[term, column]))
+    return target, most / largest
 
 
-@scalar
+@block
 def beyond_cubic(terms):
     """Return by how much a polynomial may lower the middle Bezier points of its Hermite cubic.
 
