@@ -88,8 +88,8 @@ def integrate_block(number_of_block, batch, plan, outcome, present):
     memory = aligned_memory()
     table = batch.table
     maps = batch.maps
-    # Whole vectors, and no more of them than there are lanes.
-    slots = VECTOR * ((lanes + VECTOR - 1) // VECTOR)
+    # A few lanes, such as one with maps of its own, need no more than one vector.
+    slots = VECTOR if lanes <= VECTOR else LANES
     work = np.zeros(WORK)
     every = steps // plan.steps_per_period
     block = Block(memory, first, lanes)

@@ -168,7 +168,9 @@ def step_size(present):
 
 def _economy() -> tuple[Floats, Floats]:
     """What cuts a Taylor series (ORDER,) to TERMS terms, and the Chebyshev terms that it drops."""
-    exact = np.stack([np.pad(chebyshev.poly2cheb(unit), (0, ORDER))[:ORDER] for unit in np.eye(ORDER)])
+    exact = np.stack(
+        [np.pad(chebyshev.poly2cheb(unit), (0, ORDER))[:ORDER] for unit in np.eye(ORDER)]
+    )
     kept = np.stack([np.pad(chebyshev.cheb2poly(one[:TERMS]), (0, TERMS))[:TERMS] for one in exact])
     return np.ascontiguousarray(kept.T), np.ascontiguousarray(exact.T[TERMS:])
 
@@ -327,9 +329,7 @@ def _differentiate(coefficients, right_side, present):
 def _fill_maps(right_side, size, waves, table, tails, kept, dropped, place):
     """Fill the maps of every step, shape (steps, size of a step)."""
     for number in range(table.shape[0]):
-        tails[number] = fill_step(
-            right_side, size, waves, number, table, kept, dropped, place
-        )
+        tails[number] = fill_step(right_side, size, waves, number, table, kept, dropped, place)
 
 
 @block

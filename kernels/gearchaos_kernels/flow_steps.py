@@ -18,6 +18,7 @@ from gearchaos_kernels.block_memory import (
     BEFORE,
     COEFFICIENTS,
     FORCES,
+    LANES,
     MARGINS,
     STATE,
     STRIDE,
@@ -132,8 +133,17 @@ def move_block(memory, table, row, slots, present):
             move(memory, slot, table, at, engaged_y, engaged_z, present)
     if present.resolved is None:
         return 0
-    suspects = 0
     begin, end = phases_of(table, row)
+    # A known number of slots is what the compiler makes vector instructions of.
+    if slots == VECTOR:
+        return count_suspects(memory, VECTOR, begin, end, present)
+    return count_suspects(memory, LANES, begin, end, present)
+
+
+@scalar
+def count_suspects(memory, slots, begin, end, present):
+    """Mark the lanes whose gaps may have left their branches since the step began."""
+    suspects = 0
     for slot in range(slots):
         lane = load(memory, COEFFICIENTS, slot, Lane)
         branches = read_branches(memory, slot, present)
@@ -300,8 +310,16 @@ def first_below(work, gap, done, side, distance):
             steepest = max(width * slope_left, 3.0 * (point2 - point1), width * slope_right)
             if steepest < -stray * 0.2 and value_right < 0.0:
                 return falling_root(
-                    work, gap, side, distance, left, right,
-                    value_left, width * slope_left, value_right, width * slope_right,
+                    work,
+                    gap,
+                    side,
+                    distance,
+                    left,
+                    right,
+                    value_left,
+                    width * slope_left,
+                    value_right,
+                    width * slope_right,
                 )
             clear = steepest < -stray * 0.2
             if not clear and width < _NARROW:

@@ -184,39 +184,52 @@ def move(
                 found = w.load(w.at(lanes, zero, row * STRIDE), VECTOR)
                 same = builder.fcmp_ordered("==", found, w.splat(arguments[engaged], VECTOR))
                 mask = same if mask is None else builder.and_(mask, same)
-        before = [BEFORE + STATE + line for line in range(place.states)]
-        inputs = [w.load(w.at(lanes, zero, r * STRIDE), VECTOR) for r in before + scene.forces]
-        tangents = []
-        if scene.present.tangent is not None:
-            tangents = [
-                w.load(w.at(lanes, zero, (BEFORE + TANGENT + line) * STRIDE), VECTOR)
-                for line in range(place.states)
-            ]
-        axial = place.states - 4 if scene.present.axial is not None else place.states
-        for line in range(place.states):
-            # The axial pair acts on nothing else.
-            there = [
-                column
-                for column in range(place.columns)
-                if line >= axial or not (axial <= column < place.states or column == place.states + 2
-                                         and scene.present.axial is not None)
-            ]
-            factors = {
-                column: w.splat(
-                    builder.load(w.at(numbers, zero, place.end + column * place.width + line)),
-                    VECTOR,
-                )
-                for column in there
-            }
-            for row, given in ((STATE, inputs), (TANGENT, tangents)):
-                used = [column for column in there if column < len(given)]
-                if not used:
-                    continue
-                value = w.sum([factors[c] for c in used], [given[c] for c in used])
-                target = w.at(lanes, zero, (row + line) * STRIDE)
-                if mask is not None:
-                    value = builder.select(mask, value, w.load(target, VECTOR))
-                w.store(value, target)
+
+        def apply() -> None:
+            before = [BEFORE + STATE + line for line in range(place.states)]
+            inputs = [w.load(w.at(lanes, zero, r * STRIDE), VECTOR) for r in before + scene.forces]
+            tangents = []
+            if scene.present.tangent is not None:
+                tangents = [
+                    w.load(w.at(lanes, zero, (BEFORE + TANGENT + line) * STRIDE), VECTOR)
+                    for line in range(place.states)
+                ]
+            axial = place.states - 4 if scene.present.axial is not None else place.states
+            for line in range(place.states):
+                # The axial pair acts on nothing else.
+                there = [
+                    column
+                    for column in range(place.columns)
+                    if line >= axial
+                    or not (
+                        axial <= column < place.states
+                        or column == place.states + 2
+                        and scene.present.axial is not None
+                    )
+                ]
+                factors = {
+                    column: w.splat(
+                        builder.load(w.at(numbers, zero, place.end + column * place.width + line)),
+                        VECTOR,
+                    )
+                    for column in there
+                }
+                for row, given in ((STATE, inputs), (TANGENT, tangents)):
+                    used = [column for column in there if column < len(given)]
+                    if not used:
+                        continue
+                    value = w.sum([factors[c] for c in used], [given[c] for c in used])
+                    target = w.at(lanes, zero, (row + line) * STRIDE)
+                    if mask is not None:
+                        value = builder.select(mask, value, w.load(target, VECTOR))
+                    w.store(value, target)
+
+        if mask is None:
+            apply()
+        else:
+            bits = builder.bitcast(mask, ir.IntType(VECTOR))
+            with builder.if_then(builder.icmp_unsigned("!=", bits, ir.Constant(bits.type, 0))):
+                apply()
         return context.get_dummy_value()
 
     signature = types.void(
