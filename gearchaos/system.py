@@ -195,7 +195,11 @@ class System:
             transient = max(self.config.integration.transient_periods, 1)
             guess = self.integrate(1, transient=transient - 1).states[-1]
         found = polish(
-            self._record, np.atleast_2d(guess), np.array([period], np.int32), self._steps
+            self._record,
+            np.atleast_2d(guess),
+            np.array([period], np.int32),
+            self._steps,
+            self.config.integration.method,
         )
         if not found.converged[0]:
             raise ConfigurationError(
@@ -222,6 +226,7 @@ class System:
             np.array([float(last)]),
             width,
             self._steps,
+            self.config.integration.method,
         )
         losses = loss_of_stability(followed.stable.multipliers, followed.beyond.multipliers)
         loss = StabilityLoss(int(losses.kind[0]))
@@ -276,6 +281,7 @@ class System:
             integration.recorded_periods,
             section_points=0,
             resolved=integration.crossings == "resolved",
+            method=integration.method,
         )
 
     def _at(self, values: Mapping[str, Floats]) -> kernels.System:

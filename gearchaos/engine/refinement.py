@@ -175,5 +175,6 @@ def _followed(config: Configuration, edge: NDArray[Any], last: Floats) -> Losses
         np.clip(last, lowest, highest),
         float(np.min(np.abs(last - first))) * FOLLOWED_WIDTH,
         config.integration.steps_per_period,
+        config.integration.method,
     )
     return loss_of_stability(followed.stable.multipliers, followed.beyond.multipliers)

@@ -6,7 +6,15 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
-from gearchaos_kernels import LANES, STATUS_TEXTS, Outcome, Plan, Status, integrate
+from gearchaos_kernels import (
+    LANES,
+    STATUS_TEXTS,
+    Outcome,
+    Plan,
+    Status,
+    integrate,
+    maps_memory,
+)
 from numpy.typing import NDArray
 
 from gearchaos.configuration import Configuration
@@ -63,7 +71,7 @@ class Simulation:
         self.config = config
         self.lanes = Lanes(config)
         integration, outputs = config.integration, config.outputs
-        steps, raised = stable_steps(self.lanes, integration.steps_per_period)
+        steps, note = stable_steps(self.lanes, integration.steps_per_period)
         self.plan = Plan(
             steps,
             integration.transient_periods,
@@ -71,8 +79,9 @@ class Simulation:
             section_points=outputs.section_points if outputs.section else 0,
             tangent=outputs.lyapunov,
             resolved=integration.crossings == "resolved",
+            method=integration.method,
         )
-        self.notes = [note for note in (raised, self._negative_stiffness()) if note]
+        self.notes = [note for note in (note, self._negative_stiffness()) if note]
         self._choice: list[Variable] = []
 
     def choose_steps(self) -> None:
@@ -83,7 +92,7 @@ class Simulation:
         coarsest = self.plan.steps_per_period
         lanes, solution = pilot(self.lanes, self.plan, PILOT_LANES, 4 * coarsest)
         candidates = choose_steps(
-            lambda steps: solution(steps, self.plan.resolved),
+            lambda steps: solution(steps, self.plan.resolved, self.plan.method),
             coarsest,
             tolerance,
             self.config.source,
@@ -112,7 +121,7 @@ class Simulation:
 
     @property
     def steps(self) -> int:
-        """Runge-Kutta steps of the whole sweep."""
+        """Steps of the whole sweep."""
         periods = self.plan.transient_periods + self.plan.recorded_periods
         return len(self.lanes) * periods * self.plan.steps_per_period
 
@@ -169,7 +178,11 @@ class Simulation:
             numbers *= 2 if self.config.outputs.motion else 1
         if self.config.outputs.exponents:
             numbers += self.plan.recorded_periods * states
-        return 8 * min(len(self.lanes), self.block_lanes(threads)) * numbers
+        lanes = min(len(self.lanes), self.block_lanes(threads))
+        maps = 0
+        if self.plan.method == "flow_map":
+            maps = maps_memory(self.lanes.system_of(np.arange(lanes)), self.plan)
+        return 8 * lanes * numbers + maps
 
     def block_lanes(self, threads: int) -> int:
         """Return how many lanes make a block: work for every thread, and progress to be seen."""

@@ -64,6 +64,11 @@ def stable_steps(lanes: Lanes, steps: int) -> tuple[int, str]:
     if not limits:
         return steps, ""
     worst = max(limits, key=lambda limit: limit.steps)
+    if lanes.config.integration.method == "flow_map":
+        return steps, (
+            f"integration.steps_per_period = {steps}: RK4 would need {worst.steps} steps to be "
+            "stable; flow maps have no such limit"
+        )
     unstable = np.concatenate([limit.lanes for limit in limits])
     if lanes.config.integration.unstable == "refuse" or worst.steps > MOST_STEPS_PER_PERIOD:
         raise ConfigurationError(_fault(lanes, worst, unstable, steps).text(lanes.config.source))
@@ -116,21 +121,21 @@ def solution_of(outcome: Outcome, system: System, kept: Sequence[str]) -> Soluti
 
 def pilot(
     lanes: Lanes, plan: Plan, count: int, finest: int
-) -> tuple[int, Callable[[int, bool], Solution]]:
+) -> tuple[int, Callable[[int, bool, str], Solution]]:
     """Prepare to integrate some lanes of a sweep on several grids, to compare them.
 
     ``count``: lanes wanted, spread evenly over the sweep; ``finest``: steps per period of the
     transient that all grids go on from, so that a lane comes to the same one of several coexisting
     motions on each of them. Returned are the number of lanes that there are, and a function that
-    settles with ``(steps, resolved)`` and gives the `Solution`.
+    settles with ``(steps, resolved, method)`` and gives the `Solution`.
     """
     numbers = lanes.spread(count)
     system = lanes.system_of(numbers)
-    settling = Plan(finest, plan.transient_periods, 0, section_points=0)
+    settling = Plan(finest, plan.transient_periods, 0, section_points=0, method=plan.method)
     check()
     common = integrate(system, lanes.start_of(numbers), settling).end_state
 
-    def solution(steps: int, resolved: bool) -> Solution:
+    def solution(steps: int, resolved: bool, method: str) -> Solution:
         check()
         grid = plan._replace(
             steps_per_period=steps,
@@ -138,6 +143,7 @@ def pilot(
             recorded_periods=PILOT_PERIODS,
             section_points=min(POINTS_NEEDED, PILOT_PERIODS),
             resolved=resolved,
+            method=method,
         )
         return solution_of(integrate(system, common, grid), system, lanes.config.outputs.section)
 

@@ -10,7 +10,7 @@ from numba import prange
 from numpy.typing import NDArray
 
 from gearchaos_kernels.block import Batch, integrate_block
-from gearchaos_kernels.block_memory import LANES, Present
+from gearchaos_kernels.block_memory import LANES, Present, flags
 from gearchaos_kernels.coefficients import (
     lane_coefficients,
     state_scales,
@@ -149,16 +149,3 @@ def _blocks(lanes: Integers, steps: Integers, maps_at: Integers) -> Integers:
         for at in range(0, count, LANES)
     ]
     return np.array(blocks, dtype=np.intp).reshape(-1, 4)
-
-
-def flags(system: System, plan: Plan) -> Present:
-    """Tell in types what the loop of a scene has, so that every scene is compiled for itself."""
-    effects = system.effects
-    values = {
-        **effects._asdict(),
-        "phase": effects.pitch_error and bool(np.any(system.groups.error_phase)),
-        "resolved": effects.backlash and (plan.resolved or plan.method == "flow_map"),
-        "tangent": plan.tangent,
-        "flow_map": plan.method == "flow_map",
-    }
-    return Present(**{name: () if present else None for name, present in values.items()})

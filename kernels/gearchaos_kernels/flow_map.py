@@ -24,6 +24,7 @@ as Chebyshev series are. Where the series do not converge to rounding, the step 
 from __future__ import annotations
 
 from collections import OrderedDict
+from collections.abc import Hashable
 from typing import NamedTuple
 
 import numpy as np
@@ -40,19 +41,20 @@ from gearchaos_kernels.block_memory import (
     State,
     aligned_memory,
     fill_lane,
+    flags,
     load,
     read_state,
     write_state,
 )
 from gearchaos_kernels.coefficients import lane_coefficients
-from gearchaos_kernels.compilation import block, evaluator, scalar
+from gearchaos_kernels.compilation import evaluator, part, scalar
 from gearchaos_kernels.equations import (
     Directions,
     accelerations,
     gaps_at,
 )
 from gearchaos_kernels.forcing import Phase, forcing_at
-from gearchaos_kernels.system import Floats, System
+from gearchaos_kernels.system import Floats, Groups, Plan, System
 
 TERMS = 16
 """Terms of the polynomials along a step."""
@@ -70,18 +72,11 @@ TAIL = 2e-15
 MOST_STEPS = 4096
 """Steps per period beyond which nothing is divided any more."""
 
-MOST_BYTES = 2**28
+MOST_BYTES = 2**27
 """Maps that are kept in memory."""
 
 SAMPLES = 48
 """Places at which a polynomial is compared with its cubic."""
-
-OWN = (
-    "mesh_frequency damping_ratio base_helix_angle stiffness_variation_scale mass_ratio_p "
-    "mass_ratio_g transverse_stiffness_p transverse_damping_p transverse_stiffness_g "
-    "transverse_damping_g axial_stiffness_p axial_damping_p axial_stiffness_g axial_damping_g"
-).split()
-"""Groups on which the maps depend."""
 
 _UNIT = {
     "load": 0.0,
@@ -90,6 +85,9 @@ _UNIT = {
     "error_amplitude": 1.0,
     "error_phase": 0.0,
 }
+
+OWN = [name for name in Groups._fields if name not in _UNIT]
+"""Groups on which the maps depend."""
 
 
 class Layout(NamedTuple):
@@ -177,6 +175,9 @@ def _economy() -> tuple[Floats, Floats]:
 
 _KEPT, _DROPPED = _economy()
 
+_ENGAGED = np.array([[1.0 - pair % 2, 1.0 - pair // 2] for pair in range(4)])
+"""Whether the flanks of both directions are engaged, on each pair of branches."""
+
 
 class Maps(NamedTuple):
     """Maps of several groups of lanes in one array.
@@ -192,12 +193,22 @@ class Maps(NamedTuple):
 
 def sharing(system: System) -> NDArray[np.intp]:
     """Return the number of the group of lanes with the same maps of every lane, shape (lanes,)."""
-    rows = np.stack([getattr(system.groups, name) for name in OWN], axis=1)
+    rows = _own_groups(system)
+    if (rows == rows[:1]).all():
+        return np.zeros(len(rows), dtype=np.intp)
     _, number = np.unique(rows, axis=0, return_inverse=True)
     return number.reshape(-1).astype(np.intp)
 
 
-_kept: OrderedDict[tuple[object, ...], Floats] = OrderedDict()
+def maps_memory(system: System, plan: Plan) -> int:
+    """Return about how many bytes the maps of lanes that are integrated together take."""
+    place: Layout = layout.py_func(flags(system, plan))
+    one = 8 * plan.steps_per_period * (HEADER + place.pairs * place.size)
+    return min(one * (int(sharing(system).max(initial=0)) + 1), 2 * MOST_BYTES)
+
+
+_kept: OrderedDict[Hashable, Floats] = OrderedDict()
+_joined: dict[Hashable, Maps] = {}
 
 
 def maps_of(system: System, steps: int, present: Present) -> Maps:
@@ -205,62 +216,67 @@ def maps_of(system: System, steps: int, present: Present) -> Maps:
 
     Those used last are kept: the same lanes may be integrated again and again.
     """
-    scene = (
-        steps,
-        present._replace(tangent=None),
-        system.physical,
-        system.stiffness_cosine.tobytes(),
-        system.stiffness_sine.tobytes(),
-    )
-    rows = np.stack([getattr(system.groups, name) for name in OWN], axis=1)
+    present = present._replace(tangent=None)
+    waves = system.stiffness_cosine, system.stiffness_sine
+    scene = (steps, present, system.physical, *(wave.tobytes() for wave in waves))
+    rows = [row.tobytes() for row in _own_groups(system)]
+    if (scene, *rows) in _joined:
+        return _joined[scene, *rows]
     tables: list[Floats] = []
     size = 0
     for number, row in enumerate(rows):
-        key = (*scene, row.tobytes())
-        if key not in _kept:
-            _kept[key] = _make(system.of([number]), steps, present._replace(tangent=None))
-        _kept.move_to_end(key)
-        tables.append(_kept[key])
+        if (scene, row) not in _kept:
+            _kept[scene, row] = _make(system.of([number]), steps, present)
+        _kept.move_to_end((scene, row))
+        tables.append(_kept[scene, row])
         size += tables[-1].nbytes
         if size > MOST_BYTES:
             break
     while sum(table.nbytes for table in _kept.values()) > MOST_BYTES and len(_kept) > 1:
         _kept.popitem(last=False)
-    counts = np.array([len(table) for table in tables], dtype=np.intp)
     sizes = np.array([table.size for table in tables], dtype=np.intp)
-    flat = [table.reshape(-1) for table in tables]
-    joined = flat[0] if len(flat) == 1 else np.concatenate(flat)
-    return Maps(joined, counts, np.cumsum(sizes) - sizes)
+    joined = Maps(
+        np.concatenate([table.reshape(-1) for table in tables]),
+        np.array([len(table) for table in tables], dtype=np.intp),
+        np.cumsum(sizes) - sizes,
+    )
+    _joined.clear()
+    _joined[scene, *rows] = joined
+    return joined
+
+
+def _own_groups(system: System) -> Floats:
+    """Return the groups on which maps depend, shape (lanes, groups)."""
+    return np.stack([getattr(system.groups, name) for name in OWN], axis=1)
 
 
 def _make(system: System, steps: int, present: Present) -> Floats:
-    """Make the maps of one lane, shape (steps, size of a step), with steps divided if need be."""
+    """Make the maps of one lane, shape (steps, size of a step), with steps divided if need be.
+
+    A motion so fast that no steps resolve it has maps that are not a number.
+    """
     place: Layout = layout.py_func(present)
     unit = {name: np.full(1, value) for name, value in _UNIT.items()}
     system = system._replace(groups=system.groups._replace(**unit))
-    waves = np.stack([system.stiffness_cosine, system.stiffness_sine])
-    count = steps
+    states, count = place.states, steps
     while True:
         coefficients = lane_coefficients(system, system.mesh_period / count)[0]
-        table = np.zeros((count, HEADER + place.pairs * place.size))
-        tails = np.zeros(count)
         right_side = RightSide(
-            np.zeros((place.states, place.states)),
-            np.zeros((place.states, 3)),
-            np.zeros((2, place.states)),
-            np.zeros((2, place.states)),
-            np.zeros((2, 3)),
+            *(np.zeros(shape) for shape in ((states, states), (states, 3))),
+            *(np.zeros(shape) for shape in ((states, 2), (2, states), (2, 3))),
         )
         _differentiate(coefficients, right_side, present)
-        stiffness = Lane(*coefficients)
-        size = stiffness.mean_stiffness, stiffness.stiffness_variation
-        _fill_maps(right_side, size, waves, table, tails, _KEPT, _DROPPED, place)
+        forcing = _forcing(system, Lane(*coefficients), count, place.varies)
+        table = np.zeros((count, HEADER + place.pairs * place.size))
+        edges = 2.0 * np.pi / count * np.arange(count + 1)
+        for column, values in enumerate((np.sin(edges), np.cos(edges))):
+            table[:, column], table[:, column + 2] = values[:-1], values[1:]
+        tails = np.zeros(count)
+        _fill_maps(right_side, forcing, _ENGAGED, table, tails, _KEPT, _DROPPED, place)
         if tails.max() < TAIL:
             return table
         if 2 * count > MOST_STEPS or not np.isfinite(coefficients).all():
-            raise ValueError(
-                f"no {count} steps per mesh period are so short that the motion can be told"
-            )
+            return np.full((steps, table.shape[1]), np.nan)
         count *= 2
 
 
@@ -268,7 +284,7 @@ class RightSide(NamedTuple):
     """Eq. 13 as matrices: what every state and every forcing adds to rates and gaps.
 
     ``constant`` (states, states), ``forced`` (states, 3): rates without mesh stiffness, by state
-    and by drive, sine and cosine of the error; ``mobility`` (2, states): what a force of one in the
+    and by drive, sine and cosine of the error; ``mobility`` (states, 2): what a force of one in the
     mesh takes away, the axial one with its share of the stiffness; ``gaps`` (2, states),
     ``gaps_forced`` (2, 3): both gaps, by the same.
     """
@@ -322,62 +338,55 @@ def _differentiate(coefficients, right_side, present):
         result = State(zero, accelerations(rest, forces, 0.0, lane, present))
         write_state(memory, STATE, 0, result, present)
         for line in range(states):
-            right_side.mobility[way, line] = memory[(STATE + line) * STRIDE]
+            right_side.mobility[line, way] = memory[(STATE + line) * STRIDE]
+
+
+def _forcing(system: System, lane: Lane, steps: int, varies: bool) -> Floats:
+    """Taylor coefficients about the middle of every step, shape (steps, 3, `ORDER`).
+
+    Of the mesh stiffness (eq. 19), and of sine and cosine of the mesh phase.
+    """
+    half = np.pi / steps
+    middle = (2 * np.arange(steps) + 1)[:, np.newaxis] * half
+    term = np.arange(ORDER)
+    factor = half**term / np.cumprod(np.maximum(term, 1.0))
+    turn = np.exp(1j * middle) * 1j**term * factor
+    stiffness = lane.mean_stiffness * (term == 0) * np.ones((steps, 1))
+    if varies:
+        for number, amplitude in enumerate(system.stiffness_cosine - 1j * system.stiffness_sine, 1):
+            waves = amplitude * np.exp(1j * number * middle) * (1j * number) ** term * factor
+            stiffness = stiffness + lane.stiffness_variation * waves.real
+    return np.stack([stiffness, turn.imag, turn.real], axis=1)
 
 
 @evaluator
-def _fill_maps(right_side, size, waves, table, tails, kept, dropped, place):
+def _fill_maps(right_side, forcing, engaged, table, tails, kept, dropped, place):
     """Fill the maps of every step, shape (steps, size of a step)."""
     for number in range(table.shape[0]):
-        tails[number] = fill_step(right_side, size, waves, number, table, kept, dropped, place)
+        row = table[number]
+        tail = 0.0
+        for pair in range(place.pairs):
+            at = HEADER + pair * place.size
+            piece = row[at : at + place.size]
+            left = fill_pair(
+                piece, row, right_side, forcing[number], engaged[pair], kept, dropped, place
+            )
+            tail = larger(tail, left)
+        tails[number] = tail
 
 
-@block
-def fill_step(right_side, size, waves, number, table, kept, dropped, place):
-    """Fill the maps of one step; return what is left of the series."""
-    row = table[number]
-    half = np.pi / table.shape[0]
-    middle = (2 * number + 1) * half
-    # Taylor coefficients of mesh stiffness, sine and cosine about the middle of the step.
-    forcing = np.zeros((3, ORDER))
-    mean, variation = size
-    forcing[0, 0] = mean
-    if place.varies:
-        for harmonic in range(1, waves.shape[1] + 1):
-            wave = variation * (waves[0, harmonic - 1] - 1j * waves[1, harmonic - 1])
-            wave *= np.exp(1j * harmonic * middle)
-            for term in range(ORDER):
-                forcing[0, term] += wave.real
-                wave *= 1j * harmonic * half / (term + 1)
-    turn = np.exp(1j * middle)
-    for term in range(ORDER):
-        forcing[1, term] = turn.imag
-        forcing[2, term] = turn.real
-        turn *= 1j * half / (term + 1)
-    begin = 2 * number * half
-    row[0] = np.sin(begin)
-    row[1] = np.cos(begin)
-    row[2] = np.sin(begin + 2.0 * half)
-    row[3] = np.cos(begin + 2.0 * half)
-    tail = 0.0
-    for pair in range(place.pairs):
-        engaged = np.array([[1.0 - pair % 2], [1.0 - pair // 2]])
-        at = HEADER + pair * place.size
-        part = row[at : at + place.size]
-        left = fill_pair(part, row, right_side, forcing, engaged, kept, dropped, place)
-        tail = larger(tail, left)
-    return tail
-
-
-@block
-def fill_pair(part, row, right_side, forcing, engaged, kept, dropped, place):
+@part
+def fill_pair(piece, row, right_side, forcing, engaged, kept, dropped, place):
     """Fill the maps of one step on one pair of branches; return what is left of the series."""
     states = place.states
     columns = place.columns
     stiffness = forcing[0]
-    mobility = np.ascontiguousarray(right_side.mobility.T)
+    mobility = right_side.mobility
     rows = right_side.gaps
-    engaged_rows = engaged * rows
+    engaged_rows = np.zeros((2, states))
+    for way in range(2):
+        for line in range(states):
+            engaged_rows[way, line] = engaged[way] * rows[way, line]
     error = states + 1 + place.ways
 
     # The motion by column, and what acts on it: gaps, forces times K, drive and error.
@@ -403,7 +412,7 @@ def fill_pair(part, row, right_side, forcing, engaged, kept, dropped, place):
                 value = 0.0
                 for j in range(k + 1):
                     value += stiffness[k - j] * gap[j, way, column]
-                force[way, column] = engaged[way, 0] * value
+                force[way, column] = engaged[way] * value
             force[way, states + 1 + way] -= stiffness[k]
         add_product(scale, right_side.constant, psi[k], psi[k + 1])
         add_product(scale, right_side.forced, inputs, psi[k + 1])
@@ -446,28 +455,28 @@ def fill_pair(part, row, right_side, forcing, engaged, kept, dropped, place):
     end = over_beginning(last, first, back)
     for line in range(states):
         for column in range(columns):
-            part[place.end + column * place.width + line] = end[line, column]
+            piece[place.end + column * place.width + line] = end[line, column]
     along = over_beginning(gap.reshape((2 * ORDER, columns)), first, back)
     cut, left = economised(along.reshape((ORDER, 2 * columns)), kept, dropped)
     tail = larger(tail, left)
     traced = np.zeros((ORDER, states, 2))
-    start = np.ascontiguousarray(first[:, :states])
     for k in range(ORDER):
-        add_product(0.5, start, switch[k], traced[k])
+        # Only columns of the state: there are no more rows to multiply them with.
+        add_product(0.5, first, switch[k], traced[k])
     thrown, left = economised(traced.reshape((ORDER, 2 * states)), kept, dropped)
     tail = larger(tail, left)
     for way in range(place.ways):
         at = place.gap_y if way == 0 else place.gap_z
         bound = BOUND_Y if way == 0 else BOUND_Z
         for column in range(columns):
-            terms = part[at + column * TERMS : at + (column + 1) * TERMS]
+            terms = piece[at + column * TERMS : at + (column + 1) * TERMS]
             for term in range(TERMS):
                 terms[term] = cut[term, way * columns + column]
             row[bound + column] = max(row[bound + column], beyond_cubic(terms))
         at = place.switch_y if way == 0 else place.switch_z
         for term in range(TERMS):
             for line in range(states):
-                part[at + term * place.width + line] = thrown[term, 2 * line + way]
+                piece[at + term * place.width + line] = thrown[term, 2 * line + way]
     return tail
 
 
@@ -477,7 +486,7 @@ def larger(a, b):
     return a if a > b or a != a else b
 
 
-@block
+@part
 def add_product(scale, a, b, target):
     """Add the product of two small matrices, many of whose elements are 0, times a number."""
     for line in range(a.shape[0]):
@@ -488,7 +497,7 @@ def add_product(scale, a, b, target):
                     target[line, column] += factor * b[source, column]
 
 
-@block
+@part
 def over_beginning(rows, first, back):
     """Turn rows over the middle state and forcing into ones over the state at the beginning."""
     states = back.shape[0]
@@ -505,7 +514,7 @@ def over_beginning(rows, first, back):
     return target
 
 
-@block
+@part
 def economised(series, kept, dropped):
     """Cut Taylor series to fewer terms; return them, and the largest share that is lost."""
     target = np.zeros((TERMS, series.shape[1]))
@@ -524,7 +533,7 @@ def economised(series, kept, dropped):
     return target, most / largest
 
 
-@block
+@part
 def beyond_cubic(terms):
     """Return by how much a polynomial may lower the middle Bezier points of its Hermite cubic.
 

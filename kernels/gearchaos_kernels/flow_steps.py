@@ -178,8 +178,6 @@ def cross(memory, slot, table, row, work, present):
     lane = load(memory, COEFFICIENTS, slot, Lane)
     b = lane.half_backlash
     branches = read_branches(memory, slot, present)
-    # Vectors along a state are wider than some of them.
-    work[:] = 0.0
     for line in range(place.states):
         work[INPUTS + line] = memory[(BEFORE + STATE + line) * STRIDE + slot]
         if present.tangent is not None:
@@ -270,34 +268,36 @@ def leaving(work, gap, done, branch, half_backlash):
     """Return the moment after ``done`` at which a gap leaves its branch, or `NEVER`."""
     if half_backlash == 0.0:
         return NEVER
+    bend = 0.0
+    for term in range(TERMS - 1, 3, -1):
+        bend += term * (term - 1.0) * (term - 2.0) * (term - 3.0) * abs(work[gap + term])
+    begin = value_and_slope(work, gap, done)
+    end = value_and_slope(work, gap, 1.0)
     if branch.engaged != 0.0:
         side = math.copysign(1.0, branch.offset)
-        return first_below(work, gap, done, side, -half_backlash)
+        return first_below(work, gap, done, begin, end, bend, side, -half_backlash)
     return min(
-        first_below(work, gap, done, -1.0, half_backlash),
-        first_below(work, gap, done, 1.0, half_backlash),
+        first_below(work, gap, done, begin, end, bend, -1.0, half_backlash),
+        first_below(work, gap, done, begin, end, bend, 1.0, half_backlash),
     )
 
 
 @scalar
-def first_below(work, gap, done, side, distance):
+def first_below(work, gap, done, begin, end, bend, side, distance):
     """Return where a gap, seen from one side and raised by a distance, first falls below zero.
 
-    From ``done`` on, piece by piece: one whose Bezier points with their margins are not below zero
-    has no such place, in one that only falls it is found by Newton's method, others are halved.
+    ``begin``, ``end``: value and slope at ``done`` and at the end of the step; ``bend``: more than
+    its fourth derivative. Piece by piece: one whose Bezier points with their margins are not below
+    zero has no such place, in one that only falls it is found by Newton's method, others are
+    halved.
     """
-    bend = 0.0
-    for term in range(TERMS - 1, 3, -1):
-        bend += term * (term - 1.0) * (term - 2.0) * (term - 3.0) * abs(work[gap + term])
     left = done
-    value, slope = value_and_slope(work, gap, left)
     # A step that begins where the last one ended at the boundary begins on the right side of it.
-    value_left = max(side * value + distance, 0.0)
-    slope_left = side * slope
+    value_left = max(side * begin[0] + distance, 0.0)
+    slope_left = side * begin[1]
     right = 1.0
-    value, slope = value_and_slope(work, gap, right)
-    value_right = side * value + distance
-    slope_right = side * slope
+    value_right = side * end[0] + distance
+    slope_right = side * end[1]
     for _ in range(_LOOKS):
         width = right - left
         # The polynomial and the cubic differ by bend (width^4 / 24) t^2 (1 - t)^2 at most.

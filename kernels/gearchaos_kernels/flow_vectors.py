@@ -122,7 +122,7 @@ def _pieces(width: int) -> list[tuple[int, int]]:
 
 @intrinsic
 def keep_before(_typing: Any, memory: Any, slot: Any, table: Any, row: Any, present: Any) -> Any:
-    """Copy eight lanes as they are before a step, and bound how far gaps stray from their cubics."""
+    """Copy eight lanes as they are before a step, and bound how their gaps bend in it."""
     scene = _Scene(present)
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
@@ -194,19 +194,13 @@ def move(
                     w.load(w.at(lanes, zero, (BEFORE + TANGENT + line) * STRIDE), VECTOR)
                     for line in range(place.states)
                 ]
-            axial = place.states - 4 if scene.present.axial is not None else place.states
+            # The axial pair and the offset of its flank act on nothing else.
+            axial, apart = place.states, set[int]()
+            if scene.present.axial is not None:
+                axial = place.states - 4
+                apart = {*range(axial, place.states), place.states + 2}
             for line in range(place.states):
-                # The axial pair acts on nothing else.
-                there = [
-                    column
-                    for column in range(place.columns)
-                    if line >= axial
-                    or not (
-                        axial <= column < place.states
-                        or column == place.states + 2
-                        and scene.present.axial is not None
-                    )
-                ]
+                there = [c for c in range(place.columns) if line >= axial or c not in apart]
                 factors = {
                     column: w.splat(
                         builder.load(w.at(numbers, zero, place.end + column * place.width + line)),
@@ -292,7 +286,7 @@ def add_switch(
     """Carry a lane to another branch: move its state, and tangent vector, at the step's beginning.
 
     To the state is added the factor times the integral from -1 to the moment of the `SWITCH` of the
-    new branch times the polynomial at ``gap`` in the work of the lane, by Gauss's rule of ten nodes.
+    new branch times the polynomial at ``gap`` in the work of the lane, by Gauss's rule.
     """
     scene = _Scene(present)
     width = scene.layout.width
