@@ -88,8 +88,8 @@ def integrate_block(number_of_block, batch, plan, outcome, present):
     memory = aligned_memory()
     table = batch.table
     maps = batch.maps
-    # A few lanes, such as one with maps of its own, need no more than one vector.
-    slots = VECTOR if lanes <= VECTOR else LANES
+    # A few lanes need no more than one vector, and one lane with maps of its own not even that.
+    slots = 1 if lanes == 1 else VECTOR if lanes <= VECTOR else LANES
     work = np.zeros(WORK)
     every = steps // plan.steps_per_period
     block = Block(memory, first, lanes)
@@ -110,7 +110,7 @@ def integrate_block(number_of_block, batch, plan, outcome, present):
                 )
                 suspects = step_block(memory, phases, present)
             else:
-                suspects = move_block(memory, maps, row, slots, present)
+                suspects = move_block(memory, maps, row, slots, work, present)
             if present.resolved is not None:
                 if suspects > 0:
                     recorded = period >= plan.transient_periods

@@ -75,9 +75,6 @@ MOST_STEPS = 4096
 MOST_BYTES = 2**27
 """Maps that are kept in memory."""
 
-SAMPLES = 48
-"""Places at which a polynomial is compared with its cubic."""
-
 _UNIT = {
     "load": 0.0,
     "half_backlash": 0.0,
@@ -174,6 +171,26 @@ def _economy() -> tuple[Floats, Floats]:
 
 
 _KEPT, _DROPPED = _economy()
+
+
+def _bends() -> Floats:
+    """By how much each power of s may lower the middle Bezier points of its Hermite cubic.
+
+    With t from 0 to 1 along the step, both differ by no more than b t^2 (1 - t)^2, and that is no
+    more than b/4 (t (1 - t)^2 + t^2 (1 - t)): what both middle points add, moved by b/12.
+    """
+    t = np.linspace(0.0, 1.0, 402)[1:-1]
+    power = np.arange(TERMS)[:, np.newaxis]
+    s, sign = 2.0 * t - 1.0, (-1.0) ** power
+    first = (1.0 - t) ** 2 * ((1.0 + 2.0 * t) * sign - 2.0 * t * power * sign)
+    last = t**2 * ((3.0 - 2.0 * t) - 2.0 * (1.0 - t) * power)
+    apart = np.abs(s**power - first - last) / (t * (1.0 - t)) ** 2
+    # Powers up to the third are cubics themselves; between two samples it is hardly larger.
+    bends: Floats = np.where(np.arange(TERMS) > 3, 1.01 * apart.max(axis=1) / 12.0, 0.0)
+    return bends
+
+
+_BENDS = _bends()
 
 _ENGAGED = np.array([[1.0 - pair % 2, 1.0 - pair // 2] for pair in range(4)])
 """Whether the flanks of both directions are engaged, on each pair of branches."""
@@ -272,7 +289,7 @@ def _make(system: System, steps: int, present: Present) -> Floats:
         for column, values in enumerate((np.sin(edges), np.cos(edges))):
             table[:, column], table[:, column + 2] = values[:-1], values[1:]
         tails = np.zeros(count)
-        _fill_maps(right_side, forcing, _ENGAGED, table, tails, _KEPT, _DROPPED, place)
+        _fill_maps(right_side, forcing, _ENGAGED, table, tails, _KEPT, _DROPPED, _BENDS, place)
         if tails.max() < TAIL:
             return table
         if 2 * count > MOST_STEPS or not np.isfinite(coefficients).all():
@@ -360,7 +377,7 @@ def _forcing(system: System, lane: Lane, steps: int, varies: bool) -> Floats:
 
 
 @evaluator
-def _fill_maps(right_side, forcing, engaged, table, tails, kept, dropped, place):
+def _fill_maps(right_side, forcing, engaged, table, tails, kept, dropped, bends, place):
     """Fill the maps of every step, shape (steps, size of a step)."""
     for number in range(table.shape[0]):
         row = table[number]
@@ -369,14 +386,14 @@ def _fill_maps(right_side, forcing, engaged, table, tails, kept, dropped, place)
             at = HEADER + pair * place.size
             piece = row[at : at + place.size]
             left = fill_pair(
-                piece, row, right_side, forcing[number], engaged[pair], kept, dropped, place
+                piece, row, right_side, forcing[number], engaged[pair], kept, dropped, bends, place
             )
             tail = larger(tail, left)
         tails[number] = tail
 
 
 @part
-def fill_pair(piece, row, right_side, forcing, engaged, kept, dropped, place):
+def fill_pair(piece, row, right_side, forcing, engaged, kept, dropped, bends, place):
     """Fill the maps of one step on one pair of branches; return what is left of the series."""
     states = place.states
     columns = place.columns
@@ -387,12 +404,13 @@ def fill_pair(piece, row, right_side, forcing, engaged, kept, dropped, place):
     for way in range(2):
         for line in range(states):
             engaged_rows[way, line] = engaged[way] * rows[way, line]
-    error = states + 1 + place.ways
+    ways = place.ways
+    error = states + 1 + ways
 
     # The motion by column, and what acts on it: gaps, forces times K, drive and error.
     psi = np.zeros((ORDER + 1, states, columns))
-    gap = np.zeros((ORDER, 2, columns))
-    force = np.zeros((2, columns))
+    gap = np.zeros((ORDER, ways, columns))
+    force = np.zeros((ways, columns))
     inputs = np.zeros((3, columns))
     for column in range(states):
         psi[0, column, column] = 1.0
@@ -407,12 +425,13 @@ def fill_pair(piece, row, right_side, forcing, engaged, kept, dropped, place):
             inputs[2, error + 1] = -forcing[1, k]
         add_product(1.0, rows, psi[k], gap[k])
         add_product(1.0, right_side.gaps_forced, inputs, gap[k])
-        for way in range(place.ways):
+        for way in range(ways):
             for column in range(columns):
-                value = 0.0
-                for j in range(k + 1):
-                    value += stiffness[k - j] * gap[j, way, column]
-                force[way, column] = engaged[way] * value
+                force[way, column] = 0.0
+            for j in range(k + 1):
+                factor = engaged[way] * stiffness[k - j]
+                for column in range(columns):
+                    force[way, column] += factor * gap[j, way, column]
             force[way, states + 1 + way] -= stiffness[k]
         add_product(scale, right_side.constant, psi[k], psi[k + 1])
         add_product(scale, right_side.forced, inputs, psi[k + 1])
@@ -420,8 +439,8 @@ def fill_pair(piece, row, right_side, forcing, engaged, kept, dropped, place):
 
     # The inverse flow, and with K what it makes of the mobilities.
     inverse = np.zeros((ORDER + 1, states, states))
-    moved = np.zeros((ORDER, states, 2))
-    switch = np.zeros((ORDER, states, 2))
+    moved = np.zeros((ORDER, states, ways))
+    switch = np.zeros((ORDER, states, ways))
     for line in range(states):
         inverse[0, line, line] = 1.0
     for k in range(ORDER):
@@ -429,7 +448,7 @@ def fill_pair(piece, row, right_side, forcing, engaged, kept, dropped, place):
         add_product(1.0, inverse[k], mobility, moved[k])
         for j in range(k + 1):
             for line in range(states):
-                for way in range(place.ways):
+                for way in range(ways):
                     switch[k, line, way] += stiffness[k - j] * moved[j, line, way]
         add_product(scale, inverse[k], right_side.constant, inverse[k + 1])
         add_product(scale, switch[k], engaged_rows, inverse[k + 1])
@@ -456,27 +475,28 @@ def fill_pair(piece, row, right_side, forcing, engaged, kept, dropped, place):
     for line in range(states):
         for column in range(columns):
             piece[place.end + column * place.width + line] = end[line, column]
-    along = over_beginning(gap.reshape((2 * ORDER, columns)), first, back)
-    cut, left = economised(along.reshape((ORDER, 2 * columns)), kept, dropped)
+    along = over_beginning(gap.reshape((ways * ORDER, columns)), first, back)
+    cut, left = economised(along.reshape((ORDER, ways * columns)), kept, dropped)
     tail = larger(tail, left)
-    traced = np.zeros((ORDER, states, 2))
+    traced = np.zeros((ORDER, states, ways))
     for k in range(ORDER):
-        # Only columns of the state: there are no more rows to multiply them with.
         add_product(0.5, first, switch[k], traced[k])
-    thrown, left = economised(traced.reshape((ORDER, 2 * states)), kept, dropped)
+    thrown, left = economised(traced.reshape((ORDER, ways * states)), kept, dropped)
     tail = larger(tail, left)
-    for way in range(place.ways):
+    for way in range(ways):
         at = place.gap_y if way == 0 else place.gap_z
         bound = BOUND_Y if way == 0 else BOUND_Z
         for column in range(columns):
             terms = piece[at + column * TERMS : at + (column + 1) * TERMS]
+            bend = 0.0
             for term in range(TERMS):
                 terms[term] = cut[term, way * columns + column]
-            row[bound + column] = max(row[bound + column], beyond_cubic(terms))
+                bend += bends[term] * abs(terms[term])
+            row[bound + column] = max(row[bound + column], bend)
         at = place.switch_y if way == 0 else place.switch_z
         for term in range(TERMS):
             for line in range(states):
-                piece[at + term * place.width + line] = thrown[term, 2 * line + way]
+                piece[at + term * place.width + line] = thrown[term, ways * line + way]
     return tail
 
 
@@ -488,12 +508,15 @@ def larger(a, b):
 
 @part
 def add_product(scale, a, b, target):
-    """Add the product of two small matrices, many of whose elements are 0, times a number."""
-    for line in range(a.shape[0]):
-        for source in range(b.shape[0]):
+    """Add the product of two small matrices, many of whose elements are 0, times a number.
+
+    What one of them has more of than the target or the other one does not count: no axial pair.
+    """
+    for line in range(target.shape[0]):
+        for source in range(min(a.shape[1], b.shape[0])):
             factor = scale * a[line, source]
             if factor != 0.0:
-                for column in range(b.shape[1]):
+                for column in range(target.shape[1]):
                     target[line, column] += factor * b[source, column]
 
 
@@ -531,33 +554,3 @@ def economised(series, kept, dropped):
         for term in range(TERMS):
             largest = larger(largest, abs(target[term, column]))
     return target, most / largest
-
-
-@part
-def beyond_cubic(terms):
-    """Return by how much a polynomial may lower the middle Bezier points of its Hermite cubic.
-
-    With t from 0 to 1 along the step, both differ by no more than b t^2 (1 - t)^2, and that is no
-    more than b/4 (t (1 - t)^2 + t^2 (1 - t)): what both middle points add, moved by b/12.
-    """
-    values = np.zeros(2)
-    slopes = np.zeros(2)
-    for end in range(2):
-        s = 2.0 * end - 1.0
-        power = 1.0
-        for term in range(TERMS):
-            values[end] += terms[term] * power
-            slopes[end] += term * terms[term] * power * s
-            power *= s
-    most = 0.0
-    for number in range(1, SAMPLES):
-        t = number / SAMPLES
-        left = 1.0 - t
-        value = 0.0
-        for term in range(TERMS - 1, -1, -1):
-            value = value * (2.0 * t - 1.0) + terms[term]
-        cubic = left * left * ((1.0 + 2.0 * t) * values[0] + 2.0 * t * slopes[0])
-        cubic += t * t * ((1.0 + 2.0 * left) * values[1] - 2.0 * left * slopes[1])
-        most = max(most, abs(value - cubic) / (t * left) ** 2)
-    # Between two samples it is hardly larger than at them.
-    return 1.05 * most / 12.0

@@ -120,9 +120,11 @@ def pair_of(branches, present):
 
 
 @scalar
-def move_block(memory, table, row, slots, present):
+def move_block(memory, table, row, slots, work, present):
     """Take one step in so many slots; return how many may have left a contact branch."""
     place = layout(present)
+    if slots == 1:
+        return move_lane(memory, table, row, work, present)
     for slot in range(0, slots, VECTOR):
         keep_before(memory, slot, table, row, present)
     for pair in range(place.pairs):
@@ -138,6 +140,56 @@ def move_block(memory, table, row, slots, present):
     if slots == VECTOR:
         return count_suspects(memory, VECTOR, begin, end, present)
     return count_suspects(memory, LANES, begin, end, present)
+
+
+@scalar
+def move_lane(memory, table, row, work, present):
+    """Take one step of the only lane, along its state; bit for bit the one that vectors take."""
+    place = layout(present)
+    keep_before(memory, 0, table, row, present)
+    gather(memory, 0, work, present)
+    at = row + HEADER
+    if present.resolved is not None:
+        at += pair_of(read_branches(memory, 0, present), present) * place.size
+    scatter(memory, 0, table, at, work, present)
+    if present.resolved is None:
+        return 0
+    begin, end = phases_of(table, row)
+    return count_suspects(memory, 1, begin, end, present)
+
+
+@scalar
+def gather(memory, slot, work, present):
+    """Read what is to be multiplied with a map: state before the step, forces, tangent vector."""
+    place = layout(present)
+    for line in range(place.states):
+        work[INPUTS + line] = memory[(BEFORE + STATE + line) * STRIDE + slot]
+        if present.tangent is not None:
+            work[TANGENT_INPUTS + line] = memory[(BEFORE + TANGENT + line) * STRIDE + slot]
+    column = place.states
+    work[INPUTS + column] = memory[FORCES * STRIDE + slot]
+    work[INPUTS + column + 1] = memory[(FORCES + 1) * STRIDE + slot]
+    column += 2
+    if present.axial is not None:
+        work[INPUTS + column] = memory[(FORCES + 2) * STRIDE + slot]
+        column += 1
+    if present.pitch_error is not None:
+        work[INPUTS + column] = memory[(FORCES + 3) * STRIDE + slot]
+    if present.phase is not None:
+        work[INPUTS + column + 1] = memory[(FORCES + 4) * STRIDE + slot]
+
+
+@scalar
+def scatter(memory, slot, table, at, work, present):
+    """Write where a map leads what was read, state and tangent vector."""
+    place = layout(present)
+    end_of(work, RESULT, INPUTS, table, at + place.end, present)
+    for line in range(place.states):
+        memory[(STATE + line) * STRIDE + slot] = work[RESULT + line]
+    if present.tangent is not None:
+        tangent_end_of(work, RESULT, TANGENT_INPUTS, table, at + place.end, present)
+        for line in range(place.states):
+            memory[(TANGENT + line) * STRIDE + slot] = work[RESULT + line]
 
 
 @scalar
@@ -178,20 +230,7 @@ def cross(memory, slot, table, row, work, present):
     lane = load(memory, COEFFICIENTS, slot, Lane)
     b = lane.half_backlash
     branches = read_branches(memory, slot, present)
-    for line in range(place.states):
-        work[INPUTS + line] = memory[(BEFORE + STATE + line) * STRIDE + slot]
-        if present.tangent is not None:
-            work[TANGENT_INPUTS + line] = memory[(BEFORE + TANGENT + line) * STRIDE + slot]
-    column = place.states
-    work[INPUTS + column] = memory[FORCES * STRIDE + slot]
-    column += 2
-    if present.axial is not None:
-        column += 1
-    if present.pitch_error is not None:
-        work[INPUTS + column] = memory[(FORCES + 3) * STRIDE + slot]
-    if present.phase is not None:
-        work[INPUTS + column + 1] = memory[(FORCES + 4) * STRIDE + slot]
-
+    gather(memory, slot, work, present)
     error_y, error_z = mean_errors(lane, present)
     done = -1.0
     crossings = 0
@@ -246,13 +285,7 @@ def cross(memory, slot, table, row, work, present):
 
     overflow = 1 if moment <= 1.0 else 0
     if crossings > 0:
-        end_of(work, RESULT, INPUTS, table, at + place.end, present)
-        for line in range(place.states):
-            memory[(STATE + line) * STRIDE + slot] = work[RESULT + line]
-        if present.tangent is not None:
-            tangent_end_of(work, RESULT, TANGENT_INPUTS, table, at + place.end, present)
-            for line in range(place.states):
-                memory[(TANGENT + line) * STRIDE + slot] = work[RESULT + line]
+        scatter(memory, slot, table, at, work, present)
         if overflow > 0:
             _, end = phases_of(table, row)
             state = read_state(memory, STATE, slot, present)

@@ -107,10 +107,16 @@ class _Writer:
             return b if a is None else a
         return self.builder.fadd(a, b, flags=_FLAGS)
 
-    def sum(self, factors: Sequence[Any], terms: Sequence[Any]) -> Any:
-        """Return a sum of products, as two sums that do not wait for each other."""
+    def sum(
+        self, factors: Sequence[Any], terms: Sequence[Any], columns: Sequence[int] | None = None
+    ) -> Any:
+        """Return a sum of products, as two sums that do not wait for each other.
+
+        Those of even and of odd columns: leaving out columns of zeros changes no bit.
+        """
         parts: list[Any] = [None, None]
-        for number, (factor, term) in enumerate(zip(factors, terms, strict=True)):
+        numbers = range(len(factors)) if columns is None else columns
+        for number, factor, term in zip(numbers, factors, terms, strict=True):
             parts[number % 2] = self.multiply_add(factor, term, parts[number % 2])
         return self.add(*parts)
 
@@ -212,7 +218,7 @@ def move(
                     used = [column for column in there if column < len(given)]
                     if not used:
                         continue
-                    value = w.sum([factors[c] for c in used], [given[c] for c in used])
+                    value = w.sum([factors[c] for c in used], [given[c] for c in used], used)
                     target = w.at(lanes, zero, (row + line) * STRIDE)
                     if mask is not None:
                         value = builder.select(mask, value, w.load(target, VECTOR))
