@@ -1,8 +1,9 @@
 """Measure error and time of step sizes on some lanes of a sweep.
 
-The truth is what the engine finds with very fine steps. Errors are those that 95 % of the periodic
-lanes do not exceed. The table goes to stdout, everything else
-to stderr; a figure (PNG and PDF) and the table as JSON are written under the name in --output.
+RK4 with plain and with resolved steps, and flow maps, which need few steps. The truth is what fine
+flow maps find. Errors are those that 95 % of the periodic lanes do not exceed. The table goes to
+stdout, everything else to stderr; a figure (PNG and PDF) and the table as JSON are written under
+the name in --output.
 Exit codes: 0 done, 2 usage or configuration, 4 cannot read or write.
 """
 
@@ -13,7 +14,6 @@ import sys
 import time
 from argparse import ArgumentParser, Namespace
 from collections.abc import Sequence
-from itertools import product
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -25,8 +25,11 @@ from gearchaos.progress import notice, say
 if TYPE_CHECKING:
     from gearchaos.engine.simulation import Simulation
 
-MODES = ("plain", "resolved")
-TRUTH_STEPS = 3200
+MODES = {"plain": (False, "rk4"), "resolved": (True, "rk4"), "flow map": (True, "flow_map")}
+"""Each with its setting of `Plan`: resolved, method."""
+FLOW_MAP_STEPS = (12, 24, 48, 96)
+MOST_STEPS = 1600
+TRUTH_STEPS = 384
 ROUNDS = 3
 WANTED = (1e-4, 1e-6, 1e-8)
 
@@ -78,9 +81,12 @@ def _accuracy(options: Namespace) -> int:
         )
     for count in steps:
         # Each is refused as a sweep would refuse it.
-        stable = config.replace("integration.unstable", "refuse")
+        stable = config.replace("integration.method", "rk4")
+        stable = stable.replace("integration.unstable", "refuse")
         Simulation(stable.replace("integration.steps_per_period", count))
-    settings = measure(Simulation(config), steps, options.lanes)
+    settings = measure(
+        Simulation(config.replace("integration.method", "rk4")), steps, options.lanes
+    )
     print("\n".join(table(settings)))
     if not any(setting.error > 0.0 for setting in settings):
         raise ConfigurationError(
@@ -98,9 +104,9 @@ def _numbers_of_steps(text: str) -> list[int]:
         steps = sorted({int(number) for number in text.split(",")})
     except ValueError:
         steps = [0]
-    if steps[0] < 1 or steps[-1] > TRUTH_STEPS // 2:
+    if steps[0] < 1 or steps[-1] > MOST_STEPS:
         raise ConfigurationError(
-            f"--steps {text}: give numbers from 1 to {TRUTH_STEPS // 2}, separated by commas"
+            f"--steps {text}: give numbers from 1 to {MOST_STEPS}, separated by commas"
         )
     return steps
 
@@ -122,7 +128,7 @@ def _write(settings: Sequence[Setting], title: str, targets: list[str], overwrit
         save_figure(page, target, title=title, overwrite=overwrite)
     facts = {
         "title": title,
-        "truth": f"{TRUTH_STEPS} resolved steps per mesh period",
+        "truth": f"{TRUTH_STEPS} flow maps per mesh period",
         "settings": [setting._asdict() for setting in settings],
         "machine": provenance(current_threads(), sum(setting.seconds for setting in settings)),
     }
@@ -133,7 +139,7 @@ def _write(settings: Sequence[Setting], title: str, targets: list[str], overwrit
 def measure(simulation: Simulation, steps: Sequence[int], lanes: int) -> list[Setting]:
     """Measure error and time of every number of steps per mesh period, plain and resolved.
 
-    So many lanes are tried, spread evenly over the sweep.
+    Beside them those of `FLOW_MAP_STEPS`. So many lanes are tried, spread evenly over the sweep.
     """
     from statistics import fmean, median
 
@@ -143,17 +149,18 @@ def measure(simulation: Simulation, steps: Sequence[int], lanes: int) -> list[Se
 
     with notice(COMPILING):
         _, solution = pilot(simulation.lanes, simulation.plan, lanes, TRUTH_STEPS)
-        for mode in MODES:
-            solution(steps[0], mode == "resolved")
-    with notice(f"computing the truth with {TRUTH_STEPS} steps per period"):
-        truth = solution(TRUTH_STEPS, True)
+        for setting in MODES.values():
+            solution(steps[0], *setting)
+    with notice(f"computing the truth with {TRUTH_STEPS} flow maps per period"):
+        truth = solution(TRUTH_STEPS, *MODES["flow map"])
     settings = []
-    for mode, count in product(MODES, steps):
+    tried = [(mode, count) for mode in ("plain", "resolved") for count in steps]
+    for mode, count in tried + [("flow map", count) for count in FLOW_MAP_STEPS]:
         seconds = []
         for _ in range(ROUNDS):
             check()
             began = time.perf_counter()
-            found = solution(count, mode == "resolved")
+            found = solution(count, *MODES[mode])
             seconds.append(time.perf_counter() - began)
         apart = difference(found, truth)
         errors = bound(apart.section_error), bound(apart.exponent_error[apart.period > 0])

@@ -27,7 +27,7 @@ from gearchaos.dynamics.following import (
 from gearchaos.dynamics.orbit import Branch, Orbit
 from gearchaos.dynamics.orbits import Orbits, orbit_exponent, polish
 from gearchaos.dynamics.stability import fewest_stable_steps
-from gearchaos.dynamics.systems import system_of
+from gearchaos.dynamics.systems import plan_of, system_of
 from gearchaos.engine.lanes import Lanes
 from gearchaos.engine.response import respond
 from gearchaos.engine.starts import start_states
@@ -195,7 +195,11 @@ class System:
             transient = max(self.config.integration.transient_periods, 1)
             guess = self.integrate(1, transient=transient - 1).states[-1]
         found = polish(
-            self._record, np.atleast_2d(guess), np.array([period], np.int32), self._steps
+            self._record,
+            np.atleast_2d(guess),
+            np.array([period], np.int32),
+            self._steps,
+            self.config.integration.method,
         )
         if not found.converged[0]:
             raise ConfigurationError(
@@ -222,6 +226,7 @@ class System:
             np.array([float(last)]),
             width,
             self._steps,
+            self.config.integration.method,
         )
         losses = loss_of_stability(followed.stable.multipliers, followed.beyond.multipliers)
         loss = StabilityLoss(int(losses.kind[0]))
@@ -269,14 +274,7 @@ class System:
 
     @property
     def _plan(self) -> Plan:
-        integration = self.config.integration
-        return Plan(
-            self._steps,
-            integration.transient_periods,
-            integration.recorded_periods,
-            section_points=0,
-            resolved=integration.crossings == "resolved",
-        )
+        return plan_of(self.config, steps_per_period=self._steps)
 
     def _at(self, values: Mapping[str, Floats]) -> kernels.System:
         return system_of(self.config, {**axis_values(self.config), **values})

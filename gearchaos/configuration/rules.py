@@ -155,6 +155,13 @@ def _exponents_are_not_carried(config: Configuration) -> Iterator[Fault]:
         yield Fault("outputs.exponents", rule, remedy, True)
 
 
+@reads("integration")
+def _plain_steps_are_those_of_rk4(config: Configuration) -> Iterator[Fault]:
+    if config.integration.method == "flow_map" and config.integration.crossings == "plain":
+        rule = 'has no meaning with integration.method = "flow_map", which resolves every crossing'
+        yield Fault("integration.crossings", rule, 'it goes with method = "rk4"', "plain")
+
+
 @reads("outputs", "integration")
 def _errors_are_measured_on_a_section(config: Configuration) -> Iterator[Fault]:
     if config.outputs.section:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection
 from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias, get_args
 
-from pydantic import Field, create_model
+from pydantic import Field, create_model, model_validator
 
 from gearchaos.configuration.keys import Harmonics, Numbers, Table, key
 from gearchaos.gear.group_table import GROUP_TABLE, GroupRow
@@ -13,6 +13,8 @@ from gearchaos.gear.group_table import GROUP_TABLE, GroupRow
 MOST_LANES = 100_000_000
 """Lanes of one run: what a file and a machine can still hold."""
 MOST_STEPS_PER_PERIOD = 1_000_000
+FLOW_MAP_STEPS = 24
+"""Steps per period of flow maps: fewer cost more at a crossing, more cost more between them."""
 _MOST_VALUES = 10_000_000
 _MOST_STARTS = 1_000_000
 
@@ -147,10 +149,19 @@ class Sweep(Table):
 
 
 class Integration(Table):
-    """Runge-Kutta of order 4 on a fixed grid over the mesh period."""
+    """The method, on a fixed grid over the mesh period."""
 
+    method: Literal["rk4", "flow_map"] = key(
+        "classical Runge-Kutta of order 4, or maps of whole steps that are exact between crossings "
+        "and at them",
+        default="rk4",
+    )
     steps_per_period: int = key(
-        "steps per mesh period", default=200, ge=1, le=MOST_STEPS_PER_PERIOD
+        f'steps per mesh period; {FLOW_MAP_STEPS} with method = "flow_map", where nothing else is '
+        "given",
+        default=200,
+        ge=1,
+        le=MOST_STEPS_PER_PERIOD,
     )
     tolerance: float | None = key(
         "largest error of section and exponent; the steps are then doubled, from steps_per_period "
@@ -168,11 +179,12 @@ class Integration(Table):
     )
     crossings: Literal["resolved", "plain"] = key(
         "whether a step that crosses a clearance boundary is split there, which keeps the order "
-        "of the method, or is a plain step",
+        "of the method, or is a plain step; flow maps resolve every crossing",
         default="resolved",
     )
     unstable: Literal["refuse", "raise"] = key(
-        "whether a number of steps below the stability limit of a lane is refused, or raised to it",
+        "whether a number of steps below the stability limit of a lane is refused, or raised to "
+        "it; flow maps have none",
         default="refuse",
     )
     transient_periods: int = key(
@@ -181,6 +193,13 @@ class Integration(Table):
     recorded_periods: int = key(
         "mesh periods observed after the transient", default=500, ge=1, le=1_000_000_000
     )
+
+    @model_validator(mode="before")
+    @classmethod
+    def _steps_of_the_method(cls, given: Any) -> Any:
+        if isinstance(given, dict) and given.get("method") == "flow_map":
+            return {"steps_per_period": FLOW_MAP_STEPS, **given}
+        return given
 
 
 class Outputs(Table):

@@ -121,6 +121,7 @@ def follow(
     last: Floats,
     width: float,
     steps_per_period: int,
+    method: str = "rk4",
 ) -> Followed:
     """Follow the orbit of every lane along a parameter to where it loses stability.
 
@@ -130,14 +131,15 @@ def follow(
 
     ``system_at`` gives the system of all lanes for a value of the parameter in each, (lanes,);
     ``first``, ``last`` (lanes,): the values at both ends of the way, in either order; ``guess``,
-    ``period`` and ``steps_per_period`` as for `polish` at the first values; ``width``: wanted
-    distance of the stable value and the one beyond. Towards a fold a multiplier nears +1 like the
-    root of the distance: with too large a width it is not yet `NEAR_FOLD`.
+    ``period``, ``steps_per_period`` and ``method`` as for `polish` at the first values; ``width``:
+    wanted distance of the stable value and the one beyond. Towards a fold a multiplier nears +1
+    like the root of the distance: with too large a width it is not yet `NEAR_FOLD`.
     """
 
     def orbits(share: Floats, guess: Floats, followed: NDArray[np.bool_]) -> Orbits:
         system = system_at(first + share * (last - first))
-        return polish(system, guess, np.where(followed, period, np.int32(0)), steps_per_period)
+        sought = np.where(followed, period, np.int32(0))
+        return polish(system, guess, sought, steps_per_period, method)
 
     share = np.zeros_like(first)
     step = np.full_like(first, LONGEST_STEP)

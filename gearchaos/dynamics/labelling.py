@@ -99,7 +99,9 @@ def _told_again(system: System, outcome: Outcome, plan: Plan) -> Labels:
 
 def _tell_linear(system: System, plan: Plan, labels: Labels) -> None:
     """Tell growth without bound by the multipliers, in place: what is linear is never chaotic."""
-    once = Plan(plan.steps_per_period, 0, 1, section_points=0, tangent=True)
+    once = plan._replace(
+        transient_periods=0, recorded_periods=1, section_points=0, history_periods=0, tangent=True
+    )
     jacobian = period_jacobian(system, np.zeros((system.lanes, len(system.states))), once)
     with np.errstate(invalid="ignore"):
         grows = np.max(np.abs(np.linalg.eigvals(np.nan_to_num(jacobian))), axis=1) > 1.0
@@ -146,7 +148,7 @@ def _settle(
             continue
         end = outcome.end_state[tried]
         periods = np.full(tried.size, n, dtype=np.int32)
-        orbits = polish(system.of(tried), end, periods, plan.steps_per_period)
+        orbits = polish(system.of(tried), end, periods, plan.steps_per_period, plan.method)
         apart = np.abs(orbits.points - end) / coordinate_scale(outcome.section[tried])
         settled = tried[(np.max(apart, axis=1) <= SETTLING) & orbits.stable]
         searched[settled] = False

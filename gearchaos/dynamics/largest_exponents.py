@@ -54,7 +54,9 @@ def largest_exponents(
     lanes = np.flatnonzero((period > 0) & np.isfinite(values))
     if not plan.resolved or not lanes.size:
         return found
-    orbits = polish(system.of(lanes), state[lanes], period[lanes], plan.steps_per_period)
+    orbits = polish(
+        system.of(lanes), state[lanes], period[lanes], plan.steps_per_period, plan.method
+    )
     lanes, size = lanes[orbits.stable], np.abs(orbits.multipliers[orbits.stable])
     duration = period[lanes] * system.mesh_period[lanes]
     resolved = size > SMALLEST_RESOLVED * size[:, :1]

@@ -46,7 +46,11 @@ class Orbits(NamedTuple):
 
 
 def polish(
-    system: System, guess: Floats, period: NDArray[np.int32], steps_per_period: int
+    system: System,
+    guess: Floats,
+    period: NDArray[np.int32],
+    steps_per_period: int,
+    method: str = "rk4",
 ) -> Orbits:
     """Find the periodic orbit next to the guess of every lane.
 
@@ -56,7 +60,8 @@ def polish(
     of that of the largest coordinate where this is more.
 
     ``guess`` (lanes, states): states of eq. 13 at tau = 0; ``period`` (lanes,) in mesh periods, 0
-    where there is no orbit to look for; ``steps_per_period``: resolved ones. Not converged is a
+    where there is no orbit to look for; ``steps_per_period``: resolved ones, of
+    this ``method``. Not converged is a
     lane in which Newton's method does not close the orbit or leads out of the neighbourhood of the
     guess, in which the orbit found repeats after a divisor of the period, or whose period is 0.
     """
@@ -69,7 +74,7 @@ def polish(
     for n in np.unique(period[period > 0]).tolist():
         chosen = np.flatnonzero(period == n)
         # With a tangent, so that map and Jacobian are compiled once and agree bit for bit.
-        plan = Plan(steps_per_period, 0, n, section_points=n, tangent=True)
+        plan = Plan(steps_per_period, 0, n, section_points=n, tangent=True, method=method)
         for whole, some in zip(found, _polish(system.of(chosen), guess[chosen], plan), strict=True):
             whole[chosen] = some
     return found

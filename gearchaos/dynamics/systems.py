@@ -1,17 +1,32 @@
-"""From a configuration and values of its parameters to the system that the kernels integrate."""
+"""From a configuration and values of its parameters to a system and a plan for the kernels."""
 
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
+from typing import Any
 
 import numpy as np
-from gearchaos_kernels import Effects, Groups, System
+from gearchaos_kernels import Effects, Groups, Plan, System
 from numpy.typing import NDArray
 
 from gearchaos.configuration import Configuration
 from gearchaos.configuration.sweep_values import groups_at
 
 Floats = NDArray[np.float64]
+
+
+def plan_of(config: Configuration, **others: Any) -> Plan:
+    """Return the configured plan of an integration that keeps no section, but for some fields."""
+    integration = config.integration
+    configured = Plan(
+        integration.steps_per_period,
+        integration.transient_periods,
+        integration.recorded_periods,
+        section_points=0,
+        resolved=integration.crossings == "resolved",
+        method=integration.method,
+    )
+    return configured._replace(**others)
 
 
 def system_of(

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
-from gearchaos_kernels import Plan, integrate
+from gearchaos_kernels import integrate
 from numpy.typing import NDArray
 
 from gearchaos.configuration import Configuration, swept_values
@@ -17,7 +17,7 @@ from gearchaos.dynamics.following import (
     loss_of_stability,
 )
 from gearchaos.dynamics.labelling import LOOKS
-from gearchaos.dynamics.systems import system_of
+from gearchaos.dynamics.systems import plan_of, system_of
 from gearchaos.engine.running import run
 from gearchaos.errors import ConfigurationError, FileError
 from gearchaos.records.period import TOLERANCE
@@ -182,16 +182,11 @@ def _settled(config: Configuration, edge: NDArray[Any]) -> Floats:
 
     Where a longer look told it, the end of the record may be far away.
     """
-    state, integration = edge["state"].copy(), config.integration
+    state = edge["state"].copy()
     lanes = np.flatnonzero(edge["far"])
     if lanes.size:
-        further = Plan(
-            integration.steps_per_period,
-            sum(LOOKS) * integration.recorded_periods,
-            0,
-            section_points=0,
-            resolved=integration.crossings == "resolved",
-        )
+        longer = sum(LOOKS) * config.integration.recorded_periods
+        further = plan_of(config, transient_periods=longer, recorded_periods=0)
         values = {config.sweep.parameter: edge["value"][lanes]}
         system = system_of(config, values, config.needed_effects)
         state[lanes] = integrate(system, state[lanes], further).end_state
@@ -209,5 +204,6 @@ def _followed(config: Configuration, edge: NDArray[Any], last: Floats) -> Losses
         np.clip(last, lowest, highest),
         float(np.min(np.abs(last - first))) * FOLLOWED_WIDTH,
         config.integration.steps_per_period,
+        config.integration.method,
     )
     return loss_of_stability(followed.stable.multipliers, followed.beyond.multipliers)

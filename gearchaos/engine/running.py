@@ -23,6 +23,10 @@ from gearchaos.results.result import Result
 from gearchaos.results.variables import Variable
 
 PILOT_SECONDS = 0.2
+METHOD_TEXTS = {
+    "rk4": "classical Runge-Kutta of order 4 with fixed steps",
+    "flow_map": "flow maps: exact steps from crossing to crossing",
+}
 COMPILING = "preparing the kernel of this scene; the first time this takes some seconds"
 
 
@@ -183,8 +187,8 @@ def metadata(simulation: Simulation, seconds: float) -> Mapping[str, Any]:
         "effects": " ".join(config.scene.effects),
         "start": config.start.kind,
         "carry": config.start.carry,
-        "method": "classical Runge-Kutta of order 4 with fixed steps",
         **config.integration.model_dump(exclude_none=True),
+        "method": METHOD_TEXTS[config.integration.method],
         "steps_per_period": simulation.plan.steps_per_period,
         "notes": "\n".join(simulation.notes),
         **provenance(current_threads(), seconds),

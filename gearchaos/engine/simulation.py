@@ -6,7 +6,16 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
-from gearchaos_kernels import LANES, STATUS_TEXTS, Outcome, Plan, Status, System, integrate
+from gearchaos_kernels import (
+    LANES,
+    STATUS_TEXTS,
+    Outcome,
+    Plan,
+    Status,
+    System,
+    integrate,
+    maps_memory,
+)
 from numpy.typing import NDArray
 
 from gearchaos.configuration import Configuration
@@ -14,6 +23,7 @@ from gearchaos.dynamics.exponents import exponents, sum_of_exponents
 from gearchaos.dynamics.labelling import LOOKS, Told, labels_of
 from gearchaos.dynamics.largest_exponents import MEANINGS as RECORD_MEANINGS
 from gearchaos.dynamics.largest_exponents import largest_exponents
+from gearchaos.dynamics.systems import plan_of
 from gearchaos.engine.error_check import MEANINGS, check_arrays, checked_lanes
 from gearchaos.engine.lanes import Lanes
 from gearchaos.engine.steps import (
@@ -66,17 +76,15 @@ class Simulation:
         self.config = config
         self.lanes = Lanes(config)
         integration, outputs = config.integration, config.outputs
-        steps, raised = stable_steps(self.lanes, integration.steps_per_period)
-        self.plan = Plan(
-            steps,
-            integration.transient_periods,
-            integration.recorded_periods,
+        steps, note = stable_steps(self.lanes, integration.steps_per_period)
+        self.plan = plan_of(
+            config,
+            steps_per_period=steps,
             section_points=outputs.section_points if outputs.section else 0,
             tangent=outputs.lyapunov,
-            resolved=integration.crossings == "resolved",
         )
         coarse = coarse_steps(self.lanes, steps) if outputs.lyapunov else ""
-        self.notes = [note for note in (raised, coarse, self._negative_stiffness()) if note]
+        self.notes = [note for note in (note, coarse, self._negative_stiffness()) if note]
         self._choice: list[Variable] = []
 
     def choose_steps(self) -> None:
@@ -87,7 +95,7 @@ class Simulation:
         coarsest = self.plan.steps_per_period
         lanes, solution = pilot(self.lanes, self.plan, PILOT_LANES, 4 * coarsest)
         candidates = choose_steps(
-            lambda steps: solution(steps, self.plan.resolved),
+            lambda steps: solution(steps, self.plan.resolved, self.plan.method),
             coarsest,
             tolerance,
             self.config.source,
@@ -116,7 +124,7 @@ class Simulation:
 
     @property
     def steps(self) -> int:
-        """Runge-Kutta steps of the whole sweep."""
+        """Steps of the whole sweep."""
         periods = self.plan.transient_periods + self.plan.recorded_periods
         return len(self.lanes) * periods * self.plan.steps_per_period
 
@@ -176,7 +184,10 @@ class Simulation:
             records += max(lanes, LOOKS[-1]) if self.config.outputs.motion else 0
         if self.config.outputs.exponents:
             numbers += self.plan.recorded_periods * states
-        return 8 * records * numbers
+        maps = 0
+        if self.plan.method == "flow_map":
+            maps = maps_memory(self.lanes.system_of(np.arange(lanes)), self.plan)
+        return 8 * records * numbers + maps
 
     def block_lanes(self, threads: int) -> int:
         """Return how many lanes make a block: work for every thread, and progress to be seen."""

@@ -76,6 +76,11 @@ def stable_steps(lanes: Lanes, steps: int) -> tuple[int, str]:
     if not limits:
         return steps, ""
     worst = max(limits, key=lambda limit: limit.steps)
+    if lanes.config.integration.method == "flow_map":
+        return steps, (
+            f"integration.steps_per_period = {steps}: RK4 would need {worst.steps} steps to be "
+            "stable; flow maps have no such limit"
+        )
     unstable = np.concatenate([limit.lanes for limit in limits])
     if lanes.config.integration.unstable == "refuse" or worst.steps > MOST_STEPS_PER_PERIOD:
         raise ConfigurationError(_fault(lanes, worst, unstable, steps).text(lanes.config.source))
@@ -91,6 +96,8 @@ def coarse_steps(lanes: Lanes, steps: int) -> str:
     A standard error does not show it: it speaks of the length of the record.
     """
     system = lanes.system_of(lanes.spread(PILOT_LANES))
+    if lanes.config.integration.method != "rk4":
+        return ""
     if steps >= SURELY_FINE * np.max(sufficient_steps(system)):
         return ""
     bias, true = exponent_bias(system, steps)
@@ -159,21 +166,21 @@ def solution_of(
 
 def pilot(
     lanes: Lanes, plan: Plan, count: int, finest: int
-) -> tuple[int, Callable[[int, bool], Solution]]:
+) -> tuple[int, Callable[[int, bool, str], Solution]]:
     """Prepare to integrate some lanes of a sweep on several grids, to compare them.
 
     ``count``: lanes wanted, spread evenly over the sweep; ``finest``: steps per period of the
     transient that all grids go on from, so that a lane comes to the same one of several coexisting
     motions on each of them. Returned are the number of lanes that there are, and a function that
-    settles with ``(steps, resolved)`` and gives the `Solution`.
+    settles with ``(steps, resolved, method)`` and gives the `Solution`.
     """
     numbers = lanes.spread(count)
     system = lanes.system_of(numbers)
-    settling = Plan(finest, plan.transient_periods, 0, section_points=0)
+    settling = Plan(finest, plan.transient_periods, 0, section_points=0, method=plan.method)
     check()
     common = integrate(system, lanes.start_of(numbers), settling).end_state
 
-    def solution(steps: int, resolved: bool) -> Solution:
+    def solution(steps: int, resolved: bool, method: str) -> Solution:
         check()
         grid = plan._replace(
             steps_per_period=steps,
@@ -181,6 +188,7 @@ def pilot(
             recorded_periods=PILOT_PERIODS,
             section_points=min(POINTS_NEEDED, PILOT_PERIODS),
             resolved=resolved,
+            method=method,
         )
         outcome = integrate(system, common, grid)
         return solution_of(system, outcome, grid, lanes.config.outputs.section)

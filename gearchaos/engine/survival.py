@@ -5,10 +5,10 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from gearchaos_kernels import Plan, Status, integrate
+from gearchaos_kernels import Status, integrate
 
 from gearchaos.configuration import Configuration
-from gearchaos.dynamics.systems import system_of
+from gearchaos.dynamics.systems import plan_of, system_of
 from gearchaos.engine.running import choose_threads
 from gearchaos.interrupts import check
 from gearchaos.records.label import CHAOTIC_GROWTH
@@ -55,15 +55,7 @@ def survival(
     values = {config.sweep.parameter: result[result.axis][lanes]}
     choose_threads(threads)
     system = system_of(config, values, config.needed_effects)
-    integration = config.integration
-    plan = Plan(
-        integration.steps_per_period,
-        0,
-        integration.recorded_periods,
-        section_points=0,
-        tangent=True,
-        resolved=integration.crossings == "resolved",
-    )
+    plan = plan_of(config, transient_periods=0, tangent=True)
     state, tangent = result["end_state"][lanes], None
     for _ in range(records):
         check()

@@ -11,11 +11,12 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
 
 from gearchaos.figures.page import Page, page
-from gearchaos.figures.style import BLUE, ORANGE, SINGLE_COLUMN_MM
+from gearchaos.figures.style import BLACK, BLUE, ORANGE, SINGLE_COLUMN_MM
 
 LOOKS: dict[str, dict[str, Any]] = {
     "plain": {"color": ORANGE, "marker": "o"},
     "resolved": {"color": BLUE, "marker": "s"},
+    "flow map": {"color": BLACK, "marker": "^"},
 }
 HEIGHT_MM = 65.0
 
@@ -36,7 +37,7 @@ def work_precision(axes: Axes, modes: Mapping[str, Points]) -> list[Line2D]:
         known = [point for point in points if np.isfinite(point[1]) and point[1] > 0.0]
         seconds, errors = ([point[column] for point in known] for column in (0, 1))
         lines += axes.plot(seconds, errors, label=mode, markersize=3, linewidth=0.8, **LOOKS[mode])
-        # Labels of the two modes keep apart: above to the right, below to the left.
+        # Labels of neighbouring modes keep apart: above to the right, below to the left.
         offset, side = ((3, 3), "left") if mode == "plain" else ((-3, -7), "right")
         for x, y, steps in known:
             axes.annotate(

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from gearchaos.configuration import Configuration
 from gearchaos.configuration.run_tables import states_of
-from gearchaos.dynamics.systems import system_of
+from gearchaos.dynamics.systems import plan_of, system_of
 from gearchaos.engine.starts import start_states
 from gearchaos.records.lyapunov import largest_exponent
 from gearchaos.records.period import return_distances
@@ -81,7 +81,8 @@ def evaluate(
         start = start_states(config, system, np.tile(line, candidates))
         if before is not None:
             start = np.where(np.isfinite(before).all(axis=1, keepdims=True), before, start)
-        plan = _plan(config)
+        recorded = config.integration.recorded_periods
+        plan = plan_of(config, section_points=recorded, tangent=True)
         outcome = integrate(system, start, plan)
         before = outcome.end_state
         looked_at = np.flatnonzero(np.tile(accelerated[line], candidates))
@@ -96,18 +97,6 @@ def evaluate(
 def coordinates_of(config: Configuration) -> tuple[str, ...]:
     """Return the coordinates whose accelerations `Records` hold, in their order."""
     return states_of(config.needed_effects)[::2]
-
-
-def _plan(config: Configuration) -> Plan:
-    integration = config.integration
-    return Plan(
-        integration.steps_per_period,
-        integration.transient_periods,
-        integration.recorded_periods,
-        section_points=integration.recorded_periods,
-        tangent=True,
-        resolved=integration.crossings == "resolved",
-    )
 
 
 def _records(system: System, outcome: Outcome, looked_at: NDArray[np.intp], steps: int) -> Records:

@@ -149,6 +149,7 @@ def _end(
         np.array([value + step]),
         WIDTH,
         config.integration.steps_per_period,
+        config.integration.method,
     )
     loss = loss_of_stability(followed.stable.multipliers, followed.beyond.multipliers)
     end = float(followed.stable_value[0])
@@ -185,7 +186,8 @@ def exponents_beside(
 
 def _exponents(config: Configuration, values: Floats, states: Floats) -> tuple[float, float]:
     period, system = np.ones(2, dtype=np.int32), system_of(config, {PITCH_ERROR: values})
-    orbits = polish(system, states, period, config.integration.steps_per_period)
+    integration = config.integration
+    orbits = polish(system, states, period, integration.steps_per_period, integration.method)
     before, after = orbit_exponent(orbits.multipliers, period, system.mesh_period).tolist()
     return before, after
 

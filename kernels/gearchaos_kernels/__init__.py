@@ -4,6 +4,7 @@ from gearchaos_kernels.batch import integrate
 from gearchaos_kernels.block_memory import LANES
 from gearchaos_kernels.compilation import CACHE_FOLDER, source_hash
 from gearchaos_kernels.evaluation import jacobian, mesh_motion
+from gearchaos_kernels.flow_map import maps_memory
 from gearchaos_kernels.status import STATUS_TEXTS, Status
 from gearchaos_kernels.system import STATES, Effects, Groups, MeshMotion, Outcome, Plan, System
 from gearchaos_kernels.threads import current_threads, most_threads, processor, use_threads
@@ -23,6 +24,7 @@ __all__ = [
     "current_threads",
     "integrate",
     "jacobian",
+    "maps_memory",
     "mesh_motion",
     "most_threads",
     "processor",

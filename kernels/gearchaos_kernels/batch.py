@@ -2,20 +2,27 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from typing import Any
+
 import numpy as np
 from numba import prange
+from numpy.typing import NDArray
 
 from gearchaos_kernels.block import Batch, integrate_block
-from gearchaos_kernels.block_memory import LANES, Present
+from gearchaos_kernels.block_memory import LANES, Present, flags
 from gearchaos_kernels.coefficients import (
     lane_coefficients,
     state_scales,
     steps_between_scalings,
 )
 from gearchaos_kernels.compilation import driver
+from gearchaos_kernels.flow_map import maps_of, sharing
 from gearchaos_kernels.forcing import phase_table
 from gearchaos_kernels.status import Status
-from gearchaos_kernels.system import Floats, Outcome, Plan, System
+from gearchaos_kernels.system import Floats, Outcome, Plan, Schedule, System
+
+Integers = NDArray[np.intp]
 
 
 @driver
@@ -31,8 +38,9 @@ def _integrate_blocks(
     axial,
     resolved,
     tangent,
+    flow_map,
 ):
-    for number in prange((outcome.status.shape[0] + LANES - 1) // LANES):
+    for number in prange(batch.blocks.shape[0]):
         # Packed here: as a record it would not pass into the parallel loop.
         present = Present(
             pitch_error,
@@ -43,14 +51,15 @@ def _integrate_blocks(
             axial,
             resolved,
             tangent,
+            flow_map,
         )
-        integrate_block(number * LANES, batch, plan, outcome, present)
+        integrate_block(number, batch, plan, outcome, present)
 
 
 def integrate(
     system: System, start: Floats, plan: Plan, *, tangent_start: Floats | None = None
 ) -> Outcome:
-    """Integrate a batch of lanes with fixed-step RK4 from tau = 0.
+    """Integrate a batch of lanes from tau = 0, by RK4 or by flow maps.
 
     Parameters
     ----------
@@ -83,29 +92,60 @@ def integrate(
         overflows=np.zeros(lanes, dtype=np.int64),
         history=np.full((lanes, plan.history_periods * steps + 1, states), np.nan),
     )
-    step = system.mesh_period / steps
-    batch = Batch(
-        lane_coefficients(system, step),
-        state_scales(system, step),
-        np.ascontiguousarray(start, dtype=np.float64),
-        np.ascontiguousarray(tangent_start, dtype=np.float64),
-        steps_between_scalings(system, steps),
-        phase_table(system.stiffness_cosine, system.stiffness_sine, steps),
-    )
-    _integrate_blocks(batch, plan, outcome, *flags(system, plan))
+    present = flags(system, plan)
+    schedule = Schedule(*(getattr(plan, name) for name in Schedule._fields))
+    for order, blocks, maps, steps_of in _shares(system, plan, present):
+        step = system.mesh_period / steps_of
+        batch = Batch(
+            lane_coefficients(system, step),
+            state_scales(system, step),
+            np.ascontiguousarray(start, dtype=np.float64),
+            np.ascontiguousarray(tangent_start, dtype=np.float64),
+            steps_between_scalings(system, steps_of),
+            phase_table(system.stiffness_cosine, system.stiffness_sine, steps),
+            order,
+            blocks,
+            maps,
+        )
+        _integrate_blocks(batch, schedule, outcome, *present)
     return outcome._replace(
         growth=outcome.growth if plan.tangent else None,
         history=outcome.history if plan.history_periods else None,
     )
 
 
-def flags(system: System, plan: Plan) -> Present:
-    """Tell in types what the loop of a scene has, so that every scene is compiled for itself."""
-    effects = system.effects
-    values = {
-        **effects._asdict(),
-        "phase": effects.pitch_error and bool(np.any(system.groups.error_phase)),
-        "resolved": effects.backlash and plan.resolved,
-        "tangent": plan.tangent,
-    }
-    return Present(**{name: () if present else None for name, present in values.items()})
+def _shares(system: System, plan: Plan, present: Present) -> Iterator[tuple[Any, Any, Any, Any]]:
+    """Cut lanes into blocks; lanes of a block share their maps, if the method has any.
+
+    As many at a time as have maps that fit into memory: order of the lanes, blocks as `Batch` has
+    them, maps, and the steps per period of every lane.
+    """
+    lanes, steps = system.lanes, plan.steps_per_period
+    if plan.method == "rk4":
+        blocks = _blocks(np.array([lanes]), np.array([steps]), np.array([0]))
+        yield np.arange(lanes), blocks, np.zeros(0), np.full(lanes, steps)
+        return
+    group = sharing(system)
+    every = np.argsort(group, kind="stable")
+    _, first, counts = np.unique(group[every], return_index=True, return_counts=True)
+    done = 0
+    while done < first.size:
+        maps = maps_of(system.of(every[first[done:]]), steps, present)
+        some = slice(done, done + maps.steps.size)
+        lanes_of = counts[some]
+        order = every[first[done] : first[done] + lanes_of.sum()]
+        steps_of = np.full(lanes, steps)
+        steps_of[order] = np.repeat(maps.steps, lanes_of)
+        yield order, _blocks(lanes_of, maps.steps, maps.starts), maps.table, steps_of
+        done += maps.steps.size
+
+
+def _blocks(lanes: Integers, steps: Integers, maps_at: Integers) -> Integers:
+    """Cut each group of so many lanes into blocks: first, lanes, steps, place of the maps."""
+    first = np.cumsum(lanes) - lanes
+    blocks = [
+        (begin + at, min(LANES, count - at), number, place)
+        for begin, count, number, place in zip(first, lanes, steps, maps_at, strict=True)
+        for at in range(0, count, LANES)
+    ]
+    return np.array(blocks, dtype=np.intp).reshape(-1, 4)

@@ -1,9 +1,10 @@
 """One block of lanes through all its mesh periods, on one thread.
 
-The loop over slots in `step_block` has a whole step in plain local numbers as its body: this is
-what the compiler turns into vector instructions. What is done once per mesh period (section, check
-for divergence) stands outside it, and so do scaling the tangent vectors and the splitting of the
-few steps that cross a clearance boundary.
+A method takes one step in every slot, and says how many lanes may have left a contact branch; those
+are looked at one by one. The loop over slots in `step_block` has a whole Runge-Kutta step in plain
+local numbers as its body: this is what the compiler turns into vector instructions. `flow_steps`
+takes the other kind. What is done once per mesh period (section, check for divergence) stands
+outside, and so does scaling the tangent vectors.
 """
 
 from __future__ import annotations
@@ -41,6 +42,9 @@ from gearchaos_kernels.block_memory import (
 from gearchaos_kernels.compilation import align_stack, block, scalar
 from gearchaos_kernels.contact import branches_at, step_may_leave
 from gearchaos_kernels.equations import gaps_at
+from gearchaos_kernels.flow_map import step_size
+from gearchaos_kernels.flow_steps import begin_forces, cross, move_block
+from gearchaos_kernels.flow_vectors import VECTOR, WORK
 from gearchaos_kernels.forcing import During, forcing_at, phase_on_grid
 from gearchaos_kernels.rk4 import step, tangent_step
 from gearchaos_kernels.splitting import split_step
@@ -60,7 +64,9 @@ class Batch(NamedTuple):
     """What the blocks read, lanes first; see `coefficients`, and `forcing` for the table.
 
     ``coefficients`` (lanes, fields of `Lane`), ``scales``, ``start`` and ``tangent_start`` (lanes,
-    states), ``steps_between_scalings`` (lanes,), ``table`` (rows, columns).
+    states), ``steps_between_scalings`` (lanes,), ``table`` (rows, columns). ``blocks`` (blocks, 4):
+    place of the first lane of each in ``order`` (lanes,), number of lanes, steps per period and
+    where its maps begin in ``maps``, which only a method that has maps looks at.
     """
 
     coefficients: NDArray[np.float64]
@@ -69,36 +75,48 @@ class Batch(NamedTuple):
     tangent_start: NDArray[np.float64]
     steps_between_scalings: NDArray[np.intp]
     table: NDArray[np.float64]
+    order: NDArray[np.intp]
+    blocks: NDArray[np.intp]
+    maps: NDArray[np.float64]
 
 
 @block
-def integrate_block(first, batch, plan, outcome, present):
-    """Integrate the lanes from ``first`` on that a block holds, and write what comes of them."""
+def integrate_block(number_of_block, batch, plan, outcome, present):
+    """Integrate the lanes of a block, and write what comes of them."""
     align_stack()
-    lanes = min(LANES, outcome.status.shape[0] - first)
+    first, lanes, steps, maps_at = batch.blocks[number_of_block]
     memory = aligned_memory()
     table = batch.table
+    maps = batch.maps
+    # A few lanes need no more than one vector, and one lane with maps of its own not even that.
+    slots = 1 if lanes == 1 else VECTOR if lanes <= VECTOR else LANES
+    work = np.zeros(WORK)
+    every = steps // plan.steps_per_period
     block = Block(memory, first, lanes)
     interval = begin(block, batch, present)
     periods = plan.transient_periods + plan.recorded_periods
     for period in range(periods):
-        for number in range(plan.steps_per_period):
-            if period >= periods - plan.history_periods:
-                sample = (period - periods + plan.history_periods) * plan.steps_per_period + number
-                keep_state(block, batch, outcome.history, sample)
-            # Not in the loop over slots: nobody tells the compiler that its stores spare the table.
-            phases = During(
-                phase_on_grid(table, 2 * number),
-                phase_on_grid(table, 2 * number + 1),
-                phase_on_grid(table, 2 * number + 2),
-            )
-            suspects = step_block(memory, phases, present)
+        for number in range(steps):
+            if period >= periods - plan.history_periods and number % every == 0:
+                sample = (period - periods + plan.history_periods) * plan.steps_per_period
+                keep_state(block, batch, outcome.history, sample + number // every)
+            row = maps_at + number * step_size(present)
+            if present.flow_map is None:
+                # Not in the loop over slots: nobody tells the compiler that its stores spare it.
+                phases = During(
+                    phase_on_grid(table, 2 * number),
+                    phase_on_grid(table, 2 * number + 1),
+                    phase_on_grid(table, 2 * number + 2),
+                )
+                suspects = step_block(memory, phases, present)
+            else:
+                suspects = move_block(memory, maps, row, slots, work, present)
             if present.resolved is not None:
                 if suspects > 0:
                     recorded = period >= plan.transient_periods
-                    split(memory, table, lanes, number, recorded, present)
+                    split(memory, table, maps, row, work, lanes, number, recorded, present)
             if present.tangent is not None:
-                last = number == plan.steps_per_period - 1
+                last = number == steps - 1
                 if (number + 1) % interval == 0 or last:
                     scale_tangents(block, batch, number + 1, last)
         end_period(block, batch, period, plan, outcome, present)
@@ -110,10 +128,10 @@ def begin(block, batch, present):
     """Fill the memory of a block; return the shortest interval between scalings of a tangent."""
     memory, first, lanes = block
     # A scaling interval belongs to a lane, whatever its neighbours need.
-    interval = batch.steps_between_scalings[first]
+    interval = batch.steps_between_scalings[batch.order[first]]
     for slot in range(LANES):
         # A block that is not full repeats the last lane, and nothing of that is stored.
-        index = first + min(slot, lanes - 1)
+        index = batch.order[first + min(slot, lanes - 1)]
         interval = min(interval, batch.steps_between_scalings[index])
         fill_lane(memory, slot, batch.coefficients[index])
         fill(memory, STATE, slot, batch.scales[index], batch.start[index])
@@ -126,6 +144,8 @@ def begin(block, batch, present):
             state = read_state(memory, STATE, slot, present)
             gaps = gaps_at(state, lane, forcing, present)
             write_branches(memory, slot, branches_at(gaps, lane.half_backlash, present))
+        if present.flow_map is not None:
+            begin_forces(memory, slot, load(memory, COEFFICIENTS, slot, Lane), present)
     return interval
 
 
@@ -164,14 +184,17 @@ def step_block(memory, phases, present):
 
 
 @scalar
-def split(memory, table, lanes, number, recorded, present):
+def split(memory, table, maps, row, work, lanes, number, recorded, present):
     """Split the step of every lane that may have left a contact branch."""
     # No array of the outcome here: passing one means counting references to it at every step.
     for slot in range(lanes):
         if memory[SUSPECT * STRIDE + slot] == 0.0:
             continue
         before = load(memory, CROSSINGS, slot, Crossings)
-        count, slowest, overflow = split_step(memory, slot, table, number, present)
+        if present.flow_map is None:
+            count, slowest, overflow = split_step(memory, slot, table, number, present)
+        else:
+            count, slowest, overflow = cross(memory, slot, maps, row, work, present)
         if not recorded:
             count = 0
             slowest = math.inf
@@ -187,7 +210,7 @@ def scale_tangents(block, batch, steps_done, last):
     memory, first, lanes = block
     # Those of repeated lanes, too: they would become denormal, and cost all others their speed.
     for slot in range(LANES):
-        index = first + min(slot, lanes - 1)
+        index = batch.order[first + min(slot, lanes - 1)]
         if steps_done % batch.steps_between_scalings[index] != 0 and not last:
             continue
         scale = batch.scales[index]
@@ -209,7 +232,7 @@ def end_period(block, batch, period, plan, outcome, present):
     recorded = period - plan.transient_periods
     point = recorded - plan.recorded_periods + plan.section_points
     for slot in range(lanes):
-        index = first + slot
+        index = batch.order[first + slot]
         if outcome.status[index] != _OK:
             continue
         sound = within_range(memory, slot, batch.scales[index])
@@ -234,7 +257,7 @@ def end(block, batch, plan, outcome):
     """Write the last state and tangent vector of every lane, and what it has crossed."""
     memory, first, lanes = block
     for slot in range(lanes):
-        index = first + slot
+        index = batch.order[first + slot]
         scale = batch.scales[index]
         take(memory, STATE, slot, scale, outcome.end_state[index])
         take(memory, TANGENT, slot, scale, outcome.end_tangent[index])
@@ -251,7 +274,7 @@ def keep_state(block, batch, history, sample):
     """Write the state of every lane into one sample of its history."""
     memory, first, lanes = block
     for slot in range(lanes):
-        index = first + slot
+        index = batch.order[first + slot]
         take(memory, STATE, slot, batch.scales[index], history[index, sample])
 
 

@@ -27,7 +27,7 @@ from numba.extending import intrinsic
 from numpy.typing import NDArray
 
 from gearchaos_kernels.compilation import CACHE_LINE, scalar
-from gearchaos_kernels.system import STATES
+from gearchaos_kernels.system import STATES, Plan, System
 
 LANES = 32
 """Lanes of one block: a few vectors wide, small enough for the first-level cache."""
@@ -49,6 +49,20 @@ class Present(NamedTuple):
     axial: tuple[()] | None
     resolved: tuple[()] | None
     tangent: tuple[()] | None
+    flow_map: tuple[()] | None
+
+
+def flags(system: System, plan: Plan) -> Present:
+    """Tell in types what the loop of a scene has, so that every scene is compiled for itself."""
+    effects = system.effects
+    values = {
+        **effects._asdict(),
+        "phase": effects.pitch_error and bool(np.any(system.groups.error_phase)),
+        "resolved": effects.backlash and (plan.resolved or plan.method == "flow_map"),
+        "tangent": plan.tangent,
+        "flow_map": plan.method == "flow_map",
+    }
+    return Present(**{name: () if present else None for name, present in values.items()})
 
 
 class Coordinates(NamedTuple):
@@ -136,7 +150,11 @@ SUSPECT = AXIAL_BRANCH + len(Branch._fields)
 GROWTH = SUSPECT + 1
 """Row of the logarithm of the tangent vector's growth since the period began."""
 CROSSINGS = GROWTH + 1
-ROWS = CROSSINGS + len(Crossings._fields)
+FORCES = CROSSINGS + len(Crossings._fields)
+"""First row of what forces a lane where a step is a map; see `flow_map`."""
+MARGINS = FORCES + 5
+"""Rows of how far either gap may stray from its cubic in a step that is a map."""
+ROWS = MARGINS + 2
 
 _ITEM = np.dtype(np.float64).itemsize
 

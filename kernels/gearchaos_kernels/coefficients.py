@@ -74,7 +74,9 @@ def lane_coefficients(system: System, step: Floats) -> Floats:
     return np.stack(np.broadcast_arrays(*lane), axis=1).astype(np.float64)
 
 
-def steps_between_scalings(system: System, steps_per_period: int) -> NDArray[np.intp]:
+def steps_between_scalings(
+    system: System, steps_per_period: int | NDArray[np.intp]
+) -> NDArray[np.intp]:
     """Return after how many steps each tangent vector is scaled back to length 1, shape (lanes,).
 
     Between two scalings it must neither overflow nor vanish. Its rate of growth or decay is bounded

@@ -110,6 +110,11 @@ def scalar(function: Callable[..., Any]) -> Any:
     return _decorate(function, forceinline=True, no_cfunc_wrapper=True, no_cpython_wrapper=True)
 
 
+def part(function: Callable[..., Any]) -> Any:
+    """Compile a function that only compiled code calls, and calls rather than copies."""
+    return _decorate(function, no_cfunc_wrapper=True, no_cpython_wrapper=True)
+
+
 def driver(function: Callable[..., Any], parallel: bool = True) -> Any:
     """Compile a function that only splits, calls and merges, in parallel and cached on disk."""
     dispatcher = _decorate(function, parallel=parallel, nogil=True)

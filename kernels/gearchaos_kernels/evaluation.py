@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from gearchaos_kernels.batch import flags
 from gearchaos_kernels.block_memory import (
     COEFFICIENTS,
     STATE,
@@ -16,6 +15,7 @@ from gearchaos_kernels.block_memory import (
     aligned_memory,
     fill,
     fill_lane,
+    flags,
     load,
     read_state,
     take,

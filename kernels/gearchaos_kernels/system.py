@@ -100,7 +100,8 @@ class Plan(NamedTuple):
 
     The section is kept at the end of the last ``section_points`` mesh periods. ``resolved`` splits
     the steps that cross a clearance boundary; without it they are plain steps. Of the last
-    ``history_periods`` every step is kept.
+    ``history_periods`` every step is kept. ``method``: "rk4" or "flow_map", which resolves every
+    crossing and whose steps are exact.
     """
 
     steps_per_period: int
@@ -110,6 +111,17 @@ class Plan(NamedTuple):
     tangent: bool = False
     resolved: bool = True
     history_periods: int = 0
+    method: str = "rk4"
+
+
+class Schedule(NamedTuple):
+    """What the compiled loop over the periods has to know of a plan."""
+
+    steps_per_period: int
+    transient_periods: int
+    recorded_periods: int
+    section_points: int
+    history_periods: int
 
 
 class Outcome(NamedTuple):

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import gearchaos
-from gearchaos.accuracy import TRUTH_STEPS, Setting, measure, recommendation
+from gearchaos.accuracy import FLOW_MAP_STEPS, TRUTH_STEPS, Setting, measure, recommendation
 from gearchaos.engine.simulation import Simulation
 from gearchaos.engine.steps import pilot
 
@@ -28,10 +28,10 @@ def test_the_table_is_all_that_stdout_holds_and_ends_with_recommendations(ended)
     run, folder = ended
     assert run.code == 0
     lines = run.out.splitlines()
-    assert len(lines) == 1 + 6 + 3
+    assert len(lines) == 1 + 6 + len(FLOW_MAP_STEPS) + 3
     for line, error in zip(lines[-3:], ("1e-04", "1e-06", "1e-08"), strict=True):
         assert re.fullmatch(
-            rf"For an error of {error}: (\d+ (plain|resolved) steps per mesh period\."
+            rf"For an error of {error}: (\d+ (plain|resolved|flow map) steps per mesh period\."
             r"|none of these; give finer --steps\.)",
             line,
         )
@@ -40,7 +40,7 @@ def test_the_table_is_all_that_stdout_holds_and_ends_with_recommendations(ended)
 
 def test_the_json_holds_what_the_table_says_and_the_machine(ended):
     facts = json.loads((ended[1] / "pan2021_first_accuracy.json").read_text())
-    assert [s["steps"] for s in facts["settings"]] == [50, 100, 200] * 2
+    assert [s["steps"] for s in facts["settings"]] == [50, 100, 200] * 2 + [*FLOW_MAP_STEPS]
     assert facts["machine"]["processor"]
     assert all(s["seconds"] > 0 for s in facts["settings"])
 
@@ -113,7 +113,7 @@ def test_the_truth_is_that_of_the_stored_orbits():
     values = f"sweep={{parameter='pitch_error', values={[*stored]}}}"
     sweep = Simulation(gearchaos.load_config(PAN2021, [values]))
     _, motion = pilot(sweep.lanes, sweep.plan, 2, TRUTH_STEPS)
-    truth = motion(TRUTH_STEPS, True)
+    truth = motion(TRUTH_STEPS, True, "flow_map")
     for lane, orbit in enumerate(stored.values()):
         # The mean over 150 periods is off by up to 1e-6.
         assert truth.exponent[lane] == pytest.approx(orbit["largest_exponent"], abs=1e-6)

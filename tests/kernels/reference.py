@@ -28,6 +28,9 @@ COSINE /= SOLUTIONS["mean_stiffness"]
 SINE = np.array([1.203, -1.15e-4, -0.1335, 9.478e-8, 0.04819, -3.819e-5])
 SINE /= SOLUTIONS["mean_stiffness"]
 
+FLOW_MAP = "flow_map"
+"""Stands for the other method where steps are plain or resolved."""
+
 FULL = Effects()
 NO_AXIAL = Effects(axial=False)
 TORSION_ONLY = Effects(transverse=False, axial=False)
@@ -111,18 +114,19 @@ def run(
     points: int | None = None,
     tangent: bool = True,
     physical: bool = False,
-    resolved: bool = False,
+    resolved: bool | str = False,
 ) -> Outcome:
     """Integrate Pan 2021's mesh stiffness, by default keeping every state after every period.
 
     A start has all ten states, the outcome those of the scene. The tangent vector is on unless a
     test is about the plain loop: one compiled scene then serves many tests. Steps are plain ones
-    unless ``resolved`` splits those that cross a clearance.
+    unless ``resolved`` splits those that cross a clearance, or is `FLOW_MAP`.
     """
     rest = np.zeros((model.load.size, len(STATES)))
     start = rest if start is None else np.broadcast_to(start, rest.shape)
     points = transient + periods if points is None else points
-    plan = Plan(steps, transient, periods, points, tangent, resolved)
+    method = FLOW_MAP if resolved == FLOW_MAP else "rk4"
+    plan = Plan(steps, transient, periods, points, tangent, bool(resolved), method=method)
     return integrate(system_of(model, scene, physical), start[:, columns(scene)], plan)
 
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from gearchaos_kernels import LANES, Outcome
 
-from .reference import FULL, assert_same_bits, lanes_of, lanes_out_of, pan2021, run, state
+from .reference import FLOW_MAP, FULL, assert_same_bits, lanes_of, lanes_out_of, pan2021, run, state
 
 TOTAL = 3 * LANES + 4
 MODEL = pan2021(
@@ -22,9 +22,12 @@ MODEL.transverse_damping_g[77] = -0.9
 HOW = {"steps": 72, "transient": 20, "periods": 40, "points": 30}
 
 
-@pytest.fixture(scope="module", params=[False, True], ids=["plain", "resolved"])
+WAYS = [False, True, FLOW_MAP]
+
+
+@pytest.fixture(scope="module", params=WAYS, ids=["plain", "resolved", "flow-map"])
 def integrate(request) -> Callable[..., Outcome]:
-    """What integrates some lanes of this test, with plain steps or with split ones."""
+    """What integrates some lanes of this test, with plain steps, split ones, or by flow maps."""
 
     def some(chosen) -> Outcome:
         model, start = lanes_of(MODEL, chosen), START[chosen]
@@ -95,7 +98,7 @@ def test_integration_leaves_its_arguments_alone(whole):
     assert whole.section.shape == (TOTAL, HOW["points"], 10)
 
 
-@pytest.mark.parametrize("resolved", [False, True])
+@pytest.mark.parametrize("resolved", WAYS)
 def test_a_longer_transient_is_the_same_motion_recorded_later(resolved):
     how = {**HOW, "resolved": resolved}
     longer = run(MODEL, FULL, START, **{**how, "transient": 25, "periods": 35})

@@ -6,6 +6,7 @@ from gearchaos_kernels import Effects, Status
 
 from .reference import (
     BASE_HELIX_ANGLE,
+    FLOW_MAP,
     FULL,
     NO_BACKLASH,
     OMEGA,
@@ -20,7 +21,11 @@ COS = np.cos(BASE_HELIX_ANGLE)
 CLEARANCE = Effects(False, False, True, False, False)
 """Torsion with constant stiffness: nothing acts but load, mesh and clearance."""
 
-BOTH = pytest.mark.parametrize("resolved", [False, True], ids=["plain", "resolved"])
+BOTH = pytest.mark.parametrize(
+    "resolved",
+    [False, True, pytest.param(FLOW_MAP, marks=pytest.mark.slow)],
+    ids=["plain", "resolved", "flow-map"],
+)
 
 
 def assert_sound(outcome) -> None:
