@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from gearchaos.results.crises import Crisis
     from gearchaos.results.jumps import Jump
     from gearchaos.results.result import Result
-    from gearchaos.results.stage_table import LabelledLanes, Stage
+    from gearchaos.results.stage_table import Stage
 
 
 WIDTH = 80
@@ -93,6 +93,7 @@ def _stages(options: argparse.Namespace) -> int:
         slice_lines,
         stage_table,
     )
+    from gearchaos.results.variables import RECORD
 
     whole = open_result(options.result)
     result = one_axis(whole, **_coordinates(options.at, whole))
@@ -106,6 +107,7 @@ def _stages(options: argparse.Namespace) -> int:
         stages = refined_stages(stages, boundaries)
     outlasting = _survival(result, options) if options.survival is not None else None
     jumping, bursting = jumps(result), crises(result)
+    mixed = int((result[RECORD] == 1).sum()) if RECORD in result else 0
     if options.json:
         facts = {"parameter": result.axis, "slice": where, **_facts(stages, boundaries)}
         for stage, counts in zip(facts["stages"], bands, strict=True):
@@ -116,7 +118,7 @@ def _stages(options: argparse.Namespace) -> int:
         print(json.dumps(finite(facts), indent=1, allow_nan=False))
     else:
         print("\n".join(table(result.axis, stages, slice_lines(where))))
-        told = band_lines(stages, bands) + remarks(jumping, bursting, lanes)
+        told = band_lines(stages, bands) + remarks(jumping, bursting, mixed)
         told += [outlasting.text] if outlasting else []
         for lines in (told, boundary_list(boundaries or ())):
             if lines:
@@ -205,7 +207,7 @@ def band_lines(stages: Sequence[Stage], bands: Sequence[Mapping[int, int]]) -> l
     return lines
 
 
-def remarks(jumping: Sequence[Jump], bursting: Sequence[Crisis], lanes: LabelledLanes) -> list[str]:
+def remarks(jumping: Sequence[Jump], bursting: Sequence[Crisis], mixed: int) -> list[str]:
     """Word what the table does not show: jumps and crises in a stage, chaos that came to rest."""
     lines = [
         f"{jump.below:.6g} to {jump.above:.6g}: jumps to another motion of {jump.label}"
@@ -217,11 +219,10 @@ def remarks(jumping: Sequence[Jump], bursting: Sequence[Crisis], lanes: Labelled
         f"{crisis.lowest_above:.3g} to {crisis.highest_above:.3g} above"
         for crisis in bursting
     ]
-    late = int(((lanes.period > 0) & (lanes.exponent > 0.0)).sum())
-    if late:
+    if mixed:
         lines.append(
-            f"{late} periodic lanes came to rest within their record, the chaos before it\n"
-            "included in their exponent; integration.transient_periods leaves it out"
+            f"{mixed} periodic lanes came to rest within their record, which holds another\n"
+            "motion before; integration.transient_periods leaves it out"
         )
     return lines
 

@@ -28,10 +28,14 @@ class Exponents(NamedTuple):
     standard_errors: Floats
 
     def given(self, exact: Floats) -> Exponents:
-        """Return them with those that are known exactly (lanes, states), NaN where none is."""
-        known = np.isfinite(exact)
+        """Return them with all of a lane replaced of which the first one is known exactly.
+
+        ``exact`` (lanes, states): not a number where none is known, or where rounding hides it.
+        """
+        known = np.broadcast_to(np.isfinite(exact[:, :1]), exact.shape)
         return Exponents(
-            np.where(known, exact, self.values), np.where(known, 0.0, self.standard_errors)
+            np.where(known, exact, self.values),
+            np.where(known, np.where(np.isfinite(exact), 0.0, np.nan), self.standard_errors),
         )
 
 

@@ -35,6 +35,10 @@ WHOLE = 0.25
 """Largest difference of the subsequences of a curve, see `subsequence_spread`."""
 
 
+MARGIN = 1e-9
+"""Distance of a multiplier from the unit circle that rounding does not explain."""
+
+
 class Told(NamedTuple):
     """Labels, and the state (lanes, states) at the end of the look that told each."""
 
@@ -103,12 +107,13 @@ def _tell_linear(system: System, plan: Plan, labels: Labels) -> None:
         transient_periods=0, recorded_periods=1, section_points=0, history_periods=0, tangent=True
     )
     jacobian = period_jacobian(system, np.zeros((system.lanes, len(system.states))), once)
-    with np.errstate(invalid="ignore"):
-        grows = np.max(np.abs(np.linalg.eigvals(np.nan_to_num(jacobian))), axis=1) > 1.0
+    size = np.max(np.abs(np.linalg.eigvals(np.nan_to_num(jacobian))), axis=1)
+    grows = size > 1.0 + MARGIN
     labels.motion[grows] = GROWS
     labels.period[grows] = 0
-    others = np.isin(labels.motion, (CHAOTIC, QUASI_PERIODIC)) & ~grows
-    labels.motion[others] = UNRESOLVED
+    # Without damping a forced oscillation goes around a torus.
+    settles = (labels.motion == QUASI_PERIODIC) & (size < 1.0 - MARGIN)
+    labels.motion[settles | (labels.motion == CHAOTIC) & ~grows] = UNRESOLVED
 
 
 def _record(system: System, outcome: Outcome, most_points: int) -> Record:

@@ -15,8 +15,8 @@ from gearchaos.records.lyapunov import largest_exponent
 
 Floats = NDArray[np.float64]
 
-UNIFORM, MIXED = 0, 1
-MEANINGS = ("uniform", "mixed")
+UNIFORM, MIXED, NOT_TOLD = 0, 1, 2
+MEANINGS = ("uniform", "mixed", "not_told")
 """Meanings of the values of ``record``."""
 
 
@@ -25,7 +25,8 @@ class LargestExponents(NamedTuple):
 
     ``values``, ``standard_errors`` (lanes,): the standard error is that of a finite record, and
     thus 0 where the exponent is that of an orbit; ``record`` (lanes,) of `MEANINGS`: mixed where a
-    lane is periodic in the end, but its record holds motion of another kind; ``of_orbit`` (lanes,
+    lane is periodic in the end, but its record holds motion of another kind, and not told where
+    there is no orbit to compare it with; ``of_orbit`` (lanes,
     states): all exponents of the orbit, the largest first, not a number where there is none and
     where rounding hides them.
     """
@@ -48,7 +49,7 @@ def largest_exponents(
     """
     assert outcome.growth is not None
     values, errors = largest_exponent(outcome.growth, system.mesh_period)
-    record = np.full(period.shape, UNIFORM, dtype=np.uint8)
+    record = np.full(period.shape, NOT_TOLD, dtype=np.uint8)
     of_orbit = np.full((period.size, len(system.states)), np.nan)
     found = LargestExponents(values, errors, record, of_orbit)
     lanes = np.flatnonzero((period > 0) & np.isfinite(values))
@@ -57,7 +58,9 @@ def largest_exponents(
     orbits = polish(
         system.of(lanes), state[lanes], period[lanes], plan.steps_per_period, plan.method
     )
-    lanes, size = lanes[orbits.stable], np.abs(orbits.multipliers[orbits.stable])
+    # A multiplier that is 0 but for underflow tells no exponent.
+    told = orbits.stable & (np.abs(orbits.multipliers[:, 0]) > 0.0)
+    lanes, size = lanes[told], np.abs(orbits.multipliers[told])
     duration = period[lanes] * system.mesh_period[lanes]
     resolved = size > SMALLEST_RESOLVED * size[:, :1]
     size = np.where(resolved, size, np.nan)

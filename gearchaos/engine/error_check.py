@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gearchaos.dynamics.largest_exponents import MIXED
 from gearchaos.records.difference import Difference
 
 NOT_CHECKED, SAME, CHANGED = 0, 1, 2
@@ -62,7 +63,7 @@ class Tally:
             self._unsplit_lanes += int(np.count_nonzero(arrays["unsplit_steps"]))
             self._unsplit_steps += int(np.sum(arrays["unsplit_steps"]))
         if "record" in arrays:
-            self._mixed += int(np.count_nonzero(arrays["record"]))
+            self._mixed += int(np.count_nonzero(arrays["record"] == MIXED))
         if "motion_changed" in arrays:
             checked = arrays["motion_changed"] != NOT_CHECKED
             for name, blocks in self._checked.items():
@@ -100,7 +101,7 @@ class Tally:
             if np.isfinite(exponent[periodic]).any():
                 text += f", their exponent by {_spread(exponent[periodic])}"
             text += "; "
-        others = np.isfinite(exponent) & np.isfinite(of_record) & ~periodic
+        others = np.isfinite(exponent) & np.isfinite(of_record) & ~periodic & (motion == SAME)
         if others.any():
             text += (
                 f"exponent of {others.sum()} others by {_spread(exponent[others])} from the step "

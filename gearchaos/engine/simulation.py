@@ -83,7 +83,8 @@ class Simulation:
             section_points=outputs.section_points if outputs.section else 0,
             tangent=outputs.lyapunov,
         )
-        coarse = coarse_steps(self.lanes, steps) if outputs.lyapunov else ""
+        judged = outputs.lyapunov and integration.tolerance is None
+        coarse = coarse_steps(self.lanes, steps) if judged else ""
         self.notes = [note for note in (note, coarse, self._negative_stiffness()) if note]
         self._choice: list[Variable] = []
 

@@ -109,8 +109,8 @@ def lyapunov(
         color=BLUE,
     )
     mixed = None
-    if RECORD in result and (result.lanes(RECORD)[lanes.numbers] == 1).any():
-        among = result.lanes(RECORD)[lanes.numbers] == 1
+    among = drawn[result.lanes(RECORD)[lanes.numbers][drawn] == 1] if RECORD in result else []
+    if len(among):
         (mixed,) = axes.plot(
             lanes.parameter[among],
             whole[among],
@@ -120,7 +120,7 @@ def lyapunov(
             markerfacecolor="none",
             markeredgewidth=0.5,
             color=VERMILION,
-            label="record holds ended chaos",
+            label="came from another motion",
         )
     axes.set_ylabel(axis_label(result, LARGEST_EXPONENT, line_length=20))
     marks = close_panel(

@@ -54,8 +54,7 @@ def _third_stage_in_words(found: Reproduction) -> str:
         f"up to the last lane on two bands, {last:.2f}. An interior crisis ends it: the section, "
         f"no wider than {crisis.before:.2f} up to there, spans {crisis.after:.2f} at once at "
         f"{crisis.value:.2f}. The exponents of the lanes on two bands go from {lowest} to "
-        f"{highest}: those of periodic motions, and of chaos then. The paper's are about zero, as "
-        "on a torus; no torus was found here."
+        f"{highest}: those of periodic motions, and of chaos then. The paper's are about zero."
     )
 
 

@@ -36,7 +36,7 @@ def crises(result: Result) -> list[Crisis]:
     chaotic = lanes.labels == "chaotic"
     found: dict[int, tuple[float, Crisis]] = {}
     for name in section_variables(result):
-        lowest, highest = np.nanmin(result[name], axis=1), np.nanmax(result[name], axis=1)
+        lowest, highest = np.min(result[name], axis=1), np.max(result[name], axis=1)
         extent = highest - lowest
         upwards = grows_at(extent, chaotic)
         downwards = extent.size - grows_at(extent[::-1], chaotic[::-1])

@@ -30,6 +30,7 @@ from gearchaos.results.variables import (
     ALL_EXPONENTS,
     HARMONIC,
     LARGEST_EXPONENT,
+    RECORD,
     SECTION,
     SECTION_POINT,
     START,
@@ -185,6 +186,7 @@ def _check_variables(
         exponents=ALL_EXPONENTS in found,
         check_meanings=["same"] if "motion_changed" in found else [],
         motion_meanings=["periodic"] if "motion" in found else [],
+        record_meanings=["uniform"] if RECORD in found else [],
     )
     for due in expected:
         got = found.get(due.name)
