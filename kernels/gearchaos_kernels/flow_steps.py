@@ -35,7 +35,7 @@ from gearchaos_kernels.block_memory import (
 from gearchaos_kernels.compilation import scalar
 from gearchaos_kernels.contact import NEVER, branches_at, first_fall, next_branch
 from gearchaos_kernels.equations import gaps_at
-from gearchaos_kernels.flow_map import HEADER, TERMS, layout
+from gearchaos_kernels.flow_map import BOUND_Y, BOUND_Z, HEADER, TERMS, layout
 from gearchaos_kernels.flow_vectors import (
     GAP_Y,
     GAP_Z,
@@ -146,8 +146,19 @@ def move_block(memory, table, row, slots, work, present):
 def move_lane(memory, table, row, work, present):
     """Take one step of the only lane, along its state; bit for bit the one that vectors take."""
     place = layout(present)
-    keep_before(memory, 0, table, row, present)
+    # Number by number: a vector would have to wait for the single numbers stored before it.
+    for line in range(place.states):
+        memory[(BEFORE + STATE + line) * STRIDE] = memory[(STATE + line) * STRIDE]
+        if present.tangent is not None:
+            memory[(BEFORE + TANGENT + line) * STRIDE] = memory[(TANGENT + line) * STRIDE]
     gather(memory, 0, work, present)
+    margin_y = 0.0
+    margin_z = 0.0
+    for column in range(place.columns):
+        margin_y += table[row + BOUND_Y + column] * abs(work[INPUTS + column])
+        margin_z += table[row + BOUND_Z + column] * abs(work[INPUTS + column])
+    memory[MARGINS * STRIDE] = margin_y
+    memory[(MARGINS + 1) * STRIDE] = margin_z
     at = row + HEADER
     if present.resolved is not None:
         at += pair_of(read_branches(memory, 0, present), present) * place.size

@@ -7,7 +7,7 @@ polynomial (`combine`, `add_switch`). The compiler finds neither by itself.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
@@ -92,9 +92,10 @@ class _Writer:
         order = ir.Constant(ir.VectorType(ir.IntType(32), width), [0] * width)
         return self.builder.shuffle_vector(one, ir.Constant(kind, ir.Undefined), order)
 
-    def constant(self, numbers: Sequence[float]) -> Any:
+    def constant(self, numbers: Iterable[float]) -> Any:
         """Return a vector of known numbers."""
-        return ir.Constant(ir.VectorType(_DOUBLE, len(numbers)), [float(n) for n in numbers])
+        values = [float(number) for number in numbers]
+        return ir.Constant(ir.VectorType(_DOUBLE, len(values)), values)
 
     def multiply_add(self, a: Any, b: Any, c: Any) -> Any:
         """Return a b + c, with c None for nothing."""

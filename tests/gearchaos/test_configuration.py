@@ -106,6 +106,7 @@ def test_the_resolved_toml_states_every_default(text):
     config = Configuration.from_toml(text)
     tables = tomllib.loads(config.resolved_toml())
     assert tables["integration"] == {
+        "method": "rk4",
         "steps_per_period": 200,
         "error_check": 0.0,
         "crossings": "resolved",

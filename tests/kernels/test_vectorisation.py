@@ -26,8 +26,9 @@ ARITHMETIC = re.compile(r"v(add|sub|mul|fn?m(add|sub)\d+)pd$")
 SCALAR = re.compile(r"v(add|sub|mul|fn?m(add|sub)\d+)sd$")
 LABEL = re.compile(r"^\.LBB\w+:", re.MULTILINE)
 INSTRUCTION = re.compile(r"^\s+(v\w+)\s+(.*)$", re.MULTILINE)
-STORE = re.compile(r"%[yz]mm\d+, -?\d*\(%r\w+,\s*%r\w+")
-"""A wide register into memory at an index: spilled registers go to the stack, which has none."""
+STORE = re.compile(r"%[yz]mm\d+, -?\d*\((?!%r[sb]p\))%r\w+")
+"""A wide register into memory, not to the stack, where spilled ones go; a short loop that is
+unrolled as a whole has no index."""
 
 WIDE = ("ymm", "zmm")
 TORSION = Effects(*[False] * len(Effects._fields))
@@ -105,8 +106,13 @@ def loop_of(scene: Effects, tangent: bool, resolved: bool, /) -> Loop:
     assembly = loop.inspect_asm(loop.signatures[-1])
     rows = rows_written(scene, tangent, resolved)
     blocks = map(INSTRUCTION.findall, LABEL.split(assembly))
-    # What begins and ends a block of lanes has wide stores of its own, but fewer.
-    body = [one for block in blocks if stores_of(block) >= rows for one in block]
+    # What begins and ends a block of lanes has wide stores of its own, but fewer, or no arithmetic.
+    body = [
+        one
+        for block in blocks
+        if stores_of(block) >= rows and any(ARITHMETIC.match(name) for name, _ in block)
+        for one in block
+    ]
     scalars = sum(bool(SCALAR.match(name)) for name, _ in body)
     counts: Counter[tuple[str, str]] = Counter()
     for mnemonic, operands in body:
