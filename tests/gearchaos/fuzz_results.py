@@ -46,6 +46,7 @@ def good_result(path: Path, axes: tuple[Axis, ...] = GOOD_AXES[0]) -> None:
         exponents=True,
         check_meanings=["not_checked", "same", "changed"],
         motion_meanings=["periodic", "quasi_periodic", "chaotic", "unresolved", "diverged"],
+        record_meanings=["uniform", "mixed"],
     )
     variables += step_choice_variables([50, 100], choice)
     sizes = {axis.name: axis.values.size for axis in axes}

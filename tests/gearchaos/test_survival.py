@@ -15,7 +15,11 @@ LASTING = 13.4
 FADING = (14.82, 14.87, 14.9)
 """Here chaos lives for a thousand periods or so: within 6000 it comes to rest on a period 1."""
 
-SHORT = ("integration.transient_periods=100", "integration.recorded_periods=200")
+SHORT = (
+    "integration.transient_periods=100",
+    "integration.recorded_periods=200",
+    "outputs.section_points=100",
+)
 
 
 def saved(folder, values):

@@ -97,8 +97,8 @@ def test_a_dry_run_tells_lanes_steps_memory_and_time_and_writes_nothing(tmp_path
     assert re.fullmatch(r"about \d+\.\d s with \d+ threads?", told.pop("time"))
     # Per lane: 2 x 5 section points, exponent, its error, crossings, their speed, 10 states at
     # the start and 10 at the end, return distance; unsplit steps, period of divergence and of the
-    # motion; status, kind of motion.
-    assert told.pop("file") == f"about {120 * (8 * 35 + 4 * 3 + 2) / 1000:.1f}kB before compression"
+    # motion, bands; status, kind of motion, kind of record.
+    assert told.pop("file") == f"about {120 * (8 * 35 + 4 * 4 + 3) / 1000:.1f}kB before compression"
     assert told == {
         "output": "gears.h5",
         "states": "10",

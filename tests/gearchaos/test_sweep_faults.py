@@ -162,8 +162,8 @@ def test_a_full_disk_costs_neither_the_old_result_nor_the_finished_lanes(tmp_pat
     assert sweep(tmp_path, "--quiet").code == 0  # The kernel is in the cache from now on.
     old = (tmp_path / "gears.h5").read_bytes()
     arguments = ["--overwrite", "--set", "pitch_error.mean_um=1.0"]
-    # Room for the block of lanes, which is some 8 kB, but not for the result with its texts.
-    room = 12_000
+    # Room for the block of lanes, which is some 12 kB, but not for the result with its texts.
+    room = 14_000
     ended = sweep(tmp_path, *arguments, preexec_fn=lambda: _limit_file_size(room))
     assert (ended.code, ended.out) == (4, "")
     assert "gears.h5: cannot be written: File too large" in ended.err

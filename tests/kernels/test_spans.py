@@ -64,7 +64,6 @@ def test_an_undamped_pair_does_after_ten_thousand_periods_what_the_method_predic
         start,
         steps=steps,
         periods=periods,
-        tangent=False,
         resolved=resolved,
     )
     assert outcome.status.tolist() == [Status.OK]
@@ -82,9 +81,7 @@ def test_energy_without_damping_never_grows_and_falls_as_the_method_predicts(
     scene = scene._replace(axial=False)
     model = pan2021(0.0, **UNDAMPED, half_backlash=0.0)
     start = state(delta_5=1.0)
-    outcome = run(
-        model, scene, start, steps=steps, periods=10_000, tangent=False, resolved=resolved
-    )
+    outcome = run(model, scene, start, steps=steps, periods=10_000, resolved=resolved)
     found = energy(model, outcome.section[0])
     assert np.diff(found).max() < 1e-13
     predicted = np.stack([after(model, start, steps, number) for number in (1, 2000, 10_000)])
@@ -105,7 +102,6 @@ def test_the_amplitude_of_a_single_oscillator_falls_by_the_sixth_power_of_the_st
         state(delta_5=1.0),
         steps=steps,
         periods=periods,
-        tangent=False,
         resolved=True,
     )
     position, rate = outcome.section[0, :, 0], outcome.section[0, :, 1]
@@ -125,7 +121,6 @@ def rattling(steps: int, resolved: bool) -> tuple[np.ndarray, np.ndarray]:
         starts,
         steps=steps,
         periods=500,
-        tangent=False,
         resolved=resolved,
     )
     position, rate = outcome.section[..., 0], outcome.section[..., 1]
@@ -180,7 +175,6 @@ def test_a_hundred_thousand_periods_of_free_oscillation_keep_the_phase_of_the_me
         steps=steps,
         periods=periods,
         points=1,
-        tangent=False,
     )
     x = 2.0 * np.pi / model.mesh_frequency[0] * np.sqrt(COS) / steps
     turn = np.angle(1.0 - x**2 / 2.0 + x**4 / 24.0 + 1j * (x - x**3 / 6.0))
