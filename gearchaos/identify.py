@@ -52,14 +52,14 @@ def _identify(options: Namespace) -> int:
     judge = Judge(problem)
     if options.score is not None:
         with notice(COMPILING):
-            tried = _scored(judge, options.score)
+            tried = _scored(problem, judge, options.score)
     else:
         tried = _searched(problem, judge, options)
     print("\n".join(report(judge, tried)), flush=True)
     return OK
 
 
-def _scored(judge: Judge, path: str) -> Tried:
+def _scored(problem: Problem, judge: Judge, path: str) -> Tried:
     import numpy as np
 
     from gearchaos.configuration import groups_at
@@ -77,7 +77,7 @@ def _scored(judge: Judge, path: str) -> Tried:
                 f"--score {path}: has no {one.name}, which the targets leave free"
             )
         known[one.name] = np.array([value])
-    require_stable(config, judge.values, known)
+    require_stable(problem.config, judge.values, known)
     return judge.judge_values(0, known)
 
 
