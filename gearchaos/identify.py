@@ -17,8 +17,8 @@ from argparse import ArgumentParser, Namespace
 from importlib.util import find_spec
 from typing import TYPE_CHECKING
 
-from gearchaos.command_line import OK, Command
-from gearchaos.errors import ConfigurationError, FileError
+from gearchaos.command_line import COMMON_OPTIONS, OK, Command
+from gearchaos.errors import ConfigurationError
 from gearchaos.finishing import output_of
 from gearchaos.progress import Progress, notice, say
 
@@ -37,6 +37,8 @@ def _arguments(parser: ArgumentParser) -> None:
         metavar="config.toml",
         help="search nothing, but judge the parameters of this configuration by the targets",
     )
+    replaced = "replace one key of the targets file, such as search.seed=2"
+    add("--set", **{**COMMON_OPTIONS["set"], "help": replaced})
 
 
 def _identify(options: Namespace) -> int:
@@ -50,18 +52,19 @@ def _identify(options: Namespace) -> int:
     judge = Judge(problem)
     if options.score is not None:
         with notice(COMPILING):
-            tried = _scored(judge, options.score)
+            tried = _scored(problem, judge, options.score)
     else:
         tried = _searched(problem, judge, options)
     print("\n".join(report(judge, tried)), flush=True)
     return OK
 
 
-def _scored(judge: Judge, path: str) -> Tried:
+def _scored(problem: Problem, judge: Judge, path: str) -> Tried:
     import numpy as np
 
     from gearchaos.configuration import groups_at
     from gearchaos.configuration.sweep_values import SWEEPABLE_GROUPS
+    from gearchaos.identification.evaluation import require_stable
     from gearchaos.identification.loading import observed_configuration
 
     config = observed_configuration(judge.targets, path)
@@ -74,6 +77,7 @@ def _scored(judge: Judge, path: str) -> Tried:
                 f"--score {path}: has no {one.name}, which the targets leave free"
             )
         known[one.name] = np.array([value])
+    require_stable(problem.config, judge.values, known)
     return judge.judge_values(0, known)
 
 
@@ -81,6 +85,7 @@ def _searched(problem: Problem, judge: Judge, options: Namespace) -> Tried:
     from gearchaos_kernels import current_threads
 
     from gearchaos.engine.provenance import provenance
+    from gearchaos.identification.evaluation import require_stable
     from gearchaos.identification.search import MOST_CENTRES, RUNGS
     from gearchaos.identification.searching import decisive_facts, search
     from gearchaos.identification.tried import read_tried, write_tried
@@ -91,11 +96,12 @@ def _searched(problem: Problem, judge: Judge, options: Namespace) -> Tried:
         raise ConfigurationError(
             "the package cma, which searches, is not installed; pip install gearchaos[identify]"
         )
+    require_stable(problem.config, judge.values, problem.targets.corners())
     output, keys = output_of(options), [one.name for one in problem.targets.parameter]
-    known = None
+    known, kept = None, False
     facts = decisive_facts(problem)
     if options.resume and not options.overwrite and os.path.exists(output):
-        known, earlier = read_tried(output, keys)
+        (known, earlier), kept = read_tried(output, keys), True
         require_same(f"{output}: is the result", earlier, facts, "replace it with --overwrite")
         if earlier.get("complete"):
             say(f"complete already: {output}, {len(known)} candidates")
@@ -105,6 +111,7 @@ def _searched(problem: Problem, judge: Judge, options: Namespace) -> Tried:
     began = time.monotonic()
 
     def keep(tried: Tried, complete: bool = False) -> None:
+        nonlocal kept
         told = {
             "complete": int(complete),
             **provenance(current_threads(), time.monotonic() - began),
@@ -113,15 +120,16 @@ def _searched(problem: Problem, judge: Judge, options: Namespace) -> Tried:
             "targets": problem.text,
         }
         write_tried(output, tried, keys, judge.observations, told)
+        kept = True
 
     tried_before = 0 if known is None else len(known)
     most = problem.targets.search.candidates + MOST_CENTRES * (1 + 2 * RUNGS * len(keys))
     try:
         with Progress(most, tried_before, unit="candidate") as bar:
             tried = search(judge, known, keep, bar.advance, output)
-    except (KeyboardInterrupt, FileError) as fault:
-        if os.path.exists(output):
-            fault.add_note(f"the candidates in {output} are kept; go on with --resume")
+    except KeyboardInterrupt as interrupt:
+        if kept:
+            interrupt.add_note(f"the candidates in {output} are kept; go on with --resume")
         raise
     keep(tried, complete=True)
     say(f"{output}: {len(tried)} candidates, {time.monotonic() - began:.1f} s")
@@ -129,7 +137,7 @@ def _searched(problem: Problem, judge: Judge, options: Namespace) -> Tried:
 
 
 main = Command(
-    "identify", __doc__, _arguments, _identify, common=("output", "overwrite", "threads", "set")
+    "identify", __doc__, _arguments, _identify, common=("output", "overwrite", "threads")
 )
 
 if __name__ == "__main__":

@@ -10,8 +10,10 @@ from numpy.typing import NDArray
 
 from gearchaos.configuration import Configuration
 from gearchaos.configuration.run_tables import states_of
+from gearchaos.dynamics.stability import stability_limit
 from gearchaos.dynamics.systems import plan_of, system_of
 from gearchaos.engine.starts import start_states
+from gearchaos.errors import ConfigurationError
 from gearchaos.records.lyapunov import largest_exponent
 from gearchaos.records.period import return_distances
 
@@ -25,6 +27,9 @@ KEPT_PERIODS = 8
 
 FINER = 4
 """How many times finer that motion is, so that its largest acceleration is not stepped over."""
+
+MOTIONS_AT_ONCE = 2**8
+"""Lanes whose finer motion is in memory at a time: all of its samples are."""
 
 
 class Records(NamedTuple):
@@ -86,7 +91,14 @@ def evaluate(
         outcome = integrate(system, start, plan)
         before = outcome.end_state
         looked_at = np.flatnonzero(np.tile(accelerated[line], candidates))
-        found = _records(system, outcome, looked_at, plan.steps_per_period)
+        finer = plan._replace(
+            steps_per_period=FINER * plan.steps_per_period,
+            transient_periods=0,
+            recorded_periods=KEPT_PERIODS,
+            section_points=0,
+            history_periods=KEPT_PERIODS,
+        )
+        found = _records(system, outcome, looked_at, finer)
         arrays: Any = (array.reshape(candidates, line.size, *array.shape[1:]) for array in found)
         parts.append(Records(*arrays))
     order = np.argsort(np.ravel(lines))
@@ -94,12 +106,34 @@ def evaluate(
     return Records(*joined).at(order)
 
 
+def require_stable(config: Configuration, values: Floats, parameters: dict[str, Floats]) -> None:
+    """Refuse candidates with which RK4 is unstable at the ends of the swept values.
+
+    ``values`` and ``parameters`` as in `evaluate`. Raises ConfigurationError.
+    """
+    steps, ends = config.integration.steps_per_period, values[[0, -1]]
+    if config.integration.method == "flow_map":
+        return
+    candidates = len(next(iter(parameters.values())))
+    swept = {config.sweep.parameter: np.tile(ends, candidates)}
+    fixed = {key: np.repeat(value, ends.size) for key, value in parameters.items()}
+    limit = stability_limit(system_of(config, swept | fixed, config.needed_effects), steps)
+    if limit is not None:
+        worst = limit.lanes[np.argmax(limit.fewest)]
+        where = ", ".join(f"{key} = {value[worst]:.6g}" for key, value in (swept | fixed).items())
+        raise ConfigurationError(
+            f"{config.source}: integration.steps_per_period = {steps}: RK4 is unstable below "
+            f"{limit.steps} steps per period because of the {limit.owner}, with {where}; raise it "
+            "in `set` of the targets file, or narrow the bounds there"
+        )
+
+
 def coordinates_of(config: Configuration) -> tuple[str, ...]:
     """Return the coordinates whose accelerations `Records` hold, in their order."""
     return states_of(config.needed_effects)[::2]
 
 
-def _records(system: System, outcome: Outcome, looked_at: NDArray[np.intp], steps: int) -> Records:
+def _records(system: System, outcome: Outcome, looked_at: NDArray[np.intp], finer: Plan) -> Records:
     """Return what lanes came to, each array with the lanes first."""
     assert outcome.growth is not None
     sound = outcome.status == Status.OK
@@ -109,16 +143,13 @@ def _records(system: System, outcome: Outcome, looked_at: NDArray[np.intp], step
     period = np.where(returns.any(axis=1), np.argmax(returns, axis=1) + 1, 0)
     exponent, _ = largest_exponent(outcome.growth, system.mesh_period)
     acceleration = np.full((sound.size, len(system.states) // 2), np.nan)
-    if looked_at.size:
-        finer = FINER * steps
-        plan = Plan(
-            finer, 0, KEPT_PERIODS, section_points=0, tangent=True, history_periods=KEPT_PERIODS
-        )
-        some = system.of(looked_at)
-        motion = integrate(some, outcome.end_state[looked_at], plan)
+    for first in range(0, looked_at.size, MOTIONS_AT_ONCE):
+        lanes = looked_at[first : first + MOTIONS_AT_ONCE]
+        some = system.of(lanes)
+        motion = integrate(some, outcome.end_state[lanes], finer)
         assert motion.history is not None
-        found = mesh_motion(some, motion.history, finer).accelerations
-        acceleration[looked_at] = np.max(found, axis=1)
+        found = mesh_motion(some, motion.history, finer.steps_per_period).accelerations
+        acceleration[lanes] = np.max(found, axis=1)
     return Records(
         outcome.section[..., 0],
         np.where(sound, period, 0).astype(np.int32),

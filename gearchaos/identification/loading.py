@@ -23,6 +23,9 @@ from gearchaos.records.period import LONGEST_PERIOD, POINTS_NEEDED
 MOTION = re.compile(r"(?P<kind>period|bands) (?P<number>[1-9]\d?)|chaotic|aperiodic")
 """The motions that a stage may have."""
 
+OBSERVATIONS = ("stage", "jump", "crisis", "exponent", "increment")
+"""Tables of what was observed."""
+
 
 class Problem(NamedTuple):
     """What is to be found: the targets, and the configuration that computes them."""
@@ -94,10 +97,9 @@ def _faults(targets: Targets) -> Iterator[Fault]:
             remedy = f'such as "{increment.coordinate.removesuffix("_rate")}"'
             key = f"increment[{number}].coordinate"
             yield Fault(key, "must be a displacement", remedy, increment.coordinate)
-    tables = ("stage", "jump", "crisis", "exponent", "increment")
-    if not any(getattr(targets, table) for table in tables):
+    if not any(getattr(targets, table) for table in OBSERVATIONS):
         rule = "is missing, and so are the other observations"
-        yield Fault("stage", rule, f"give at least one of {', '.join(tables)}")
+        yield Fault("stage", rule, f"give at least one of {', '.join(OBSERVATIONS)}")
     search = targets.search
     if not search.population <= search.drawn <= search.candidates:
         rule = (
@@ -145,3 +147,20 @@ def _unfit(config: Configuration, targets: Targets, source: str) -> Iterator[str
                 for name, own in own_names.items():
                     told = told.replace(f"second_sweep.{name}", f"parameter[{number}].{own}")
                 yield f"{source}: {told}"
+    for key, value in _places(targets):
+        try:
+            config.replace("sweep", {"parameter": config.sweep.parameter, "values": [value]})
+        except ConfigurationError as error:
+            for problem in error.problems:
+                told = problem.removeprefix(f"{config.source}: ")
+                yield f"{source}: {told.replace('sweep.values', key)}"
+
+
+def _places(targets: Targets) -> Iterator[tuple[str, float]]:
+    """Yield where on the axis of the sweep something is looked at, each place with its key."""
+    for table in OBSERVATIONS:
+        for number, one in enumerate(getattr(targets, table)):
+            for name, value in one.model_dump(by_alias=True).items():
+                if name in ("from", "to", "at", "within"):
+                    for place in value if name == "within" else [value]:
+                        yield f"{table}[{number}].{name}", place

@@ -21,7 +21,7 @@ ONE_UNIT = 1.0
 NEAREST = 3
 """Steps in each direction whose misfits tell how even the best set's surroundings are."""
 
-LABEL, COLUMN = 34, 11
+LABEL, COLUMN = 34, 12
 
 
 class Reach(NamedTuple):
@@ -102,7 +102,8 @@ def _determined(keys: Iterable[str], tried: Tried) -> Iterator[str]:
     yield _row("", ["alone from", "to", "all from", "to"])
     for key, *ends in zip(keys, *found[:4], strict=True):
         yield _row(key, ends)
-    yield f"(sets a thousandth of the bounds beside set 1: misfit {found.surroundings:.4g})"
+    beside = "a thousandth of the bounds beside where the last steps began"
+    yield f"({beside}: misfit {found.surroundings:.4g})"
 
 
 def _row(name: str, entries: Iterable[str | float]) -> str:

@@ -29,6 +29,9 @@ FIRST_SPREAD = 0.2
 RUNGS = 20
 """Steps away from the best candidate, for each parameter and direction."""
 
+STARTS = 4
+"""Drawn sets kept for each run to begin from: runs that end early are followed by more."""
+
 MOST_CENTRES = 5
 """Where one of those steps is better than the best candidate, they begin again from it."""
 
@@ -52,7 +55,7 @@ def proposals(search: Search, parameters: int) -> Proposals:
     drawn = random.random((search.drawn, parameters))
     misfits = yield Generation(DRAWN, drawn)
     best, least = drawn[np.argmin(misfits)], float(np.min(misfits))
-    starts = distinct(drawn, misfits, search.apart, most=search.drawn)
+    starts = distinct(drawn, misfits, search.apart, most=STARTS * search.runs)
     left, run = search.candidates - search.drawn, 0
     while left >= search.population:
         begin = drawn[starts[run % len(starts)]]

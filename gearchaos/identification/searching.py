@@ -100,7 +100,8 @@ def search(
 
     ``known`` are those of an earlier part of it, from the file ``source``, which are not computed
     again; ``keep`` is called with all there are from time to time, and where the search is
-    interrupted; ``advance`` with every number of candidates done.
+    interrupted, as soon as they are more than the known ones; ``advance`` with every number of
+    candidates done.
 
     Raises
     ------
@@ -108,7 +109,7 @@ def search(
         If the known candidates are not the first ones of this search.
     """
     parts: list[Tried] = []
-    done, spoke = 0, time.monotonic()
+    done, before, spoke = 0, 0 if known is None else len(known), time.monotonic()
     asking = proposals(judge.targets.search, len(judge.targets.parameter))
     generation = next(asking)
     try:
@@ -117,7 +118,7 @@ def search(
             for first in range(0, len(generation.points), judge.at_once):
                 check()
                 piece = generation._replace(points=generation.points[first:][: judge.at_once])
-                if known is not None and done < len(known):
+                if known is not None and done < before:
                     found = _again(piece, known.part(done, done + len(piece.points)), judge, source)
                 else:
                     found = judge.judge(piece)
@@ -125,7 +126,7 @@ def search(
                 parts.append(found)
                 done += len(found)
                 misfits.append(found.misfit)
-                if time.monotonic() - spoke > SECONDS_BETWEEN_SNAPSHOTS:
+                if done > before and time.monotonic() - spoke > SECONDS_BETWEEN_SNAPSHOTS:
                     spoke = time.monotonic()
                     parts = [joined(parts)]
                     keep(parts[0])
@@ -133,7 +134,7 @@ def search(
     except StopIteration:
         return joined(parts)
     except KeyboardInterrupt:
-        if parts:
+        if done > before:
             keep(joined(parts))
         raise
 

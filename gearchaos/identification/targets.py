@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from itertools import product
 from typing import Annotated, Any, TypeAlias
 
 import numpy as np
@@ -14,6 +15,10 @@ from gearchaos.configuration.run_tables import State
 
 Floats = NDArray[np.float64]
 Pair: TypeAlias = Annotated[tuple[float, float], Field(strict=False)]
+
+
+MOST_FREE = 16
+"""Parameters that are free: 2^16 corners of their bounds are looked at before a search."""
 
 
 class Parameter(Table):
@@ -110,14 +115,18 @@ class Targets(Table):
         "keys of it that are replaced, as by --set", default=()
     )
     search: Search = key("how much is tried", default=Search())
-    parameter: Annotated[tuple[Parameter, ...], Field(strict=False, min_length=1)] = key(
-        "what is free"
-    )
+    parameter: Annotated[
+        tuple[Parameter, ...], Field(strict=False, min_length=1, max_length=MOST_FREE)
+    ] = key("what is free")
     stage: Annotated[tuple[Stage, ...], Field(strict=False)] = _many("observed stages")
     jump: Annotated[tuple[Jump, ...], Field(strict=False)] = _many("observed jumps")
     crisis: Annotated[tuple[Crisis, ...], Field(strict=False)] = _many("observed crises")
     exponent: Annotated[tuple[Exponent, ...], Field(strict=False)] = _many("observed exponents")
     increment: Annotated[tuple[Increment, ...], Field(strict=False)] = _many("observed increments")
+
+    def corners(self) -> dict[str, Floats]:
+        """Return the free parameters at all corners of their bounds, each of shape (corners,)."""
+        return self.values(np.array(list(product((0.0, 1.0), repeat=len(self.parameter)))))
 
     def values(self, points: Floats) -> dict[str, Floats]:
         """Return the free parameters, each of shape (candidates,), at points of the unit cube.

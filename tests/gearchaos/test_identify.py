@@ -1,7 +1,9 @@
 """Parameters are found again from what was observed, also after a search was stopped."""
 
 import math
+from contextlib import chdir, redirect_stderr, redirect_stdout
 from dataclasses import dataclass
+from io import StringIO
 from pathlib import Path
 
 import h5py
@@ -9,13 +11,15 @@ import numpy as np
 import pytest
 
 from gearchaos.errors import ConfigurationError, FileError
+from gearchaos.identification import evaluation, searching
+from gearchaos.identification.evaluation import require_stable
 from gearchaos.identification.loading import load_targets
-from gearchaos.identification.report import reach
+from gearchaos.identification.report import _row, reach
 from gearchaos.identification.searching import Judge, decisive_facts, search
-from gearchaos.identification.tried import read_tried, write_tried
+from gearchaos.identification.tried import Tried, read_tried, write_tried
 from gearchaos.identify import main
 
-from .commands import run_module
+from .commands import Ended, run_module
 
 DAMPING, AMPLITUDE, FREQUENCY, LOAD = 0.05, 0.02, 0.5, 0.1
 
@@ -55,7 +59,7 @@ configuration = "pair.toml"
 
 [search]
 seed = 3
-candidates = 400
+candidates = 240
 drawn = 40
 runs = 1
 population = 12
@@ -101,12 +105,20 @@ class Identified:
         return self.folder / "targets.h5"
 
 
+def command(folder, *arguments):
+    """Run the command in this process, which has imported what it needs."""
+    out, err = StringIO(), StringIO()
+    with chdir(folder), redirect_stdout(out), redirect_stderr(err):
+        code = main(["targets.toml", *arguments])
+    return Ended(code, out.getvalue(), err.getvalue())
+
+
 @pytest.fixture(scope="module")
 def identified(tmp_path_factory):
     folder = tmp_path_factory.mktemp("identify")
     (folder / "pair.toml").write_text(PAIR)
     (folder / "targets.toml").write_text(TARGETS)
-    ended = run_module("gearchaos.identify", "targets.toml", cwd=folder)
+    ended = command(folder)
     assert ended.code == 0, ended.err
     return Identified(folder, ended.out, ended.err)
 
@@ -146,7 +158,9 @@ class TestALinearPair:
         share += widths * INCREMENT_WIDTH / (acceleration(3.0) - acceleration(1.0))
         assert tried.values[best, 1] == pytest.approx(AMPLITUDE, rel=share)
 
-    def test_every_candidate_is_kept(self, identified):
+    def test_every_candidate_is_kept(self, identified, monkeypatch):
+        # However many motions are looked at together.
+        monkeypatch.setattr(evaluation, "MOTIONS_AT_ONCE", 3)
         tried, facts = tried_of(identified)
         judge = Judge(problem_of(identified))
         some = {"damping_ratio": tried.values[:5, 0], "pitch_error_amplitude": tried.values[:5, 1]}
@@ -182,7 +196,7 @@ class TestALinearPair:
 
 
 class TestASearchThatWasStopped:
-    def test_goes_on_to_the_same_candidates(self, identified, tmp_path, monkeypatch, capsys):
+    def test_goes_on_to_the_same_candidates(self, identified, tmp_path):
         problem, (whole, _) = problem_of(identified), tried_of(identified)
         keys, judge = [one.name for one in problem.targets.parameter], Judge(problem)
         for name in ("pair.toml", "targets.toml"):
@@ -191,9 +205,8 @@ class TestASearchThatWasStopped:
         first = whole.part(0, 40 + 12 * 7)
         facts = decisive_facts(problem)
         write_tried(tmp_path / "targets.h5", first, keys, judge.observations, facts)
-        monkeypatch.chdir(tmp_path)
-        assert main(["targets.toml", "--resume", "--quiet"]) == 0
-        assert capsys.readouterr().out == identified.out
+        ended = command(tmp_path, "--resume", "--quiet")
+        assert (ended.code, ended.out) == (0, identified.out)
         assert numbers(tmp_path / "targets.h5") == numbers(identified.file)
 
     def test_keeps_its_candidates_when_it_is_interrupted(self, identified):
@@ -213,23 +226,38 @@ class TestASearchThatWasStopped:
         assert np.array_equal(again.misfit, whole.misfit)
         assert np.array_equal(again.values, whole.values)
 
+    def test_loses_no_candidate_while_it_is_taken_up_again(self, identified, monkeypatch):
+        class Stopping(Tried):
+            def part(self, first, last):
+                if first == 40 + 12:
+                    raise KeyboardInterrupt
+                return super().part(first, last)
+
+        def advance(_):
+            raise KeyboardInterrupt
+
+        monkeypatch.setattr(searching, "SECONDS_BETWEEN_SNAPSHOTS", 0.0)
+        judge, kept = Judge(problem_of(identified)), []
+        known = tried_of(identified)[0].part(0, 40 + 12 * 3)
+        for before in (Stopping(*known), known):
+            with pytest.raises(KeyboardInterrupt):
+                search(judge, before, kept.append, advance, "-")
+        assert kept == []
+
     def test_is_complete_where_nothing_is_left(self, identified):
         before = identified.file.stat().st_mtime_ns
-        ended = run_module("gearchaos.identify", "targets.toml", "--resume", cwd=identified.folder)
+        ended = command(identified.folder, "--resume")
         assert (ended.code, ended.out) == (0, identified.out)
         assert "complete already" in ended.err
         assert identified.file.stat().st_mtime_ns == before
 
     def test_is_not_replaced_unasked(self, identified):
-        ended = run_module("gearchaos.identify", "targets.toml", cwd=identified.folder)
+        ended = command(identified.folder)
         assert ended.code == 4
         assert "exists already; replace it with --overwrite" in ended.err
 
     def test_is_not_continued_with_other_targets(self, identified):
-        ended = run_module(
-            *("gearchaos.identify", "targets.toml", "--resume", "--set", "search.seed=4"),
-            cwd=identified.folder,
-        )
+        ended = command(identified.folder, "--resume", "--set", "search.seed=4")
         assert ended.code == 4
         assert "targets.search.seed (3, now 4)" in ended.err
 
@@ -282,6 +310,34 @@ def test_a_fault_of_the_targets_is_one_clear_message(sound, tmp_path):
     (problem,) = raised.value.problems
     assert message in problem
     assert raised.value.exit_code in (2, 4)
+
+
+def test_a_place_off_the_axis_is_refused(tmp_path):
+    (tmp_path / "pair.toml").write_text(PAIR.replace("load", "pitch_error = 1.0\nload"))
+    swept = 'sweep={parameter="mesh_frequency",values=[1.0]}'
+    text = TARGETS.replace("[search]", f"set = ['{swept}']\n[search]", 1)
+    (tmp_path / "targets.toml").write_text(text.replace("from = 0.5", "from = 0.0"))
+    with pytest.raises(ConfigurationError) as raised:
+        load_targets(tmp_path / "targets.toml")
+    (problem,) = raised.value.problems
+    assert "targets.toml: stage[0].from = 0.0: mesh_frequency must be finite and > 0" in problem
+
+
+def test_bounds_with_which_the_steps_are_unstable_are_refused(identified):
+    # Undamped, eq. 13 has the eigenvalues i and -i: RK4 is stable for steps of up to sqrt(8).
+    fewest = math.ceil(2.0 * math.pi / FREQUENCY / math.sqrt(8.0))
+    few = f'set=["integration.steps_per_period={fewest - 1}"]'
+    ended = command(identified.folder, "--overwrite", "--set", few)
+    assert (ended.code, ended.out) == (2, "")
+    assert f"integration.steps_per_period = {fewest - 1}: RK4 is unstable below" in ended.err
+    assert "raise it in `set`" in ended.err and "because of the torsion" in ended.err
+    problem = load_targets(identified.folder / "targets.toml", [few])
+    exact = problem.config.replace("integration.method", "flow_map")
+    require_stable(exact, np.array([1.0]), problem.targets.corners())
+
+
+def test_numbers_beside_each_other_stay_apart():
+    assert _row("", [-1.2345e-05, -1.2345e-05]).split() == ["-1.2345e-05"] * 2
 
 
 def test_targets_without_observations_are_refused(tmp_path):
