@@ -4,7 +4,15 @@ import numpy as np
 import pytest
 
 import gearchaos
-from gearchaos.engine.error_check import CHANGED, MEANINGS, NOT_CHECKED, SAME, Tally, checked_lanes
+from gearchaos.engine.error_check import (
+    CHANGED,
+    CHECKED,
+    MEANINGS,
+    NOT_CHECKED,
+    SAME,
+    Tally,
+    checked_lanes,
+)
 
 from .short_sweeps import assert_same, computed, simulation
 
@@ -49,6 +57,14 @@ def test_the_error_is_the_difference_to_half_the_step():
     assert np.allclose(coarse["section_error"][single], distance[single], rtol=0.1, atol=1e-7)
     exponents = np.abs(coarse["lyapunov_exponent"] - fine["lyapunov_exponent"])
     assert np.array_equal(coarse["exponent_step_error"], exponents)
+
+
+def test_the_check_looks_at_what_the_labels_know_and_not_at_what_the_file_keeps():
+    few = computed(simulation(*LONG, "integration.error_check=1.0", "outputs.section_points=2"))
+    many = computed(simulation(*LONG, "integration.error_check=1.0"))
+    for name in CHECKED:
+        assert np.array_equal(few[name], many[name], equal_nan=True)
+    assert np.isfinite(few["section_error"]).sum() > 5
 
 
 def test_lanes_that_were_not_checked_say_so():

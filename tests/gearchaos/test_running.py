@@ -5,7 +5,7 @@ import pytest
 
 import gearchaos
 
-from .commands import SMALL, same_data, small_config, sweep
+from .commands import SMALL, run_module, same_data, small_config, sweep
 
 
 @pytest.fixture
@@ -56,6 +56,18 @@ def test_a_run_says_nothing_unless_it_is_asked_to(config, capfd):
     out, err = capfd.readouterr()
     assert out == ""
     assert "40 of 40 lanes" in err
+
+
+def test_what_a_silent_run_has_to_note_is_told_by_its_result(tmp_path, config, capfd):
+    overrides = ["groups.stiffness_variation_scale=9.0", "integration.steps_per_period=24"]
+    result = gearchaos.run(config(*overrides, 'integration.unstable="raise"'))
+    assert capfd.readouterr() == ("", "")
+    notes = result.metadata["notes"].splitlines()
+    assert [note for note in notes if "the mesh stiffness falls to" in note]
+    result.save(tmp_path / "noted.h5")
+    told = " ".join(run_module("gearchaos.info", "noted.h5", cwd=tmp_path).out.split())
+    for note in notes:
+        assert note in told
 
 
 def test_a_saved_run_is_read_back_as_it_was(tmp_path, config):
