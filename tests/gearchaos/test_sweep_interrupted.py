@@ -156,8 +156,8 @@ def is_locked(output):
 @pytest.mark.slow
 @pytest.mark.skipif(not HELD_LOCKS.exists(), reason="the system does not tell which locks are held")
 def test_twenty_kills_at_random_moments_cost_no_bit(tmp_path):
-    # Thirty-two blocks, of which every attempt finishes a few; the last ones meet the merging.
-    wide = ("--threads", "1", *LINEAR, "--set", "sweep.count=8000", "--quiet")
+    # Sixty-three blocks, of which every attempt finishes a few; the last ones meet the merging.
+    wide = ("--threads", "1", *LINEAR, "--set", "sweep.count=16000", "--quiet")
     wide += ("--set", "integration.transient_periods=100")
     (tmp_path / "undisturbed").mkdir()
     assert sweep(tmp_path / "undisturbed", *wide).code == 0
@@ -173,11 +173,11 @@ def test_twenty_kills_at_random_moments_cost_no_bit(tmp_path):
         while process.is_alive() and not is_locked(output):
             time.sleep(0.005)
         before = blocks_in(tmp_path)
-        enough = min(before + moments.randint(0, 6), 32)
+        enough = min(before + moments.randint(0, 6), 63)
         while process.is_alive() and blocks_in(tmp_path) < enough:
             time.sleep(0.001)
         # The result to be is begun beside the blocks.
-        while process.is_alive() and enough == 32 and not list((tmp_path / BLOCKS).glob(".gears*")):
+        while process.is_alive() and enough == 63 and not list((tmp_path / BLOCKS).glob(".gears*")):
             time.sleep(0.001)
         time.sleep(moments.uniform(0.0, 0.03))
         process.kill()
@@ -187,8 +187,8 @@ def test_twenty_kills_at_random_moments_cost_no_bit(tmp_path):
         # What was there before is there still.
         assert finished[-1] >= before
         assert not output.exists()
-    assert len({count for count in finished if 0 < count < 32}) > 5, finished
-    assert finished.count(32) > 1, finished
+    assert len({count for count in finished if 0 < count < 63}) > 5, finished
+    assert finished.count(63) > 1, finished
     assert sweep(tmp_path, *wide, "--resume") == (0, "gears.h5\n", "")
     assert names_in(tmp_path) == ["gears.h5", "gears.toml", "undisturbed"]
     undisturbed = gearchaos.open_result(tmp_path / "undisturbed" / "gears.h5")

@@ -12,7 +12,10 @@ from .reference import (
     run,
     state,
 )
-from .test_hard_cases import BOTH, CLEARANCE, COS, assert_sound
+from .test_hard_cases import CLEARANCE, COS, assert_sound
+
+RK4 = pytest.mark.parametrize("resolved", [False, True], ids=["plain", "resolved"])
+"""Flow maps have no such limit."""
 
 
 def swinging(radians_a_step: np.ndarray, steps: int = 20):
@@ -22,7 +25,7 @@ def swinging(radians_a_step: np.ndarray, steps: int = 20):
 
 
 @pytest.mark.parametrize("scene", [CLEARANCE, TORSION_ONLY], ids=["constant", "varying"])
-@BOTH
+@RK4
 def test_a_run_far_beyond_the_stability_limit_diverges_in_a_few_periods(resolved, scene):
     model = swinging(np.linspace(4.5, 15.0, 64))
     outcome = run(
@@ -36,7 +39,7 @@ def test_a_run_far_beyond_the_stability_limit_diverges_in_a_few_periods(resolved
         assert np.isnan(outcome.section[lane, period:]).all()
 
 
-@BOTH
+@RK4
 def test_just_beyond_the_limit_lost_contact_bounds_what_the_method_blows_up(resolved):
     # Between 2.83 and 3.3 radians a step the method amplifies in contact and not off the flank:
     # the run neither diverges nor means anything, in a scene that can only settle. No status tells
@@ -68,7 +71,7 @@ def test_split_steps_can_hold_an_unstable_bearing_which_leaps_across_the_clearan
     assert sound.crossings.tolist() == [4 * 400]
 
 
-@BOTH
+@RK4
 def test_a_lane_out_of_the_range_of_numbers_within_a_period_stops_as_diverged(resolved):
     # Beyond all numbers, a gap has no moment at which it crosses: nothing is split or counted.
     start = np.stack([state(delta_5=value) for value in (1e300, -1e307)])
