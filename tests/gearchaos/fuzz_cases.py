@@ -20,6 +20,9 @@ WORKER = Path(__file__).with_name("fuzz_worker.py")
 STARTING_SECONDS = 60.0
 """Added to the time limit of the first case of a process, which imports and compiles."""
 
+COMPILING_SECONDS = 20.0
+"""Added to the time without an answer after which a case hangs: it may compile its kernels."""
+
 BUSY = 4.0
 """Seconds in which a process is given one second of the processor, at least."""
 
@@ -105,7 +108,7 @@ class Watch:
         before = _state(case.path)
         began = time.monotonic()
         allowed = self._seconds + STARTING_SECONDS * (self._worker is None)
-        answer = self._ask([case.command, *case.arguments], BUSY * allowed)
+        answer = self._ask([case.command, *case.arguments], BUSY * (allowed + COMPILING_SECONDS))
         if isinstance(answer, str):
             return Ending(None, answer, "", time.monotonic() - began)
         seconds, megabytes = answer["seconds"], answer["megabytes"]
