@@ -42,7 +42,7 @@ from gearchaos_kernels.block_memory import (
 from gearchaos_kernels.compilation import align_stack, block, scalar
 from gearchaos_kernels.contact import branches_at, step_may_leave
 from gearchaos_kernels.equations import gaps_at
-from gearchaos_kernels.flow_map import step_size
+from gearchaos_kernels.flow_layout import step_size
 from gearchaos_kernels.flow_steps import begin_forces, cross, move_block
 from gearchaos_kernels.flow_vectors import VECTOR, WORK
 from gearchaos_kernels.forcing import During, forcing_at, phase_on_grid

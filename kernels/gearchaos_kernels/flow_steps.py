@@ -35,7 +35,7 @@ from gearchaos_kernels.block_memory import (
 from gearchaos_kernels.compilation import scalar
 from gearchaos_kernels.contact import NEVER, branches_at, first_fall, next_branch
 from gearchaos_kernels.equations import gaps_at
-from gearchaos_kernels.flow_map import BOUND_Y, BOUND_Z, HEADER, TERMS, layout
+from gearchaos_kernels.flow_layout import BOUND_Y, BOUND_Z, HEADER, TERMS, layout
 from gearchaos_kernels.flow_vectors import (
     GAP_Y,
     GAP_Z,

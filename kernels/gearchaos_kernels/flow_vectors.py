@@ -27,7 +27,7 @@ from gearchaos_kernels.block_memory import (
     TANGENTIAL_BRANCH,
 )
 from gearchaos_kernels.compilation import FASTMATH
-from gearchaos_kernels.flow_map import BOUND_Y, BOUND_Z, TERMS, Layout, layout
+from gearchaos_kernels.flow_layout import BOUND_Y, BOUND_Z, TERMS, Layout, layout
 
 VECTOR = 8
 """Lanes of a vector."""
@@ -68,6 +68,11 @@ class _Writer:
     def data(self, kind: Any, array: Any) -> Any:
         """Return the first address of an array."""
         return self.context.make_array(kind)(self.context, self.builder, array).data
+
+    def element(self, signature: Any, arguments: Any, number: int) -> Any:
+        """Return the address in an array argument that the argument behind it counts."""
+        array = self.data(signature.args[number], arguments[number])
+        return self.builder.gep(array, [arguments[number + 1]])
 
     def at(self, pointer: Any, index: Any, more: int = 0) -> Any:
         """Return the address of an element."""
@@ -134,8 +139,7 @@ def keep_before(_typing: Any, memory: Any, slot: Any, table: Any, row: Any, pres
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         w = _Writer(context, builder)
-        lanes = builder.gep(w.data(signature.args[0], arguments[0]), [arguments[1]])
-        numbers = builder.gep(w.data(signature.args[2], arguments[2]), [arguments[3]])
+        lanes, numbers = (w.element(signature, arguments, array) for array in (0, 2))
         zero = ir.Constant(arguments[1].type, 0)
         kind = ir.VectorType(_DOUBLE, VECTOR)
         name = f"llvm.fabs.v{VECTOR}f64"
@@ -180,8 +184,7 @@ def move(
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         w = _Writer(context, builder)
-        lanes = builder.gep(w.data(signature.args[0], arguments[0]), [arguments[1]])
-        numbers = builder.gep(w.data(signature.args[2], arguments[2]), [arguments[3]])
+        lanes, numbers = (w.element(signature, arguments, array) for array in (0, 2))
         zero = ir.Constant(arguments[1].type, 0)
         place, mask = scene.layout, None
         if place.pairs > 1:
