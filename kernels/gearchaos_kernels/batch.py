@@ -53,7 +53,8 @@ def _integrate_blocks(
             tangent,
             flow_map,
         )
-        integrate_block(number, batch, plan, outcome, present)
+        # One type of number inside and outside of the parallel loop: else two are compiled.
+        integrate_block(np.int64(number), batch, plan, outcome, present)
 
 
 def integrate(

@@ -1,9 +1,11 @@
 """How the kernels are compiled: flags, vector width, stack alignment and what is cached.
 
-Every flag is named here and nowhere else. Two facts about Numba shape this file:
+Every flag is named here and nowhere else. Three facts about Numba shape this file:
 
 * a cached caller contains the code of its callees, and would keep it when one is edited in another
   file. The cache folder is therefore named after a hash of all kernel sources;
+* every function is optimised and made executable for itself, and again in each function it is
+  linked into: five times for the block of lanes. Here only what Python calls is;
 * LLVM prefers 256-bit vectors on some AVX-512 processors, and it spills vector registers to an
   unaligned stack. Both cost up to half of the speed of the lane loop.
 """
@@ -13,6 +15,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import llvmlite.binding
@@ -21,6 +24,7 @@ from llvmlite import ir
 from numba import config, types
 from numba.core import cgutils
 from numba.core import ir as numba_ir
+from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import CompilerBase, DefaultPassBuilder
 from numba.core.compiler_machinery import FunctionPass, register_pass
 from numba.core.ir_utils import get_definition, guard
@@ -101,8 +105,44 @@ class _Compiler(CompilerBase):  # type: ignore[misc]
         return [passes]
 
 
-def _decorate(function: Callable[..., Any], **flags: Any) -> Any:
-    return numba.njit(pipeline_class=_Compiler, **_SHARED_FLAGS, **flags)(function)
+class _LinkedOnly(JITCodeLibrary):  # type: ignore[misc]
+    """Code of functions that no Python calls: a driver that they are linked into optimises it."""
+
+    codegen = SimpleNamespace(set_env=lambda _name, _environment: None)
+
+    def _optimize_final_module(self) -> None:
+        """Leave it to the driver."""
+
+    def _finalize_final_module(self) -> None:
+        """Make nothing executable."""
+        self._finalize_dynamic_globals()
+        self._finalized = True
+
+    def get_pointer_to_function(self, _name: str) -> int:
+        """Return null, as where there is no such function."""
+        self._ensure_finalized()
+        return 0
+
+
+class _DriverCompiler(_Compiler):
+    """Compile a driver; everything that is compiled on its way is only linked into it."""
+
+    def _compile_core(self) -> Any:
+        """Run the passes with a library for the driver, and another kind for all others."""
+        codegen = self.state.targetctx.codegen()
+        self.state.library = codegen.create_library(self.state.func_id.func_qualname)
+        self.state.library.enable_object_caching()
+        codegen._library_class = _LinkedOnly
+        try:
+            return super()._compile_core()
+        finally:
+            del codegen._library_class
+
+
+def _decorate(
+    function: Callable[..., Any], compiler: type[CompilerBase] = _Compiler, **flags: Any
+) -> Any:
+    return numba.njit(pipeline_class=compiler, **_SHARED_FLAGS, **flags)(function)
 
 
 def scalar(function: Callable[..., Any]) -> Any:
@@ -117,7 +157,7 @@ def part(function: Callable[..., Any]) -> Any:
 
 def driver(function: Callable[..., Any], parallel: bool = True) -> Any:
     """Compile a function that only splits, calls and merges, in parallel and cached on disk."""
-    dispatcher = _decorate(function, parallel=parallel, nogil=True)
+    dispatcher = _decorate(function, _DriverCompiler, parallel=parallel, nogil=True)
     dispatcher._cache = KernelCache(function, CACHE_FOLDER)
     return dispatcher
 
