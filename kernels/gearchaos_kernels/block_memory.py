@@ -26,7 +26,7 @@ from numba.core import cgutils
 from numba.extending import intrinsic
 from numpy.typing import NDArray
 
-from gearchaos_kernels.compilation import CACHE_LINE, scalar
+from gearchaos_kernels.compilation import CACHE_LINE, part, scalar
 from gearchaos_kernels.system import STATES, Plan, System
 
 LANES = 32
@@ -167,7 +167,7 @@ class Block(NamedTuple):
     lanes: int
 
 
-@scalar
+@part
 def aligned_memory():
     """Return memory for one block that starts on a cache line."""
     memory = np.empty(ROWS * STRIDE + CACHE_LINE // _ITEM)

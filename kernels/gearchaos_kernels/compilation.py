@@ -142,12 +142,20 @@ class _DriverCompiler(_Compiler):
 def _decorate(
     function: Callable[..., Any], compiler: type[CompilerBase] = _Compiler, **flags: Any
 ) -> Any:
-    return numba.njit(pipeline_class=compiler, **_SHARED_FLAGS, **flags)(function)
+    dispatcher = numba.njit(pipeline_class=compiler, **_SHARED_FLAGS, **flags)(function)
+    # Numba would compile for every constant argument anew; LLVM knows them all the same.
+    template = dispatcher.get_call_template
+    dispatcher.get_call_template = lambda args, kws: template(
+        tuple(map(types.unliteral, args)), kws
+    )
+    return dispatcher
 
 
 def scalar(function: Callable[..., Any]) -> Any:
     """Compile a formula of plain numbers that is inlined wherever it is used."""
-    return _decorate(function, forceinline=True, no_cfunc_wrapper=True, no_cpython_wrapper=True)
+    return _decorate(
+        function, forceinline=True, no_cfunc_wrapper=True, no_cpython_wrapper=True, _nrt=False
+    )
 
 
 def part(function: Callable[..., Any]) -> Any:
@@ -157,7 +165,9 @@ def part(function: Callable[..., Any]) -> Any:
 
 def driver(function: Callable[..., Any], parallel: bool = True) -> Any:
     """Compile a function that only splits, calls and merges, in parallel and cached on disk."""
-    dispatcher = _decorate(function, _DriverCompiler, parallel=parallel, nogil=True)
+    dispatcher = _decorate(
+        function, _DriverCompiler, parallel=parallel, nogil=True, no_cfunc_wrapper=True
+    )
     dispatcher._cache = KernelCache(function, CACHE_FOLDER)
     return dispatcher
 
