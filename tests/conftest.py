@@ -17,3 +17,5 @@ def pytest_cmdline_main(config):
         return
     if getattr(option, "numprocesses", 0) is None:
         option.numprocesses = "logical"
+        # A file in one process: what its tests compile is compiled once.
+        option.dist = "loadfile"

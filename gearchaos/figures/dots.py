@@ -119,13 +119,16 @@ def counts(axes: Axes, lanes: Lanes, rows: Floats, margin: int = 0) -> NDArray[n
     box = axes.bbox
     left, bottom = floor(box.x0) - margin, floor(box.y0) - margin
     width, height = ceil(box.x1) + margin - left, ceil(box.y1) + margin - bottom
-    counted = np.zeros(height * width, np.uint32)
+    counted = np.zeros(height * width, np.intp)
+    # Each axis for itself, as those of a diagram are: a point is half the work of a transform.
+    (along, _, begin), (_, up, bottom_edge), _ = (axes.transLimits + axes.transAxes).get_matrix()
+    x = along * axes.xaxis.get_transform().transform(lanes.parameter) + begin
+    columns = np.floor(x + 0.5) - left
     for part, values in portions(lanes, rows):
-        x = np.repeat(lanes.parameter[part], values.shape[1])
-        place = axes.transData.transform(np.column_stack([x, values.ravel()]))
-        column = np.floor(place[:, 0] + 0.5) - left
-        row = np.ceil(place[:, 1] - 0.5) - bottom
+        y = up * axes.yaxis.get_transform().transform(values) + bottom_edge
+        row = np.ceil(y - 0.5) - bottom
+        column = np.broadcast_to(columns[part, np.newaxis], row.shape)
         inside = (column >= 0) & (column < width) & (row >= 0) & (row < height)
         pixel = row[inside].astype(np.intp) * width + column[inside].astype(np.intp)
-        np.add.at(counted, pixel, np.uint32(1))
-    return counted.reshape(height, width)
+        counted += np.bincount(pixel, minlength=counted.size)
+    return counted.astype(np.uint32).reshape(height, width)
