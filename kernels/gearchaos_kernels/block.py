@@ -39,7 +39,7 @@ from gearchaos_kernels.block_memory import (
     write_branches,
     write_state,
 )
-from gearchaos_kernels.compilation import align_stack, block, scalar
+from gearchaos_kernels.compilation import align_stack, part, scalar
 from gearchaos_kernels.contact import branches_at, step_may_leave
 from gearchaos_kernels.equations import gaps_at
 from gearchaos_kernels.flow_layout import step_size
@@ -80,7 +80,7 @@ class Batch(NamedTuple):
     maps: NDArray[np.float64]
 
 
-@block
+@part
 def integrate_block(number_of_block, batch, plan, outcome, present):
     """Integrate the lanes of a block, and write what comes of them."""
     align_stack()

@@ -177,11 +177,6 @@ def evaluator(function: Callable[..., Any]) -> Any:
     return driver(function, parallel=False)
 
 
-def block(function: Callable[..., Any]) -> Any:
-    """Compile a function that integrates one block of lanes on one thread."""
-    return _decorate(function, nogil=True)
-
-
 @intrinsic
 def align_stack(_typing_context: Any) -> Any:
     """Align the caller's stack frame to a cache line, so that spilled vectors do not straddle two.

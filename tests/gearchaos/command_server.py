@@ -12,6 +12,7 @@ import signal
 import sys
 
 import matplotlib.pyplot as plt  # noqa: F401
+from numba.core.registry import cpu_target
 
 import gearchaos.engine.refinement
 import gearchaos.engine.running
@@ -25,6 +26,9 @@ LONGEST = 300
 
 def main() -> None:
     """Serve until the input ends."""
+    # What Numba would import in every process before it loads the first kernel.
+    cpu_target.typing_context.refresh()
+    cpu_target.target_context.refresh()
     for line in sys.stdin:
         process = os.fork()
         if process == 0:
