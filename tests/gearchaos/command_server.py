@@ -1,7 +1,8 @@
 """A process that has imported what commands import, and forks to run each of them as a process.
 
 It reads one JSON list a line: module, arguments, folder, and the files for stdout and stderr. It
-answers with the exit code on a line. Everything but the imports happens as in a process of its own.
+answers with the number of the process, and then with its exit code, each on a line. Everything but
+the imports happens as in a process of its own.
 """
 
 import atexit
@@ -33,14 +34,21 @@ def main() -> None:
         process = os.fork()
         if process == 0:
             run(*json.loads(line))
-        ended = os.waitstatus_to_exitcode(os.waitpid(process, 0)[1])
-        sys.stdout.write(f"{ended}\n")
-        sys.stdout.flush()
+        answer(process)
+        answer(os.waitstatus_to_exitcode(os.waitpid(process, 0)[1]))
+
+
+def answer(number: int) -> None:
+    """Write a line."""
+    sys.stdout.write(f"{number}\n")
+    sys.stdout.flush()
 
 
 def run(module: str, arguments: list[str], folder: str, out: str, err: str) -> None:
     """Become the process of one command, and end as it ends."""
     signal.alarm(LONGEST)
+    # A test run in the background may have been told to ignore Ctrl-C, and hands that on.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
     os.chdir(folder)
     for name, descriptor in ((os.devnull, 0), (out, 1), (err, 2)):
         os.dup2(os.open(name, os.O_RDWR), descriptor)

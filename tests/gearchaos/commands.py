@@ -3,11 +3,10 @@
 import atexit
 import json
 import os
-import signal
 import subprocess
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -106,26 +105,30 @@ def small_config(folder: Path) -> Path:
 def run_module(module: str, *arguments: str, cwd: Path, **options) -> Ended:
     """Run ``python -m module`` in a folder."""
     if not options and _environment() == _ENVIRONMENT:
-        return _forked(module, arguments, cwd)
+        return _begin(module, arguments, cwd)[1]()
     command = [sys.executable, "-m", module, *arguments]
     done = subprocess.run(command, cwd=cwd, capture_output=True, text=True, timeout=300, **options)
     assert "Traceback" not in done.stderr, done.stderr
     return Ended(done.returncode, done.stdout, done.stderr)
 
 
-def _forked(module: str, arguments: Sequence[str], cwd: Path) -> Ended:
-    """Run the command in a process that need not import what it needs."""
-    server = _server()
-    with TemporaryDirectory() as folder:
-        out, err = Path(folder, "out"), Path(folder, "err")
-        for file in (out, err):
-            file.touch()
-        words = [module, arguments, str(cwd), str(out), str(err)]
-        server.stdin.write(json.dumps(words) + "\n")
-        server.stdin.flush()
-        ended = Ended(int(server.stdout.readline()), out.read_text(), err.read_text())
-    assert "Traceback" not in ended.err, ended.err
-    return ended
+def _begin(module: str, arguments: Sequence[str], cwd: Path) -> tuple[int, Callable[[], Ended]]:
+    """Begin a command that need not import what it needs; return its process, and how to wait."""
+    server, folder = _server(), TemporaryDirectory()
+    out, err = Path(folder.name, "out"), Path(folder.name, "err")
+    for file in (out, err):
+        file.touch()
+    words = [module, arguments, str(cwd), str(out), str(err)]
+    server.stdin.write(json.dumps(words) + "\n")
+    server.stdin.flush()
+
+    def ended() -> Ended:
+        with folder:
+            ended = Ended(int(server.stdout.readline()), out.read_text(), err.read_text())
+        assert "Traceback" not in ended.err, ended.err
+        return ended
+
+    return int(server.stdout.readline()), ended
 
 
 @cache
@@ -169,17 +172,9 @@ def same_data(one: gearchaos.Result, other: gearchaos.Result) -> bool:
 
 def signalled(folder: Path, blocks: str, number: int, *arguments: str) -> Ended:
     """Run a sweep, send it a signal once a block is finished; return exit code, stdout, stderr."""
-    with subprocess.Popen(
-        [sys.executable, "-m", "gearchaos.sweep", *arguments],
-        cwd=folder,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        # A test run in the background may have been told to ignore Ctrl-C, and hands that on.
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
-    ) as process:
-        while process.poll() is None and not list((folder / blocks).glob("*.block")):
-            time.sleep(0.005)
-        process.send_signal(number)
-        out, err = process.communicate(timeout=60)
-    return Ended(process.returncode, out, err)
+    process, ended = _begin("gearchaos.sweep", arguments, folder)
+    late = time.monotonic() + 60.0
+    while not list((folder / blocks).glob("*.block")) and time.monotonic() < late:
+        time.sleep(0.005)
+    os.kill(process, number)
+    return ended()
