@@ -173,7 +173,7 @@ def test_twenty_kills_at_random_moments_cost_no_bit(tmp_path):
         while process.is_alive() and not is_locked(output):
             time.sleep(0.005)
         before = blocks_in(tmp_path)
-        enough = min(before + moments.randint(0, 6), 63)
+        enough = min(before + moments.randint(1, 7), 63)
         while process.is_alive() and blocks_in(tmp_path) < enough:
             time.sleep(0.001)
         # The result to be is begun beside the blocks.
