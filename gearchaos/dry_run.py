@@ -11,14 +11,14 @@ import numpy as np
 from gearchaos_kernels import current_threads
 from tqdm import tqdm
 
-from gearchaos.engine.running import pilot_rate
+from gearchaos.engine.running import pilot_seconds
 from gearchaos.engine.simulation import Simulation
 from gearchaos.results.variables import START
 
 
 def describe(simulation: Simulation, output: str) -> None:
     """Say what a run would compute and how long it would take, judged by a few real lanes."""
-    seconds = simulation.steps / pilot_rate(simulation)
+    seconds = pilot_seconds(simulation)
     duration = f"{seconds:.1f} s" if seconds < 100 else str(timedelta(seconds=round(seconds)))
     config = simulation.config
     lanes, threads = simulation.lanes, current_threads()
@@ -35,13 +35,13 @@ def describe(simulation: Simulation, output: str) -> None:
     ]
     if lanes.starts > 1:
         spans.append(f"{lanes.starts} starts each")
-    memory = simulation.block_memory(threads)
+    memory, steps = simulation.block_memory(threads), simulation.plan.steps_per_period
     for key, value in {
         "output": f"{output}{' (exists)' if os.path.exists(output) else ''}",
         "effects": ", ".join(config.scene.effects) or "none",
         "states": f"{len(lanes.states)}{_left_out(simulation)}",
         "lanes": f"{len(lanes)} ({', '.join(spans)})",
-        "steps": f"{simulation.steps:.3g} ({simulation.plan.steps_per_period} per period)",
+        "steps": f"{simulation.periods * steps:.3g} ({steps} per period)",
         "file": f"about {tqdm.format_sizeof(bytes_kept, 'B')} before compression",
         "memory": f"about {tqdm.format_sizeof(memory, 'B')} for a block of lanes",
         "time": f"about {duration} with {threads} thread{'s' if threads > 1 else ''}",

@@ -164,9 +164,9 @@ class System:
         outcome = kernels.integrate(self._record, self._start(start), plan)
         if outcome.status[0] != Status.OK or outcome.history is None:
             raise ConfigurationError(
-                f"{self.config.source}: the motion {kernels.STATUS_TEXTS[Status.DIVERGED]} in mesh "
-                f"period {outcome.diverged_period[0]}; raise integration.steps_per_period or check "
-                "the load and the start state"
+                f"{self.config.source}: the motion {kernels.STATUS_TEXTS[outcome.status[0]]} in "
+                f"mesh period {outcome.diverged_period[0]}; raise integration.steps_per_period or "
+                "check the load and the start state"
             )
         states = outcome.history[0]
         return Trajectory(np.arange(states.shape[0]) / plan.steps_per_period, states)
@@ -261,8 +261,12 @@ class System:
         return spectral_lines(values, self._steps)
 
     def stability_limit(self) -> int:
-        """Return the fewest steps per mesh period with which the integration is stable."""
-        return int(fewest_stable_steps(self._record)[0])
+        """Return the fewest steps per mesh period with which the integration is stable.
+
+        Of flow maps that is one.
+        """
+        rk4 = self.config.integration.method == "rk4"
+        return int(fewest_stable_steps(self._record)[0]) if rk4 else 1
 
     def mesh_motion(self, motion: Trajectory) -> kernels.MeshMotion:
         """Return mesh forces, contact and accelerations along a motion from `integrate` (eq. 13).

@@ -165,7 +165,7 @@ class Integration(Table):
     )
     tolerance: float | None = key(
         "largest error of section and exponent; the steps are then doubled, from steps_per_period "
-        "on, until lanes of the sweep that are tried beforehand reach it",
+        "on, until lanes of the sweep that are tried beforehand reach it; flow maps are tried once",
         example=1e-6,
         default=None,
         gt=0,

@@ -76,6 +76,8 @@ def labels_of(system: System, outcome: Outcome, plan: Plan) -> Told:
             _measure_return(labels, record.section, some[told.period > 0])
         sound = np.isfinite(state[lanes]).all(axis=1)
         lanes = lanes[sound & (labels.motion[lanes] == UNRESOLVED)]
+    # Nothing is known of it, not that it diverges.
+    labels.motion[outcome.status == Status.TOO_FAST] = UNRESOLVED
     return Told(labels, state)
 
 

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
+from gearchaos_kernels import Status
 from numpy.typing import NDArray
 
 from gearchaos.dynamics.largest_exponents import MIXED
@@ -54,11 +55,13 @@ class Tally:
         self._unsplit_lanes = 0
         self._unsplit_steps = 0
         self._mixed = 0
+        self._too_fast = 0
         self._checked = {name: [np.zeros(0)] for name in (*CHECKED, _OF_THE_RECORD)}
 
     def add(self, arrays: Mapping[str, NDArray[Any]]) -> None:
         """Count the lanes of one block."""
         self.diverged += int(np.count_nonzero(arrays["status"]))
+        self._too_fast += int(np.count_nonzero(arrays["status"] == Status.TOO_FAST))
         if "unsplit_steps" in arrays:
             self._unsplit_lanes += int(np.count_nonzero(arrays["unsplit_steps"]))
             self._unsplit_steps += int(np.sum(arrays["unsplit_steps"]))
@@ -74,6 +77,11 @@ class Tally:
     def remarks(self) -> list[str]:
         """What a user should know of the lanes, a line each."""
         remarks = [self.errors] if self.errors else []
+        if self._too_fast:
+            remarks.append(
+                f"{self._too_fast} of the diverged lanes did not diverge, but move faster than so "
+                "few flow maps can follow (status in the file); raise integration.steps_per_period"
+            )
         if self._unsplit_steps:
             remarks.append(
                 f"{self._unsplit_steps} steps of {self._unsplit_lanes} lanes crossed contact "

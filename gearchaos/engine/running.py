@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from gearchaos_kernels import current_threads, most_threads, use_threads
+from gearchaos_kernels import LANES, current_threads, most_threads, use_threads
 
 from gearchaos.configuration import Configuration
 from gearchaos.engine.error_check import Tally
@@ -128,29 +128,32 @@ def _check_memory(simulation: Simulation) -> None:
             f"{simulation.config.source}: integration.recorded_periods = {plan.recorded_periods}, "
             f"outputs.section_points = {plan.section_points}: a block of lanes takes {wanted:.3g} "
             f"bytes, more than the {memory:.3g} of this machine; record fewer periods, keep fewer "
-            "points"
+            f"points{', take fewer steps' if plan.method == 'flow_map' else ''}"
         )
 
 
-def pilot_rate(simulation: Simulation) -> float:
-    """Measure how many Runge-Kutta steps a second this sweep makes here.
+def pilot_seconds(simulation: Simulation) -> float:
+    """Estimate how long this sweep takes here.
 
     Parameters
     ----------
     simulation : Simulation
-        Compiled; a few mesh periods of its first block are integrated.
+        Compiled; a few mesh periods of as many lanes as the threads integrate at once are tried.
     """
-    lanes = min(len(simulation.lanes), simulation.block_lanes(current_threads()))
+    lanes = min(len(simulation.lanes), LANES * current_threads())
     if simulation.carried:  # One value after the other.
         lanes = simulation.lanes.starts
-    periods = 1
-    while True:
+
+    def seconds(periods: int) -> float:
         began = time.perf_counter()
-        steps = simulation.rehearse(lanes, periods)
-        seconds = time.perf_counter() - began
-        if seconds > PILOT_SECONDS:
-            return steps / seconds
+        simulation.rehearse(lanes, periods)
+        return time.perf_counter() - began
+
+    # The first time includes what a method prepares for the lanes: their maps.
+    preparing, periods = seconds(1), 1
+    while (taken := seconds(periods)) <= PILOT_SECONDS:
         periods *= 2
+    return preparing / lanes * len(simulation.lanes) + taken / periods / lanes * simulation.periods
 
 
 def choose_threads(threads: int | None) -> None:

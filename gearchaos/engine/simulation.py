@@ -23,10 +23,12 @@ from gearchaos.dynamics.exponents import exponents, sum_of_exponents
 from gearchaos.dynamics.labelling import LOOKS, Told, labels_of
 from gearchaos.dynamics.largest_exponents import MEANINGS as RECORD_MEANINGS
 from gearchaos.dynamics.largest_exponents import largest_exponents
+from gearchaos.dynamics.stability import sufficient_steps
 from gearchaos.dynamics.systems import plan_of
 from gearchaos.engine.error_check import MEANINGS, check_arrays, checked_lanes
 from gearchaos.engine.lanes import Lanes
 from gearchaos.engine.steps import (
+    MOST_STEPS,
     PILOT_LANES,
     Candidate,
     choose_steps,
@@ -100,6 +102,8 @@ class Simulation:
             coarsest,
             tolerance,
             self.config.source,
+            # Finer flow maps are no more exact.
+            4 * coarsest if self.plan.method == "flow_map" else MOST_STEPS,
         )
         steps, *measured = zip(*candidates, strict=True)
         self._choice = step_choice_variables(
@@ -124,10 +128,9 @@ class Simulation:
         return self.config.start.carry == "downwards"
 
     @property
-    def steps(self) -> int:
-        """Steps of the whole sweep."""
-        periods = self.plan.transient_periods + self.plan.recorded_periods
-        return len(self.lanes) * periods * self.plan.steps_per_period
+    def periods(self) -> int:
+        """Mesh periods of the whole sweep."""
+        return len(self.lanes) * (self.plan.transient_periods + self.plan.recorded_periods)
 
     @property
     def recording(self) -> Plan:
@@ -160,8 +163,8 @@ class Simulation:
     def _splits_steps(self) -> bool:
         return self.plan.resolved and "backlash" in self.lanes.effects
 
-    def rehearse(self, lanes: int = 1, periods: int = 0, history_periods: int = 0) -> int:
-        """Integrate the first lanes for a few mesh periods and return the number of steps.
+    def rehearse(self, lanes: int = 1, periods: int = 0, history_periods: int = 0) -> None:
+        """Integrate some lanes of the sweep for a few mesh periods.
 
         The kernel of this scene is compiled for it, or loaded from the cache.
         """
@@ -171,9 +174,8 @@ class Simulation:
             section_points=0,
             history_periods=history_periods,
         )
-        numbers = np.arange(lanes)
+        numbers = self.lanes.spread(lanes)
         integrate(self.lanes.system_of(numbers), self.lanes.start_of(numbers), plan)
-        return lanes * periods * plan.steps_per_period
 
     def block_memory(self, threads: int) -> int:
         """Return about how many bytes the arrays of one block take while it is computed."""
@@ -187,7 +189,9 @@ class Simulation:
             numbers += self.plan.recorded_periods * states
         maps = 0
         if self.plan.method == "flow_map":
-            maps = maps_memory(self.lanes.system_of(np.arange(lanes)), self.plan)
+            for block in np.arange(lanes), np.arange(len(self.lanes) - lanes, len(self.lanes)):
+                system = self.lanes.system_of(block)
+                maps = max(maps, maps_memory(system, self.plan, sufficient_steps(system)))
         return 8 * records * numbers + maps
 
     def block_lanes(self, threads: int) -> int:

@@ -41,7 +41,7 @@ PILOT_PERIODS = 150
 """Mesh periods in which a lane settles on its grid, and as many that are compared."""
 
 MOST_STEPS = 25_600
-"""Finest grid of the search."""
+"""Finest grid of the search, where the method needs one."""
 
 
 class Candidate(NamedTuple):
@@ -76,13 +76,14 @@ def stable_steps(lanes: Lanes, steps: int) -> tuple[int, str]:
     if not limits:
         return steps, ""
     worst = max(limits, key=lambda limit: limit.steps)
-    if lanes.config.integration.method == "flow_map":
+    integration, beyond = lanes.config.integration, worst.steps > MOST_STEPS_PER_PERIOD
+    if integration.method == "flow_map" and not beyond:
         return steps, (
             f"integration.steps_per_period = {steps}: RK4 would need {worst.steps} steps to be "
             "stable; flow maps have no such limit"
         )
     unstable = np.concatenate([limit.lanes for limit in limits])
-    if lanes.config.integration.unstable == "refuse" or worst.steps > MOST_STEPS_PER_PERIOD:
+    if integration.unstable == "refuse" or beyond:
         raise ConfigurationError(_fault(lanes, worst, unstable, steps).text(lanes.config.source))
     return worst.steps, (
         f"integration.steps_per_period raised from {steps} to {worst.steps}, the stability limit "
@@ -197,12 +198,17 @@ def pilot(
 
 
 def choose_steps(
-    solution: Callable[[int], Solution], coarsest: int, tolerance: float, source: str
+    solution: Callable[[int], Solution],
+    coarsest: int,
+    tolerance: float,
+    source: str,
+    finest: int = MOST_STEPS,
 ) -> list[Candidate]:
     """Double the steps until the error is small enough; the last candidate is the one to take.
 
     ``solution`` integrates the pilot lanes with so many steps per period, from one common state;
-    ``tolerance``: of section and exponent; ``source``: what a message calls the configuration.
+    ``tolerance``: of section and exponent; ``source``: what a message calls the configuration;
+    ``finest``: steps per period with which nothing is compared any more.
 
     Raises
     ------
@@ -212,7 +218,7 @@ def choose_steps(
     found: dict[int, Solution] = {}
     candidates: list[Candidate] = []
     steps = coarsest
-    while 4 * steps <= MOST_STEPS:
+    while 4 * steps <= finest:
         for grid in (steps, 2 * steps, 4 * steps):
             if grid not in found:
                 found[grid] = solution(grid)

@@ -109,6 +109,9 @@ def integrate(
             maps,
         )
         _integrate_blocks(batch, schedule, outcome, *present)
+        if maps.size:
+            unmapped = np.repeat(np.isnan(maps[blocks[:, 3]]), blocks[:, 1])
+            outcome.status[order[unmapped]] = Status.TOO_FAST
     return outcome._replace(
         growth=outcome.growth if plan.tangent else None,
         history=outcome.history if plan.history_periods else None,

@@ -83,11 +83,20 @@ def sharing(system: System) -> NDArray[np.intp]:
     return number.reshape(-1).astype(np.intp)
 
 
-def maps_memory(system: System, plan: Plan) -> int:
-    """Return about how many bytes the maps of lanes that are integrated together take."""
+def maps_memory(system: System, plan: Plan, stable: NDArray[np.int64]) -> int:
+    """Return about how many bytes the maps of lanes that are integrated together take.
+
+    ``stable`` (lanes,): steps per period with which RK4 is stable. Series need about as many, and
+    two for every harmonic of the stiffness; fewer are divided, see `_make`.
+    """
     place: Layout = layout.py_func(flags(system, plan))
-    one = 8 * plan.steps_per_period * (HEADER + place.pairs * place.size)
-    return min(one * (int(sharing(system).max(initial=0)) + 1), 2 * MOST_BYTES)
+    _, first = np.unique(sharing(system), return_index=True)
+    needed = stable[first] + 2.0 * system.stiffness_cosine.size * place.varies
+    steps = plan.steps_per_period
+    divided = steps * 2.0 ** np.ceil(np.log2(np.maximum(needed / steps, 1.0)))
+    sizes = 8 * (HEADER + place.pairs * place.size) * np.minimum(divided, max(steps, MOST_STEPS))
+    # Those that are kept, and those that are used.
+    return 2 * int(min(sizes.sum(), MOST_BYTES + sizes.max()))
 
 
 _kept: OrderedDict[Hashable, Floats] = OrderedDict()

@@ -10,9 +10,11 @@ class Status(IntEnum):
 
     OK = 0
     DIVERGED = 1
+    TOO_FAST = 2
 
 
 STATUS_TEXTS = {
     Status.OK: "integrated to the end",
     Status.DIVERGED: "left the range of numbers (or became not a number) and was stopped",
+    Status.TOO_FAST: "moves faster than so few flow maps can follow, and was stopped",
 }

@@ -34,6 +34,7 @@ SHORT = (
     "outputs.section_points=8",
     "sweep.count=13",
 )
+METHODS = ("rk4", "flow_map")
 RANDOM = ("start.kind=random", "start.seed=5", "start.count=3", "start.spread=0.7")
 
 

@@ -5,6 +5,7 @@ import pytest
 from gearchaos_kernels import Status
 
 from .short_sweeps import (
+    METHODS,
     RANDOM,
     assert_same,
     blocks,
@@ -18,9 +19,10 @@ from .short_sweeps import (
 )
 
 
+@pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("direction", ["upwards", "downwards"])
-def test_carried_sweep_is_the_chain_of_its_lanes_made_by_hand(direction):
-    sweep = simulation(f"start.carry={direction}")
+def test_carried_sweep_is_the_chain_of_its_lanes_made_by_hand(direction, method):
+    sweep = simulation(f"start.carry={direction}", f"integration.method={method}")
     arrays = computed(sweep, 5)
     state = np.zeros(6)
     for value in range(13) if direction == "upwards" else reversed(range(13)):

@@ -54,6 +54,12 @@ ONE_FAULT = [
     ("pair.helix_angle_deg=90", "helix_angle_deg = 90", "less than 90", "helix angle"),
     ("sweep.count=0", "sweep.count = 0", "must be at least 1", "number of values"),
     ("outputs.allowed_diverged_share=2.0", "share = 2.0", "must be at most 1", "diverged lanes"),
+    (
+        "integration={method='flow_map', crossings='plain'}",
+        'integration.crossings = "plain"',
+        "flow_map",
+        "resolves every crossing; it goes with method",
+    ),
     # words
     ('scene.effects=["backlsh"]', '[0] = "backlsh"', "must be one of", "did you mean `backlash`?"),
     ("start.kind=rset", 'start.kind = "rset"', "must be one of", "did you mean `rest`?"),

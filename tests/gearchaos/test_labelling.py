@@ -2,12 +2,13 @@
 
 import numpy as np
 import pytest
-from gearchaos_kernels import Plan
+from gearchaos_kernels import Plan, Status
 
 from gearchaos.configuration import load_config
 from gearchaos.dynamics.exponents import period_jacobian
 from gearchaos.dynamics.largest_exponents import MIXED
 from gearchaos.dynamics.orbits import polish
+from gearchaos.engine.error_check import Tally
 from gearchaos.engine.simulation import Simulation
 from gearchaos.records.label import (
     CHAOTIC,
@@ -173,6 +174,18 @@ def test_a_diverged_lane_is_labelled_as_diverged(tmp_path):
     assert arrays["motion"].tolist()[0] == DIVERGED
     assert DIVERGED not in arrays["motion"].tolist()[1:]
     assert np.isnan(arrays["return_distance"][0])
+
+
+def test_a_lane_too_fast_for_its_flow_maps_is_no_diverged_one(tmp_path):
+    # Twice as many would be more than are tried.
+    how = ("integration.method=flow_map", "integration.steps_per_period=2100")
+    arrays = computed(listing(tmp_path, "mesh_frequency", [1e-4, 0.8], *how))
+    assert arrays["status"].tolist() == [Status.TOO_FAST, Status.OK]
+    assert arrays["motion"][0] == UNRESOLVED
+    assert np.isnan(arrays["end_state"][0]).all()
+    tally = Tally()
+    tally.add(arrays)
+    assert "1 of the diverged lanes did not diverge" in "".join(tally.remarks)
 
 
 def test_the_meanings_of_the_labels_are_in_the_result():

@@ -5,6 +5,7 @@ import pytest
 
 from .short_sweeps import (
     RANDOM,
+    SHORT,
     assert_same,
     blocks,
     computed,
@@ -19,6 +20,20 @@ from .short_sweeps import (
 def test_a_sweep_does_not_depend_on_the_size_of_its_blocks(overrides, values):
     sweep = simulation(*overrides)
     assert_same(computed(sweep, values), computed(sweep))
+
+
+def test_two_parameters_of_which_one_changes_the_maps_are_those_of_fine_runge_kutta_steps():
+    where = (
+        "sweep.count=3",
+        "second_sweep={parameter='mesh_frequency', values=[0.8, 0.3]}",
+        "outputs.exponents=true",
+    )
+    exact = simulation(*where, "integration={method='flow_map'}", *SHORT[1:3])
+    arrays = computed(exact)
+    assert_same(computed(exact, 1), arrays)
+    fine = computed(simulation(*where, "integration.steps_per_period=1600"))
+    for name in ("end_state", "section_delta_5", "lyapunov_exponents"):
+        assert np.abs(arrays[name] - fine[name]).max() < 1e-7
 
 
 def test_blocks_need_not_hold_whole_values_where_nothing_is_carried():

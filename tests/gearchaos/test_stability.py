@@ -264,6 +264,13 @@ def test_a_state_at_rest_without_load_stays_there_with_any_number_of_steps():
     assert np.all(outcome.end_state == 0.0)
 
 
+def test_flow_maps_have_no_limit_and_say_so():
+    sweep = simulation("integration.method=flow_map", "integration.steps_per_period=3")
+    assert sweep.plan.steps_per_period == 3
+    (note,) = sweep.notes
+    assert note.endswith("RK4 would need 16 steps to be stable; flow maps have no such limit")
+
+
 @pytest.mark.parametrize(("steps", "warned"), [(16, True), (25, True), (64, False), (200, False)])
 def test_steps_that_are_stable_but_too_few_for_exponents_are_told(steps, warned):
     sweep = simulation("integration.unstable='raise'", f"integration.steps_per_period={steps}")

@@ -47,6 +47,15 @@ def test_a_tolerance_out_of_reach_is_refused_with_what_was_reached():
         choose_steps(method_of_order_four, 10, 1e-20, "x.toml")
 
 
+def test_steps_that_are_exact_are_measured_once():
+    with pytest.raises(ConfigurationError, match=r"is not reached, but 1.0e-02 with 10 steps"):
+        choose_steps(method_of_order_four, 10, 1e-4, "x.toml", finest=40)
+    sweep = simulation(*SHORT, "integration.method=flow_map", "integration.tolerance=1e-11")
+    sweep.choose_steps()
+    (steps,) = (v.values for v in sweep.variables if v.name == "candidate_steps")
+    assert list(steps) == [25] == [sweep.plan.steps_per_period]
+
+
 def test_where_nothing_is_periodic_no_error_is_claimed():
     def noise(steps: int) -> Solution:
         return solution(np.random.default_rng(steps).uniform(size=(20, 48, 1)))

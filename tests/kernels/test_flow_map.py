@@ -2,10 +2,13 @@
 
 import numpy as np
 import pytest
-from gearchaos_kernels import Plan, integrate
+from gearchaos_kernels import Plan, integrate, maps_memory
+from gearchaos_kernels.block_memory import flags
+from gearchaos_kernels.flow_map import maps_of
 from scipy.linalg import expm
 
 from gearchaos.dynamics.exponents import exponents, period_jacobian, sum_of_exponents
+from gearchaos.dynamics.stability import sufficient_steps
 
 from .reference import (
     BASE_HELIX_ANGLE,
@@ -110,6 +113,18 @@ def test_lanes_share_maps_or_not_with_the_same_result():
     for lanes in ([7], [0, 1, 2, 3], list(range(39, -1, -1))):
         some = integrate(pair.of(lanes), np.zeros((len(lanes), 6)), plan)
         assert_same_bits(some, lanes_out_of(whole, lanes))
+
+
+@pytest.mark.parametrize("scene", [TORSION_ONLY, NO_AXIAL])
+@pytest.mark.parametrize("steps", [1, STEPS])
+def test_the_memory_of_maps_is_foretold_within_a_factor_of_two(scene, steps):
+    for frequency in (0.06, 0.3, 1.5):
+        pair = system_of(pan2021(1.0, mesh_frequency=frequency), scene)
+        plan = Plan(steps, 0, 1, 0, method=FLOW_MAP)
+        made = maps_of(pair, steps, flags(pair, plan)).table.nbytes
+        # Those kept and those used.
+        told = maps_memory(pair, plan, sufficient_steps(pair))
+        assert 1 <= told / (2 * made) <= 2
 
 
 def random_pairs(count: int, seed: int) -> dict:
