@@ -128,22 +128,20 @@ def _stages(options: argparse.Namespace) -> int:
 def _refined(result: Result, stages: list[Stage], options: argparse.Namespace) -> list[Boundary]:
     # Only here: reading a file needs no compiler.
     from gearchaos.engine.refinement import refinable, refined_boundaries
-    from gearchaos.engine.running import COMPILING
-    from gearchaos.progress import notice
+    from gearchaos.engine.running import compiling
 
     config = refinable(result, options.result)
-    with notice(COMPILING):
+    with compiling():
         return refined_boundaries(config, result, stages, options.refine, options.threads)
 
 
 def _survival(result: Result, options: argparse.Namespace) -> Survival:
     from gearchaos.engine.refinement import computable
-    from gearchaos.engine.running import COMPILING
+    from gearchaos.engine.running import compiling
     from gearchaos.engine.survival import survival
-    from gearchaos.progress import notice
 
     config = computable(result, options.result)
-    with notice(COMPILING):
+    with compiling():
         return survival(config, result, options.survival, options.threads)
 
 

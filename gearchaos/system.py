@@ -16,7 +16,7 @@ import numpy as np
 from gearchaos_kernels import Plan, Status
 from numpy.typing import NDArray
 
-from gearchaos.configuration import Configuration, axis_values, load_config, swept_values
+from gearchaos.configuration import Configuration, axis_values, configuration_of, swept_values
 from gearchaos.dynamics.exponents import Exponents, exponents, sum_of_exponents
 from gearchaos.dynamics.following import (
     STABILITY_LOSS_TEXTS,
@@ -79,8 +79,7 @@ class System:
         at: Mapping[str, float] | None = None,
         **groups: float,
     ) -> None:
-        if not isinstance(config, Configuration):
-            config = load_config(config)
+        config = configuration_of(config)
         values = {name: float(value) for name, value in {**(at or {}), **groups}.items()}
         self.config = config.at(values)
         for sweep in self.config.sweeps.values():

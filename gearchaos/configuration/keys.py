@@ -7,7 +7,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Annotated, Any, TypeAlias
 
-from pydantic import BaseModel, ConfigDict, Field
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field, model_validator
 from pydantic.fields import FieldInfo
 
 from gearchaos.configuration.toml_text import toml_literal
@@ -26,6 +27,15 @@ class Table(BaseModel):
         serialize_by_alias=True,
         protected_namespaces=(),
     )
+
+    @model_validator(mode="before")
+    @classmethod
+    def _numbers_of_numpy(cls, given: Any) -> Any:
+        """Take the numbers of NumPy for those of Python: nothing is converted by that."""
+        if not isinstance(given, dict):
+            return given
+        numpy = (np.generic, np.ndarray)
+        return {k: v.tolist() if isinstance(v, numpy) else v for k, v in given.items()}
 
 
 # TOML has lists, the models hold tuples; strictness about the entries is not affected.

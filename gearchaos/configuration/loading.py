@@ -29,6 +29,11 @@ def load_config(path: str | os.PathLike[str], overrides: Iterable[str] = ()) -> 
     return Configuration.from_toml(text_of_file(source), source, overrides)
 
 
+def configuration_of(given: Configuration | str | os.PathLike[str]) -> Configuration:
+    """Return a configuration, or read it from the TOML file at a path, see `load_config`."""
+    return given if isinstance(given, Configuration) else load_config(given)
+
+
 def text_of_file(source: str) -> str:
     """Read the text of a file at a path; FileError or ConfigurationError if it cannot be read."""
     if not source:
@@ -43,6 +48,11 @@ def text_of_file(source: str) -> str:
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) else str(error)
         raise FileError(f"{source!r}: cannot be read: {reason}") from None
+    if content.startswith(b"\x89HDF"):
+        raise ConfigurationError(
+            f"{source}: is an HDF5 file, and a configuration is TOML; `gearchaos info {source}` "
+            "shows that of a result"
+        )
     if len(content) > LARGEST_FILE:
         raise ConfigurationError(
             f"{source}: larger than {LARGEST_FILE // 1024**2} MB, so hardly a configuration; "

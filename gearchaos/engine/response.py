@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import time
 from typing import Any
 
@@ -10,7 +11,7 @@ from gearchaos_kernels import Outcome, Status, System, mesh_motion
 from numpy.typing import NDArray
 from tqdm import tqdm
 
-from gearchaos.configuration import Configuration
+from gearchaos.configuration import Configuration, configuration_of
 from gearchaos.engine.refinement import computable
 from gearchaos.engine.running import choose_threads, metadata, result_of
 from gearchaos.engine.simulation import Simulation
@@ -29,14 +30,17 @@ LARGEST_RESPONSE = 4 * 2**30
 
 
 def respond(
-    config: Configuration, periods: int = DEFAULT_PERIODS, threads: int | None = None
+    config: Configuration | str | os.PathLike[str],
+    periods: int = DEFAULT_PERIODS,
+    threads: int | None = None,
 ) -> Result:
     """Compute the motion at every step of the last mesh periods, for every value of the sweep.
 
     Parameters
     ----------
-    config : Configuration
-        From `load_config`; transient, recorded periods, start and scene are as configured.
+    config : Configuration or path
+        From `load_config`, or the path of its file; transient, recorded periods, start and scene
+        are as configured.
     periods : int
         Mesh periods at the end of the recorded ones.
     threads : int, optional
@@ -55,6 +59,7 @@ def respond(
         threads.
     """
     choose_threads(threads)
+    config = configuration_of(config)
     simulation = prepared(config, periods)
     simulation.choose_steps()
     return compute_response(simulation, periods, config.text)

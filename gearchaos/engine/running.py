@@ -6,19 +6,23 @@ import math
 import os
 import time
 from collections.abc import Mapping, Sequence
+from contextlib import AbstractContextManager
+from contextvars import copy_context
+from functools import partial
 from typing import Any
 
 import numpy as np
 from gearchaos_kernels import current_threads, most_threads, use_threads
+from numba.core import event
 
-from gearchaos.configuration import Configuration
+from gearchaos.configuration import Configuration, configuration_of
 from gearchaos.engine.error_check import Tally
 from gearchaos.engine.executors import LocalExecutor, compute_blocks
 from gearchaos.engine.provenance import provenance
 from gearchaos.engine.simulation import Arrays, Bounds, Simulation
 from gearchaos.errors import ConfigurationError
 from gearchaos.interrupts import check
-from gearchaos.progress import Progress, notice, say, speaking
+from gearchaos.progress import Progress, say, speaking
 from gearchaos.results.result import Result
 from gearchaos.results.variables import Variable
 
@@ -27,16 +31,40 @@ METHOD_TEXTS = {
     "rk4": "classical Runge-Kutta of order 4 with fixed steps",
     "flow_map": "flow maps: exact steps from crossing to crossing",
 }
-COMPILING = "preparing the kernel of this scene; the first time this takes some seconds"
 
 
-def run(config: Configuration, threads: int | None = None, progress: bool = False) -> Result:
+class _Announcer(event.Listener):  # type: ignore[misc]
+    """Says once that the kernel is compiled, to whom it was made for."""
+
+    def __init__(self) -> None:
+        """Remember who listens: it may be compiled in another thread."""
+        self._say = [partial(copy_context().run, say)]
+
+    def on_start(self, _event: event.Event) -> None:
+        """Say it the first time."""
+        if self._say:
+            self._say.pop()("preparing the kernel of this scene, once; this takes some seconds")
+
+    def on_end(self, _event: event.Event) -> None:
+        """Say nothing."""
+
+
+def compiling() -> AbstractContextManager[object]:
+    """Say so if what follows is compiled, and not loaded from the cache."""
+    return event.install_listener("numba:compile", _Announcer())
+
+
+def run(
+    config: Configuration | str | os.PathLike[str],
+    threads: int | None = None,
+    progress: bool = False,
+) -> Result:
     """Compute a sweep in memory.
 
     Parameters
     ----------
-    config : Configuration
-        From `load_config`.
+    config : Configuration or path
+        From `load_config`, or the path of its file.
     threads : int, optional
         Threads to use; by default all that there are.
     progress : bool
@@ -54,7 +82,7 @@ def run(config: Configuration, threads: int | None = None, progress: bool = Fals
     """
     choose_threads(threads)
     with speaking(quiet=not progress):
-        return _run(Simulation(config))
+        return _run(Simulation(configuration_of(config)))
 
 
 def _run(simulation: Simulation) -> Result:
@@ -110,7 +138,7 @@ def prepare(simulation: Simulation, *, compile_now: bool = True, history_periods
     check()  # Imports take a while.
     if compile_now:
         _check_memory(simulation)
-        with notice(COMPILING):
+        with compiling():
             simulation.rehearse(periods=history_periods, history_periods=history_periods)
         check()
     simulation.choose_steps()

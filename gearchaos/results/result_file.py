@@ -19,7 +19,7 @@ from gearchaos.results.checksum_line import append_checksum
 from gearchaos.results.sink import Sink
 from gearchaos.results.variables import HARMONIC, Variable, diagram_axis, lane_axes
 
-SCHEMA = "gearchaos-sweep"
+SCHEMA, SEARCH_SCHEMA = "gearchaos-sweep", "gearchaos-identification"
 SCHEMA_VERSION = "3.0"
 PARAMETERS = "parameters"
 DIMS = "dims"

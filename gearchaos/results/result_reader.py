@@ -16,7 +16,14 @@ from gearchaos.errors import FileError
 from gearchaos.gear.group_table import LARGEST_VALUE
 from gearchaos.results.atomic_file import reason
 from gearchaos.results.checksum_line import checksum_fits
-from gearchaos.results.result_file import ORIGINS, PARAMETERS, SCHEMA, SCHEMA_VERSION, Parameter
+from gearchaos.results.result_file import (
+    ORIGINS,
+    PARAMETERS,
+    SCHEMA,
+    SCHEMA_VERSION,
+    SEARCH_SCHEMA,
+    Parameter,
+)
 from gearchaos.results.stored_dataset import (
     UnfitError,
     datasets_of,
@@ -80,9 +87,11 @@ def read_result(path: str | os.PathLike[str], *, rows: bool = True) -> Contents:
         raise FileError(f"{name}: {printable(str(error))}") from error
     except Exception as error:
         # Damage surfaces in h5py as nearly any kind of exception.
-        what = "is damaged" if h5py.is_hdf5(name) else "is not an HDF5 file, or is cut off"
+        if not h5py.is_hdf5(name):
+            remedy = "give the name of a result, which a sweep of a configuration writes"
+            raise FileError(f"{name}: is not an HDF5 file; {remedy}") from error
         why = printable(reason(error))
-        raise FileError(f"{name}: {what} ({why}); run the sweep again") from error
+        raise FileError(f"{name}: is damaged ({why}); run the sweep again") from error
 
 
 def fixed_coordinates(metadata: Mapping[str, Any]) -> dict[str, float]:
@@ -154,6 +163,11 @@ def _wording(notes: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _check_schema(metadata: Mapping[str, Any]) -> None:
+    if metadata.get("schema") == SEARCH_SCHEMA:
+        raise UnfitError(
+            "holds the candidates of a search, not the result of a sweep",
+            "`gearchaos identify TARGETS.toml --resume` goes on with it and reports what it found",
+        )
     if metadata.get("schema") != SCHEMA:
         raise UnfitError(
             f'is not a gearchaos result: it lacks the attribute schema = "{SCHEMA}"',
