@@ -137,7 +137,7 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
         "--variable",
         metavar="NAME",
         help="section variable of a sweep (default: section_delta_5), coordinate of a response "
-        "(default: delta_5)",
+        "(default: delta_5) or another of its variables over time, such as mesh_force_tangential",
     )
     add("--from", dest="low", type=number, metavar="VALUE", help="lowest parameter to show")
     add("--to", dest="high", type=number, metavar="VALUE", help="highest parameter to show")

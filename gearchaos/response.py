@@ -31,20 +31,16 @@ def _arguments(parser: ArgumentParser) -> None:
     from gearchaos.results.response_variables import DEFAULT_PERIODS
 
     add = parser.add_argument
-    text = (
-        "the pair, its scene, start and integration; or a result, from one lane of which to go on"
-    )
+    text = "the pair, its scene, start and integration; or a result, one lane of which goes on"
     add("config", metavar="config.toml|RESULT.h5", help=text)
     values = parser.add_mutually_exclusive_group(required=True)
+    text = "multiple of the pitch error, may be repeated"
+    values.add_argument("--pitch-error", type=float, action="append", metavar="P", help=text)
     text = (
         "value of the parameter that the configuration sweeps, may be repeated; of a result the "
         "nearest lane, with NAME=VALUE for each axis where there are several"
     )
-    for flag, kind, name, words in (
-        ("--pitch-error", float, "P", "multiple of the pitch error, may be repeated"),
-        ("--at", place, "VALUE", text),
-    ):
-        values.add_argument(flag, type=kind, action="append", metavar=name, help=words)
+    values.add_argument("--at", type=place, action="append", metavar="VALUE", help=text)
     text = "mesh periods kept (default: %(default)s)"
     add("--periods", type=int, default=DEFAULT_PERIODS, metavar="N", help=text)
 
@@ -82,10 +78,8 @@ def _lane(options: Namespace) -> Asked:
     from gearchaos.results.result import open_result
 
     if options.set or options.at is None:
-        raise ConfigurationError(
-            f"{options.config}: is a result, and goes on with its own configuration; name a lane "
-            "with --at, without --set or --pitch-error"
-        )
+        rule = "is a result, and goes on with its own configuration; name a lane with --at"
+        raise ConfigurationError(f"{options.config}: {rule}, without --set or --pitch-error")
     result = open_result(options.config)
     lane = result.sel("nearest", **coordinates(options.at, result.axes))
     if lane.axes:
@@ -93,8 +87,7 @@ def _lane(options: Namespace) -> Asked:
         raise ConfigurationError(f"{options.config}: name one lane, with {rest} as well")
     where = ", ".join(f"{axis} = {value:.12g}" for axis, value in lane.fixed.items())
     note = f"goes on from the end of the lane {where} of {options.config}"
-    text = str(lane.metadata["configuration"])
-    return continued(lane, options.config), text, [note]
+    return continued(lane, options.config), str(lane.metadata["configuration"]), [note]
 
 
 def _configuration(options: Namespace) -> Asked:

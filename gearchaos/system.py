@@ -7,7 +7,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Mapping
 from typing import NamedTuple, Self
 
@@ -16,7 +15,7 @@ import numpy as np
 from gearchaos_kernels import Plan, Status
 from numpy.typing import NDArray
 
-from gearchaos.configuration import Configuration, axis_values, configuration_of, swept_values
+from gearchaos.configuration import Given, axis_values, configuration_of, swept_values
 from gearchaos.dynamics.exponents import Exponents, exponents, sum_of_exponents
 from gearchaos.dynamics.following import (
     STABILITY_LOSS_TEXTS,
@@ -75,7 +74,7 @@ class System:
 
     def __init__(
         self,
-        config: Configuration | str | os.PathLike[str],
+        config: Given,
         at: Mapping[str, float] | None = None,
         **groups: float,
     ) -> None:

@@ -32,10 +32,9 @@ class Table(BaseModel):
     @classmethod
     def _numbers_of_numpy(cls, given: Any) -> Any:
         """Take the numbers of NumPy for those of Python: nothing is converted by that."""
-        if not isinstance(given, dict):
-            return given
-        numpy = (np.generic, np.ndarray)
-        return {k: v.tolist() if isinstance(v, numpy) else v for k, v in given.items()}
+        kinds = (np.generic, np.ndarray)
+        entries = given.items() if isinstance(given, dict) else ()
+        return {k: v.tolist() if isinstance(v, kinds) else v for k, v in entries} or given
 
 
 # TOML has lists, the models hold tuples; strictness about the entries is not affected.

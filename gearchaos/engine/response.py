@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import time
 from typing import Any
 
@@ -11,7 +10,7 @@ from gearchaos_kernels import Outcome, Status, System, mesh_motion
 from numpy.typing import NDArray
 from tqdm import tqdm
 
-from gearchaos.configuration import Configuration, configuration_of
+from gearchaos.configuration import Configuration, Given, configuration_of
 from gearchaos.engine.refinement import computable
 from gearchaos.engine.running import choose_threads, metadata, result_of
 from gearchaos.engine.simulation import Simulation
@@ -29,11 +28,7 @@ LARGEST_RESPONSE = 4 * 2**30
 """Bytes that a response may take in memory."""
 
 
-def respond(
-    config: Configuration | str | os.PathLike[str],
-    periods: int = DEFAULT_PERIODS,
-    threads: int | None = None,
-) -> Result:
+def respond(config: Given, periods: int = DEFAULT_PERIODS, threads: int | None = None) -> Result:
     """Compute the motion at every step of the last mesh periods, for every value of the sweep.
 
     Parameters

@@ -5,17 +5,16 @@ from __future__ import annotations
 import math
 import os
 import time
-from collections.abc import Mapping, Sequence
-from contextlib import AbstractContextManager
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from contextvars import copy_context
-from functools import partial
 from typing import Any
 
 import numpy as np
 from gearchaos_kernels import current_threads, most_threads, use_threads
 from numba.core import event
 
-from gearchaos.configuration import Configuration, configuration_of
+from gearchaos.configuration import Given, configuration_of
 from gearchaos.engine.error_check import Tally
 from gearchaos.engine.executors import LocalExecutor, compute_blocks
 from gearchaos.engine.provenance import provenance
@@ -26,39 +25,37 @@ from gearchaos.progress import Progress, say, speaking
 from gearchaos.results.result import Result
 from gearchaos.results.variables import Variable
 
-PILOT_SECONDS = 0.2
 METHOD_TEXTS = {
     "rk4": "classical Runge-Kutta of order 4 with fixed steps",
     "flow_map": "flow maps: exact steps from crossing to crossing",
 }
+COMPILING = "preparing the kernel of this scene, once; this takes some seconds"
 
 
 class _Announcer(event.Listener):  # type: ignore[misc]
-    """Says once that the kernel is compiled, to whom it was made for."""
+    """Says once that a kernel is compiled, from whichever thread, to whom it was made for."""
 
     def __init__(self) -> None:
-        """Remember who listens: it may be compiled in another thread."""
-        self._say = [partial(copy_context().run, say)]
+        """Remember who is spoken to."""
+        self._context, self._said = copy_context(), False
 
     def on_start(self, _event: event.Event) -> None:
         """Say it the first time."""
-        if self._say:
-            self._say.pop()("preparing the kernel of this scene, once; this takes some seconds")
+        if not self._said:
+            self._said = True
+            self._context.run(say, COMPILING)
 
-    def on_end(self, _event: event.Event) -> None:
-        """Say nothing."""
-
-
-def compiling() -> AbstractContextManager[object]:
-    """Say so if what follows is compiled, and not loaded from the cache."""
-    return event.install_listener("numba:compile", _Announcer())
+    on_end = on_start
 
 
-def run(
-    config: Configuration | str | os.PathLike[str],
-    threads: int | None = None,
-    progress: bool = False,
-) -> Result:
+@contextmanager
+def compiling() -> Iterator[None]:
+    """Say so if what follows is compiled, and not only loaded from the cache."""
+    with event.install_listener("numba:compile", _Announcer()):
+        yield
+
+
+def run(config: Given, threads: int | None = None, progress: bool = False) -> Result:
     """Compute a sweep in memory.
 
     Parameters
@@ -139,7 +136,7 @@ def prepare(simulation: Simulation, *, compile_now: bool = True, history_periods
     if compile_now:
         _check_memory(simulation)
         with compiling():
-            simulation.rehearse(periods=history_periods, history_periods=history_periods)
+            simulation.rehearse(history_periods)
         check()
     simulation.choose_steps()
     say(*simulation.notes)
@@ -158,27 +155,6 @@ def _check_memory(simulation: Simulation) -> None:
             f"bytes, more than the {memory:.3g} of this machine; record fewer periods, keep fewer "
             "points"
         )
-
-
-def pilot_rate(simulation: Simulation) -> float:
-    """Measure how many Runge-Kutta steps a second this sweep makes here.
-
-    Parameters
-    ----------
-    simulation : Simulation
-        Compiled; a few mesh periods of its first block are integrated.
-    """
-    lanes = min(len(simulation.lanes), simulation.block_lanes(current_threads()))
-    if simulation.carried:  # One value after the other.
-        lanes = simulation.lanes.starts
-    periods = 1
-    while True:
-        began = time.perf_counter()
-        steps = simulation.rehearse(lanes, periods)
-        seconds = time.perf_counter() - began
-        if seconds > PILOT_SECONDS:
-            return steps / seconds
-        periods *= 2
 
 
 def choose_threads(threads: int | None) -> None:

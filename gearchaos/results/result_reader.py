@@ -16,14 +16,7 @@ from gearchaos.errors import FileError
 from gearchaos.gear.group_table import LARGEST_VALUE
 from gearchaos.results.atomic_file import reason
 from gearchaos.results.checksum_line import checksum_fits
-from gearchaos.results.result_file import (
-    ORIGINS,
-    PARAMETERS,
-    SCHEMA,
-    SCHEMA_VERSION,
-    SEARCH_SCHEMA,
-    Parameter,
-)
+from gearchaos.results.result_file import ORIGINS, PARAMETERS, SCHEMA, SCHEMA_VERSION, Parameter
 from gearchaos.results.stored_dataset import (
     UnfitError,
     datasets_of,
@@ -52,6 +45,9 @@ Contents = tuple[
     list[Variable], dict[str, NDArray[Any]], dict[str, Parameter], dict[str, str | int | float]
 ]
 """Variables, data, parameters and metadata, as for `Result`."""
+
+SEARCH = "gearchaos-identification"
+"""Schema of the candidates of a search, which are no result of a sweep."""
 
 SOON_HASHED = 1 << 30
 """Bytes whose checksum takes about a second."""
@@ -163,7 +159,7 @@ def _wording(notes: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _check_schema(metadata: Mapping[str, Any]) -> None:
-    if metadata.get("schema") == SEARCH_SCHEMA:
+    if metadata.get("schema") == SEARCH:
         raise UnfitError(
             "holds the candidates of a search, not the result of a sweep",
             "`gearchaos identify TARGETS.toml --resume` goes on with it and reports what it found",

@@ -429,7 +429,7 @@ def test_a_result_is_no_configuration(tmp_path):
     path = tmp_path / "pair.h5"
     with h5py.File(path, "w"):
         pass
-    shows = r"pair\.h5: is an HDF5 file, and a configuration is TOML; `gearchaos info .*pair\.h5`"
+    shows = r"pair\.h5: is HDF5, and a configuration is TOML; `gearchaos info .*pair\.h5`"
     with pytest.raises(ConfigurationError, match=shows):
         load_config(path)
 
