@@ -143,11 +143,11 @@ def measure(simulation: Simulation, steps: Sequence[int], lanes: int) -> list[Se
     """
     from statistics import fmean, median
 
-    from gearchaos.engine.running import COMPILING
+    from gearchaos.engine.running import compiling
     from gearchaos.engine.steps import pilot
     from gearchaos.records.difference import bound, difference
 
-    with notice(COMPILING):
+    with compiling():
         _, solution = pilot(simulation.lanes, simulation.plan, lanes, TRUTH_STEPS)
         for setting in MODES.values():
             solution(steps[0], *setting)

@@ -11,7 +11,7 @@ from collections.abc import Callable, Sequence
 from io import TextIOWrapper
 from typing import Any, NamedTuple, TextIO
 
-from gearchaos.errors import FileError, GearchaosError
+from gearchaos.errors import ConfigurationError, FileError, GearchaosError
 from gearchaos.interrupts import Termination, check, heeded
 from gearchaos.progress import complain, speaking
 from gearchaos.version import software_version
@@ -130,6 +130,34 @@ def number(text: str, low: float = -math.inf, high: float = math.inf) -> float:
     if not low <= value <= high:
         raise ArgumentTypeError(f"{text} is not between {low:g} and {high:g}")
     return value
+
+
+def place(text: str) -> tuple[str, float]:
+    """Read NAME=VALUE off the command line, or a VALUE, which has an empty name."""
+    name, _, value = text.rpartition("=")
+    return name.strip(), number(value)
+
+
+def coordinates(
+    places: Sequence[tuple[str, float]], axes: Sequence[str], free: str = ""
+) -> dict[str, float]:
+    """Name the axis of each place of --at; a bare value lies on the one axis beside ``free``.
+
+    Raises ConfigurationError if that is not one, or an axis comes twice.
+    """
+    from gearchaos.results.variables import axis_name
+
+    others = [axis for axis in axes if axis != free]
+    found: dict[str, float] = {}
+    for name, value in places:
+        axis = axis_name(name) or (others[0] if len(others) == 1 else "")
+        if not axis or axis in found:
+            raise ConfigurationError(
+                f"--at {name}{'=' if name else ''}{value:g}: must be NAME=VALUE, each of the axes "
+                f"{', '.join(axes)} once"
+            )
+        found[axis] = value
+    return found
 
 
 def version_text() -> str:

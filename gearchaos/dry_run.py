@@ -1,33 +1,52 @@
-"""What ``--dry-run`` tells: what a sweep would compute, and how long that would take."""
+"""What ``--dry-run`` tells: what a sweep would compute, and how much time and memory that takes."""
 
 from __future__ import annotations
 
+import json
 import math
 import os
 import sys
+import time
 from datetime import timedelta
 
 import numpy as np
-from gearchaos_kernels import current_threads
+from gearchaos_kernels import LANES, current_threads
 from tqdm import tqdm
 
-from gearchaos.engine.running import pilot_seconds
+from gearchaos.configuration import Configuration, swept_values
+from gearchaos.engine.sharding import Shard
 from gearchaos.engine.simulation import Simulation
+from gearchaos.progress import notice
+from gearchaos.results.result_file import CACHE_BYTES
 from gearchaos.results.variables import START
 
+SAMPLE_PERIODS = 1000
+"""Mesh periods of a sample: over much fewer, labels cost more than their share."""
 
-def describe(simulation: Simulation, output: str) -> None:
-    """Say what a run would compute and how long it would take, judged by a few real lanes."""
-    seconds = pilot_seconds(simulation)
-    duration = f"{seconds:.1f} s" if seconds < 100 else str(timedelta(seconds=round(seconds)))
-    config = simulation.config
-    lanes, threads = simulation.lanes, current_threads()
+
+def describe(simulation: Simulation, output: str, shard: Shard | None, as_json: bool) -> None:
+    """Say what a run, or one shard of it, would compute, judged by a sample of its lanes."""
+    config, lanes, threads = simulation.config, simulation.lanes, current_threads()
+    every = len(lanes)
+    own = every if shard is None else sum(last - first for first, last in shard.blocks(every))
+    seconds = own * _seconds_per_lane(simulation)
     sizes = {v.name: len(v.values) for v in simulation.variables if v.values is not None}
-    bytes_kept = sum(
+    rows = [
         np.dtype(v.dtype).itemsize * math.prod(sizes[dim] for dim in v.dims)
         for v in simulation.variables
         if v.values is None
-    )
+    ]
+    bytes_kept = own * sum(rows) // every
+    memory = _memory(simulation) + sum(min(CACHE_BYTES, row) for row in rows)
+    plan = simulation.plan
+    steps = own * (plan.transient_periods + plan.recorded_periods) * plan.steps_per_period
+    if as_json:
+        facts = {"output": output, "exists": os.path.exists(output), "states": len(lanes.states)}
+        facts |= {"lanes": own, "steps": steps, "seconds": seconds, "threads": threads}
+        facts |= {"file_bytes": bytes_kept, "memory_bytes": memory}
+        print(json.dumps(facts, indent=1))
+        return
+    duration = f"{seconds:.1f} s" if seconds < 100 else str(timedelta(seconds=round(seconds)))
     spans = [
         f"{axis.values.size} values of {axis.name} from {axis.values[0]:g} to {axis.values[-1]:g}"
         for axis in lanes.axes
@@ -35,22 +54,71 @@ def describe(simulation: Simulation, output: str) -> None:
     ]
     if lanes.starts > 1:
         spans.append(f"{lanes.starts} starts each")
-    memory, steps = simulation.block_memory(threads), simulation.plan.steps_per_period
+    unused = ", ".join(name for name in config.scene.effects if name not in lanes.effects)
+    unused = f" (nothing that is kept needs {unused})" if unused else ""
     for key, value in {
         "output": f"{output}{' (exists)' if os.path.exists(output) else ''}",
         "effects": ", ".join(config.scene.effects) or "none",
-        "states": f"{len(lanes.states)}{_left_out(simulation)}",
-        "lanes": f"{len(lanes)} ({', '.join(spans)})",
-        "steps": f"{simulation.periods * steps:.3g} ({steps} per period)",
+        "states": f"{len(lanes.states)}{unused}",
+        "lanes": f"{own}{'' if shard is None else f' of {every}'} ({', '.join(spans)})",
+        "steps": f"{steps:.3g} ({plan.steps_per_period} per period)",
         "file": f"about {tqdm.format_sizeof(bytes_kept, 'B')} before compression",
-        "memory": f"about {tqdm.format_sizeof(memory, 'B')} for a block of lanes",
+        "memory": f"about {tqdm.format_sizeof(memory, 'B')} at the peak of the process",
         "time": f"about {duration} with {threads} thread{'s' if threads > 1 else ''}",
     }.items():
         sys.stderr.write(f"{key + ':':10}{value}\n")
 
 
-def _left_out(simulation: Simulation) -> str:
-    unused = [
-        name for name in simulation.config.scene.effects if name not in simulation.lanes.effects
-    ]
-    return f" (nothing that is kept needs {', '.join(unused)})" if unused else ""
+def _seconds_per_lane(simulation: Simulation) -> float:
+    """Compute a block of lanes from all over the sweep, as long as it takes to label them.
+
+    A whole block: what is checked, or looked at again, is computed in vectors of lanes.
+    """
+    lanes = simulation.block_lanes(current_threads()) / (8 if simulation.carried else 1)
+    periods = simulation.plan.transient_periods + simulation.plan.recorded_periods
+    seconds = math.nan
+    with notice("computing some lanes, to tell how long all take"):
+        # The first time, little is computed, and the kernels are loaded.
+        for length in (min(1.0, 8.0 / periods), min(1.0, SAMPLE_PERIODS / periods)):
+            sample = Simulation(_thinned(simulation, lanes / len(simulation.lanes), length))
+            began = time.perf_counter()
+            sample.compute(0, len(sample.lanes))
+            seconds = (time.perf_counter() - began) / len(sample.lanes)
+            seconds *= periods / (sample.plan.transient_periods + sample.plan.recorded_periods)
+    return seconds
+
+
+def _thinned(simulation: Simulation, share: float, length: float) -> Configuration:
+    """Return a sweep with this share of the lanes, and of the mesh periods."""
+    config, plan, starts = simulation.config, simulation.plan, simulation.lanes.starts
+    # Of every axis that is one the same.
+    share = min(1.0, share) ** (1.0 / max(1, sum(n > 1 for n in simulation.lanes.shape)))
+    for table, sweep in config.sweeps.items():
+        values = swept_values(sweep)
+        # Neighbours behave alike, which a vector of lanes profits from.
+        run = min(values.size, -(-LANES // starts)) if table == "sweep" else 1
+        runs = math.ceil(share * values.size / run)
+        first = np.linspace(0, values.size - run, runs + 2)[1:-1].round().astype(int)
+        some = values[np.unique(np.add.outer(first, np.arange(run)))].tolist()
+        config = config.replace(table, {"parameter": sweep.parameter, "values": some})
+    recorded = math.ceil(length * plan.recorded_periods)
+    for key, value in {
+        "start.count": math.ceil(share * starts),
+        "integration.steps_per_period": plan.steps_per_period,
+        "integration.tolerance": None,
+        "integration.transient_periods": math.ceil(length * plan.transient_periods),
+        "outputs.section_points": min(config.outputs.section_points, recorded),
+        "integration.recorded_periods": recorded,
+    }.items():
+        config = config.replace(key, value)
+    return config
+
+
+def _memory(simulation: Simulation) -> int:
+    """Return about how many bytes the process takes at most: as many as so far, and a block."""
+    block = simulation.block_memory(current_threads())
+    try:
+        from resource import RUSAGE_SELF, getrusage
+    except ImportError:  # Windows.
+        return block
+    return block + getrusage(RUSAGE_SELF).ru_maxrss * (1 if sys.platform == "darwin" else 1024)

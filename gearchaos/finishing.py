@@ -19,14 +19,17 @@ if TYPE_CHECKING:
 def output_of(options: Namespace, suffix: str = ".h5") -> str:
     """Return the result file to be: that of --output, or one named after the configuration.
 
-    Raises FileError if it is the configuration itself.
+    Raises FileError if it is the input itself, or no file at all.
     """
+    if (options.output or options.config) == "-":
+        raise FileError("-: a result is a file, not a stream, and needs a name; give --output PATH")
     # A text, not a Path, which would drop the slash that tells a folder from a file.
     output: str = options.output
     if options.output is None:
         output = f"{Path(options.config).stem}{suffix}"
-    if os.path.exists(output) and os.path.samefile(output, options.config):
-        raise FileError(f"{output}: is the configuration itself; choose another --output")
+    with suppress(OSError, ValueError):  # One of them is not there.
+        if os.path.samefile(output, options.config):
+            raise FileError(f"{output}: is the input itself; choose another --output")
     return output
 
 

@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING
 from gearchaos.command_line import COMMON_OPTIONS, OK, Command
 from gearchaos.errors import ConfigurationError
 from gearchaos.finishing import output_of
-from gearchaos.progress import Progress, notice, say
+from gearchaos.progress import Progress, say
 
 if TYPE_CHECKING:
     from gearchaos.identification.loading import Problem
@@ -42,7 +42,7 @@ def _arguments(parser: ArgumentParser) -> None:
 
 
 def _identify(options: Namespace) -> int:
-    from gearchaos.engine.running import COMPILING, choose_threads
+    from gearchaos.engine.running import choose_threads, compiling
     from gearchaos.identification.loading import load_targets
     from gearchaos.identification.report import report
     from gearchaos.identification.searching import Judge
@@ -51,7 +51,7 @@ def _identify(options: Namespace) -> int:
     choose_threads(options.threads)
     judge = Judge(problem)
     if options.score is not None:
-        with notice(COMPILING):
+        with compiling():
             tried = _scored(problem, judge, options.score)
     else:
         tried = _searched(problem, judge, options)

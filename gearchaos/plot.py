@@ -17,7 +17,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from gearchaos.command_line import OK, Command, number
+from gearchaos.command_line import OK, Command, coordinates, number, place
 from gearchaos.errors import FigureError, FileError
 from gearchaos.progress import say
 
@@ -36,7 +36,7 @@ def _plot(options: argparse.Namespace) -> int:
     from gearchaos.figures.response_lane import is_response
     from gearchaos.results.result import open_result
 
-    result = _slice(open_result(options.result), dict(options.at))
+    result = _slice(open_result(options.result), options.at)
     sheets = (_response_sheets if is_response(result) else _sweep_sheets)(result, options)
     targets = [_targets(options, name, len(sheets) == 1) for name, _ in sheets]
     _check_targets([path for paths in targets for path in paths], options.result, options.overwrite)
@@ -108,20 +108,19 @@ def _response_sheets(result: Result, options: argparse.Namespace) -> list[Sheet]
     ]
 
 
-def _slice(result: Result, at: dict[str, float]) -> Result:
+def _slice(result: Result, at: Sequence[tuple[str, float]]) -> Result:
     """Fix the axes that --at names at the values next to those it gives."""
     from gearchaos.figures.lanes import swept_axes
-    from gearchaos.results.variables import axis_name
 
     if not at:
         return result
-    coordinates = {axis_name(name): value for name, value in at.items()}
-    if not {*swept_axes(result)} - {*coordinates}:
+    fixed = coordinates(at, result.axes, result.axis)
+    if not {*swept_axes(result)} - {*fixed}:
         raise FigureError(
-            f"--at {' and '.join(coordinates)}: nothing is left to draw against; choose values of "
+            f"--at {' and '.join(fixed)}: nothing is left to draw against; choose values of "
             f"{result.axis} with --from and --to"
         )
-    return result.sel(method="nearest", **coordinates)
+    return result.sel(method="nearest", **fixed)
 
 
 def _arguments(parser: argparse.ArgumentParser) -> None:
@@ -138,18 +137,18 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
         "--variable",
         metavar="NAME",
         help="section variable of a sweep (default: section_delta_5), coordinate of a response "
-        "(default: delta_5)",
+        "(default: delta_5) or another of its variables over time, such as mesh_force_tangential",
     )
     add("--from", dest="low", type=number, metavar="VALUE", help="lowest parameter to show")
     add("--to", dest="high", type=number, metavar="VALUE", help="highest parameter to show")
     add(
         "--at",
-        type=_place,
+        type=place,
         action="append",
         default=[],
         metavar="NAME=VALUE",
         help="draw the slice next to this value of a second parameter, or of start; may be "
-        "repeated",
+        "repeated; VALUE is enough where there is one of them",
     )
     add(
         "--stages",
@@ -233,13 +232,6 @@ def _lanes_in_words(result: Result) -> str:
     words += "".join(f" at {axis} = {value:.6g}" for axis, value in result.fixed.items())
     diverged = int((result["status"] != 0).sum()) if "status" in result else 0
     return f"{words}, {diverged} of them diverged" if diverged else words
-
-
-def _place(text: str) -> tuple[str, float]:
-    name, found, value = text.partition("=")
-    if not (name and found):
-        raise argparse.ArgumentTypeError(f"{text!r} is not NAME=VALUE, such as start=0")
-    return name.strip(), number(value)
 
 
 def _dpi(text: str) -> int:

@@ -1,5 +1,6 @@
 """Compute the motion of some pitch errors, or of some values of the swept parameter, at every step
-of the last mesh periods: displacements, velocities, accelerations, mesh forces and contact.
+of the last mesh periods: displacements, velocities, accelerations, mesh forces and contact. Of a
+result, the motion goes on from where one of its lanes ended, with no transient.
 
 The path of the result goes to stdout, everything else to stderr; python -m gearchaos.plot draws
 it. Exit codes: 0 done, 2 the command line or the configuration asks for what cannot be, 3 done, but
@@ -12,13 +13,16 @@ import sys
 from argparse import ArgumentParser, Namespace
 from typing import TYPE_CHECKING
 
-from gearchaos.command_line import Command
+from gearchaos.command_line import Command, coordinates, place
 from gearchaos.errors import ConfigurationError
 from gearchaos.finishing import ending, output_of
 from gearchaos.progress import say
 
 if TYPE_CHECKING:
     from gearchaos.configuration import Configuration
+
+    Asked = tuple[Configuration, str, list[str]]
+    """What to compute, the configuration as it was written, and what to say of it."""
 
 PITCH_ERROR = "pitch_error"
 
@@ -27,19 +31,24 @@ def _arguments(parser: ArgumentParser) -> None:
     from gearchaos.results.response_variables import DEFAULT_PERIODS
 
     add = parser.add_argument
-    add("config", metavar="config.toml", help="the pair, its scene, start and integration")
+    text = "the pair, its scene, start and integration; or a result, one lane of which goes on"
+    add("config", metavar="config.toml|RESULT.h5", help=text)
     values = parser.add_mutually_exclusive_group(required=True)
-    for flag, name, text in (
-        ("--pitch-error", "P", "multiple of the pitch error, may be repeated"),
-        ("--at", "VALUE", "value of the parameter that the configuration sweeps, may be repeated"),
-    ):
-        values.add_argument(flag, type=float, action="append", metavar=name, help=text)
+    text = "multiple of the pitch error, may be repeated"
+    values.add_argument("--pitch-error", type=float, action="append", metavar="P", help=text)
+    text = (
+        "value of the parameter that the configuration sweeps, may be repeated; of a result the "
+        "nearest lane, with NAME=VALUE for each axis where there are several"
+    )
+    values.add_argument("--at", type=place, action="append", metavar="VALUE", help=text)
     text = "mesh periods kept (default: %(default)s)"
     add("--periods", type=int, default=DEFAULT_PERIODS, metavar="N", help=text)
 
 
 def _respond(options: Namespace) -> int:
-    config = _configuration(options)
+    from h5py import is_hdf5
+
+    config, text, note = (_lane if is_hdf5(options.config) else _configuration)(options)
     from gearchaos.engine.response import compute_response, prepared
     from gearchaos.engine.running import choose_threads, prepare
     from gearchaos.results.atomic_file import check_output
@@ -48,8 +57,9 @@ def _respond(options: Namespace) -> int:
     simulation = prepared(config, options.periods)
     output = output_of(options, "_response.h5")
     check_output(output, options.overwrite)
+    simulation.notes += note
     prepare(simulation, history_periods=1)
-    result = compute_response(simulation, options.periods, config.text)
+    result = compute_response(simulation, options.periods, text)
     result.save(output, overwrite=options.overwrite)
     print(output, flush=True)
     diverged = int((result["status"] != 0).sum())
@@ -62,18 +72,41 @@ def _respond(options: Namespace) -> int:
     return ending(simulation, diverged)
 
 
-def _configuration(options: Namespace) -> Configuration:
+def _lane(options: Namespace) -> Asked:
+    """Go on from where one lane of a result ended."""
+    from gearchaos.engine.response import continued
+    from gearchaos.results.result import open_result
+
+    if options.set or options.at is None:
+        rule = "is a result, and goes on with its own configuration; name a lane with --at"
+        raise ConfigurationError(f"{options.config}: {rule}, without --set or --pitch-error")
+    result = open_result(options.config)
+    lane = result.sel("nearest", **coordinates(options.at, result.axes))
+    if lane.axes:
+        rest = " and ".join(f"--at {axis}=VALUE" for axis in lane.axes)
+        raise ConfigurationError(f"{options.config}: name one lane, with {rest} as well")
+    where = ", ".join(f"{axis} = {value:.12g}" for axis, value in lane.fixed.items())
+    note = f"goes on from the end of the lane {where} of {options.config}"
+    return continued(lane, options.config), str(lane.metadata["configuration"]), [note]
+
+
+def _configuration(options: Namespace) -> Asked:
+    """Take the place of what a configuration sweeps."""
     from gearchaos.configuration import load_config
     from gearchaos.configuration.toml_text import toml_literal
 
     parameter, values = PITCH_ERROR, options.pitch_error
     if values is None:
-        values = options.at
         parameter = load_config(options.config, options.set).sweep.parameter
+        values = [value for _, value in options.at]
+        for name in {name for name, _ in options.at} - {"", parameter}:
+            raise ConfigurationError(
+                f"--at {name}: {options.config} sweeps {parameter}; replace another key with --set"
+            )
     # Repeating a value is no mistake worth a message.
     sweep = {"parameter": parameter, "values": sorted(set(values))}
     try:
-        return load_config(options.config, [*options.set, f"sweep={toml_literal(sweep)}"])
+        config = load_config(options.config, [*options.set, f"sweep={toml_literal(sweep)}"])
     except ConfigurationError as error:
         swept = load_config(options.config, options.set).sweep.parameter
         if parameter == swept:
@@ -83,7 +116,14 @@ def _configuration(options: Namespace) -> Configuration:
             f"--pitch-error takes the place of the sweep over {swept}: give one value of it with "
             f"--set {key}=VALUE, or several with --at"
         )
-        raise ConfigurationError([*error.problems, hint]) from error
+        raise ConfigurationError([hint, *error.problems]) from error
+    if config.start.carry != "none":
+        raise ConfigurationError(
+            f'{options.config}: start.carry = "{config.start.carry}": a lane goes on from the one '
+            "before it, and values by themselves have none; run the sweep, then: gearchaos "
+            "response RESULT.h5 --at VALUE"
+        )
+    return config, config.text, []
 
 
 main = Command(

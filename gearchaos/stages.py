@@ -12,11 +12,9 @@ import math
 import sys
 import textwrap
 from collections.abc import Mapping, Sequence
-from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
-from gearchaos.command_line import OK, Command, number
-from gearchaos.errors import ConfigurationError
+from gearchaos.command_line import OK, Command, coordinates, number, place
 
 if TYPE_CHECKING:
     from gearchaos.engine.refinement import Boundary
@@ -50,6 +48,7 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
     )
     add(
         "--at",
+        type=place,
         action="append",
         default=[],
         metavar="NAME=VALUE",
@@ -96,7 +95,7 @@ def _stages(options: argparse.Namespace) -> int:
     from gearchaos.results.variables import RECORD
 
     whole = open_result(options.result)
-    result = one_axis(whole, **_coordinates(options.at, whole))
+    result = one_axis(whole, **coordinates(options.at, whole.axes, whole.axis))
     where = slice_facts(whole, result)
     lanes = labelled_lanes(result, name=options.result)
     stages = stage_table(lanes, options.narrowest)
@@ -126,45 +125,23 @@ def _stages(options: argparse.Namespace) -> int:
     return OK
 
 
-def _coordinates(texts: Sequence[str], result: Result) -> dict[str, float]:
-    """Read where axes are to be fixed: ``NAME=VALUE``, or a value where there is one other axis."""
-    from gearchaos.results.variables import axis_name
-
-    others = [name for name in result.axes if name != result.axis]
-    coordinates: dict[str, float] = {}
-    for text in texts:
-        key, _, value = text.rpartition("=")
-        name = axis_name(key.strip()) or (others[0] if len(others) == 1 else "")
-        with suppress(argparse.ArgumentTypeError):
-            if name and name not in coordinates:
-                coordinates[name] = number(value)
-                continue
-        raise ConfigurationError(
-            f"--at {text}: must be NAME=VALUE with a number, each of the axes "
-            f"{', '.join(result.axes)} once"
-        )
-    return coordinates
-
-
 def _refined(result: Result, stages: list[Stage], options: argparse.Namespace) -> list[Boundary]:
     # Only here: reading a file needs no compiler.
     from gearchaos.engine.refinement import refinable, refined_boundaries
-    from gearchaos.engine.running import COMPILING
-    from gearchaos.progress import notice
+    from gearchaos.engine.running import compiling
 
     config = refinable(result, options.result)
-    with notice(COMPILING):
+    with compiling():
         return refined_boundaries(config, result, stages, options.refine, options.threads)
 
 
 def _survival(result: Result, options: argparse.Namespace) -> Survival:
     from gearchaos.engine.refinement import computable
-    from gearchaos.engine.running import COMPILING
+    from gearchaos.engine.running import compiling
     from gearchaos.engine.survival import survival
-    from gearchaos.progress import notice
 
     config = computable(result, options.result)
-    with notice(COMPILING):
+    with compiling():
         return survival(config, result, options.survival, options.threads)
 
 

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 def _arguments(parser: ArgumentParser) -> None:
     add = parser.add_argument
-    add("config", metavar="config.toml", help="what to compute")
+    add("config", metavar="config.toml", help="what to compute; - reads it from stdin")
     add("--resume", action="store_true", help="go on from the finished blocks of a stopped sweep")
     add(
         "--dask",
@@ -39,7 +39,9 @@ def _arguments(parser: ArgumentParser) -> None:
         metavar="i/N",
         help="compute the i-th of N shards only; python -m gearchaos.merge joins them",
     )
-    add("--dry-run", action="store_true", help="say what would be computed, and stop")
+    text = "say what would be computed, in how much time and memory, and stop"
+    add("--dry-run", action="store_true", help=text)
+    add("--json", action="store_true", help="with --dry-run: print that as JSON")
 
 
 def _sweep(options: Namespace) -> int:
@@ -55,11 +57,13 @@ def _sweep(options: Namespace) -> int:
     choose_threads(options.threads)
     simulation = Simulation(config)
     output = output_of(options)
+    if options.json and not options.dry_run:
+        raise ConfigurationError("--json: only what --dry-run tells is JSON; a sweep is HDF5")
     if options.dry_run:
         from gearchaos.dry_run import describe
 
         prepare(simulation)
-        describe(simulation, output)
+        describe(simulation, output, shard, options.json)
         return OK
     if options.resume and not options.overwrite:
         code = complete_already(simulation, output)

@@ -7,7 +7,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Mapping
 from typing import NamedTuple, Self
 
@@ -16,7 +15,7 @@ import numpy as np
 from gearchaos_kernels import Plan, Status
 from numpy.typing import NDArray
 
-from gearchaos.configuration import Configuration, axis_values, load_config, swept_values
+from gearchaos.configuration import Given, axis_values, configuration_of, swept_values
 from gearchaos.dynamics.exponents import Exponents, exponents, sum_of_exponents
 from gearchaos.dynamics.following import (
     STABILITY_LOSS_TEXTS,
@@ -29,6 +28,7 @@ from gearchaos.dynamics.orbits import Orbits, orbit_exponent, polish
 from gearchaos.dynamics.stability import fewest_stable_steps
 from gearchaos.dynamics.systems import plan_of, system_of
 from gearchaos.engine.lanes import Lanes
+from gearchaos.engine.refinement import computable
 from gearchaos.engine.response import respond
 from gearchaos.engine.starts import start_states
 from gearchaos.engine.steps import stable_steps
@@ -36,7 +36,6 @@ from gearchaos.errors import ConfigurationError
 from gearchaos.records.amplitude_spectrum import SpectralLines, spectral_lines
 from gearchaos.results.response_variables import DEFAULT_PERIODS
 from gearchaos.results.result import Result
-from gearchaos.results.variables import axis_name
 
 Floats = NDArray[np.float64]
 
@@ -75,12 +74,11 @@ class System:
 
     def __init__(
         self,
-        config: Configuration | str | os.PathLike[str],
+        config: Given,
         at: Mapping[str, float] | None = None,
         **groups: float,
     ) -> None:
-        if not isinstance(config, Configuration):
-            config = load_config(config)
+        config = configuration_of(config)
         values = {name: float(value) for name, value in {**(at or {}), **groups}.items()}
         self.config = config.at(values)
         for sweep in self.config.sweeps.values():
@@ -115,14 +113,7 @@ class System:
         if missing:
             raise ConfigurationError(f"give a value of {', '.join(missing)}, an axis of the result")
         lane = result.sel(method="nearest", **coordinates)
-        text = str(lane.metadata["configuration_resolved"])
-        config = Configuration.from_toml(text, "configuration of the result")
-        config = config.replace("integration.tolerance", None)
-        config = config.replace(
-            "integration.steps_per_period", int(lane.metadata["steps_per_period"])
-        )
-        parameters = (sweep.parameter for sweep in config.sweeps.values())
-        system = cls(config, {p: lane.fixed[axis_name(p)] for p in parameters})
+        system = cls(computable(lane, "the result"))
         ended = dict(zip(lane.variables["state"].flags, lane["end_state"], strict=True))
         system.state = np.array([ended.get(name, 0.0) for name in system.states])
         return system

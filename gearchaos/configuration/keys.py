@@ -7,7 +7,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Annotated, Any, TypeAlias
 
-from pydantic import BaseModel, ConfigDict, Field
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field, model_validator
 from pydantic.fields import FieldInfo
 
 from gearchaos.configuration.toml_text import toml_literal
@@ -26,6 +27,14 @@ class Table(BaseModel):
         serialize_by_alias=True,
         protected_namespaces=(),
     )
+
+    @model_validator(mode="before")
+    @classmethod
+    def _numbers_of_numpy(cls, given: Any) -> Any:
+        """Take the numbers of NumPy for those of Python: nothing is converted by that."""
+        kinds = (np.generic, np.ndarray)
+        entries = given.items() if isinstance(given, dict) else ()
+        return {k: v.tolist() if isinstance(v, kinds) else v for k, v in entries} or given
 
 
 # TOML has lists, the models hold tuples; strictness about the entries is not affected.

@@ -47,6 +47,7 @@ _FOUND = {
     int: "a number",
     dict: "a table",
     list: "a list",
+    **dict.fromkeys((datetime.date, datetime.datetime, datetime.time), "a date or time"),
 }
 
 _NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?")
@@ -136,7 +137,7 @@ def _rule(error: ErrorDetails) -> str:
         return _RULES[kind].format(**error.get("ctx", {})) if kind in _RULES else error["msg"]
     if kind == "float_type" and type(value) is int:
         return "must be a number that fits into 64 bits"
-    return f"must be {_EXPECTED[kind]}, not {_FOUND.get(type(value), 'a date or time')}"
+    return f"must be {_EXPECTED[kind]}, not {_FOUND.get(type(value), type(value).__name__)}"
 
 
 def _names(location: Sequence[int | str], tables: Mapping[str, Any]) -> list[int | str]:

@@ -10,7 +10,8 @@ from gearchaos_kernels import Outcome, Status, System, mesh_motion
 from numpy.typing import NDArray
 from tqdm import tqdm
 
-from gearchaos.configuration import Configuration
+from gearchaos.configuration import Configuration, Given, configuration_of
+from gearchaos.engine.refinement import computable
 from gearchaos.engine.running import choose_threads, metadata, result_of
 from gearchaos.engine.simulation import Simulation
 from gearchaos.errors import ConfigurationError
@@ -27,15 +28,14 @@ LARGEST_RESPONSE = 4 * 2**30
 """Bytes that a response may take in memory."""
 
 
-def respond(
-    config: Configuration, periods: int = DEFAULT_PERIODS, threads: int | None = None
-) -> Result:
+def respond(config: Given, periods: int = DEFAULT_PERIODS, threads: int | None = None) -> Result:
     """Compute the motion at every step of the last mesh periods, for every value of the sweep.
 
     Parameters
     ----------
-    config : Configuration
-        From `load_config`; transient, recorded periods, start and scene are as configured.
+    config : Configuration or path
+        From `load_config`, or the path of its file; transient, recorded periods, start and scene
+        are as configured.
     periods : int
         Mesh periods at the end of the recorded ones.
     threads : int, optional
@@ -54,9 +54,31 @@ def respond(
         threads.
     """
     choose_threads(threads)
+    config = configuration_of(config)
     simulation = prepared(config, periods)
     simulation.choose_steps()
     return compute_response(simulation, periods, config.text)
+
+
+def continued(lane: Result, name: str) -> Configuration:
+    """Return the configuration of the motion that goes on from the end of a lane of a result.
+
+    All axes of the result, which messages call by a name, are fixed; no transient is left out.
+    Raises FileError if it holds no configuration, ConfigurationError if the lane diverged.
+    """
+    config, ended = computable(lane, name), lane["end_state"].tolist()
+    if not np.isfinite(ended).all():
+        where = ", ".join(f"{axis} = {value:g}" for axis, value in lane.fixed.items())
+        raise ConfigurationError(f"{name}: {where}: this lane diverged, choose another with --at")
+    state = dict(zip(lane.variables["state"].flags, ended, strict=True))
+    for key, value in {
+        "start": {"kind": "given", "state": state},
+        # States that the file lacks would begin far from where they settle.
+        "scene.effects": config.needed_effects,
+        "integration.transient_periods": 0,
+    }.items():
+        config = config.replace(key, value)
+    return config
 
 
 def prepared(config: Configuration, periods: int) -> Simulation:

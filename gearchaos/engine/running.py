@@ -5,38 +5,63 @@ from __future__ import annotations
 import math
 import os
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from contextvars import copy_context
 from typing import Any
 
 import numpy as np
-from gearchaos_kernels import LANES, current_threads, most_threads, use_threads
+from gearchaos_kernels import current_threads, most_threads, use_threads
+from numba.core import event
 
-from gearchaos.configuration import Configuration
+from gearchaos.configuration import Given, configuration_of
 from gearchaos.engine.error_check import Tally
 from gearchaos.engine.executors import LocalExecutor, compute_blocks
 from gearchaos.engine.provenance import provenance
 from gearchaos.engine.simulation import Arrays, Bounds, Simulation
 from gearchaos.errors import ConfigurationError
 from gearchaos.interrupts import check
-from gearchaos.progress import Progress, notice, say, speaking
+from gearchaos.progress import Progress, say, speaking
 from gearchaos.results.result import Result
 from gearchaos.results.variables import Variable
 
-PILOT_SECONDS = 0.2
 METHOD_TEXTS = {
     "rk4": "classical Runge-Kutta of order 4 with fixed steps",
     "flow_map": "flow maps: exact steps from crossing to crossing",
 }
-COMPILING = "preparing the kernel of this scene; the first time this takes some seconds"
+COMPILING = "preparing the kernel of this scene, once; this takes some seconds"
 
 
-def run(config: Configuration, threads: int | None = None, progress: bool = False) -> Result:
+class _Announcer(event.Listener):  # type: ignore[misc]
+    """Says once that a kernel is compiled, from whichever thread, to whom it was made for."""
+
+    def __init__(self) -> None:
+        """Remember who is spoken to."""
+        self._context, self._said = copy_context(), False
+
+    def on_start(self, _event: event.Event) -> None:
+        """Say it the first time."""
+        if not self._said:
+            self._said = True
+            self._context.run(say, COMPILING)
+
+    on_end = on_start
+
+
+@contextmanager
+def compiling() -> Iterator[None]:
+    """Say so if what follows is compiled, and not only loaded from the cache."""
+    with event.install_listener("numba:compile", _Announcer()):
+        yield
+
+
+def run(config: Given, threads: int | None = None, progress: bool = False) -> Result:
     """Compute a sweep in memory.
 
     Parameters
     ----------
-    config : Configuration
-        From `load_config`.
+    config : Configuration or path
+        From `load_config`, or the path of its file.
     threads : int, optional
         Threads to use; by default all that there are.
     progress : bool
@@ -54,7 +79,7 @@ def run(config: Configuration, threads: int | None = None, progress: bool = Fals
     """
     choose_threads(threads)
     with speaking(quiet=not progress):
-        return _run(Simulation(config))
+        return _run(Simulation(configuration_of(config)))
 
 
 def _run(simulation: Simulation) -> Result:
@@ -110,8 +135,8 @@ def prepare(simulation: Simulation, *, compile_now: bool = True, history_periods
     check()  # Imports take a while.
     if compile_now:
         _check_memory(simulation)
-        with notice(COMPILING):
-            simulation.rehearse(periods=history_periods, history_periods=history_periods)
+        with compiling():
+            simulation.rehearse(history_periods)
         check()
     simulation.choose_steps()
     say(*simulation.notes)
@@ -130,30 +155,6 @@ def _check_memory(simulation: Simulation) -> None:
             f"bytes, more than the {memory:.3g} of this machine; record fewer periods, keep fewer "
             f"points{', take fewer steps' if plan.method == 'flow_map' else ''}"
         )
-
-
-def pilot_seconds(simulation: Simulation) -> float:
-    """Estimate how long this sweep takes here.
-
-    Parameters
-    ----------
-    simulation : Simulation
-        Compiled; a few mesh periods of as many lanes as the threads integrate at once are tried.
-    """
-    lanes = min(len(simulation.lanes), LANES * current_threads())
-    if simulation.carried:  # One value after the other.
-        lanes = simulation.lanes.starts
-
-    def seconds(periods: int) -> float:
-        began = time.perf_counter()
-        simulation.rehearse(lanes, periods)
-        return time.perf_counter() - began
-
-    # The first time includes what a method prepares for the lanes: their maps.
-    preparing, periods = seconds(1), 1
-    while (taken := seconds(periods)) <= PILOT_SECONDS:
-        periods *= 2
-    return preparing / lanes * len(simulation.lanes) + taken / periods / lanes * simulation.periods
 
 
 def choose_threads(threads: int | None) -> None:

@@ -128,11 +128,6 @@ class Simulation:
         return self.config.start.carry == "downwards"
 
     @property
-    def periods(self) -> int:
-        """Mesh periods of the whole sweep."""
-        return len(self.lanes) * (self.plan.transient_periods + self.plan.recorded_periods)
-
-    @property
     def recording(self) -> Plan:
         """The plan with all that is recorded: what is kept, and what the labels are read off."""
         checked = POINTS_NEEDED if self.config.integration.error_check > 0.0 else 0
@@ -163,19 +158,15 @@ class Simulation:
     def _splits_steps(self) -> bool:
         return self.plan.resolved and "backlash" in self.lanes.effects
 
-    def rehearse(self, lanes: int = 1, periods: int = 0, history_periods: int = 0) -> None:
-        """Integrate some lanes of the sweep for a few mesh periods.
+    def rehearse(self, periods: int = 0) -> None:
+        """Integrate the first lane, and so many mesh periods of it step by step.
 
         The kernel of this scene is compiled for it, or loaded from the cache.
         """
-        plan = self.plan._replace(
-            transient_periods=0,
-            recorded_periods=periods,
-            section_points=0,
-            history_periods=history_periods,
-        )
-        numbers = self.lanes.spread(lanes)
-        integrate(self.lanes.system_of(numbers), self.lanes.start_of(numbers), plan)
+        plan = self.plan._replace(transient_periods=0, section_points=0)
+        plan = plan._replace(recorded_periods=periods, history_periods=periods)
+        first = np.arange(1)
+        integrate(self.lanes.system_of(first), self.lanes.start_of(first), plan)
 
     def block_memory(self, threads: int) -> int:
         """Return about how many bytes the arrays of one block take while it is computed."""

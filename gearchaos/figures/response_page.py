@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from gearchaos.errors import FigureError
 from gearchaos.figures.labels import form_in_words, in_words, place_of
 from gearchaos.figures.page import Page, few_ticks, footnote, letter, page, remark
 from gearchaos.figures.response import (
@@ -45,7 +44,8 @@ def response_page(
     lane : int
         Number of the lane, from 0, all axes of the result flattened.
     coordinate : str, optional
-        Such as ``"delta_1"``; default ``"delta_5"``, the torsion.
+        Such as ``"delta_1"``; default ``"delta_5"``, the torsion. Of what is no coordinate, such
+        as ``"mesh_force_tangential"``, the page has the time history and its own spectrum.
     width_mm, height_mm : float
         Size of the page; 180 mm is two columns of a journal, and at 85 mm, one column, the panels
         stand one above the other.
@@ -53,40 +53,35 @@ def response_page(
     Raises
     ------
     FigureError
-        If the result is no response, has no such lane or coordinate, or the lane diverged.
+        If the result is no response, has no such lane or variable, or the lane diverged.
     """
     coordinate = COORDINATE if coordinate is None else coordinate
-    known = coordinates_of(result)
-    if known and coordinate not in known:
-        raise FigureError(
-            f"no coordinate {coordinate!r} in the response; it has {', '.join(known)}"
-        )
-    columns = 2 if width_mm >= SIDE_BY_SIDE_MM else 1
-    with page(width_mm, height_mm or _PANEL_HEIGHT_MM * 4 / columns) as figure:
-        panels = figure.subplots(4 // columns, columns, squeeze=False)
-        history, portrait, section, spectrum = panels.ravel()
+    whole = coordinate in coordinates_of(result)
+    columns, count = 2 if width_mm >= SIDE_BY_SIDE_MM else 1, 4 if whole else 2
+    with page(width_mm, height_mm or _PANEL_HEIGHT_MM * count / columns) as figure:
+        panels = figure.subplots(count // columns, columns, squeeze=False)
+        history, *planes, spectrum = panels.ravel()
         last = result[TIME][-1]
         time_history(
             history, result, lane, coordinate, between=(max(0.0, last - SHOWN_PERIODS), last)
         )
-        phase_portrait(portrait, result, lane, coordinate)
-        poincare_section(section, result, lane, coordinate)
+        texts = [in_words(result, place_of(result, lane))]
+        if whole:
+            phase_portrait(planes[0], result, lane, coordinate)
+            poincare_section(planes[1], result, lane, coordinate)
+            points = result.lanes(f"section_{coordinate}").shape[1]
+            # A lane may have come to rest on its orbit within the longer of the two records.
+            texts += [f"last {periods} mesh periods" for periods in (round(float(last)), points)]
         amplitude_spectrum(
             spectrum,
             result,
             lane,
-            acceleration_of(coordinate),
+            acceleration_of(coordinate) if whole else coordinate,
             window="rectangular" if repeats_after(result, lane) else "hann",
             logarithmic=True,
         )
         letter(panels.ravel())
-        points = result.lanes(f"section_{coordinate}").shape[1]
-        # A lane may have come to rest on its orbit within the longer of the two records.
-        for axes, words in (
-            (history, in_words(result, place_of(result, lane))),
-            (portrait, f"last {round(float(last))} mesh periods"),
-            (section, f"last {points} mesh periods"),
-        ):
+        for axes, words in zip((history, *planes), texts, strict=True):
             few_ticks(axes, 6, 6)
             remark(axes, words)
         footnote(figure, form_in_words(result))

@@ -17,12 +17,12 @@ from gearchaos.identification.observations import Observation
 from gearchaos.results.atomic_file import reason
 from gearchaos.results.checksum_line import checksum_fits
 from gearchaos.results.result_file import write_result
+from gearchaos.results.result_reader import SEARCH
 from gearchaos.results.stored_dataset import UnfitError, datasets_of, scalars_of, values_of
 from gearchaos.results.variables import STATUS, Variable, axis_name
 
 Floats = NDArray[np.float64]
 
-SCHEMA = "gearchaos-identification"
 CANDIDATE, OBSERVATION = "candidate", "observation"
 MEANINGS = ("complete", "diverged")
 """Meanings of the status of a candidate: whether all of its lanes were integrated to the end."""
@@ -78,7 +78,7 @@ def write_tried(
     variables = _variables(len(tried), keys, observations)
     metadata = {**facts, "parameters_searched": " ".join(keys)}
     blocks = [(0, len(tried), arrays)]
-    write_result(path, variables, blocks, {}, metadata, overwrite=True, schema=SCHEMA)
+    write_result(path, variables, blocks, {}, metadata, overwrite=True, schema=SEARCH)
 
 
 def _variables(
@@ -128,7 +128,7 @@ def read_tried(path: str | os.PathLike[str], keys: Sequence[str]) -> tuple[Tried
             datasets = datasets_of(file)
             text = {n: d for n, d in datasets.items() if d.dtype.kind in "OS"}
             facts |= {n: d[()].decode("utf-8", "replace") for n, d in text.items()}
-            if facts.get("schema") != SCHEMA or facts["parameters_searched"] != " ".join(keys):
+            if facts.get("schema") != SEARCH or facts["parameters_searched"] != " ".join(keys):
                 raise UnfitError("is no result of this search", "choose another --output")
             columns = [values_of(key, datasets[axis_name(key)]) for key in keys]
             rest = ("computed", "misfit", STATUS)

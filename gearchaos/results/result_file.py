@@ -32,7 +32,7 @@ Box: TypeAlias = tuple[slice, ...]
 
 _CHUNK_BYTES = 1 << 19
 _LONGEST_ATTRIBUTE = 32_000
-_CACHE_BYTES = 4 << 20
+CACHE_BYTES = 4 << 20  # Of each variable, while it is written.
 _PACKED = {"compression": "gzip", "compression_opts": 4, "shuffle": True, "fletcher32": True}
 
 
@@ -93,7 +93,7 @@ def write_result(
     with replacing(path, overwrite=overwrite, scratch=scratch) as partial:
         with (
             Sink(partial) as sink,
-            h5py.File(sink, "w", track_order=True, rdcc_nbytes=_CACHE_BYTES) as file,
+            h5py.File(sink, "w", track_order=True, rdcc_nbytes=CACHE_BYTES) as file,
         ):
             _write_metadata(file, {**metadata, **own_metadata(axes), "schema": schema})
             for variable in everything:

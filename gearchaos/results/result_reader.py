@@ -46,6 +46,9 @@ Contents = tuple[
 ]
 """Variables, data, parameters and metadata, as for `Result`."""
 
+SEARCH = "gearchaos-identification"
+"""Schema of the candidates of a search, which are no result of a sweep."""
+
 SOON_HASHED = 1 << 30
 """Bytes whose checksum takes about a second."""
 
@@ -80,9 +83,11 @@ def read_result(path: str | os.PathLike[str], *, rows: bool = True) -> Contents:
         raise FileError(f"{name}: {printable(str(error))}") from error
     except Exception as error:
         # Damage surfaces in h5py as nearly any kind of exception.
-        what = "is damaged" if h5py.is_hdf5(name) else "is not an HDF5 file, or is cut off"
+        if not h5py.is_hdf5(name):
+            remedy = "give the name of a result, which a sweep of a configuration writes"
+            raise FileError(f"{name}: is not an HDF5 file; {remedy}") from error
         why = printable(reason(error))
-        raise FileError(f"{name}: {what} ({why}); run the sweep again") from error
+        raise FileError(f"{name}: is damaged ({why}); run the sweep again") from error
 
 
 def fixed_coordinates(metadata: Mapping[str, Any]) -> dict[str, float]:
@@ -154,6 +159,11 @@ def _wording(notes: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _check_schema(metadata: Mapping[str, Any]) -> None:
+    if metadata.get("schema") == SEARCH:
+        raise UnfitError(
+            "holds the candidates of a search, not the result of a sweep",
+            "`gearchaos identify TARGETS.toml --resume` goes on with it and reports what it found",
+        )
     if metadata.get("schema") != SCHEMA:
         raise UnfitError(
             f'is not a gearchaos result: it lacks the attribute schema = "{SCHEMA}"',

@@ -338,6 +338,20 @@ def test_a_configuration_cannot_be_changed_but_replaced():
         config.replace("integration.steps_per_period", 0)
 
 
+def test_numbers_of_numpy_are_numbers():
+    config = load_config(PAN2021)
+    changed = config.replace("outputs.lyapunov", np.bool_(False))
+    changed = changed.replace("pair.teeth", np.array([20, 40]))
+    changed = changed.replace("sweep", {"parameter": "pitch_error", "values": np.linspace(1, 2, 3)})
+    plain = config.replace("outputs.lyapunov", False).replace("pair.teeth", [20, 40])
+    assert changed == plain.replace(
+        "sweep", {"parameter": "pitch_error", "values": [1.0, 1.5, 2.0]}
+    )
+    changed = config.replace("sweep.count", np.int64(3))
+    assert changed == Configuration.from_toml(changed.resolved_toml())
+    assert changed.sweep.size == 3
+
+
 def test_a_configuration_survives_pickling():
     config = load_config(PAN2021)
     copy = pickle.loads(pickle.dumps(config))

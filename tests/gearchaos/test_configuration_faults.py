@@ -1,7 +1,9 @@
 """Every fault of a configuration gives one clear message, all of them at once."""
 
+import datetime
 from pathlib import Path
 
+import h5py
 import pytest
 
 from gearchaos.configuration import Configuration, load_config
@@ -427,6 +429,27 @@ def test_what_is_not_utf_8_is_located_by_its_line(tmp_path):
     path.write_bytes(b"# first line\ntitle = 'Z\xe4hne'\n")
     with pytest.raises(ConfigurationError, match=r"latin\.toml: line 2 is not UTF-8"):
         load_config(path)
+
+
+def test_a_result_is_no_configuration(tmp_path):
+    path = tmp_path / "pair.h5"
+    with h5py.File(path, "w"):
+        pass
+    shows = r"pair\.h5: is HDF5, and a configuration is TOML; `gearchaos info .*pair\.h5`"
+    with pytest.raises(ConfigurationError, match=shows):
+        load_config(path)
+
+
+def test_what_is_no_value_of_toml_is_called_what_it_is():
+    config = load_config(PAN2021)
+    for value, name in ((object(), "object"), ({1}, "set"), (datetime.date.today(), "a date or")):
+        with pytest.raises(ConfigurationError, match=f"must be a whole number, not {name}"):
+            config.replace("sweep.count", value)
+
+
+def test_a_choice_is_refused_with_the_choices():
+    with pytest.raises(ConfigurationError, match="one of 'none', 'upwards' or 'downwards'"):
+        load_config(PAN2021, ["start.carry=up"])
 
 
 def test_a_huge_file_is_refused(tmp_path):

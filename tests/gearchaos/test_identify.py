@@ -18,6 +18,7 @@ from gearchaos.identification.report import _row, reach
 from gearchaos.identification.searching import Judge, decisive_facts, search
 from gearchaos.identification.tried import Tried, read_tried, write_tried
 from gearchaos.identify import main
+from gearchaos.results.result import open_result
 
 from .commands import Ended, run_module
 
@@ -128,6 +129,11 @@ def numbers(path):
     with h5py.File(path) as file:
         names = [name for name in file if isinstance(file[name], h5py.Dataset) and file[name].shape]
         return {name: file[name][...].tobytes() for name in names}
+
+
+def test_the_candidates_are_no_result_of_a_sweep_and_that_is_said(identified):
+    with pytest.raises(FileError, match=r"holds the candidates of a search.*--resume"):
+        open_result(identified.file)
 
 
 def problem_of(identified):

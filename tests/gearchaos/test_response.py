@@ -214,7 +214,13 @@ def test_diverged_lanes_are_kept_and_told(tmp_path, capsys):
     [
         ([], "one of the arguments --pitch-error --at is required"),
         (["--at", "1", "--pitch-error", "1"], "not allowed with"),
-        (["--at", "5,86"], "invalid float value: '5,86'"),
+        (["--at", "5,86"], "'5,86' is not a finite number"),
+        (["--at", "load=1"], f"--at load: {FULL} sweeps pitch_error; replace another key with"),
+        (
+            ["--at", "1", "--set", "start.carry=upwards"],
+            f'{FULL}: start.carry = "upwards": a lane goes on from the one before it, and values '
+            "by themselves have none; run the sweep, then: gearchaos response RESULT.h5 --at VALUE",
+        ),
         (["--pitch-error", "nan"], "must be a finite number"),
         (["--pitch-error", "1", "--periods", "7"], "integration.recorded_periods = 6"),
         (["--pitch-error", "1", "--threads", "0"], "threads = 0"),
@@ -234,10 +240,11 @@ def test_a_pitch_error_in_a_sweep_over_something_else_needs_a_value_of_that(tmp_
     output = tmp_path / "spur.h5"
     asked = [str(FULL.with_name("spur_pair.toml")), "--pitch-error", "1", "-o", str(output)]
     assert main(asked) == 2
-    assert (
-        "--pitch-error takes the place of the sweep over mesh_frequency: give one value of it with "
-        "--set groups.mesh_frequency=VALUE, or several with --at\n"
-    ) in capsys.readouterr().err
+    assert capsys.readouterr().err.startswith(
+        "gearchaos response: error: --pitch-error takes the place of the sweep over "
+        "mesh_frequency: give one value of it with --set groups.mesh_frequency=VALUE, or several "
+        "with --at\n"
+    )
     assert not output.exists()
 
 
@@ -246,5 +253,5 @@ def test_the_configuration_is_never_replaced(tmp_path, capsys):
     shutil.copy(FULL, config)
     asked = [str(config), "--pitch-error", "1", "--overwrite", "-o", str(config)]
     assert main(asked) == 4
-    assert "is the configuration itself" in capsys.readouterr().err
+    assert "is the input itself" in capsys.readouterr().err
     assert config.read_text() == FULL.read_text()

@@ -231,12 +231,27 @@ def test_the_command_draws_a_page_for_each_lane(path, arguments, names, capsys):
     assert err == f"gearchaos plot: 2 lanes over pitch_error, {size} at 50 dpi\n"
 
 
+@pytest.mark.parametrize("name", ["mesh_force_tangential", "delta_5_rate"])
+def test_what_is_no_coordinate_has_its_history_and_its_own_spectrum(path, result, name, capsys):
+    asked = ["--variable", name, "--to", "6", "--format", "png", "--dpi", "50"]
+    assert main([str(path), *asked]) == 0
+    out, err = capsys.readouterr()
+    assert out == f"{path.parent}/response_pitch_error_5.86_{name}.png\n"
+    assert "180 mm x 52 mm" in err
+    history, spectrum = response_page(result, 0, name).axes
+    np.testing.assert_array_equal(history.lines[0].get_ydata(), result[name][0])
+    alone = Figure().subplots()
+    amplitude_spectrum(alone, result, 0, name, logarithmic=True)
+    for one, other in zip(spectrum.collections, alone.collections, strict=True):
+        np.testing.assert_array_equal(one.get_segments(), other.get_segments())
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
         (["--output", "all.png"], "is one png file, but there are several pages to draw"),
         (["--full-range"], "is a response; it belongs to the diagram of a sweep"),
-        (["--variable", "delta_3"], "no coordinate 'delta_3' in the response; it has delta_5"),
+        (["--variable", "delta_3"], "no variable 'delta_3' over time in the result; it has delta"),
         (["--from", "13"], "the result has 5.86 to 12.5"),
     ],
 )

@@ -199,7 +199,7 @@ def test_what_contradicts_the_format_is_refused(fault: str, good: Path, tmp_path
 def test_a_file_of_another_kind_is_refused(tmp_path: Path) -> None:
     text = tmp_path / "sweep.toml"
     text.write_text("[scene]\n", encoding="utf-8")
-    assert "is not an HDF5 file" in refusal(text)
+    assert "is not an HDF5 file; give the name of a result" in refusal(text)
     other = tmp_path / "other.h5"
     with h5py.File(other, "w") as file:
         file["x"] = np.arange(3)

@@ -28,6 +28,9 @@ def test_python_and_the_command_give_the_same_bits(tmp_path, config, overrides):
     flags = [word for override in overrides for word in ("--set", override)]
     assert sweep(tmp_path, *flags, "--quiet").code == 0
     in_memory = gearchaos.run(config(*overrides))
+    if overrides == ["sweep.count=200"]:
+        (tmp_path / "longer.toml").write_text(SMALL.replace("count = 40", "count = 200"))
+        assert same_data(gearchaos.run(tmp_path / "longer.toml"), in_memory)
     assert same_data(gearchaos.open_result(tmp_path / "gears.h5"), in_memory)
 
 

@@ -209,9 +209,9 @@ def test_a_bare_value_is_enough_where_there_is_one_other_axis(tmp_path):
 @pytest.mark.parametrize(
     ("at", "words"),
     [
-        (["0.1"], "--at 0.1: must be NAME=VALUE with a number, each of the axes load, pitch_error"),
-        (["load=x"], "--at load=x: must be NAME=VALUE"),
-        (["load=nan"], "--at load=nan: must be NAME=VALUE"),
+        (["0.1"], "--at 0.1: must be NAME=VALUE, each of the axes load, pitch_error, start once"),
+        (["load=x"], "'x' is not a finite number"),
+        (["load=nan"], "'nan' is not a finite number"),
         (["load=0.1", "load=0.3"], "--at load=0.3: must be NAME=VALUE"),
         (["torque=1"], "torque: is no axis of the result; its axes: load, pitch_error, start"),
         (["load=0.1", "pitch_error=0"], "no swept parameter is left"),

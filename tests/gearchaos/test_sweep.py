@@ -1,5 +1,6 @@
 """The sweep command: what it prints where, what it writes, and how it ends."""
 
+import json
 import os
 import pty
 import re
@@ -11,8 +12,21 @@ import numpy as np
 import pytest
 
 import gearchaos
+from gearchaos.configuration import Configuration, load_config, swept_values
+from gearchaos.dry_run import _thinned
+from gearchaos.engine.simulation import Simulation
 
-from .commands import DIVERGING, names_in, run_module, small_config, sweep
+from .commands import (
+    DIVERGING,
+    LINEAR,
+    SMALL,
+    names_in,
+    run_module,
+    same_data,
+    small_config,
+    sweep,
+)
+from .short_sweeps import PAN2021
 
 
 def test_the_path_of_the_result_is_all_that_stdout_holds(tmp_path):
@@ -70,7 +84,9 @@ def test_a_new_scene_is_announced_once_and_compiled_once_per_machine(tmp_path):
     assert first.err.count("preparing the kernel of this scene") == 1
     compiled = {path: path.stat().st_mtime_ns for path in (tmp_path / "cache").rglob("*.nb?")}
     assert compiled
-    assert sweep(tmp_path, *plainest, env=environment).code == 0
+    second = sweep(tmp_path, *plainest, env=environment)
+    assert second.code == 0
+    assert "preparing the kernel" not in second.err
     again = {path: path.stat().st_mtime_ns for path in (tmp_path / "cache").rglob("*.nb?")}
     assert again == compiled
 
@@ -93,7 +109,7 @@ def test_a_dry_run_tells_lanes_steps_memory_and_time_and_writes_nothing(tmp_path
     assert names_in(tmp_path) == ["gears.toml"]
     told = dict(re.findall(r"^(\w+): +(.+)$", ended.err, re.MULTILINE))
     assert told.pop("effects").startswith("pitch_error, stiffness_variation, backlash")
-    assert re.fullmatch(r"about [\d.]+[kM]B for a block of lanes", told.pop("memory"))
+    assert re.fullmatch(r"about [\d.]+MB at the peak of the process", told.pop("memory"))
     assert re.fullmatch(r"about \d+\.\d s with \d+ threads?", told.pop("time"))
     # Per lane: 2 x 5 section points, exponent, its error, crossings, their speed, 10 states at
     # the start and 10 at the end, return distance; unsplit steps, period of divergence and of the
@@ -105,6 +121,66 @@ def test_a_dry_run_tells_lanes_steps_memory_and_time_and_writes_nothing(tmp_path
         "lanes": "120 (40 values of pitch_error from 0 to 5, 3 starts each)",
         "steps": "7.2e+04 (40 per period)",
     }
+
+
+def test_a_dry_run_tells_a_scheduler_as_json_what_one_shard_takes(tmp_path):
+    ended = sweep(
+        tmp_path, "--dry-run", "--json", "--shard", "2/3", "--set", "sweep.count=700", "-q"
+    )
+    assert (ended.code, ended.err) == (0, "")
+    facts = json.loads(ended.out)
+    # Blocks of 256 lanes: the second one of three.
+    assert [facts[name] for name in ("output", "exists", "states")] == ["gears.h5", False, 10]
+    assert (facts["lanes"], facts["steps"]) == (256, 256 * 40 * 15)
+    assert facts["file_bytes"] == 256 * (8 * 35 + 4 * 4 + 3)
+    assert facts["seconds"] > 0.0
+    # Not only arrays: nobody starts with less than the interpreter and its packages take.
+    assert facts["memory_bytes"] > 5e7
+    ended = sweep(tmp_path, "--json")
+    assert (ended.code, ended.out) == (2, "")
+    assert "--json: only what --dry-run tells is JSON" in ended.err
+
+
+def test_what_a_dry_run_computes_is_the_sweep_with_fewer_lanes_and_periods():
+    asked = ("start.kind=random", "start.count=9", "integration.error_check=0.5")
+    second = 'second_sweep={parameter="load", from=0.2, to=0.3, count=30}'
+    config = load_config(PAN2021, [*asked, second, "sweep.count=300", "outputs.exponents=true"])
+    few = _thinned(Simulation(config), 0.01, 0.1)
+    for name, some in few.sweeps.items():
+        every = swept_values(config.sweeps[name])
+        assert set(swept_values(some)) < set(every)
+        # From all over the sweep, no end before the other.
+        assert min(some.values) - every[0] == pytest.approx(every[-1] - max(some.values), rel=0.1)
+    # The cube root of a hundredth of each axis: 64.6, 6.5 and 1.9, in runs of 32 / 9 neighbours.
+    assert (few.sweep.size, few.second_sweep.size, few.start.count) == (68, 7, 2)
+    assert (few.integration.transient_periods, few.integration.recorded_periods) == (50, 50)
+    assert few.outputs == config.replace("outputs.section_points", 50).outputs
+    assert few.integration.error_check == 0.5
+
+
+def test_a_configuration_comes_from_standard_input(tmp_path):
+    arguments = (*LINEAR, "--set", "sweep.count=3", "--output", "piped.h5", "--quiet")
+    ended = run_module("gearchaos.sweep", "-", *arguments, cwd=tmp_path, input=SMALL)
+    assert ended == (0, "piped.h5\n", "")
+    piped = gearchaos.open_result(tmp_path / "piped.h5")
+    config = Configuration.from_toml(SMALL, overrides=[*LINEAR[1::2], "sweep.count=3"])
+    assert same_data(piped, gearchaos.run(config))
+    assert piped.metadata["configuration"] == SMALL
+
+
+def test_what_standard_input_lacks_is_told_of_it(tmp_path):
+    broken = SMALL.replace("count = 40", "count = 0")
+    ended = run_module("gearchaos.sweep", "-", cwd=tmp_path, input=broken)
+    assert ended.code == 2
+    assert "error: -: sweep.count = 0: must be at least 1" in ended.err
+
+
+@pytest.mark.parametrize("arguments", [("gears.toml", "--output", "-"), ("/dev/stdin", "-o", "-")])
+def test_a_result_is_not_written_to_standard_output(tmp_path, arguments):
+    small_config(tmp_path)
+    ended = run_module("gearchaos.sweep", *arguments, cwd=tmp_path, input=SMALL)
+    said = "-: a result is a file, not a stream, and needs a name; give --output PATH"
+    assert ended == (4, "", f"gearchaos sweep: error: {said}\n")
 
 
 def test_a_dry_run_says_that_the_output_exists_and_leaves_it_alone(tmp_path):

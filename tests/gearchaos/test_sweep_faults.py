@@ -117,7 +117,7 @@ def test_a_configuration_that_cannot_be_read_is_code_4(tmp_path, config, message
         ("gears.h5/", "'gears.h5/': is not a file name; give the name of a file"),
         ("", "'': is not a file name; give the name of a file"),
         (os.devnull, f"{os.devnull}: is not a regular file; give the name of a file"),
-        ("gears.toml", "gears.toml: is the configuration itself; choose another --output"),
+        ("gears.toml", "gears.toml: is the input itself; choose another --output"),
     ],
 )
 def test_an_output_that_cannot_be_is_code_4_before_anything_is_computed(tmp_path, output, message):
