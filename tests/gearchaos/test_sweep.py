@@ -175,7 +175,7 @@ def test_what_standard_input_lacks_is_told_of_it(tmp_path):
     assert "error: -: sweep.count = 0: must be at least 1" in ended.err
 
 
-@pytest.mark.parametrize("arguments", [("gears.toml", "--output", "-"), ("/dev/stdin", "-o", "-")])
+@pytest.mark.parametrize("arguments", [("gears.toml", "--output", "-"), ("-",)])
 def test_a_result_is_not_written_to_standard_output(tmp_path, arguments):
     small_config(tmp_path)
     ended = run_module("gearchaos.sweep", *arguments, cwd=tmp_path, input=SMALL)
