@@ -3,8 +3,8 @@
     python benchmarks/throughput.py [--rounds 7]
 
 Rounds alternate between the kernels, so that a machine that slows down slows all of them; every
-figure is the median over the rounds, and ratios are medians of the ratios within a round. Flow maps,
-24 a period, are counted as the 200 steps a period of the other rows.
+figure is the median over the rounds, and ratios are medians of the ratios within a round. Flow
+maps, 24 a period, are counted as the 200 steps a period of the other rows.
 """
 
 import argparse

@@ -40,8 +40,6 @@ def work_precision(axes: Axes, modes: Mapping[str, Points]) -> list[Line2D]:
     axes.set_xscale("log")
     axes.set_yscale("log")
     axes.margins(0.08)
-    # Costs rarely span two decades, within which nothing would be labelled, or everything.
-    axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0), numticks=5))
     axes.xaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
     axes.xaxis.set_minor_formatter(NullFormatter())
     return lines
@@ -63,6 +61,8 @@ def work_precision_page(
             chosen = {mode: [(one[cost], one[2]) for one in modes[mode]] for mode in modes}
             lines = work_precision(panels[cost], chosen)
             panels[cost].set_xlabel(label)
+        # Times rarely span a decade, within which nothing would be labelled, or everything.
+        panels[1].xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
         panels[0].set_ylabel("Error of section and exponent")
         letter(panels)
         figure.legend(handles=lines, loc="outside upper center", ncols=3, **LEGEND)
