@@ -71,7 +71,6 @@ def _config(mode: str, steps: int) -> gearchaos.Configuration:
         "steps_per_period": steps,
         "crossings": "resolved" if resolved else "plain",
         "method": method,
-        "unstable": "refuse",
     }
     return gearchaos.load_config(SWEEP, [f"integration.{key}={table[key]}" for key in table])
 
