@@ -2,9 +2,9 @@
 
     python benchmarks/step_sizes.py [--steps 50,100,200,400,800] [--output step_sizes]
 
-The same sweep at several numbers of steps per mesh period, with plain and with resolved steps. The
-boundaries are read off the sweep's own grid of 0.01; the last column is the wall time of the
-computation relative to the fastest run.
+The same sweep at several numbers of steps per mesh period, with plain and with resolved steps, and
+with 12 to 96 flow maps. The boundaries are read off the sweep's own grid of 0.01; the last column
+is the wall time of the computation relative to the fastest run.
 """
 
 import argparse
@@ -21,12 +21,15 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import NullLocator
 
 import gearchaos
-from gearchaos.figures.style import BLUE, ORANGE, STYLE
+from gearchaos.accuracy import MODES
+from gearchaos.figures.style import STYLE
+from gearchaos.figures.work_precision import LOOKS
 from gearchaos.records.period import motion_period
 from gearchaos.results.result import Result
 
 SWEEP = Path(__file__).parent.parent / "sweeps" / "pan2021.toml"
 CHAOTIC = 0.01
+FLOW_MAP_STEPS = (12, 24, 48, 96)
 BOUNDARIES = ("hop", "period 1 ends", "period 2 ends", "chaos begins", "period 3 from", "to")
 
 
@@ -38,22 +41,23 @@ def main() -> None:
     parser.add_argument("--output", type=Path, default=Path("step_sizes"))
     options = parser.parse_args()
     print_machine()
+    steps = tuple(map(int, options.steps.split(",")))
     runs = [
-        (crossings, steps, _config(crossings, steps))
-        for crossings in ("plain", "resolved")
-        for steps in map(int, options.steps.split(","))
+        (mode, count, _config(mode, count))
+        for mode in MODES
+        for count in (FLOW_MAP_STEPS if mode == "flow map" else steps)
     ]
     for _, _, config in runs:
         gearchaos.run(config.replace("sweep.count", 11))
     # Rounds visit every run in turn, so that a machine that slows down slows all of them.
     rounds = [[_timed(config) for _, _, config in runs] for _ in range(options.rounds)]
     rows = [
-        (crossings, steps, rounds[0][number][0], statistics.median(r[number][1] for r in rounds))
-        for number, (crossings, steps, _) in enumerate(runs)
+        (mode, count, rounds[0][number][0], statistics.median(r[number][1] for r in rounds))
+        for number, (mode, count, _) in enumerate(runs)
     ]
     _print(rows)
     table = [
-        {"crossings": mode, "steps_per_period": steps, "boundaries": found, "seconds": seconds}
+        {"mode": mode, "steps_per_period": steps, "boundaries": found, "seconds": seconds}
         for mode, steps, found, seconds in rows
     ]
     facts = {"machine": machine_facts(), "threads": most_threads(), "runs": table}
@@ -61,9 +65,14 @@ def main() -> None:
     _draw(rows, options.output.with_suffix(".png"))
 
 
-def _config(crossings: str, steps: int) -> gearchaos.Configuration:
-    overrides = [f"integration.steps_per_period={steps}", f"integration.crossings={crossings}"]
-    return gearchaos.load_config(SWEEP, overrides)
+def _config(mode: str, steps: int) -> gearchaos.Configuration:
+    resolved, method = MODES[mode]
+    table = {
+        "steps_per_period": steps,
+        "crossings": "resolved" if resolved else "plain",
+        "method": method,
+    }
+    return gearchaos.load_config(SWEEP, [f"integration.{key}={table[key]}" for key in table])
 
 
 def _timed(config: gearchaos.Configuration) -> tuple[dict[str, float], float]:
@@ -115,17 +124,17 @@ def _draw(rows: list[tuple[str, int, dict[str, float], float]], path: Path) -> N
     with matplotlib.rc_context(STYLE):
         figure = Figure(figsize=(3.35, 3.2), layout="constrained")
         shifts, times = figure.subplots(2, sharex=True)
-        for mode, colour, marker in (("plain", ORANGE, "o"), ("resolved", BLUE, "s")):
+        for mode, look in LOOKS.items():
             mine = [row for row in rows if row[0] == mode]
             steps = [row[1] for row in mine]
             worst = [
                 max(abs(found[name] - finest[name]) for name in BOUNDARIES)
                 for _, _, found, _ in mine
             ]
-            style = {"color": colour, "marker": marker, "markersize": 3, "linewidth": 0.8}
+            style = {**look, "markersize": 3, "linewidth": 0.8}
             shifts.plot(steps, worst, label=mode, **style)
             times.plot(steps, [row[3] for row in mine], **style)
-        every = sorted({row[1] for row in rows})
+        every = sorted({row[1] for row in rows})[::2]
         for axes in (shifts, times):
             axes.set_xscale("log")
             axes.set_xticks(every, [str(steps) for steps in every])

@@ -3,7 +3,8 @@
     python benchmarks/throughput.py [--rounds 7]
 
 Rounds alternate between the kernels, so that a machine that slows down slows all of them; every
-figure is the median over the rounds, and ratios are medians of the ratios within a round.
+figure is the median over the rounds, and ratios are medians of the ratios within a round. Flow
+maps, 24 a period, are counted as the 200 steps a period of the other rows.
 """
 
 import argparse
@@ -30,6 +31,8 @@ SCENES = {
     "no axial pair, 6 states": Effects(axial=False),
     "torsion, 2 states": Effects(transverse=False, axial=False),
 }
+FLOW_MAP = {"steps": 24, "method": "flow_map"}
+THREADED = {"": {}, ", resolved": {}, ", flow map": FLOW_MAP}
 
 
 def main() -> None:
@@ -56,8 +59,11 @@ def _contestants():
             for name, scene in SCENES.items():
                 kind = f"{name}, resolved" if resolved else name
                 yield kind, tangent, engine(scene, tangent, resolved, threads=1)
-        everything = engine(Effects(), tangent, False, most_threads())
-        yield f"full, {most_threads()} threads", tangent, everything
+        for name, scene in SCENES.items():
+            yield f"{name}, flow map", tangent, engine(scene, tangent, True, 1, **FLOW_MAP)
+        for kind, how in THREADED.items():
+            everything = engine(Effects(), tangent, kind != "", most_threads(), **how)
+            yield f"full, {most_threads()} threads{kind}", tangent, everything
 
 
 def _pan(lanes: int) -> System:
@@ -66,18 +72,27 @@ def _pan(lanes: int) -> System:
 
 
 def engine(
-    scene: Effects, tangent: bool, resolved: bool, threads: int, steps: int = STEPS
+    scene: Effects,
+    tangent: bool,
+    resolved: bool,
+    threads: int,
+    steps: int = STEPS,
+    method: str = "rk4",
 ) -> Callable[[], int]:
-    """Return work that integrates the sweep of Pan 2021 and tells how many steps that took."""
+    """Return work that integrates the sweep of Pan 2021 and tells how many steps that took.
+
+    Steps of RK4: flow maps count for `STEPS` a period.
+    """
     lanes = LANES * threads
     system = _pan(lanes)._replace(effects=scene)
     # The end state is written in full, so that no effect can be optimised away.
-    plan = Plan(steps, 0, PERIODS, 1, tangent, resolved)
+    plan = Plan(steps, 0, PERIODS, 1, tangent, resolved, method=method)
+    counted = lanes * PERIODS * (steps if method == "rk4" else STEPS)
 
     def work() -> int:
         use_threads(threads)
         integrate(system, np.zeros((lanes, len(system.states))), plan)
-        return lanes * PERIODS * steps
+        return counted
 
     return work
 
@@ -110,12 +125,13 @@ def _print_table(rates: dict[tuple[str, bool], list[float]]) -> None:
             ratio = statistics.median(a / b for a, b in zip(mine, yardstick, strict=True))
             cells += f"{statistics.median(mine):{width}.1f}{ratio:8.1f}"
         print(f"{name:34}{cells}")
-    threaded = f"full, {most_threads()} threads"
-    for tangent in (False, True):
-        pairs = zip(rates[threaded, tangent], rates["full, 10 states", tangent], strict=True)
-        speedup = statistics.median(a / b for a, b in pairs)
-        kind = "with tangent" if tangent else "plain"
-        print(f"{most_threads()} threads over 1, {kind}: {speedup:.2f}")
+    for kind in THREADED:
+        for tangent in (False, True):
+            many = rates[f"full, {most_threads()} threads{kind}", tangent]
+            pairs = zip(many, rates[f"full, 10 states{kind}", tangent], strict=True)
+            speedup = statistics.median(a / b for a, b in pairs)
+            with_tangent = ", with tangent" if tangent else ""
+            print(f"{most_threads()} threads over 1{kind}{with_tangent}: {speedup:.2f}")
 
 
 if __name__ == "__main__":

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 MODES = {"plain": (False, "rk4"), "resolved": (True, "rk4"), "flow map": (True, "flow_map")}
 """Each with its setting of `Plan`: resolved, method."""
-FLOW_MAP_STEPS = (12, 24, 48, 96)
+FLOW_MAP_STEPS = (6, 12, 24, 48, 96, 192)
 MOST_STEPS = 1600
 TRUTH_STEPS = 384
 ROUNDS = 3
@@ -120,7 +120,7 @@ def _write(settings: Sequence[Setting], title: str, targets: list[str], overwrit
     from gearchaos.results.atomic_file import replacing
 
     points = {
-        mode: [(s.seconds, s.error, s.steps) for s in settings if s.mode == mode] for mode in MODES
+        mode: [(s.steps, s.seconds, s.error) for s in settings if s.mode == mode] for mode in MODES
     }
     page = work_precision_page(points)
     *pictures, table_file = targets
