@@ -155,7 +155,7 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
         "--stages",
         action="store_true",
         help="shade the stages behind the diagram of a sweep; those narrower than a 150th of the "
-        "axis go into what surrounds them",
+        "axis go into what surrounds them, or make it one of several motions",
     )
     add("--full-range", action="store_true", help="show every lane, however few lie far out")
     add(

@@ -69,7 +69,7 @@ def bifurcation(
         axes,
         lanes,
         rows,
-        markersize=float(np.clip(200.0 / lanes.numbers.size, 0.8, 1.8)),
+        markersize=lanes.dot_size(0.8),
         color=BLACK,
         rasterized=True,
         alpha=min(1.0, 4.0 / max(1, rows.shape[1]) ** 0.5) * min(1.0, MOST_DOTS / total),

@@ -60,6 +60,7 @@ STYLE: dict[RcKeyType, Any] = {
     "ytick.major.width": 0.5,
     "xtick.minor.width": 0.4,
     "ytick.minor.width": 0.4,
+    "hatch.linewidth": 0.3,
     "figure.constrained_layout.h_pad": 0.02,
     "figure.constrained_layout.w_pad": 0.02,
     "figure.constrained_layout.hspace": 0.02,

@@ -46,8 +46,8 @@ def bifurcation_page(
     variable, between, full_range
         As for `bifurcation`.
     stages : bool or LabelledLanes
-        Shade the stages behind both panels; of several starts those of the first, as the legend
-        then says. Lanes with other labels than those of the result may be given.
+        Shade the stages behind both panels. Lanes with other labels than those of the result may be
+        given.
     marked : (str, sequence of float), optional
         A few words, and the values of the parameter of which they tell: ticks at the upper edge.
     width_mm, height_mm : float
@@ -96,9 +96,8 @@ def bifurcation_page(
             mark_values(stack, *marked)
         if stages:
             given = None if isinstance(stages, bool) else stages
-            one = result.sel(start=0) if "start" in result.axes else result
             for axes in stack:
-                shade_stages(axes, one, lanes=given, legend=axes is stack[0])
+                shade_stages(axes, result, lanes=given, legend=axes is stack[0])
         else:
             footnote(figure, form_in_words(result))
         if result.fixed:
