@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection, PolyCollection
+from matplotlib.colors import to_rgb
 from matplotlib.legend import Legend
 from matplotlib.lines import Line2D
 
@@ -50,6 +51,9 @@ def lyapunov(
     *,
     between: Between = (None, None),
     full_range: bool = False,
+    color: str = BLACK,
+    label: str | None = None,
+    marker: str = ".",
 ) -> LyapunovArtists:
     """Draw the largest Lyapunov exponent into axes, with zero line and uncertainty.
 
@@ -60,7 +64,7 @@ def lyapunov(
 
     Parameters
     ----------
-    axes, result, between, full_range
+    axes, result, between, full_range, color, label, marker
         As for `bifurcation`.
 
     Raises
@@ -97,25 +101,27 @@ def lyapunov(
         lw=0.0,
         hatch="////",
     )
+    pale = 0.6 + 0.4 * np.array(to_rgb(color))
     band = axes.fill_between(
         x,
         joined - reach,
         joined + reach,
-        color=GREY,
-        alpha=0.5,
+        color=pale,
         linewidth=0.0,
         label="\N{PLUS-MINUS SIGN}2 standard errors",
     )
     ends = (exponent - reach)[alone], (exponent + reach)[alone]
-    bars = axes.vlines(x[alone], *ends, colors=BLACK, lw=0.6, alpha=0.5)
+    bars = axes.vlines(x[alone], *ends, colors=pale, lw=0.6)
     line_style = "none" if several_starts and alone.any() else "-"
-    (line,) = axes.plot(x, exponent, color=BLACK, linewidth=0.6, linestyle=line_style)
+    look = {"color": color, "linestyle": line_style, "label": label}
+    (line,) = axes.plot(x, exponent, linewidth=0.6, **look)
     points = dots(
         axes,
         lanes._replace(diverged=~lonely),
         result.lanes(LARGEST_EXPONENT)[:, np.newaxis],
         markersize=lanes.dot_size(1.0),
-        color=BLACK,
+        color=color,
+        marker=marker,
     )
     mixed = None
     among = drawn[result.lanes(RECORD)[lanes.numbers][drawn] == 1] if RECORD in result else []
@@ -138,6 +144,7 @@ def lyapunov(
         lanes,
         whole,
         whole,
+        line,
         spread=np.nan_to_num(spread),
         hold_zero=True,
         full_range=full_range,

@@ -191,11 +191,46 @@ def test_a_few_outlying_lanes_are_marked_and_do_not_flatten_the_rest(axes, resul
     assert axes.get_ylim()[0] > -5.0
     np.testing.assert_array_equal(chart.off_scale[0].get_xdata(), result["growth"][[30, 31]])
     assert chart.off_scale[0].get_label() == "off scale (to \N{MINUS SIGN}400)"
+    axes.clear()
     diagram = bifurcation(axes, result)
     assert axes.get_ylim()[1] < 1.1
     np.testing.assert_array_equal(diagram.off_scale[0].get_xdata(), result["growth"][[60]])
     assert bifurcation(axes, result, full_range=True).off_scale == []
     assert axes.get_ylim()[1] > 1e4
+
+
+def test_a_second_result_widens_the_limits_and_every_lane_is_seen_or_marked(axes, result):
+    other = logistic_sweep(np.linspace(2.0, 3.0, 41))
+    other["section_delta_5"][:] -= 5.0
+    result["section_delta_5"][60, 5] = 1e4
+    first = bifurcation(axes, result, label="above")
+    (outlier,) = first.off_scale
+    second = bifurcation(axes, other, color="#0072B2", marker="^", label="below")
+    left, right = axes.get_xlim()
+    assert left < 2.0 and right > 3.9
+    bottom, top = axes.get_ylim()
+    points = np.concatenate([one.points.get_ydata() for one in (first, second)])
+    assert np.count_nonzero((points < bottom) | (points > top)) == 1
+    # The triangle was drawn anew, at the edge as it is now, and the legend has all names.
+    assert outlier.axes is None and first.off_scale[0].axes is axes
+    np.testing.assert_array_equal(first.off_scale[0].get_xdata(), result["growth"][[60]])
+    assert second.off_scale == []
+    names = [text.get_text() for text in second.legend.get_texts()]
+    assert names == ["above", "off scale (to 1e+04)", "below"]
+    assert second.points.get_color() == "#0072B2" and second.points.get_marker() == "^"
+    bifurcation(axes, other, full_range=True)
+    assert axes.get_ylim()[1] > 1e4 and first.off_scale == []
+
+
+def test_results_over_each_other_share_a_page_and_are_named(result):
+    other = logistic_sweep(np.linspace(2.0, 3.0, 41), with_exponent=False)
+    page = bifurcation_page([result, other], labels=["one", "other $"])
+    upper, lower = page.axes
+    assert upper.get_xlim() == lower.get_xlim()
+    assert upper.get_xlim()[0] < 2.0
+    assert [text.get_text() for text in upper.get_legend().get_texts()] == ["one", r"other \$"]
+    with pytest.raises(FigureError, match="drawn over each other, and without stages"):
+        bifurcation_page([result, other], stages=True)
 
 
 def test_limits_hold_everything_where_nothing_lies_far_out():
@@ -307,7 +342,7 @@ def test_a_notebook_can_show_the_page(result):
 
 
 def test_a_figure_of_another_format_is_refused(result, tmp_path):
-    with pytest.raises(FigureError, match=r"\.png or \.pdf"):
+    with pytest.raises(FigureError, match=r"\.png or \.pdf or \.svg"):
         save_figure(bifurcation_page(result), tmp_path / "page.gif")
 
 

@@ -97,15 +97,15 @@ def test_a_stage_that_hides_too_many_others_says_so(labels, kind):
 
 # Machado, Oliveira, Fernandes 2009, severity 1: linear RGB of everybody, and of those who lack the
 # cones for long, middle and short waves.
-COLOUR_BLIND = np.reshape(
+COLOUR_BLIND = np.fromstring(
     """
     1 0 0  0 1 0  0 0 1
     0.152286 1.052583 -0.204868  0.114503 0.786281 0.099216  -0.003882 -0.048116 1.051998
     0.367322 0.860646 -0.227968  0.280085 0.672501 0.047413  -0.011820 0.042940 0.968881
     1.255528 -0.076749 -0.178779  -0.078411 0.930809 0.147602  0.004733 0.691367 0.303900
-    """.split(),
-    (4, 3, 3),
-).astype(float)
+    """,
+    sep=" ",
+).reshape(4, 3, 3)
 
 
 def lab(colour: str, seen_through: np.ndarray) -> np.ndarray:
