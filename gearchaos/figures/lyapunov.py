@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -101,7 +101,7 @@ def lyapunov(
         lw=0.0,
         hatch="////",
     )
-    pale = 0.6 + 0.4 * np.array(to_rgb(color))
+    pale: Any = 0.6 + 0.4 * np.array(to_rgb(color))
     band = axes.fill_between(
         x,
         joined - reach,
@@ -113,7 +113,7 @@ def lyapunov(
     ends = (exponent - reach)[alone], (exponent + reach)[alone]
     bars = axes.vlines(x[alone], *ends, colors=pale, lw=0.6)
     line_style = "none" if several_starts and alone.any() else "-"
-    look = {"color": color, "linestyle": line_style, "label": label}
+    look: dict[str, Any] = {"color": color, "linestyle": line_style, "label": label}
     (line,) = axes.plot(x, exponent, linewidth=0.6, **look)
     points = dots(
         axes,

@@ -82,8 +82,8 @@ def close_panel(
     # Of axes that were cleared, nothing is left.
     earlier = [one for one in _DRAWN.get(axes, []) if one.artist.axes is axes]
     there = np.isfinite(low)
-    parts = (part[there] for part in (lanes.parameter, low, high, np.zeros(low.shape) + spread))
-    own = _Drawn(artist, lanes.limits, *parts, full_range, _name_of(artist), [])
+    reach = lanes.parameter[there], low[there], high[there], (np.zeros(low.shape) + spread)[there]
+    own = _Drawn(artist, lanes.limits, *reach, full_range, _name_of(artist), [])
     drawn = _DRAWN[axes] = [*earlier, own]
     axes.set_xlim(min(one.limits[0] for one in drawn), max(one.limits[1] for one in drawn))
     axes.set_xlabel(axis_label(result, result.axis))
@@ -108,8 +108,8 @@ def close_panel(
 def _name_of(artist: Line2D) -> list[Artist]:
     if str(artist.get_label()).startswith("_"):
         return []
-    look = {"color": artist.get_color(), "marker": "s", "markersize": 3.5, "linestyle": "none"}
-    return [Line2D([], [], label=artist.get_label(), **look)]
+    color, label = artist.get_color(), str(artist.get_label())
+    return [Line2D([], [], color=color, label=label, marker="s", markersize=3.5, linestyle="none")]
 
 
 def robust_limits(

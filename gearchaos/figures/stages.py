@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from itertools import pairwise
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -107,21 +107,21 @@ def shade_stages(
     kinds = [_kind(stage, lanes) for stage in stages]
     # A later version of the file format may know motions that this one does not.
     colours = {**SHADES, **dict.fromkeys({*kinds} - {*SHADES}, SHADES["unresolved"])}
-    looks = {
+    looks: dict[str, dict[str, Any]] = {
         kind: {"facecolor": shade, "edgecolor": "0.55", "hatch": HATCHES.get(kind)}
         for kind, shade in colours.items()
     }
-    shades = [
-        axes.axvspan(max(left, low), min(right, high), linewidth=0.0, zorder=0.0, **looks[kind])
+    seen = [
+        (kind, max(left, low), min(right, high))
         for kind, left, right in zip(kinds, edges[:-1], edges[1:], strict=True)
         if left < high and right > low
     ]
+    shades = [
+        axes.axvspan(left, right, linewidth=0.0, zorder=0.0, **looks[kind])
+        for kind, left, right in seen
+    ]
     axes.set_xlim(low, high)
-    drawn = {
-        kind
-        for kind, stage in zip(kinds, stages, strict=True)
-        if stage.start <= high and stage.end >= low
-    }
+    drawn = {kind for kind, _, _ in seen}
     handles = [Patch(linewidth=0.3, label=kind, **looks[kind]) for kind in looks if kind in drawn]
     # A line at the foot of the page would lie on the legend.
     title = form_in_words(result) or None
