@@ -42,9 +42,7 @@ def test_a_table_has_a_row_per_lane_and_words_for_flags():
     points = RESULT.to_dataframe("section_point")
     assert list(points.columns) == ["section_delta_5"]
     np.testing.assert_array_equal(points["section_delta_5"], RESULT["section_delta_5"].ravel())
-    with pytest.raises(
-        ConfigurationError, match=r"time: no values along it; there are .*section_p"
-    ):
+    with pytest.raises(ConfigurationError, match=r"time: no values along it; .*section_p"):
         RESULT.to_dataframe("time")
     one = RESULT.sel(load=0.1, start=0).to_dataframe()
     assert one.index.name == "pitch_error"
