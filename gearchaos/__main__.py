@@ -18,6 +18,8 @@ COMMANDS = {
     "identify": "fit parameters of a pair to what was observed of its diagram",
     "accuracy": "measure what accuracy costs on some lanes of a sweep",
     "merge": "join what several jobs have computed of one sweep",
+    "export": "write a result as CSV, Parquet or for MATLAB",
+    "example": "list the ready configurations, or copy one",
     "configuration": "print the JSON Schema of a configuration file",
 }
 

@@ -36,11 +36,16 @@ def _plot(options: argparse.Namespace) -> int:
     from gearchaos.figures.response_lane import is_response
     from gearchaos.results.result import open_result
 
-    result = _slice(open_result(options.result), options.at)
-    sheets = (_response_sheets if is_response(result) else _sweep_sheets)(result, options)
+    results = [_slice(open_result(path), options.at) for path in options.result]
+    responses = [
+        path for path, one in zip(options.result, results, strict=True) if is_response(one)
+    ]
+    if responses and len(results) > 1:
+        raise FigureError(f"{responses[0]}: is a response; draw it alone, only sweeps share a page")
+    sheets = _response_sheets(results[0], options) if responses else _sweep_sheets(results, options)
     targets = [_targets(options, name, len(sheets) == 1) for name, _ in sheets]
-    _check_targets([path for paths in targets for path in paths], options.result, options.overwrite)
-    title = str(result.metadata.get("title", "")) or options.result.stem
+    _check_targets([path for paths in targets for path in paths], options)
+    title = ", ".join(_titles(results, options.result))
     for (_, draw), paths in zip(sheets, targets, strict=True):
         figure = draw()
         for path in paths:
@@ -48,18 +53,24 @@ def _plot(options: argparse.Namespace) -> int:
             print(path, flush=True)
     width, height = (25.4 * inches for inches in figure.get_size_inches())
     size = f"{width:.0f} mm x {height:.0f} mm at {options.dpi} dpi"
-    say(f"{_lanes_in_words(result)}, {size}")
+    say(f"{'; '.join(map(_lanes_in_words, results))}, {size}")
     return OK
 
 
-def _sweep_sheets(result: Result, options: argparse.Namespace) -> list[Sheet]:
+def _titles(results: Sequence[Result], paths: Sequence[Path]) -> list[str]:
+    """Name results by their titles, or by their files where these do not tell them apart."""
+    titles = [str(one.metadata.get("title", "")) for one in results]
+    return titles if all(titles) and len({*titles}) == len(paths) else [one.stem for one in paths]
+
+
+def _sweep_sheets(results: Sequence[Result], options: argparse.Namespace) -> list[Sheet]:
     from gearchaos.figures import bifurcation_page
     from gearchaos.figures.labels import in_a_name
     from gearchaos.figures.style import SINGLE_COLUMN_MM
     from gearchaos.results.result import DEFAULT_VARIABLE
 
     # A detail does not take the place of the whole.
-    name = in_a_name(result.fixed)
+    name = in_a_name(results[0].fixed)
     if options.variable not in (None, DEFAULT_VARIABLE):
         name += f"_{options.variable}"
     for word, end in (("from", options.low), ("to", options.high)):
@@ -67,8 +78,9 @@ def _sweep_sheets(result: Result, options: argparse.Namespace) -> list[Sheet]:
     name += "_stages" if options.stages else ""
     draw = partial(
         bifurcation_page,
-        result,
+        results,
         options.variable,
+        labels=_titles(results, options.result),
         between=(options.low, options.high),
         full_range=options.full_range,
         stages=options.stages,
@@ -88,12 +100,12 @@ def _response_sheets(result: Result, options: argparse.Namespace) -> list[Sheet]
     for option in ("full_range", "stages"):
         if getattr(options, option):
             raise FigureError(
-                f"--{option.replace('_', '-')}: {options.result} is a response; it belongs to the "
-                "diagram of a sweep"
+                f"--{option.replace('_', '-')}: {options.result[0]} is a response; it belongs to "
+                "the diagram of a sweep"
             )
     lanes = select_lanes(result, (options.low, options.high))
     if lanes.diverged.all():
-        raise FigureError(f"{options.result}: nothing to draw: every lane diverged")
+        raise FigureError(f"{options.result[0]}: nothing to draw: every lane diverged")
     coordinate = "" if options.variable in (None, COORDINATE) else f"_{options.variable}"
     draw = partial(
         response_page,
@@ -125,14 +137,15 @@ def _slice(result: Result, at: Sequence[tuple[str, float]]) -> Result:
 
 def _arguments(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument
-    add("result", type=Path, metavar="RESULT.h5", help="result file of a sweep or a response")
+    text = "result file of a sweep or a response; several sweeps are drawn over each other"
+    add("result", type=Path, nargs="+", metavar="RESULT.h5", help=text)
     add(
         "-o",
         "--output",
         metavar="PATH",
-        help="folder for the figures, their name without its ending, or one file .png or .pdf",
+        help="folder for the figures, their name without its ending, or one file such as x.pdf",
     )
-    add("--format", metavar="FORMATS", help="png, pdf or both (default: png,pdf)")
+    add("--format", metavar="FORMATS", help="some of png, pdf, svg, eps, tiff (default: png,pdf)")
     add(
         "--variable",
         metavar="NAME",
@@ -154,7 +167,7 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
         "--stages",
         action="store_true",
         help="shade the stages behind the diagram of a sweep; those narrower than a 150th of the "
-        "axis go into what surrounds them",
+        "axis go into what surrounds them, or make it one of several motions",
     )
     add("--full-range", action="store_true", help="show every lane, however few lie far out")
     add(
@@ -175,21 +188,23 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
 def _targets(options: argparse.Namespace, name: str, alone: bool) -> list[Path]:
     from matplotlib.backend_bases import FigureCanvasBase
 
-    from gearchaos.figures.files import FORMATS
+    from gearchaos.figures.files import ENDINGS, FORMATS
 
     formats = FORMATS
     if options.format is not None:
         formats = tuple(dict.fromkeys(kind.strip().lower() for kind in options.format.split(",")))
-        unknown = [repr(kind) for kind in formats if kind not in FORMATS]
+        unknown = [repr(kind) for kind in formats if kind not in ENDINGS]
         if unknown:
-            raise FigureError(f"--format: {', '.join(unknown)} is none of {', '.join(FORMATS)}")
-    path: Path = options.result
-    stem = path.stem if path.suffix.lower() in RESULT_ENDINGS else path.name
+            raise FigureError(f"--format: {', '.join(unknown)} is none of {', '.join(ENDINGS)}")
+    path: Path = options.result[0]
+    stem = "_and_".join(
+        path.stem if path.suffix.lower() in RESULT_ENDINGS else path.name for path in options.result
+    )
     output = path.parent if options.output is None else Path(options.output)
     ending = output.suffix.lower().removeprefix(".")
     if options.output is None or output.is_dir() or options.output.endswith(("/", "\\")):
         output /= f"{stem}{name}"
-    elif ending in FORMATS:
+    elif ending in ENDINGS:
         if options.format is not None and formats != (ending,):
             other = f"--format asks for {','.join(formats)}"
         elif not alone:
@@ -201,23 +216,23 @@ def _targets(options: argparse.Namespace, name: str, alone: bool) -> list[Path]:
         )
     elif ending in FigureCanvasBase.filetypes:
         raise FigureError(
-            f"--output {options.output}: a figure is written as {' or '.join(FORMATS)}"
+            f"--output {options.output}: a figure is written as {' or '.join(ENDINGS)}"
         )
     elif not alone:
         output = output.with_name(f"{output.name}{name}")
     return [output.with_name(f"{output.name}.{kind}") for kind in formats]
 
 
-def _check_targets(targets: Sequence[Path], result: Path, overwrite: bool) -> None:
+def _check_targets(targets: Sequence[Path], options: argparse.Namespace) -> None:
     from gearchaos.figures.files import is_own_figure
     from gearchaos.results.atomic_file import check_output
 
     problems: list[str] = []
     for target in targets:
         try:
-            if target.exists() and result.exists() and target.samefile(result):
-                raise FileError(f"{target}: is the result file itself; choose another --output")
-            check_output(target, overwrite=overwrite or is_own_figure(target))
+            if target.exists() and any(target.samefile(result) for result in options.result):
+                raise FileError(f"{target}: is a result file itself; choose another --output")
+            check_output(target, overwrite=options.overwrite or is_own_figure(target))
         except FileError as error:
             problems += error.problems
     if problems:

@@ -34,6 +34,9 @@ def bifurcation(
     *,
     between: Between = (None, None),
     full_range: bool = False,
+    color: str = BLACK,
+    label: str | None = None,
+    marker: str = ".",
 ) -> BifurcationArtists:
     """Draw the bifurcation diagram of one section variable into axes.
 
@@ -55,6 +58,9 @@ def bifurcation(
         The part of the parameter range to show.
     full_range : bool
         Let the vertical axis reach every lane, however few lie far out.
+    color, label, marker : str
+        Of the dots, for diagrams of several results in the same axes: the limits then hold what
+        those of each would, the triangles follow them, and the legend names the labels.
 
     Raises
     ------
@@ -69,8 +75,10 @@ def bifurcation(
         axes,
         lanes,
         rows,
-        markersize=float(np.clip(200.0 / lanes.numbers.size, 0.8, 1.8)),
-        color=BLACK,
+        markersize=lanes.dot_size(0.8),
+        color=color,
+        label=label,
+        marker=marker,
         rasterized=True,
         alpha=min(1.0, 4.0 / max(1, rows.shape[1]) ** 0.5) * min(1.0, MOST_DOTS / total),
     )
@@ -80,7 +88,7 @@ def bifurcation(
         np.fmin.reduce(values, axis=1, out=low[part])
         np.fmax.reduce(values, axis=1, out=high[part])
     return BifurcationArtists(
-        points, *close_panel(axes, result, lanes, low, high, full_range=full_range)
+        points, *close_panel(axes, result, lanes, low, high, points, full_range=full_range)
     )
 
 

@@ -34,7 +34,7 @@ def dots(axes: Axes, lanes: Lanes, rows: Floats, **look: Any) -> Line2D:
     look
         Properties of the dots, as of a line.
     """
-    look |= {"linestyle": "none", "marker": ".", "markeredgewidth": 0.0}
+    look = {"linestyle": "none", "marker": ".", **look, "markeredgewidth": 0.0}
     if lanes.numbers.size * rows.shape[1] > MOST_DOTS:
         return axes.add_line(DenseDots(lanes, rows, **look))
     values = next(portions(lanes, rows))[1]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 
 from matplotlib.mathtext import MathTextParser
@@ -9,6 +10,17 @@ from matplotlib.mathtext import MathTextParser
 from gearchaos.results.result import Result
 
 DIMENSIONLESS = ("", "1")
+SCALES = {
+    r"(section_)?delta_\d": r"unit $b\prime$",
+    r"(section_)?delta_\d_rate": r"unit $b\prime\omega_h$",
+    r"delta_\d_acceleration": r"unit $b\prime\omega_h^2$",
+    r"mesh_force_\w+": r"unit $k_mb\prime$",
+    r"lyapunov_exponents?(_standard_error)?": r"per unit of $\tau$",
+}
+"""What one stands for in dimensionless variables, by a pattern of their names: docs/model.md.
+
+The prime is written out, since one in superscript stands apart from its letter.
+"""
 
 
 def axis_label(result: Result, name: str, line_length: int = 60) -> str:
@@ -25,21 +37,29 @@ def axis_label(result: Result, name: str, line_length: int = 60) -> str:
     Returns
     -------
     str
-        For example ``Largest Lyapunov exponent, $\\lambda_1$``; a dimensionless quantity
-        gets no unit.
+        For example ``Largest Lyapunov exponent, $\\lambda_1$ (per unit of $\\tau$)``; of a pure
+        number there is no unit.
     """
     attributes = result.attributes(name)
     wording = " ".join(str(attributes.get("long_name", "") or name).split())
-    symbol, units = _formula(attributes.get("symbol", "")), str(attributes.get("units", ""))
+    symbol, unit = _formula(attributes.get("symbol", "")), unit_of(result, name)
     words = [plain(word) for word in (wording[:1].upper() + wording[1:]).split(" ")]
     # The symbol stays on the line of the last word.
     if symbol:
         words[-1] += f", {symbol}"
-    if units not in DIMENSIONLESS:
-        words[-1] += f" ({plain(units)})"
+    if unit:
+        words.append(f"({unit})")
     # No shorter last line than need be: the narrowest lines that are as few.
     breaks = [_broken(words, length) for length in range(1, line_length + 1)]
     return "\n".join(next(lines for lines in breaks if len(lines) == len(breaks[-1])))
+
+
+def unit_of(result: Result, name: str) -> str:
+    """Word the unit of a variable, or what its numbers are multiples of; "" of a pure number."""
+    units = str(result.attributes(name).get("units", ""))
+    if units in DIMENSIONLESS:
+        return next((unit for names, unit in SCALES.items() if re.fullmatch(names, name)), "")
+    return plain(re.sub(r"\bum\b", "\N{MICRO SIGN}m", units))
 
 
 def place_of(result: Result, lane: int) -> dict[str, float]:
@@ -58,9 +78,9 @@ def in_words(result: Result, place: Mapping[str, float]) -> str:
     texts = []
     for axis, value in place.items():
         attributes = result.attributes(axis) if axis in result else {}
-        units = str(attributes.get("units", ""))
-        name = _formula(attributes.get("symbol", "")) or plain(axis)
-        unit = "" if units in DIMENSIONLESS else f" {plain(units)}"
+        wording = str(attributes.get("long_name", "")) or axis.replace("_", " ")
+        name = _formula(attributes.get("symbol", "")) or plain(wording)
+        unit = f" {unit_of(result, axis)}".rstrip() if axis in result else ""
         texts.append(f"start {value:g}" if axis == "start" else f"{name} = {value:.6g}{unit}")
     return ", ".join(texts)
 
@@ -84,7 +104,7 @@ def _broken(words: list[str], line_length: int) -> list[str]:
     lines = [words[0]]
     for word in words[1:]:
         # Of a formula, however long its source, little is to be seen.
-        if len(lines[-1]) + 1 + len(word.split("$")[0]) <= line_length:
+        if len(re.sub(r"\$[^$]*\$", "xx", f"{lines[-1]} {word}")) <= line_length:
             lines[-1] += " " + word
         else:
             lines.append(word)

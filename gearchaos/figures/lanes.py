@@ -33,6 +33,10 @@ class Lanes(NamedTuple):
     diverged: Mask
     limits: tuple[float, float]
 
+    def dot_size(self, least: float) -> float:
+        """Choose the size in points of a dot, larger where the parameter has few values."""
+        return float(np.clip(150.0 / np.unique(self.parameter).size, least, 3.0))
+
 
 def swept_axes(result: Result) -> list[str]:
     """Return the axes of a result that are swept parameters: all but the starts."""
@@ -79,8 +83,10 @@ def select_lanes(result: Result, between: Between = (None, None)) -> Lanes:
     diverged = np.zeros(numbers.shape, dtype=bool)
     if "status" in result:
         diverged = result.lanes("status")[numbers] != 0
-    left = float(parameter[0]) if low is None else low
-    right = float(parameter[-1]) if high is None else high
+    # Half a lane beyond the outermost ones, which would lie under the frame.
+    half = float(parameter[-1] - parameter[0]) / (2 * max(1, np.unique(parameter).size - 1))
+    left = float(parameter[0]) - half if low is None else low
+    right = float(parameter[-1]) + half if high is None else high
     if left >= right:
         pad = abs(left) * PAD or 0.5
         left, right = left - pad, right + pad

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection, PolyCollection
+from matplotlib.colors import to_rgb
 from matplotlib.legend import Legend
 from matplotlib.lines import Line2D
 
@@ -15,7 +16,7 @@ from gearchaos.figures.dots import dots
 from gearchaos.figures.labels import axis_label
 from gearchaos.figures.lanes import Between, Floats, Mask, diagram_lanes, outermost
 from gearchaos.figures.panel import close_panel
-from gearchaos.figures.style import BLUE, GREY, ORANGE, VERMILION
+from gearchaos.figures.style import BLACK, GREY, VERMILION
 from gearchaos.results.result import Result
 from gearchaos.results.variables import LARGEST_EXPONENT, RECORD, STANDARD_ERROR
 
@@ -50,17 +51,20 @@ def lyapunov(
     *,
     between: Between = (None, None),
     full_range: bool = False,
+    color: str = BLACK,
+    label: str | None = None,
+    marker: str = ".",
 ) -> LyapunovArtists:
     """Draw the largest Lyapunov exponent into axes, with zero line and uncertainty.
 
-    Diverged lanes are gaps with a red tick at the bottom; a positive exponent is shaded down
+    Diverged lanes are gaps with a red tick at the bottom; a positive exponent is hatched down
     to zero; the vertical axis always holds zero, and lanes beyond robust limits get a triangle.
     Of more lanes than a page can tell apart (`figures.lanes.COLUMNS`), line, shades and bars are
     those of the lowest and the highest exponent in each column.
 
     Parameters
     ----------
-    axes, result, between, full_range
+    axes, result, between, full_range, color, label, marker
         As for `bifurcation`.
 
     Raises
@@ -85,28 +89,39 @@ def lyapunov(
     joined = np.where(alone, np.nan, exponent)
 
     zero = axes.axhline(0.0, color=GREY, linewidth=0.5, linestyle=(0, (4, 2)), zorder=1)
+    # Colours are those of the stages behind; what is said of an exponent is black and grey.
     positive = axes.fill_between(
-        x, 0.0, joined, where=joined > 0.0, interpolate=True, color=ORANGE, alpha=0.4, lw=0.0
+        x,
+        0.0,
+        joined,
+        where=joined > 0.0,
+        interpolate=True,
+        fc="none",
+        ec=GREY,
+        lw=0.0,
+        hatch="////",
     )
+    pale: Any = 0.6 + 0.4 * np.array(to_rgb(color))
     band = axes.fill_between(
         x,
         joined - reach,
         joined + reach,
-        color=BLUE,
-        alpha=0.35,
+        color=pale,
         linewidth=0.0,
         label="\N{PLUS-MINUS SIGN}2 standard errors",
     )
     ends = (exponent - reach)[alone], (exponent + reach)[alone]
-    bars = axes.vlines(x[alone], *ends, colors=BLUE, lw=0.6, alpha=0.5)
+    bars = axes.vlines(x[alone], *ends, colors=pale, lw=0.6)
     line_style = "none" if several_starts and alone.any() else "-"
-    (line,) = axes.plot(x, exponent, color=BLUE, linewidth=0.6, linestyle=line_style)
+    look: dict[str, Any] = {"color": color, "linestyle": line_style, "label": label}
+    (line,) = axes.plot(x, exponent, linewidth=0.6, **look)
     points = dots(
         axes,
         lanes._replace(diverged=~lonely),
         result.lanes(LARGEST_EXPONENT)[:, np.newaxis],
-        markersize=float(np.clip(300.0 / lanes.numbers.size, 1.0, 3.0)),
-        color=BLUE,
+        markersize=lanes.dot_size(1.0),
+        color=color,
+        marker=marker,
     )
     mixed = None
     among = drawn[result.lanes(RECORD)[lanes.numbers][drawn] == 1] if RECORD in result else []
@@ -129,6 +144,7 @@ def lyapunov(
         lanes,
         whole,
         whole,
+        line,
         spread=np.nan_to_num(spread),
         hold_zero=True,
         full_range=full_range,

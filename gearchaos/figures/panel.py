@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from typing import Any, NamedTuple
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from matplotlib.artist import Artist
@@ -13,7 +14,7 @@ from matplotlib.lines import Line2D
 
 from gearchaos.figures.labels import axis_label, number, plain
 from gearchaos.figures.lanes import Floats, Lanes, columns
-from gearchaos.figures.style import GREY, LEGEND, VERMILION
+from gearchaos.figures.style import BLACK, GREY, LEGEND, VERMILION
 from gearchaos.results.result import Result
 
 OUTLYING_SHARE = 0.03
@@ -28,12 +29,30 @@ class Marks(NamedTuple):
     legend: Legend | None
 
 
+class _Drawn(NamedTuple):
+    """What one call has drawn into axes, how far its lanes reach, and what the legend says."""
+
+    artist: Line2D
+    limits: tuple[float, float]
+    parameter: Floats
+    low: Floats
+    high: Floats
+    spread: Floats
+    full_range: bool
+    named: list[Artist]
+    off_scale: list[Line2D]
+
+
+_DRAWN: WeakKeyDictionary[Axes, list[_Drawn]] = WeakKeyDictionary()
+
+
 def close_panel(
     axes: Axes,
     result: Result,
     lanes: Lanes,
     low: Floats,
     high: Floats,
+    artist: Line2D,
     *,
     spread: Floats | float = 0.0,
     hold_zero: bool = False,
@@ -42,6 +61,8 @@ def close_panel(
 ) -> Marks:
     """Set limits and the label of the parameter, and mark the lanes that cannot be shown.
 
+    Limits and marks are those of everything that was drawn into the axes in this way.
+
     Parameters
     ----------
     axes : matplotlib.axes.Axes
@@ -49,6 +70,8 @@ def close_panel(
     lanes : Lanes
     low, high : ndarray of float, shape (lanes,)
         Lowest and highest value of each lane, not a number where there is none.
+    artist : Line2D
+        What shows the lanes; the legend names its label, if it has one.
     spread : ndarray of float, shape (lanes,), optional
         What the limits leave room for beyond these.
     hold_zero, full_range : bool
@@ -56,18 +79,37 @@ def close_panel(
     also : sequence of Artist
         What the legend names before the marks.
     """
-    axes.set_xlim(lanes.limits)
+    # Of axes that were cleared, nothing is left.
+    earlier = [one for one in _DRAWN.get(axes, []) if one.artist.axes is axes]
+    there = np.isfinite(low)
+    reach = lanes.parameter[there], low[there], high[there], (np.zeros(low.shape) + spread)[there]
+    own = _Drawn(artist, lanes.limits, *reach, full_range, _name_of(artist), [])
+    drawn = _DRAWN[axes] = [*earlier, own]
+    axes.set_xlim(min(one.limits[0] for one in drawn), max(one.limits[1] for one in drawn))
     axes.set_xlabel(axis_label(result, result.axis))
     rug = _mark_diverged(axes, result, lanes.parameter[lanes.diverged])
-    off_scale: list[Line2D] = []
-    there = np.isfinite(low)
-    if there.any():
-        reach = (low - spread)[there], (high + spread)[there]
-        axes.set_ylim(robust_limits(*reach, hold_zero=hold_zero, full_range=full_range))
-        off_scale = _mark_off_scale(axes, lanes.parameter[there], low[there], high[there])
+    own.named.extend([*also, *([rug] if rug else [])])
+    if any(one.low.size for one in drawn):
+        least = np.concatenate([one.low - one.spread for one in drawn])
+        most = np.concatenate([one.high + one.spread for one in drawn])
+        full_range = any(one.full_range for one in drawn)
+        axes.set_ylim(robust_limits(least, most, hold_zero=hold_zero, full_range=full_range))
     else:
         _say_nothing_to_show(axes, lanes)
-    return Marks(rug, off_scale, legend_above(axes, [*also, *([rug] if rug else []), *off_scale]))
+    for one in drawn:
+        for mark in one.off_scale:
+            mark.remove()
+        one.off_scale[:] = _mark_off_scale(axes, one) if one.low.size else []
+    # Entries that several results have in common appear once.
+    named = {str(mark.get_label()): mark for one in drawn for mark in one.named + one.off_scale}
+    return Marks(rug, own.off_scale, legend_above(axes, list(named.values())))
+
+
+def _name_of(artist: Line2D) -> list[Artist]:
+    if str(artist.get_label()).startswith("_"):
+        return []
+    color, label = artist.get_color(), str(artist.get_label())
+    return [Line2D([], [], color=color, label=label, marker="s", markersize=3.5, linestyle="none")]
 
 
 def robust_limits(
@@ -111,8 +153,10 @@ def _mark_diverged(axes: Axes, result: Result, parameter: Floats) -> Line2D | No
     return _marks(axes, parameter, 0.0, label, look)
 
 
-def _mark_off_scale(axes: Axes, parameter: Floats, low: Floats, high: Floats) -> list[Line2D]:
+def _mark_off_scale(axes: Axes, drawn: _Drawn) -> list[Line2D]:
     """Draw a triangle at the edge of the axes for every lane that reaches beyond it."""
+    _, _, parameter, low, high, *_ = drawn
+    color = GREY if drawn.artist.get_color() == BLACK else drawn.artist.get_color()
     bottom, top = axes.get_ylim()
     marks = []
     for beyond, extreme, height, marker in (
@@ -121,7 +165,7 @@ def _mark_off_scale(axes: Axes, parameter: Floats, low: Floats, high: Floats) ->
     ):
         if beyond.any():
             label = f"off scale (to {number(float(extreme))})"
-            look = {"marker": marker, "markersize": 2.2, "markeredgewidth": 0.0, "color": GREY}
+            look = {"marker": marker, "markersize": 2.2, "markeredgewidth": 0.0, "color": color}
             marks.append(_marks(axes, parameter[beyond], height, label, look))
     return marks
 
@@ -168,7 +212,7 @@ def legend_above(axes: Axes, handles: Sequence[Artist]) -> Legend | None:
         handles=handles,
         loc="lower right",
         bbox_to_anchor=(1.0, 1.0),
-        ncols=len(handles),
+        ncols=min(len(handles), 3),
         borderaxespad=0.3,
         **LEGEND,
     )

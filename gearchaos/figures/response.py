@@ -9,7 +9,7 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 
 from gearchaos.errors import FigureError
-from gearchaos.figures.labels import axis_label, plain
+from gearchaos.figures.labels import axis_label, plain, unit_of
 from gearchaos.figures.lanes import Between, Floats
 from gearchaos.figures.page import remark
 from gearchaos.figures.response_lane import (
@@ -165,7 +165,7 @@ def amplitude_spectrum(
     axes.set_xlabel("Frequency over mesh frequency")
     axes.xaxis.set_major_locator(MaxNLocator(9, integer=True))
     symbol = result.attributes(variable).get("symbol") or plain(variable)
-    axes.set_ylabel(f"Amplitude of {symbol}")
+    axes.set_ylabel(f"Amplitude of {symbol} ({unit_of(result, variable)})")
     plural = "s" if periods > 1 else ""
     remark(axes, f"{window.capitalize()} window, {periods} mesh period{plural}")
     return lines

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from itertools import pairwise
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
+import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.legend import Legend
 from matplotlib.patches import Patch, Rectangle
@@ -14,22 +15,36 @@ from gearchaos.figures.labels import form_in_words
 from gearchaos.figures.style import LEGEND, SMALL_FONT_PT
 from gearchaos.results.result import Result
 from gearchaos.results.stage_table import LabelledLanes, Stage, labelled_lanes, stage_table
+from gearchaos.results.variables import LABELS, START
 
-# Blues that darken with the period, but for period 3, the window in chaos that is looked for; the
-# others differ from them in hue, and all are light enough for black points to stand out.
+# Blues that darken with the period, but for period 3, the window in chaos that is looked for. Those
+# without hatching differ in lightness, and all are light enough for black points to stand out.
 SHADES = {
-    "period 1": "#E3EEF8",
-    "period 2": "#BBD7EF",
-    "period 3": "#D9CCEA",
-    "longer period": "#8FBCE2",
-    "two bands": "#C6E6E1",
-    "quasi-periodic": "#CDE8CF",
-    "chaotic": "#FCE5C4",
-    "unresolved": "#E2E2E2",
+    "period 1": "#F4F8FC",
+    "period 2": "#D3E7F7",
+    "period 3": "#DDB6DE",
+    "period 4 or more": "#82B1DE",
+    "two bands": "#CDE8E2",
+    "quasi-periodic": "#DCEFD2",
+    "chaotic": "#F5CC8E",
+    "several motions": "#FFFFFF",
+    "unresolved": "#E6E6E6",
     "diverged": "#F6CDBB",
     "grows": "#F3C6DC",
 }
 """Colour of each kind of stage, in the order of the legend."""
+
+HATCHES = {
+    "two bands": "----",
+    "quasi-periodic": "....",
+    "several motions": "\\" * 6,
+    "unresolved": "xxxx",
+    "diverged": "++++",
+    "grows": "||||",
+}
+
+OWN_SHARE = 0.75
+"""Of the lanes of a stage, at least this share has its motion, or it is one of several motions."""
 
 NARROWEST_SHARE = 1.0 / 150.0
 """Narrower stages, in parts of the axis, go into what surrounds them: half a mm in a column."""
@@ -58,8 +73,8 @@ def shade_stages(
     axes : matplotlib.axes.Axes
         With the swept parameter along x, limits set.
     result : Result
-        Of one axis, with labels of the motion. Where it was chosen among several starts
-        (``result.sel(start=0)``), the legend names that start; so it does the published form.
+        Over one swept parameter, with labels of the motion. Values whose starts come to different
+        motions are "several motions"; so is a stage that hides too many narrower ones.
     lanes : LabelledLanes, optional
         Lanes with other labels than those of the result.
     narrowest : float, optional
@@ -77,37 +92,39 @@ def shade_stages(
     FileError
         If the result has no labels.
     FigureError
-        If it has several axes.
+        If it has several swept parameters.
     """
-    if len(result.axes) > 1:
+    if [axis for axis in result.axes if axis != START] != [result.axis]:
         raise FigureError(
             f"stages are those of one axis, but the result has {', '.join(result.axes)}; fix the "
             "others with result.sel"
         )
-    lanes = labelled_lanes(result) if lanes is None else lanes
+    lanes = _of_all_starts(result) if lanes is None else lanes
     low, high = sorted(axes.get_xlim())
     stages = stage_table(lanes, NARROWEST_SHARE * (high - low) if narrowest is None else narrowest)
     # Neighbours meet halfway between their lanes, and the outermost reach to the ends of the axis.
     edges = [low, *((one.end + other.start) / 2.0 for one, other in pairwise(stages)), high]
+    kinds = [_kind(stage, lanes) for stage in stages]
     # A later version of the file format may know motions that this one does not.
-    colours = {**SHADES, **dict.fromkeys({*map(_kind, stages)} - {*SHADES}, SHADES["unresolved"])}
-    shades = [
-        axes.axvspan(
-            max(left, low), min(right, high), color=colours[_kind(stage)], linewidth=0.0, zorder=0.0
-        )
-        for stage, left, right in zip(stages, edges[:-1], edges[1:], strict=True)
+    colours = {**SHADES, **dict.fromkeys({*kinds} - {*SHADES}, SHADES["unresolved"])}
+    looks: dict[str, dict[str, Any]] = {
+        kind: {"facecolor": shade, "edgecolor": "0.55", "hatch": HATCHES.get(kind)}
+        for kind, shade in colours.items()
+    }
+    seen = [
+        (kind, max(left, low), min(right, high))
+        for kind, left, right in zip(kinds, edges[:-1], edges[1:], strict=True)
         if left < high and right > low
     ]
-    axes.set_xlim(low, high)
-    drawn = {_kind(stage) for stage in stages if stage.start <= high and stage.end >= low}
-    handles = [
-        Patch(facecolor=shade, edgecolor="0.6", linewidth=0.3, label=kind)
-        for kind, shade in colours.items()
-        if kind in drawn
+    shades = [
+        axes.axvspan(left, right, linewidth=0.0, zorder=0.0, **looks[kind])
+        for kind, left, right in seen
     ]
-    start = f"stages of start {result.fixed['start']:g}" if "start" in result.fixed else ""
+    axes.set_xlim(low, high)
+    drawn = {kind for kind, _, _ in seen}
+    handles = [Patch(linewidth=0.3, label=kind, **looks[kind]) for kind in looks if kind in drawn]
     # A line at the foot of the page would lie on the legend.
-    title = "\n".join(filter(None, (start, form_in_words(result)))) or None
+    title = form_in_words(result) or None
     if not legend:
         return StageArtists(stages, shades, None)
     assert axes.figure is not None
@@ -115,7 +132,7 @@ def shade_stages(
     names = axes.figure.legend(
         handles=handles,
         loc="outside lower center",
-        ncols=len(handles),
+        ncols=min(len(handles), 5),
         title=title,
         title_fontsize=SMALL_FONT_PT,
         **LEGEND,
@@ -123,5 +140,17 @@ def shade_stages(
     return StageArtists(stages, shades, names)
 
 
-def _kind(stage: Stage) -> str:
-    return "longer period" if stage.period > 3 else stage.label
+def _kind(stage: Stage, lanes: LabelledLanes) -> str:
+    if np.mean(lanes.labels[stage.first : stage.last + 1] == stage.label) < OWN_SHARE:
+        return "several motions"
+    return "period 4 or more" if stage.period > 3 else stage.label
+
+
+def _of_all_starts(result: Result) -> LabelledLanes:
+    """Take the labels of all starts; where they differ, the motion has no period."""
+    if START not in result.axes:
+        return labelled_lanes(result)
+    one = labelled_lanes(result.sel(start=result[START][0]))
+    differ = np.any([result[name] != result[name][:, :1] for name in LABELS], axis=(0, 2))
+    labels = np.where(differ, "several motions", one.labels)
+    return one._replace(labels=labels, period=np.where(differ, 0, one.period))

@@ -16,7 +16,12 @@ BLACK = "#000000"
 BLUE = "#0072B2"
 ORANGE = "#E69F00"
 VERMILION = "#D55E00"
+GREEN = "#009E73"
+PURPLE = "#CC79A7"
 GREY = "#595959"
+
+OVERLAID = ((BLACK, "."), (BLUE, "^"), (GREEN, "v"), (PURPLE, "s"), (ORANGE, "D"))
+"""Colours and markers of several results in the same axes."""
 
 SMALL_FONT_PT = 7.0
 FONT_PT = 8.0
@@ -60,6 +65,7 @@ STYLE: dict[RcKeyType, Any] = {
     "ytick.major.width": 0.5,
     "xtick.minor.width": 0.4,
     "ytick.minor.width": 0.4,
+    "hatch.linewidth": 0.3,
     "figure.constrained_layout.h_pad": 0.02,
     "figure.constrained_layout.w_pad": 0.02,
     "figure.constrained_layout.hspace": 0.02,
@@ -69,5 +75,9 @@ STYLE: dict[RcKeyType, Any] = {
     "savefig.bbox": None,
     # Journals ask for TrueType; matplotlib's default, Type 3, cannot be edited.
     "pdf.fonttype": 42,
+    "ps.fonttype": 42,
+    "svg.hashsalt": "gearchaos",
+    # Ticks in front of what is drawn, so that EPS can make one picture of the latter.
+    "axes.axisbelow": False,
 }
 """Settings for `matplotlib.rc_context`; nothing is ever set globally."""

@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import cycle
+from typing import Any
 
 from matplotlib.axes import Axes
 
 from gearchaos.errors import FigureError
 from gearchaos.figures.bifurcation import bifurcation
-from gearchaos.figures.labels import form_in_words, in_words
+from gearchaos.figures.labels import form_in_words, in_words, plain
 from gearchaos.figures.lanes import Between
 from gearchaos.figures.lyapunov import lyapunov
 from gearchaos.figures.page import Page, few_ticks, footnote, letter, page
 from gearchaos.figures.panel import mark_values
 from gearchaos.figures.stages import shade_stages
-from gearchaos.figures.style import SINGLE_COLUMN_MM, SMALL_FONT_PT
+from gearchaos.figures.style import OVERLAID, SINGLE_COLUMN_MM, SMALL_FONT_PT
 from gearchaos.results.result import Result, section_variables
 from gearchaos.results.stage_table import LabelledLanes
 from gearchaos.results.variables import LARGEST_EXPONENT
@@ -25,13 +27,14 @@ MOST_INTERVALS = (7, 8)
 
 
 def bifurcation_page(
-    result: Result,
+    result: Result | Sequence[Result],
     variable: str | None = None,
     *,
     between: Between = (None, None),
     full_range: bool = False,
     stages: bool | LabelledLanes = False,
     marked: tuple[str, Sequence[float]] | None = None,
+    labels: Sequence[str] | None = None,
     width_mm: float = SINGLE_COLUMN_MM,
     height_mm: float | None = None,
 ) -> Page:
@@ -41,15 +44,17 @@ def bifurcation_page(
 
     Parameters
     ----------
-    result : Result
-        Over one swept parameter.
+    result : Result or sequence of Result
+        Over one swept parameter; several are drawn over each other.
     variable, between, full_range
         As for `bifurcation`.
     stages : bool or LabelledLanes
-        Shade the stages behind both panels; of several starts those of the first, as the legend
-        then says. Lanes with other labels than those of the result may be given.
+        Shade the stages behind both panels. Lanes with other labels than those of the result may be
+        given.
     marked : (str, sequence of float), optional
         A few words, and the values of the parameter of which they tell: ticks at the upper edge.
+    labels : sequence of str, optional
+        What the legend calls each of several results; default their titles.
     width_mm, height_mm : float
         Size of the page; 85 mm is one column of a journal and 180 mm two. The default height
         follows from the width and the number of panels.
@@ -64,13 +69,19 @@ def bifurcation_page(
     ------
     FigureError
         If the result has nothing to draw, no such variable or no lane in the range, or runs over
-        two parameters.
+        two parameters; if several results run over different parameters or stages are wanted.
     FileError
         If stages are wanted and the result has no labels of the motion.
     """
     # A variable that was asked for and is not there is an error, not a page without it.
-    has_section = variable is not None or bool(section_variables(result))
-    has_exponent = LARGEST_EXPONENT in result
+    results = [result] if isinstance(result, Result) else list(result)
+    if len({one.axis for one in results}) > 1 or (stages and len(results) > 1):
+        raise FigureError(
+            f"{len(results)} results over {', '.join(one.axis for one in results)}: only results "
+            "over the same parameter are drawn over each other, and without stages"
+        )
+    has_section = variable is not None or any(map(section_variables, results))
+    has_exponent = any(LARGEST_EXPONENT in one for one in results)
     panels = has_section + has_exponent
     if not panels:
         raise FigureError(
@@ -82,10 +93,15 @@ def bifurcation_page(
         stack: list[Axes] = list(
             figure.subplots(panels, 1, sharex=True, squeeze=False, height_ratios=ratios)[:, 0]
         )
-        if has_section:
-            bifurcation(stack[0], result, variable, between=between, full_range=full_range)
-        if has_exponent:
-            lyapunov(stack[-1], result, between=between, full_range=full_range)
+        labels = labels or [str(one.metadata.get("title", "")) for one in results]
+        for one, name, (color, marker) in zip(results, labels, cycle(OVERLAID), strict=False):
+            shown: dict[str, Any] = {"between": between, "full_range": full_range}
+            if len(results) > 1:
+                shown |= {"color": color, "marker": marker, "label": plain(name) or "untitled"}
+            if variable is not None or section_variables(one):
+                bifurcation(stack[0], one, variable, **shown)
+            if LARGEST_EXPONENT in one:
+                lyapunov(stack[-1], one, **shown)
         if panels == 2:
             stack[0].set_xlabel("")
             letter(stack)
@@ -96,12 +112,15 @@ def bifurcation_page(
             mark_values(stack, *marked)
         if stages:
             given = None if isinstance(stages, bool) else stages
-            one = result.sel(start=0) if "start" in result.axes else result
             for axes in stack:
-                shade_stages(axes, one, lanes=given, legend=axes is stack[0])
+                shade_stages(axes, results[0], lanes=given, legend=axes is stack[0])
         else:
-            footnote(figure, form_in_words(result))
-        if result.fixed:
-            figure.suptitle(in_words(result, result.fixed), fontsize=SMALL_FONT_PT)
+            forms = [form_in_words(one) for one in results]
+            own = [name for name, form in zip(labels, forms, strict=True) if form]
+            whose = f"{plain(', '.join(own))}: " if 0 < len(own) < len(forms) else ""
+            footnote(figure, whose + max(forms))
+        places = dict.fromkeys(in_words(one, one.fixed) for one in results if one.fixed)
+        if places:
+            figure.suptitle("; ".join(places), fontsize=SMALL_FONT_PT)
         figure.align_ylabels(stack)
     return figure

@@ -24,7 +24,7 @@ def pitch_error_page(printed: Published, found: Reproduction) -> Page:
     amplitude = found.group("pitch_error_amplitude")
     beta = np.radians(found.group("base_helix_angle_deg"))
     error = amplitude * np.sin(2.0 * np.pi * CYCLE)  # eq. 14
-    with _cycle(58.0, 0.0, "Pitch error, $e/b'$ (dimensionless)") as (figure, axes):
+    with _cycle(58.0, 0.0, r"Pitch error, $e/b\prime$ (dimensionless)") as (figure, axes):
         for label, share, look in (
             (r"$e$, along the line of action", 1.0, {"color": BLACK}),
             (r"$e\,\cos\beta_b$, transverse", np.cos(beta), {"color": BLUE, "dashes": (5, 2)}),

@@ -88,7 +88,7 @@ def motion_page(printed: Published, found: Reproduction, shown: ShownMotion) -> 
     lane = lane_of(result, shown.pitch_error)
     label = motion_at(found.shown(result), shown.pitch_error)
     with column(86.0) as figure:
-        grid = figure.add_gridspec(2, 2, height_ratios=(0.8, 1.0))
+        grid = figure.add_gridspec(2, 2, height_ratios=(0.8, 1.0), wspace=0.1)
         history = figure.add_subplot(grid[0, :])
         portrait, section = figure.add_subplot(grid[1, 0]), figure.add_subplot(grid[1, 1])
         end = float(result[TIME][-1])
@@ -99,7 +99,7 @@ def motion_page(printed: Published, found: Reproduction, shown: ShownMotion) -> 
         few_ticks(history, 8, 5)
         for axes in (portrait, section):
             axes.set(xlabel=r"$\delta_5$", ylabel=r"$\delta_5'$")
-            few_ticks(axes, 4, 5)
+            few_ticks(axes, 5, 6)
         letter((history, portrait, section))
         remark(history, f"$P$ = {shown.pitch_error:g}, {label}{begun}")
         remark(section, f"{result['section_delta_5'].shape[1]} points")

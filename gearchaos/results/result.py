@@ -7,6 +7,7 @@ import os
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
+from html import escape
 from pathlib import Path
 from typing import Any, Literal
 
@@ -196,6 +197,27 @@ class Result:
             self.metadata,
             overwrite=overwrite,
         )
+
+    def to_xarray(self) -> Any:
+        """Give an `xarray.Dataset` of everything; raises FileError if xarray is not installed."""
+        from gearchaos.results.tables import dataset
+
+        return dataset(self)
+
+    def to_dataframe(self, *along: str) -> Any:
+        """Give a `pandas.DataFrame` with a row per lane, or per lane and, say, "section_point".
+
+        Raises ConfigurationError if nothing runs along it, FileError if pandas is not installed.
+        """
+        from gearchaos.results.tables import table
+
+        return table(self, along)
+
+    def _repr_html_(self) -> str:
+        head, *_ = repr(self).splitlines()
+        rows = ((v.name, ", ".join(v.dims), v.units, v.long_name) for v in self.variables.values())
+        cells = ("".join(f"<td>{escape(text)}</td>" for text in row) for row in rows)
+        return f"{escape(head)}<table>{''.join(f'<tr>{row}</tr>' for row in cells)}</table>"
 
     def __repr__(self) -> str:
         sizes = " x ".join(f"{self[axis].size} {axis}" for axis in self.axes) or "one lane"

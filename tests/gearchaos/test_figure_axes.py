@@ -31,17 +31,25 @@ def test_a_slice_of_two_parameters_is_drawn_and_named():
     np.testing.assert_array_equal(points.get_ydata(), one["section_delta_5"][well].ravel())
 
 
-def test_the_diagram_shows_all_starts_and_the_stages_say_whose_they_are():
+def test_the_diagram_shows_all_starts_and_the_stages_say_where_they_differ():
     page = bifurcation_page(STARTS, stages=True)
     (legend,) = page.legends
-    assert legend.get_title().get_text() == "stages of start 0"
+    motion = STARTS["motion"]
+    same = (motion == motion[:, :1]).all(axis=1)
+    assert same.any() and not same.all()
+    stages = shade_stages(page.axes[0], STARTS, narrowest=0.0).stages
+    for stage in stages:
+        alike = same[stage.first : stage.last + 1]
+        assert not alike.any() if stage.label == "several motions" else alike.all()
+    assert "several motions" in [text.get_text() for text in legend.get_texts()]
     points = bifurcation(Figure().subplots(), STARTS).points
     assert points.get_xdata().size == np.count_nonzero(STARTS["status"] == 0) * 6
 
 
 def test_stages_are_those_of_one_axis():
-    with pytest.raises(FigureError, match=r"pitch_error, start.*result\.sel"):
-        shade_stages(Figure().subplots(), STARTS)
+    for axes in ("two parameters", "two parameters, several starts"):
+        with pytest.raises(FigureError, match=r"load, pitch_error.*result\.sel"):
+            shade_stages(Figure().subplots(), result_over(AXES[axes]))
 
 
 @pytest.mark.parametrize(

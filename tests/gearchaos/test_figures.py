@@ -92,13 +92,14 @@ def test_every_section_point_of_the_file_is_drawn(axes, result, tmp_path):
     np.testing.assert_array_equal(points.get_xdata(), np.repeat(stored["growth"], POINTS))
     np.testing.assert_array_equal(points.get_ydata(), stored["section_delta_1"].ravel())
     assert points.get_rasterized()
-    assert axes.get_xlim() == (2.8, 3.9)
+    half = 1.1 / (LANES - 1) / 2.0
+    assert axes.get_xlim() == pytest.approx((2.8 - half, 3.9 + half), rel=1e-15)
 
 
 def test_the_torsional_section_is_drawn_unless_another_is_asked_for(axes, result):
     drawn = bifurcation(axes, result).points.get_ydata()
     np.testing.assert_array_equal(drawn, result["section_delta_5"].ravel())
-    assert axes.get_ylabel().endswith(r"$\delta_5$")
+    assert axes.get_ylabel().endswith("$\\delta_5$\n(unit $b\\prime$)")
 
 
 def test_a_variable_the_result_lacks_is_named_with_those_it_has(axes, result):
@@ -111,7 +112,10 @@ def test_labels_come_from_the_file_and_name_units_only_where_there_are_some(axes
     assert axes.get_xlabel() == "Growth rate, $r$ (rpm)"
     lyapunov(axes, logistic_sweep([3.0, 3.1]))
     assert axes.get_xlabel() == "Growth rate, $r$"
-    assert axes.get_ylabel().replace("\n", " ") == r"Largest Lyapunov exponent, $\lambda_1$"
+    wording = r"Largest Lyapunov exponent, $\lambda_1$ (per unit of $\tau$)"
+    assert axes.get_ylabel().replace("\n", " ") == wording
+    bifurcation(axes, logistic_sweep([3.0, 3.1], units="N/(um mm)"))
+    assert axes.get_xlabel() == "Growth rate, $r$ (N/(\N{MICRO SIGN}m mm))"
 
 
 @pytest.mark.parametrize("symbol", [r"$\frac{$", "100 $", "$", r"$\nonsense$"])
@@ -168,6 +172,13 @@ def test_several_starts_of_one_value_are_not_joined_by_a_line(axes):
     assert bifurcation(axes, result).points.get_xdata().size == 6 * POINTS
 
 
+def test_few_values_have_large_dots_however_many_starts_they_have(axes):
+    few, many = logistic_sweep([3.0, 3.5, 3.9], starts=40), logistic_sweep(np.linspace(3, 3.9, 900))
+    for draw, least in ((bifurcation, 0.8), (lyapunov, 1.0)):
+        assert draw(axes, few).points.get_markersize() == 3.0
+        assert draw(axes, many).points.get_markersize() == least
+
+
 def test_a_lane_between_diverged_ones_is_still_seen(axes):
     chart = lyapunov(axes, logistic_sweep([3.0, 3.1, 3.2, 3.3], diverged=[0, 2]))
     np.testing.assert_array_equal(chart.points.get_xdata(), [3.1, 3.3])
@@ -180,11 +191,46 @@ def test_a_few_outlying_lanes_are_marked_and_do_not_flatten_the_rest(axes, resul
     assert axes.get_ylim()[0] > -5.0
     np.testing.assert_array_equal(chart.off_scale[0].get_xdata(), result["growth"][[30, 31]])
     assert chart.off_scale[0].get_label() == "off scale (to \N{MINUS SIGN}400)"
+    axes.clear()
     diagram = bifurcation(axes, result)
     assert axes.get_ylim()[1] < 1.1
     np.testing.assert_array_equal(diagram.off_scale[0].get_xdata(), result["growth"][[60]])
     assert bifurcation(axes, result, full_range=True).off_scale == []
     assert axes.get_ylim()[1] > 1e4
+
+
+def test_a_second_result_widens_the_limits_and_every_lane_is_seen_or_marked(axes, result):
+    other = logistic_sweep(np.linspace(2.0, 3.0, 41))
+    other["section_delta_5"][:] -= 5.0
+    result["section_delta_5"][60, 5] = 1e4
+    first = bifurcation(axes, result, label="above")
+    (outlier,) = first.off_scale
+    second = bifurcation(axes, other, color="#0072B2", marker="^", label="below")
+    left, right = axes.get_xlim()
+    assert left < 2.0 and right > 3.9
+    bottom, top = axes.get_ylim()
+    points = np.concatenate([one.points.get_ydata() for one in (first, second)])
+    assert np.count_nonzero((points < bottom) | (points > top)) == 1
+    # The triangle was drawn anew, at the edge as it is now, and the legend has all names.
+    assert outlier.axes is None and first.off_scale[0].axes is axes
+    np.testing.assert_array_equal(first.off_scale[0].get_xdata(), result["growth"][[60]])
+    assert second.off_scale == []
+    names = [text.get_text() for text in second.legend.get_texts()]
+    assert names == ["above", "off scale (to 1e+04)", "below"]
+    assert second.points.get_color() == "#0072B2" and second.points.get_marker() == "^"
+    bifurcation(axes, other, full_range=True)
+    assert axes.get_ylim()[1] > 1e4 and first.off_scale == []
+
+
+def test_results_over_each_other_share_a_page_and_are_named(result):
+    other = logistic_sweep(np.linspace(2.0, 3.0, 41), with_exponent=False)
+    page = bifurcation_page([result, other], labels=["one", "other $"])
+    upper, lower = page.axes
+    assert upper.get_xlim() == lower.get_xlim()
+    assert upper.get_xlim()[0] < 2.0
+    assert [text.get_text() for text in upper.get_legend().get_texts()] == ["one", r"other \$"]
+    with pytest.raises(FigureError, match="drawn over each other, and without stages"):
+        bifurcation_page([result, other], stages=True)
 
 
 def test_limits_hold_everything_where_nothing_lies_far_out():
@@ -205,7 +251,7 @@ def test_a_narrow_peak_on_a_level_line_is_no_outlier():
 def test_a_part_of_the_range_shows_its_lanes_only(axes, result):
     points = bifurcation(axes, result, between=(3.5, None)).points
     assert points.get_xdata().min() >= 3.5
-    assert axes.get_xlim() == (3.5, 3.9)
+    assert axes.get_xlim() == (3.5, 3.9 + (3.9 - points.get_xdata().min()) / 43 / 2.0)
     with pytest.raises(FigureError, match=r"growth from 5\.0 to 6\.0.*2\.8 to 3\.9"):
         lyapunov(axes, result, between=(5.0, 6.0))
 
@@ -296,7 +342,7 @@ def test_a_notebook_can_show_the_page(result):
 
 
 def test_a_figure_of_another_format_is_refused(result, tmp_path):
-    with pytest.raises(FigureError, match=r"\.png or \.pdf"):
+    with pytest.raises(FigureError, match=r"\.png or \.pdf or \.svg"):
         save_figure(bifurcation_page(result), tmp_path / "page.gif")
 
 

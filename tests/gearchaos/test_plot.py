@@ -1,6 +1,7 @@
 """The plot command on real files: what it writes, what it says, and how it ends."""
 
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -12,6 +13,8 @@ import pytest
 from gearchaos.plot import main
 from gearchaos.results.result import Result
 from gearchaos.results.variables import Axis, sweep_variables
+
+PICTURES = {"png": b"\x89PNG", "pdf": b"%PDF", "svg": b"<?xml", "eps": b"%!PS", "tiff": b"II*\0"}
 
 
 @pytest.fixture
@@ -86,18 +89,39 @@ def test_running_twice_draws_the_same_bits_twice(result_file):
     assert draw() == draw()
 
 
-@pytest.mark.parametrize("ending", [".png", ".pdf"])
+@pytest.mark.parametrize(("ending", "begins"), PICTURES.items())
+def test_every_format_says_whose_it_is_and_gives_the_same_bits(result_file, ending, begins):
+    drawn = []
+    for _ in range(2):
+        assert main([str(result_file), "--format", ending, "--dpi", "100"]) == 0
+        drawn.append(result_file.with_suffix(f".{ending}").read_bytes())
+    assert drawn[0] == drawn[1] and drawn[0].startswith(begins)
+    assert b"gearchaos " in drawn[0] and b"Date" not in drawn[0]
+
+
+def test_what_an_eps_shows_is_not_black_where_dots_are_translucent(result_file):
+    """The format has no transparency: a picture of translucent dots alone would be a black box."""
+    assert main([str(result_file), "-o", str(result_file.parent / "x.eps"), "--dpi", "60"]) == 0
+    text = (result_file.parent / "x.eps").read_text()
+    pictures = re.findall(r"false 3 colorimage\n([0-9a-f\n]+)", text)
+    assert len(pictures) == 2
+    for picture in pictures:
+        assert np.mean(np.frombuffer(bytes.fromhex(picture), np.uint8) > 250) > 0.8
+
+
+@pytest.mark.parametrize("ending", [".png", ".pdf", ".svg", ".tiff"])
 def test_a_file_that_the_command_did_not_draw_is_kept(result_file, ending, capsys):
     foreign = result_file.with_suffix(ending)
     foreign.write_text("a photograph of gearchaos")
-    assert main([str(result_file)]) == 4
+    kinds = ["--format", f"png,pdf,{ending[1:]}"]
+    assert main([str(result_file), *kinds]) == 4
     out, err = capsys.readouterr()
     assert out == ""
     assert err.startswith(f"gearchaos plot: error: {foreign}: ")
     assert "--overwrite" in err
     assert foreign.read_text() == "a photograph of gearchaos"
     assert len(list(result_file.parent.iterdir())) == 2
-    assert main([str(result_file), "--overwrite"]) == 0
+    assert main([str(result_file), *kinds, "--overwrite"]) == 0
     assert foreign.stat().st_size > 5000
 
 
@@ -118,6 +142,18 @@ def test_names_say_what_is_drawn(result_file, arguments, names, capsys):
     assert main([str(result_file), *(text.format(folder) for text in arguments)]) == 0
     assert capsys.readouterr().out.splitlines() == [str(folder / name) for name in names]
     assert all((folder / name).is_file() for name in names)
+
+
+def test_several_sweeps_are_drawn_over_each_other(result_file, capsys):
+    other = result_file.with_name("other.h5")
+    other.write_bytes(result_file.read_bytes())
+    assert main([str(result_file), str(other), "--format", "svg"]) == 0
+    out, err = capsys.readouterr()
+    assert out == f"{result_file.with_name('pair_and_other.svg')}\n"
+    assert err.count("50 lanes over load") == 2
+    assert main([str(result_file), str(other), "-o", str(other), "--overwrite"]) == 0
+    assert main([str(result_file), str(other), "--stages"]) == 2
+    assert "without stages" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(
@@ -187,9 +223,9 @@ def test_a_file_that_is_no_result_is_named_and_nothing_is_written(result_file, k
         (["--from", "nan"], "not a finite number"),
         (["--width", "1"], "not between 60 and 1000"),
         (["--dpi", "99.5"], "not a whole number"),
-        (["--format", "png,gif"], "'gif' is none of png, pdf"),
+        (["--format", "png,gif"], "'gif' is none of png, pdf, svg, eps, tiff"),
         (["--output", "fig.png", "--format", "pdf"], "leave the ending off"),
-        (["--output", "fig.svg"], "--output fig.svg: a figure is written as png or pdf"),
+        (["--output", "fig.gif"], "--output fig.gif: a figure is written as png or pdf or svg"),
         (["--colour"], "unrecognized arguments"),
     ],
 )
@@ -214,7 +250,7 @@ def test_the_result_itself_is_never_replaced(result_file, capsys):
     disguised = result_file.rename(result_file.with_suffix(".png"))
     before = disguised.read_bytes()
     assert main([str(disguised), "--output", str(disguised), "--overwrite"]) == 4
-    assert "is the result file itself" in capsys.readouterr().err
+    assert "is a result file itself" in capsys.readouterr().err
     assert disguised.read_bytes() == before
 
 

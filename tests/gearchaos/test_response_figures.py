@@ -45,7 +45,7 @@ def known_response(diverged: tuple[int, ...] = (), swept: str = "pitch_error") -
     axis = Axis(
         axis_name(swept),
         "rpm" if physical else "1",
-        "multiple of the pitch error",
+        "speed of the driving gear" if physical else "multiple of the pitch error",
         "" if physical else "$P$",
         np.array([5.86, 12.5]),
     )
@@ -107,7 +107,7 @@ def test_the_history_is_the_record_over_mesh_periods(axes, result):
     assert (x[0], x[-1], x.size) == (2.0, 5.0, 3 * STEPS + 1)
     np.testing.assert_array_equal(y, result["mesh_force_tangential"][1, 2 * STEPS : 5 * STEPS + 1])
     assert axes.get_xlabel() == r"Time in mesh periods, $\Omega\tau/2\pi$"
-    assert axes.get_ylabel() == "Tangential mesh force, $N_y$"
+    assert axes.get_ylabel() == "Tangential mesh\nforce, $N_y$ (unit $k_mb\\prime$)"
 
 
 def test_a_periodic_portrait_closes_and_carries_a_point_for_each_mesh_period(axes, result):
@@ -142,7 +142,7 @@ def test_the_lines_of_the_spectrum_are_the_waves(axes, result, logarithmic):
     high = {order: height for order, height in lines.items() if height > 1e-9}
     assert high == pytest.approx({0.0: MEAN, round(2 / 3, 9): SLOW, 1.0: FAST})
     assert axes.get_title("right") == "Rectangular window, 6 mesh periods"
-    assert axes.get_ylabel() == r"Amplitude of $\delta_5$"
+    assert axes.get_ylabel() == r"Amplitude of $\delta_5$ (unit $b\prime$)"
     assert axes.get_ylim()[1] > FAST
 
 
@@ -203,7 +203,7 @@ def test_the_page_has_the_asked_size_and_texts_a_journal_accepts(result, lane, w
 def test_a_page_names_a_parameter_without_a_symbol_and_leaves_settings_alone():
     before = dict(mpl.rcParams)
     page = response_page(known_response(swept="operation.speed_rpm"), 0)
-    assert page.axes[0].get_title("right") == "operation_speed_rpm = 5.86 rpm"
+    assert page.axes[0].get_title("right") == "speed of the driving gear = 5.86 rpm"
     assert dict(mpl.rcParams) == before
 
 

@@ -1,13 +1,15 @@
 """Stages are shaded behind a diagram where its lanes lie, and named in a legend."""
 
+from itertools import combinations
+
 import numpy as np
 import pytest
-from matplotlib.colors import to_hex
+from matplotlib.colors import to_hex, to_rgb
 from matplotlib.figure import Figure
 
 from gearchaos.errors import FileError
 from gearchaos.figures.panel import mark_values
-from gearchaos.figures.stages import SHADES, shade_stages
+from gearchaos.figures.stages import HATCHES, SHADES, shade_stages
 from gearchaos.records.label import MEANINGS
 from gearchaos.results.result import Result
 from gearchaos.results.stage_table import labelled_lanes
@@ -67,13 +69,13 @@ def test_only_what_the_axis_shows_is_shaded_and_named():
 
 
 def test_every_label_has_a_shade_of_its_own():
-    letters = "1235bqcudg"
-    labelled = labelled_lanes(result_of(letters.replace("b", "q")))
+    letters = "1235bqcmudg"
+    known = letters.replace("b", "q").replace("m", "q")
+    labelled = labelled_lanes(result_of(known))
     named = np.where(np.array([*letters]) == "b", "two bands", labelled.labels)
+    named = np.where(np.array([*letters]) == "m", "several motions", named)
     lanes = labelled._replace(labels=named)
-    _, artists, _, colours = shaded(
-        letters.replace("b", "q"), (0.0, 9.0), narrowest=0.0, lanes=lanes
-    )
+    _, artists, _, colours = shaded(known, (0.0, 10.0), narrowest=0.0, lanes=lanes)
     assert colours == list(SHADES.values())
     assert len({*colours}) == len(SHADES)
     assert [text.get_text() for text in artists.legend.get_texts()] == list(SHADES)
@@ -84,6 +86,48 @@ def test_what_is_too_narrow_to_be_seen_is_left_out():
     assert len(shaded(labels, (0.0, 300.0))[1].shades) == 1
     assert len(shaded(labels, (145.0, 155.0))[1].shades) == 3
     assert shaded(labels, (0.0, 300.0), legend=False)[1].legend is None
+
+
+@pytest.mark.parametrize(("labels", "kind"), [("1c11", "period 1"), ("1c1c1", "several motions")])
+def test_a_stage_that_hides_too_many_others_says_so(labels, kind):
+    """Three of four lanes are a stage; three of five are several motions."""
+    _, artists, _, _ = shaded(labels, (0.0, 600.0))
+    assert [text.get_text() for text in artists.legend.get_texts()] == [kind]
+
+
+# Machado, Oliveira, Fernandes 2009, severity 1: linear RGB of everybody, and of those who lack the
+# cones for long, middle and short waves.
+COLOUR_BLIND = np.fromstring(
+    """
+    1 0 0  0 1 0  0 0 1
+    0.152286 1.052583 -0.204868  0.114503 0.786281 0.099216  -0.003882 -0.048116 1.051998
+    0.367322 0.860646 -0.227968  0.280085 0.672501 0.047413  -0.011820 0.042940 0.968881
+    1.255528 -0.076749 -0.178779  -0.078411 0.930809 0.147602  0.004733 0.691367 0.303900
+    """,
+    sep=" ",
+).reshape(4, 3, 3)
+
+
+def lab(colour: str, seen_through: np.ndarray) -> np.ndarray:
+    """CIE L*a*b* of a colour, white D65."""
+    rgb = np.array(to_rgb(colour))
+    linear = np.where(rgb <= 0.04045, rgb / 12.92, ((rgb + 0.055) / 1.055) ** 2.4)
+    to_xyz = [[0.4124, 0.3576, 0.1805], [0.2126, 0.7152, 0.0722], [0.0193, 0.1192, 0.9505]]
+    x, y, z = np.cbrt(to_xyz @ np.clip(seen_through @ linear, 0.0, 1.0) / [0.9505, 1.0, 1.089])
+    return np.array([116.0 * y - 16.0, 500.0 * (x - y), 200.0 * (y - z)])
+
+
+def test_shades_without_the_same_hatching_are_told_apart_in_grey_and_by_the_colour_blind():
+    """A difference of 2.3 is just noticeable side by side; three of them are seen across a page."""
+    hatches = [HATCHES.get(kind) for kind in SHADES]
+    assert len({*hatches}) == len(HATCHES) + 1
+    plain = [colour for kind, colour in SHADES.items() if kind not in HATCHES]
+    for one, other in combinations(plain, 2):
+        for eyes in COLOUR_BLIND:
+            assert np.linalg.norm(lab(one, eyes) - lab(other, eyes)) > 3 * 2.3
+        grey = [lab(colour, COLOUR_BLIND[0])[0] for colour in (one, other)]
+        assert abs(grey[0] - grey[1]) > 2.3
+    assert min(lab(colour, COLOUR_BLIND[0])[0] for colour in SHADES.values()) > 60.0
 
 
 def test_a_result_without_labels_cannot_be_shaded():

@@ -1,0 +1,40 @@
+"""List the ready configurations, or copy one of them into the current folder.
+
+Exit codes: 0 done, 2 there is no such example, 4 the file exists already or cannot be written.
+"""
+
+from __future__ import annotations
+
+import sys
+import tomllib
+from argparse import ArgumentParser, Namespace
+
+from gearchaos.command_line import OK, Command
+from gearchaos.errors import ConfigurationError
+
+
+def _arguments(parser: ArgumentParser) -> None:
+    parser.add_argument("name", nargs="?", help="which to copy, such as pan2021; default: list all")
+
+
+def _example(options: Namespace) -> int:
+    from gearchaos.paper.sweep_files import sweep_file
+    from gearchaos.results.atomic_file import replacing
+
+    ready = {path.stem: path for path in sorted(sweep_file("pan2021.toml").parent.glob("*.toml"))}
+    if options.name is None:
+        for name, path in ready.items():
+            print(f"{name:24} {tomllib.loads(path.read_text(encoding='utf-8'))['title']}")
+        return OK
+    if (source := ready.get(options.name.removesuffix(".toml"))) is None:
+        raise ConfigurationError(f"{options.name}: is no example; there are {', '.join(ready)}")
+    with replacing(source.name, overwrite=options.overwrite) as partial:
+        partial.write_bytes(source.read_bytes())
+    print(source.name, flush=True)
+    return OK
+
+
+main = Command("example", __doc__, _arguments, _example, common=("overwrite",))
+
+if __name__ == "__main__":
+    sys.exit(main())

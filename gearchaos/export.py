@@ -1,0 +1,48 @@
+"""Write a result as a table, .csv or .parquet, or as arrays for MATLAB and Octave, .mat.
+
+A table has a row per lane, and a column for each number of a lane; with --along section_point a row
+per section point. Needs pip install gearchaos[export]. Exit codes: 0 done, 2 nothing runs along
+that dimension or no such format, 4 a file cannot be read or written, or a package is missing.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from argparse import ArgumentParser, Namespace
+
+from gearchaos.command_line import OK, Command
+from gearchaos.errors import ConfigurationError, FileError
+
+ENDINGS = (".csv", ".parquet", ".mat")
+
+
+def _arguments(parser: ArgumentParser) -> None:
+    add = parser.add_argument
+    add("result", metavar="RESULT.h5", help="result file of a sweep or a response")
+    add("output", metavar="PATH", help="file to write, ending in .csv, .parquet or .mat")
+    text = "rows also run along this dimension, such as section_point, state or time"
+    add("--along", action="append", default=[], metavar="NAME", help=text)
+
+
+def _export(options: Namespace) -> int:
+    from gearchaos.results.atomic_file import check_output, replacing
+    from gearchaos.results.result import open_result
+    from gearchaos.results.tables import write
+
+    if not options.output.lower().endswith(ENDINGS):
+        raise ConfigurationError(f"{options.output}: must end in {', '.join(ENDINGS)}")
+    result = open_result(options.result)
+    if os.path.exists(options.output) and os.path.samefile(options.output, options.result):
+        raise FileError(f"{options.output}: is the result file itself; choose another name")
+    check_output(options.output, options.overwrite)
+    with replacing(options.output, overwrite=options.overwrite) as partial:
+        write(result, partial, options.output.lower().rpartition(".")[2], options.along)
+    print(options.output, flush=True)
+    return OK
+
+
+main = Command("export", __doc__, _arguments, _export, common=("overwrite",))
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,66 @@
+"""Results for other libraries: an xarray Dataset, a pandas DataFrame, arrays for MATLAB."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from importlib import import_module
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from gearchaos.errors import ConfigurationError, FileError
+
+if TYPE_CHECKING:
+    from gearchaos.results.result import Result
+
+
+def needed(package: str) -> Any:
+    """Import a package that gearchaos does without otherwise; raises FileError if it is missing."""
+    try:
+        return import_module(package)
+    except ImportError as error:
+        text = f"the package {package.partition('.')[0]} is not installed"
+        raise FileError(f"{text}; pip install gearchaos[export]") from error
+
+
+def dataset(result: Result) -> Any:
+    """Give the xarray.Dataset of a result, as `xarray.open_dataset` does of its file."""
+    xarray = needed("xarray")
+    arrays = {name: (result.dims(name), result[name], result.attributes(name)) for name in result}
+    coordinates = {name: arrays.pop(name) for name in result if result.dims(name) == (name,)}
+    return xarray.Dataset(arrays, coordinates, result.metadata)
+
+
+def table(result: Result, along: Sequence[str] = ()) -> Any:
+    """Give the pandas.DataFrame of what runs over the axes and these dimensions, flags as words.
+
+    Raises ConfigurationError if no variable runs over them, FileError if pandas is missing.
+    """
+    pandas, dims = needed("pandas"), (*result.axes, *along)
+    columns: dict[str, Any] = {}
+    for name in (name for name in result if result.dims(name) == dims and name not in dims):
+        columns[name], flags = result[name].ravel(), result.variables[name].flags
+        if flags:
+            codes = np.where(columns[name] < len(flags), columns[name], -1).astype(int)
+            columns[name] = pandas.Categorical.from_codes(codes, flags)
+    if not columns:
+        others = {result.dims(name)[len(result.axes) :] for name in result}
+        there = ", ".join(sorted(dim[0] for dim in others if len(dim) == 1 and dim[0] in result))
+        raise ConfigurationError(f"{', '.join(along)}: no values along it; there are {there}")
+    index = pandas.MultiIndex.from_product([result[dim] for dim in dims], names=dims)
+    return pandas.DataFrame(columns, index.get_level_values(0) if len(dims) == 1 else index)
+
+
+def write(result: Result, path: Path, kind: str, along: Sequence[str] = ()) -> None:
+    """Write a table as "csv" or "parquet", or every array and the words of flags as "mat"."""
+    if kind == "mat":
+        known = [v for v in result.variables.values() if v.flags]
+        words = {f"{v.name}_meanings": np.array(v.flags, dtype=object) for v in known}
+        arrays = {**{name: result[name] for name in result}, **words, "metadata": result.metadata}
+        needed("scipy.io").savemat(path, arrays, appendmat=False)
+    elif kind == "csv":
+        table(result, along).to_csv(path)
+    else:
+        needed("pyarrow")
+        table(result, along).to_parquet(path, engine="pyarrow")

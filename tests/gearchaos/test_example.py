@@ -1,0 +1,30 @@
+"""The ready configurations are listed and copied, and load."""
+
+from pathlib import Path
+
+from gearchaos.configuration import load_config
+from gearchaos.example import main
+
+SWEEPS = Path(__file__).resolve().parents[2] / "sweeps"
+
+
+def test_every_ready_configuration_is_listed_with_what_it_is(capsys):
+    assert main([]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert [line.split()[0] for line in lines] == sorted(path.stem for path in SWEEPS.iterdir())
+    assert all(len(line) > 30 for line in lines)
+
+
+def test_one_is_copied_as_it_is_and_nothing_is_replaced(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert main(["spur_pair"]) == 0
+    assert capsys.readouterr().out == "spur_pair.toml\n"
+    copied = tmp_path / "spur_pair.toml"
+    assert copied.read_bytes() == (SWEEPS / "spur_pair.toml").read_bytes()
+    assert load_config(copied).sweep
+    copied.write_text("mine")
+    assert main(["spur_pair"]) == 4
+    assert copied.read_text() == "mine" and "--overwrite" in capsys.readouterr().err
+    assert main(["spur_pair.toml", "--overwrite"]) == 0
+    assert main(["spurpair"]) == 2
+    assert "there are mesh_frequency, pan2021," in capsys.readouterr().err
