@@ -8,6 +8,7 @@ import os
 import sys
 import time
 from datetime import timedelta
+from pathlib import Path
 
 import numpy as np
 from gearchaos_kernels import LANES, current_threads
@@ -38,6 +39,8 @@ def describe(simulation: Simulation, output: str, shard: Shard | None, as_json: 
     ]
     bytes_kept = own * sum(rows) // every
     memory = _memory(simulation) + sum(min(CACHE_BYTES, row) for row in rows)
+    # What HDF5 and the allocator keep while a file is written is not known beforehand.
+    memory += memory // 20
     plan = simulation.plan
     steps = own * (plan.transient_periods + plan.recorded_periods) * plan.steps_per_period
     if as_json:
@@ -117,6 +120,12 @@ def _thinned(simulation: Simulation, share: float, length: float) -> Configurati
 def _memory(simulation: Simulation) -> int:
     """Return about how many bytes the process takes at most: as many as so far, and a block."""
     block = simulation.block_memory(current_threads())
+    try:
+        # Linux counts for getrusage what the process that began this one took.
+        status = Path("/proc/self/status").read_text("utf-8")
+        return block + 1024 * int(status.partition("VmHWM:")[2].split()[0])
+    except OSError:
+        pass
     try:
         from resource import RUSAGE_SELF, getrusage
     except ImportError:  # Windows.
