@@ -6,7 +6,16 @@ from gearchaos_kernels.compilation import CACHE_FOLDER, source_hash
 from gearchaos_kernels.evaluation import jacobian, mesh_motion
 from gearchaos_kernels.flow_map import maps_memory
 from gearchaos_kernels.status import STATUS_TEXTS, Status
-from gearchaos_kernels.system import STATES, Effects, Groups, MeshMotion, Outcome, Plan, System
+from gearchaos_kernels.system import (
+    STATES,
+    Effects,
+    Groups,
+    MeshMotion,
+    Outcome,
+    Plan,
+    System,
+    Teeth,
+)
 from gearchaos_kernels.threads import current_threads, most_threads, processor, use_threads
 
 __all__ = [
@@ -21,6 +30,7 @@ __all__ = [
     "Plan",
     "Status",
     "System",
+    "Teeth",
     "current_threads",
     "integrate",
     "jacobian",

@@ -21,6 +21,7 @@ from gearchaos_kernels.flow_map import maps_of, sharing
 from gearchaos_kernels.forcing import phase_table
 from gearchaos_kernels.status import Status
 from gearchaos_kernels.system import Floats, Outcome, Plan, Schedule, System
+from gearchaos_kernels.teeth import NO_TEETH, share_table
 
 Integers = NDArray[np.intp]
 
@@ -32,6 +33,7 @@ def _integrate_blocks(
     outcome,
     pitch_error,
     phase,
+    teeth,
     stiffness_variation,
     backlash,
     transverse,
@@ -45,6 +47,7 @@ def _integrate_blocks(
         present = Present(
             pitch_error,
             phase,
+            teeth,
             stiffness_variation,
             backlash,
             transverse,
@@ -94,6 +97,7 @@ def integrate(
         history=np.full((lanes, plan.history_periods * steps + 1, states), np.nan),
     )
     present = flags(system, plan)
+    teeth = NO_TEETH if present.teeth is None or system.teeth is None else system.teeth
     schedule = Schedule(*(getattr(plan, name) for name in Schedule._fields))
     for order, blocks, maps, steps_of in _shares(system, plan, present):
         step = system.mesh_period / steps_of
@@ -107,6 +111,10 @@ def integrate(
             order,
             blocks,
             maps,
+            share_table(teeth, steps),
+            np.ascontiguousarray(teeth.driving, dtype=np.float64),
+            np.ascontiguousarray(teeth.driven, dtype=np.float64),
+            np.ascontiguousarray(teeth.profile, dtype=np.intp),
         )
         _integrate_blocks(batch, schedule, outcome, *present)
         if maps.size:

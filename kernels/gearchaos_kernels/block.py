@@ -49,6 +49,7 @@ from gearchaos_kernels.forcing import During, forcing_at, phase_on_grid
 from gearchaos_kernels.rk4 import step, tangent_step
 from gearchaos_kernels.splitting import split_step
 from gearchaos_kernels.status import Status
+from gearchaos_kernels.teeth import engage, share_errors, share_step, with_teeth
 
 LARGEST_STATE = 1e100
 """A state beyond this has left every length scale: the lane is stopped as diverged."""
@@ -66,7 +67,8 @@ class Batch(NamedTuple):
     ``coefficients`` (lanes, fields of `Lane`), ``scales``, ``start`` and ``tangent_start`` (lanes,
     states), ``steps_between_scalings`` (lanes,), ``table`` (rows, columns). ``blocks`` (blocks, 4):
     place of the first lane of each in ``order`` (lanes,), number of lanes, steps per period and
-    where its maps begin in ``maps``, which only a method that has maps looks at.
+    where its maps begin in ``maps``, which only a method that has maps looks at. ``shares``: see
+    `share_table`; ``driving``, ``driven``, ``profile``: see `Teeth`.
     """
 
     coefficients: NDArray[np.float64]
@@ -78,6 +80,10 @@ class Batch(NamedTuple):
     order: NDArray[np.intp]
     blocks: NDArray[np.intp]
     maps: NDArray[np.float64]
+    shares: NDArray[np.float64]
+    driving: NDArray[np.float64]
+    driven: NDArray[np.float64]
+    profile: NDArray[np.intp]
 
 
 @part
@@ -93,14 +99,18 @@ def integrate_block(number_of_block, batch, plan, outcome, present):
     work = np.zeros(WORK)
     every = steps // plan.steps_per_period
     block = Block(memory, first, lanes)
+    turn(block, batch, plan.first_period, present)
     interval = begin(block, batch, present)
     periods = plan.transient_periods + plan.recorded_periods
     for period in range(periods):
+        turn(block, batch, plan.first_period + period, present)
         for number in range(steps):
             if period >= periods - plan.history_periods and number % every == 0:
                 sample = (period - periods + plan.history_periods) * plan.steps_per_period
                 keep_state(block, batch, outcome.history, sample + number // every)
             row = maps_at + number * step_size(present)
+            if present.teeth is not None:
+                share_step(memory, batch.shares, number)
             if present.flow_map is None:
                 # Not in the loop over slots: nobody tells the compiler that its stores spare it.
                 phases = During(
@@ -124,6 +134,18 @@ def integrate_block(number_of_block, batch, plan, outcome, present):
 
 
 @scalar
+def turn(block, batch, period, present):
+    """Bring the tooth pairs of a mesh period into mesh."""
+    if present.teeth is not None:
+        memory, first, lanes = block
+        for slot in range(LANES):
+            profile = batch.profile[batch.order[first + min(slot, lanes - 1)]]
+            engage(memory, slot, batch.driving[profile], batch.driven[profile], period)
+        # What ends a step begins the next one.
+        share_errors(memory, batch.shares, 0, 2)
+
+
+@scalar
 def begin(block, batch, present):
     """Fill the memory of a block; return the shortest interval between scalings of a tangent."""
     memory, first, lanes = block
@@ -140,7 +162,8 @@ def begin(block, batch, present):
         store(memory, CROSSINGS, slot, Crossings(0.0, math.inf, 0.0))
         if present.resolved is not None:
             lane = load(memory, COEFFICIENTS, slot, Lane)
-            forcing = forcing_at(lane, phase_on_grid(batch.table, 0), present)
+            point = with_teeth(memory, slot, 2, phase_on_grid(batch.table, 0), present)
+            forcing = forcing_at(lane, point, present)
             state = read_state(memory, STATE, slot, present)
             gaps = gaps_at(state, lane, forcing, present)
             write_branches(memory, slot, branches_at(gaps, lane.half_backlash, present))
@@ -158,9 +181,9 @@ def step_block(memory, phases, present):
         lane = load(memory, COEFFICIENTS, slot, Lane)
         state = read_state(memory, STATE, slot, present)
         during = During(
-            forcing_at(lane, phases.begin, present),
-            forcing_at(lane, phases.middle, present),
-            forcing_at(lane, phases.end, present),
+            forcing_at(lane, with_teeth(memory, slot, 0, phases.begin, present), present),
+            forcing_at(lane, with_teeth(memory, slot, 1, phases.middle, present), present),
+            forcing_at(lane, with_teeth(memory, slot, 2, phases.end, present), present),
         )
         if present.resolved is None:
             after, slopes = step(state, 1.0, lane, during, None, present)

@@ -33,6 +33,7 @@ from gearchaos_kernels.equations import (
 )
 from gearchaos_kernels.forcing import forcing_at, phase_on_grid, phase_table
 from gearchaos_kernels.system import Effects, Floats, MeshMotion, Plan, System
+from gearchaos_kernels.teeth import NO_TEETH, engage, share_errors, share_table, with_teeth
 
 _ALONE = Plan(1, 0, 0, 0, resolved=False)
 """No loop: nothing is split and no tangent vector carried along."""
@@ -80,7 +81,9 @@ def _differentiate(coefficients, scales, slopes, result, present):
             take(memory, STATE, 0, scale, result[index, :, column])
 
 
-def mesh_motion(system: System, states: Floats, steps_per_period: int) -> MeshMotion:
+def mesh_motion(
+    system: System, states: Floats, steps_per_period: int, first_period: int = 0
+) -> MeshMotion:
     """Return forces, contact and accelerations along a motion (eqs 6, 7, 13, 22 and 23).
 
     Without clearance teeth never part, and the sign of the gap tells the flank.
@@ -91,6 +94,8 @@ def mesh_motion(system: System, states: Floats, steps_per_period: int) -> MeshMo
     states : ndarray, shape (lanes, samples, states)
         Samples one step apart, the first one at mesh phase 0.
     steps_per_period : int
+    first_period : int
+        Mesh periods that the teeth have turned before the first sample.
     """
     lanes, samples, count = states.shape
     step = system.mesh_period / steps_per_period
@@ -101,20 +106,28 @@ def mesh_motion(system: System, states: Floats, steps_per_period: int) -> MeshMo
         np.zeros((lanes, samples), dtype=np.uint8),
         np.zeros((lanes, samples, count // 2)),
     )
+    present = flags(system, _ALONE)
+    teeth = NO_TEETH if present.teeth is None or system.teeth is None else system.teeth
     _follow(
         lane_coefficients(system, step),
         state_scales(system, step),
         step,
         phase_table(system.stiffness_cosine, system.stiffness_sine, steps_per_period),
+        share_table(teeth, steps_per_period),
+        np.ascontiguousarray(teeth.driving[teeth.profile], dtype=np.float64),
+        np.ascontiguousarray(teeth.driven[teeth.profile], dtype=np.float64),
+        first_period,
         np.ascontiguousarray(states, dtype=np.float64),
         motion,
-        flags(system, _ALONE),
+        present,
     )
     return motion
 
 
 @evaluator
-def _follow(coefficients, scales, steps, table, states, motion, present):
+def _follow(
+    coefficients, scales, steps, table, shares, driving, driven, first, states, motion, present
+):
     """Evaluate eq. 13 at every sample, lane by lane."""
     memory = aligned_memory()
     change = np.empty(scales.shape[1])
@@ -129,7 +142,12 @@ def _follow(coefficients, scales, steps, table, states, motion, present):
             fill(memory, STATE, 0, scales[index], states[index, sample])
             state = read_state(memory, STATE, 0, present)
             row = 2 * sample % (table.shape[0] - 1)
-            forcing = forcing_at(lane, phase_on_grid(table, row), present)
+            if present.teeth is not None:
+                period = first + 2 * sample // (table.shape[0] - 1)
+                engage(memory, 0, driving[index], driven[index], period)
+                share_errors(memory, shares, row, 0)
+            point = with_teeth(memory, 0, 0, phase_on_grid(table, row), present)
+            forcing = forcing_at(lane, point, present)
             gaps = gaps_at(state, lane, forcing, present)
             forces, _ = mesh_forces(gaps, lane, forcing.stiffness, None, present)
             # Scaled, N_y and N_z enter eq. 13 with coefficient -1, and per step squared.

@@ -105,7 +105,7 @@ def differentiate(coefficients, right_side, present):
         sine = 1.0 if column == states + 1 else 0.0
         cosine = 1.0 if column == states + 2 else 0.0
         state = read_state(memory, STATE, 0, present)
-        acting = forcing_at(lane, Phase(0.0, sine, cosine), present)
+        acting = forcing_at(lane, Phase(0.0, sine, cosine, -sine), present)
         both = gaps_at(state, lane, acting, present)
         gaps = right_side.gaps
         rates = right_side.constant

@@ -70,7 +70,8 @@ _ITERATIONS = 60
 @scalar
 def phases_of(table, row):
     """Return the mesh phase at the beginning and at the end of a step."""
-    return Phase(0.0, table[row], table[row + 1]), Phase(0.0, table[row + 2], table[row + 3])
+    begin = Phase(0.0, table[row], table[row + 1], -table[row])
+    return begin, Phase(0.0, table[row + 2], table[row + 3], -table[row + 2])
 
 
 @scalar

@@ -1,8 +1,9 @@
 """What acts on a lane at one instant: mesh stiffness, load and pitch error.
 
-With a fixed number of steps per mesh period, every period meets the same phases, so that all of it
-comes from one table: the inner loop evaluates no trigonometric function. Between the points of
-the table the series about the nearest one is as exact as the table itself.
+The pitch error here is the sine of eq. 14; `teeth` has the one that teeth share. With a fixed
+number of steps per mesh period, every period meets the same phases, so that all of it comes from
+one table: the inner loop evaluates no trigonometric function. Between the points of the table the
+series about the nearest one is as exact as the table itself.
 """
 
 from __future__ import annotations
@@ -24,11 +25,23 @@ _MOST_TERMS = 40
 
 
 class Phase(NamedTuple):
-    """A mesh phase: stiffness variation relative to the mean, sine and cosine of the angle."""
+    """A mesh phase: stiffness variation relative to the mean, and a pitch error of amplitude 1.
+
+    Of the error its value, and its first and second derivative by the phase in radians.
+    """
 
     variation: float
-    sine: float
-    cosine: float
+    value: float
+    slope: float
+    curvature: float
+
+
+class Shared(NamedTuple):
+    """Value, slope and curvature of the error that the teeth in mesh share; see `Phase`."""
+
+    value: float
+    slope: float
+    curvature: float
 
 
 class Forcing(NamedTuple):
@@ -85,7 +98,8 @@ def _table(cosine_bytes: bytes, sine_bytes: bytes, steps_per_period: int) -> NDA
 @scalar
 def phase_on_grid(table, row):
     """Return one row of the table."""
-    return Phase(table[row, VARIATION], table[row, SINE], table[row, COSINE])
+    sine = table[row, SINE]
+    return Phase(table[row, VARIATION], sine, table[row, COSINE], -sine)
 
 
 @scalar
@@ -108,11 +122,8 @@ def phase_within(table, number, fraction):
     variation = 0.0
     for term in range(table.shape[1] - 1, VARIATION - 1, -1):
         variation = variation * angle + table[row, term]
-    return Phase(
-        variation,
-        table[row, SINE] * cosine + table[row, COSINE] * sine,
-        table[row, COSINE] * cosine - table[row, SINE] * sine,
-    )
+    value = table[row, SINE] * cosine + table[row, COSINE] * sine
+    return Phase(variation, value, table[row, COSINE] * cosine - table[row, SINE] * sine, -value)
 
 
 @scalar
@@ -127,16 +138,18 @@ def forcing_at(lane, point, present):
     axial_error = 0.0
     axial_error_rate = 0.0
     if present.pitch_error is not None:
-        sine = point.sine
-        cosine = point.cosine
+        value = point.value
+        slope = point.slope
+        curvature = point.curvature
         if present.phase is not None:
-            sine = lane.cos_phase * point.sine + lane.sin_phase * point.cosine
-            cosine = lane.cos_phase * point.cosine - lane.sin_phase * point.sine
-        # -e'' = Omega^2 e of the sine drives delta_5, which is measured from e (eq. 13).
-        drive = lane.load + lane.error_inertia * sine
-        error = lane.error_mean + lane.error_amplitude * sine
-        error_rate = lane.error_rate * cosine
+            value = lane.cos_phase * point.value + lane.sin_phase * point.slope
+            slope = lane.cos_phase * point.slope - lane.sin_phase * point.value
+            curvature = -value
+        # -e'' drives delta_5, which is measured from e (eq. 13).
+        drive = lane.load - lane.error_inertia * curvature
+        error = lane.error_mean + lane.error_amplitude * value
+        error_rate = lane.error_rate * slope
         if present.axial is not None:
-            axial_error = lane.axial_error_mean + lane.axial_error_amplitude * sine
-            axial_error_rate = lane.axial_error_rate * cosine
+            axial_error = lane.axial_error_mean + lane.axial_error_amplitude * value
+            axial_error_rate = lane.axial_error_rate * slope
     return Forcing(stiffness, drive, error, error_rate, axial_error, axial_error_rate)

@@ -27,6 +27,7 @@ from gearchaos_kernels.contact import NEVER, branches_at, leaving_fraction, next
 from gearchaos_kernels.equations import gaps_at
 from gearchaos_kernels.forcing import During, forcing_at, phase_on_grid, phase_within
 from gearchaos_kernels.rk4 import step, tangent_step
+from gearchaos_kernels.teeth import with_teeth, with_teeth_within
 
 MOST_SPLITS = 16
 """Crossings of one step; a step with more goes on with its last branches and is counted."""
@@ -53,8 +54,10 @@ def split_step(memory, slot, table, number, present):
     tangent = state
     if present.tangent is not None:
         tangent = read_state(memory, BEFORE + TANGENT, slot, present)
-    begin = forcing_at(lane, phase_on_grid(table, 2 * number), present)
-    end = forcing_at(lane, phase_on_grid(table, 2 * number + 2), present)
+    begins = with_teeth(memory, slot, 0, phase_on_grid(table, 2 * number), present)
+    begin = forcing_at(lane, begins, present)
+    ends = with_teeth(memory, slot, 2, phase_on_grid(table, 2 * number + 2), present)
+    end = forcing_at(lane, ends, present)
     gaps = gaps_at(state, lane, begin, present)
     branches = read_branches(memory, slot, present)
     done = 0.0
@@ -69,9 +72,9 @@ def split_step(memory, slot, table, number, present):
             break
 
         piece = fraction * left
-        middle = forcing_at(lane, phase_within(table, number, done + 0.5 * piece), present)
+        middle = forcing_within(memory, slot, lane, table, number, done + 0.5 * piece, present)
         done += piece
-        crossing = forcing_at(lane, phase_within(table, number, done), present)
+        crossing = forcing_within(memory, slot, lane, table, number, done, present)
         during = During(begin, middle, crossing)
         state, slopes = step(state, piece, lane, during, branches, present)
         if present.tangent is not None:
@@ -89,7 +92,7 @@ def split_step(memory, slot, table, number, present):
             branches = Branches(following, branches.axial)
 
         left = 1.0 - done
-        middle = forcing_at(lane, phase_within(table, number, done + 0.5 * left), present)
+        middle = forcing_within(memory, slot, lane, table, number, done + 0.5 * left, present)
         after, slopes = step(state, left, lane, During(begin, middle, end), branches, present)
         write_state(memory, STATE, slot, after, present)
         if present.tangent is not None:
@@ -98,6 +101,14 @@ def split_step(memory, slot, table, number, present):
     if crossings > 0:
         write_branches(memory, slot, branches_at(gaps_after, lane.half_backlash, present))
     return crossings, slowest, 1 if fraction <= 1.0 else 0
+
+
+@scalar
+def forcing_within(memory, slot, lane, table, number, fraction, present):
+    """Return what acts on a lane at a fraction of a step."""
+    point = phase_within(table, number, fraction)
+    point = with_teeth_within(memory, slot, fraction, point, table.shape[0], present)
+    return forcing_at(lane, point, present)
 
 
 @scalar

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -57,12 +58,32 @@ class Groups(NamedTuple):
     axial_damping_g: Floats
 
 
+class Teeth(NamedTuple):
+    """Pitch errors tooth by tooth, in place of the sine of eq. 14; see `teeth`.
+
+    ``driving`` (profiles, teeth of the driving gear), ``driven`` (profiles, teeth of the driven
+    one): the errors in the order in which teeth come into mesh, positive where the flank lies
+    ahead in the direction of rotation, in units of `Groups.error_amplitude`; ``profile`` (lanes,):
+    which of these a lane has. ``share`` (cells,): mean share of one tooth pair in the mesh force
+    over each cell, of which a mesh period has ``cells_per_period``, from its coming into mesh at
+    mesh phase ``entry``, in periods, on.
+    """
+
+    driving: Floats
+    driven: Floats
+    profile: NDArray[np.intp]
+    share: Floats
+    cells_per_period: int
+    entry: float
+
+
 class System(NamedTuple):
     """Everything that defines the right-hand side of eq. 13 for a batch of lanes.
 
     ``stiffness_cosine`` and ``stiffness_sine``, shape (harmonics,), are the Fourier coefficients of
     the mesh stiffness relative to its mean (eq. 19); ``physical`` says whether delta_5 + e enters
-    the gaps, as eq. 1 gives, instead of delta_5 as eqs 6 and 7 are printed.
+    the gaps, as eq. 1 gives, instead of delta_5 as eqs 6 and 7 are printed. With ``teeth`` the
+    pitch error is not that of eq. 14.
     """
 
     effects: Effects
@@ -70,6 +91,7 @@ class System(NamedTuple):
     stiffness_cosine: Floats
     stiffness_sine: Floats
     physical: bool = True
+    teeth: Teeth | None = None
 
     @property
     def states(self) -> tuple[str, ...]:
@@ -86,9 +108,23 @@ class System(NamedTuple):
         """Duration of a mesh period in units of tau, shape (lanes,)."""
         return 2.0 * np.pi / self.groups.mesh_frequency
 
+    @property
+    def repeats_after(self) -> int:
+        """Mesh periods after which the excitation repeats: 1, or until the same teeth meet."""
+        if self.teeth is None or not self.effects.pitch_error:
+            return 1
+        return math.lcm(self.teeth.driving.shape[1], self.teeth.driven.shape[1])
+
+    @property
+    def excitation_period(self) -> Floats:
+        """Duration of `repeats_after` mesh periods in units of tau, shape (lanes,)."""
+        return self.repeats_after * self.mesh_period
+
     def of(self, lanes: slice | NDArray[np.intp] | list[int]) -> System:
         """Return the system of some lanes, in the order given."""
-        return self._replace(groups=Groups(*(group[lanes] for group in self.groups)))
+        teeth = self.teeth and self.teeth._replace(profile=self.teeth.profile[lanes])
+        groups = Groups(*(group[lanes] for group in self.groups))
+        return self._replace(groups=groups, teeth=teeth)
 
     def repeated(self, times: int) -> System:
         """Return the system with every lane so many times in a row."""
@@ -101,7 +137,8 @@ class Plan(NamedTuple):
     The section is kept at the end of the last ``section_points`` mesh periods. ``resolved`` splits
     the steps that cross a clearance boundary; without it they are plain steps. Of the last
     ``history_periods`` every step is kept. ``method``: "rk4" or "flow_map", which resolves every
-    crossing and whose steps are exact.
+    crossing and whose steps are exact. ``first_period``: mesh periods that the teeth have turned
+    before tau = 0.
     """
 
     steps_per_period: int
@@ -112,6 +149,7 @@ class Plan(NamedTuple):
     resolved: bool = True
     history_periods: int = 0
     method: str = "rk4"
+    first_period: int = 0
 
 
 class Schedule(NamedTuple):
@@ -122,6 +160,7 @@ class Schedule(NamedTuple):
     recorded_periods: int
     section_points: int
     history_periods: int
+    first_period: int
 
 
 class Outcome(NamedTuple):
@@ -148,6 +187,15 @@ class Outcome(NamedTuple):
     slowest_crossing: Floats
     overflows: NDArray[np.int64]
     history: Floats | None
+
+    def every(self, periods: int) -> Outcome:
+        """Return it with section and growth once every so many mesh periods, up to the end."""
+        section, growth = self.section[:, ::-periods][:, ::-1], self.growth
+        if growth is not None and periods > 1:
+            whole = growth.shape[1] // periods
+            growth = growth[:, growth.shape[1] - whole * periods :]
+            growth = growth.reshape(-1, whole, periods).sum(axis=2)
+        return self._replace(section=section, growth=growth)
 
 
 class MeshMotion(NamedTuple):

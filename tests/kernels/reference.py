@@ -13,7 +13,7 @@ from typing import Any
 
 import numba
 import numpy as np
-from gearchaos_kernels import STATES, Effects, Groups, Outcome, Plan, System, integrate
+from gearchaos_kernels import STATES, Effects, Groups, Outcome, Plan, System, Teeth, integrate
 
 SOLUTIONS = json.loads((Path(__file__).parents[1] / "data" / "pan2021.json").read_text())
 
@@ -82,9 +82,30 @@ def lanes_of(model: Groups, chosen: Any) -> Groups:
     return Groups(*(group[chosen] for group in model))
 
 
-def system_of(groups: Groups, effects: Effects = FULL, physical: bool = False) -> System:
+def system_of(
+    groups: Groups, effects: Effects = FULL, physical: bool = False, teeth: Teeth | None = None
+) -> System:
     """Return a system with the mesh stiffness of Pan 2021."""
-    return System(effects, groups, COSINE, SINE, physical)
+    return System(effects, groups, COSINE, SINE, physical, teeth)
+
+
+def drawn_teeth(driving: int, driven: int, lanes: int = 1, contact_ratio: float = 2.26) -> Teeth:
+    """Return errors of so many teeth, other ones in every lane, shared as a trapezoid rises."""
+    random = np.random.default_rng(driving + 1000 * driven)
+    cells_per_period = 20
+    place = (np.arange(round(contact_ratio * cells_per_period)) + 0.5) / cells_per_period
+    line = np.minimum(np.minimum(place, 0.86), contact_ratio - place)
+    share = [
+        line[n] / line[n % cells_per_period :: cells_per_period].sum() for n in range(line.size)
+    ]
+    return Teeth(
+        random.uniform(-1.0, 1.0, (lanes, driving)),
+        random.uniform(-1.0, 1.0, (lanes, driven)),
+        np.arange(lanes)[::-1].copy(),
+        np.array(share),
+        cells_per_period,
+        0.3,
+    )
 
 
 def columns(effects: Effects) -> list[int]:
@@ -115,6 +136,7 @@ def run(
     tangent: bool = True,
     physical: bool = False,
     resolved: bool | str = False,
+    teeth: Teeth | None = None,
 ) -> Outcome:
     """Integrate Pan 2021's mesh stiffness, by default keeping every state after every period.
 
@@ -127,7 +149,7 @@ def run(
     points = transient + periods if points is None else points
     method = FLOW_MAP if resolved == FLOW_MAP else "rk4"
     plan = Plan(steps, transient, periods, points, tangent, bool(resolved), method=method)
-    return integrate(system_of(model, scene, physical), start[:, columns(scene)], plan)
+    return integrate(system_of(model, scene, physical, teeth), start[:, columns(scene)], plan)
 
 
 def assert_same_bits(one: Outcome, other: Outcome) -> None:

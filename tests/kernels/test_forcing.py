@@ -49,8 +49,8 @@ def test_the_mesh_phase_within_a_step_is_that_of_the_trigonometric_functions(ste
             angle = 2.0 * math.pi * (number + fraction) / steps
             point = phase_within(table, number, fraction)
             assert abs(point.variation - variation(cosine, sine, angle)) < ROUNDING * size
-            assert abs(point.sine - math.sin(angle)) < ROUNDING
-            assert abs(point.cosine - math.cos(angle)) < ROUNDING
+            assert abs(point.value - math.sin(angle)) < ROUNDING
+            assert abs(point.slope - math.cos(angle)) < ROUNDING
 
 
 @pytest.mark.parametrize("steps", [2, 3, 4, 6])
@@ -65,8 +65,8 @@ def test_with_a_handful_of_steps_a_period_the_phase_is_still_far_better_than_the
             angle = 2.0 * math.pi * (number + fraction) / steps
             point = phase_within(table, number, fraction)
             assert abs(point.variation - variation(cosine, sine, angle)) < 10.0 * ROUNDING
-            assert abs(point.sine - math.sin(angle)) < ROUNDING + left_out
-            assert abs(point.cosine - math.cos(angle)) < ROUNDING + left_out
+            assert abs(point.value - math.sin(angle)) < ROUNDING + left_out
+            assert abs(point.slope - math.cos(angle)) < ROUNDING + left_out
 
 
 @pytest.mark.parametrize("steps", STEPS)
@@ -147,4 +147,4 @@ def test_what_a_scene_leaves_out_is_zero_or_constant():
     assert tuple(forcing_at(groups, point, NOTHING)) == (0.9, 0.3, 0.0, 0.0, 0, 0)
     without_axial = forcing_at(groups, point, EVERYTHING._replace(phase=None, axial=None))
     assert without_axial.axial_error == without_axial.axial_error_rate == 0.0
-    assert without_axial.error == pytest.approx(0.05 + 1.3 * point.sine, abs=ROUNDING)
+    assert without_axial.error == pytest.approx(0.05 + 1.3 * point.value, abs=ROUNDING)

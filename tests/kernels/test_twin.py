@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from gearchaos_kernels import Effects, Groups
 
-from .reference import columns, pan2021, run, state
+from .reference import columns, drawn_teeth, pan2021, run, state
 from .twin import Twin
 
 STEPS = 60
@@ -56,6 +56,21 @@ def scene_cases() -> list:
         quick = sum(scene) % 2 == 1
         cases.append(pytest.param(scene, id=named(scene), marks=() if quick else pytest.mark.slow))
     return cases
+
+
+@pytest.mark.parametrize("scene", [case for case in scene_cases() if case.values[0].pitch_error])
+@pytest.mark.parametrize("physical", [False, True])
+def test_kernels_share_the_errors_of_the_teeth_in_mesh(scene, physical):
+    teeth = drawn_teeth(3, 2, lanes=2)
+    outcome = run(MODEL, scene, START, steps=STEPS, periods=PERIODS, physical=physical, teeth=teeth)
+    for number in range(2):
+        groups = lane(number)
+        groups.profile = teeth.profile[number]
+        twin = Twin(groups, scene, physical, teeth).integrate(START[number], STEPS, PERIODS)
+        assert outcome.section[number] == pytest.approx(
+            twin.states[:, columns(scene)], rel=0, abs=ROUNDING
+        )
+        assert outcome.growth[number] == pytest.approx(twin.growth, rel=0, abs=ROUNDING)
 
 
 @pytest.mark.parametrize("scene", scene_cases())

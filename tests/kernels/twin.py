@@ -6,10 +6,11 @@ the tangent vector by the variational equation: none of the kernels' scalings, t
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
-from gearchaos_kernels import Effects
+from gearchaos_kernels import Effects, Teeth
 
 from .reference import COSINE, SINE
 
@@ -23,13 +24,42 @@ class Motion(NamedTuple):
     growth: np.ndarray
 
 
+def spline(x: float, degree: int = 5) -> float:
+    """The B-spline with knots 0, 1, ... from powers that begin at each of them."""
+    knots = np.arange(degree + 2)
+    weights = [(-1) ** k * math.comb(degree + 1, k) for k in knots]
+    powers = np.where(x > knots, np.maximum(x - knots, 0.0) ** degree, 0.0)
+    return float(np.sum(weights * powers)) / math.factorial(degree) if 0 < x < degree + 1 else 0.0
+
+
+def shared_error(teeth: Teeth, profile: int, phase: float) -> np.ndarray:
+    """The errors of all tooth pairs around a phase in mesh periods, weighed by their shares.
+
+    With its first and second derivative by the phase in radians.
+    """
+    driving, driven = teeth.driving[profile], teeth.driven[profile]
+    total = np.zeros(3)
+    for pair in range(math.floor(phase) - 10, math.floor(phase) + 2):
+        error = driven[pair % driven.size] - driving[pair % driving.size]
+        place = teeth.cells_per_period * (phase - pair - teeth.entry)
+        for cell in range(max(0, math.floor(place) - 5), min(teeth.share.size, math.ceil(place))):
+            x, share = place - cell, teeth.share[cell]
+            first = spline(x, 4) - spline(x - 1, 4)
+            second = spline(x, 3) - 2.0 * spline(x - 1, 3) + spline(x - 2, 3)
+            total += error * share * np.array([spline(x), first, second])
+    return total * (teeth.cells_per_period / (2.0 * np.pi)) ** np.arange(3)
+
+
 class Twin:
     """One lane: groups are plain numbers, named as in `Groups`."""
 
-    def __init__(self, groups, scene: Effects, physical: bool = False) -> None:
+    def __init__(
+        self, groups, scene: Effects, physical: bool = False, teeth: Teeth | None = None
+    ) -> None:
         self.groups = groups
         self.scene = scene
         self.physical = physical
+        self.teeth = teeth
         self.present = np.tile(np.repeat([True, scene.transverse, scene.axial], [1, 2, 2]), 2)
 
     def stiffness(self, tau):
@@ -41,10 +71,15 @@ class Twin:
         return 1.0 + self.groups.stiffness_variation_scale * variation
 
     def error(self, tau):
-        """e(tau), its rate, and the inertial term Omega^2 e of the sine, eqs 13 and 14."""
+        """e(tau), its rate, and the inertial term -e'', Omega^2 e of the sine, eqs 13 and 14."""
         if not self.scene.pitch_error:
             return 0.0, 0.0, 0.0
         omega, amplitude = self.groups.mesh_frequency, self.groups.error_amplitude
+        if self.teeth is not None:
+            phase = omega * tau / (2.0 * np.pi)
+            shared = shared_error(self.teeth, self.groups.profile, phase)
+            e, rate, second = amplitude * shared * omega ** np.arange(3)
+            return self.groups.error_mean + e, rate, -second
         angle = omega * tau + self.groups.error_phase
         sine = amplitude * np.sin(angle)
         return self.groups.error_mean + sine, omega * amplitude * np.cos(angle), omega**2 * sine
