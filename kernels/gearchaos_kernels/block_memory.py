@@ -157,7 +157,7 @@ FORCES = CROSSINGS + len(Crossings._fields)
 """First row of what forces a lane where a step is a map; see `flow_map`."""
 MARGINS = FORCES + 5
 """Rows of how far either gap may stray from its cubic in a step that is a map."""
-MOST_PAIRS = 8
+MOST_PAIRS = 7
 """Tooth pairs in mesh at once."""
 PAIRS = MARGINS + 2
 """First row of their errors; see `teeth`."""

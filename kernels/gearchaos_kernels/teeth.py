@@ -28,15 +28,16 @@ DEGREE = 5
 NO_TEETH = Teeth(np.zeros((1, 1)), np.zeros((1, 1)), np.zeros(1, np.intp), np.zeros(1), 1, 0.0)
 """Stands where the pitch error is that of eq. 14."""
 
-_AT_ONCE = 4
+_AT_ONCE = 3
 """Pairs whose errors are weighed in one go."""
 
 
 def share_table(teeth: Teeth, steps_per_period: int) -> Floats:
     """Return the shares of the pairs in mesh at every half step, shape (2 steps + 1, 3, pairs).
 
-    The share and its first and second derivative by the mesh phase in radians; first the pair that
-    came last, and pairs that fill up, without a share. Raises ValueError with too many in mesh.
+    The share and its first and second derivative by the mesh phase in radians, of all pairs but the
+    one that came last, which has the rest, and of pairs that fill up, without a share. Raises
+    ValueError with too many in mesh.
     """
     cells = np.ascontiguousarray(teeth.share, dtype=np.float64)
     return _table(cells.tobytes(), teeth.cells_per_period, teeth.entry, steps_per_period)
@@ -48,7 +49,7 @@ def _table(share: bytes, cells_per_period: int, entry: float, steps: int) -> Flo
     pairs = int(np.ceil((cells.size + DEGREE) / cells_per_period + entry))
     if pairs > MOST_PAIRS:
         raise ValueError(f"{pairs} tooth pairs in mesh at once, more than {MOST_PAIRS}")
-    pairs += -pairs % _AT_ONCE
+    pairs += -(pairs - 1) % _AT_ONCE
     phase = np.arange(2 * steps + 1)[:, np.newaxis] / (2 * steps)
     place = cells_per_period * (phase + np.arange(pairs) - entry)
     whole = np.floor(place)
@@ -60,7 +61,7 @@ def _table(share: bytes, cells_per_period: int, entry: float, steps: int) -> Flo
         for order in range(3):
             slope = (cells_per_period / (2.0 * np.pi)) ** order
             table[:, order] += slope * cell * _basis(place - whole + back, order)
-    return table
+    return np.ascontiguousarray(table[:, :, 1:])
 
 
 def _basis(x: Floats, derivative: int, degree: int = DEGREE) -> Floats:
@@ -77,29 +78,45 @@ def _basis(x: Floats, derivative: int, degree: int = DEGREE) -> Floats:
 
 @scalar
 def engage(memory, slot, driving, driven, period):
-    """Store the errors of the pairs in mesh in one mesh period, the last one to come first."""
+    """Store the errors of the pairs in mesh: that of the last one to come, the rest less that."""
+    newest = 0.0
     for place in range(MOST_PAIRS):
         pair = period - place
-        driving_tooth = driving[pair % driving.shape[0]]
-        memory[(PAIRS + place) * STRIDE + slot] = driven[pair % driven.shape[0]] - driving_tooth
+        error = driven[pair % driven.shape[0]] - driving[pair % driving.shape[0]] - newest
+        memory[(PAIRS + place) * STRIDE + slot] = error
+        if place == 0:
+            newest = error
 
 
 @scalar
 def share_errors(memory, shares, row, half):
     """Weigh the errors of the pairs in mesh in every slot, at one of the three phases of a step."""
-    for first in range(0, shares.shape[2], _AT_ONCE):
-        pair = (PAIRS + first) * STRIDE
-        for order in range(3):
-            at = (SHARED + 3 * half + order) * STRIDE
-            share = shares[row, order]
-            w0, w1, w2, w3 = share[first], share[first + 1], share[first + 2], share[first + 3]
-            for slot in range(LANES):
-                newer = w0 * memory[pair + slot] + w1 * memory[pair + STRIDE + slot]
-                older = (
-                    w2 * memory[pair + 2 * STRIDE + slot] + w3 * memory[pair + 3 * STRIDE + slot]
-                )
-                others = 0.0 if first == 0 else memory[at + slot]
-                memory[at + slot] = newer + older + others
+    weigh(memory, shares[row], half, 0)
+    if shares.shape[2] > _AT_ONCE:
+        weigh(memory, shares[row], half, _AT_ONCE)
+
+
+@scalar
+def weigh(memory, shares, half, first):
+    """Weigh the errors of three pairs, and add what others have."""
+    a1, a2, a3 = shares[0, first], shares[0, first + 1], shares[0, first + 2]
+    b1, b2, b3 = shares[1, first], shares[1, first + 1], shares[1, first + 2]
+    c1, c2, c3 = shares[2, first], shares[2, first + 1], shares[2, first + 2]
+    at = (SHARED + 3 * half) * STRIDE
+    for slot in range(LANES):
+        value = memory[PAIRS * STRIDE + slot]
+        slope = 0.0
+        curvature = 0.0
+        if first > 0:
+            value = memory[at + slot]
+            slope = memory[at + STRIDE + slot]
+            curvature = memory[at + 2 * STRIDE + slot]
+        e1 = memory[(PAIRS + first + 1) * STRIDE + slot]
+        e2 = memory[(PAIRS + first + 2) * STRIDE + slot]
+        e3 = memory[(PAIRS + first + 3) * STRIDE + slot]
+        memory[at + slot] = value + a1 * e1 + a2 * e2 + a3 * e3
+        memory[at + STRIDE + slot] = slope + b1 * e1 + b2 * e2 + b3 * e3
+        memory[at + 2 * STRIDE + slot] = curvature + c1 * e1 + c2 * e2 + c3 * e3
 
 
 @scalar
