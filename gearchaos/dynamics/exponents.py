@@ -66,7 +66,8 @@ def exponents(system: System, start: Floats, plan: Plan) -> Exponents:
     frame = np.broadcast_to(_first_frame(states), (lanes, states, states))
     state = start
     for period in range(-plan.transient_periods, plan.recorded_periods):
-        state, vectors, growth = _carry(system, state, frame, once)
+        turned = plan.transient_periods + period
+        state, vectors, growth = _carry(system, state, frame, once._replace(first_period=turned))
         frame, triangle = np.linalg.qr(vectors)
         left = np.abs(np.diagonal(triangle, axis1=1, axis2=2))
         resolved = np.logical_and.accumulate(left > SMALLEST_RESOLVED, axis=1)
@@ -111,6 +112,7 @@ def period_jacobian(system: System, start: Floats, plan: Plan) -> Floats:
             tangent=False,
         )
         start = integrate(system, start, before).end_state
+        plan = plan._replace(first_period=plan.first_period + plan.transient_periods)
     lanes, states = start.shape
     frame = np.broadcast_to(np.eye(states), (lanes, states, states))
     carried = _carry(system, start, frame, plan._replace(transient_periods=0))

@@ -49,9 +49,11 @@ class Told(NamedTuple):
 def labels_of(system: System, outcome: Outcome, plan: Plan) -> Told:
     """Label lanes by their record, which should hold `MOST_POINTS` section points or all there are.
 
-    ``plan`` is that by which they were integrated. `doubtful` lanes are labelled by a longer record
+    ``plan`` is that by which they were integrated, over whole excitation periods. `doubtful` lanes are labelled by a longer record
     that begins where theirs ended, and what that does not tell by a still longer one.
     """
+    repeats = system.repeats_after
+    outcome = outcome.every(repeats)
     record = _record(system, outcome, MOST_POINTS)
     labels = _told(system, outcome, plan, record)
     lanes = np.flatnonzero(doubtful(record, labels))
@@ -60,7 +62,7 @@ def labels_of(system: System, outcome: Outcome, plan: Plan) -> Told:
         further = plan._replace(
             transient_periods=0,
             recorded_periods=longer * plan.recorded_periods,
-            section_points=longer * min(MOST_POINTS, plan.recorded_periods),
+            section_points=longer * min(MOST_POINTS * repeats, plan.recorded_periods),
             history_periods=0,
         )
         # In portions whose longer records take no more memory than those of all lanes.
@@ -69,6 +71,7 @@ def labels_of(system: System, outcome: Outcome, plan: Plan) -> Told:
             some = lanes[first : first + size]
             part = system.of(some)
             again = integrate(part, state[some], further, tangent_start=tangent[some])
+            again = again.every(repeats)
             state[some], tangent[some] = again.end_state, again.end_tangent
             told = _told_again(part, again, further)
             labels.motion[some], labels.period[some] = told.motion, told.period
@@ -106,7 +109,11 @@ def _told_again(system: System, outcome: Outcome, plan: Plan) -> Labels:
 def _tell_linear(system: System, plan: Plan, labels: Labels) -> None:
     """Tell growth without bound by the multipliers, in place: what is linear is never chaotic."""
     once = plan._replace(
-        transient_periods=0, recorded_periods=1, section_points=0, history_periods=0, tangent=True
+        transient_periods=0,
+        recorded_periods=system.repeats_after,
+        section_points=0,
+        history_periods=0,
+        tangent=True,
     )
     jacobian = period_jacobian(system, np.zeros((system.lanes, len(system.states))), once)
     size = np.max(np.abs(np.linalg.eigvals(np.nan_to_num(jacobian))), axis=1)

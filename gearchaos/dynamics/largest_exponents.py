@@ -44,8 +44,8 @@ def largest_exponents(
 
     A lane that is periodic and has its crossings resolved takes the exponent of the stable orbit
     next to its state (lanes, states): no finite record enters there, and a transient at its begin
-    does not count. ``outcome``: with growth, integrated by ``plan``; ``period`` (lanes,) in mesh
-    periods, 0 where a lane is not periodic.
+    does not count. ``outcome``: with growth, integrated by ``plan``; ``period`` (lanes,) in
+    excitation periods, 0 where a lane is not periodic.
     """
     assert outcome.growth is not None
     values, errors = largest_exponent(outcome.growth, system.mesh_period)
@@ -61,7 +61,7 @@ def largest_exponents(
     # A multiplier that is 0 but for underflow tells no exponent.
     told = orbits.stable & (np.abs(orbits.multipliers[:, 0]) > 0.0)
     lanes, size = lanes[told], np.abs(orbits.multipliers[told])
-    duration = period[lanes] * system.mesh_period[lanes]
+    duration = period[lanes] * system.excitation_period[lanes]
     resolved = size > SMALLEST_RESOLVED * size[:, :1]
     size = np.where(resolved, size, np.nan)
     of_orbit[lanes] = np.log(size) / duration[:, np.newaxis]

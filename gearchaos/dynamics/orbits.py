@@ -54,15 +54,15 @@ def polish(
 ) -> Orbits:
     """Find the periodic orbit next to the guess of every lane.
 
-    Newton's method on the map over ``period`` mesh periods, with its Jacobian from the tangent
+    Newton's method on the map over ``period`` excitation periods, with its Jacobian from the tangent
     flow. A step is halved until the return distance falls and the point stays near the guess. A
     coordinate is measured by its largest magnitude on the section of the guess, or by a thousandth
     of that of the largest coordinate where this is more.
 
-    ``guess`` (lanes, states): states of eq. 13 at tau = 0; ``period`` (lanes,) in mesh periods, 0
-    where there is no orbit to look for; ``steps_per_period``: resolved ones, of
-    this ``method``. Not converged is a
-    lane in which Newton's method does not close the orbit or leads out of the neighbourhood of the
+    ``guess`` (lanes, states): states of eq. 13 at tau = 0; ``period`` (lanes,) in excitation
+    periods, see `System.repeats_after`, 0 where there is no orbit to look for;
+    ``steps_per_period``: resolved ones a mesh period, of this ``method``. Not converged is a lane
+    in which Newton's method does not close the orbit or leads out of the neighbourhood of the
     guess, in which the orbit found repeats after a divisor of the period, or whose period is 0.
     """
     found = Orbits(
@@ -74,21 +74,23 @@ def polish(
     for n in np.unique(period[period > 0]).tolist():
         chosen = np.flatnonzero(period == n)
         # With a tangent, so that map and Jacobian are compiled once and agree bit for bit.
-        plan = Plan(steps_per_period, 0, n, section_points=n, tangent=True, method=method)
-        for whole, some in zip(found, _polish(system.of(chosen), guess[chosen], plan), strict=True):
-            whole[chosen] = some
+        whole = n * system.repeats_after
+        plan = Plan(steps_per_period, 0, whole, whole, tangent=True, method=method)
+        for all_lanes, some in zip(found, _polish(system.of(chosen), guess[chosen], plan), strict=True):
+            all_lanes[chosen] = some
     return found
 
 
 def orbit_exponent(
-    multipliers: NDArray[np.complex128], period: NDArray[np.int32], mesh_period: Floats
+    multipliers: NDArray[np.complex128], period: NDArray[np.int32], excitation_period: Floats
 ) -> Floats:
     """Return the largest Lyapunov exponent of `Orbits`, per unit of tau, shape (lanes,).
 
-    ``period`` (lanes,) in mesh periods, ``mesh_period`` (lanes,) in units of tau; not a number
-    where the multipliers are not.
+    ``period`` (lanes,) in excitation periods, ``excitation_period`` (lanes,) in units of tau; not a
+    number where the multipliers are not.
     """
-    exponent: Floats = np.log(np.abs(multipliers[:, 0])) / (np.maximum(period, 1) * mesh_period)
+    duration = np.maximum(period, 1) * excitation_period
+    exponent: Floats = np.log(np.abs(multipliers[:, 0])) / duration
     return exponent
 
 
@@ -96,7 +98,8 @@ def _polish(system: System, guess: Floats, plan: Plan) -> Orbits:
     """Polish lanes of one period."""
     lanes = np.arange(guess.shape[0])
     start, points = guess, guess.copy()
-    section = integrate(system, points, plan).section
+    repeats = system.repeats_after
+    section = integrate(system, points, plan).every(repeats).section
     scale = coordinate_scale(section)
     residual = _distance(section[:, -1], points, scale)
     searching = np.isfinite(residual)
@@ -111,7 +114,7 @@ def _polish(system: System, guess: Floats, plan: Plan) -> Orbits:
         )
         for share in _SHARES:
             trial = points[rest] + share * step[rest]
-            passed = integrate(system.of(rest), trial, plan).section
+            passed = integrate(system.of(rest), trial, plan).every(repeats).section
             distance = _distance(passed[:, -1], trial, scale[rest])
             # Half of what the tangent promises: beyond a fold the distance falls, but not to 0.
             better = distance < (1.0 - share / 2.0) * residual[rest]

@@ -6,7 +6,7 @@ import time
 from typing import Any
 
 import numpy as np
-from gearchaos_kernels import Outcome, Status, System, mesh_motion
+from gearchaos_kernels import Outcome, Plan, Status, System, mesh_motion
 from numpy.typing import NDArray
 from tqdm import tqdm
 
@@ -126,7 +126,7 @@ def compute_response(simulation: Simulation, periods: int, text: str) -> Result:
     arrays = {
         **simulation.arrays(lanes, start, outcome),
         MESH_PERIOD: system.mesh_period,
-        **_motion(system, outcome, plan.steps_per_period),
+        **_motion(system, outcome, plan),
     }
     variables = response_variables(
         simulation.lanes.axes,
@@ -157,9 +157,10 @@ def _check_size(simulation: Simulation, periods: int) -> None:
         )
 
 
-def _motion(system: System, outcome: Outcome, steps_per_period: int) -> dict[str, NDArray[Any]]:
+def _motion(system: System, outcome: Outcome, plan: Plan) -> dict[str, NDArray[Any]]:
     assert outcome.history is not None
-    found = mesh_motion(system, outcome.history, steps_per_period)
+    turned = plan.transient_periods + plan.recorded_periods - plan.history_periods
+    found = mesh_motion(system, outcome.history, plan.steps_per_period, turned)
     motion: dict[str, NDArray[Any]] = {
         name: outcome.history[..., column].copy() for column, name in enumerate(system.states)
     }

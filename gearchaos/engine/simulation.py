@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping
 from typing import Any
 
@@ -42,7 +43,7 @@ from gearchaos.interrupts import check
 from gearchaos.records.difference import difference
 from gearchaos.records.label import MEANINGS as MOTION_MEANINGS
 from gearchaos.records.label import MOST_POINTS
-from gearchaos.records.period import POINTS_NEEDED
+from gearchaos.records.period import POINTS_NEEDED, RETURNS
 from gearchaos.results.variables import Variable, step_choice_variables, sweep_variables
 
 Arrays = Mapping[str, NDArray[Any]]
@@ -79,15 +80,18 @@ class Simulation:
         self.lanes = Lanes(config)
         integration, outputs = config.integration, config.outputs
         steps, note = stable_steps(self.lanes, integration.steps_per_period)
+        repeats, lengths = self.lanes.repeats_after, self._whole_lengths()
         self.plan = plan_of(
             config,
             steps_per_period=steps,
+            **lengths,
             section_points=outputs.section_points if outputs.section else 0,
             tangent=outputs.lyapunov,
         )
         judged = outputs.lyapunov and integration.tolerance is None
         coarse = coarse_steps(self.lanes, steps) if judged else ""
-        self.notes = [note for note in (note, coarse, self._negative_stiffness()) if note]
+        longer = "" if repeats == 1 else self._longer(lengths)
+        self.notes = [text for text in (note, coarse, longer, self._negative_stiffness()) if text]
         self._choice: list[Variable] = []
 
     def choose_steps(self) -> None:
@@ -132,7 +136,7 @@ class Simulation:
         """The plan with all that is recorded: what is kept, and what the labels are read off."""
         checked = POINTS_NEEDED if self.config.integration.error_check > 0.0 else 0
         wanted = MOST_POINTS if self.config.outputs.motion else checked
-        enough = min(wanted, self.plan.recorded_periods)
+        enough = min(wanted * self.lanes.repeats_after, self.plan.recorded_periods)
         return self.plan._replace(section_points=max(self.plan.section_points, enough))
 
     @property
@@ -303,6 +307,26 @@ class Simulation:
         some = told and Told(told.labels.of(checked), told.state[checked])
         coarse = solution_of(system, outcome_of(outcome, checked), plan, kept, some)
         return check_arrays(lanes, checked, difference(coarse, fine))
+
+    def _whole_lengths(self) -> dict[str, int]:
+        """Transient and record in whole excitation periods, enough of them to tell a period."""
+        integration, repeats = self.config.integration, self.lanes.repeats_after
+        least = {"transient_periods": 0, "recorded_periods": 1 if repeats == 1 else RETURNS}
+        return {
+            name: repeats * max(math.ceil(getattr(integration, name) / repeats), count)
+            for name, count in least.items()
+        }
+
+    def _longer(self, lengths: Mapping[str, int]) -> str:
+        """Tell by how much the teeth make transient and record longer than they are configured."""
+        repeats = self.lanes.repeats_after
+        changed = [
+            f"integration.{name} raised from {asked} to {length}"
+            for name, length in lengths.items()
+            if length != (asked := getattr(self.config.integration, name))
+        ]
+        text = f"the pitch errors repeat after {repeats} mesh periods, the excitation period"
+        return f"{text}: {', '.join(changed)}, whole ones of it" if changed else text
 
     def _negative_stiffness(self) -> str:
         """Tell where the variation of the mesh stiffness exceeds its mean."""

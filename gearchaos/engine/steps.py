@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Sequence
 from typing import NamedTuple
 
@@ -23,7 +24,7 @@ from gearchaos.engine.lanes import Lanes
 from gearchaos.errors import ConfigurationError
 from gearchaos.interrupts import check
 from gearchaos.records.difference import Solution, bound, difference, motions_by_period
-from gearchaos.records.period import POINTS_NEEDED, motion_period
+from gearchaos.records.period import POINTS_NEEDED, RETURNS, motion_period
 
 LANES_AT_ONCE = 2**14
 """Lanes whose stability is looked at together."""
@@ -152,6 +153,7 @@ def solution_of(
     Compared is the section of the kept states, or of all where none is kept. Without labels the
     period is read off the section, and other motions are not told from each other.
     """
+    outcome = outcome.every(system.repeats_after)
     if told is None:
         period, state = motion_period(outcome.section), outcome.end_state
         motion = motions_by_period(period)
@@ -181,13 +183,16 @@ def pilot(
     check()
     common = integrate(system, lanes.start_of(numbers), settling).end_state
 
+    repeats = system.repeats_after
+    periods = repeats * max(RETURNS, math.ceil(PILOT_PERIODS / repeats))
+
     def solution(steps: int, resolved: bool, method: str) -> Solution:
         check()
         grid = plan._replace(
             steps_per_period=steps,
-            transient_periods=PILOT_PERIODS,
-            recorded_periods=PILOT_PERIODS,
-            section_points=min(POINTS_NEEDED, PILOT_PERIODS),
+            transient_periods=periods,
+            recorded_periods=periods,
+            section_points=min(POINTS_NEEDED * repeats, periods),
             resolved=resolved,
             method=method,
         )

@@ -189,13 +189,8 @@ class Outcome(NamedTuple):
     history: Floats | None
 
     def every(self, periods: int) -> Outcome:
-        """Return it with section and growth once every so many mesh periods, up to the end."""
-        section, growth = self.section[:, ::-periods][:, ::-1], self.growth
-        if growth is not None and periods > 1:
-            whole = growth.shape[1] // periods
-            growth = growth[:, growth.shape[1] - whole * periods :]
-            growth = growth.reshape(-1, whole, periods).sum(axis=2)
-        return self._replace(section=section, growth=growth)
+        """Return it with the section once every so many mesh periods, up to the end."""
+        return self._replace(section=self.section[:, ::-periods][:, ::-1])
 
 
 class MeshMotion(NamedTuple):

@@ -1,0 +1,76 @@
+"""How the tooth pairs in mesh share the mesh force: by the lengths of their contact lines.
+
+The contact line of a pair of helical gears grows over the smaller of both contact ratios, stays,
+and shrinks again, until the pair has been in mesh for their sum, in mesh periods; all of them
+together give the stiffness of Pan 2021, eqs 15-18.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from gearchaos_kernels.teeth import DEGREE
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+_SAMPLES = 64
+"""Places within a cell over which a share is averaged."""
+
+
+class ContactShares(NamedTuple):
+    """Mean shares (cells,) of a pair, so many cells a mesh period, from its entry (a phase) on."""
+
+    share: Floats
+    cells_per_period: int
+    entry: float
+
+
+def contact_shares(
+    transverse: float, overlap: float, smoothing: float, fundamental: complex = 0.0
+) -> ContactShares:
+    """Return the share of a tooth pair in the mesh force while it is in mesh.
+
+    Parameters
+    ----------
+    transverse, overlap : float
+        Contact ratios, eps_alpha > 0 and eps_beta >= 0.
+    smoothing : float
+        Mesh periods over which a pair takes load at least: shares jump otherwise in a spur pair.
+    fundamental : complex
+        cosine - i sine of the first harmonic of the mesh stiffness. The total length of the contact
+        lines has its phase; without one the first pair comes into mesh at phase 0.
+
+    Raises
+    ------
+    ValueError
+        If there are moments without any pair in mesh.
+    """
+    if transverse + overlap < 1.0:
+        raise ValueError(
+            f"the total contact ratio {transverse + overlap:.3g} is less than 1: at times no tooth "
+            "pair is in mesh"
+        )
+    per_period = max(1, round((DEGREE + 1) / smoothing))
+    cells = int(np.ceil((transverse + overlap) * per_period))
+    samples = (np.arange(_SAMPLES * per_period) + 0.5) / (_SAMPLES * per_period)
+    turns = np.arange(cells // per_period + 1)[:, np.newaxis]
+    lines = _contact_line(samples + turns, transverse, overlap)
+    shares = (lines / lines.sum(axis=0)).reshape(-1, _SAMPLES).mean(axis=1)[:cells]
+    # The phase of the total length, were it to begin at phase 0.
+    own = complex(np.mean(lines.sum(axis=0) * np.exp(-2j * np.pi * samples)))
+    turned = fundamental * own.conjugate()
+    ahead = -np.angle(turned) / (2.0 * np.pi) if abs(turned) > 1e-9 else 0.0
+    # A spline is half its width late.
+    entry = (ahead - DEGREE / (2.0 * per_period)) % 1.0
+    return ContactShares(shares, per_period, float(entry))
+
+
+def _contact_line(place: Floats, transverse: float, overlap: float) -> Floats:
+    """Length of the contact line of a pair, relative, so many mesh periods after its entry."""
+    if overlap == 0.0:
+        return np.where(place < transverse, 1.0, 0.0)
+    left = transverse + overlap - place
+    longest = min(transverse, overlap)
+    return np.clip(np.minimum(place, left), 0.0, longest)
