@@ -19,7 +19,7 @@ from gearchaos.engine.sharding import Shard
 from gearchaos.engine.simulation import Simulation
 from gearchaos.progress import notice
 from gearchaos.results.result_file import CACHE_BYTES
-from gearchaos.results.variables import START
+from gearchaos.results.variables import REPEATS
 
 SAMPLE_PERIODS = 1000
 """Mesh periods of a sample: over much fewer, labels cost more than their share."""
@@ -53,8 +53,10 @@ def describe(simulation: Simulation, output: str, shard: Shard | None, as_json: 
     spans = [
         f"{axis.values.size} values of {axis.name} from {axis.values[0]:g} to {axis.values[-1]:g}"
         for axis in lanes.axes
-        if axis.name != START
+        if axis.name not in REPEATS
     ]
+    if lanes.repeats > lanes.starts:
+        spans.append(f"{lanes.repeats // lanes.starts} drawn gear pairs each")
     if lanes.starts > 1:
         spans.append(f"{lanes.starts} starts each")
     unused = ", ".join(name for name in config.scene.effects if name not in lanes.effects)
@@ -93,17 +95,21 @@ def _seconds_per_lane(simulation: Simulation) -> float:
 
 def _thinned(simulation: Simulation, share: float, length: float) -> Configuration:
     """Return a sweep with this share of the lanes, and of the mesh periods."""
-    config, plan, starts = simulation.config, simulation.plan, simulation.lanes.starts
+    config, plan = simulation.config, simulation.plan
+    starts, repeats = simulation.lanes.starts, simulation.lanes.repeats
     # Of every axis that is one the same.
     share = min(1.0, share) ** (1.0 / max(1, sum(n > 1 for n in simulation.lanes.shape)))
     for table, sweep in config.sweeps.items():
         values = swept_values(sweep)
         # Neighbours behave alike, which a vector of lanes profits from.
-        run = min(values.size, -(-LANES // starts)) if table == "sweep" else 1
+        run = min(values.size, -(-LANES // repeats)) if table == "sweep" else 1
         runs = math.ceil(share * values.size / run)
         first = np.linspace(0, values.size - run, runs + 2)[1:-1].round().astype(int)
         some = values[np.unique(np.add.outer(first, np.arange(run)))].tolist()
         config = config.replace(table, {"parameter": sweep.parameter, "values": some})
+    if repeats > starts:
+        pairs = math.ceil(share * (repeats // starts))
+        config = config.replace("pitch_error.realisations", pairs)
     recorded = math.ceil(length * plan.recorded_periods)
     for key, value in {
         "start.count": math.ceil(share * starts),
