@@ -19,7 +19,7 @@ from gearchaos.engine.sharding import Shard
 from gearchaos.engine.simulation import Simulation
 from gearchaos.progress import notice
 from gearchaos.results.result_file import CACHE_BYTES
-from gearchaos.results.variables import REPEATS
+from gearchaos.results.variables import START
 
 SAMPLE_PERIODS = 1000
 """Mesh periods of a sample: over much fewer, labels cost more than their share."""
@@ -53,10 +53,8 @@ def describe(simulation: Simulation, output: str, shard: Shard | None, as_json: 
     spans = [
         f"{axis.values.size} values of {axis.name} from {axis.values[0]:g} to {axis.values[-1]:g}"
         for axis in lanes.axes
-        if axis.name not in REPEATS
+        if axis.name != START
     ]
-    if lanes.repeats > lanes.starts:
-        spans.append(f"{lanes.repeats // lanes.starts} drawn gear pairs each")
     if lanes.starts > 1:
         spans.append(f"{lanes.starts} starts each")
     unused = ", ".join(name for name in config.scene.effects if name not in lanes.effects)
@@ -108,8 +106,7 @@ def _thinned(simulation: Simulation, share: float, length: float) -> Configurati
         some = values[np.unique(np.add.outer(first, np.arange(run)))].tolist()
         config = config.replace(table, {"parameter": sweep.parameter, "values": some})
     if repeats > starts:
-        pairs = math.ceil(share * (repeats // starts))
-        config = config.replace("pitch_error.realisations", pairs)
+        config = config.replace("pitch_error.realisations", math.ceil(share * repeats / starts))
     recorded = math.ceil(length * plan.recorded_periods)
     for key, value in {
         "start.count": math.ceil(share * starts),

@@ -17,10 +17,11 @@ from bisect import bisect_left
 
 _MODULES_MM = (0.5, 2.0, 3.5, 6.0, 10.0, 16.0, 25.0, 40.0, 70.0)
 _DIAMETERS_MM = (5, 20, 50, 125, 280, 560, 1000, 1600, 2500, 4000, 6000, 8000, 10_000)
-"""Ends of the ranges of 1995; the upper one belongs to its range."""
-
-_LARGEST_DIAMETER_MM = {1995: _DIAMETERS_MM[-1], 2013: 15_000}
-_GRADES = {1995: 12, 2013: 11}
+_RANGES = {
+    1995: (range(1, 13), _MODULES_MM, _DIAMETERS_MM),
+    2013: (range(1, 12), (0.5, 70.0), (5, 15_000)),
+}
+"""Grades, and ends of the ranges of module and diameter, the upper one of which belongs to it."""
 
 
 def single_pitch_um(
@@ -28,64 +29,42 @@ def single_pitch_um(
 ) -> float:
     """Return the limit f_p of the amount of every single pitch deviation, in um.
 
-    Parameters
-    ----------
-    grade : int
-        1 to 12, or to 11 with the edition of 2013; that of 1995 knows a grade 0, too, which is not
-        offered.
-    normal_module_mm, reference_diameter_mm : float
-        In mm, from 0.5 to 70 and from 5 to 10000, or to 15000 with the edition of 2013.
-    edition : {1995, 2013}
-
-    Raises
-    ------
-    ValueError
-        If one of them is outside its range.
+    Grades go from 1 to 12, to 11 in the edition of 2013; the grade 0 of 1995 is not offered.
+    Modules go from 0.5 to 70 mm, diameters from 5 to 10000 mm, to 15000 mm in the edition of 2013.
+    Raises ValueError outside of that.
     """
-    module, diameter = _sizes(grade, normal_module_mm, reference_diameter_mm, edition)
-    if edition == 1995:
-        return _limit(0.3 * (module + 0.4 * math.sqrt(diameter)) + 4.0, grade)
-    return _limit(0.001 * diameter + 0.4 * module + 5.0, grade)
+    return _limits(grade, normal_module_mm, reference_diameter_mm, edition)[0]
 
 
 def cumulative_pitch_um(
     grade: float, normal_module_mm: float, reference_diameter_mm: float, edition: int = 1995
 ) -> float:
-    """Return the limit F_p of the range of the cumulative pitch deviations, in um.
-
-    Parameters and errors are those of `single_pitch_um`.
-    """
-    module, diameter = _sizes(grade, normal_module_mm, reference_diameter_mm, edition)
-    root = math.sqrt(diameter)
-    if edition == 1995:
-        return _limit(0.3 * module + 1.25 * root + 7.0, grade)
-    return _limit(0.002 * diameter + 0.55 * root + 0.7 * module + 12.0, grade)
+    """Return the limit F_p of the range of the cumulative ones, as `single_pitch_um` does."""
+    return _limits(grade, normal_module_mm, reference_diameter_mm, edition)[1]
 
 
-def _sizes(grade: float, module: float, diameter: float, edition: int) -> tuple[float, float]:
-    """Return the module and the diameter that the formulas take, in mm."""
-    if edition not in _GRADES:
+def _limits(grade: float, module: float, diameter: float, edition: int) -> list[float]:
+    if edition not in _RANGES:
         raise ValueError(f"edition {edition} of ISO 1328-1: must be 1995 or 2013")
-    standard = f"ISO 1328-1:{edition}"
-    if grade not in range(1, _GRADES[edition] + 1):
-        raise ValueError(f"grade {grade:g}: {standard} has grades 1 to {_GRADES[edition]}")
-    for value, name, least, most in (
-        (module, "normal module", _MODULES_MM[0], _MODULES_MM[-1]),
-        (diameter, "reference diameter", _DIAMETERS_MM[0], _LARGEST_DIAMETER_MM[edition]),
-    ):
-        if not least <= value <= most:
-            raise ValueError(f"{name} {value:.6g} mm: {standard} goes from {least:g} to {most:g}")
+    (grades, *ranges), sizes = _RANGES[edition], []
+    if grade not in grades:
+        raise ValueError(f"grade {grade:g}: ISO 1328-1:{edition} has grades 1 to {grades[-1]}")
+    names = ("normal module", "reference diameter")
+    for name, value, ends in zip(names, (module, diameter), ranges, strict=True):
+        if not ends[0] <= value <= ends[-1]:
+            within = f"{ends[0]:g} to {ends[-1]:g} mm"
+            raise ValueError(f"{name} {value:.6g} mm: ISO 1328-1:{edition} goes from {within}")
+        upper = bisect_left(ends, value, lo=1)
+        sizes.append(math.sqrt(ends[upper - 1] * ends[upper]) if edition == 1995 else value)
+    m, d = sizes
     if edition == 1995:
-        return _mean_of_range(module, _MODULES_MM), _mean_of_range(diameter, _DIAMETERS_MM)
-    return module, diameter
+        of_grade_5 = (0.3 * (m + 0.4 * math.sqrt(d)) + 4.0, 0.3 * m + 1.25 * math.sqrt(d) + 7.0)
+    else:
+        cumulative = 0.002 * d + 0.55 * math.sqrt(d) + 0.7 * m + 12.0
+        of_grade_5 = (0.001 * d + 0.4 * m + 5.0, cumulative)
+    return [_rounded(limit * math.pow(2.0, (grade - 5.0) / 2.0)) for limit in of_grade_5]
 
 
-def _mean_of_range(value: float, ends: tuple[float, ...]) -> float:
-    upper = bisect_left(ends, value, lo=1)
-    return math.sqrt(ends[upper - 1] * ends[upper])
-
-
-def _limit(of_grade_5: float, grade: float) -> float:
-    limit = of_grade_5 * math.pow(2.0, (grade - 5.0) / 2.0)
+def _rounded(limit: float) -> float:
     per_um = 10 if limit < 5.0 else 2 if limit <= 10.0 else 1
     return math.floor(limit * per_um + 0.5) / per_um

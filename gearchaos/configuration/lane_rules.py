@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from gearchaos.configuration.messages import Fault
-from gearchaos.configuration.pitch_error_rules import grade_faults, moves_drawn_gears
+from gearchaos.configuration.pitch_error_rules import OF_DRAWN_GEARS, grade_faults
 from gearchaos.configuration.run_tables import Sweep
 from gearchaos.configuration.sweep_values import SWEEPABLE_KEYS, FloatArray, groups_at
 from gearchaos.errors import ConfigurationError
@@ -45,8 +45,8 @@ def lane_faults(config: Configuration) -> Iterator[Fault]:
     yield from _out_of_range(groups)
     yield from _decoupled(config, groups)
     for axis, (table, sweep) in enumerate(reversed(sweeps.items())):
-        derives = not missing and sweep.parameter in SWEEPABLE_KEYS
-        derives = derives and not moves_drawn_gears(config, sweep.parameter)
+        drawn = sweep.parameter in OF_DRAWN_GEARS and "pitch_error" in config.scene.effects
+        derives = not missing and sweep.parameter in SWEEPABLE_KEYS and not drawn
         if derives and not _moved(config, groups, axis, sweep.size):
             yield _without_effect(config, table, some[sweep.parameter])
 

@@ -6,8 +6,8 @@ import os
 from collections.abc import Iterable
 from typing import TypeAlias
 
+from gearchaos.configuration.files import text_of_file
 from gearchaos.configuration.models import Configuration
-from gearchaos.configuration.text_files import text_of_file
 
 Given: TypeAlias = Configuration | str | os.PathLike[str]
 

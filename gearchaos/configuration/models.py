@@ -8,7 +8,7 @@ from typing import Any, Literal, Self
 
 from pydantic import PrivateAttr, TypeAdapter, ValidationError, ValidationInfo, model_validator
 
-from gearchaos.configuration.deviation_files import with_deviation_files
+from gearchaos.configuration.files import with_deviation_files
 from gearchaos.configuration.keys import Key, Table, key, keys_of
 from gearchaos.configuration.lane_rules import lane_faults
 from gearchaos.configuration.messages import MOST_SHOWN, Fault, fault_of, texts
@@ -175,8 +175,7 @@ class Configuration(Table):
         for parameter, value in values.items():
             if parameter == REALISATION:
                 number = int(value) if float(value).is_integer() else value
-                one = {"first_realisation": number, "realisations": 1}
-                tables["pitch_error"] = {**tables["pitch_error"], **one}
+                tables["pitch_error"] |= {"first_realisation": number, "realisations": 1}
                 continue
             path = f"groups.{parameter}" if parameter in SWEEPABLE_GROUPS else parameter
             tables = with_value(tables, path.split("."), float(value))
@@ -216,11 +215,9 @@ class Configuration(Table):
 @cache
 def configuration_keys() -> dict[str, Key]:
     """Every key of a configuration by its dotted path."""
-    keys: dict[str, Key] = {}
-    for one in keys_of(Configuration):
-        # Kinds of a table share keys; the first is that of the default.
-        keys.setdefault(one.path, one)
-    return keys
+    every = [(one.path, one) for one in keys_of(Configuration)]
+    # Of a key that several kinds of a table have, the first counts: that of the default.
+    return dict(every) | dict(reversed(every))
 
 
 def _broken_rules(config: Configuration, unreadable: Collection[str]) -> Iterator[Fault]:

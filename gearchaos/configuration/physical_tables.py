@@ -27,6 +27,9 @@ _SHAPE = '"fourier" takes the coefficients, "trapezoid" takes rise, top, fall, b
 _KIND = '"sine": at mesh frequency, "teeth": as measured, "grade": drawn by an accuracy grade'
 _optional = partial(key, default=None)
 _mean = partial(key, "mean of the pitch error", "um", 0.0, default=0.0)
+_smoothing = partial(
+    key, "share of the mesh period in which teeth take their load", "1", default=0.1, gt=0, le=1
+)
 _share = partial(key, units="1", example=0.25, default=None, ge=0, le=1)
 
 
@@ -125,63 +128,39 @@ class SineError(Table):
 class GearDeviations(Table):
     """Pitch deviations of one gear as they were measured: a list, or a column of a file."""
 
-    cumulative_um: Numbers | None = _optional(
-        "cumulative deviations, one for every tooth", "um", [0.0, 3.1, -1.4], min_length=1
-    )
-    single_um: Numbers | None = _optional(
-        "single deviations instead, from the tooth before to this one",
-        "um",
-        [-1.7, 3.1, -1.4],
-        min_length=1,
-    )
-    file: str | None = _optional(
-        "CSV file beside the configuration, a row for every tooth; read where no list is given",
-        example="gear.csv",
-    )
+    cumulative_um: Numbers | None = _optional("cumulative deviations of all teeth", "um")
+    single_um: Numbers | None = _optional("single deviations: each from the tooth before it", "um")
+    file: str | None = _optional("CSV file instead of a list, relative to the configuration")
     column: str | None = _optional("heading of the column to take", example="Fp")
-    holds: Literal["cumulative", "single"] = key(
-        "which deviations the column holds", default="cumulative"
-    )
+    holds: Literal["cumulative", "single"] = key("what the column holds", default="cumulative")
     counted: Literal["with_rotation", "against_rotation"] = key(
-        "in which direction the teeth are counted, and a deviation is positive",
-        default="with_rotation",
+        "direction in which teeth are counted and deviations positive", default="with_rotation"
     )
-    flank: Literal["right", "left"] | None = _optional(
-        "which flanks were measured, those that carry the load; for the record only"
-    )
+    flank: Literal["right", "left"] | None = _optional("flank that was measured, for the record")
 
 
-class _ToothErrors(Table):
-    mean_um: float = _mean()
-    smoothing: float = key(
-        "share of the mesh period in which a pair of teeth takes over its load",
-        "1",
-        default=0.1,
-        gt=0,
-        le=1,
-    )
-
-
-class TeethError(_ToothErrors):
+class TeethError(Table):
     """The pitch deviations of either gear or both, tooth by tooth."""
 
     kind: Literal["teeth"] = key(_KIND)
+    mean_um: float = _mean()
+    smoothing: float = _smoothing()
     driving: GearDeviations | None = _optional("deviations of the driving gear")
     driven: GearDeviations | None = _optional("deviations of the driven gear")
 
 
-class GradeError(_ToothErrors):
+class GradeError(Table):
     """Pitch deviations of gears drawn at random that just pass an accuracy grade of ISO 1328-1."""
 
     kind: Literal["grade"] = key(_KIND)
+    mean_um: float = _mean()
+    smoothing: float = _smoothing()
     grade: float = key("accuracy grade, a whole number", "1", 7, ge=1, le=12, multiple_of=1)
     edition: Literal[1995, 2013] = key("edition of ISO 1328-1", default=1995)
     seed: int = key("seed of the drawn gears", default=0, ge=0, le=2**32 - 1)
     realisations: int = key("number of drawn gear pairs", default=1, ge=1, le=1_000_000)
     first_realisation: int = key("number of the first of them", default=0, ge=0, le=2**32 - 1)
-    eccentricity: float = key(
-        "share of an eccentricity in the cumulative deviations", "1", default=0.5, ge=0, le=1
-    )
+    eccentricity: float = key("share of an eccentricity", "1", default=0.5, ge=0, le=1)
 
 
 def _kind_of_all_files_before(given: Any) -> Any:

@@ -10,7 +10,6 @@ from gearchaos_kernels import System
 from numpy.typing import NDArray
 
 from gearchaos.configuration import Configuration, axis_values, swept_values
-from gearchaos.configuration.physical_tables import GradeError
 from gearchaos.configuration.run_tables import states_of
 from gearchaos.configuration.sweep_values import SWEEPABLE_GROUPS, SWEEPABLE_KEYS, groups_at
 from gearchaos.dynamics.systems import system_of
@@ -18,13 +17,7 @@ from gearchaos.engine.starts import start_states
 from gearchaos.gear.group_table import GROUP_TABLE
 from gearchaos.gear.tooth_deviations import REALISATION
 from gearchaos.results.result_file import Parameter
-from gearchaos.results.variables import (
-    HARMONIC,
-    Axis,
-    axis_name,
-    realisation_axis,
-    start_axis,
-)
+from gearchaos.results.variables import HARMONIC, Axis, axis_name, pair_axis, start_axis
 
 Floats = NDArray[np.float64]
 Numbers = NDArray[np.intp]
@@ -60,9 +53,10 @@ class Lanes:
         self.axes = [axis_of(parameter, values) for parameter, values in self._values.items()]
         # What the system of a lane depends on, in the order of the axes.
         self._of_systems: dict[str, NDArray[Any]] = dict(self._values)
-        numbers = drawn_pairs(config)
+        first = getattr(config.pitch_error, "first_realisation", 0)
+        numbers = first + np.arange(getattr(config.pitch_error, "realisations", 1))
         if numbers.size > 1:
-            self.axes.append(realisation_axis(numbers))
+            self.axes.append(pair_axis(numbers))
             self._of_systems[REALISATION] = numbers
         self.starts = config.start.count
         self.repeats = numbers.size * self.starts
@@ -129,14 +123,6 @@ class Lanes:
                 value, origin, row.units, row.long_name, row.mathtext, dims
             )
         return parameters
-
-
-def drawn_pairs(config: Configuration) -> Numbers:
-    """Return the numbers of the gear pairs that are drawn, shape (pairs,); 0 alone without any."""
-    error = config.pitch_error
-    if not isinstance(error, GradeError):
-        return np.zeros(1, dtype=np.intp)
-    return error.first_realisation + np.arange(error.realisations)
 
 
 def axis_of(parameter: str, values: Floats) -> Axis:

@@ -15,14 +15,8 @@ from gearchaos.figures.labels import form_in_words
 from gearchaos.figures.lanes import swept_axes
 from gearchaos.figures.style import LEGEND, SMALL_FONT_PT
 from gearchaos.results.result import Result
-from gearchaos.results.stage_table import (
-    LabelledLanes,
-    Stage,
-    labelled_lanes,
-    one_axis,
-    stage_table,
-)
-from gearchaos.results.variables import LABELS
+from gearchaos.results.stage_table import LabelledLanes, Stage, labelled_lanes, stage_table
+from gearchaos.results.variables import LABELS, REPEATS
 
 # Blues that darken with the period, but for period 3, the window in chaos that is looked for. Those
 # without hatching differ in lightness, and all are light enough for black points to stand out.
@@ -155,7 +149,8 @@ def _kind(stage: Stage, lanes: LabelledLanes) -> str:
 
 def _of_all_repeats(result: Result) -> LabelledLanes:
     """Take the labels of all pairs and starts; where they differ, the motion has no period."""
-    lanes = labelled_lanes(one_axis(result))
+    first = {axis: result[axis][0] for axis in REPEATS if axis in result.axes}
+    lanes = labelled_lanes(result.sel(**first))
     every = [result[name].reshape(lanes.values.size, -1) for name in LABELS]
     differ = np.any([labels != labels[:, :1] for labels in every], axis=(0, 2))
     labels = np.where(differ, "several motions", lanes.labels)

@@ -9,6 +9,9 @@ import numpy.typing as npt
 
 FloatArray: TypeAlias = npt.NDArray[np.float64]
 
+_TINY = 1e-300
+"""Keeps the deviations of a single tooth, which are zero, from being divided by zero."""
+
 
 def drawn_gears(
     numbers: npt.ArrayLike,
@@ -21,23 +24,19 @@ def drawn_gears(
 ) -> FloatArray:
     """Draw cumulative pitch deviations, shape (realisations, teeth), in um, 0 on tooth 0.
 
-    The single deviations are independent and normal, made to sum to zero; an eccentricity of random
-    phase is added. All is scaled until the largest single deviation or the range of the cumulative
-    ones is at its limit: the worst gear of its kind that still passes. A gear depends on seed, gear
-    and its number alone, and not on the machine.
+    The single deviations are independent and normal, made to sum to zero, and an eccentricity of
+    random phase is added. All is scaled until the largest single deviation or the range of the
+    cumulative ones is at its limit: the worst gear of its form that still passes.
 
     Parameters
     ----------
-    numbers : array_like of int, shape (realisations,)
-        Which ones of all that could be drawn.
-    seed : int
-    gear : int
-        0 for the driving gear, 1 for the driven one, which is drawn independently.
+    numbers, seed, gear : array_like of int, shape (realisations,), and int
+        A gear depends on its number, the seed and whether it drives (0) or is driven (1) alone, and
+        not on the machine.
     teeth : int
-    single_um, cumulative_um : array_like, shape (realisations,) or ()
-        Limits of the single deviations' amount and of the cumulative ones' range, in um.
-    eccentricity : array_like, shape (realisations,) or ()
-        Its share of the range, from 0 to 1.
+    single_um, cumulative_um, eccentricity : array_like, shape (realisations,) or ()
+        Limits of the single deviations' amount and of the cumulative ones' range, in um; share of
+        the eccentricity in the range, from 0 to 1.
     """
     numbers, single, range_, share = (
         np.asarray(value)[..., np.newaxis]
@@ -49,12 +48,13 @@ def drawn_gears(
     around = np.cos(2.0 * np.pi * (phase + np.arange(teeth) / teeth))
     random = np.cumsum(_exact(normal), axis=1)
     random -= random[:, -1:] * (np.arange(1, teeth + 1) / teeth)
-    form = (1.0 - share) * random / _not_zero(np.ptp(random, axis=1, keepdims=True))
+    form = (1.0 - share) * random / (np.ptp(random, axis=1, keepdims=True) + _TINY)
     form += share * _exact(around) / 2.0
     steps = np.abs(form - np.roll(form, 1, axis=1)).max(axis=1, keepdims=True)
     spread = np.ptp(form, axis=1, keepdims=True)
-    scale = np.minimum(single / _not_zero(steps), range_ / _not_zero(spread))
-    return np.round(scale * (form - form[:, :1]), 6)
+    scale = np.minimum(single / (steps + _TINY), range_ / (spread + _TINY))
+    drawn: FloatArray = np.round(scale * (form - form[:, :1]), 6)
+    return drawn
 
 
 def _uniform(seed: int, gear: int, number: int, count: int) -> FloatArray:
@@ -66,8 +66,3 @@ def _uniform(seed: int, gear: int, number: int, count: int) -> FloatArray:
 def _exact(values: FloatArray) -> FloatArray:
     """Round where machines may differ, to a grid on which sums are exact in any order."""
     return np.rint(values * 2.0**20) / 2.0**20
-
-
-def _not_zero(values: FloatArray) -> FloatArray:
-    # Of a single tooth every deviation is zero.
-    return np.maximum(values, 1e-300)

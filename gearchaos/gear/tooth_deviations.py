@@ -36,24 +36,15 @@ def tooth_deviations(
 ) -> Deviations | None:
     """Return the deviations of some lanes, None where the pitch error is a sine.
 
-    Parameters
-    ----------
-    error, pair : table
-        ``[pitch_error]`` and ``[pair]`` of a configuration.
-    values : mapping of str to array_like
-        Values of swept parameters in every lane, which broadcast against each other, and the
-        numbers of drawn gear pairs as `REALISATION`. Only profiles that occur are made.
-
-    Raises
-    ------
-    ValueError
-        If a grade, module or diameter is outside the ranges of ISO 1328-1.
+    ``error``, ``pair``: the tables ``[pitch_error]`` and ``[pair]`` of a configuration; ``values``:
+    those of swept parameters in every lane, which broadcast against each other, and the numbers of
+    drawn gear pairs as `REALISATION`. Only profiles that occur are made. Raises ValueError if a
+    grade, module or diameter is outside the ranges of ISO 1328-1.
     """
-    kind = getattr(error, "kind", "sine")
-    if kind == "sine":
+    if error is None or error.kind == "sine":
         return None
     lanes = np.broadcast_shapes(*map(np.shape, values.values()))
-    if kind == "teeth":
+    if error.kind == "teeth":
         driving, driven = listed_deviations(error.driving), listed_deviations(error.driven)
         return Deviations(driving, driven, np.zeros(lanes, dtype=np.intp))
     own = {
@@ -72,19 +63,17 @@ def tooth_deviations(
 def _drawn(error: Any, gear: int, teeth: int, rows: FloatArray) -> FloatArray:
     numbers, grades, shares, modules, helix_angles = rows.T
     diameters = teeth * modules / np.cos(np.radians(helix_angles))
-    single, cumulative = (
-        [limit(*sizes, error.edition) for sizes in zip(grades, modules, diameters, strict=True)]
-        for limit in (single_pitch_um, cumulative_pitch_um)
-    )
+    sizes = list(zip(grades, modules, diameters, strict=True))
+    single = [single_pitch_um(*one, error.edition) for one in sizes]
+    cumulative = [cumulative_pitch_um(*one, error.edition) for one in sizes]
     return drawn_gears(numbers, error.seed, gear, teeth, single, cumulative, shares)
 
 
 def listed_deviations(gear: Any) -> FloatArray:
     """Return the deviations of a gear from its table in ``[pitch_error]``, shape (1, teeth), in um.
 
-    They are listed as they were counted. By ISO 1328-1 a deviation is positive where the flank lies
-    farther on in the direction of counting; when the gear turns in that direction, a tooth with a
-    lower number follows into mesh.
+    By ISO 1328-1 a deviation is positive where the flank lies farther on in the direction of
+    counting; when the gear turns that way, a tooth with a lower number follows into mesh.
     """
     if gear is None:
         return np.zeros((1, 1))
@@ -99,8 +88,8 @@ def counted_deviations(
 ) -> FloatArray:
     """Return cumulative deviations (teeth,) relative to tooth 0, as they were counted.
 
-    They come from cumulative ones or from single ones. The single one of tooth k is that of the
-    pitch from tooth k - 1 to it; what is left of their sum is spread evenly over all teeth.
+    The single one of tooth k is that of the pitch from tooth k - 1 to it; what is left of their
+    sum is spread evenly over all teeth.
     """
     given = single if cumulative is None else cumulative
     deviations: FloatArray = np.array(given, dtype=np.float64)

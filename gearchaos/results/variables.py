@@ -105,7 +105,7 @@ def start_axis(count: int) -> Axis:
     return Axis(START, "1", text, "", np.arange(count))
 
 
-def realisation_axis(numbers: NDArray[Any]) -> Axis:
+def pair_axis(numbers: NDArray[Any]) -> Axis:
     """Give the axis of several drawn gear pairs, of these numbers."""
     return Axis(REALISATION, "1", "drawn gear pair", "", numbers)
 
