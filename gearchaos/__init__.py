@@ -23,6 +23,7 @@ if (
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from gearchaos import iso1328
     from gearchaos.configuration import Configuration, load_config
     from gearchaos.engine.response import respond
     from gearchaos.engine.running import run
@@ -39,6 +40,7 @@ __all__ = [
     "GearchaosError",
     "Result",
     "System",
+    "iso1328",
     "load_config",
     "open_result",
     "respond",
@@ -53,6 +55,7 @@ _HOMES = {
     "engine.response": ("respond",),
     "engine.running": ("run",),
     "errors": ("ConfigurationError", "FigureError", "FileError", "GearchaosError"),
+    "iso1328": ("iso1328",),
     "results.result": ("Result", "open_result"),
     "system": ("System",),
     "version": ("software_version",),
@@ -64,7 +67,8 @@ def __getattr__(name: str) -> Any:
         if name in names:
             from importlib import import_module
 
-            return getattr(import_module(f"gearchaos.{home}"), name)
+            module = import_module(f"gearchaos.{home}")
+            return module if name == home else getattr(module, name)
     raise AttributeError(f"module 'gearchaos' has no attribute {name!r}")
 
 

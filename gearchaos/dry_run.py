@@ -93,17 +93,20 @@ def _seconds_per_lane(simulation: Simulation) -> float:
 
 def _thinned(simulation: Simulation, share: float, length: float) -> Configuration:
     """Return a sweep with this share of the lanes, and of the mesh periods."""
-    config, plan, starts = simulation.config, simulation.plan, simulation.lanes.starts
+    config, plan = simulation.config, simulation.plan
+    starts, repeats = simulation.lanes.starts, simulation.lanes.repeats
     # Of every axis that is one the same.
     share = min(1.0, share) ** (1.0 / max(1, sum(n > 1 for n in simulation.lanes.shape)))
     for table, sweep in config.sweeps.items():
         values = swept_values(sweep)
         # Neighbours behave alike, which a vector of lanes profits from.
-        run = min(values.size, -(-LANES // starts)) if table == "sweep" else 1
+        run = min(values.size, -(-LANES // repeats)) if table == "sweep" else 1
         runs = math.ceil(share * values.size / run)
         first = np.linspace(0, values.size - run, runs + 2)[1:-1].round().astype(int)
         some = values[np.unique(np.add.outer(first, np.arange(run)))].tolist()
         config = config.replace(table, {"parameter": sweep.parameter, "values": some})
+    if repeats > starts:
+        config = config.replace("pitch_error.realisations", math.ceil(share * repeats / starts))
     recorded = math.ceil(length * plan.recorded_periods)
     for key, value in {
         "start.count": math.ceil(share * starts),

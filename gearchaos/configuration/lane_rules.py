@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from gearchaos.configuration.messages import Fault
+from gearchaos.configuration.pitch_error_rules import OF_DRAWN_GEARS, grade_faults
 from gearchaos.configuration.run_tables import Sweep
 from gearchaos.configuration.sweep_values import SWEEPABLE_KEYS, FloatArray, groups_at
 from gearchaos.errors import ConfigurationError
@@ -39,11 +40,13 @@ def lane_faults(config: Configuration) -> Iterator[Fault]:
         yield Fault("groups", f"cannot be derived from the physical tables ({error})", remedy)
         return
     missing = groups.missing(config.scene.effects)
+    yield from grade_faults(config, by_parameter)
     yield from (_missing(config, row) for row in missing)
     yield from _out_of_range(groups)
     yield from _decoupled(config, groups)
     for axis, (table, sweep) in enumerate(reversed(sweeps.items())):
-        derives = not missing and sweep.parameter in SWEEPABLE_KEYS
+        drawn = sweep.parameter in OF_DRAWN_GEARS and "pitch_error" in config.scene.effects
+        derives = not missing and sweep.parameter in SWEEPABLE_KEYS and not drawn
         if derives and not _moved(config, groups, axis, sweep.size):
             yield _without_effect(config, table, some[sweep.parameter])
 

@@ -24,6 +24,7 @@ _RULES = {
     "greater_than_equal": "must be at least {ge:.12g}",
     "less_than": "must be less than {lt:.12g}",
     "less_than_equal": "must be at most {le:.12g}",
+    "multiple_of": "must be a whole number",
     "too_short": "needs at least {min_length} value(s)",
     "too_long": "takes at most {max_length} value(s)",
     "literal_error": "must be one of {expected}",
@@ -50,7 +51,11 @@ _FOUND = {
     **dict.fromkeys((datetime.date, datetime.datetime, datetime.time), "a date or time"),
 }
 
-_NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?")
+NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?")
+
+
+_TAGS = ("kind", "shape")
+"""Keys by which the kinds of a table are told apart."""
 
 
 class Fault(NamedTuple):
@@ -113,15 +118,21 @@ def fault_of(error: ErrorDetails, tables: Mapping[str, Any], keys: Mapping[str, 
     kind, value, rule = error["type"], error["input"], _rule(error)
     names = _names(error["loc"], tables)
     if kind.startswith("union_tag"):
-        names.append("shape")
-        value = value.get("shape")
+        names.append(error["ctx"]["discriminator"].strip("'"))
+        value = value.get(names[-1])
     path = ".".join(name for name in names if isinstance(name, str))
     remedy = keys[path].remedy if path in keys else ""
     if kind == "extra_forbidden":
-        remedy = _elsewhere(str(names[-1]), ".".join(map(str, names[:-1])), keys)
+        table = ".".join(map(str, names[:-1]))
+        remedy = _elsewhere(str(names[-1]), table, keys)
+        if path in keys:
+            # Tables of another kind have this key; pydantic names the kind before it.
+            tag = next(name for name in _TAGS if f"{table}.{name}" in keys)
+            rule = f'has no meaning with {tag} = "{error["loc"][-2]}"'
+            remedy = f"drop it, or choose another {table}.{tag}"
     elif isinstance(value, str) and kind in ("literal_error", "union_tag_invalid"):
         remedy = suggestion(value, re.findall(r"'([^']*)'", rule)) or remedy
-    elif isinstance(value, str) and kind == "float_type" and _NUMBER.fullmatch(value.strip()):
+    elif isinstance(value, str) and kind == "float_type" and NUMBER.fullmatch(value.strip()):
         remedy = f"write it without the quotes: {value.strip()}"
     if kind == "missing" or error["loc"][-1] == "[key]":
         value = None
@@ -145,6 +156,9 @@ def _names(location: Sequence[int | str], tables: Mapping[str, Any]) -> list[int
     names: list[int | str] = []
     node: Any = tables
     for position, name in enumerate(location):
+        tags = [node.get(tag) for tag in _TAGS] if isinstance(node, Mapping) else []
+        if name in tags and position < len(location) - 1:
+            continue
         known = range(len(node)) if isinstance(node, (list, tuple)) else node
         if isinstance(known, (Mapping, range)) and name in known:
             node = node[name]

@@ -8,6 +8,7 @@ from typing import Any, Literal, Self
 
 from pydantic import PrivateAttr, TypeAdapter, ValidationError, ValidationInfo, model_validator
 
+from gearchaos.configuration.files import with_deviation_files
 from gearchaos.configuration.keys import Key, Table, key, keys_of
 from gearchaos.configuration.lane_rules import lane_faults
 from gearchaos.configuration.messages import MOST_SHOWN, Fault, fault_of, texts
@@ -15,6 +16,7 @@ from gearchaos.configuration.physical_tables import (
     PHYSICAL_KEYS,
     PHYSICAL_TABLES,
     Bearings,
+    GradeError,
     Mesh,
     Operation,
     Pair,
@@ -40,6 +42,7 @@ from gearchaos.configuration.toml_text import (
     with_value,
 )
 from gearchaos.errors import ConfigurationError
+from gearchaos.gear.tooth_deviations import REALISATION
 
 
 class Configuration(Table):
@@ -57,7 +60,7 @@ class Configuration(Table):
     pair: Pair | None = key("catalogue data of the two gears", default=None)
     operation: Operation | None = key("the point of operation", default=None)
     mesh: Mesh | None = key("stiffness, damping and clearance of the mesh", default=None)
-    pitch_error: PitchError | None = key("one pitch error e(t)", default=None)
+    pitch_error: PitchError | None = key("the pitch error", default=None)
     bearings: Bearings | None = key("the bearings", default=None)
     groups: GivenGroups = key("dimensionless groups given directly", default=GivenGroups())
     scene: Scene = key("which effects exist")
@@ -68,6 +71,9 @@ class Configuration(Table):
     )
     integration: Integration = key("the fixed grid of the integration", default=Integration())
     outputs: Outputs = key("what is kept of every lane", default=Outputs())
+    files: dict[str, str] | None = key(
+        "files that are named above, word for word, as a result keeps them", default=None
+    )
 
     _source: str = PrivateAttr(default="<python>")
     _text: str | None = PrivateAttr(default=None)
@@ -79,7 +85,10 @@ class Configuration(Table):
 
     @property
     def text(self) -> str:
-        """The TOML text verbatim, before overrides; `resolved_toml` where there was none."""
+        """The TOML text verbatim, before overrides; `resolved_toml` where there was none.
+
+        Files that it names are appended as ``[files]``, so that it stands alone.
+        """
         return self.resolved_toml() if self._text is None else self._text
 
     @property
@@ -111,15 +120,20 @@ class Configuration(Table):
         """
         tables = with_overrides(tables_from_toml(text, source), overrides, source)
         config = cls.from_tables(tables, source)
-        config._text = text
+        appended = config.files is not None and "files" not in tables
+        config._text = text + (toml_text({"files": config.files}) if appended else "")
         return config
 
     @classmethod
     def from_tables(cls, tables: Mapping[str, Any], source: str = "<python>") -> Configuration:
         """Make a configuration from nested mappings with the keys of the TOML file.
 
-        Raises ConfigurationError with one message per fault, all faults at once.
+        Raises ConfigurationError with one message per fault, all faults at once, and FileError if a
+        file that they name cannot be read.
         """
+        tables, faults = with_deviation_files(tables, source)
+        if faults:
+            raise ConfigurationError(texts(faults, source))
         try:
             config = cls.model_validate(dict(tables), context={"source": source})
         except ValidationError as error:
@@ -149,13 +163,20 @@ class Configuration(Table):
         """Return a copy in which parameters, by name, are fixed at values in their units.
 
         Where [sweep] swept one, that becomes a sweep of this one value; where [second_sweep] did,
-        that goes. Raises ConfigurationError if a parameter cannot be swept, or if a rule is broken.
+        that goes. ``realisation`` is the number of a drawn gear pair, then the only one. Raises
+        ConfigurationError if a parameter cannot be swept, or if a rule is broken.
         """
-        unknown = [fault for name in values for fault in unknown_parameter("parameter", name)]
+        drawn = isinstance(self.pitch_error, GradeError)
+        names = [name for name in values if not (drawn and name == REALISATION)]
+        unknown = [fault for name in names for fault in unknown_parameter("parameter", name)]
         if unknown:
             raise ConfigurationError(texts(unknown, self.source))
         tables = self.tables()
         for parameter, value in values.items():
+            if parameter == REALISATION:
+                number = int(value) if float(value).is_integer() else value
+                tables["pitch_error"] |= {"first_realisation": number, "realisations": 1}
+                continue
             path = f"groups.{parameter}" if parameter in SWEEPABLE_GROUPS else parameter
             tables = with_value(tables, path.split("."), float(value))
             if parameter == self.sweep.parameter:
@@ -194,7 +215,9 @@ class Configuration(Table):
 @cache
 def configuration_keys() -> dict[str, Key]:
     """Every key of a configuration by its dotted path."""
-    return {key.path: key for key in keys_of(Configuration)}
+    every = [(one.path, one) for one in keys_of(Configuration)]
+    # Of a key that several kinds of a table have, the first counts: that of the default.
+    return dict(every) | dict(reversed(every))
 
 
 def _broken_rules(config: Configuration, unreadable: Collection[str]) -> Iterator[Fault]:

@@ -6,13 +6,14 @@
 from __future__ import annotations
 
 from functools import partial
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal, TypeAlias
 
-from pydantic import Field
+from pydantic import BeforeValidator, Field
 
 from gearchaos.configuration.keys import (
     Harmonics,
     NotNegativePair,
+    Numbers,
     PositivePair,
     Table,
     TeethPair,
@@ -23,7 +24,12 @@ from gearchaos.gear.geometry import STEEL_DENSITY
 from gearchaos.gear.mesh_stiffness import DEFAULT_HARMONICS
 
 _SHAPE = '"fourier" takes the coefficients, "trapezoid" takes rise, top, fall, bottom, half_height'
+_KIND = '"sine": at mesh frequency, "teeth": as measured, "grade": drawn by an accuracy grade'
 _optional = partial(key, default=None)
+_mean = partial(key, "mean of the pitch error", "um", 0.0, default=0.0)
+_smoothing = partial(
+    key, "share of the mesh period in which teeth take their load", "1", default=0.1, gt=0, le=1
+)
 _share = partial(key, units="1", example=0.25, default=None, ge=0, le=1)
 
 
@@ -110,12 +116,63 @@ class Mesh(Table):
     ) = _optional("variation of the mesh stiffness over the mesh period")
 
 
-class PitchError(Table):
+class SineError(Table):
     """One pitch error e(t), a sine at mesh frequency (Pan 2021, eq. 14)."""
 
+    kind: Literal["sine"] = key(_KIND, default="sine")
     amplitude_um: float | None = _optional("amplitude of the pitch error", "um", 11.0)
-    mean_um: float = key("mean of the pitch error", "um", 0.0, default=0.0)
+    mean_um: float = _mean()
     phase_deg: float = key("phase of the pitch error", "degree", 0.0, default=0.0)
+
+
+class GearDeviations(Table):
+    """Pitch deviations of one gear as they were measured: a list, or a column of a file."""
+
+    cumulative_um: Numbers | None = _optional("cumulative deviations of all teeth", "um")
+    single_um: Numbers | None = _optional("single deviations: each from the tooth before it", "um")
+    file: str | None = _optional("CSV file instead of a list, relative to the configuration")
+    column: str | None = _optional("heading of the column to take", example="Fp")
+    holds: Literal["cumulative", "single"] = key("what the column holds", default="cumulative")
+    counted: Literal["with_rotation", "against_rotation"] = key(
+        "direction in which teeth are counted and deviations positive", default="with_rotation"
+    )
+    flank: Literal["right", "left"] | None = _optional("flank that was measured, for the record")
+
+
+class TeethError(Table):
+    """The pitch deviations of either gear or both, tooth by tooth."""
+
+    kind: Literal["teeth"] = key(_KIND)
+    mean_um: float = _mean()
+    smoothing: float = _smoothing()
+    driving: GearDeviations | None = _optional("deviations of the driving gear")
+    driven: GearDeviations | None = _optional("deviations of the driven gear")
+
+
+class GradeError(Table):
+    """Pitch deviations of gears drawn at random that just pass an accuracy grade of ISO 1328-1."""
+
+    kind: Literal["grade"] = key(_KIND)
+    mean_um: float = _mean()
+    smoothing: float = _smoothing()
+    grade: float = key("accuracy grade, a whole number", "1", 7, ge=1, le=12, multiple_of=1)
+    edition: Literal[1995, 2013] = key("edition of ISO 1328-1", default=1995)
+    seed: int = key("seed of the drawn gears", default=0, ge=0, le=2**32 - 1)
+    realisations: int = key("number of drawn gear pairs", default=1, ge=1, le=1_000_000)
+    first_realisation: int = key("number of the first of them", default=0, ge=0, le=2**32 - 1)
+    eccentricity: float = key("share of an eccentricity", "1", default=0.5, ge=0, le=1)
+
+
+def _kind_of_all_files_before(given: Any) -> Any:
+    return {"kind": "sine", **given} if isinstance(given, dict) else given
+
+
+PitchError: TypeAlias = Annotated[
+    SineError | TeethError | GradeError,
+    Field(discriminator="kind"),
+    BeforeValidator(_kind_of_all_files_before),
+]
+"""``[pitch_error]``; without a kind it is a sine."""
 
 
 class Bearings(Table):
@@ -135,18 +192,19 @@ class Bearings(Table):
     )
 
 
-PHYSICAL_TABLES: dict[str, type[Table]] = {
-    "pair": Pair,
-    "operation": Operation,
-    "mesh": Mesh,
-    "pitch_error": PitchError,
-    "bearings": Bearings,
+PHYSICAL_TABLES: dict[str, tuple[type[Table], ...]] = {
+    "pair": (Pair,),
+    "operation": (Operation,),
+    "mesh": (Mesh,),
+    "pitch_error": (SineError, TeethError, GradeError),
+    "bearings": (Bearings,),
 }
-"""The physical tables by name."""
+"""The physical tables by name: the kinds of each."""
 
 PHYSICAL_KEYS = {
     key.path: key
-    for name, table in PHYSICAL_TABLES.items()
+    for name, tables in PHYSICAL_TABLES.items()
+    for table in tables
     for key in keys_of(table, name)
     if not key.tables
 }

@@ -121,9 +121,10 @@ def _swept_effect_is_kept(config: Configuration) -> Iterator[Fault]:
             yield Fault(f"{table}.parameter", rule, remedy, row.name)
 
 
-@reads("start")
+@reads("start", "pitch_error")
 def _lanes_are_not_too_many(config: Configuration) -> Iterator[Fault]:
     counts = {f"values of [{table}]": sweep.size for table, sweep in config.sweeps.items()}
+    counts["drawn gear pairs"] = getattr(config.pitch_error, "realisations", 1)
     counts["starts"] = config.start.count
     lanes = math.prod(counts.values())
     if lanes > MOST_LANES:

@@ -12,14 +12,20 @@ from gearchaos.configuration.physical_tables import PHYSICAL_KEYS
 from gearchaos.configuration.run_tables import Sweep
 from gearchaos.gear.group_table import GROUPS_BY_NAME
 from gearchaos.gear.groups import Groups, resolve_groups
+from gearchaos.gear.tooth_deviations import REALISATION
 
 if TYPE_CHECKING:
     from gearchaos.configuration.models import Configuration
 
 FloatArray: TypeAlias = npt.NDArray[np.float64]
 
+SMOOTHING = "pitch_error.smoothing"
+"""A single number that all lanes share, with the weights with which pairs of teeth carry."""
+
 SWEEPABLE_KEYS = {
-    path: key for path, key in PHYSICAL_KEYS.items() if key.is_number and path.count(".") == 1
+    path: key
+    for path, key in PHYSICAL_KEYS.items()
+    if key.is_number and path.count(".") == 1 and path != SMOOTHING
 }
 """Physical keys that a sweep may vary, by path: the single numbers of the physical tables."""
 
@@ -52,9 +58,10 @@ def groups_at(config: Configuration, values: Mapping[str, npt.ArrayLike]) -> Gro
 
     ``values``, by parameter and in its unit, are arrays that broadcast against each other. A group
     replaces the one in the file; a physical quantity takes part in the derivation of every group
-    that is not given. Each group comes in the broadcast shape of the values on which it depends,
-    as a float where on none. Raises ConfigurationError if the harmonics of the mesh stiffness would
-    differ between lanes, KeyError if a parameter cannot be swept.
+    that is not given; no group depends on the number of a drawn gear pair. Each group comes in the
+    broadcast shape of the values on which it depends, as a float where on none. Raises
+    ConfigurationError if the harmonics of the mesh stiffness would differ between lanes, KeyError
+    if a parameter cannot be swept.
     """
     physical: dict[str, Any] = config.physical()
     given: dict[str, Any] = dict(config.groups.given())
@@ -64,6 +71,6 @@ def groups_at(config: Configuration, values: Mapping[str, npt.ArrayLike]) -> Gro
     for parameter, value in values.items():
         if parameter in SWEEPABLE_GROUPS:
             given[parameter] = value
-        else:
+        elif parameter != REALISATION:
             physical[SWEEPABLE_KEYS[parameter].path] = np.asarray(value, dtype=np.float64)
     return resolve_groups(physical, given)

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from gearchaos.configuration import Configuration
 from gearchaos.configuration.sweep_values import groups_at
+from gearchaos.gear.tooth_deviations import tooth_deviations
 
 Floats = NDArray[np.float64]
 
@@ -38,7 +39,7 @@ def system_of(
     ----------
     config : Configuration
     values : mapping of str to ndarray, shape (lanes,)
-        Value of each swept parameter in every lane.
+        Value of each swept parameter in every lane, and the number of its drawn gear pair.
     effects : collection of str, optional
         Effects that exist; by default those of the scene.
     """
@@ -60,6 +61,8 @@ def system_of(
         "mass_ratio_g": filled("mass_ratio_g", absent=1.0),
     }
     groups |= {name: filled(name) for name in Groups._fields if name not in groups}
+    # The deviations of every tooth, for the forcing of the kernels.
+    teeth = tooth_deviations(config.pitch_error, config.pair, values)  # noqa: F841
     acting = config.scene.effects if effects is None else effects
     cosine, sine = found.stiffness_cosine, found.stiffness_sine
     return System(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 from gearchaos_kernels import System
@@ -14,8 +15,9 @@ from gearchaos.configuration.sweep_values import SWEEPABLE_GROUPS, SWEEPABLE_KEY
 from gearchaos.dynamics.systems import system_of
 from gearchaos.engine.starts import start_states
 from gearchaos.gear.group_table import GROUP_TABLE
+from gearchaos.gear.tooth_deviations import REALISATION
 from gearchaos.results.result_file import Parameter
-from gearchaos.results.variables import HARMONIC, Axis, axis_name, start_axis
+from gearchaos.results.variables import HARMONIC, Axis, axis_name, pair_axis, start_axis
 
 Floats = NDArray[np.float64]
 Numbers = NDArray[np.intp]
@@ -33,20 +35,31 @@ class Lanes:
     Attributes
     ----------
     axes : list of Axis
-        One for each dimension: the second swept parameter, the first one, the start.
+        One for each dimension: the second swept parameter, the first one, the drawn gear pair, the
+        start; those that there are.
     effects : tuple of str
         Effects that act on what is kept.
     states : tuple of str
         States of the scene that these effects leave.
     starts : int
-        Lanes of one value, or pair of values.
+        Starts of one value, or pair of values, with one gear pair.
+    repeats : int
+        Lanes of one value, or pair of values: of all its gear pairs and starts.
     """
 
     def __init__(self, config: Configuration) -> None:
         self.config = config
         self._values = axis_values(config)
         self.axes = [axis_of(parameter, values) for parameter, values in self._values.items()]
+        # What the system of a lane depends on, in the order of the axes.
+        self._of_systems: dict[str, NDArray[Any]] = dict(self._values)
+        first = getattr(config.pitch_error, "first_realisation", 0)
+        numbers = first + np.arange(getattr(config.pitch_error, "realisations", 1))
+        if numbers.size > 1:
+            self.axes.append(pair_axis(numbers))
+            self._of_systems[REALISATION] = numbers
         self.starts = config.start.count
+        self.repeats = numbers.size * self.starts
         if self.starts > 1:
             self.axes.append(start_axis(self.starts))
         self.effects = config.needed_effects
@@ -63,12 +76,12 @@ class Lanes:
     @property
     def carried_along(self) -> int:
         """Lanes of one line along the first swept parameter, along which a state may be carried."""
-        return self.starts * swept_values(self.config.sweep).size
+        return self.repeats * swept_values(self.config.sweep).size
 
     def values_of(self, lanes: Numbers) -> dict[str, Floats]:
-        """Return the value of each swept parameter in some lanes."""
+        """Return the value of each swept parameter in some lanes, and the number of the pair."""
         index = np.unravel_index(lanes, self.shape)
-        found = zip(self._values.items(), index, strict=False)
+        found = zip(self._of_systems.items(), index, strict=False)
         return {parameter: values[at] for (parameter, values), at in found}
 
     def system_of(self, lanes: Numbers) -> System:

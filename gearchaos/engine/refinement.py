@@ -20,6 +20,7 @@ from gearchaos.dynamics.labelling import LOOKS
 from gearchaos.dynamics.systems import plan_of, system_of
 from gearchaos.engine.running import run
 from gearchaos.errors import ConfigurationError, FileError
+from gearchaos.gear.tooth_deviations import REALISATION
 from gearchaos.records.period import TOLERANCE
 from gearchaos.results.result import Result
 from gearchaos.results.stage_table import Stage, labelled_lanes
@@ -70,7 +71,7 @@ def computable(result: Result, name: str) -> Configuration:
         raise FileError(f"{name}: holds no configuration; run the sweep again")
     config = Configuration.from_toml(text, f"{name} (configuration_resolved)")
     steps = int(result.metadata.get("steps_per_period", config.integration.steps_per_period))
-    parameters = (sweep.parameter for sweep in config.sweeps.values())
+    parameters = [REALISATION, *(sweep.parameter for sweep in config.sweeps.values())]
     fixed = {p: result.fixed[axis_name(p)] for p in parameters if axis_name(p) in result.fixed}
     if fixed:
         config = config.at(fixed)

@@ -191,9 +191,9 @@ class Simulation:
 
     def block_lanes(self, threads: int) -> int:
         """Return how many lanes make a block: work for every thread, and progress to be seen."""
-        lanes, starts = LANES * max(8, 2 * threads), self.lanes.starts
+        lanes, repeats = LANES * max(8, 2 * threads), self.lanes.repeats
         # A carried sweep hands on whole values.
-        return max(starts, lanes - lanes % starts) if self.carried else lanes
+        return max(repeats, lanes - lanes % repeats) if self.carried else lanes
 
     def blocks(self, size: int) -> list[Bounds]:
         """Cut the sweep into blocks of so many lanes, in the order in which they are computed."""
@@ -221,15 +221,15 @@ class Simulation:
         start = self.lanes.start_of(lanes)
         if not self.carried:
             return start, integrate(self.lanes.system_of(lanes), start, plan)
-        starts, downwards = self.lanes.starts, self.downwards
+        repeats, downwards = self.lanes.repeats, self.downwards
         outcomes: list[Outcome] = []
-        before = None if carried is None else carried[:starts] if downwards else carried[-starts:]
+        before = None if carried is None else carried[:repeats] if downwards else carried[-repeats:]
         line = self.lanes.carried_along
-        values = range(0, lanes.size, starts)
+        values = range(0, lanes.size, repeats)
         for at in reversed(values) if downwards else values:
-            mine = slice(at, at + starts)
+            mine = slice(at, at + repeats)
             number = int(lanes[at])
-            if (number + starts) % line == 0 if downwards else number % line == 0:
+            if (number + repeats) % line == 0 if downwards else number % line == 0:
                 before = None
             if before is not None:
                 # A lane that diverged hands nothing on: its successor begins anew.

@@ -88,7 +88,7 @@ def stable_steps(lanes: Lanes, steps: int) -> tuple[int, str]:
         raise ConfigurationError(_fault(lanes, worst, unstable, steps).text(lanes.config.source))
     return worst.steps, (
         f"integration.steps_per_period raised from {steps} to {worst.steps}, the stability limit "
-        f"of {unstable.size * lanes.starts} of {len(lanes)} lanes"
+        f"of {unstable.size * lanes.repeats} of {len(lanes)} lanes"
     )
 
 
@@ -114,8 +114,8 @@ def coarse_steps(lanes: Lanes, steps: int) -> str:
 
 
 def _limits(lanes: Lanes, steps: int) -> Iterator[StabilityLimit]:
-    # The starts of one value share its system.
-    every = np.arange(0, len(lanes), lanes.starts)
+    # Starts and pitch errors of one value share its stability.
+    every = np.arange(0, len(lanes), lanes.repeats)
     for first in range(0, every.size, LANES_AT_ONCE):
         some = every[first : first + LANES_AT_ONCE]
         limit = stability_limit(lanes.system_of(some), steps)
@@ -137,7 +137,7 @@ def _fault(lanes: Lanes, worst: StabilityLimit, unstable: NDArray[np.intp], step
         remedy = f"check the magnitudes behind it: there are at most {MOST_STEPS_PER_PERIOD} steps"
     return Fault(
         "integration.steps_per_period",
-        f"RK4 is unstable below {worst.steps} steps per period for {unstable.size * lanes.starts} "
+        f"RK4 is unstable below {worst.steps} steps per period for {unstable.size * lanes.repeats} "
         f"of {len(lanes)} lanes ({', '.join(places)}), because of the eigenvalue "
         f"{worst.eigenvalue.real:.3g}{pair} of the {worst.owner}",
         remedy,

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from gearchaos.errors import FigureError
 from gearchaos.results.result import Result
+from gearchaos.results.variables import REPEATS
 
 Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -39,8 +40,8 @@ class Lanes(NamedTuple):
 
 
 def swept_axes(result: Result) -> list[str]:
-    """Return the axes of a result that are swept parameters: all but the starts."""
-    return [axis for axis in result.axes if axis != "start"]
+    """Return the axes of a result that are swept parameters: all but pairs and starts."""
+    return [axis for axis in result.axes if axis not in REPEATS]
 
 
 def diagram_lanes(result: Result, between: Between = (None, None)) -> Lanes:

@@ -12,10 +12,11 @@ from matplotlib.patches import Patch, Rectangle
 
 from gearchaos.errors import FigureError
 from gearchaos.figures.labels import form_in_words
+from gearchaos.figures.lanes import swept_axes
 from gearchaos.figures.style import LEGEND, SMALL_FONT_PT
 from gearchaos.results.result import Result
 from gearchaos.results.stage_table import LabelledLanes, Stage, labelled_lanes, stage_table
-from gearchaos.results.variables import LABELS, START
+from gearchaos.results.variables import LABELS, REPEATS
 
 # Blues that darken with the period, but for period 3, the window in chaos that is looked for. Those
 # without hatching differ in lightness, and all are light enough for black points to stand out.
@@ -73,8 +74,8 @@ def shade_stages(
     axes : matplotlib.axes.Axes
         With the swept parameter along x, limits set.
     result : Result
-        Over one swept parameter, with labels of the motion. Values whose starts come to different
-        motions are "several motions"; so is a stage that hides too many narrower ones.
+        Over one swept parameter, with labels of the motion. Values whose starts or gear pairs come
+        to different motions are "several motions"; so is a stage that hides too many narrower ones.
     lanes : LabelledLanes, optional
         Lanes with other labels than those of the result.
     narrowest : float, optional
@@ -94,12 +95,12 @@ def shade_stages(
     FigureError
         If it has several swept parameters.
     """
-    if [axis for axis in result.axes if axis != START] != [result.axis]:
+    if swept_axes(result) != [result.axis]:
         raise FigureError(
             f"stages are those of one axis, but the result has {', '.join(result.axes)}; fix the "
             "others with result.sel"
         )
-    lanes = _of_all_starts(result) if lanes is None else lanes
+    lanes = _of_all_repeats(result) if lanes is None else lanes
     low, high = sorted(axes.get_xlim())
     stages = stage_table(lanes, NARROWEST_SHARE * (high - low) if narrowest is None else narrowest)
     # Neighbours meet halfway between their lanes, and the outermost reach to the ends of the axis.
@@ -146,11 +147,11 @@ def _kind(stage: Stage, lanes: LabelledLanes) -> str:
     return "period 4 or more" if stage.period > 3 else stage.label
 
 
-def _of_all_starts(result: Result) -> LabelledLanes:
-    """Take the labels of all starts; where they differ, the motion has no period."""
-    if START not in result.axes:
-        return labelled_lanes(result)
-    one = labelled_lanes(result.sel(start=result[START][0]))
-    differ = np.any([result[name] != result[name][:, :1] for name in LABELS], axis=(0, 2))
-    labels = np.where(differ, "several motions", one.labels)
-    return one._replace(labels=labels, period=np.where(differ, 0, one.period))
+def _of_all_repeats(result: Result) -> LabelledLanes:
+    """Take the labels of all pairs and starts; where they differ, the motion has no period."""
+    first = {axis: result[axis][0] for axis in REPEATS if axis in result.axes}
+    lanes = labelled_lanes(result.sel(**first))
+    every = [result[name].reshape(lanes.values.size, -1) for name in LABELS]
+    differ = np.any([labels != labels[:, :1] for labels in every], axis=(0, 2))
+    labels = np.where(differ, "several motions", lanes.labels)
+    return lanes._replace(labels=labels, period=np.where(differ, 0, lanes.period))

@@ -121,6 +121,15 @@ class Quantities:
         damping = self[f"bearings.{direction}_damping_N_s_per_m"][gear]
         return damping / (2.0 * self.pair.masses[gear] * self.scaling_frequency)
 
+    def pitch_error_amplitude(self) -> Any:
+        """Amplitude of a sine over b'; of deviations in um along the reference circle, their unit.
+
+        Along the line of action they count cos(alpha_t) times.
+        """
+        if self.physical["pitch_error.kind"] in (None, "sine"):
+            return self.over_length_scale("pitch_error.amplitude_um")
+        return np.cos(self.pair.transverse_pressure_angle) * _MICROMETRE / self.length_scale
+
     @cached_property
     def mesh_stiffness(self) -> FourierStiffness:
         """The stiffness harmonics relative to the mean (Pan 2021, eqs 15-19)."""
@@ -158,7 +167,7 @@ _DERIVATIONS: dict[str, Callable[[Quantities], Any]] = {
     "damping_ratio": Quantities.damping_ratio,
     "base_helix_angle_deg": lambda q: np.degrees(q.pair.base_helix_angle),
     "half_backlash": lambda q: q.over_length_scale("mesh.half_backlash_um"),
-    "pitch_error_amplitude": lambda q: q.over_length_scale("pitch_error.amplitude_um"),
+    "pitch_error_amplitude": Quantities.pitch_error_amplitude,
     "pitch_error_mean": lambda q: q.over_length_scale("pitch_error.mean_um"),
     "pitch_error_phase_deg": lambda q: q["pitch_error.phase_deg"],
     "stiffness_cosine": lambda q: q.mesh_stiffness.coefficients().real,

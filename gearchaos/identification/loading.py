@@ -12,8 +12,8 @@ from typing import NamedTuple
 from pydantic import ValidationError
 
 from gearchaos.configuration import Configuration, load_config
+from gearchaos.configuration.files import text_of_file
 from gearchaos.configuration.keys import keys_of
-from gearchaos.configuration.loading import text_of_file
 from gearchaos.configuration.messages import MOST_SHOWN, Fault, fault_of, texts
 from gearchaos.configuration.toml_text import tables_from_toml, toml_literal, with_overrides
 from gearchaos.errors import ConfigurationError

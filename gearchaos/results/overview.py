@@ -25,8 +25,8 @@ from gearchaos.results.variables import (
     HARMONIC,
     LABELS,
     LARGEST_EXPONENT,
+    REPEATS,
     STANDARD_ERROR,
-    START,
     STEP_ERROR,
     Variable,
 )
@@ -83,7 +83,7 @@ def overview(path: str | os.PathLike[str]) -> dict[str, Any]:
 
 
 def _stages(result: Result) -> tuple[dict[str, Any], list[dict[str, Any]]]:
-    if result.axis == START or not all(name in result for name in LABELS):
+    if result.axis in REPEATS or not all(name in result for name in LABELS):
         return {}, []
     part = one_axis(result)
     stages = stage_table(labelled_lanes(part))

@@ -32,7 +32,7 @@ class Result:
     ----------
     axes : sequence of str
         Names of the dimensions of the lanes: second swept parameter, first swept parameter,
-        start; those that there are.
+        realisation, start; those that there are.
     variables : sequence of Variable
         What there is, in the order of the file.
     data : mapping of str to ndarray

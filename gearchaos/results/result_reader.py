@@ -31,9 +31,9 @@ from gearchaos.results.variables import (
     HARMONIC,
     LARGEST_EXPONENT,
     RECORD,
+    REPEATS,
     SECTION,
     SECTION_POINT,
-    START,
     STATE,
     STATUS,
     Axis,
@@ -186,7 +186,7 @@ def _check_variables(
     if STATE not in data:
         raise UnfitError(f"lacks the variable {STATE}")
     expected = sweep_variables(
-        [Axis(name, "", "", "", np.zeros(1, "i4" if name == START else "f8")) for name in axes],
+        [Axis(name, "", "", "", np.zeros(1, "i4" if name in REPEATS else "f8")) for name in axes],
         states=found[STATE].flags,
         section=[n.removeprefix(SECTION) for n in found if n.startswith(f"{SECTION}delta_")],
         section_points=np.size(data.get(SECTION_POINT, ())),

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from gearchaos.errors import ConfigurationError, FileError
 from gearchaos.results.result import Result
-from gearchaos.results.variables import BANDS, LABELS, LARGEST_EXPONENT, START
+from gearchaos.results.variables import BANDS, LABELS, LARGEST_EXPONENT, REPEATS
 
 Floats = NDArray[np.float64]
 
@@ -94,7 +94,7 @@ def one_axis(result: Result, **coordinates: float) -> Result:
     or if no swept parameter is left.
     """
     part = result.sel("nearest", **coordinates)
-    if part.axis in ("", START):
+    if part.axis in ("", *REPEATS):
         raise ConfigurationError(f"{', '.join(coordinates)}: fixed, no swept parameter is left")
     return part.sel(**{name: part[name][0] for name in part.axes if name != part.axis})
 

@@ -9,7 +9,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gearchaos.gear.tooth_deviations import REALISATION
+
 START = "start"
+REPEATS = (REALISATION, START)
+"""Axes along which no parameter is swept: drawn gear pairs and starts of one parameter value."""
 SECTION_POINT = "section_point"
 STATE = "state"
 EXPONENT_NUMBER = "exponent"
@@ -101,9 +105,14 @@ def start_axis(count: int) -> Axis:
     return Axis(START, "1", text, "", np.arange(count))
 
 
+def pair_axis(numbers: NDArray[Any]) -> Axis:
+    """Give the axis of several drawn gear pairs, of these numbers."""
+    return Axis(REALISATION, "1", "drawn gear pair", "", numbers)
+
+
 def diagram_axis(axes: Sequence[str]) -> str:
     """Name the axis along which a diagram runs: the first swept parameter, "" without axes."""
-    return ([START] + [name for name in axes if name != START])[-1] if axes else ""
+    return ([*axes[:1]] + [name for name in axes if name not in REPEATS])[-1] if axes else ""
 
 
 def lane_axes(variables: Sequence[Variable]) -> tuple[str, ...]:
@@ -127,7 +136,7 @@ def sweep_variables(
 ) -> list[Variable]:
     """List the variables of a sweep in the order of the file.
 
-    The axes are second swept parameter, first swept parameter, start, those that there are;
+    The axes are second swept parameter, first swept parameter, realisation, start, those there are;
     ``states`` those of the scene in its order, ``section`` those recorded at so many section
     points. Meanings are those of 0, 1, ...: of ``status``, of ``motion_changed`` where lanes are
     computed twice to measure their error, and of ``motion`` and ``record`` where they are labelled.

@@ -43,9 +43,25 @@ PHYSICAL = {
     "mesh.stiffness.bottom": None,
     "mesh.stiffness.half_height": None,
     "mesh.stiffness.harmonics": None,
+    "pitch_error.kind": "sine",
     "pitch_error.amplitude_um": 11.0,
     "pitch_error.mean_um": 2.0,
     "pitch_error.phase_deg": 30.0,
+    "pitch_error.smoothing": None,
+    **{
+        f"pitch_error.{gear}.{key}": None
+        for gear in ("driving", "driven")
+        for key in (
+            *("cumulative_um", "single_um", "file", "column"),
+            *("holds", "counted", "flank"),
+        )
+    },
+    "pitch_error.grade": None,
+    "pitch_error.edition": None,
+    "pitch_error.seed": None,
+    "pitch_error.realisations": None,
+    "pitch_error.first_realisation": None,
+    "pitch_error.eccentricity": None,
     "bearings.transverse_stiffness_N_per_m": (1e8, 2e8),
     "bearings.transverse_damping_N_s_per_m": (100.0, 300.0),
     "bearings.axial_stiffness_N_per_m": (3e7, 4e7),

@@ -1,0 +1,121 @@
+"""Files of a user: texts read whole, and the pitch deviations in CSV files."""
+
+from __future__ import annotations
+
+import csv
+import os
+from collections.abc import Mapping
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from gearchaos.configuration.messages import NUMBER, Fault, shown
+from gearchaos.errors import ConfigurationError, FileError
+
+LISTS = {"cumulative": "cumulative_um", "single": "single_um"}
+"""Keys of the lists of deviations by what a column holds."""
+
+LARGEST_FILE = 4 * 1024 * 1024
+"""Bytes: room for several hundred thousand swept values, and read in seconds whatever it holds."""
+
+CONFIGURATION = "configuration"
+
+
+def text_of_file(source: str, what: str = CONFIGURATION) -> str:
+    """Read the text of a file at a path, a configuration or what else the messages call it.
+
+    Raises FileError or ConfigurationError if it cannot be read.
+    """
+    own = what == CONFIGURATION
+    if not source:
+        raise FileError("no configuration file: the path is empty; name a TOML file")
+    try:
+        if source == "-":
+            content = _standard_input()
+        else:
+            with Path(source).open("rb") as file:
+                content = file.read(LARGEST_FILE + 1)
+    except FileNotFoundError:
+        raise FileError(f"{source}: no such file; check the path of the {what}") from None
+    except IsADirectoryError:
+        kind = "TOML file" if own else "file"
+        raise FileError(f"{source}: is a directory; name a {kind} in it") from None
+    except (OSError, ValueError) as error:
+        reason = error.strerror if isinstance(error, OSError) else str(error)
+        raise FileError(f"{source!r}: cannot be read: {reason}") from None
+    if content.startswith(b"\x89HDF") and own:
+        remedy = f"`gearchaos info {source}` shows that of a result"
+        raise ConfigurationError(f"{source}: is HDF5, and a configuration is TOML; {remedy}")
+    if len(content) > LARGEST_FILE:
+        remedy = "give many swept values as sweep.from, sweep.to and sweep.count"
+        size = f"larger than {LARGEST_FILE // 1024**2} MB, so hardly a {what}"
+        raise ConfigurationError(f"{source}: {size}; {remedy if own else 'name another file'}")
+    try:
+        # utf-8-sig: some editors begin a file with a byte order mark.
+        return content.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = content[: error.start].count(b"\n") + 1
+        raise ConfigurationError(
+            f"{source}: line {line} is not UTF-8 text; save the {what} as UTF-8"
+        ) from None
+
+
+@cache
+def _standard_input() -> bytes:
+    """Read it for whoever asks first, and keep it for who asks again."""
+    with open(0, "rb", closefd=False) as stream:
+        return stream.read(LARGEST_FILE + 1)
+
+
+def with_deviation_files(
+    tables: Mapping[str, Any], source: str
+) -> tuple[Mapping[str, Any], list[Fault]]:
+    """Return the tables of a configuration with the deviations in the files they name, and faults.
+
+    The numbers go into the table of the gear, where none are listed, and the text into ``files``,
+    from which it is taken when it is needed again. Raises as `text_of_file`.
+    """
+    faults = []
+    for gear in ("driving", "driven"):
+        error, here = _table(tables, "pitch_error"), f"pitch_error.{gear}.file"
+        table, files = _table(error, gear), _table(tables, "files")
+        name = table.get("file")
+        if not isinstance(name, str) or not table.keys().isdisjoint(LISTS.values()):
+            continue
+        if not isinstance(files.get(name), str):
+            path = os.path.join(os.path.dirname(source) or ".", name)
+            files[name] = text_of_file(path, f"pitch deviations ({here} in {source})")
+        read = LISTS.get(str(table.get("holds")), LISTS["cumulative"])
+        try:
+            table[read] = _column(files[name], table.get("column"))
+            tables = {**tables, "pitch_error": {**error, gear: table}, "files": files}
+        except (ValueError, csv.Error) as fault:
+            rule, remedy = [*map(str, fault.args), ""][:2]
+            faults.append(Fault(here, rule, remedy, name))
+    return tables, faults
+
+
+def _table(tables: Mapping[str, Any], name: str) -> dict[str, Any]:
+    found = tables.get(name)
+    return dict(found) if isinstance(found, Mapping) else {}
+
+
+def _column(text: str, column: object) -> list[float]:
+    """Return the numbers of a column; ValueError with rule and remedy where they are none."""
+    lines = [(number, line) for number, line in enumerate(text.splitlines(), start=1)]
+    lines = [(n, line) for n, line in lines if line.strip() and not line.lstrip().startswith("#")]
+    delimiter = next((mark for mark in ";\t," if lines and mark in lines[0][1]), ",")
+    reader = csv.reader((line for _, line in lines), delimiter=delimiter)
+    headings = [cell.strip() for cell in next(reader, [])]
+    if column not in headings:
+        asked = "column is missing" if column is None else f"has no column {shown(column)}"
+        raise ValueError(asked, f"its first line has the headings {shown(headings)}")
+    place, numbers = headings.index(column), []
+    for row in reader:
+        cell = "".join(row[place : place + 1]).strip()
+        if not NUMBER.fullmatch(cell):
+            where = f"line {lines[reader.line_num - 1][0]}, column {column}"
+            rule = f"{where}: must be a finite number, not {shown(cell)}"
+            raise ValueError(rule, "give one for every tooth, decimals with a point")
+        numbers.append(float(cell))
+    return numbers
