@@ -63,7 +63,7 @@ def groups_at(config: Configuration, values: Mapping[str, npt.ArrayLike]) -> Gro
     ConfigurationError if the harmonics of the mesh stiffness would differ between lanes, KeyError
     if a parameter cannot be swept.
     """
-    physical: dict[str, Any] = config.physical()
+    physical = physical_at(config, values)
     given: dict[str, Any] = dict(config.groups.given())
     if "stiffness_variation" not in config.scene.effects:
         # Lanes share one table of harmonics; a scene without it may sweep what they depend on.
@@ -71,6 +71,16 @@ def groups_at(config: Configuration, values: Mapping[str, npt.ArrayLike]) -> Gro
     for parameter, value in values.items():
         if parameter in SWEEPABLE_GROUPS:
             given[parameter] = value
-        elif parameter != REALISATION:
-            physical[SWEEPABLE_KEYS[parameter].path] = np.asarray(value, dtype=np.float64)
+        elif parameter != REALISATION and parameter not in SWEEPABLE_KEYS:
+            raise KeyError(parameter)
     return resolve_groups(physical, given)
+
+
+def physical_at(config: Configuration, values: Mapping[str, npt.ArrayLike]) -> dict[str, Any]:
+    """Return every key of the physical tables by its path, with the values that are swept."""
+    swept = {
+        SWEEPABLE_KEYS[parameter].path: np.asarray(value, dtype=np.float64)
+        for parameter, value in values.items()
+        if parameter in SWEEPABLE_KEYS
+    }
+    return config.physical() | swept

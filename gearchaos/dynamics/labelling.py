@@ -49,8 +49,9 @@ class Told(NamedTuple):
 def labels_of(system: System, outcome: Outcome, plan: Plan) -> Told:
     """Label lanes by their record, which should hold `MOST_POINTS` section points or all there are.
 
-    ``plan`` is that by which they were integrated, over whole excitation periods. `doubtful` lanes are labelled by a longer record
-    that begins where theirs ended, and what that does not tell by a still longer one.
+    ``plan`` is that by which they were integrated, over whole excitation periods. `doubtful` lanes
+    are labelled by a longer record that begins where theirs ended, and what that does not tell by a
+    still longer one.
     """
     repeats = system.repeats_after
     outcome = outcome.every(repeats)

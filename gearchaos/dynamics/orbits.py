@@ -54,10 +54,10 @@ def polish(
 ) -> Orbits:
     """Find the periodic orbit next to the guess of every lane.
 
-    Newton's method on the map over ``period`` excitation periods, with its Jacobian from the tangent
-    flow. A step is halved until the return distance falls and the point stays near the guess. A
-    coordinate is measured by its largest magnitude on the section of the guess, or by a thousandth
-    of that of the largest coordinate where this is more.
+    Newton's method on the map over ``period`` excitation periods, with its Jacobian from the
+    tangent flow. A step is halved until the return distance falls and the point stays near the
+    guess. A coordinate is measured by its largest magnitude on the section of the guess, or by a
+    thousandth of that of the largest coordinate where this is more.
 
     ``guess`` (lanes, states): states of eq. 13 at tau = 0; ``period`` (lanes,) in excitation
     periods, see `System.repeats_after`, 0 where there is no orbit to look for;
@@ -76,7 +76,9 @@ def polish(
         # With a tangent, so that map and Jacobian are compiled once and agree bit for bit.
         whole = n * system.repeats_after
         plan = Plan(steps_per_period, 0, whole, whole, tangent=True, method=method)
-        for all_lanes, some in zip(found, _polish(system.of(chosen), guess[chosen], plan), strict=True):
+        for all_lanes, some in zip(
+            found, _polish(system.of(chosen), guess[chosen], plan), strict=True
+        ):
             all_lanes[chosen] = some
     return found
 

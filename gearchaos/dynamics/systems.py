@@ -6,11 +6,14 @@ from collections.abc import Collection, Mapping
 from typing import Any
 
 import numpy as np
-from gearchaos_kernels import Effects, Groups, Plan, System
+from gearchaos_kernels import Effects, Groups, Plan, System, Teeth
 from numpy.typing import NDArray
 
 from gearchaos.configuration import Configuration
-from gearchaos.configuration.sweep_values import groups_at
+from gearchaos.configuration.sweep_values import groups_at, physical_at
+from gearchaos.errors import ConfigurationError
+from gearchaos.gear.contact_shares import contact_shares
+from gearchaos.gear.derivation import Quantities
 from gearchaos.gear.tooth_deviations import tooth_deviations
 
 Floats = NDArray[np.float64]
@@ -61,14 +64,34 @@ def system_of(
         "mass_ratio_g": filled("mass_ratio_g", absent=1.0),
     }
     groups |= {name: filled(name) for name in Groups._fields if name not in groups}
-    # The deviations of every tooth, for the forcing of the kernels.
-    teeth = tooth_deviations(config.pitch_error, config.pair, values)  # noqa: F841
     acting = config.scene.effects if effects is None else effects
     cosine, sine = found.stiffness_cosine, found.stiffness_sine
+    cosine, sine = (np.zeros(0) if wave is None else wave for wave in (cosine, sine))
     return System(
         Effects(**{effect: effect in acting for effect in Effects._fields}),
         Groups(**groups),
-        np.zeros(0) if cosine is None else cosine,
-        np.zeros(0) if sine is None else sine,
+        cosine,
+        sine,
         physical=config.formulation == "physical",
+        teeth=_teeth(config, values, complex(*cosine[:1], *-sine[:1])),
     )
+
+
+def _teeth(
+    config: Configuration, values: Mapping[str, Floats], fundamental: complex
+) -> Teeth | None:
+    """Return the errors of the teeth of some lanes, None where the pitch error is a sine."""
+    error = config.pitch_error
+    found = tooth_deviations(error, config.pair, values)
+    if found is None or error is None or error.kind == "sine":
+        return None
+    pair = Quantities(physical_at(config, values)).pair
+    ratios = [np.unique(r) for r in (pair.transverse_contact_ratio, pair.overlap_contact_ratio)]
+    if any(ratio.size > 1 for ratio in ratios):
+        raise ConfigurationError(
+            f"{config.source}: the contact ratio of [pair] would differ between the swept values, "
+            "but all of them share one table of contact lines; sweep another parameter"
+        )
+    transverse, overlap = (float(ratio[0]) for ratio in ratios)
+    shares = contact_shares(transverse, overlap, error.smoothing, fundamental)
+    return Teeth(*found, *shares)

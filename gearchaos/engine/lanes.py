@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -72,6 +73,11 @@ class Lanes:
 
     def __len__(self) -> int:
         return math.prod(self.shape)
+
+    @cached_property
+    def repeats_after(self) -> int:
+        """Mesh periods after which the excitation of every lane repeats."""
+        return self.system_of(np.arange(1)).repeats_after
 
     @property
     def carried_along(self) -> int:

@@ -10,10 +10,17 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from gearchaos_kernels.teeth import DEGREE
 from numpy.typing import NDArray
 
+from gearchaos.errors import ConfigurationError
+
 Floats = NDArray[np.float64]
+
+MOST_CONTACT = 5.0
+"""Largest total contact ratio: the kernels have room for seven pairs in mesh or next to it."""
+
+_PIECES = 6
+"""Cells over which the splines between the shares reach."""
 
 _SAMPLES = 64
 """Places within a cell over which a share is averaged."""
@@ -44,15 +51,15 @@ def contact_shares(
 
     Raises
     ------
-    ValueError
-        If there are moments without any pair in mesh.
+    ConfigurationError
+        If there are moments without any pair in mesh, or too many are.
     """
-    if transverse + overlap < 1.0:
-        raise ValueError(
-            f"the total contact ratio {transverse + overlap:.3g} is less than 1: at times no tooth "
-            "pair is in mesh"
+    if not 1.0 <= transverse + overlap <= MOST_CONTACT:
+        raise ConfigurationError(
+            f"[pair]: its total contact ratio {transverse + overlap:.3g} must be between 1 and "
+            f"{MOST_CONTACT:g} for pitch errors tooth by tooth; check the data of the gears"
         )
-    per_period = max(1, round((DEGREE + 1) / smoothing))
+    per_period = max(1, round(_PIECES / smoothing))
     cells = int(np.ceil((transverse + overlap) * per_period))
     samples = (np.arange(_SAMPLES * per_period) + 0.5) / (_SAMPLES * per_period)
     turns = np.arange(cells // per_period + 1)[:, np.newaxis]
@@ -61,9 +68,7 @@ def contact_shares(
     # The phase of the total length, were it to begin at phase 0.
     own = complex(np.mean(lines.sum(axis=0) * np.exp(-2j * np.pi * samples)))
     turned = fundamental * own.conjugate()
-    ahead = -np.angle(turned) / (2.0 * np.pi) if abs(turned) > 1e-9 else 0.0
-    # A spline is half its width late.
-    entry = (ahead - DEGREE / (2.0 * per_period)) % 1.0
+    entry = -np.angle(turned) / (2.0 * np.pi) % 1.0 if abs(turned) > 1e-9 else 0.0
     return ContactShares(shares, per_period, float(entry))
 
 

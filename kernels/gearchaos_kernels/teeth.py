@@ -40,7 +40,9 @@ def share_table(teeth: Teeth, steps_per_period: int) -> Floats:
     ValueError with too many in mesh.
     """
     cells = np.ascontiguousarray(teeth.share, dtype=np.float64)
-    return _table(cells.tobytes(), teeth.cells_per_period, teeth.entry, steps_per_period)
+    # The spline of a cell is centred on it; what then begins before period 0 is the next pair.
+    entry = (teeth.entry - DEGREE / (2.0 * teeth.cells_per_period)) % 1.0
+    return _table(cells.tobytes(), teeth.cells_per_period, entry, steps_per_period)
 
 
 @lru_cache(maxsize=8)

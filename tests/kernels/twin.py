@@ -38,10 +38,11 @@ def shared_error(teeth: Teeth, profile: int, phase: float) -> np.ndarray:
     With its first and second derivative by the phase in radians.
     """
     driving, driven = teeth.driving[profile], teeth.driven[profile]
+    begin = (teeth.entry - 2.5 / teeth.cells_per_period) % 1.0
     total = np.zeros(3)
     for pair in range(math.floor(phase) - 10, math.floor(phase) + 2):
         error = driven[pair % driven.size] - driving[pair % driving.size]
-        place = teeth.cells_per_period * (phase - pair - teeth.entry)
+        place = teeth.cells_per_period * (phase - pair - begin)
         for cell in range(max(0, math.floor(place) - 5), min(teeth.share.size, math.ceil(place))):
             x, share = place - cell, teeth.share[cell]
             first = spline(x, 4) - spline(x - 1, 4)
