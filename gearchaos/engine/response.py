@@ -17,6 +17,7 @@ from gearchaos.engine.simulation import Simulation
 from gearchaos.errors import ConfigurationError
 from gearchaos.results.response_variables import (
     DEFAULT_PERIODS,
+    MESH_ERROR,
     MESH_PERIOD,
     NO_CONTACT_STATE,
     acceleration_of,
@@ -166,6 +167,7 @@ def _motion(system: System, outcome: Outcome, plan: Plan) -> dict[str, NDArray[A
     }
     for column, name in enumerate(system.states[::2]):
         motion[acceleration_of(name)] = found.accelerations[..., column].copy()
+    motion[MESH_ERROR] = found.pitch_error
     motion["mesh_force_tangential"] = found.force_tangential
     motion["contact_tangential"] = found.contact_tangential
     if system.effects.axial:

@@ -10,6 +10,7 @@ from gearchaos.results.variables import STATE_WORDING, Axis, Variable
 
 TIME = "time"
 MESH_PERIOD = "mesh_period"
+MESH_ERROR = "mesh_error"
 DEFAULT_PERIODS = 32
 """Mesh periods of a response where their number is not given."""
 
@@ -50,6 +51,7 @@ def response_variables(
         if state.endswith("_rate"):
             text, symbol = text.replace("velocity", "acceleration"), symbol.replace("'", "''")
             variables.append(motion(acceleration_of(state.removesuffix("_rate")), text, symbol))
+    variables.append(motion(MESH_ERROR, "pitch error of the mesh", "$e$"))
     for direction, symbol in (("tangential", "$N_y$"), ("axial", "$N_z$"))[: 2 if axial else 1]:
         name, text = f"contact_{direction}", f"contact in the {direction} direction"
         dims = (*lane, TIME)

@@ -31,7 +31,7 @@ from gearchaos_kernels.equations import (
     mesh_forces,
     tangent_forces,
 )
-from gearchaos_kernels.forcing import forcing_at, phase_on_grid, phase_table
+from gearchaos_kernels.forcing import forcing_at, phase_on_grid, phase_table, shifted
 from gearchaos_kernels.system import Effects, Floats, MeshMotion, Plan, System
 from gearchaos_kernels.teeth import NO_TEETH, engage, share_errors, share_table, with_teeth
 
@@ -105,6 +105,7 @@ def mesh_motion(
         np.zeros((lanes, samples), dtype=np.uint8),
         np.zeros((lanes, samples), dtype=np.uint8),
         np.zeros((lanes, samples, count // 2)),
+        np.zeros((lanes, samples)),
     )
     present = flags(system, _ALONE)
     teeth = NO_TEETH if present.teeth is None or system.teeth is None else system.teeth
@@ -148,6 +149,10 @@ def _follow(
                 share_errors(memory, shares, row, 0)
             point = with_teeth(memory, 0, 0, phase_on_grid(table, row), present)
             forcing = forcing_at(lane, point, present)
+            if present.pitch_error is not None:
+                # Half of what twice the error is made of, whatever the form of the gaps.
+                value = lane.axial_error_amplitude * shifted(lane, point, present).value
+                motion.pitch_error[index, sample] = 0.5 * (lane.axial_error_mean + value)
             gaps = gaps_at(state, lane, forcing, present)
             forces, _ = mesh_forces(gaps, lane, forcing.stiffness, None, present)
             # Scaled, N_y and N_z enter eq. 13 with coefficient -1, and per step squared.

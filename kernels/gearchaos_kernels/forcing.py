@@ -138,18 +138,22 @@ def forcing_at(lane, point, present):
     axial_error = 0.0
     axial_error_rate = 0.0
     if present.pitch_error is not None:
-        value = point.value
-        slope = point.slope
-        curvature = point.curvature
-        if present.phase is not None:
-            value = lane.cos_phase * point.value + lane.sin_phase * point.slope
-            slope = lane.cos_phase * point.slope - lane.sin_phase * point.value
-            curvature = -value
+        point = shifted(lane, point, present)
         # -e'' drives delta_5, which is measured from e (eq. 13).
-        drive = lane.load - lane.error_inertia * curvature
-        error = lane.error_mean + lane.error_amplitude * value
-        error_rate = lane.error_rate * slope
+        drive = lane.load - lane.error_inertia * point.curvature
+        error = lane.error_mean + lane.error_amplitude * point.value
+        error_rate = lane.error_rate * point.slope
         if present.axial is not None:
-            axial_error = lane.axial_error_mean + lane.axial_error_amplitude * value
-            axial_error_rate = lane.axial_error_rate * slope
+            axial_error = lane.axial_error_mean + lane.axial_error_amplitude * point.value
+            axial_error_rate = lane.axial_error_rate * point.slope
     return Forcing(stiffness, drive, error, error_rate, axial_error, axial_error_rate)
+
+
+@scalar
+def shifted(lane, point, present):
+    """Return a mesh phase with the sine of the error shifted by the phase that a lane gives it."""
+    if present.phase is None:
+        return point
+    value = lane.cos_phase * point.value + lane.sin_phase * point.slope
+    slope = lane.cos_phase * point.slope - lane.sin_phase * point.value
+    return Phase(point.variation, value, slope, -value)

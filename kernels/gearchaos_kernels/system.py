@@ -199,7 +199,8 @@ class MeshMotion(NamedTuple):
     ``force_tangential``, ``force_axial`` (lanes, samples): N_y and N_z of eq. 13;
     ``contact_tangential``, ``contact_axial`` (lanes, samples): 0 apart, 1 on the driving flank, 2
     on the back flank; ``accelerations`` (lanes, samples, coordinates): delta_5'' and, where the
-    system has them, delta_1'' to delta_4''. Without an axial pair its force and contact are 0.
+    system has them, delta_1'' to delta_4''; ``pitch_error`` (lanes, samples): e. Without an axial
+    pair its force and contact are 0.
     """
 
     force_tangential: Floats
@@ -207,3 +208,4 @@ class MeshMotion(NamedTuple):
     contact_tangential: NDArray[np.uint8]
     contact_axial: NDArray[np.uint8]
     accelerations: Floats
+    pitch_error: Floats
