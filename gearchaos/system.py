@@ -41,10 +41,14 @@ Floats = NDArray[np.float64]
 
 
 class Trajectory(NamedTuple):
-    """A motion: ``time`` (samples,) in mesh periods, ``states`` (samples, states) of eq. 13."""
+    """A motion: ``time`` (samples,) in mesh periods, ``states`` (samples, states) of eq. 13.
+
+    ``first_period``: mesh periods that the teeth have turned before it.
+    """
 
     time: Floats
     states: Floats
+    first_period: int = 0
 
 
 class System:
@@ -133,6 +137,11 @@ class System:
         """2 pi / Omega in units of tau."""
         return float(self._record.mesh_period[0])
 
+    @property
+    def repeats_after(self) -> int:
+        """Mesh periods of an excitation period: 1, or until the same teeth meet again."""
+        return self._record.repeats_after
+
     def __repr__(self) -> str:
         effects = ", ".join(self.config.scene.effects) or "no effects"
         return f"<System {self.config.title!r}: {len(self.states)} states, {effects}>"
@@ -160,7 +169,7 @@ class System:
                 "check the load and the start state"
             )
         states = outcome.history[0]
-        return Trajectory(np.arange(states.shape[0]) / plan.steps_per_period, states)
+        return Trajectory(np.arange(states.shape[0]) / plan.steps_per_period, states, transient)
 
     def response(self, periods: int = DEFAULT_PERIODS) -> Result:
         """Compute the motion after the configured transient, with accelerations and mesh forces.
@@ -172,10 +181,11 @@ class System:
         return respond(self.config.replace("start", start), periods)
 
     def orbit(self, period: int = 1, guess: Floats | None = None) -> Orbit:
-        """Find the orbit of so many mesh periods that a motion settles on, or that next to a guess.
+        """Find the orbit of so many periods that a motion settles on, or that next to a guess.
 
-        ``guess`` (states,) is a state close to the orbit at mesh phase 0, by default the one after
-        the configured transient.
+        Of excitation periods: with pitch errors tooth by tooth these are `repeats_after` mesh
+        periods, else one. ``guess`` (states,) is a state close to the orbit at its beginning, by
+        default the one after the configured transient.
 
         Raises
         ------
@@ -183,7 +193,8 @@ class System:
             If there is no orbit of this period next to the guess.
         """
         if guess is None:
-            transient = max(self.config.integration.transient_periods, 1)
+            repeats = self.repeats_after
+            transient = repeats * max(-(-self.config.integration.transient_periods // repeats), 1)
             guess = self.integrate(1, transient=transient - 1).states[-1]
         found = polish(
             self._record,
@@ -194,7 +205,8 @@ class System:
         )
         if not found.converged[0]:
             raise ConfigurationError(
-                f"{self.config.source}: no orbit of {period} mesh periods next to the guess; give "
+                f"{self.config.source}: no orbit of {period * self.repeats_after} mesh periods "
+                "next to the guess; give "
                 "another period or guess, or a longer integration.transient_periods"
             )
         return self._orbit(found, period)
@@ -264,7 +276,8 @@ class System:
 
         Every array has the shape (samples,), accelerations (samples, coordinates).
         """
-        found = kernels.mesh_motion(self._record, motion.states[np.newaxis], self._steps)
+        states = motion.states[np.newaxis]
+        found = kernels.mesh_motion(self._record, states, self._steps, motion.first_period)
         return kernels.MeshMotion(*(array[0] for array in found))
 
     @property
@@ -279,7 +292,7 @@ class System:
 
     def _orbit(self, found: Orbits, period: int) -> Orbit:
         exponent = orbit_exponent(
-            found.multipliers, np.array([period], np.int32), self._record.mesh_period
+            found.multipliers, np.array([period], np.int32), self._record.excitation_period
         )
         return Orbit(
             period,

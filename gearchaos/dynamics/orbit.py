@@ -13,9 +13,10 @@ from gearchaos.dynamics.following import StabilityLoss
 class Orbit(NamedTuple):
     """A periodic orbit.
 
-    ``period`` in mesh periods; ``point`` (states,) at mesh phase 0; ``multipliers`` (states,): the
-    Floquet multipliers, largest modulus first; ``exponent``: the largest Lyapunov exponent per unit
-    of tau; ``residual``: distance after one period, relative to the scale of each coordinate.
+    ``period`` in excitation periods; ``point`` (states,) at its beginning; ``multipliers``
+    (states,): the Floquet multipliers, largest modulus first; ``exponent``: the largest Lyapunov
+    exponent per unit of tau; ``residual``: distance after one period, relative to the scale of each
+    coordinate.
     """
 
     period: int

@@ -90,8 +90,9 @@ class Simulation:
         )
         judged = outputs.lyapunov and integration.tolerance is None
         coarse = coarse_steps(self.lanes, steps) if judged else ""
-        longer = "" if repeats == 1 else self._longer(lengths)
-        self.notes = [text for text in (note, coarse, longer, self._negative_stiffness()) if text]
+        teeth = [self._longer(lengths), self._parting_pairs()] if repeats > 1 else []
+        notes = [note, coarse, *teeth, self._negative_stiffness()]
+        self.notes = [text for text in notes if text]
         self._choice: list[Variable] = []
 
     def choose_steps(self) -> None:
@@ -327,6 +328,24 @@ class Simulation:
         ]
         text = f"the pitch errors repeat after {repeats} mesh periods, the excitation period"
         return f"{text}: {', '.join(changed)}, whole ones of it" if changed else text
+
+    def _parting_pairs(self) -> str:
+        """Tell where neighbouring tooth pairs differ by more than the load bends them."""
+        system = self.lanes.system_of(self.lanes.spread(PILOT_LANES))
+        if system.teeth is None:
+            return ""
+        gears = system.teeth.driving, system.teeth.driven
+        step = sum(np.abs(gear - np.roll(gear, 1, axis=1)).max(axis=1) for gear in gears)
+        groups = system.groups
+        apart = np.abs(groups.error_amplitude) * step[system.teeth.profile]
+        parting = np.mean(apart > np.abs(groups.load))
+        if parting == 0.0:
+            return ""
+        return (
+            f"in {parting:.0%} of the lanes neighbouring tooth pairs differ by up to "
+            f"{apart.max():.2g}, more than the static deflection there; single pairs may then part "
+            "while its neighbours carry, which the model leaves out"
+        )
 
     def _negative_stiffness(self) -> str:
         """Tell where the variation of the mesh stiffness exceeds its mean."""

@@ -1,0 +1,115 @@
+"""Systems whose pitch errors differ from tooth to tooth: periods, orbits, exponents, lengths."""
+
+import numpy as np
+import pytest
+
+import gearchaos
+from gearchaos.configuration import Configuration
+
+DEVIATIONS = np.round(12.0 * np.sin(2.0 * np.pi * np.arange(21) / 21), 2) + [0, 5, -4] * 7
+
+TABLES = {
+    "pair": {
+        "teeth": [21, 38],
+        "normal_module_mm": 2.166,
+        "normal_pressure_angle_deg": 20.0,
+        "helix_angle_deg": 20.0,
+        "face_width_mm": 15.0,
+    },
+    "mesh": {
+        "length_scale_um": 50.0,
+        "stiffness": {"shape": "trapezoid"},
+        "half_backlash_um": 50.0,
+    },
+    "groups": {"mesh_frequency": 0.9, "load": 0.3, "damping_ratio": 0.05},
+    "pitch_error": {"kind": "teeth", "driving": {"cumulative_um": DEVIATIONS.tolist()}},
+    "scene": {"effects": ["pitch_error", "stiffness_variation", "backlash"]},
+    "sweep": {"parameter": "pitch_error", "values": [0.5, 1.0, 2.0]},
+    "integration": {"transient_periods": 400, "recorded_periods": 200},
+}
+
+
+def configured(**changes) -> Configuration:
+    return Configuration.from_tables({**TABLES, **changes})
+
+
+GRADES = {"kind": "grade", "grade": 9, "realisations": 4, "seed": 5}
+
+
+@pytest.fixture(scope="module")
+def result():
+    return gearchaos.run(configured())
+
+
+def test_a_motion_that_repeats_with_the_teeth_has_period_one(result):
+    assert result.metadata["excitation_period"] == 21
+    assert result["period"].tolist() == [1, 1, 1]
+    section = result["section_delta_5"]
+    assert section[:, -1] == pytest.approx(section[:, -22], abs=1e-9)
+    assert np.ptp(section[:, -21:], axis=1).min() > 0.01
+
+
+def test_lengths_are_whole_excitation_periods_and_said_to_be_so(result):
+    assert result.metadata["transient_periods"] == 420
+    assert result.metadata["recorded_periods"] == 210
+    assert "repeat after 21 mesh periods" in result.metadata["notes"]
+    assert "recorded_periods raised from 200 to 210" in result.metadata["notes"]
+
+
+def test_floquet_multipliers_over_21_mesh_periods_are_the_exponents_of_tangent_vectors():
+    lengths = {"transient_periods": 630, "recorded_periods": 1260}
+    system = gearchaos.System(configured(integration=lengths), pitch_error=2.0)
+    orbit = system.orbit()
+    assert system.repeats_after == 21
+    assert orbit.residual < 1e-12
+    by_multipliers = np.log(np.abs(orbit.multipliers)) / (21 * system.mesh_period)
+    assert by_multipliers == pytest.approx(system.exponents().values, rel=0, abs=1e-6)
+    assert by_multipliers.sum() == pytest.approx(system.sum_of_exponents(), rel=0, abs=1e-8)
+
+
+def test_the_exponent_of_a_sweep_is_that_of_the_orbit(result):
+    system = gearchaos.System.of_lane(result, pitch_error=1.0)
+    assert result["lyapunov_exponent"][1] == pytest.approx(system.orbit().exponent, rel=1e-9)
+
+
+def test_a_carried_sweep_hands_its_states_on_in_phase(result):
+    carried = gearchaos.run(configured(start={"kind": "rest", "carry": "upwards"}))
+    assert carried["section_delta_5"] == pytest.approx(result["section_delta_5"], abs=1e-9)
+
+
+def test_an_excitation_period_of_both_gears_is_their_least_common_multiple():
+    config = configured(pitch_error=GRADES, sweep={"parameter": "pitch_error", "values": [1.0]})
+    result = gearchaos.run(config)
+    assert result.metadata["excitation_period"] == 798
+    assert result.metadata["recorded_periods"] == 3 * 798
+    assert result["period"].tolist() == [[1, 1, 1, 1]]
+    assert np.unique(result["end_state"][..., 0]).size == 4
+
+
+def test_a_drawn_pair_moves_as_it_does_alone():
+    config = configured(pitch_error=GRADES, sweep={"parameter": "pitch_error", "values": [1.0]})
+    all_pairs = gearchaos.run(config)
+    alone = gearchaos.run(config.at({"realisation": 2.0}))
+    for name in ("section_delta_5", "end_state", "lyapunov_exponent"):
+        assert np.array_equal(alone[name][0], all_pairs[name][0, 2]), name
+
+
+def test_the_error_in_a_response_is_that_of_the_teeth_in_mesh():
+    system = gearchaos.System(configured(), pitch_error=1.0)
+    response = system.response(periods=42)
+    error = response["mesh_error"][0]
+    steps = response.metadata["steps_per_period"]
+    assert error[: 21 * steps] == pytest.approx(error[21 * steps : 42 * steps], abs=1e-15)
+    # Along the line of action, of a driving tooth that lies ahead less remains.
+    alpha_t = np.arctan(np.tan(np.radians(20.0)) / np.cos(np.radians(20.0)))
+    deviations = DEVIATIONS - DEVIATIONS[0]
+    assert -error.max() * 50.0 > deviations.min() * np.cos(alpha_t)
+    assert -error.min() * 50.0 < deviations.max() * np.cos(alpha_t)
+    mean = np.mean(error[: 21 * steps]) * 50.0
+    assert mean == pytest.approx(-np.mean(deviations) * np.cos(alpha_t), rel=1e-9)
+
+
+def test_a_contact_ratio_that_no_pair_of_gears_can_have_is_refused():
+    wide = {**TABLES["pair"], "face_width_mm": 150.0}
+    with pytest.raises(gearchaos.ConfigurationError, match="total contact ratio"):
+        gearchaos.run(configured(pair=wide))
