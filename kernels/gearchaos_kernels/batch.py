@@ -34,6 +34,7 @@ def _integrate_blocks(
     pitch_error,
     phase,
     teeth,
+    wide,
     stiffness_variation,
     backlash,
     transverse,
@@ -48,6 +49,7 @@ def _integrate_blocks(
             pitch_error,
             phase,
             teeth,
+            wide,
             stiffness_variation,
             backlash,
             transverse,
@@ -79,6 +81,11 @@ def integrate(
     -------
     Outcome
         Identical bit for bit for any number of threads, any split and any order of the lanes.
+
+    Raises
+    ------
+    ValueError
+        If flow maps are asked for with pitch errors tooth by tooth.
     """
     lanes, states = start.shape[0], len(system.states)
     steps = plan.steps_per_period
@@ -97,6 +104,8 @@ def integrate(
         history=np.full((lanes, plan.history_periods * steps + 1, states), np.nan),
     )
     present = flags(system, plan)
+    if present.flow_map is not None and present.teeth is not None:
+        raise ValueError("flow maps know pitch errors that are a sine, not those of teeth")
     teeth = NO_TEETH if present.teeth is None or system.teeth is None else system.teeth
     schedule = Schedule(*(getattr(plan, name) for name in Schedule._fields))
     for order, blocks, maps, steps_of in _shares(system, plan, present):

@@ -49,7 +49,7 @@ from gearchaos_kernels.forcing import During, forcing_at, phase_on_grid
 from gearchaos_kernels.rk4 import step, tangent_step
 from gearchaos_kernels.splitting import split_step
 from gearchaos_kernels.status import Status
-from gearchaos_kernels.teeth import engage, share_errors, share_step, with_teeth
+from gearchaos_kernels.teeth import engage, keep_shared, shares_at, with_kept, with_teeth
 
 LARGEST_STATE = 1e100
 """A state beyond this has left every length scale: the lane is stopped as diverged."""
@@ -93,6 +93,7 @@ def integrate_block(number_of_block, batch, plan, outcome, present):
     first, lanes, steps, maps_at = batch.blocks[number_of_block]
     memory = aligned_memory()
     table = batch.table
+    shares = batch.shares
     maps = batch.maps
     # A few lanes need no more than one vector, and one lane with maps of its own not even that.
     slots = 1 if lanes == 1 else VECTOR if lanes <= VECTOR else LANES
@@ -109,8 +110,6 @@ def integrate_block(number_of_block, batch, plan, outcome, present):
                 sample = (period - periods + plan.history_periods) * plan.steps_per_period
                 keep_state(block, batch, outcome.history, sample + number // every)
             row = maps_at + number * step_size(present)
-            if present.teeth is not None:
-                share_step(memory, batch.shares, number)
             if present.flow_map is None:
                 # Not in the loop over slots: nobody tells the compiler that its stores spare it.
                 phases = During(
@@ -118,13 +117,15 @@ def integrate_block(number_of_block, batch, plan, outcome, present):
                     phase_on_grid(table, 2 * number + 1),
                     phase_on_grid(table, 2 * number + 2),
                 )
-                suspects = step_block(memory, phases, present)
+                middle_shares = shares_at(batch.shares, 2 * number + 1, present)
+                end_shares = shares_at(batch.shares, 2 * number + 2, present)
+                suspects = step_block(memory, phases, middle_shares, end_shares, present)
             else:
                 suspects = move_block(memory, maps, row, slots, work, present)
             if present.resolved is not None:
                 if suspects > 0:
                     recorded = period >= plan.transient_periods
-                    split(memory, table, maps, row, work, lanes, number, recorded, present)
+                    split(memory, table, shares, maps, row, work, lanes, number, recorded, present)
             if present.tangent is not None:
                 last = number == steps - 1
                 if (number + 1) % interval == 0 or last:
@@ -141,8 +142,6 @@ def turn(block, batch, period, present):
         for slot in range(LANES):
             profile = batch.profile[batch.order[first + min(slot, lanes - 1)]]
             engage(memory, slot, batch.driving[profile], batch.driven[profile], period)
-        # What ends a step begins the next one.
-        share_errors(memory, batch.shares, 0, 2)
 
 
 @scalar
@@ -160,9 +159,11 @@ def begin(block, batch, present):
         fill(memory, TANGENT, slot, batch.scales[index], batch.tangent_start[index])
         memory[GROWTH * STRIDE + slot] = 0.0
         store(memory, CROSSINGS, slot, Crossings(0.0, math.inf, 0.0))
+        weights = shares_at(batch.shares, 0, present)
+        point = with_teeth(memory, slot, weights, phase_on_grid(batch.table, 0), present)
+        keep_shared(memory, slot, point, present)
         if present.resolved is not None:
             lane = load(memory, COEFFICIENTS, slot, Lane)
-            point = with_teeth(memory, slot, 2, phase_on_grid(batch.table, 0), present)
             forcing = forcing_at(lane, point, present)
             state = read_state(memory, STATE, slot, present)
             gaps = gaps_at(state, lane, forcing, present)
@@ -173,17 +174,22 @@ def begin(block, batch, present):
 
 
 @scalar
-def step_block(memory, phases, present):
+def step_block(memory, phases, middle_shares, end_shares, present):
     """Take one step in every slot; return how many may have left a contact branch."""
     # A sum of integers, which the compiler knows how to vectorise; it does not know a flag.
     suspects = 0
     for slot in range(LANES):
         lane = load(memory, COEFFICIENTS, slot, Lane)
         state = read_state(memory, STATE, slot, present)
+        # What ended the last step begins this one.
+        begin = with_kept(memory, slot, phases.begin, present)
+        middle = with_teeth(memory, slot, middle_shares, phases.middle, present)
+        end = with_teeth(memory, slot, end_shares, phases.end, present)
+        keep_shared(memory, slot, end, present)
         during = During(
-            forcing_at(lane, with_teeth(memory, slot, 0, phases.begin, present), present),
-            forcing_at(lane, with_teeth(memory, slot, 1, phases.middle, present), present),
-            forcing_at(lane, with_teeth(memory, slot, 2, phases.end, present), present),
+            forcing_at(lane, begin, present),
+            forcing_at(lane, middle, present),
+            forcing_at(lane, end, present),
         )
         if present.resolved is None:
             after, slopes = step(state, 1.0, lane, during, None, present)
@@ -207,7 +213,7 @@ def step_block(memory, phases, present):
 
 
 @scalar
-def split(memory, table, maps, row, work, lanes, number, recorded, present):
+def split(memory, table, shares, maps, row, work, lanes, number, recorded, present):
     """Split the step of every lane that may have left a contact branch."""
     # No array of the outcome here: passing one means counting references to it at every step.
     for slot in range(lanes):
@@ -215,7 +221,7 @@ def split(memory, table, maps, row, work, lanes, number, recorded, present):
             continue
         before = load(memory, CROSSINGS, slot, Crossings)
         if present.flow_map is None:
-            count, slowest, overflow = split_step(memory, slot, table, number, present)
+            count, slowest, overflow = split_step(memory, slot, table, shares, number, present)
         else:
             count, slowest, overflow = cross(memory, slot, maps, row, work, present)
         if not recorded:

@@ -44,6 +44,7 @@ class Present(NamedTuple):
     pitch_error: tuple[()] | None
     phase: tuple[()] | None
     teeth: tuple[()] | None
+    wide: tuple[()] | None
     stiffness_variation: tuple[()] | None
     backlash: tuple[()] | None
     transverse: tuple[()] | None
@@ -56,11 +57,12 @@ class Present(NamedTuple):
 def flags(system: System, plan: Plan) -> Present:
     """Tell in types what the loop of a scene has, so that every scene is compiled for itself."""
     effects = system.effects
-    teeth = effects.pitch_error and system.teeth is not None
+    teeth = system.teeth if effects.pitch_error else None
     values = {
         **effects._asdict(),
-        "phase": effects.pitch_error and not teeth and bool(np.any(system.groups.error_phase)),
-        "teeth": teeth,
+        "phase": effects.pitch_error and teeth is None and bool(np.any(system.groups.error_phase)),
+        "teeth": teeth is not None,
+        "wide": teeth is not None and teeth.pairs_in_mesh > NARROW,
         "resolved": effects.backlash and (plan.resolved or plan.method == "flow_map"),
         "tangent": plan.tangent,
         "flow_map": plan.method == "flow_map",
@@ -157,13 +159,13 @@ FORCES = CROSSINGS + len(Crossings._fields)
 """First row of what forces a lane where a step is a map; see `flow_map`."""
 MARGINS = FORCES + 5
 """Rows of how far either gap may stray from its cubic in a step that is a map."""
-MOST_PAIRS = 7
-"""Tooth pairs in mesh at once."""
+NARROW, MOST_PAIRS = 4, 7
+"""Tooth pairs in mesh at once: with more than the first the loop is another one."""
 PAIRS = MARGINS + 2
 """First row of their errors; see `teeth`."""
 SHARED = PAIRS + MOST_PAIRS
-"""Rows of the error that they share at the three phases of a step: value, slope and curvature."""
-ROWS = SHARED + 9
+"""Rows of the error that they share where the last step ended: value, slope and curvature."""
+ROWS = SHARED + 3
 
 _ITEM = np.dtype(np.float64).itemsize
 

@@ -33,7 +33,7 @@ from gearchaos_kernels.equations import (
 )
 from gearchaos_kernels.forcing import forcing_at, phase_on_grid, phase_table, shifted
 from gearchaos_kernels.system import Effects, Floats, MeshMotion, Plan, System
-from gearchaos_kernels.teeth import NO_TEETH, engage, share_errors, share_table, with_teeth
+from gearchaos_kernels.teeth import NO_TEETH, engage, share_table, shares_at, with_teeth
 
 _ALONE = Plan(1, 0, 0, 0, resolved=False)
 """No loop: nothing is split and no tangent vector carried along."""
@@ -146,8 +146,8 @@ def _follow(
             if present.teeth is not None:
                 period = first + 2 * sample // (table.shape[0] - 1)
                 engage(memory, 0, driving[index], driven[index], period)
-                share_errors(memory, shares, row, 0)
-            point = with_teeth(memory, 0, 0, phase_on_grid(table, row), present)
+            weights = shares_at(shares, row, present)
+            point = with_teeth(memory, 0, weights, phase_on_grid(table, row), present)
             forcing = forcing_at(lane, point, present)
             if present.pitch_error is not None:
                 # Half of what twice the error is made of, whatever the form of the gaps.

@@ -36,14 +36,6 @@ class Phase(NamedTuple):
     curvature: float
 
 
-class Shared(NamedTuple):
-    """Value, slope and curvature of the error that the teeth in mesh share; see `Phase`."""
-
-    value: float
-    slope: float
-    curvature: float
-
-
 class Forcing(NamedTuple):
     """What acts on a lane at one instant, per step; what a scene leaves out is the constant 0."""
 

@@ -27,14 +27,14 @@ from gearchaos_kernels.contact import NEVER, branches_at, leaving_fraction, next
 from gearchaos_kernels.equations import gaps_at
 from gearchaos_kernels.forcing import During, forcing_at, phase_on_grid, phase_within
 from gearchaos_kernels.rk4 import step, tangent_step
-from gearchaos_kernels.teeth import with_teeth, with_teeth_within
+from gearchaos_kernels.teeth import between, shares_at, with_teeth
 
 MOST_SPLITS = 16
 """Crossings of one step; a step with more goes on with its last branches and is counted."""
 
 
 @scalar
-def split_step(memory, slot, table, number, present):
+def split_step(memory, slot, table, shares, number, present):
     """Repeat one step of one lane in pieces that each stay on their contact branches.
 
     The state before the step is in the rows from `BEFORE` on, the one after it, which ignored the
@@ -54,10 +54,8 @@ def split_step(memory, slot, table, number, present):
     tangent = state
     if present.tangent is not None:
         tangent = read_state(memory, BEFORE + TANGENT, slot, present)
-    begins = with_teeth(memory, slot, 0, phase_on_grid(table, 2 * number), present)
-    begin = forcing_at(lane, begins, present)
-    ends = with_teeth(memory, slot, 2, phase_on_grid(table, 2 * number + 2), present)
-    end = forcing_at(lane, ends, present)
+    begin = forcing_on_grid(memory, slot, lane, table, shares, 2 * number, present)
+    end = forcing_on_grid(memory, slot, lane, table, shares, 2 * number + 2, present)
     gaps = gaps_at(state, lane, begin, present)
     branches = read_branches(memory, slot, present)
     done = 0.0
@@ -72,9 +70,11 @@ def split_step(memory, slot, table, number, present):
             break
 
         piece = fraction * left
-        middle = forcing_within(memory, slot, lane, table, number, done + 0.5 * piece, present)
+        middle = forcing_within(
+            memory, slot, lane, table, shares, number, done + 0.5 * piece, present
+        )
         done += piece
-        crossing = forcing_within(memory, slot, lane, table, number, done, present)
+        crossing = forcing_within(memory, slot, lane, table, shares, number, done, present)
         during = During(begin, middle, crossing)
         state, slopes = step(state, piece, lane, during, branches, present)
         if present.tangent is not None:
@@ -92,7 +92,9 @@ def split_step(memory, slot, table, number, present):
             branches = Branches(following, branches.axial)
 
         left = 1.0 - done
-        middle = forcing_within(memory, slot, lane, table, number, done + 0.5 * left, present)
+        middle = forcing_within(
+            memory, slot, lane, table, shares, number, done + 0.5 * left, present
+        )
         after, slopes = step(state, left, lane, During(begin, middle, end), branches, present)
         write_state(memory, STATE, slot, after, present)
         if present.tangent is not None:
@@ -104,10 +106,24 @@ def split_step(memory, slot, table, number, present):
 
 
 @scalar
-def forcing_within(memory, slot, lane, table, number, fraction, present):
+def forcing_within(memory, slot, lane, table, shares, number, fraction, present):
     """Return what acts on a lane at a fraction of a step."""
     point = phase_within(table, number, fraction)
-    point = with_teeth_within(memory, slot, fraction, point, table.shape[0], present)
+    if present.teeth is not None:
+        half = 0 if fraction < 0.5 else 1
+        row = 2 * number + half
+        begin = with_teeth(memory, slot, shares_at(shares, row, present), point, present)
+        end = with_teeth(memory, slot, shares_at(shares, row + 1, present), point, present)
+        width = 2.0 * math.pi / (table.shape[0] - 1)
+        point = between(begin, end, 2.0 * fraction - half, width, point)
+    return forcing_at(lane, point, present)
+
+
+@scalar
+def forcing_on_grid(memory, slot, lane, table, shares, row, present):
+    """Return what acts on a lane at a row of the table."""
+    point = phase_on_grid(table, row)
+    point = with_teeth(memory, slot, shares_at(shares, row, present), point, present)
     return forcing_at(lane, point, present)
 
 

@@ -58,6 +58,10 @@ class Groups(NamedTuple):
     axial_damping_g: Floats
 
 
+SPLINE_DEGREE = 5
+"""Of the splines between the shares: e'' then has the derivatives that order 4 asks for."""
+
+
 class Teeth(NamedTuple):
     """Pitch errors tooth by tooth, in place of the sine of eq. 14; see `teeth`.
 
@@ -75,6 +79,21 @@ class Teeth(NamedTuple):
     share: Floats
     cells_per_period: int
     entry: float
+
+    @property
+    def begins(self) -> float:
+        """Mesh phase, in periods, at which the first pair of a period begins to take load.
+
+        The spline of a cell is centred on it and reaches beyond; what then begins before the period
+        does is the next pair.
+        """
+        return (self.entry - SPLINE_DEGREE / (2.0 * self.cells_per_period)) % 1.0
+
+    @property
+    def pairs_in_mesh(self) -> int:
+        """Most tooth pairs that have a share in the same mesh period."""
+        reach = (self.share.size + SPLINE_DEGREE) / self.cells_per_period
+        return math.ceil(reach + self.begins)
 
 
 class System(NamedTuple):

@@ -11,25 +11,28 @@ lane keeps the errors of the few pairs in mesh, which move on by one pair every 
 
 from __future__ import annotations
 
-import math
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gearchaos_kernels.block_memory import LANES, MOST_PAIRS, PAIRS, SHARED, STRIDE, load
+from gearchaos_kernels.block_memory import MOST_PAIRS, NARROW, PAIRS, SHARED, STRIDE, load, store
 from gearchaos_kernels.compilation import scalar
-from gearchaos_kernels.forcing import Phase, Shared
-from gearchaos_kernels.system import Floats, Teeth
+from gearchaos_kernels.forcing import Phase
+from gearchaos_kernels.system import SPLINE_DEGREE, Floats, Teeth
 
-DEGREE = 5
-"""Of the splines between the shares: e'' then has the derivatives that order 4 asks for."""
+
+class Shared(NamedTuple):
+    """Value, slope and curvature of the error that the teeth in mesh share; see `Phase`."""
+
+    value: float
+    slope: float
+    curvature: float
+
 
 NO_TEETH = Teeth(np.zeros((1, 1)), np.zeros((1, 1)), np.zeros(1, np.intp), np.zeros(1), 1, 0.0)
 """Stands where the pitch error is that of eq. 14."""
-
-_AT_ONCE = 3
-"""Pairs whose errors are weighed in one go."""
 
 
 def share_table(teeth: Teeth, steps_per_period: int) -> Floats:
@@ -39,34 +42,31 @@ def share_table(teeth: Teeth, steps_per_period: int) -> Floats:
     one that came last, which has the rest, and of pairs that fill up, without a share. Raises
     ValueError with too many in mesh.
     """
-    cells = np.ascontiguousarray(teeth.share, dtype=np.float64)
-    # The spline of a cell is centred on it; what then begins before period 0 is the next pair.
-    entry = (teeth.entry - DEGREE / (2.0 * teeth.cells_per_period)) % 1.0
-    return _table(cells.tobytes(), teeth.cells_per_period, entry, steps_per_period)
+    if teeth.pairs_in_mesh > MOST_PAIRS:
+        raise ValueError(f"{teeth.pairs_in_mesh} tooth pairs in mesh at once, not {MOST_PAIRS}")
+    share = np.ascontiguousarray(teeth.share, dtype=np.float64).tobytes()
+    pairs = NARROW if teeth.pairs_in_mesh <= NARROW else MOST_PAIRS
+    return _table(share, teeth.cells_per_period, teeth.begins, pairs, steps_per_period)
 
 
 @lru_cache(maxsize=8)
-def _table(share: bytes, cells_per_period: int, entry: float, steps: int) -> Floats:
+def _table(share: bytes, cells_per_period: int, begins: float, pairs: int, steps: int) -> Floats:
     cells = np.frombuffer(share)
-    pairs = int(np.ceil((cells.size + DEGREE) / cells_per_period + entry))
-    if pairs > MOST_PAIRS:
-        raise ValueError(f"{pairs} tooth pairs in mesh at once, more than {MOST_PAIRS}")
-    pairs += -(pairs - 1) % _AT_ONCE
     phase = np.arange(2 * steps + 1)[:, np.newaxis] / (2 * steps)
-    place = cells_per_period * (phase + np.arange(pairs) - entry)
+    place = cells_per_period * (phase + np.arange(pairs) - begins)
     whole = np.floor(place)
-    number = np.clip(whole.astype(np.intp), -1, cells.size + DEGREE)
-    padded = np.pad(cells, (DEGREE + 1, DEGREE + 1))
+    number = np.clip(whole.astype(np.intp), -1, cells.size + SPLINE_DEGREE)
+    padded = np.pad(cells, (SPLINE_DEGREE + 1, SPLINE_DEGREE + 1))
     table = np.zeros((2 * steps + 1, 3, pairs))
-    for back in range(DEGREE + 1):
-        cell = padded[number - back + DEGREE + 1]
+    for back in range(SPLINE_DEGREE + 1):
+        cell = padded[number - back + SPLINE_DEGREE + 1]
         for order in range(3):
             slope = (cells_per_period / (2.0 * np.pi)) ** order
             table[:, order] += slope * cell * _basis(place - whole + back, order)
     return np.ascontiguousarray(table[:, :, 1:])
 
 
-def _basis(x: Floats, derivative: int, degree: int = DEGREE) -> Floats:
+def _basis(x: Floats, derivative: int, degree: int = SPLINE_DEGREE) -> Floats:
     """Return the spline of unit knots that is not zero from 0 to its degree + 1."""
     if derivative:
         below = _basis(x, derivative - 1, degree - 1), _basis(x - 1.0, derivative - 1, degree - 1)
@@ -91,70 +91,78 @@ def engage(memory, slot, driving, driven, period):
 
 
 @scalar
-def share_errors(memory, shares, row, half):
-    """Weigh the errors of the pairs in mesh in every slot, at one of the three phases of a step."""
-    weigh(memory, shares[row], half, 0)
-    if shares.shape[2] > _AT_ONCE:
-        weigh(memory, shares[row], half, _AT_ONCE)
+def shares_at(shares, row, present):
+    """Return one row of the table as numbers that every slot reads, None without teeth."""
+    if present.teeth is None:
+        return None
+    near = three(shares[row], 0)
+    if present.wide is None:
+        return near, near
+    return near, three(shares[row], NARROW - 1)
 
 
 @scalar
-def weigh(memory, shares, half, first):
-    """Weigh the errors of three pairs, and add what others have."""
-    a1, a2, a3 = shares[0, first], shares[0, first + 1], shares[0, first + 2]
-    b1, b2, b3 = shares[1, first], shares[1, first + 1], shares[1, first + 2]
-    c1, c2, c3 = shares[2, first], shares[2, first + 1], shares[2, first + 2]
-    at = (SHARED + 3 * half) * STRIDE
-    for slot in range(LANES):
-        value = memory[PAIRS * STRIDE + slot]
-        slope = 0.0
-        curvature = 0.0
-        if first > 0:
-            value = memory[at + slot]
-            slope = memory[at + STRIDE + slot]
-            curvature = memory[at + 2 * STRIDE + slot]
-        e1 = memory[(PAIRS + first + 1) * STRIDE + slot]
-        e2 = memory[(PAIRS + first + 2) * STRIDE + slot]
-        e3 = memory[(PAIRS + first + 3) * STRIDE + slot]
-        memory[at + slot] = value + a1 * e1 + a2 * e2 + a3 * e3
-        memory[at + STRIDE + slot] = slope + b1 * e1 + b2 * e2 + b3 * e3
-        memory[at + 2 * STRIDE + slot] = curvature + c1 * e1 + c2 * e2 + c3 * e3
+def three(shares, first):
+    """Return the shares of three pairs with their derivatives."""
+    return (
+        (shares[0, first], shares[0, first + 1], shares[0, first + 2]),
+        (shares[1, first], shares[1, first + 1], shares[1, first + 2]),
+        (shares[2, first], shares[2, first + 1], shares[2, first + 2]),
+    )
 
 
 @scalar
-def share_step(memory, shares, number):
-    """Prepare a step: its begin is the end of the one before, its middle and end are new."""
-    for order in range(3):
-        for slot in range(LANES):
-            end = memory[(SHARED + 6 + order) * STRIDE + slot]
-            memory[(SHARED + order) * STRIDE + slot] = end
-    share_errors(memory, shares, 2 * number + 1, 1)
-    share_errors(memory, shares, 2 * number + 2, 2)
-
-
-@scalar
-def with_teeth(memory, slot, half, point, present):
-    """Return one of the three mesh phases of a step with the error that its teeth share, if any."""
+def with_teeth(memory, slot, shares, point, present):
+    """Return a mesh phase with the error that the teeth share, if they have their own."""
     if present.teeth is None:
         return point
-    shared = load(memory, SHARED + 3 * half, slot, Shared)
+    near, far = shares
+    value, slope, curvature = weigh(memory, slot, 1, near)
+    if present.wide is not None:
+        more = weigh(memory, slot, NARROW, far)
+        value += more[0]
+        slope += more[1]
+        curvature += more[2]
+    return Phase(point.variation, memory[PAIRS * STRIDE + slot] + value, slope, curvature)
+
+
+@scalar
+def weigh(memory, slot, first, shares):
+    """Weigh the errors of three pairs."""
+    e1 = memory[(PAIRS + first) * STRIDE + slot]
+    e2 = memory[(PAIRS + first + 1) * STRIDE + slot]
+    e3 = memory[(PAIRS + first + 2) * STRIDE + slot]
+    a, b, c = shares
+    return (
+        a[0] * e1 + a[1] * e2 + a[2] * e3,
+        b[0] * e1 + b[1] * e2 + b[2] * e3,
+        c[0] * e1 + c[1] * e2 + c[2] * e3,
+    )
+
+
+@scalar
+def keep_shared(memory, slot, point, present):
+    """Keep the error that the teeth share at the end of a step."""
+    if present.teeth is not None:
+        store(memory, SHARED, slot, Shared(point.value, point.slope, point.curvature))
+
+
+@scalar
+def with_kept(memory, slot, point, present):
+    """Return a mesh phase with the error that the teeth shared where the last step ended."""
+    if present.teeth is None:
+        return point
+    shared = load(memory, SHARED, slot, Shared)
     return Phase(point.variation, shared.value, shared.slope, shared.curvature)
 
 
 @scalar
-def with_teeth_within(memory, slot, fraction, point, rows, present):
-    """Return the mesh phase at a fraction of a step with the error that its teeth share, if any.
+def between(begin, end, t, width, point):
+    """Return a mesh phase with the error between two half steps so far apart.
 
-    Between two half steps, of which there are so many rows a period, it is the polynomial of order
-    5 through value, slope and curvature at both.
+    At a fraction of the way it is the polynomial of order 5 through value, slope and curvature at
+    both.
     """
-    if present.teeth is None:
-        return point
-    half = 0 if fraction < 0.5 else 1
-    width = 2.0 * math.pi / (rows - 1)
-    t = 2.0 * fraction - half
-    begin = load(memory, SHARED + 3 * half, slot, Shared)
-    end = load(memory, SHARED + 3 * half + 3, slot, Shared)
     c1 = width * begin.slope
     c2 = 0.5 * width * width * begin.curvature
     # What the parabola at the beginning leaves of value, slope and curvature at the end.
