@@ -6,6 +6,7 @@ import csv
 import os
 from collections.abc import Mapping
 from functools import cache
+from math import isfinite
 from pathlib import Path
 from typing import Any
 
@@ -84,7 +85,7 @@ def with_deviation_files(
             continue
         if not isinstance(files.get(name), str):
             path = os.path.join(os.path.dirname(source) or ".", name)
-            files[name] = text_of_file(path, f"pitch deviations ({here} in {source})")
+            files[name] = text_of_file(path, f"file of pitch deviations ({here} in {source})")
         read = LISTS.get(str(table.get("holds")), LISTS["cumulative"])
         try:
             table[read] = _column(files[name], table.get("column"))
@@ -113,7 +114,7 @@ def _column(text: str, column: object) -> list[float]:
     place, numbers = headings.index(column), []
     for row in reader:
         cell = "".join(row[place : place + 1]).strip()
-        if not NUMBER.fullmatch(cell):
+        if not (NUMBER.fullmatch(cell) and isfinite(float(cell))):
             where = f"line {lines[reader.line_num - 1][0]}, column {column}"
             rule = f"{where}: must be a finite number, not {shown(cell)}"
             raise ValueError(rule, "give one for every tooth, decimals with a point")

@@ -61,10 +61,7 @@ def _unsound(
     """Yield the rule that a list of deviations breaks, with its remedy."""
     given = cumulative or single or ()
     if len(given) != teeth:
-        yield (
-            f"holds {len(given)} values, and the gear has {teeth} teeth",
-            "give one for every tooth",
-        )
+        yield f"holds {len(given)} values for {teeth} teeth", "give one for every tooth"
         return
     if cumulative is None:
         total, largest = sum(given), max(map(abs, given))
