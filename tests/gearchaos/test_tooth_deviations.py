@@ -129,6 +129,7 @@ COLUMNS = {
     "tabs": "Fp\ttooth\n" + "".join(f"{f}\t0\n" for f in F),
     "one column": "Fp\r\n" + "".join(f"{f}\r\n" for f in F),
     "quotes": '"tooth","Fp"\n' + "".join(f'"a, b","{f}"\n' for f in F),
+    "beside a longer one": "g,p,Fp\n" + "".join(f"0,1,{f}\n" for f in F) + "0,2,\n0\n",
     "a byte order mark": "\ufeffFp;x\n" + "".join(f"{f};\n" for f in F),
 }
 
@@ -178,7 +179,8 @@ def test_a_configuration_and_its_result_stand_alone_without_the_file(tmp_path):
     assert run_module("gearchaos.response", *onwards, cwd=tmp_path).code == 0
     # Who reads the configuration anew needs the file.
     ended = run_module("gearchaos.sweep", *arguments, "--overwrite", cwd=tmp_path)
-    assert ended.code == 4 and "gear.csv: no such file; check the path" in ended.err
+    assert ended.code == 2
+    assert 'pitch_error.driving.file = "gear.csv": no such file; check the path of' in ended.err
 
 
 ROWS = "Fp\n" + "".join(f"{f}\n" for f in F)
@@ -192,9 +194,15 @@ FAULTY_FILES = {
         'line 3, column Fp: must be a finite number, not "1e999"',
     ),
     "decimal comma": (ROWS.replace("Fp", "x;Fp").replace("4.0", "0;4,0"), "decimals with a point"),
-    "short row": ("x;Fp\n1;0.0\n\n2\n", 'line 4, column Fp: must be a finite number, not ""'),
+    "short row": (
+        "x;Fp\n1;0.0\n\n2\n3;1.0\n",
+        'line 4, column Fp: must be a finite number, not ""',
+    ),
     "missing tooth": (ROWS.replace("4.0\n", ""), "gear.csv, column Fp: holds 4 values for 5 teeth"),
-    "binary": (b"\x89HDF\r\n\x1a\n", "gear.csv: line 1 is not UTF-8 text; save the file of"),
+    "binary": (
+        b"\x89HDF\r\n\x1a\n",
+        'file = "gear.csv": line 1 is not UTF-8 text; save the file of',
+    ),
     "zeros": (bytes(100), 'has no column "Fp"'),
     "huge": (b"Fp\n" + b"0.0\n" * 2_000_000, "larger than 4 MB, so hardly a file of pitch"),
 }
@@ -212,12 +220,17 @@ def test_a_faulty_file_is_refused_with_its_line(content, message, tmp_path):
 
 @pytest.mark.parametrize(
     ("name", "message"),
-    [("none.csv", "none.csv: no such file; check"), (".", ": is a directory; name a file in it")],
+    [
+        ("none.csv", 'driving.file = "none.csv": no such file; check'),
+        (".", ": is a directory; name a file in it"),
+        ("a\\u0000b", "cannot be read: embedded null byte"),
+        ("\\u001b[31m", r'driving.file = "\x1b[31m": no such file'),
+    ],
 )
 def test_a_missing_file_is_refused_with_its_key(name, message, tmp_path):
     (tmp_path / "gears.toml").write_text(driving(f'file = "{name}"', 'column = "Fp"'))
     ended = run_module("gearchaos.sweep", "gears.toml", "--dry-run", cwd=tmp_path)
-    assert ended.code == 4 and message in ended.err
+    assert ended.code == 2 and message in ended.err
 
 
 GRADE = '[pitch_error]\nkind = "grade"\ngrade = 7\n'
