@@ -116,6 +116,18 @@ def test_boundaries_are_refined_with_the_gear_pair_of_the_slice(tmp_path):
     assert run_module("gearchaos.stages", *arguments, cwd=tmp_path).code == 0
 
 
+def test_a_response_holds_all_gear_pairs(tmp_path):
+    (tmp_path / "gears.toml").write_text(text_of(DRAWN, "[21, 38]"))
+    arguments = ("gears.toml", "--pitch-error", "2.0", "--periods", "2")
+    assert run_module("gearchaos.response", *arguments, cwd=tmp_path).code == 0
+    response = gearchaos.open_result(tmp_path / "gears_response.h5")
+    assert response.axes == ("pitch_error", "realisation")
+    drawn = run_module("gearchaos.plot", "gears_response.h5", "--format", "png", cwd=tmp_path)
+    assert drawn.code == 0 and "realisation_2" in drawn.out.replace(
+        "drawn_gear_pair", "realisation"
+    )
+
+
 def test_a_dry_run_tells_how_many_there_are(tmp_path):
     (tmp_path / "gears.toml").write_text(text_of(DRAWN, "[21, 38]"))
     ended = run_module("gearchaos.sweep", "gears.toml", "--dry-run", cwd=tmp_path)

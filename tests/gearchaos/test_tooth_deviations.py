@@ -250,6 +250,12 @@ FAULTS = {
         (),
         "cumulative_um: place a tooth 216.7 um off tooth 0, more than a tenth of the module; give",
     ),
+    "endless": (LISTED.replace("4.0, 1.0", "1e308, -1e308"), (), "place a tooth 1e+308 um off"),
+    "endless single ones": (
+        f"{ERROR}[pitch_error.driving]\nsingle_um = [-1.5e308, 1e308, 1e308, -1e308, 0.5e308]\n",
+        (),
+        "um off tooth 0, more than a tenth of the module",
+    ),
     "a text": (LISTED.replace("4.0", '"4"'), (), 'cumulative_um[1] = "4": must be a number'),
     "a nan": (LISTED.replace("4.0", "nan"), (), "cumulative_um[1] = nan: must be a finite number"),
     "amplitude": (
