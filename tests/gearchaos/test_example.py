@@ -29,7 +29,7 @@ def test_one_is_copied_as_it_is_and_nothing_is_replaced(tmp_path, monkeypatch, c
     assert copied.read_text() == "mine" and "--overwrite" in capsys.readouterr().err
     assert main(["spur_pair.toml", "--overwrite"]) == 0
     assert main(["spurpair"]) == 2
-    assert "there are inspection, mesh_frequency, pan2021," in capsys.readouterr().err
+    assert "inspection, mesh_frequency, pan2021," in capsys.readouterr().err
 
 
 def test_measured_deviations_are_copied_along(tmp_path, monkeypatch, capsys):
