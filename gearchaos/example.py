@@ -19,7 +19,7 @@ def _arguments(parser: ArgumentParser) -> None:
 
 def _example(options: Namespace) -> int:
     from gearchaos.paper.sweep_files import sweep_file
-    from gearchaos.results.atomic_file import replacing
+    from gearchaos.results.atomic_file import check_output, replacing
 
     ready = {path.stem: path for path in sorted(sweep_file("pan2021.toml").parent.glob("*.toml"))}
     if options.name is None:
@@ -28,9 +28,14 @@ def _example(options: Namespace) -> int:
         return OK
     if (source := ready.get(options.name.removesuffix(".toml"))) is None:
         raise ConfigurationError(f"{options.name}: is no example; there are {', '.join(ready)}")
-    with replacing(source.name, overwrite=options.overwrite) as partial:
-        partial.write_bytes(source.read_bytes())
-    print(source.name, flush=True)
+    # Measured deviations lie beside the configuration that names them.
+    files = [source, *source.parent.glob(f"{source.stem}.csv")]
+    for file in files:
+        check_output(file.name, overwrite=options.overwrite)
+    for file in files:
+        with replacing(file.name, overwrite=options.overwrite) as partial:
+            partial.write_bytes(file.read_bytes())
+        print(file.name, flush=True)
     return OK
 
 

@@ -47,7 +47,7 @@ def _settings(metadata: Mapping[str, Any]) -> list[str]:
     from gearchaos.configuration import Configuration
     from gearchaos.configuration.messages import shown
     from gearchaos.configuration.toml_text import flat_tables, tables_from_toml
-    from gearchaos.errors import GearchaosError
+    from gearchaos.errors import ConfigurationError
 
     text = str(metadata.get("configuration", ""))
     resolved = str(metadata.get("configuration_resolved", ""))
@@ -56,7 +56,7 @@ def _settings(metadata: Mapping[str, Any]) -> list[str]:
         written, by_itself, ran = (
             flat_tables(tables_from_toml(toml, "configuration")) for toml in (text, alone, resolved)
         )
-    except GearchaosError:  # Not ours to judge here: the numbers are there all the same.
+    except ConfigurationError:  # Not ours to judge here: the numbers are there all the same.
         return []
     lines = []
     for key, value in ran.items():

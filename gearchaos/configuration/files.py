@@ -6,11 +6,12 @@ import csv
 import os
 from collections.abc import Mapping
 from functools import cache
+from math import isfinite
 from pathlib import Path
 from typing import Any
 
 from gearchaos.configuration.messages import NUMBER, Fault, shown
-from gearchaos.errors import ConfigurationError, FileError
+from gearchaos.errors import ConfigurationError, FileError, GearchaosError
 
 LISTS = {"cumulative": "cumulative_um", "single": "single_um"}
 """Keys of the lists of deviations by what a column holds."""
@@ -73,25 +74,27 @@ def with_deviation_files(
     """Return the tables of a configuration with the deviations in the files they name, and faults.
 
     The numbers go into the table of the gear, where none are listed, and the text into ``files``,
-    from which it is taken when it is needed again. Raises as `text_of_file`.
+    from which it is taken when it is needed again.
     """
     faults = []
     for gear in ("driving", "driven"):
-        error, here = _table(tables, "pitch_error"), f"pitch_error.{gear}.file"
-        table, files = _table(error, gear), _table(tables, "files")
+        error, files = _table(tables, "pitch_error"), _table(tables, "files")
+        table = _table(error, gear)
         name = table.get("file")
         if not isinstance(name, str) or not table.keys().isdisjoint(LISTS.values()):
             continue
-        if not isinstance(files.get(name), str):
-            path = os.path.join(os.path.dirname(source) or ".", name)
-            files[name] = text_of_file(path, f"pitch deviations ({here} in {source})")
+        path = os.path.join(os.path.dirname(source) or ".", name)
         read = LISTS.get(str(table.get("holds")), LISTS["cumulative"])
         try:
+            if not isinstance(files.get(name), str):
+                files[name] = text_of_file(path, "file of pitch deviations")
             table[read] = _column(files[name], table.get("column"))
             tables = {**tables, "pitch_error": {**error, gear: table}, "files": files}
-        except (ValueError, csv.Error) as fault:
+        except (GearchaosError, ValueError, csv.Error) as fault:
             rule, remedy = [*map(str, fault.args), ""][:2]
-            faults.append(Fault(here, rule, remedy, name))
+            # The fault names the file.
+            rule = rule.removeprefix(f"{path}: ")
+            faults.append(Fault(f"pitch_error.{gear}.file", rule, remedy, name))
     return tables, faults
 
 
@@ -110,12 +113,14 @@ def _column(text: str, column: object) -> list[float]:
     if column not in headings:
         asked = "column is missing" if column is None else f"has no column {shown(column)}"
         raise ValueError(asked, f"its first line has the headings {shown(headings)}")
-    place, numbers = headings.index(column), []
+    place, cells = headings.index(column), {}
     for row in reader:
-        cell = "".join(row[place : place + 1]).strip()
-        if not NUMBER.fullmatch(cell):
-            where = f"line {lines[reader.line_num - 1][0]}, column {column}"
-            rule = f"{where}: must be a finite number, not {shown(cell)}"
+        cells[lines[reader.line_num - 1][0]] = "".join(row[place : place + 1]).strip()
+    # Beside a gear with more teeth a column ends in empty cells.
+    while cells and not cells[max(cells)]:
+        cells.popitem()
+    for line, cell in cells.items():
+        if not (NUMBER.fullmatch(cell) and isfinite(float(cell))):
+            rule = f"line {line}, column {column}: must be a finite number, not {shown(cell)}"
             raise ValueError(rule, "give one for every tooth, decimals with a point")
-        numbers.append(float(cell))
-    return numbers
+    return [float(cell) for cell in cells.values()]

@@ -128,8 +128,7 @@ class Configuration(Table):
     def from_tables(cls, tables: Mapping[str, Any], source: str = "<python>") -> Configuration:
         """Make a configuration from nested mappings with the keys of the TOML file.
 
-        Raises ConfigurationError with one message per fault, all faults at once, and FileError if a
-        file that they name cannot be read.
+        Raises ConfigurationError with one message per fault, all faults at once.
         """
         tables, faults = with_deviation_files(tables, source)
         if faults:

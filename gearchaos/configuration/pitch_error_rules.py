@@ -61,10 +61,7 @@ def _unsound(
     """Yield the rule that a list of deviations breaks, with its remedy."""
     given = cumulative or single or ()
     if len(given) != teeth:
-        yield (
-            f"holds {len(given)} values, and the gear has {teeth} teeth",
-            "give one for every tooth",
-        )
+        yield f"holds {len(given)} values for {teeth} teeth", "give one for every tooth"
         return
     if cumulative is None:
         total, largest = sum(given), max(map(abs, given))
@@ -72,10 +69,11 @@ def _unsound(
             rule = f"sum to {total:.6g} um, and single deviations around a circle sum to zero"
             yield rule, "look for a missing or a wrong one, or give cumulative_um"
             return
-    found = counted_deviations(cumulative, single)
+    with np.errstate(all="ignore"):
+        found = counted_deviations(cumulative, single)
     worst = found[np.argmax(np.abs(found))]
     # A tenth of the module in micrometres.
-    if abs(worst) > 100.0 * module_mm:
+    if not abs(worst) <= 100.0 * module_mm:
         rule = f"place a tooth {worst:.6g} um off tooth 0, more than a tenth of the module"
         yield rule, "give deviations, not places, in micrometres"
 

@@ -42,7 +42,10 @@ def drawn_gears(
         np.asarray(value)[..., np.newaxis]
         for value in np.broadcast_arrays(numbers, single_um, cumulative_um, eccentricity)
     )
-    uniform = np.array([_uniform(seed, gear, int(one), 2 * teeth + 1) for one in numbers[:, 0]])
+    # Every gear has a counter of its own; the last word keeps it apart from random start states.
+    counters = [[0, 0, int(number), 1 + gear] for number in numbers[:, 0]]
+    bits = (np.random.Philox(seed, counter=counter) for counter in counters)
+    uniform = np.array([np.random.Generator(one).random(2 * teeth + 1) for one in bits])
     turns, phase = uniform[:, teeth:-1], uniform[:, -1:]
     normal = np.sqrt(-2.0 * np.log1p(-uniform[:, :teeth])) * np.cos(2.0 * np.pi * turns)
     around = np.cos(2.0 * np.pi * (phase + np.arange(teeth) / teeth))
@@ -55,12 +58,6 @@ def drawn_gears(
     scale = np.minimum(single / (steps + _TINY), range_ / (spread + _TINY))
     drawn: FloatArray = np.round(scale * (form - form[:, :1]), 6)
     return drawn
-
-
-def _uniform(seed: int, gear: int, number: int, count: int) -> FloatArray:
-    # A counter of its own for every gear. Its last word keeps it apart from random start states.
-    counter = [0, 0, number, 1 + gear]
-    return np.random.Generator(np.random.Philox(seed, counter=counter)).random(count)
 
 
 def _exact(values: FloatArray) -> FloatArray:

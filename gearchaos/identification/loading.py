@@ -125,9 +125,13 @@ def observed_configuration(targets: Targets, path: str | os.PathLike[str]) -> Co
 
 
 def _unfit(config: Configuration, targets: Targets, source: str) -> Iterator[str]:
-    if config.second_sweep is not None or config.start.count > 1:
-        key = "second_sweep" if config.second_sweep is not None else "start.count"
-        yield f"{source}: configuration: {config.source} has {key}; observations have one axis"
+    for key, several in {
+        "second_sweep": config.second_sweep is not None,
+        "start.count": config.start.count > 1,
+        "pitch_error.realisations": getattr(config.pitch_error, "realisations", 1) > 1,
+    }.items():
+        if several:
+            yield f"{source}: configuration: {config.source} has {key}; observations have one axis"
     if config.integration.recorded_periods < POINTS_NEEDED:
         yield (
             f"{source}: integration.recorded_periods = {config.integration.recorded_periods}: must "
@@ -137,6 +141,9 @@ def _unfit(config: Configuration, targets: Targets, source: str) -> Iterator[str
         return
     # A second sweep over the bounds obeys the rules that a free parameter must obey.
     for number, free in enumerate(targets.parameter):
+        if free.name == "pitch_error.grade":
+            rule = "takes whole numbers only; fit another parameter at each grade"
+            yield f"{source}: parameter[{number}].name = {free.name}: {rule}"
         bounds = {"parameter": free.name, "from": free.low, "to": free.high, "count": 2}
         try:
             config.replace("second_sweep", bounds)

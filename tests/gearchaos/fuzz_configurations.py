@@ -17,6 +17,13 @@ SECOND_SWEEPS = tuple(
         ("operation.speed_rpm", "values = [7000.0, 8000.0, 9000.0]"),
     )
 )
+_SINE = "amplitude_um = 11.0\nmean_um = 2.0\nphase_deg = 30.0"
+_TOOTH_BY_TOOTH = (
+    'kind = "grade"\ngrade = 7\nrealisations = 2',
+    f'kind = "teeth"\ndriving = {{ cumulative_um = {[0.0, 3.0, -1.0] * 7} }}',
+    'kind = "teeth"\n[pitch_error.driven]\nfile = "none.csv"\ncolumn = "Fp"',
+)
+FAULTY = (SMALL, SMALL, *SECOND_SWEEPS, *(SMALL.replace(_SINE, one) for one in _TOOTH_BY_TOOTH))
 
 WORDS = (
     "[", "]", "{", "}", "=", ".", ",", "#", '"', "'", '"""', "\\", "\n", "\r", "\0", "\x1b[31m",
@@ -46,7 +53,7 @@ def configuration(number: int) -> tuple[str, bytes]:
     """Return what was done to a configuration file, and the file: two in three are computed."""
     source = random.Random(f"configuration {number}")
     kind = COMPUTED if number % 3 else list(KINDS)[number // 3 % len(KINDS)]
-    text = source.choice((SMALL, SMALL, *SECOND_SWEEPS))
+    text = source.choice((SMALL, SMALL, *SECOND_SWEEPS) if number % 3 else FAULTY)
     return kind, _values_moved(source, text) if number % 3 else KINDS[kind](source, text)
 
 

@@ -44,7 +44,7 @@ def simulation(*overrides: str) -> Simulation:
 
 def blocks(sweep: Simulation, values: int) -> list[tuple[int, int]]:
     """Return the bounds of blocks of so many swept values, in the order of computation."""
-    return sweep.blocks(values * sweep.lanes.starts)
+    return sweep.blocks(values * sweep.lanes.repeats)
 
 
 def computed(sweep: Simulation, values: int = 13) -> dict[str, np.ndarray]:

@@ -22,6 +22,7 @@ from gearchaos.configuration import (
 )
 from gearchaos.configuration.models import configuration_keys
 from gearchaos.configuration.schema import json_schema, key_tables
+from gearchaos.configuration.sweep_values import SWEEPABLE_GROUPS
 from gearchaos.errors import ConfigurationError
 from gearchaos.gear.group_table import GROUP_TABLE
 from gearchaos.results.variables import STATE_WORDING
@@ -88,9 +89,11 @@ SHARES = "{shape='trapezoid', rise=0.25, top=0.25, fall=0.25, bottom=0.25, half_
 @pytest.mark.parametrize("path", SWEEPS, ids=lambda path: path.stem)
 def test_every_sweep_of_the_project_loads_and_resolves(path):
     config = load_config(path)
-    values, groups = lane_groups(config)
+    swept = axis_values(config)
+    groups = groups_at(config, dict(zip(swept, np.ix_(*swept.values()), strict=True)))
     assert groups.missing(config.scene.effects) == []
-    assert np.array_equal(getattr(groups, config.sweep.parameter), values)
+    for parameter in swept.keys() & SWEEPABLE_GROUPS.keys():
+        assert np.array_equal(np.ravel(getattr(groups, parameter)), swept[parameter])
 
 
 @pytest.mark.parametrize("path", SWEEPS, ids=lambda path: path.stem)

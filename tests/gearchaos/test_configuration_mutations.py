@@ -15,8 +15,14 @@ from gearchaos.errors import GearchaosError
 
 SWEEP = Path(__file__).resolve().parents[2] / "sweeps" / "pan2021_full.toml"
 TABLES = tomllib.loads(SWEEP.read_text(encoding="utf-8"))
+DEVIATIONS = {"cumulative_um": [0.0, 3.0, -1.0] * 7, "flank": "left"}
+PITCH_ERRORS = [
+    TABLES.get("pitch_error"),
+    {"kind": "teeth", "driving": DEVIATIONS},
+    {"kind": "grade", "grade": 7, "realisations": 3},
+]
 PATHS = sorted(configuration_keys())
-WORDS = ["load", "axial", "delta_5", "random", "trapezoid", *PATHS]
+WORDS = ["load", "teeth", "grade", "axial", "delta_5", "random", "trapezoid", *PATHS]
 
 scalars = st.one_of(
     st.floats(),
@@ -49,8 +55,12 @@ def problems_of(make, *arguments):
     return None
 
 
-def mutated(changes):
+def mutated(changes, pitch_error):
     tables = copy.deepcopy(TABLES)
+    if pitch_error is not None:
+        tables["pitch_error"] = copy.deepcopy(pitch_error)
+        del tables["groups"]["pitch_error_amplitude"]
+        tables["mesh"]["length_scale_um"] = 25.0
     for path, value in changes:
         *way, name = path.split(".")
         node = tables
@@ -67,14 +77,15 @@ def mutated(changes):
 
 
 @settings(max_examples=300, deadline=None, suppress_health_check=list(HealthCheck))
-@given(mutations)
-def test_a_mutated_configuration_is_sound_or_refused(changes):
-    problems = problems_of(Configuration.from_tables, mutated(changes), "mutated.toml")
+@given(mutations, st.sampled_from(PITCH_ERRORS))
+def test_a_mutated_configuration_is_sound_or_refused(changes, pitch_error):
+    tables = mutated(changes, pitch_error)
+    problems = problems_of(Configuration.from_tables, tables, "mutated.toml")
     if problems is not None:
         assert problems
         assert all(problem.startswith("mutated.toml: ") for problem in problems)
         return
-    config = Configuration.from_tables(mutated(changes), "mutated.toml")
+    config = Configuration.from_tables(tables, "mutated.toml")
     assert Configuration.from_toml(config.resolved_toml()) == config
     if all(sweep.size < 10_000 for sweep in config.sweeps.values()):
         axes = axis_values(config)
