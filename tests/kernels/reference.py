@@ -137,6 +137,8 @@ def run(
     physical: bool = False,
     resolved: bool | str = False,
     teeth: Teeth | None = None,
+    first_period: int = 0,
+    history: int = 0,
 ) -> Outcome:
     """Integrate Pan 2021's mesh stiffness, by default keeping every state after every period.
 
@@ -148,7 +150,9 @@ def run(
     start = rest if start is None else np.broadcast_to(start, rest.shape)
     points = transient + periods if points is None else points
     method = FLOW_MAP if resolved == FLOW_MAP else "rk4"
-    plan = Plan(steps, transient, periods, points, tangent, bool(resolved), method=method)
+    plan = Plan(
+        steps, transient, periods, points, tangent, bool(resolved), history, method, first_period
+    )
     return integrate(system_of(model, scene, physical, teeth), start[:, columns(scene)], plan)
 
 

@@ -12,6 +12,8 @@ TORSION = Effects(*[False] * len(Effects._fields))
 CLEARANCE = TORSION._replace(backlash=True)
 
 MODEL = pan2021(5.86, error_mean=0.1, error_phase=0.4)
+TORQUE = state(delta_5_rate=1.0)
+"""What a unit of load accelerates."""
 
 
 def one(model: Groups, name: str) -> float:
@@ -41,24 +43,31 @@ def system(model: Groups) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return matrix, np.kron(row_y, [0.0, 1.0]), np.kron(row_z, [0.0, 1.0])
 
 
-def steady_state(model: Groups, physical: bool) -> np.ndarray:
-    """Return the periodic response at tau = 0: a constant and one harmonic."""
+def response(model: Groups, physical: bool, frequency: float) -> np.ndarray:
+    """Return the phasor of the states for a pitch error of amplitude 1 and any frequency."""
     matrix, row_y, row_z = system(model)
-    beta, omega = one(model, "base_helix_angle"), one(model, "mesh_frequency")
-    torsion = state(delta_5_rate=1.0)
+    beta = one(model, "base_helix_angle")
     if physical:
         in_y, in_z = 1.0 - np.cos(beta), -np.tan(beta) - np.sin(beta)
     else:
         in_y, in_z = -np.cos(beta), -np.sin(beta)
-    forced = in_y * row_y + in_z * row_z
-    lasting = one(model, "load") * torsion + one(model, "error_mean") * forced
-    constant = -np.linalg.solve(matrix, lasting)
+    damped = 1.0 + 2.0j * one(model, "damping_ratio") * frequency
+    force = damped * (in_y * row_y + in_z * row_z) + frequency**2 * TORQUE
+    return np.linalg.solve(1.0j * frequency * np.eye(10) - matrix, force)
+
+
+def resting_state(model: Groups, physical: bool) -> np.ndarray:
+    """Return the state under the load and the mean of the pitch error alone."""
+    loaded = -np.linalg.solve(system(model)[0], one(model, "load") * TORQUE)
+    return loaded + one(model, "error_mean") * response(model, physical, 0.0).real
+
+
+def steady_state(model: Groups, physical: bool) -> np.ndarray:
+    """Return the periodic response at tau = 0: a constant and one harmonic."""
+    wave = response(model, physical, one(model, "mesh_frequency"))
     # e is the imaginary part of amplitude exp(i (Omega tau + phi)).
-    damped = 1.0 + 2.0j * one(model, "damping_ratio") * omega
-    force = damped * forced + omega**2 * torsion
-    wave = np.linalg.solve(1.0j * omega * np.eye(10) - matrix, force)
     phasor = one(model, "error_amplitude") * np.exp(1.0j * one(model, "error_phase"))
-    return constant + np.imag(phasor * wave)
+    return resting_state(model, physical) + np.imag(phasor * wave)
 
 
 def exponent_of(model: Groups, scene, start=None, **how) -> float:
