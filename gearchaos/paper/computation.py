@@ -10,9 +10,10 @@ import numpy as np
 from gearchaos.configuration import Configuration
 from gearchaos.engine.response import respond
 from gearchaos.engine.running import run
-from gearchaos.paper.bands import Crisis, crisis_of, lanes_as_printed, motions_shown
+from gearchaos.errors import ConfigurationError
 from gearchaos.paper.hop import STEP, Hop, exponents_beside, find_hop
 from gearchaos.paper.published import published
+from gearchaos.paper.stages import Crisis, crisis_of, lanes_as_printed
 from gearchaos.results.result import Result
 from gearchaos.results.stage_table import LabelledLanes
 
@@ -28,15 +29,15 @@ class Reproduction:
 
     ``config``: of the torsional diagram, figure 7; ``sweep``: that diagram; ``hop``: the hop in it,
     with the interval in which two motions coexist; ``exponents``: the largest ones of all ten
-    states before and after it, starting at rest, None without a hop; ``response``: all effects, at
-    rest at the start, without pitch error and at those of figures 5, 6, 14 and 15 and of Table 3;
+    states before and after it, starting at rest; ``response``: all effects, at rest at the start,
+    without pitch error and at those of figures 5, 6, 14 and 15 and of Table 3;
     ``motions``, ``motions_from_contact``: at the pitch errors of figures 8 to 13, by the start.
     """
 
     config: Configuration
     sweep: Result
-    hop: Hop | None
-    exponents: tuple[float, float] | None
+    hop: Hop
+    exponents: tuple[float, float]
     response: Result
     motions: Result
     motions_from_contact: Result
@@ -52,7 +53,7 @@ class Reproduction:
 
     def shown(self, result: Result) -> LabelledLanes:
         """Label the lanes of one of these results as their figures show them, each by itself."""
-        return motions_shown(result, self.crisis)
+        return lanes_as_printed(result, self.crisis, strictly=True)
 
     def group(self, name: str) -> float:
         """Return a group that all lanes of the sweep share."""
@@ -82,18 +83,23 @@ def compute(
         Threads to use; by default all that there are.
     notify : callable
         Told what comes next.
+
+    Raises
+    ------
+    ConfigurationError
+        If no two motions coexist, or a start at rest does not hop from one to the other.
     """
-    printed = published()
     notify("figure 7: the sweep over the pitch error")
     sweep = run(config, threads)
     notify("the hop of figure 7: both motions, upwards and downwards")
     hop = find_hop(config, step=hop_step, threads=threads)
-    change = None if hop is None else hop.changes.get("rest")
-    exponents = None if change is None else exponents_beside(full, change, threads)
+    if hop is None or "rest" not in hop.changes:
+        raise ConfigurationError(f"{config.source}: at rest, there is no hop as in figure 7")
+    exponents = exponents_beside(full, hop.changes["rest"], threads)
     notify("figures 5, 6, 14 and 15: accelerations of all coordinates")
-    response = respond(_at(full, [0.0, *printed.increments.pitch_errors]), periods, threads)
+    response = respond(_at(full, [0.0, *published().increments.pitch_errors]), periods, threads)
     notify("figures 8 to 13: motions at six pitch errors")
-    shown = _at(config, [motion.pitch_error for motion in printed.motions])
+    shown = _at(config, [motion.pitch_error for motion in published().motions])
     motions, from_contact = (
         respond(shown.replace("start", {"kind": kind}), periods, threads)
         for kind in ("rest", "contact")

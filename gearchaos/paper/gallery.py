@@ -11,8 +11,7 @@ from gearchaos.errors import FileError
 from gearchaos.figures.files import FORMATS, save_figure
 from gearchaos.figures.page import Page
 from gearchaos.paper.computation import Notify, Reproduction
-from gearchaos.paper.diagram_figure import diagram_page
-from gearchaos.paper.hop_figure import hop_page
+from gearchaos.paper.diagram_figures import diagram_page, hop_page
 from gearchaos.paper.mesh_figures import mesh_stiffness_page, pitch_error_page
 from gearchaos.paper.motion_figures import (
     accelerations_page,
@@ -21,7 +20,7 @@ from gearchaos.paper.motion_figures import (
     motion_page,
     spectra_page,
 )
-from gearchaos.paper.published import Published, published
+from gearchaos.paper.published import published
 from gearchaos.paper.report import report
 from gearchaos.results.atomic_file import check_output, replacing, writing
 
@@ -41,12 +40,12 @@ class Picture(NamedTuple):
 
     name: str
     title: str
-    draw: Callable[[Published, Reproduction], Page]
+    draw: Callable[[Reproduction], Page]
 
 
 def pictures() -> tuple[Picture, ...]:
     """Return all figures, in the paper's order; `report_text.md` holds their captions."""
-    numbered: dict[int, Callable[[Published, Reproduction], Page]] = {
+    numbered: dict[int, Callable[[Reproduction], Page]] = {
         3: pitch_error_page,
         4: mesh_stiffness_page,
         5: accelerations_page,
@@ -111,17 +110,16 @@ def write_gallery(
     FileError
         If a file cannot be written.
     """
-    printed = published()
     for name, (attribute, _) in RESULTS.items():
         notify(f"writing {name}")
         getattr(found, attribute).save(folder / name, overwrite=overwrite)
     for picture in pictures():
         notify(f"drawing {picture.title.lower()}")
-        page = picture.draw(printed, found)
+        page = picture.draw(found)
         for kind in formats:
             target = folder / f"{picture.name}.{kind}"
             save_figure(page, target, title=picture.title, dpi=DPI, overwrite=overwrite)
-    text = report(printed, found, {name: words for name, (_, words) in RESULTS.items()})
+    text = report(found, {name: words for name, (_, words) in RESULTS.items()})
     with replacing(folder / REPORT, overwrite=overwrite) as partly_written:
         partly_written.write_text(text, encoding="utf-8")
     return folder / REPORT

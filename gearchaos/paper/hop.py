@@ -42,6 +42,9 @@ FOLLOWING_PERIODS = 100
 SETTLING_PERIODS = 500
 """Fewest mesh periods in which a soft axial bearing comes to rest."""
 
+STARTS = {"rest": "at rest", "contact": "contact flank"}
+"""Kinds of start states whose change from one motion to the other is looked for, worded."""
+
 APART = 1e-3
 """Distance of the section points, relative to the larger one, from which on motions differ."""
 
@@ -81,16 +84,11 @@ class Hop(NamedTuple):
         return (pitch_error - self.first) / (self.last - self.first)
 
 
-def find_hop(
-    config: Configuration,
-    starts: tuple[str, ...] = ("rest", "contact"),
-    step: float = STEP,
-    threads: int | None = None,
-) -> Hop | None:
+def find_hop(config: Configuration, step: float = STEP, threads: int | None = None) -> Hop | None:
     """Follow both motions, bisect the ends of their interval, and find where starts change over.
 
-    ``config`` sweeps the pitch error; ``starts``: kinds of start states whose hop is looked for;
-    ``step``: of the carried sweeps. None where the sweeps upwards and downwards agree everywhere.
+    ``config`` sweeps the pitch error; ``step``: of the carried sweeps. None where the sweeps
+    upwards and downwards agree everywhere.
     """
     config = _states_only(config)
     periods = min(FOLLOWING_PERIODS, config.integration.transient_periods)
@@ -110,7 +108,7 @@ def find_hop(
     fine = step / FINENESS
     low, high = math.ceil(first / fine), math.floor(last / fine)
     changes = {}
-    for kind in starts:
+    for kind in STARTS:
         begun = config.replace("start", {"kind": kind})
         within = _over(begun, low * fine, high * fine, high - low + 1)
         change = _change(run(within, threads), within, upwards, downwards)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from typing import Any
 
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
@@ -14,7 +15,7 @@ from gearchaos.figures.response import phase_portrait, poincare_section, time_hi
 from gearchaos.figures.response_lane import COORDINATE, coordinates_of, samples_per_period
 from gearchaos.figures.style import BLACK, BLUE, FONT_PT, SMALL_FONT_PT, VERMILION
 from gearchaos.paper.computation import Reproduction, lane_of, largest_acceleration
-from gearchaos.paper.published import Published, ShownMotion
+from gearchaos.paper.published import ShownMotion, published
 from gearchaos.paper.stages import motion_at
 from gearchaos.records.amplitude_spectrum import spectral_lines
 from gearchaos.results.response_variables import TIME, acceleration_of
@@ -33,11 +34,10 @@ WITHOUT_AND_WITH = ((0.0, BLUE, -0.07), (1.0, VERMILION, 0.07))
 """The pitch errors that figures 5 and 6 compare, their colours, and how far lines step aside."""
 
 
-def accelerations_page(printed: Published, found: Reproduction) -> Page:
+def accelerations_page(found: Reproduction) -> Page:
     """Draw the accelerations of all coordinates without and with pitch error (figure 5)."""
-    del printed
     names = coordinates_of(found.response)
-    with _stack(found.response, names, 12.0) as (figure, panels):
+    with _stack(found.response, names) as (figure, panels):
         for axes, name in zip(panels, names, strict=True):
             for p, color, _ in WITHOUT_AND_WITH:
                 _history(axes, found.response, p, name).set(color=color, label=f"$P$ = {p:g}")
@@ -45,11 +45,10 @@ def accelerations_page(printed: Published, found: Reproduction) -> Page:
     return figure
 
 
-def spectra_page(printed: Published, found: Reproduction) -> Page:
+def spectra_page(found: Reproduction) -> Page:
     """Draw the amplitude spectra of those accelerations (figure 6)."""
-    del printed
     names = coordinates_of(found.response)
-    with _stack(found.response, names, 18.0, spectra=True) as (figure, panels):
+    with _stack(found.response, names, spectra=True) as (figure, panels):
         for axes, name in zip(panels, names, strict=True):
             for p, color, shift in WITHOUT_AND_WITH:
                 _stems(axes, found.response, p, name, color, shift).set_label(f"$P$ = {p:g}")
@@ -57,11 +56,11 @@ def spectra_page(printed: Published, found: Reproduction) -> Page:
     return figure
 
 
-def growing_accelerations_page(printed: Published, found: Reproduction) -> Page:
+def growing_accelerations_page(found: Reproduction) -> Page:
     """Draw the torsional acceleration at growing pitch errors (figure 14)."""
-    values = printed.increments.pitch_errors
+    values = published().increments.pitch_errors
     names = [COORDINATE] * len(values)
-    with _stack(found.response, names, 8.0, sharey=True) as (figure, panels):
+    with _stack(found.response, names, one_scale=True) as (figure, panels):
         for axes, p in zip(panels, values, strict=True):
             _history(axes, found.response, p, COORDINATE)
             largest = largest_acceleration(found.response, p)
@@ -70,20 +69,20 @@ def growing_accelerations_page(printed: Published, found: Reproduction) -> Page:
     return figure
 
 
-def growing_spectra_page(printed: Published, found: Reproduction) -> Page:
+def growing_spectra_page(found: Reproduction) -> Page:
     """Draw the spectra of the torsional acceleration at growing pitch errors (figure 15)."""
-    values = printed.increments.pitch_errors
+    values = published().increments.pitch_errors
     names = [COORDINATE] * len(values)
-    with _stack(found.response, names, 14.0, spectra=True, sharey=True) as (figure, panels):
+    with _stack(found.response, names, spectra=True, one_scale=True) as (figure, panels):
         for axes, p in zip(panels, values, strict=True):
             _stems(axes, found.response, p, COORDINATE, BLACK, 0.0)
-            _write_inside(axes, 0.985, 0.93, f"$P$ = {p:g}", ha="right", fontsize=SMALL_FONT_PT)
+            look: dict[str, Any] = {"va": "top", "ha": "right", "fontsize": SMALL_FONT_PT}
+            axes.text(0.985, 0.93, f"$P$ = {p:g}", transform=axes.transAxes, **look)
     return figure
 
 
-def motion_page(printed: Published, found: Reproduction, shown: ShownMotion) -> Page:
+def motion_page(found: Reproduction, shown: ShownMotion) -> Page:
     """Draw history, phase portrait and Poincare section at one pitch error (figures 8 to 13)."""
-    del printed
     result, begun = shown_response(found, shown)
     lane = lane_of(result, shown.pitch_error)
     label = motion_at(found.shown(result), shown.pitch_error)
@@ -123,23 +122,20 @@ def shown_response(found: Reproduction, shown: ShownMotion) -> tuple[Result, str
 
 @contextmanager
 def _stack(
-    result: Result,
-    names: Sequence[str],
-    margin_mm: float,
-    *,
-    spectra: bool = False,
-    sharey: bool = False,
+    result: Result, names: Sequence[str], *, spectra: bool = False, one_scale: bool = False
 ) -> Iterator[tuple[Page, Sequence[Axes]]]:
     """Make panels one above another for the accelerations of coordinates, or their spectra."""
+    margin_mm = 8.0 + (6.0 if spectra else 0.0) + (0.0 if one_scale else 4.0)
     with column(PANEL_MM * len(names) + margin_mm) as figure:
-        panels = figure.subplots(len(names), 1, sharex=True, sharey=sharey)
+        panels = figure.subplots(len(names), 1, sharex=True, sharey=one_scale)
         yield figure, panels
         for axes, name, at in zip(panels, names, "abcdefgh", strict=False):
             axes.set_ylabel(result.attributes(acceleration_of(name))["symbol"])
             axes.set_xlabel("")
             if spectra:
                 axes.set_yscale("log")
-                _write_inside(axes, 0.02, 0.94, f"({at})", fontweight="bold")
+                look: dict[str, Any] = {"va": "top", "fontweight": "bold"}
+                axes.text(0.02, 0.94, f"({at})", transform=axes.transAxes, **look)
             else:
                 few_ticks(axes)
         if spectra:
@@ -169,16 +165,12 @@ def _stems(
     seen = (lines.order > 0.0) & (lines.order <= HIGHEST_ORDER) & (lines.amplitude > 1e-4 * top)
     order, amplitude = lines.order[seen] + shift, lines.amplitude[seen]
     axes.vlines(order, 1e-12, amplitude, color=color, linewidth=0.9)
-    (heads,) = axes.plot(order, amplitude, "o", color=color, markersize=2.2, mew=0.0)
+    (heads,) = axes.plot(order, amplitude, "o", color=color, ms=2.2, mew=0.0)
     # Logarithms of the common scale of a panel: three decades below its highest line.
     bottom, highest = axes.get_ylim() if len(axes.lines) > 1 else (top, top)
     axes.set_ylim(min(bottom, 3e-4 * top), max(highest, 4.0 * top))
     axes.set_xlim(0.0, HIGHEST_ORDER + 0.5)
     return heads
-
-
-def _write_inside(axes: Axes, x: float, y: float, text: str, **look: str | float) -> None:
-    axes.text(x, y, text, transform=axes.transAxes, va="top", **look)  # type: ignore[arg-type]
 
 
 def _frequency_axis(axes: Axes, period: float) -> None:
