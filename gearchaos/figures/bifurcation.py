@@ -67,37 +67,23 @@ def bifurcation(
     FigureError
         If the result has no such section variable, no lane in the range, or two swept parameters.
     """
-    variable = _known_variable(result, variable)
+    names = section_variables(result)
+    if not names:
+        raise FigureError("the result has no section points: the sweep did not record any")
+    variable = names[0] if variable is None else variable
+    if variable not in names:
+        there = ", ".join(names)
+        raise FigureError(f"no section variable {variable!r} in the result; it has {there}")
     lanes = diagram_lanes(result, between)
     rows = result.lanes(variable)
-    total = max(1, lanes.numbers.size * rows.shape[1])
-    points = dots(
-        axes,
-        lanes,
-        rows,
-        markersize=lanes.dot_size(0.8),
-        color=color,
-        label=label,
-        marker=marker,
-        rasterized=True,
-        alpha=min(1.0, 4.0 / max(1, rows.shape[1]) ** 0.5) * min(1.0, MOST_DOTS / total),
-    )
+    total, of_a_lane = max(1, lanes.numbers.size * rows.shape[1]), max(1, rows.shape[1])
+    alpha = min(1.0, 4.0 / of_a_lane**0.5) * min(1.0, MOST_DOTS / total)
+    look = {"markersize": lanes.dot_size(0.8), "marker": marker, "color": color, "label": label}
+    points = dots(axes, lanes, rows, rasterized=True, alpha=alpha, **look)
     axes.set_ylabel(axis_label(result, variable, line_length=34))
     low, high = np.full((2, lanes.numbers.size), np.nan)
     for part, values in portions(lanes, rows):
         np.fmin.reduce(values, axis=1, out=low[part])
         np.fmax.reduce(values, axis=1, out=high[part])
-    return BifurcationArtists(
-        points, *close_panel(axes, result, lanes, low, high, points, full_range=full_range)
-    )
-
-
-def _known_variable(result: Result, variable: str | None) -> str:
-    names = section_variables(result)
-    if not names:
-        raise FigureError("the result has no section points: the sweep did not record any")
-    if variable is not None and variable not in names:
-        raise FigureError(
-            f"no section variable {variable!r} in the result; it has {', '.join(names)}"
-        )
-    return variable or names[0]
+    marks = close_panel(axes, result, lanes, low, high, points, full_range=full_range)
+    return BifurcationArtists(points, *marks)

@@ -49,9 +49,9 @@ def axis_label(result: Result, name: str, line_length: int = 60) -> str:
         words[-1] += f", {symbol}"
     if unit:
         words.append(f"({unit})")
-    # No shorter last line than need be: the narrowest lines that are as few.
-    breaks = [_broken(words, length) for length in range(1, line_length + 1)]
-    return "\n".join(next(lines for lines in breaks if len(lines) == len(breaks[-1])))
+    # No shorter last line than need be: of those that are as few the narrowest.
+    fewest = min((_broken(words, length) for length in range(1, line_length + 1)), key=len)
+    return "\n".join(fewest)
 
 
 def unit_of(result: Result, name: str) -> str:

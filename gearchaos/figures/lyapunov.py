@@ -78,9 +78,8 @@ def lyapunov(
     whole = np.where(lanes.diverged, np.nan, result.lanes(LARGEST_EXPONENT)[lanes.numbers])
     spread = np.full(whole.shape, np.nan)
     if LARGEST_EXPONENT + STANDARD_ERROR in result:
-        spread = (
-            BAND_STANDARD_ERRORS * result.lanes(LARGEST_EXPONENT + STANDARD_ERROR)[lanes.numbers]
-        )
+        error = result.lanes(LARGEST_EXPONENT + STANDARD_ERROR)[lanes.numbers]
+        spread = BAND_STANDARD_ERRORS * error
     several_starts = bool(np.any(np.diff(lanes.parameter) == 0.0))
     # Several starts may lie on different motions, which no line should join.
     lonely = np.isfinite(whole) if several_starts else _without_neighbours(whole)
@@ -90,53 +89,24 @@ def lyapunov(
 
     zero = axes.axhline(0.0, color=GREY, linewidth=0.5, linestyle=(0, (4, 2)), zorder=1)
     # Colours are those of the stages behind; what is said of an exponent is black and grey.
-    positive = axes.fill_between(
-        x,
-        0.0,
-        joined,
-        where=joined > 0.0,
-        interpolate=True,
-        fc="none",
-        ec=GREY,
-        lw=0.0,
-        hatch="////",
-    )
+    look: dict[str, Any] = {"where": joined > 0.0, "interpolate": True, "hatch": "////"}
+    positive = axes.fill_between(x, 0.0, joined, fc="none", ec=GREY, lw=0.0, **look)
     pale: Any = 0.6 + 0.4 * np.array(to_rgb(color))
-    band = axes.fill_between(
-        x,
-        joined - reach,
-        joined + reach,
-        color=pale,
-        linewidth=0.0,
-        label="\N{PLUS-MINUS SIGN}2 standard errors",
-    )
+    look = {"color": pale, "lw": 0.0, "label": "\N{PLUS-MINUS SIGN}2 standard errors"}
+    band = axes.fill_between(x, joined - reach, joined + reach, **look)
     ends = (exponent - reach)[alone], (exponent + reach)[alone]
     bars = axes.vlines(x[alone], *ends, colors=pale, lw=0.6)
     line_style = "none" if several_starts and alone.any() else "-"
-    look: dict[str, Any] = {"color": color, "linestyle": line_style, "label": label}
-    (line,) = axes.plot(x, exponent, linewidth=0.6, **look)
-    points = dots(
-        axes,
-        lanes._replace(diverged=~lonely),
-        result.lanes(LARGEST_EXPONENT)[:, np.newaxis],
-        markersize=lanes.dot_size(1.0),
-        color=color,
-        marker=marker,
-    )
+    (line,) = axes.plot(x, exponent, ls=line_style, lw=0.6, color=color, label=label)
+    look = {"markersize": lanes.dot_size(1.0), "color": color, "marker": marker}
+    rows = result.lanes(LARGEST_EXPONENT)[:, np.newaxis]
+    points = dots(axes, lanes._replace(diverged=~lonely), rows, **look)
     mixed = None
     among = drawn[result.lanes(RECORD)[lanes.numbers][drawn] == 1] if RECORD in result else []
     if len(among):
-        (mixed,) = axes.plot(
-            lanes.parameter[among],
-            whole[among],
-            linestyle="none",
-            marker="o",
-            markersize=3.0,
-            markerfacecolor="none",
-            markeredgewidth=0.5,
-            color=VERMILION,
-            label="came from another motion",
-        )
+        look = {"ms": 3.0, "mfc": "none", "mew": 0.5, "color": VERMILION}
+        look["label"] = "came from another motion"
+        (mixed,) = axes.plot(lanes.parameter[among], whole[among], "o", **look)
     axes.set_ylabel(axis_label(result, LARGEST_EXPONENT, line_length=20))
     marks = close_panel(
         axes,

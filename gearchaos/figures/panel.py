@@ -83,11 +83,15 @@ def close_panel(
     earlier = [one for one in _DRAWN.get(axes, []) if one.artist.axes is axes]
     there = np.isfinite(low)
     reach = lanes.parameter[there], low[there], high[there], (np.zeros(low.shape) + spread)[there]
-    own = _Drawn(artist, lanes.limits, *reach, full_range, _name_of(artist), [])
+    own = _Drawn(artist, lanes.limits, *reach, full_range, [], [])
     drawn = _DRAWN[axes] = [*earlier, own]
-    axes.set_xlim(min(one.limits[0] for one in drawn), max(one.limits[1] for one in drawn))
+    left, right = zip(*(one.limits for one in drawn), strict=True)
+    axes.set_xlim(min(left), max(right))
     axes.set_xlabel(axis_label(result, result.axis))
     rug = _mark_diverged(axes, result, lanes.parameter[lanes.diverged])
+    color, label = artist.get_color(), str(artist.get_label())
+    if not label.startswith("_"):
+        own.named.append(Line2D([], [], color=color, label=label, marker="s", ms=3.5, ls="none"))
     own.named.extend([*also, *([rug] if rug else [])])
     if any(one.low.size for one in drawn):
         least = np.concatenate([one.low - one.spread for one in drawn])
@@ -103,13 +107,6 @@ def close_panel(
     # Entries that several results have in common appear once.
     named = {str(mark.get_label()): mark for one in drawn for mark in one.named + one.off_scale}
     return Marks(rug, own.off_scale, legend_above(axes, list(named.values())))
-
-
-def _name_of(artist: Line2D) -> list[Artist]:
-    if str(artist.get_label()).startswith("_"):
-        return []
-    color, label = artist.get_color(), str(artist.get_label())
-    return [Line2D([], [], color=color, label=label, marker="s", markersize=3.5, linestyle="none")]
 
 
 def robust_limits(
@@ -149,44 +146,34 @@ def _mark_diverged(axes: Axes, result: Result, parameter: Floats) -> Line2D | No
         return None
     meanings = str(result.attributes("status").get("flag_meanings", "")).split()
     label = plain(meanings[1].replace("_", " ")) if len(meanings) == 2 else "diverged"
-    look = {"marker": "|", "markersize": 8.0, "markeredgewidth": 0.8, "color": VERMILION}
-    return _marks(axes, parameter, 0.0, label, look)
+    return _marks(axes, parameter, 0.0, label, marker="|", ms=8.0, mew=0.8, color=VERMILION)
 
 
 def _mark_off_scale(axes: Axes, drawn: _Drawn) -> list[Line2D]:
     """Draw a triangle at the edge of the axes for every lane that reaches beyond it."""
-    _, _, parameter, low, high, *_ = drawn
+    low, high, (bottom, top) = drawn.low, drawn.high, axes.get_ylim()
     color = GREY if drawn.artist.get_color() == BLACK else drawn.artist.get_color()
-    bottom, top = axes.get_ylim()
     marks = []
-    for beyond, extreme, height, marker in (
-        (low < bottom, low.min(), 0.02, "v"),
-        (high > top, high.max(), 0.98, "^"),
-    ):
+    ends = (low < bottom, low.min(), 0.02, "v"), (high > top, high.max(), 0.98, "^")
+    for beyond, extreme, height, marker in ends:
         if beyond.any():
+            place = axes, drawn.parameter[beyond], height
             label = f"off scale (to {number(float(extreme))})"
-            look = {"marker": marker, "markersize": 2.2, "markeredgewidth": 0.0, "color": color}
-            marks.append(_marks(axes, parameter[beyond], height, label, look))
+            marks.append(_marks(*place, label, marker=marker, ms=2.2, mew=0.0, color=color))
     return marks
 
 
-def _marks(
-    axes: Axes, parameter: Floats, height: float, label: str, look: dict[str, Any]
-) -> Line2D:
+def _marks(axes: Axes, parameter: Floats, height: float, label: str, **look: Any) -> Line2D:
     """Draw marks at some height of the axes, in parts of it, one in each column."""
     parameter = parameter[columns(parameter, axes.get_xlim())]
-    heights, place = np.full(parameter.size, height), axes.get_xaxis_transform()
-    (line,) = axes.plot(
-        parameter, heights, linestyle="none", transform=place, zorder=4, label=label, **look
-    )
-    return line
+    look |= {"linestyle": "none", "transform": axes.get_xaxis_transform(), "zorder": 4}
+    return axes.plot(parameter, np.full(parameter.size, height), label=label, **look)[0]
 
 
 def _say_nothing_to_show(axes: Axes, lanes: Lanes) -> None:
     """Write into an empty panel why it is empty."""
-    reason = (
-        f"all {lanes.numbers.size} lanes diverged" if lanes.diverged.all() else "no finite values"
-    )
+    diverged = f"all {lanes.numbers.size} lanes diverged"
+    reason = diverged if lanes.diverged.all() else "no finite values"
     axes.set_ylim(-1.0, 1.0)
     axes.tick_params(axis="y", which="both", left=False, right=False, labelleft=False)
     text = axes.text(0.5, 0.5, reason, transform=axes.transAxes, ha="center", va="center")
@@ -198,8 +185,8 @@ def mark_values(panels: Sequence[Axes], label: str, values: Sequence[float]) -> 
 
     The legend keeps what it has named before.
     """
-    look = {"marker": "|", "markersize": 8.0, "markeredgewidth": 0.9, "color": VERMILION}
-    ticks = [_marks(axes, np.asarray(values), 1.0, label, look) for axes in panels]
+    look: dict[str, Any] = {"marker": "|", "ms": 8.0, "mew": 0.9, "color": VERMILION}
+    ticks = [_marks(axes, np.asarray(values), 1.0, label, **look) for axes in panels]
     before = panels[0].get_legend()
     legend_above(panels[0], [ticks[0], *(before.legend_handles if before else ())])
 

@@ -176,17 +176,7 @@ def _plane(coordinate: str) -> tuple[str, str]:
 
 
 def _points(axes: Axes, x: Floats, y: Floats, markersize: float) -> Line2D:
-    (points,) = axes.plot(
-        x,
-        y,
-        linestyle="none",
-        marker="o",
-        markersize=markersize,
-        markeredgewidth=0.0,
-        color=VERMILION,
-        zorder=3,
-    )
-    return points
+    return axes.plot(x, y, "o", ms=markersize, mew=0.0, color=VERMILION, zorder=3)[0]
 
 
 def _label_plane(axes: Axes, result: Result, coordinate: str) -> None:
