@@ -2,29 +2,16 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.legend import Legend
-from matplotlib.lines import Line2D
 
 from gearchaos.errors import FigureError
 from gearchaos.figures.dots import MOST_DOTS, dots, portions
 from gearchaos.figures.labels import axis_label
 from gearchaos.figures.lanes import Between, diagram_lanes
-from gearchaos.figures.panel import close_panel
+from gearchaos.figures.panel import DiagramArtists, Drawn, close_panel
 from gearchaos.figures.style import BLACK
 from gearchaos.results.result import Result, section_variables
-
-
-class BifurcationArtists(NamedTuple):
-    """What `bifurcation` has drawn: the section points, lane after lane, and its `Marks`."""
-
-    points: Line2D
-    diverged: Line2D | None
-    off_scale: list[Line2D]
-    legend: Legend | None
 
 
 def bifurcation(
@@ -37,7 +24,7 @@ def bifurcation(
     color: str = BLACK,
     label: str | None = None,
     marker: str = ".",
-) -> BifurcationArtists:
+) -> DiagramArtists:
     """Draw the bifurcation diagram of one section variable into axes.
 
     Every section point is a small translucent dot: a periodic motion, whose points coincide,
@@ -85,5 +72,5 @@ def bifurcation(
     for part, values in portions(lanes, rows):
         np.fmin.reduce(values, axis=1, out=low[part])
         np.fmax.reduce(values, axis=1, out=high[part])
-    marks = close_panel(axes, result, lanes, low, high, points, full_range=full_range)
-    return BifurcationArtists(points, *marks)
+    drawn = Drawn(points, lanes, low, high, 0.0, full_range, [], [])
+    return close_panel(axes, result, drawn)

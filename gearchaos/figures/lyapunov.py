@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.colors import to_rgb
@@ -14,8 +15,8 @@ from matplotlib.lines import Line2D
 from gearchaos.errors import FigureError
 from gearchaos.figures.dots import dots
 from gearchaos.figures.labels import axis_label
-from gearchaos.figures.lanes import Between, Floats, Mask, diagram_lanes, outermost
-from gearchaos.figures.panel import close_panel
+from gearchaos.figures.lanes import Between, Floats, diagram_lanes, outermost
+from gearchaos.figures.panel import Drawn, close_panel
 from gearchaos.figures.style import BLACK, GREY, VERMILION
 from gearchaos.results.result import Result
 from gearchaos.results.variables import LARGEST_EXPONENT, RECORD, STANDARD_ERROR
@@ -24,7 +25,7 @@ BAND_STANDARD_ERRORS = 2.0
 
 
 class LyapunovArtists(NamedTuple):
-    """What `lyapunov` has drawn, beside its `Marks`.
+    """What `lyapunov` has drawn, beside what a `DiagramArtists` has.
 
     ``line``: the exponents drawn, by the parameter, not a number where a lane diverged;
     ``points``: exponents without a neighbour to draw a line to, between diverged lanes, or all of
@@ -75,14 +76,19 @@ def lyapunov(
     if LARGEST_EXPONENT not in result:
         raise FigureError("the result has no Lyapunov exponents: the sweep left them out")
     lanes = diagram_lanes(result, between)
-    whole = np.where(lanes.diverged, np.nan, result.lanes(LARGEST_EXPONENT)[lanes.numbers])
+    stored: Floats = result.lanes(LARGEST_EXPONENT)
+    whole = stored[lanes.numbers]
+    whole[lanes.diverged | np.isinf(whole)] = np.nan
     spread = np.full(whole.shape, np.nan)
     if LARGEST_EXPONENT + STANDARD_ERROR in result:
         error = result.lanes(LARGEST_EXPONENT + STANDARD_ERROR)[lanes.numbers]
         spread = BAND_STANDARD_ERRORS * error
     several_starts = bool(np.any(np.diff(lanes.parameter) == 0.0))
     # Several starts may lie on different motions, which no line should join.
-    lonely = np.isfinite(whole) if several_starts else _without_neighbours(whole)
+    lonely = np.isfinite(whole)
+    if not several_starts:
+        beside = np.pad(lonely, 1)
+        lonely = lonely & ~(beside[2:] | beside[:-2])
     drawn = outermost(lanes, whole)
     x, exponent, reach, alone = (a[drawn] for a in (lanes.parameter, whole, spread, lonely))
     joined = np.where(alone, np.nan, exponent)
@@ -99,8 +105,7 @@ def lyapunov(
     line_style = "none" if several_starts and alone.any() else "-"
     (line,) = axes.plot(x, exponent, ls=line_style, lw=0.6, color=color, label=label)
     look = {"markersize": lanes.dot_size(1.0), "color": color, "marker": marker}
-    rows = result.lanes(LARGEST_EXPONENT)[:, np.newaxis]
-    points = dots(axes, lanes._replace(diverged=~lonely), rows, **look)
+    points = dots(axes, lanes._replace(diverged=~lonely), stored[:, np.newaxis], **look)
     mixed = None
     among = drawn[result.lanes(RECORD)[lanes.numbers][drawn] == 1] if RECORD in result else []
     if len(among):
@@ -108,24 +113,8 @@ def lyapunov(
         look["label"] = "came from another motion"
         (mixed,) = axes.plot(lanes.parameter[among], whole[among], "o", **look)
     axes.set_ylabel(axis_label(result, LARGEST_EXPONENT, line_length=20))
-    marks = close_panel(
-        axes,
-        result,
-        lanes,
-        whole,
-        whole,
-        line,
-        spread=np.nan_to_num(spread),
-        hold_zero=True,
-        full_range=full_range,
-        also=([band] if np.isfinite(whole + spread).any() else []) + ([mixed] if mixed else []),
-    )
+    named: list[Artist] = [band] if np.isfinite(whole + spread).any() else []
+    named += [mixed] if mixed else []
+    own = Drawn(line, lanes, whole, whole, np.nan_to_num(spread), full_range, named, [])
+    marks = close_panel(axes, result, own, hold_zero=True)[1:]
     return LyapunovArtists(line, points, band, bars, positive, mixed, zero, *marks)
-
-
-def _without_neighbours(exponent: Floats) -> Mask:
-    there = np.isfinite(exponent)
-    beside = np.zeros(there.size + 2, dtype=bool)
-    beside[2:] |= there
-    beside[:-2] |= there
-    return there & ~beside[1:-1]

@@ -21,92 +21,78 @@ OUTLYING_SHARE = 0.03
 MARGIN = 0.05
 
 
-class Marks(NamedTuple):
-    """The rug of diverged lanes, triangles for lanes beyond bottom and top, and their legend."""
+class DiagramArtists(NamedTuple):
+    """What a diagram has drawn.
 
+    ``points``: what shows the lanes, lane after lane; ``diverged``: the rug of diverged lanes;
+    ``off_scale``: triangles for lanes beyond bottom and top; ``legend``: of these.
+    """
+
+    points: Line2D
     diverged: Line2D | None
     off_scale: list[Line2D]
     legend: Legend | None
 
 
-class _Drawn(NamedTuple):
-    """What one call has drawn into axes, how far its lanes reach, and what the legend says."""
+class Drawn(NamedTuple):
+    """What one call has drawn into axes, and how far it reaches.
+
+    ``artist``: what shows the lanes; the legend names its label, if it has one, and what is
+    ``named``; ``low``, ``high`` (lanes,): lowest and highest value of each lane, not a number where
+    there is none; ``spread``, (lanes,) or one for all: what the limits leave room for beyond these;
+    ``full_range``: as for `robust_limits`; ``off_scale``: triangles for lanes beyond the limits.
+    """
 
     artist: Line2D
-    limits: tuple[float, float]
-    parameter: Floats
+    lanes: Lanes
     low: Floats
     high: Floats
-    spread: Floats
+    spread: Floats | float
     full_range: bool
     named: list[Artist]
     off_scale: list[Line2D]
 
 
-_DRAWN: WeakKeyDictionary[Axes, list[_Drawn]] = WeakKeyDictionary()
+_DRAWN: WeakKeyDictionary[Axes, list[Drawn]] = WeakKeyDictionary()
 
 
 def close_panel(
-    axes: Axes,
-    result: Result,
-    lanes: Lanes,
-    low: Floats,
-    high: Floats,
-    artist: Line2D,
-    *,
-    spread: Floats | float = 0.0,
-    hold_zero: bool = False,
-    full_range: bool = False,
-    also: Sequence[Artist] = (),
-) -> Marks:
+    axes: Axes, result: Result, own: Drawn, *, hold_zero: bool = False
+) -> DiagramArtists:
     """Set limits and the label of the parameter, and mark the lanes that cannot be shown.
 
-    Limits and marks are those of everything that was drawn into the axes in this way.
-
-    Parameters
-    ----------
-    axes : matplotlib.axes.Axes
-    result : Result
-    lanes : Lanes
-    low, high : ndarray of float, shape (lanes,)
-        Lowest and highest value of each lane, not a number where there is none.
-    artist : Line2D
-        What shows the lanes; the legend names its label, if it has one.
-    spread : ndarray of float, shape (lanes,), optional
-        What the limits leave room for beyond these.
-    hold_zero, full_range : bool
-        As for `robust_limits`.
-    also : sequence of Artist
-        What the legend names before the marks.
+    Limits and marks are those of everything that was drawn into the axes in this way; ``hold_zero``
+    is as for `robust_limits`.
     """
     # Of axes that were cleared, nothing is left.
     earlier = [one for one in _DRAWN.get(axes, []) if one.artist.axes is axes]
-    there = np.isfinite(low)
-    reach = lanes.parameter[there], low[there], high[there], (np.zeros(low.shape) + spread)[there]
-    own = _Drawn(artist, lanes.limits, *reach, full_range, [], [])
     drawn = _DRAWN[axes] = [*earlier, own]
-    left, right = zip(*(one.limits for one in drawn), strict=True)
+    left, right = zip(*(one.lanes.limits for one in drawn), strict=True)
     axes.set_xlim(min(left), max(right))
     axes.set_xlabel(axis_label(result, result.axis))
-    rug = _mark_diverged(axes, result, lanes.parameter[lanes.diverged])
-    color, label = artist.get_color(), str(artist.get_label())
+    color, label = own.artist.get_color(), str(own.artist.get_label())
     if not label.startswith("_"):
-        own.named.append(Line2D([], [], color=color, label=label, marker="s", ms=3.5, ls="none"))
-    own.named.extend([*also, *([rug] if rug else [])])
-    if any(one.low.size for one in drawn):
-        least = np.concatenate([one.low - one.spread for one in drawn])
-        most = np.concatenate([one.high + one.spread for one in drawn])
+        look: dict[str, Any] = {"marker": "s", "ms": 3.5, "ls": "none"}
+        own.named.insert(0, Line2D([], [], color=color, label=label, **look))
+    rug = _mark_diverged(axes, result, own.lanes.parameter[own.lanes.diverged])
+    own.named.extend([rug] if rug else [])
+    least = np.concatenate([one.low - one.spread for one in drawn])
+    most = np.concatenate([one.high + one.spread for one in drawn])
+    there = np.isfinite(least)
+    if there.any():
         full_range = any(one.full_range for one in drawn)
-        axes.set_ylim(robust_limits(least, most, hold_zero=hold_zero, full_range=full_range))
+        ends = least[there], most[there]
+        axes.set_ylim(robust_limits(*ends, hold_zero=hold_zero, full_range=full_range))
     else:
-        _say_nothing_to_show(axes, lanes)
+        _say_nothing_to_show(axes, own.lanes)
     for one in drawn:
         for mark in one.off_scale:
             mark.remove()
-        one.off_scale[:] = _mark_off_scale(axes, one) if one.low.size else []
+        one.off_scale[:] = _mark_off_scale(axes, one)
     # Entries that several results have in common appear once.
     named = {str(mark.get_label()): mark for one in drawn for mark in one.named + one.off_scale}
-    return Marks(rug, own.off_scale, legend_above(axes, list(named.values())))
+    legend = legend_above(axes, list(named.values()))
+    return DiagramArtists(own.artist, rug, own.off_scale, legend)
 
 
 def robust_limits(
@@ -149,16 +135,16 @@ def _mark_diverged(axes: Axes, result: Result, parameter: Floats) -> Line2D | No
     return _marks(axes, parameter, 0.0, label, marker="|", ms=8.0, mew=0.8, color=VERMILION)
 
 
-def _mark_off_scale(axes: Axes, drawn: _Drawn) -> list[Line2D]:
+def _mark_off_scale(axes: Axes, drawn: Drawn) -> list[Line2D]:
     """Draw a triangle at the edge of the axes for every lane that reaches beyond it."""
     low, high, (bottom, top) = drawn.low, drawn.high, axes.get_ylim()
     color = GREY if drawn.artist.get_color() == BLACK else drawn.artist.get_color()
     marks = []
-    ends = (low < bottom, low.min(), 0.02, "v"), (high > top, high.max(), 0.98, "^")
-    for beyond, extreme, height, marker in ends:
+    ends = (low < bottom, low, np.min, 0.02, "v"), (high > top, high, np.max, 0.98, "^")
+    for beyond, values, extreme, height, marker in ends:
         if beyond.any():
-            place = axes, drawn.parameter[beyond], height
-            label = f"off scale (to {number(float(extreme))})"
+            place = axes, drawn.lanes.parameter[beyond], height
+            label = f"off scale (to {number(float(extreme(values[beyond])))})"
             marks.append(_marks(*place, label, marker=marker, ms=2.2, mew=0.0, color=color))
     return marks
 

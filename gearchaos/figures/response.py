@@ -12,12 +12,7 @@ from gearchaos.errors import FigureError
 from gearchaos.figures.labels import axis_label, plain, unit_of
 from gearchaos.figures.lanes import Between, Floats
 from gearchaos.figures.page import remark
-from gearchaos.figures.response_lane import (
-    COORDINATE,
-    motion_of,
-    repeats_after,
-    samples_per_period,
-)
+from gearchaos.figures.response_lane import COORDINATE, motion_of, repeats_after, samples_per_period
 from gearchaos.figures.style import BLACK, BLUE, VERMILION
 from gearchaos.records.amplitude_spectrum import spectral_lines
 from gearchaos.results.response_variables import TIME, acceleration_of

@@ -76,9 +76,7 @@ def hop_in_words(found: Reproduction) -> dict[str, str]:
     exponents = [signed(exponent, 5) for exponent in (*found.exponents, *rest.exponents)]
     before = found.sweep["lyapunov_exponent"][found.sweep[found.sweep.axis] <= rest.before]
     return {
-        "first": f"{hop.first:.4f}",
         "falls": falls,
-        "last": f"{hop.last:.4f}",
         "rises": rises,
         "upper": f"{upper:g}",
         "lower": f"{lower:g}{parting if upper == 0.0 < lower else ''}",

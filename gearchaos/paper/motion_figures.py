@@ -36,33 +36,22 @@ WITHOUT_AND_WITH = ((0.0, BLUE, -0.07), (1.0, VERMILION, 0.07))
 
 def accelerations_page(found: Reproduction) -> Page:
     """Draw the accelerations of all coordinates without and with pitch error (figure 5)."""
-    names = coordinates_of(found.response)
-    with _stack(found.response, names) as (figure, panels):
-        for axes, name in zip(panels, names, strict=True):
-            for p, color, _ in WITHOUT_AND_WITH:
-                _history(axes, found.response, p, name).set(color=color, label=f"$P$ = {p:g}")
+    with _stack(found.response) as (figure, panels):
         legend_above(panels[0], panels[0].lines)
     return figure
 
 
 def spectra_page(found: Reproduction) -> Page:
     """Draw the amplitude spectra of those accelerations (figure 6)."""
-    names = coordinates_of(found.response)
-    with _stack(found.response, names, spectra=True) as (figure, panels):
-        for axes, name in zip(panels, names, strict=True):
-            for p, color, shift in WITHOUT_AND_WITH:
-                _stems(axes, found.response, p, name, color, shift).set_label(f"$P$ = {p:g}")
+    with _stack(found.response, spectra=True) as (figure, panels):
         panels[0].legend(frameon=False, loc="upper right", ncols=2, handletextpad=0.0)
     return figure
 
 
 def growing_accelerations_page(found: Reproduction) -> Page:
     """Draw the torsional acceleration at growing pitch errors (figure 14)."""
-    values = published().increments.pitch_errors
-    names = [COORDINATE] * len(values)
-    with _stack(found.response, names, one_scale=True) as (figure, panels):
-        for axes, p in zip(panels, values, strict=True):
-            _history(axes, found.response, p, COORDINATE)
+    with _stack(found.response, growing=True) as (figure, panels):
+        for axes, p in zip(panels, published().increments.pitch_errors, strict=True):
             largest = largest_acceleration(found.response, p)
             axes.axhline(largest, color=VERMILION, linewidth=0.6, dashes=(4, 2))
             remark(axes, f"$P$ = {p:g}, largest value {largest:.3f}")
@@ -71,11 +60,8 @@ def growing_accelerations_page(found: Reproduction) -> Page:
 
 def growing_spectra_page(found: Reproduction) -> Page:
     """Draw the spectra of the torsional acceleration at growing pitch errors (figure 15)."""
-    values = published().increments.pitch_errors
-    names = [COORDINATE] * len(values)
-    with _stack(found.response, names, spectra=True, one_scale=True) as (figure, panels):
-        for axes, p in zip(panels, values, strict=True):
-            _stems(axes, found.response, p, COORDINATE, BLACK, 0.0)
+    with _stack(found.response, spectra=True, growing=True) as (figure, panels):
+        for axes, p in zip(panels, published().increments.pitch_errors, strict=True):
             look: dict[str, Any] = {"va": "top", "ha": "right", "fontsize": SMALL_FONT_PT}
             axes.text(0.985, 0.93, f"$P$ = {p:g}", transform=axes.transAxes, **look)
     return figure
@@ -122,15 +108,32 @@ def shown_response(found: Reproduction, shown: ShownMotion) -> tuple[Result, str
 
 @contextmanager
 def _stack(
-    result: Result, names: Sequence[str], *, spectra: bool = False, one_scale: bool = False
+    response: Result, *, spectra: bool = False, growing: bool = False
 ) -> Iterator[tuple[Page, Sequence[Axes]]]:
-    """Make panels one above another for the accelerations of coordinates, or their spectra."""
-    margin_mm = 8.0 + (6.0 if spectra else 0.0) + (0.0 if one_scale else 4.0)
-    with column(PANEL_MM * len(names) + margin_mm) as figure:
-        panels = figure.subplots(len(names), 1, sharex=True, sharey=one_scale)
+    """Draw accelerations or their spectra in panels one above another.
+
+    Those of all coordinates without and with pitch error, or the torsional one at growing ones.
+    """
+    shown: list[tuple[str, Sequence[tuple[float, str, float]]]] = (
+        [(COORDINATE, [(p, BLACK, 0.0)]) for p in published().increments.pitch_errors]
+        if growing
+        else [(name, WITHOUT_AND_WITH) for name in coordinates_of(response)]
+    )
+    margin_mm = 8.0 + (6.0 if spectra else 0.0) + (0.0 if growing else 4.0)
+    with column(PANEL_MM * len(shown) + margin_mm) as figure:
+        panels = figure.subplots(len(shown), 1, sharex=True, sharey=growing)
+        for axes, (name, curves) in zip(panels, shown, strict=True):
+            for p, color, shift in curves:
+                if spectra:
+                    drawn = _stems(axes, response, p, name, color, shift)
+                else:
+                    place = response, lane_of(response, p), acceleration_of(name)
+                    drawn = time_history(axes, *place, between=(0.0, SHOWN_PERIODS))
+                    drawn.set(color=color, linewidth=0.9)
+                drawn.set_label(f"$P$ = {p:g}")
         yield figure, panels
-        for axes, name, at in zip(panels, names, "abcdefgh", strict=False):
-            axes.set_ylabel(result.attributes(acceleration_of(name))["symbol"])
+        for axes, (name, _), at in zip(panels, shown, "abcdefgh", strict=False):
+            axes.set_ylabel(response.attributes(acceleration_of(name))["symbol"])
             axes.set_xlabel("")
             if spectra:
                 axes.set_yscale("log")
@@ -139,20 +142,13 @@ def _stack(
             else:
                 few_ticks(axes)
         if spectra:
-            _frequency_axis(panels[0], float(result["mesh_period"][0]))
+            _frequency_axis(panels[0], float(response["mesh_period"][0]))
         else:
             letter(panels)
         panels[-1].set_xlabel("Frequency over mesh frequency" if spectra else TIME_LABEL)
         quantity = "Amplitude of the acceleration" if spectra else "Acceleration"
         figure.supylabel(f"{quantity} (dimensionless)", fontsize=FONT_PT)
         figure.align_ylabels(panels)
-
-
-def _history(axes: Axes, result: Result, pitch_error: float, name: str) -> Line2D:
-    lane, between = lane_of(result, pitch_error), (0.0, SHOWN_PERIODS)
-    line = time_history(axes, result, lane, acceleration_of(name), between=between)
-    line.set_linewidth(0.9)
-    return line
 
 
 def _stems(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from importlib.resources import files
 
 from gearchaos.figures.response_lane import coordinates_of
@@ -31,6 +31,7 @@ def report(found: Reproduction, names: dict[str, str]) -> str:
     """Write the report; ``names`` are the files beside it, with what each holds."""
     printed, tables = published(), compare(found)
     rows = [row for table in tables.values() for row in table]
+    harmonics = (*printed.harmonics.cosine, *printed.harmonics.sine)
     values = {key: number.value for key, number in printed.numbers.items()}
     pair, lines = pair_of(found), printed.contact_lines
     per_mm, face_width = values["mean_stiffness"], float(pair.face_width) * 1e3
@@ -41,10 +42,11 @@ def report(found: Reproduction, names: dict[str, str]) -> str:
         citation=CITATION,
         version=software_version(),
         steps=found.sweep.metadata["steps_per_period"],
-        integration=found.config.integration,
         rows=len(rows),
         counts=Counter(row.verdict for row in rows),
-        kinds=_kinds(rows),
+        kinds={kind.value: _counts(row for row in rows if row.kind is kind) for kind in Kind},
+        harmonics=len(harmonics),
+        zeros=sum(abs(value) < 1e-3 for value in harmonics),
         disagreements=_disagreements(rows),
         rules=RULES,
         overlap=OVERLAP,
@@ -53,8 +55,7 @@ def report(found: Reproduction, names: dict[str, str]) -> str:
         tables={name: _table(table) for name, table in tables.items()},
         printed=values,
         ours=our_numbers(found),
-        groups=found.sweep.parameters,
-        axial=found.response.parameters,
+        found=found,
         printed_ratio=values["damping_ratio"] / face_width**0.5,
         pair=pair,
         lines=lines,
@@ -77,24 +78,9 @@ def report(found: Reproduction, names: dict[str, str]) -> str:
     return re.sub(without_words, lambda picture: f"![{picture[1].replace('*', '')}]", text)
 
 
-KINDS = {
-    Kind.DERIVED: "taken over or derived: {harmonics} of them harmonics of Table 2, {zeros} of "
-    "which are zero but for rounding",
-    Kind.FITTED: "fitted: seen by the search for the groups",
-    Kind.PREDICTED: "predicted: depends on the groups, and no search has seen it",
-}
-
-
-def _kinds(rows: Sequence[Row]) -> str:
-    table = published().harmonics
-    harmonics = (*table.cosine, *table.sine)
-    zeros = sum(abs(value) < 1e-3 for value in harmonics)
-    lines = []
-    for kind, words in KINDS.items():
-        counts = Counter(row.verdict for row in rows if row.kind is kind)
-        told = words.format(harmonics=len(harmonics), zeros=zeros)
-        lines.append(_line(told, counts.total(), *(counts[verdict] for verdict in Verdict)))
-    return "\n".join(lines)
+def _counts(rows: Iterable[Row]) -> str:
+    counts = Counter(row.verdict for row in rows)
+    return " | ".join(map(str, (counts.total(), *(counts[verdict] for verdict in Verdict))))
 
 
 def _disagreements(rows: Iterable[Row]) -> str:
