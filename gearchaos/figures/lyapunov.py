@@ -30,8 +30,7 @@ class LyapunovArtists(NamedTuple):
     ``line``: the exponents drawn, by the parameter, not a number where a lane diverged;
     ``points``: exponents without a neighbour to draw a line to, between diverged lanes, or all of
     them where a parameter value has several starts; ``band``, ``bars``: two standard errors to
-    either side, of the line and of the points; ``positive``: between a positive exponent and zero;
-    ``mixed``: around exponents of orbits that were reached within the record, from other motion.
+    either side, of the line and of the points; ``positive``: between a positive exponent and zero.
     """
 
     line: Line2D
@@ -39,7 +38,6 @@ class LyapunovArtists(NamedTuple):
     band: PolyCollection
     bars: LineCollection
     positive: PolyCollection
-    mixed: Line2D | None
     zero: Line2D
     diverged: Line2D | None
     off_scale: list[Line2D]
@@ -106,15 +104,12 @@ def lyapunov(
     (line,) = axes.plot(x, exponent, ls=line_style, lw=0.6, color=color, label=label)
     look = {"markersize": lanes.dot_size(1.0), "color": color, "marker": marker}
     points = dots(axes, lanes._replace(diverged=~lonely), stored[:, np.newaxis], **look)
-    mixed = None
-    among = drawn[result.lanes(RECORD)[lanes.numbers][drawn] == 1] if RECORD in result else []
-    if len(among):
-        look = {"ms": 3.0, "mfc": "none", "mew": 0.5, "color": VERMILION}
-        look["label"] = "came from another motion"
-        (mixed,) = axes.plot(lanes.parameter[among], whole[among], "o", **look)
-    axes.set_ylabel(axis_label(result, LARGEST_EXPONENT, line_length=20))
     named: list[Artist] = [band] if np.isfinite(whole + spread).any() else []
-    named += [mixed] if mixed else []
+    if RECORD in result and (mixed := result.lanes(RECORD)[lanes.numbers][drawn] == 1).any():
+        # Orbits that were reached within the record.
+        look = {"ms": 3.0, "mfc": "none", "mew": 0.5, "color": VERMILION}
+        named += axes.plot(x[mixed], exponent[mixed], "o", label="came from another motion", **look)
+    axes.set_ylabel(axis_label(result, LARGEST_EXPONENT, line_length=20))
     own = Drawn(line, lanes, whole, whole, np.nan_to_num(spread), full_range, named, [])
     marks = close_panel(axes, result, own, hold_zero=True)[1:]
-    return LyapunovArtists(line, points, band, bars, positive, mixed, zero, *marks)
+    return LyapunovArtists(line, points, band, bars, positive, zero, *marks)

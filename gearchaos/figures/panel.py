@@ -12,7 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.legend import Legend
 from matplotlib.lines import Line2D
 
-from gearchaos.figures.labels import axis_label, number, plain
+from gearchaos.figures.labels import axis_label, plain, short
 from gearchaos.figures.lanes import Floats, Lanes, columns
 from gearchaos.figures.style import BLACK, GREY, LEGEND, VERMILION
 from gearchaos.results.result import Result
@@ -101,16 +101,9 @@ def robust_limits(
     """Return limits that a few outlying lanes cannot stretch.
 
     Where the outermost 3 % of the lanes at either end would take more than half of the height
-    from all the others, those that lie far out are left out; a triangle then says so.
-
-    Parameters
-    ----------
-    low, high : ndarray of float, shape (lanes,)
-        Lowest and highest value of each lane, all finite.
-    hold_zero : bool
-        Zero is part of what is to be shown.
-    full_range : bool
-        Show every lane however far it lies.
+    from all the others, those that lie far out are left out; a triangle then says so. ``low``,
+    ``high`` (lanes,): lowest and highest value of each lane, all finite; ``hold_zero``: zero is
+    part of what is to be shown; ``full_range``: every lane is shown, however far it lies.
     """
     bottom, top = float(low.min()), float(high.max())
     inner_bottom = float(np.quantile(low, OUTLYING_SHARE))
@@ -144,7 +137,7 @@ def _mark_off_scale(axes: Axes, drawn: Drawn) -> list[Line2D]:
     for beyond, values, extreme, height, marker in ends:
         if beyond.any():
             place = axes, drawn.lanes.parameter[beyond], height
-            label = f"off scale (to {number(float(extreme(values[beyond])))})"
+            label = f"off scale (to {short(extreme(values[beyond]), 3)})"
             marks.append(_marks(*place, label, marker=marker, ms=2.2, mew=0.0, color=color))
     return marks
 

@@ -24,11 +24,7 @@ def work_precision_page(
 ) -> Page:
     """Draw the error against the steps per period and against the time, all logarithmic.
 
-    Parameters
-    ----------
-    modes : mapping of str to sequence of (steps, seconds, error)
-        Points without an error are left out.
-    width_mm : float
+    ``modes``: points (steps, seconds, error) by mode; those without an error are left out.
     """
     with page(width_mm, HEIGHT_MM) as figure:
         panels = figure.subplots(1, 2, sharey=True)

@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from gearchaos.figures.labels import short
 from gearchaos.paper.computation import Reproduction, largest_acceleration
 from gearchaos.paper.our_numbers import contact_line_stiffness, our_numbers
 from gearchaos.paper.published import Kind, Printed, PrintedStage, published
@@ -110,7 +111,10 @@ def _boundaries(pairs: Pairs) -> Iterator[Row]:
 
 def _motions(found: Reproduction) -> Iterator[Row]:
     reach, sweep = RULES["boundary"].in_kind, found.labelled(found.sweep)
-    starts = found.shown(found.motions), found.shown(found.motions_from_contact)
+    starts = (
+        found.labelled(found.motions, strictly=True),
+        found.labelled(found.motions_from_contact, strictly=True),
+    )
     for shown in published().motions:
         p = shown.pitch_error
         mine, other = (motion_at(lanes, p) for lanes in starts)
@@ -130,12 +134,6 @@ def signed(value: float, digits: int = 2) -> str:
     """Write a difference with its sign, zero without."""
     text = f"{value:+.{digits}f}"
     return text.replace("-", "−") if float(text) else "0"
-
-
-def short(value: float, digits: int = 4, sign: str = "-") -> str:
-    """Write a number in a few digits, with a true minus sign."""
-    # Adding zero makes plus zero of minus zero.
-    return f"{value + 0.0:{sign}.{digits}g}".replace("-", "−")
 
 
 def _row(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,13 +13,12 @@ from gearchaos.errors import ConfigurationError
 from gearchaos.paper.hop import STEP, Hop, exponents_beside, find_hop
 from gearchaos.paper.published import published
 from gearchaos.paper.stages import Crisis, crisis_of, lanes_as_printed
+from gearchaos.progress import say
 from gearchaos.results.result import Result
 from gearchaos.results.stage_table import LabelledLanes
 
 KEPT_PERIODS = 64
 """Mesh periods of a response: lines of a spectrum 1/64 of the mesh frequency apart."""
-
-Notify = Callable[[str], None]
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,13 +45,9 @@ class Reproduction:
         """Where the diagram of figure 7 widens at once."""
         return crisis_of(self.sweep)
 
-    def labelled(self, result: Result) -> LabelledLanes:
-        """Label the lanes of one of these results as the paper does."""
-        return lanes_as_printed(result, self.crisis)
-
-    def shown(self, result: Result) -> LabelledLanes:
-        """Label the lanes of one of these results as their figures show them, each by itself."""
-        return lanes_as_printed(result, self.crisis, strictly=True)
+    def labelled(self, result: Result, *, strictly: bool = False) -> LabelledLanes:
+        """Label the lanes of one of these results as the paper does, or figures of one lane."""
+        return lanes_as_printed(result, self.crisis, strictly=strictly)
 
     def group(self, name: str) -> float:
         """Return a group that all lanes of the sweep share."""
@@ -67,38 +61,24 @@ def compute(
     hop_step: float = STEP,
     periods: int = KEPT_PERIODS,
     threads: int | None = None,
-    notify: Notify = lambda _: None,
 ) -> Reproduction:
-    """Compute the gallery.
+    """Compute the gallery, and say what comes next.
 
-    Parameters
-    ----------
-    config, full : Configuration
-        ``pan2021.toml`` and ``pan2021_full.toml``; coarser ones give a coarser gallery sooner.
-    hop_step : float
-        Step of the carried sweeps between which the hop lies.
-    periods : int
-        Mesh periods of which every step is kept.
-    threads : int, optional
-        Threads to use; by default all that there are.
-    notify : callable
-        Told what comes next.
-
-    Raises
-    ------
-    ConfigurationError
-        If no two motions coexist, or a start at rest does not hop from one to the other.
+    ``config``, ``full``: ``pan2021.toml`` and ``pan2021_full.toml``; coarser ones give a coarser
+    gallery sooner; ``hop_step``: of the carried sweeps between which the hop lies; ``periods``:
+    mesh periods of which every step is kept. Raises ConfigurationError if no two motions coexist,
+    or a start at rest does not hop from one to the other.
     """
-    notify("figure 7: the sweep over the pitch error")
+    say("figure 7: the sweep over the pitch error")
     sweep = run(config, threads)
-    notify("the hop of figure 7: both motions, upwards and downwards")
+    say("the hop of figure 7: both motions, upwards and downwards")
     hop = find_hop(config, step=hop_step, threads=threads)
     if hop is None or "rest" not in hop.changes:
         raise ConfigurationError(f"{config.source}: at rest, there is no hop as in figure 7")
     exponents = exponents_beside(full, hop.changes["rest"], threads)
-    notify("figures 5, 6, 14 and 15: accelerations of all coordinates")
+    say("figures 5, 6, 14 and 15: accelerations of all coordinates")
     response = respond(_at(full, [0.0, *published().increments.pitch_errors]), periods, threads)
-    notify("figures 8 to 13: motions at six pitch errors")
+    say("figures 8 to 13: motions at six pitch errors")
     shown = _at(config, [motion.pitch_error for motion in published().motions])
     motions, from_contact = (
         respond(shown.replace("start", {"kind": kind}), periods, threads)

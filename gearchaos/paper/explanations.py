@@ -7,7 +7,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from gearchaos.paper.comparison import short, signed
+from gearchaos.figures.labels import short
+from gearchaos.paper.comparison import signed
 from gearchaos.paper.computation import Reproduction, lane_of
 from gearchaos.paper.hop import STARTS
 from gearchaos.paper.published import published

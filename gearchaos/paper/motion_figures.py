@@ -71,7 +71,7 @@ def motion_page(found: Reproduction, shown: ShownMotion) -> Page:
     """Draw history, phase portrait and Poincare section at one pitch error (figures 8 to 13)."""
     result, begun = shown_response(found, shown)
     lane = lane_of(result, shown.pitch_error)
-    label = motion_at(found.shown(result), shown.pitch_error)
+    label = motion_at(found.labelled(result, strictly=True), shown.pitch_error)
     with column(86.0) as figure:
         grid = figure.add_gridspec(2, 2, height_ratios=(0.8, 1.0), wspace=0.1)
         history = figure.add_subplot(grid[0, :])
@@ -98,7 +98,7 @@ def shown_response(found: Reproduction, shown: ShownMotion) -> tuple[Result, str
     the paper shows.
     """
     at_rest, from_contact = (
-        motion_at(found.shown(result), shown.pitch_error)
+        motion_at(found.labelled(result, strictly=True), shown.pitch_error)
         for result in (found.motions, found.motions_from_contact)
     )
     if at_rest != shown.motion == from_contact:
@@ -142,7 +142,12 @@ def _stack(
             else:
                 few_ticks(axes)
         if spectra:
-            _frequency_axis(panels[0], float(response["mesh_period"][0]))
+            # The paper's frequency is in cycles per unit of tau.
+            period = float(response["mesh_period"][0])
+            to_and_fro = (lambda order: order / period, lambda frequency: frequency * period)
+            panels[0].tick_params(axis="x", which="both", top=False)
+            above = panels[0].secondary_xaxis("top", functions=to_and_fro)
+            above.set_xlabel(r"Frequency in cycles per unit of $\tau$")
         else:
             letter(panels)
         panels[-1].set_xlabel("Frequency over mesh frequency" if spectra else TIME_LABEL)
@@ -167,11 +172,3 @@ def _stems(
     axes.set_ylim(min(bottom, 3e-4 * top), max(highest, 4.0 * top))
     axes.set_xlim(0.0, HIGHEST_ORDER + 0.5)
     return heads
-
-
-def _frequency_axis(axes: Axes, period: float) -> None:
-    """Put the paper's frequency, in cycles per unit of tau, above a panel."""
-    axes.tick_params(axis="x", which="both", top=False)
-    to_and_fro = (lambda order: order / period, lambda frequency: frequency * period)
-    above = axes.secondary_xaxis("top", functions=to_and_fro)
-    above.set_xlabel(r"Frequency in cycles per unit of $\tau$")

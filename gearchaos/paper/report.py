@@ -7,8 +7,9 @@ from collections import Counter
 from collections.abc import Iterable
 from importlib.resources import files
 
+from gearchaos.figures.labels import short
 from gearchaos.figures.response_lane import coordinates_of
-from gearchaos.paper.comparison import NONE, Row, compare, short
+from gearchaos.paper.comparison import NONE, Row, compare
 from gearchaos.paper.computation import Reproduction, largest_acceleration
 from gearchaos.paper.explanations import hop_in_words, increments_in_words, stages_in_words
 from gearchaos.paper.our_numbers import our_numbers, pair_of

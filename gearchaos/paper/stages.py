@@ -57,9 +57,8 @@ def crisis_of(sweep: Result) -> Crisis | None:
         return None
     widest = np.maximum.accumulate(width[first:after])
     last = int(np.argmax(widest[1:] / widest[:-1]))
-    return Crisis(
-        float(lanes.values[first + last + 1]), float(widest[last]), float(widest[last + 1])
-    )
+    place = float(lanes.values[first + last + 1])
+    return Crisis(place, float(widest[last]), float(widest[last + 1]))
 
 
 def lanes_as_printed(
