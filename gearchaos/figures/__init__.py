@@ -1,8 +1,7 @@
 """Figures drawn from result files alone: no kernel, no simulation, no pyplot."""
 
-from gearchaos.figures.bifurcation import bifurcation
+from gearchaos.figures.diagrams import bifurcation, lyapunov
 from gearchaos.figures.files import save_figure
-from gearchaos.figures.lyapunov import lyapunov
 from gearchaos.figures.response import (
     amplitude_spectrum,
     phase_portrait,

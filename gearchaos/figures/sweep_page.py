@@ -9,10 +9,9 @@ from typing import Any
 from matplotlib.axes import Axes
 
 from gearchaos.errors import FigureError
-from gearchaos.figures.bifurcation import bifurcation
+from gearchaos.figures.diagrams import bifurcation, lyapunov
 from gearchaos.figures.labels import form_in_words, in_words, plain
 from gearchaos.figures.lanes import Between
-from gearchaos.figures.lyapunov import lyapunov
 from gearchaos.figures.page import Page, few_ticks, footnote, letter, page
 from gearchaos.figures.panel import mark_values
 from gearchaos.figures.stages import shade_stages

@@ -19,9 +19,6 @@ from gearchaos.results.stage_table import Stage
 
 NONE = "–"
 
-Pairs = list[tuple[PrintedStage, Stage | None]]
-"""The printed stages with those of the sweep that answer them."""
-
 
 class Row(NamedTuple):
     """One line of the comparison, worded."""
@@ -38,16 +35,10 @@ class Row(NamedTuple):
 def compare(found: Reproduction) -> dict[str, list[Row]]:
     """Compare a reproduction with all that the paper prints: the tables of the report, by name."""
     printed, ours = published(), our_numbers(found)
-    numbers = {
-        key: _row(
-            number.quantity,
-            number,
-            number.value,
-            ours[key],
-            unit="" if number.unit == "1" else f" {number.unit}",
-        )
-        for key, number in printed.numbers.items()
-    }
+    numbers = {}
+    for key, number in printed.numbers.items():
+        unit = "" if number.unit == "1" else f" {number.unit}"
+        numbers[key] = _row(number.quantity, number, number.value, ours[key], unit=unit)
     stages = counterparts(printed.stages, found.labelled(found.sweep))
     pairs = list(zip(printed.stages, stages, strict=True))
     peak = numbers.pop("spectral_peak")
@@ -83,7 +74,7 @@ def _increments(found: Reproduction) -> Iterator[Row]:
         yield _row(quantity, table, value, after - before)
 
 
-def _stages(found: Reproduction, pairs: Pairs) -> Iterator[Row]:
+def _stages(found: Reproduction, pairs: list[tuple[PrintedStage, Stage | None]]) -> Iterator[Row]:
     labels, kind = found.labelled(found.sweep).labels, published().kinds["stages"]
     for printed, stage in pairs:
         mine, difference, verdict = NONE, NONE, Verdict.DOES_NOT
@@ -100,7 +91,7 @@ def _stages(found: Reproduction, pairs: Pairs) -> Iterator[Row]:
         yield Row(printed.printed, "figure 7", kind, theirs, mine, difference, verdict)
 
 
-def _boundaries(pairs: Pairs) -> Iterator[Row]:
+def _boundaries(pairs: list[tuple[PrintedStage, Stage | None]]) -> Iterator[Row]:
     boundary = Printed("figure 7", "boundary", published().kinds["boundaries"])
     for (before, ended), (after, begun) in pairwise(pairs):
         # A boundary has two sides.
@@ -119,15 +110,10 @@ def _motions(found: Reproduction) -> Iterator[Row]:
         p = shown.pitch_error
         mine, other = (motion_at(lanes, p) for lanes in starts)
         near = motions_between(sweep, p - reach, p + reach)
-        yield Row(
-            f"motion at {p:g} e(τ)",
-            f"figure {shown.figure}",
-            published().kinds["motions"],
-            shown.printed,
-            mine if other == mine else f"{mine}; {other} from the contact flank",
-            NONE,
-            motion_verdict(shown.motion, mine, (other, *near)),
-        )
+        ours = mine if other == mine else f"{mine}; {other} from the contact flank"
+        verdict = motion_verdict(shown.motion, mine, (other, *near))
+        place = f"motion at {p:g} e(τ)", f"figure {shown.figure}", published().kinds["motions"]
+        yield Row(*place, shown.printed, ours, NONE, verdict)
 
 
 def signed(value: float, digits: int = 2) -> str:

@@ -123,8 +123,8 @@ def find_hop(config: Configuration, step: float = STEP, threads: int | None = No
 
 
 def _states_only(config: Configuration) -> Configuration:
-    config = config.replace("outputs", {"section": config.scene.states, "section_points": 1})
-    config = config.replace("outputs.lyapunov", False).replace("outputs.motion", False)
+    outputs = {"section": config.scene.states, "section_points": 1}
+    config = config.replace("outputs", {**outputs, "lyapunov": False, "motion": False})
     return config.replace("integration.recorded_periods", 1)
 
 

@@ -38,8 +38,7 @@ def mesh_stiffness_page(found: Reproduction) -> Page:
     """Draw the mesh stiffness of the contact lines and its Fourier fit (figure 4)."""
     mean = published().numbers["mean_stiffness"].value
     scale = found.group("stiffness_variation_scale")
-    both = contact_line_stiffness(), printed_series()
-    tables = (stiffness.table(CYCLE.size - 1) for stiffness in both)
+    tables = (one.table(CYCLE.size - 1) for one in (contact_line_stiffness(), printed_series()))
     trapezoid, series = (mean * np.append(table, table[0]) for table in tables)
     computed = mean + scale * (series - mean)
     with _cycle(62.0, mean, r"Mesh stiffness $k$ (N/(µm$\,$mm))") as (figure, axes):

@@ -62,8 +62,8 @@ def growing_spectra_page(found: Reproduction) -> Page:
     """Draw the spectra of the torsional acceleration at growing pitch errors (figure 15)."""
     with _stack(found.response, spectra=True, growing=True) as (figure, panels):
         for axes, p in zip(panels, published().increments.pitch_errors, strict=True):
-            look: dict[str, Any] = {"va": "top", "ha": "right", "fontsize": SMALL_FONT_PT}
-            axes.text(0.985, 0.93, f"$P$ = {p:g}", transform=axes.transAxes, **look)
+            place: dict[str, Any] = {"transform": axes.transAxes, "va": "top", "ha": "right"}
+            axes.text(0.985, 0.93, f"$P$ = {p:g}", fontsize=SMALL_FONT_PT, **place)
     return figure
 
 
