@@ -10,7 +10,7 @@ from gearchaos.configuration import Configuration
 from gearchaos.engine.response import respond
 from gearchaos.engine.running import run
 from gearchaos.errors import ConfigurationError
-from gearchaos.paper.hop import STEP, Hop, exponents_beside, find_hop
+from gearchaos.paper.hop import HIGH, LOW, STEP, Hop, exponents_beside, find_hop
 from gearchaos.paper.published import published
 from gearchaos.paper.stages import Crisis, crisis_of, lanes_as_printed
 from gearchaos.progress import say
@@ -74,7 +74,10 @@ def compute(
     say("the hop of figure 7: both motions, upwards and downwards")
     hop = find_hop(config, step=hop_step, threads=threads)
     if hop is None or "rest" not in hop.changes:
-        raise ConfigurationError(f"{config.source}: at rest, there is no hop as in figure 7")
+        raise ConfigurationError(
+            f"{config.source}: from rest, there is no hop as in figure 7 between {LOW:g} and "
+            f"{HIGH:g} e(tau); take back what was changed in it"
+        )
     exponents = exponents_beside(full, hop.changes["rest"], threads)
     say("figures 5, 6, 14 and 15: accelerations of all coordinates")
     response = respond(_at(full, [0.0, *published().increments.pitch_errors]), periods, threads)

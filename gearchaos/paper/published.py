@@ -9,11 +9,6 @@ from importlib.resources import files
 
 from pydantic.dataclasses import dataclass
 
-CITATION = (
-    "Pan, Li, Wang: *Influence of Pitch Error on Vibration, Bifurcation, and Chaos "
-    "Characteristics of the Helical Gear Pair System*, 2021"
-)
-
 
 class Kind(StrEnum):
     """What it is worth if a printed number agrees: `published.toml` says which is which."""

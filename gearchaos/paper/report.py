@@ -13,7 +13,7 @@ from gearchaos.paper.comparison import NONE, Row, compare
 from gearchaos.paper.computation import Reproduction, largest_acceleration
 from gearchaos.paper.explanations import hop_in_words, increments_in_words, stages_in_words
 from gearchaos.paper.our_numbers import our_numbers, pair_of
-from gearchaos.paper.published import CITATION, Kind, published
+from gearchaos.paper.published import Kind, published
 from gearchaos.paper.stages import OUT_OF_TURN, WINDOW
 from gearchaos.paper.verdict import OVERLAP, RULES, Verdict
 from gearchaos.results.response_variables import acceleration_of
@@ -40,9 +40,7 @@ def report(found: Reproduction, names: dict[str, str]) -> str:
     length_scale = TOLERANCE_MM / found.group("pitch_error_amplitude")
     template = files("gearchaos.paper").joinpath("report_text.md").read_text(encoding="utf-8")
     text = template.format(
-        citation=CITATION,
         version=software_version(),
-        steps=found.sweep.metadata["steps_per_period"],
         rows=len(rows),
         counts=Counter(row.verdict for row in rows),
         kinds={kind.value: _counts(row for row in rows if row.kind is kind) for kind in Kind},
