@@ -153,7 +153,8 @@ def _end(sweep: Result, lane: int, step: float) -> tuple[float, StabilityLoss]:
     value = float(sweep[sweep.axis][lane])
     system, orbit = _orbit(sweep, value)
     branch = system.follow(orbit, PITCH_ERROR, value, value + step, WIDTH)
-    return branch.value, branch.loss
+    # Of an orbit that is unstable where the sweep has it, nothing is known.
+    return (branch.value if math.isfinite(branch.value) else value), branch.loss
 
 
 def _orbit(found: Result, pitch_error: float) -> tuple[System, Orbit]:
