@@ -102,10 +102,8 @@ def _boundaries(pairs: list[tuple[PrintedStage, Stage | None]]) -> Iterator[Row]
 
 def _motions(found: Reproduction) -> Iterator[Row]:
     reach, sweep = RULES["boundary"].in_kind, found.labelled(found.sweep)
-    starts = (
-        found.labelled(found.motions, strictly=True),
-        found.labelled(found.motions_from_contact, strictly=True),
-    )
+    both = found.motions, found.motions_from_contact
+    starts = [found.labelled(motions, strictly=True) for motions in both]
     for shown in published().motions:
         p = shown.pitch_error
         mine, other = (motion_at(lanes, p) for lanes in starts)

@@ -69,9 +69,14 @@ def growing_spectra_page(found: Reproduction) -> Page:
 
 def motion_page(found: Reproduction, shown: ShownMotion) -> Page:
     """Draw history, phase portrait and Poincare section at one pitch error (figures 8 to 13)."""
-    result, begun = shown_response(found, shown)
+    both = found.motions, found.motions_from_contact
+    starts = [found.labelled(motions, strictly=True) for motions in both]
+    at_rest, from_contact = (motion_at(lanes, shown.pitch_error) for lanes in starts)
+    result, label = found.motions, at_rest
+    # Unless only the start from the contact flank comes to the motion that the paper shows.
+    if at_rest != shown.motion == from_contact:
+        result, label = found.motions_from_contact, f"{from_contact}, from the contact flank"
     lane = lane_of(result, shown.pitch_error)
-    label = motion_at(found.labelled(result, strictly=True), shown.pitch_error)
     with column(86.0) as figure:
         grid = figure.add_gridspec(2, 2, height_ratios=(0.8, 1.0), wspace=0.1)
         history = figure.add_subplot(grid[0, :])
@@ -86,24 +91,9 @@ def motion_page(found: Reproduction, shown: ShownMotion) -> Page:
             axes.set(xlabel=r"$\delta_5$", ylabel=r"$\delta_5'$")
             few_ticks(axes, 5, 6)
         letter((history, portrait, section))
-        remark(history, f"$P$ = {shown.pitch_error:g}, {label}{begun}")
+        remark(history, f"$P$ = {shown.pitch_error:g}, {label}")
         remark(section, f"{result['section_delta_5'].shape[1]} points")
     return figure
-
-
-def shown_response(found: Reproduction, shown: ShownMotion) -> tuple[Result, str]:
-    """Return the response that a figure shows, and what is said of its start.
-
-    At rest as everywhere, unless only the start from the contact flank comes to the motion that
-    the paper shows.
-    """
-    at_rest, from_contact = (
-        motion_at(found.labelled(result, strictly=True), shown.pitch_error)
-        for result in (found.motions, found.motions_from_contact)
-    )
-    if at_rest != shown.motion == from_contact:
-        return found.motions_from_contact, ", from the contact flank"
-    return found.motions, ""
 
 
 @contextmanager
