@@ -37,12 +37,11 @@ def _plot(options: argparse.Namespace) -> int:
     from gearchaos.results.result import open_result
 
     results = [_slice(open_result(path), options.at) for path in options.result]
-    responses = [
-        path for path, one in zip(options.result, results, strict=True) if is_response(one)
-    ]
-    if responses and len(results) > 1:
-        raise FigureError(f"{responses[0]}: is a response; draw it alone, only sweeps share a page")
-    sheets = _response_sheets(results[0], options) if responses else _sweep_sheets(results, options)
+    responses = [is_response(one) for one in results]
+    if any(responses) and len(results) > 1:
+        path = options.result[responses.index(True)]
+        raise FigureError(f"{path}: is a response; draw it alone, only sweeps share a page")
+    sheets = (_response_sheets if responses[0] else _sweep_sheets)(results, options)
     targets = [_targets(options, name, len(sheets) == 1) for name, _ in sheets]
     _check_targets([path for paths in targets for path in paths], options)
     title = ", ".join(_titles(results, options.result))
@@ -76,21 +75,13 @@ def _sweep_sheets(results: Sequence[Result], options: argparse.Namespace) -> lis
     for word, end in (("from", options.low), ("to", options.high)):
         name += "" if end is None else f"_{word}_{end:g}"
     name += "_stages" if options.stages else ""
-    draw = partial(
-        bifurcation_page,
-        results,
-        options.variable,
-        labels=_titles(results, options.result),
-        between=(options.low, options.high),
-        full_range=options.full_range,
-        stages=options.stages,
-        width_mm=options.width or SINGLE_COLUMN_MM,
-        height_mm=options.height,
-    )
-    return [(name, draw)]
+    shown = {"between": (options.low, options.high), "full_range": options.full_range}
+    shown |= {"stages": options.stages, "labels": _titles(results, options.result)}
+    size = {"width_mm": options.width or SINGLE_COLUMN_MM, "height_mm": options.height}
+    return [(name, partial(bifurcation_page, results, options.variable, **shown, **size))]
 
 
-def _response_sheets(result: Result, options: argparse.Namespace) -> list[Sheet]:
+def _response_sheets(results: Sequence[Result], options: argparse.Namespace) -> list[Sheet]:
     from gearchaos.figures import response_page
     from gearchaos.figures.labels import in_a_name, place_of
     from gearchaos.figures.lanes import select_lanes
@@ -103,17 +94,13 @@ def _response_sheets(result: Result, options: argparse.Namespace) -> list[Sheet]
                 f"--{option.replace('_', '-')}: {options.result[0]} is a response; it belongs to "
                 "the diagram of a sweep"
             )
+    (result,) = results
     lanes = select_lanes(result, (options.low, options.high))
     if lanes.diverged.all():
         raise FigureError(f"{options.result[0]}: nothing to draw: every lane diverged")
     coordinate = "" if options.variable in (None, COORDINATE) else f"_{options.variable}"
-    draw = partial(
-        response_page,
-        result,
-        coordinate=options.variable,
-        width_mm=options.width or DOUBLE_COLUMN_MM,
-        height_mm=options.height,
-    )
+    size = {"width_mm": options.width or DOUBLE_COLUMN_MM, "height_mm": options.height}
+    draw = partial(response_page, result, coordinate=options.variable, **size)
     return [
         (f"{in_a_name(place_of(result, lane))}{coordinate}", partial(draw, lane))
         for lane in lanes.numbers[~lanes.diverged].tolist()
@@ -136,52 +123,34 @@ def _slice(result: Result, at: Sequence[tuple[str, float]]) -> Result:
 
 
 def _arguments(parser: argparse.ArgumentParser) -> None:
-    add = parser.add_argument
+    add, millimetres = parser.add_argument, partial(number, high=1000.0)
     text = "result file of a sweep or a response; several sweeps are drawn over each other"
     add("result", type=Path, nargs="+", metavar="RESULT.h5", help=text)
-    add(
-        "-o",
-        "--output",
-        metavar="PATH",
-        help="folder for the figures, their name without its ending, or one file such as x.pdf",
-    )
+    text = "folder for the figures, their name without its ending, or one file such as x.pdf"
+    add("-o", "--output", metavar="PATH", help=text)
     add("--format", metavar="FORMATS", help="some of png, pdf, svg, eps, tiff (default: png,pdf)")
-    add(
-        "--variable",
-        metavar="NAME",
-        help="section variable of a sweep (default: section_delta_5), coordinate of a response "
-        "(default: delta_5) or another of its variables over time, such as mesh_force_tangential",
+    text = (
+        "section variable of a sweep (default: section_delta_5), coordinate of a response "
+        "(default: delta_5) or another of its variables over time, such as mesh_force_tangential"
     )
+    add("--variable", metavar="NAME", help=text)
     add("--from", dest="low", type=number, metavar="VALUE", help="lowest parameter to show")
     add("--to", dest="high", type=number, metavar="VALUE", help="highest parameter to show")
-    add(
-        "--at",
-        type=place,
-        action="append",
-        default=[],
-        metavar="NAME=VALUE",
-        help="draw the slice next to this value of a second parameter, or of start; may be "
-        "repeated; VALUE is enough where there is one of them",
+    text = (
+        "draw the slice next to this value of a second parameter, or of start; may be "
+        "repeated; VALUE is enough where there is one of them"
     )
-    add(
-        "--stages",
-        action="store_true",
-        help="shade the stages behind the diagram of a sweep; those narrower than a 150th of the "
-        "axis go into what surrounds them, or make it one of several motions",
+    add("--at", type=place, action="append", default=[], metavar="NAME=VALUE", help=text)
+    text = (
+        "shade the stages behind the diagram of a sweep; those narrower than a 150th of the "
+        "axis go into what surrounds them, or make it one of several motions"
     )
+    add("--stages", action="store_true", help=text)
     add("--full-range", action="store_true", help="show every lane, however few lie far out")
-    add(
-        "--width",
-        type=partial(number, low=60.0, high=1000.0),
-        metavar="MM",
-        help="width of the page (default: 85, one column of a journal; a response: 180, two)",
-    )
-    add(
-        "--height",
-        type=partial(number, low=70.0, high=1000.0),
-        metavar="MM",
-        help="height of the page (default: by the width)",
-    )
+    text = "width of the page (default: 85, one column of a journal; a response: 180, two)"
+    add("--width", type=partial(millimetres, low=60.0), metavar="MM", help=text)
+    text = "height of the page (default: by the width)"
+    add("--height", type=partial(millimetres, low=70.0), metavar="MM", help=text)
     add("--dpi", type=_dpi, default=300, help="pixels per inch (default: 300)")
 
 
@@ -211,13 +180,11 @@ def _targets(options: argparse.Namespace, name: str, alone: bool) -> list[Path]:
             other = "there are several pages to draw"
         else:
             return [output]
-        raise FigureError(
-            f"--output {output} is one {ending} file, but {other}; leave the ending off"
-        )
+        rule = f"is one {ending} file, but {other}; leave the ending off"
+        raise FigureError(f"--output {output} {rule}")
     elif ending in FigureCanvasBase.filetypes:
-        raise FigureError(
-            f"--output {options.output}: a figure is written as {' or '.join(ENDINGS)}"
-        )
+        rule = f"a figure is written as {' or '.join(ENDINGS)}"
+        raise FigureError(f"--output {options.output}: {rule}")
     elif not alone:
         output = output.with_name(f"{output.name}{name}")
     return [output.with_name(f"{output.name}.{kind}") for kind in formats]

@@ -42,8 +42,8 @@ def _reproduce(options: Namespace) -> int:
     check_folder(folder, options.overwrite)
     configs = [load_config(sweep_file(name)) for name in PAPERS[options.paper]]
     choose_threads(options.threads)
-    found = compute(*configs, threads=options.threads, notify=say)
-    print(write_gallery(found, folder, overwrite=options.overwrite, notify=say), flush=True)
+    found = compute(*configs, threads=options.threads)
+    print(write_gallery(found, folder, overwrite=options.overwrite), flush=True)
     say(f"done in {time.monotonic() - began:.0f} s")
     return OK
 

@@ -1,8 +1,7 @@
 """Figures drawn from result files alone: no kernel, no simulation, no pyplot."""
 
-from gearchaos.figures.bifurcation import BifurcationArtists, bifurcation
+from gearchaos.figures.diagrams import bifurcation, lyapunov
 from gearchaos.figures.files import save_figure
-from gearchaos.figures.lyapunov import LyapunovArtists, lyapunov
 from gearchaos.figures.response import (
     amplitude_spectrum,
     phase_portrait,
@@ -14,8 +13,6 @@ from gearchaos.figures.stages import shade_stages
 from gearchaos.figures.sweep_page import bifurcation_page
 
 __all__ = [
-    "BifurcationArtists",
-    "LyapunovArtists",
     "amplitude_spectrum",
     "bifurcation",
     "bifurcation_page",

@@ -25,14 +25,7 @@ def dots(axes: Axes, lanes: Lanes, rows: Floats, **look: Any) -> Line2D:
     """Draw the points of lanes as dots, those that diverged left out.
 
     Up to `MOST_DOTS` they are a line without a stroke; more of them look the same, as `DenseDots`.
-
-    Parameters
-    ----------
-    axes : Axes
-    lanes : Lanes
-    rows : ndarray of float, shape (all lanes of the result, points)
-    look
-        Properties of the dots, as of a line.
+    ``rows`` (all lanes of the result, points); ``look``: properties of the dots, as of a line.
     """
     look = {"linestyle": "none", "marker": ".", **look, "markeredgewidth": 0.0}
     if lanes.numbers.size * rows.shape[1] > MOST_DOTS:

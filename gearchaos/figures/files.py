@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from contextlib import suppress
 from io import BytesIO
 from pathlib import Path
 from typing import Any
@@ -84,8 +85,6 @@ def save_figure(
 
 def is_own_figure(path: Path) -> bool:
     """Whether a file says in its metadata that `save_figure` wrote it."""
-    try:
-        content = path.read_bytes()
-    except OSError:
-        return False
-    return re.search(OWN, content) is not None
+    with suppress(OSError):
+        return re.search(OWN, path.read_bytes()) is not None
+    return False

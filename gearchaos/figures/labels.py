@@ -26,19 +26,8 @@ The prime is written out, since one in superscript stands apart from its letter.
 def axis_label(result: Result, name: str, line_length: int = 60) -> str:
     """Compose the label of a variable: its long name, symbol and unit, broken into lines.
 
-    Parameters
-    ----------
-    result : Result
-    name : str
-        A variable of the result.
-    line_length : int
-        Characters after which a line is broken.
-
-    Returns
-    -------
-    str
-        For example ``Largest Lyapunov exponent, $\\lambda_1$ (per unit of $\\tau$)``; of a pure
-        number there is no unit.
+    For example ``Largest Lyapunov exponent, $\\lambda_1$ (per unit of $\\tau$)``; of a pure number
+    there is no unit. Lines are broken after ``line_length`` characters.
     """
     attributes = result.attributes(name)
     wording = " ".join(str(attributes.get("long_name", "") or name).split())
@@ -49,9 +38,9 @@ def axis_label(result: Result, name: str, line_length: int = 60) -> str:
         words[-1] += f", {symbol}"
     if unit:
         words.append(f"({unit})")
-    # No shorter last line than need be: the narrowest lines that are as few.
-    breaks = [_broken(words, length) for length in range(1, line_length + 1)]
-    return "\n".join(next(lines for lines in breaks if len(lines) == len(breaks[-1])))
+    # No shorter last line than need be: of those that are as few the narrowest.
+    fewest = min((_broken(words, length) for length in range(1, line_length + 1)), key=len)
+    return "\n".join(fewest)
 
 
 def unit_of(result: Result, name: str) -> str:
@@ -90,9 +79,10 @@ def in_a_name(place: Mapping[str, float]) -> str:
     return "".join(f"_{axis}_{value:.12g}" for axis, value in place.items())
 
 
-def number(value: float) -> str:
-    """Write a number for a legend, in three digits and with a true minus sign."""
-    return f"{value:.3g}".replace("-", "\N{MINUS SIGN}")
+def short(value: float, digits: int = 4, sign: str = "-") -> str:
+    """Write a number in a few digits, with a true minus sign."""
+    # Adding zero makes plus zero of minus zero.
+    return f"{value + 0.0:{sign}.{digits}g}".replace("-", "\N{MINUS SIGN}")
 
 
 def plain(text: str) -> str:

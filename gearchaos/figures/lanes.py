@@ -57,18 +57,9 @@ def diagram_lanes(result: Result, between: Between = (None, None)) -> Lanes:
 
 
 def select_lanes(result: Result, between: Between = (None, None)) -> Lanes:
-    """Select lanes by the swept parameter.
+    """Select lanes by the swept parameter: its lowest and highest value, both included.
 
-    Parameters
-    ----------
-    result : Result
-    between : (float or None, float or None)
-        Lowest and highest parameter value, both included; None: as far as the sweep goes.
-
-    Raises
-    ------
-    FigureError
-        If no lane lies in between.
+    None: as far as the sweep goes. Raises FigureError if no lane lies in between.
     """
     parameter = np.asarray(result.along(result.axis), dtype=np.float64)
     low, high = between

@@ -12,7 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.legend import Legend
 from matplotlib.lines import Line2D
 
-from gearchaos.figures.labels import axis_label, number, plain
+from gearchaos.figures.labels import axis_label, plain, short
 from gearchaos.figures.lanes import Floats, Lanes, columns
 from gearchaos.figures.style import BLACK, GREY, LEGEND, VERMILION
 from gearchaos.results.result import Result
@@ -21,95 +21,78 @@ OUTLYING_SHARE = 0.03
 MARGIN = 0.05
 
 
-class Marks(NamedTuple):
-    """The rug of diverged lanes, triangles for lanes beyond bottom and top, and their legend."""
+class DiagramArtists(NamedTuple):
+    """What a diagram has drawn.
 
+    ``points``: what shows the lanes, lane after lane; ``diverged``: the rug of diverged lanes;
+    ``off_scale``: triangles for lanes beyond bottom and top; ``legend``: of these.
+    """
+
+    points: Line2D
     diverged: Line2D | None
     off_scale: list[Line2D]
     legend: Legend | None
 
 
-class _Drawn(NamedTuple):
-    """What one call has drawn into axes, how far its lanes reach, and what the legend says."""
+class Drawn(NamedTuple):
+    """What one call has drawn into axes, and how far it reaches.
+
+    ``artist``: what shows the lanes; the legend names its label, if it has one, and what is
+    ``named``; ``low``, ``high`` (lanes,): lowest and highest value of each lane, not a number where
+    there is none; ``spread``, (lanes,) or one for all: what the limits leave room for beyond these;
+    ``full_range``: as for `robust_limits`; ``off_scale``: triangles for lanes beyond the limits.
+    """
 
     artist: Line2D
-    limits: tuple[float, float]
-    parameter: Floats
+    lanes: Lanes
     low: Floats
     high: Floats
-    spread: Floats
+    spread: Floats | float
     full_range: bool
     named: list[Artist]
     off_scale: list[Line2D]
 
 
-_DRAWN: WeakKeyDictionary[Axes, list[_Drawn]] = WeakKeyDictionary()
+_DRAWN: WeakKeyDictionary[Axes, list[Drawn]] = WeakKeyDictionary()
 
 
 def close_panel(
-    axes: Axes,
-    result: Result,
-    lanes: Lanes,
-    low: Floats,
-    high: Floats,
-    artist: Line2D,
-    *,
-    spread: Floats | float = 0.0,
-    hold_zero: bool = False,
-    full_range: bool = False,
-    also: Sequence[Artist] = (),
-) -> Marks:
+    axes: Axes, result: Result, own: Drawn, *, hold_zero: bool = False
+) -> DiagramArtists:
     """Set limits and the label of the parameter, and mark the lanes that cannot be shown.
 
-    Limits and marks are those of everything that was drawn into the axes in this way.
-
-    Parameters
-    ----------
-    axes : matplotlib.axes.Axes
-    result : Result
-    lanes : Lanes
-    low, high : ndarray of float, shape (lanes,)
-        Lowest and highest value of each lane, not a number where there is none.
-    artist : Line2D
-        What shows the lanes; the legend names its label, if it has one.
-    spread : ndarray of float, shape (lanes,), optional
-        What the limits leave room for beyond these.
-    hold_zero, full_range : bool
-        As for `robust_limits`.
-    also : sequence of Artist
-        What the legend names before the marks.
+    Limits and marks are those of everything that was drawn into the axes in this way; ``hold_zero``
+    is as for `robust_limits`.
     """
     # Of axes that were cleared, nothing is left.
     earlier = [one for one in _DRAWN.get(axes, []) if one.artist.axes is axes]
-    there = np.isfinite(low)
-    reach = lanes.parameter[there], low[there], high[there], (np.zeros(low.shape) + spread)[there]
-    own = _Drawn(artist, lanes.limits, *reach, full_range, _name_of(artist), [])
     drawn = _DRAWN[axes] = [*earlier, own]
-    axes.set_xlim(min(one.limits[0] for one in drawn), max(one.limits[1] for one in drawn))
+    left, right = zip(*(one.lanes.limits for one in drawn), strict=True)
+    axes.set_xlim(min(left), max(right))
     axes.set_xlabel(axis_label(result, result.axis))
-    rug = _mark_diverged(axes, result, lanes.parameter[lanes.diverged])
-    own.named.extend([*also, *([rug] if rug else [])])
-    if any(one.low.size for one in drawn):
-        least = np.concatenate([one.low - one.spread for one in drawn])
-        most = np.concatenate([one.high + one.spread for one in drawn])
+    color, label = own.artist.get_color(), str(own.artist.get_label())
+    if not label.startswith("_"):
+        look: dict[str, Any] = {"marker": "s", "ms": 3.5, "ls": "none"}
+        own.named.insert(0, Line2D([], [], color=color, label=label, **look))
+    rug = _mark_diverged(axes, result, own.lanes.parameter[own.lanes.diverged])
+    own.named.extend([rug] if rug else [])
+    least = np.concatenate([one.low - one.spread for one in drawn])
+    most = np.concatenate([one.high + one.spread for one in drawn])
+    there = np.isfinite(least)
+    if there.any():
         full_range = any(one.full_range for one in drawn)
-        axes.set_ylim(robust_limits(least, most, hold_zero=hold_zero, full_range=full_range))
+        ends = least[there], most[there]
+        axes.set_ylim(robust_limits(*ends, hold_zero=hold_zero, full_range=full_range))
     else:
-        _say_nothing_to_show(axes, lanes)
+        _say_nothing_to_show(axes, own.lanes)
     for one in drawn:
         for mark in one.off_scale:
             mark.remove()
-        one.off_scale[:] = _mark_off_scale(axes, one) if one.low.size else []
+        one.off_scale[:] = _mark_off_scale(axes, one)
     # Entries that several results have in common appear once.
     named = {str(mark.get_label()): mark for one in drawn for mark in one.named + one.off_scale}
-    return Marks(rug, own.off_scale, legend_above(axes, list(named.values())))
-
-
-def _name_of(artist: Line2D) -> list[Artist]:
-    if str(artist.get_label()).startswith("_"):
-        return []
-    color, label = artist.get_color(), str(artist.get_label())
-    return [Line2D([], [], color=color, label=label, marker="s", markersize=3.5, linestyle="none")]
+    legend = legend_above(axes, list(named.values()))
+    return DiagramArtists(own.artist, rug, own.off_scale, legend)
 
 
 def robust_limits(
@@ -118,16 +101,9 @@ def robust_limits(
     """Return limits that a few outlying lanes cannot stretch.
 
     Where the outermost 3 % of the lanes at either end would take more than half of the height
-    from all the others, those that lie far out are left out; a triangle then says so.
-
-    Parameters
-    ----------
-    low, high : ndarray of float, shape (lanes,)
-        Lowest and highest value of each lane, all finite.
-    hold_zero : bool
-        Zero is part of what is to be shown.
-    full_range : bool
-        Show every lane however far it lies.
+    from all the others, those that lie far out are left out; a triangle then says so. ``low``,
+    ``high`` (lanes,): lowest and highest value of each lane, all finite; ``hold_zero``: zero is
+    part of what is to be shown; ``full_range``: every lane is shown, however far it lies.
     """
     bottom, top = float(low.min()), float(high.max())
     inner_bottom = float(np.quantile(low, OUTLYING_SHARE))
@@ -149,44 +125,34 @@ def _mark_diverged(axes: Axes, result: Result, parameter: Floats) -> Line2D | No
         return None
     meanings = str(result.attributes("status").get("flag_meanings", "")).split()
     label = plain(meanings[1].replace("_", " ")) if len(meanings) == 2 else "diverged"
-    look = {"marker": "|", "markersize": 8.0, "markeredgewidth": 0.8, "color": VERMILION}
-    return _marks(axes, parameter, 0.0, label, look)
+    return _marks(axes, parameter, 0.0, label, marker="|", ms=8.0, mew=0.8, color=VERMILION)
 
 
-def _mark_off_scale(axes: Axes, drawn: _Drawn) -> list[Line2D]:
+def _mark_off_scale(axes: Axes, drawn: Drawn) -> list[Line2D]:
     """Draw a triangle at the edge of the axes for every lane that reaches beyond it."""
-    _, _, parameter, low, high, *_ = drawn
+    low, high, (bottom, top) = drawn.low, drawn.high, axes.get_ylim()
     color = GREY if drawn.artist.get_color() == BLACK else drawn.artist.get_color()
-    bottom, top = axes.get_ylim()
     marks = []
-    for beyond, extreme, height, marker in (
-        (low < bottom, low.min(), 0.02, "v"),
-        (high > top, high.max(), 0.98, "^"),
-    ):
+    ends = (low < bottom, low, np.min, 0.02, "v"), (high > top, high, np.max, 0.98, "^")
+    for beyond, values, extreme, height, marker in ends:
         if beyond.any():
-            label = f"off scale (to {number(float(extreme))})"
-            look = {"marker": marker, "markersize": 2.2, "markeredgewidth": 0.0, "color": color}
-            marks.append(_marks(axes, parameter[beyond], height, label, look))
+            place = axes, drawn.lanes.parameter[beyond], height
+            label = f"off scale (to {short(extreme(values[beyond]), 3)})"
+            marks.append(_marks(*place, label, marker=marker, ms=2.2, mew=0.0, color=color))
     return marks
 
 
-def _marks(
-    axes: Axes, parameter: Floats, height: float, label: str, look: dict[str, Any]
-) -> Line2D:
+def _marks(axes: Axes, parameter: Floats, height: float, label: str, **look: Any) -> Line2D:
     """Draw marks at some height of the axes, in parts of it, one in each column."""
     parameter = parameter[columns(parameter, axes.get_xlim())]
-    heights, place = np.full(parameter.size, height), axes.get_xaxis_transform()
-    (line,) = axes.plot(
-        parameter, heights, linestyle="none", transform=place, zorder=4, label=label, **look
-    )
-    return line
+    look |= {"linestyle": "none", "transform": axes.get_xaxis_transform(), "zorder": 4}
+    return axes.plot(parameter, np.full(parameter.size, height), label=label, **look)[0]
 
 
 def _say_nothing_to_show(axes: Axes, lanes: Lanes) -> None:
     """Write into an empty panel why it is empty."""
-    reason = (
-        f"all {lanes.numbers.size} lanes diverged" if lanes.diverged.all() else "no finite values"
-    )
+    diverged = f"all {lanes.numbers.size} lanes diverged"
+    reason = diverged if lanes.diverged.all() else "no finite values"
     axes.set_ylim(-1.0, 1.0)
     axes.tick_params(axis="y", which="both", left=False, right=False, labelleft=False)
     text = axes.text(0.5, 0.5, reason, transform=axes.transAxes, ha="center", va="center")
@@ -198,8 +164,8 @@ def mark_values(panels: Sequence[Axes], label: str, values: Sequence[float]) -> 
 
     The legend keeps what it has named before.
     """
-    look = {"marker": "|", "markersize": 8.0, "markeredgewidth": 0.9, "color": VERMILION}
-    ticks = [_marks(axes, np.asarray(values), 1.0, label, look) for axes in panels]
+    look: dict[str, Any] = {"marker": "|", "ms": 8.0, "mew": 0.9, "color": VERMILION}
+    ticks = [_marks(axes, np.asarray(values), 1.0, label, **look) for axes in panels]
     before = panels[0].get_legend()
     legend_above(panels[0], [ticks[0], *(before.legend_handles if before else ())])
 

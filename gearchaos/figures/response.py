@@ -12,12 +12,7 @@ from gearchaos.errors import FigureError
 from gearchaos.figures.labels import axis_label, plain, unit_of
 from gearchaos.figures.lanes import Between, Floats
 from gearchaos.figures.page import remark
-from gearchaos.figures.response_lane import (
-    COORDINATE,
-    motion_of,
-    repeats_after,
-    samples_per_period,
-)
+from gearchaos.figures.response_lane import COORDINATE, motion_of, repeats_after, samples_per_period
 from gearchaos.figures.style import BLACK, BLUE, VERMILION
 from gearchaos.records.amplitude_spectrum import spectral_lines
 from gearchaos.results.response_variables import TIME, acceleration_of
@@ -72,8 +67,7 @@ def time_history(
         )
     (line,) = axes.plot(time[shown], values[shown], color=BLACK, linewidth=0.6)
     axes.set_xlim(low, high)
-    axes.set_xlabel(axis_label(result, TIME))
-    _label_upwards(axes, result, variable)
+    _label(axes, result, TIME, variable)
     return line
 
 
@@ -89,7 +83,7 @@ def phase_portrait(
     (curve,) = axes.plot(displacement, velocity, color=BLACK, linewidth=0.4)
     steps = samples_per_period(result)
     points = _points(axes, displacement[::steps], velocity[::steps], markersize=2.4)
-    _label_plane(axes, result, coordinate)
+    _label(axes, result, *_plane(coordinate))
     return curve, points
 
 
@@ -110,7 +104,7 @@ def poincare_section(axes: Axes, result: Result, lane: int, coordinate: str = CO
     markersize = float(np.clip(40.0 / len(np.unique(places, axis=0)), 1.5, 3.5))
     points = _points(axes, section[0], section[1], markersize)
     axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
-    _label_plane(axes, result, coordinate)
+    _label(axes, result, *_plane(coordinate))
     return points
 
 
@@ -176,23 +170,9 @@ def _plane(coordinate: str) -> tuple[str, str]:
 
 
 def _points(axes: Axes, x: Floats, y: Floats, markersize: float) -> Line2D:
-    (points,) = axes.plot(
-        x,
-        y,
-        linestyle="none",
-        marker="o",
-        markersize=markersize,
-        markeredgewidth=0.0,
-        color=VERMILION,
-        zorder=3,
-    )
-    return points
+    return axes.plot(x, y, "o", ms=markersize, mew=0.0, color=VERMILION, zorder=3)[0]
 
 
-def _label_plane(axes: Axes, result: Result, coordinate: str) -> None:
-    axes.set_xlabel(axis_label(result, coordinate))
-    _label_upwards(axes, result, f"{coordinate}_rate")
-
-
-def _label_upwards(axes: Axes, result: Result, variable: str) -> None:
-    axes.set_ylabel(axis_label(result, variable, _LINE_LENGTH), linespacing=1.2)
+def _label(axes: Axes, result: Result, along: str, upwards: str) -> None:
+    axes.set_xlabel(axis_label(result, along))
+    axes.set_ylabel(axis_label(result, upwards, _LINE_LENGTH), linespacing=1.2)

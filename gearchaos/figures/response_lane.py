@@ -49,10 +49,8 @@ def samples_per_period(result: Result) -> int:
 def motion_of(result: Result, lane: int, variable: str) -> Floats:
     """Return a variable of one lane over time, shape (samples,).
 
-    Raises
-    ------
-    FigureError
-        If the result is no response, or has no such lane or variable, or the lane diverged.
+    Raises FigureError if the result is no response, has no such lane or variable, or the lane
+    diverged.
     """
     names = response_variables_of(result)
     if not names:

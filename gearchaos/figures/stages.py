@@ -84,10 +84,6 @@ def shade_stages(
         Put a legend of the shades below everything in the figure, which needs the constrained
         layout.
 
-    Returns
-    -------
-    StageArtists
-
     Raises
     ------
     FileError
@@ -106,39 +102,29 @@ def shade_stages(
     # Neighbours meet halfway between their lanes, and the outermost reach to the ends of the axis.
     edges = [low, *((one.end + other.start) / 2.0 for one, other in pairwise(stages)), high]
     kinds = [_kind(stage, lanes) for stage in stages]
-    # A later version of the file format may know motions that this one does not.
-    colours = {**SHADES, **dict.fromkeys({*kinds} - {*SHADES}, SHADES["unresolved"])}
-    looks: dict[str, dict[str, Any]] = {
-        kind: {"facecolor": shade, "edgecolor": "0.55", "hatch": HATCHES.get(kind)}
-        for kind, shade in colours.items()
-    }
-    seen = [
-        (kind, max(left, low), min(right, high))
-        for kind, left, right in zip(kinds, edges[:-1], edges[1:], strict=True)
-        if left < high and right > low
-    ]
-    shades = [
-        axes.axvspan(left, right, linewidth=0.0, zorder=0.0, **looks[kind])
-        for kind, left, right in seen
-    ]
+    shades, drawn = [], set()
+    for kind, (left, right) in zip(kinds, pairwise(edges), strict=True):
+        if left < high and right > low:
+            place = max(left, low), min(right, high)
+            shades.append(axes.axvspan(*place, linewidth=0.0, zorder=0.0, **_look(kind)))
+            drawn.add(kind)
     axes.set_xlim(low, high)
-    drawn = {kind for kind, _, _ in seen}
-    handles = [Patch(linewidth=0.3, label=kind, **looks[kind]) for kind in looks if kind in drawn]
-    # A line at the foot of the page would lie on the legend.
-    title = form_in_words(result) or None
     if not legend:
         return StageArtists(stages, shades, None)
+    named = [kind for kind in dict.fromkeys([*SHADES, *kinds]) if kind in drawn]
+    handles = [Patch(linewidth=0.3, label=kind, **_look(kind)) for kind in named]
     assert axes.figure is not None
-    # Above the axes are the panel's letter and the marks of lanes that cannot be shown.
-    names = axes.figure.legend(
-        handles=handles,
-        loc="outside lower center",
-        ncols=min(len(handles), 5),
-        title=title,
-        title_fontsize=SMALL_FONT_PT,
-        **LEGEND,
-    )
-    return StageArtists(stages, shades, names)
+    # Above the axes are the panel's letter and the marks of lanes that cannot be shown; and a line
+    # at the foot of the page would lie on the legend.
+    look = {"loc": "outside lower center", "ncols": min(len(handles), 5), **LEGEND}
+    look |= {"title": form_in_words(result) or None, "title_fontsize": SMALL_FONT_PT}
+    return StageArtists(stages, shades, axes.figure.legend(handles=handles, **look))
+
+
+def _look(kind: str) -> dict[str, Any]:
+    # A later version of the file format may know motions that this one does not.
+    shade = SHADES.get(kind, SHADES["unresolved"])
+    return {"facecolor": shade, "edgecolor": "0.55", "hatch": HATCHES.get(kind)}
 
 
 def _kind(stage: Stage, lanes: LabelledLanes) -> str:

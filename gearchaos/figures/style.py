@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
-
-if TYPE_CHECKING:
-    from matplotlib.typing import RcKeyType
+from typing import Any
 
 SINGLE_COLUMN_MM = 85.0
 DOUBLE_COLUMN_MM = 180.0
@@ -36,8 +33,19 @@ LEGEND: dict[str, Any] = {
 }
 """Arguments of a legend outside of the axes."""
 
+TICKS = {
+    "labelsize": SMALL_FONT_PT,
+    "direction": "in",
+    "minor.visible": True,
+    "major.size": 2.8,
+    "minor.size": 1.5,
+    "major.width": 0.5,
+    "minor.width": 0.4,
+}
+"""Settings for the ticks of either axis."""
+
 # The STIX fonts come with matplotlib, so that a figure is the same on every machine.
-STYLE: dict[RcKeyType, Any] = {
+STYLE: dict[Any, Any] = {
     "font.family": "STIXGeneral",
     "mathtext.fontset": "stix",
     "font.size": FONT_PT,
@@ -49,22 +57,9 @@ STYLE: dict[RcKeyType, Any] = {
     "axes.linewidth": 0.6,
     "axes.formatter.use_mathtext": True,
     "legend.fontsize": SMALL_FONT_PT,
-    "xtick.labelsize": SMALL_FONT_PT,
-    "ytick.labelsize": SMALL_FONT_PT,
-    "xtick.direction": "in",
-    "ytick.direction": "in",
+    **{f"{axis}tick.{name}": value for axis in "xy" for name, value in TICKS.items()},
     "xtick.top": True,
     "ytick.right": True,
-    "xtick.minor.visible": True,
-    "ytick.minor.visible": True,
-    "xtick.major.size": 2.8,
-    "ytick.major.size": 2.8,
-    "xtick.minor.size": 1.5,
-    "ytick.minor.size": 1.5,
-    "xtick.major.width": 0.5,
-    "ytick.major.width": 0.5,
-    "xtick.minor.width": 0.4,
-    "ytick.minor.width": 0.4,
     "hatch.linewidth": 0.3,
     "figure.constrained_layout.h_pad": 0.02,
     "figure.constrained_layout.w_pad": 0.02,

@@ -9,10 +9,9 @@ from typing import Any
 from matplotlib.axes import Axes
 
 from gearchaos.errors import FigureError
-from gearchaos.figures.bifurcation import bifurcation
+from gearchaos.figures.diagrams import bifurcation, lyapunov
 from gearchaos.figures.labels import form_in_words, in_words, plain
 from gearchaos.figures.lanes import Between
-from gearchaos.figures.lyapunov import lyapunov
 from gearchaos.figures.page import Page, few_ticks, footnote, letter, page
 from gearchaos.figures.panel import mark_values
 from gearchaos.figures.stages import shade_stages
@@ -81,19 +80,17 @@ def bifurcation_page(
             "over the same parameter are drawn over each other, and without stages"
         )
     has_section = variable is not None or any(map(section_variables, results))
-    has_exponent = any(LARGEST_EXPONENT in one for one in results)
-    panels = has_section + has_exponent
+    panels = has_section + any(LARGEST_EXPONENT in one for one in results)
     if not panels:
         raise FigureError(
             "nothing to draw: the result has neither section points nor Lyapunov exponents"
         )
     height = height_mm or (55.0 + 0.35 * width_mm) * (1.0 if panels == 2 else 0.7)
+    labels = labels or [str(one.metadata.get("title", "")) for one in results]
     with page(width_mm, height) as figure:
         ratios = HEIGHT_RATIOS if panels == 2 else (1.0,)
-        stack: list[Axes] = list(
-            figure.subplots(panels, 1, sharex=True, squeeze=False, height_ratios=ratios)[:, 0]
-        )
-        labels = labels or [str(one.metadata.get("title", "")) for one in results]
+        grid = figure.subplots(panels, 1, sharex=True, squeeze=False, height_ratios=ratios)
+        stack: list[Axes] = grid[:, 0].tolist()
         for one, name, (color, marker) in zip(results, labels, cycle(OVERLAID), strict=False):
             shown: dict[str, Any] = {"between": between, "full_range": full_range}
             if len(results) > 1:

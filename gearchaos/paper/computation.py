@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,16 +9,16 @@ import numpy as np
 from gearchaos.configuration import Configuration
 from gearchaos.engine.response import respond
 from gearchaos.engine.running import run
-from gearchaos.paper.bands import Crisis, crisis_of, lanes_as_printed, motions_shown
-from gearchaos.paper.hop import STEP, Hop, exponents_beside, find_hop
+from gearchaos.errors import ConfigurationError
+from gearchaos.paper.hop import HIGH, LOW, STEP, Hop, exponents_beside, find_hop
 from gearchaos.paper.published import published
+from gearchaos.paper.stages import Crisis, crisis_of, lanes_as_printed
+from gearchaos.progress import say
 from gearchaos.results.result import Result
 from gearchaos.results.stage_table import LabelledLanes
 
 KEPT_PERIODS = 64
 """Mesh periods of a response: lines of a spectrum 1/64 of the mesh frequency apart."""
-
-Notify = Callable[[str], None]
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,15 +27,15 @@ class Reproduction:
 
     ``config``: of the torsional diagram, figure 7; ``sweep``: that diagram; ``hop``: the hop in it,
     with the interval in which two motions coexist; ``exponents``: the largest ones of all ten
-    states before and after it, starting at rest, None without a hop; ``response``: all effects, at
-    rest at the start, without pitch error and at those of figures 5, 6, 14 and 15 and of Table 3;
+    states before and after it, starting at rest; ``response``: all effects, at rest at the start,
+    without pitch error and at those of figures 5, 6, 14 and 15 and of Table 3;
     ``motions``, ``motions_from_contact``: at the pitch errors of figures 8 to 13, by the start.
     """
 
     config: Configuration
     sweep: Result
-    hop: Hop | None
-    exponents: tuple[float, float] | None
+    hop: Hop
+    exponents: tuple[float, float]
     response: Result
     motions: Result
     motions_from_contact: Result
@@ -46,13 +45,9 @@ class Reproduction:
         """Where the diagram of figure 7 widens at once."""
         return crisis_of(self.sweep)
 
-    def labelled(self, result: Result) -> LabelledLanes:
-        """Label the lanes of one of these results as the paper does."""
-        return lanes_as_printed(result, self.crisis)
-
-    def shown(self, result: Result) -> LabelledLanes:
-        """Label the lanes of one of these results as their figures show them, each by itself."""
-        return motions_shown(result, self.crisis)
+    def labelled(self, result: Result, *, strictly: bool = False) -> LabelledLanes:
+        """Label the lanes of one of these results as the paper does, or figures of one lane."""
+        return lanes_as_printed(result, self.crisis, strictly=strictly)
 
     def group(self, name: str) -> float:
         """Return a group that all lanes of the sweep share."""
@@ -66,34 +61,28 @@ def compute(
     hop_step: float = STEP,
     periods: int = KEPT_PERIODS,
     threads: int | None = None,
-    notify: Notify = lambda _: None,
 ) -> Reproduction:
-    """Compute the gallery.
+    """Compute the gallery, and say what comes next.
 
-    Parameters
-    ----------
-    config, full : Configuration
-        ``pan2021.toml`` and ``pan2021_full.toml``; coarser ones give a coarser gallery sooner.
-    hop_step : float
-        Step of the carried sweeps between which the hop lies.
-    periods : int
-        Mesh periods of which every step is kept.
-    threads : int, optional
-        Threads to use; by default all that there are.
-    notify : callable
-        Told what comes next.
+    ``config``, ``full``: ``pan2021.toml`` and ``pan2021_full.toml``; coarser ones give a coarser
+    gallery sooner; ``hop_step``: of the carried sweeps between which the hop lies; ``periods``:
+    mesh periods of which every step is kept. Raises ConfigurationError if no two motions coexist,
+    or a start at rest does not hop from one to the other.
     """
-    printed = published()
-    notify("figure 7: the sweep over the pitch error")
+    say("figure 7: the sweep over the pitch error")
     sweep = run(config, threads)
-    notify("the hop of figure 7: both motions, upwards and downwards")
+    say("the hop of figure 7: both motions, upwards and downwards")
     hop = find_hop(config, step=hop_step, threads=threads)
-    change = None if hop is None else hop.changes.get("rest")
-    exponents = None if change is None else exponents_beside(full, change, threads)
-    notify("figures 5, 6, 14 and 15: accelerations of all coordinates")
-    response = respond(_at(full, [0.0, *printed.increments.pitch_errors]), periods, threads)
-    notify("figures 8 to 13: motions at six pitch errors")
-    shown = _at(config, [motion.pitch_error for motion in printed.motions])
+    if hop is None or "rest" not in hop.changes:
+        raise ConfigurationError(
+            f"{config.source}: from rest, there is no hop as in figure 7 between {LOW:g} and "
+            f"{HIGH:g} e(tau); take back what was changed in it"
+        )
+    exponents = exponents_beside(full, hop.changes["rest"], threads)
+    say("figures 5, 6, 14 and 15: accelerations of all coordinates")
+    response = respond(_at(full, [0.0, *published().increments.pitch_errors]), periods, threads)
+    say("figures 8 to 13: motions at six pitch errors")
+    shown = _at(config, [motion.pitch_error for motion in published().motions])
     motions, from_contact = (
         respond(shown.replace("start", {"kind": kind}), periods, threads)
         for kind in ("rest", "contact")

@@ -7,20 +7,19 @@ from itertools import pairwise
 
 import numpy as np
 
-from gearchaos.paper.bands import OUT_OF_TURN, TWO_BANDS, out_of_turn
-from gearchaos.paper.comparison import short, signed
+from gearchaos.figures.labels import short
+from gearchaos.paper.comparison import signed
 from gearchaos.paper.computation import Reproduction, lane_of
-from gearchaos.paper.hop_figure import STARTS
-from gearchaos.paper.our_numbers import NAN
-from gearchaos.paper.published import Published
-from gearchaos.paper.stages import motions_between
+from gearchaos.paper.hop import STARTS
+from gearchaos.paper.published import published
+from gearchaos.paper.stages import OUT_OF_TURN, TWO_BANDS, motions_between, out_of_turn
 from gearchaos.results.result import Result
 
 
-def stages_in_words(printed: Published, found: Reproduction) -> str:
+def stages_in_words(found: Reproduction) -> str:
     """Tell what lies in the stages that the paper calls chaotic or by a name of its own."""
     texts, lanes = [], found.labelled(found.sweep)
-    for stage in printed.stages:
+    for stage in published().stages:
         if stage.printed != stage.motion or stage.motion == "chaotic":
             counts = Counter(motions_between(lanes, stage.first, stage.last))
             worded = ", ".join(f"{count} {label}" for label, count in counts.most_common(6))
@@ -29,7 +28,7 @@ def stages_in_words(printed: Published, found: Reproduction) -> str:
                 f"the {counts.total()} lanes of the sweep are: {worded}."
             )
     texts.append(_third_stage_in_words(found))
-    last = printed.stages[-1]
+    last = published().stages[-1]
     escaped = motions_between(lanes, last.first, last.last).count("period 1")
     if escaped:
         texts.append(
@@ -58,12 +57,9 @@ def _third_stage_in_words(found: Reproduction) -> str:
     )
 
 
-def hop_in_words(printed: Published, found: Reproduction) -> str:
-    """Tell where two motions coexist, where starts change over, and what the exponents are."""
-    hop, paper = found.hop, printed.numbers["hop"].value
-    if hop is None:
-        return "Sweeps upwards and downwards agree everywhere: no hop was found."
-    theirs = printed.numbers["hop_exponent_before"].value
+def hop_in_words(found: Reproduction) -> dict[str, str]:
+    """Word what the report says of the hop: where motions coexist and starts change over."""
+    hop, paper = found.hop, published().numbers["hop"].value
     starts = [
         f"a start {'on the ' if kind == 'contact' else ''}{STARTS[kind]} changes between "
         f"{change.before:.3f} and {change.after:.3f}"
@@ -74,45 +70,29 @@ def hop_in_words(printed: Published, found: Reproduction) -> str:
         float(sweep["crossings_per_period"][lane_of(sweep, paper)])
         for sweep in (hop.upwards, hop.downwards)
     )
-    parts = upper == 0.0 < lower
-    parting = ": on the one the teeth never part, on the other they do" if parts else ""
+    parting = ": on the one the teeth never part, on the other they do"
     falls, rises = (loss.name.lower().replace("_", " ") for loss in hop.losses)
-    share = hop.share(paper)
+    share, rest = hop.share(paper), hop.changes["rest"]
     inside = f"inside the interval, at {share:.0%} of it"
-    place = inside if 0.0 <= share <= 1.0 else "outside of the interval"
-    rest = hop.changes.get("rest")
-    texts = [
-        "The hop is not a bifurcation at one pitch error. Two motions of period 1 coexist from "
-        f"*P* = {hop.first:.4f}, where the sweep downwards loses the one ({falls}), to *P* = "
-        f"{hop.last:.4f}, where the sweep upwards loses the other ({rises}). At {paper:g} e(τ) the "
-        f"motion of the upward sweep crosses {upper:g} clearance boundaries per period, that of "
-        f"the downward sweep {lower:g}{parting}. Which of the two a computation shows depends on "
-        f"its start state, which the paper does not give: {'; '.join(starts)}. The paper's "
-        f"{paper:g} lies {place}. That a start at rest puts the hop near it is why it was chosen.",
-    ]
-    if rest is not None:
-        values = found.sweep[found.sweep.axis]
-        exponents = found.sweep["lyapunov_exponent"][values <= rest.before]
-        before, after = (signed(exponent, 5) for exponent in rest.exponents)
-        whole, later = (signed(exponent, 5) for exponent in found.exponents or (NAN, NAN))
-        texts.append(
-            "From the Floquet multipliers of the two orbits the largest exponent of all ten states "
-            f"is {whole} before the hop and {later} after it, where the paper prints "
-            f"{signed(theirs, 4)}. The paper integrates all of eq. 13, and the axial pair, driven "
-            "one way, brings exponents of its own: with such axial bearings the largest one is "
-            "theirs, whatever torsion does. The six states of torsion and transverse "
-            f"motion alone have {before} and {after}. While the teeth stay in contact the model is "
-            "linear, so the pitch error is a mere forcing and does not enter the exponent: over "
-            f"all lanes before the hop it varies by {np.ptp(exponents):.0e}."
-        )
-    return "\n\n".join(texts)
+    exponents = [signed(exponent, 5) for exponent in (*found.exponents, *rest.exponents)]
+    before = found.sweep["lyapunov_exponent"][found.sweep[found.sweep.axis] <= rest.before]
+    return {
+        "falls": falls,
+        "rises": rises,
+        "upper": f"{upper:g}",
+        "lower": f"{lower:g}{parting if upper == 0.0 < lower else ''}",
+        "starts": "; ".join(starts),
+        "place": inside if 0.0 <= share <= 1.0 else "outside of the interval",
+        **dict(zip(("ten_before", "ten_after", "six_before", "six_after"), exponents, strict=True)),
+        "theirs": signed(published().numbers["hop_exponent_before"].value, 4),
+        "spread": f"{np.ptp(before):.0e}",
+    }
 
 
-def increments_in_words(printed: Published, found: Reproduction) -> str:
+def increments_in_words(found: Reproduction) -> str:
     """Tell why the increments of figure 14 are even, and of what they are."""
-    response, steps = found.response, printed.increments.pitch_errors
-    groups = [response.parameters[name] for name in ("mesh_frequency", "pitch_error_amplitude")]
-    omega, amplitude = (float(group.value) for group in groups)
+    response, steps = found.response, published().increments.pitch_errors
+    omega, amplitude = found.group("mesh_frequency"), found.group("pitch_error_amplitude")
     motions = [response["delta_5_acceleration"][lane_of(response, p)] for p in steps]
     magnitude = [float(np.max(np.abs(motion))) for motion in motions]
     grown = ", ".join(short(b - a) for a, b in pairwise(magnitude))

@@ -10,19 +10,11 @@ from typing import NamedTuple
 from gearchaos.errors import FileError
 from gearchaos.figures.files import FORMATS, save_figure
 from gearchaos.figures.page import Page
-from gearchaos.paper.computation import Notify, Reproduction
-from gearchaos.paper.diagram_figure import diagram_page
-from gearchaos.paper.hop_figure import hop_page
-from gearchaos.paper.mesh_figures import mesh_stiffness_page, pitch_error_page
-from gearchaos.paper.motion_figures import (
-    accelerations_page,
-    growing_accelerations_page,
-    growing_spectra_page,
-    motion_page,
-    spectra_page,
-)
-from gearchaos.paper.published import Published, published
+from gearchaos.paper import diagram_figures, mesh_figures, motion_figures
+from gearchaos.paper.computation import Reproduction
+from gearchaos.paper.published import published
 from gearchaos.paper.report import report
+from gearchaos.progress import say
 from gearchaos.results.atomic_file import check_output, replacing, writing
 
 REPORT = "report.md"
@@ -41,33 +33,32 @@ class Picture(NamedTuple):
 
     name: str
     title: str
-    draw: Callable[[Published, Reproduction], Page]
+    draw: Callable[[Reproduction], Page]
 
 
 def pictures() -> tuple[Picture, ...]:
     """Return all figures, in the paper's order; `report_text.md` holds their captions."""
-    numbered: dict[int, Callable[[Published, Reproduction], Page]] = {
-        3: pitch_error_page,
-        4: mesh_stiffness_page,
-        5: accelerations_page,
-        6: spectra_page,
-        7: diagram_page,
-        **{shown.figure: partial(motion_page, shown=shown) for shown in published().motions},
-        14: growing_accelerations_page,
-        15: growing_spectra_page,
+    draw = motion_figures.motion_page
+    numbered: dict[int, Callable[[Reproduction], Page]] = {
+        3: mesh_figures.pitch_error_page,
+        4: mesh_figures.mesh_stiffness_page,
+        5: motion_figures.accelerations_page,
+        6: motion_figures.spectra_page,
+        7: diagram_figures.diagram_page,
+        **{motion.figure: partial(draw, shown=motion) for motion in published().motions},
+        14: motion_figures.growing_accelerations_page,
+        15: motion_figures.growing_spectra_page,
     }
-    own = Picture("figure_07_hop", "The hop of figure 7", hop_page)
-    shown = [Picture(f"figure_{n:02d}", f"Figure {n}", draw) for n, draw in numbered.items()]
+    own = Picture("figure_07_hop", "The hop of figure 7", diagram_figures.hop_page)
+    shown = [Picture(f"figure_{n:02d}", f"Figure {n}", page) for n, page in numbered.items()]
     return tuple(sorted([*shown, own]))
 
 
 def check_folder(folder: Path, overwrite: bool) -> None:
     """Make the folder, and make sure that nothing in it is replaced unasked.
 
-    Raises
-    ------
-    FileError
-        If it holds a gallery that may not be replaced, is a file, or cannot be written to.
+    Raises FileError if it holds a gallery that may not be replaced, is a file, or cannot be written
+    to.
     """
     if folder.exists() and not folder.is_dir():
         raise FileError(f"{folder}: is a file; give the name of a folder as --output")
@@ -86,42 +77,23 @@ def check_folder(folder: Path, overwrite: bool) -> None:
 
 
 def write_gallery(
-    found: Reproduction,
-    folder: Path,
-    *,
-    overwrite: bool = False,
-    formats: Sequence[str] = FORMATS,
-    notify: Notify = lambda _: None,
+    found: Reproduction, folder: Path, *, overwrite: bool = False, formats: Sequence[str] = FORMATS
 ) -> Path:
-    """Write everything and return the path of the report, which comes last.
+    """Write everything, say what comes next, and return the path of the report, which comes last.
 
-    Parameters
-    ----------
-    found : Reproduction
-    folder : Path
-    overwrite : bool
-        Whether existing files are replaced.
-    formats : sequence of str
-        Of the figures, ``"png"`` among them: that is what the report shows.
-    notify : callable
-        Told what comes next.
-
-    Raises
-    ------
-    FileError
-        If a file cannot be written.
+    ``formats``: of the figures, ``"png"`` among them: that is what the report shows. Raises
+    FileError if a file cannot be written.
     """
-    printed = published()
     for name, (attribute, _) in RESULTS.items():
-        notify(f"writing {name}")
+        say(f"writing {name}")
         getattr(found, attribute).save(folder / name, overwrite=overwrite)
     for picture in pictures():
-        notify(f"drawing {picture.title.lower()}")
-        page = picture.draw(printed, found)
+        say(f"drawing {picture.title.lower()}")
+        page = picture.draw(found)
         for kind in formats:
             target = folder / f"{picture.name}.{kind}"
             save_figure(page, target, title=picture.title, dpi=DPI, overwrite=overwrite)
-    text = report(printed, found, {name: words for name, (_, words) in RESULTS.items()})
+    text = report(found, {name: words for name, (_, words) in RESULTS.items()})
     with replacing(folder / REPORT, overwrite=overwrite) as partly_written:
         partly_written.write_text(text, encoding="utf-8")
     return folder / REPORT

@@ -14,11 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gearchaos.configuration import Configuration
-from gearchaos.dynamics.following import StabilityLoss, follow, loss_of_stability
-from gearchaos.dynamics.orbits import orbit_exponent, polish
-from gearchaos.dynamics.systems import system_of
+from gearchaos.dynamics.following import StabilityLoss
+from gearchaos.dynamics.orbit import Orbit
 from gearchaos.engine.running import run
 from gearchaos.results.result import Result
+from gearchaos.system import System
 
 Floats = NDArray[np.float64]
 
@@ -41,6 +41,9 @@ FOLLOWING_PERIODS = 100
 
 SETTLING_PERIODS = 500
 """Fewest mesh periods in which a soft axial bearing comes to rest."""
+
+STARTS = {"rest": "at rest", "contact": "contact flank"}
+"""Kinds of start states whose change from one motion to the other is looked for, worded."""
 
 APART = 1e-3
 """Distance of the section points, relative to the larger one, from which on motions differ."""
@@ -81,16 +84,11 @@ class Hop(NamedTuple):
         return (pitch_error - self.first) / (self.last - self.first)
 
 
-def find_hop(
-    config: Configuration,
-    starts: tuple[str, ...] = ("rest", "contact"),
-    step: float = STEP,
-    threads: int | None = None,
-) -> Hop | None:
+def find_hop(config: Configuration, step: float = STEP, threads: int | None = None) -> Hop | None:
     """Follow both motions, bisect the ends of their interval, and find where starts change over.
 
-    ``config`` sweeps the pitch error; ``starts``: kinds of start states whose hop is looked for;
-    ``step``: of the carried sweeps. None where the sweeps upwards and downwards agree everywhere.
+    ``config`` sweeps the pitch error; ``step``: of the carried sweeps. None where the sweeps
+    upwards and downwards agree everywhere.
     """
     config = _states_only(config)
     periods = min(FOLLOWING_PERIODS, config.integration.transient_periods)
@@ -100,28 +98,33 @@ def find_hop(
         run(carried.replace("start.carry", direction), threads)
         for direction in ("upwards", "downwards")
     )
-    both = np.flatnonzero(_apart(upwards, downwards))
+    one, other = upwards["end_state"], downwards["end_state"]
+    size = np.maximum(np.abs(one), np.abs(other)).max(axis=1)
+    both = np.flatnonzero(np.abs(one - other).max(axis=1) > APART * size)
     if not both.size:
         return None
     # Next to an end a lane may still be on its way: the orbit is followed from the lane before.
     inner = (both[min(1, both.size - 1)], both[max(-2, -both.size)])
-    first, falls = _end(config, downwards, int(inner[0]), -2.0 * step)
-    last, rises = _end(config, upwards, int(inner[1]), 2.0 * step)
+    first, falls = _end(downwards, int(inner[0]), -2.0 * step)
+    last, rises = _end(upwards, int(inner[1]), 2.0 * step)
     fine = step / FINENESS
     low, high = math.ceil(first / fine), math.floor(last / fine)
+    within = _over(config, low * fine, high * fine, high - low + 1)
     changes = {}
-    for kind in starts:
-        begun = config.replace("start", {"kind": kind})
-        within = _over(begun, low * fine, high * fine, high - low + 1)
-        change = _change(run(within, threads), within, upwards, downwards)
-        if change is not None:
-            changes[kind] = change
+    for kind in STARTS:
+        found = run(within.replace("start", {"kind": kind}), threads)
+        on_first = _distance(found, upwards) < _distance(found, downwards)
+        places = np.flatnonzero(on_first[:-1] & ~on_first[1:])
+        if places.size:
+            before, after = found[found.axis][places[0] : places[0] + 2].tolist()
+            exponents = _orbit(found, before)[1].exponent, _orbit(found, after)[1].exponent
+            changes[kind] = Change(before, after, places.size - 1, exponents)
     return Hop(upwards, downwards, first, last, (falls, rises), changes)
 
 
 def _states_only(config: Configuration) -> Configuration:
-    config = config.replace("outputs", {"section": config.scene.states, "section_points": 1})
-    config = config.replace("outputs.lyapunov", False).replace("outputs.motion", False)
+    outputs = {"section": config.scene.states, "section_points": 1}
+    config = config.replace("outputs", {**outputs, "lyapunov": False, "motion": False})
     return config.replace("integration.recorded_periods", 1)
 
 
@@ -130,66 +133,34 @@ def _over(config: Configuration, low: float, high: float, count: int) -> Configu
     return config.replace("sweep", sweep)
 
 
-def _apart(one: Result, other: Result) -> NDArray[np.bool_]:
-    a, b = one["end_state"], other["end_state"]
-    size = np.maximum(np.abs(a), np.abs(b)).max(axis=1)
-    return np.asarray(np.abs(a - b).max(axis=1) > APART * size)
-
-
-def _end(
-    config: Configuration, sweep: Result, lane: int, step: float
-) -> tuple[float, StabilityLoss]:
-    """Follow the period-1 orbit of a carried sweep beyond its last value, to where it ends."""
-    value = float(sweep[sweep.axis][lane])
-    followed = follow(
-        lambda values: system_of(config, {PITCH_ERROR: values}),
-        sweep["end_state"][[lane]],
-        np.ones(1, dtype=np.int32),
-        np.array([value]),
-        np.array([value + step]),
-        WIDTH,
-        config.integration.steps_per_period,
-        config.integration.method,
-    )
-    loss = loss_of_stability(followed.stable.multipliers, followed.beyond.multipliers)
-    end = float(followed.stable_value[0])
-    return (end if np.isfinite(end) else value), StabilityLoss(int(loss.kind[0]))
-
-
-def _change(found: Result, config: Configuration, first: Result, second: Result) -> Change | None:
-    on_first = _distance(found, first) < _distance(found, second)
-    changes = np.flatnonzero(on_first[:-1] & ~on_first[1:])
-    if not changes.size:
-        return None
-    lanes = changes[0] + np.arange(2)
-    before, after = found[found.axis][lanes].tolist()
-    exponents = _exponents(config, found[found.axis][lanes], found["end_state"][lanes])
-    return Change(before, after, changes.size - 1, exponents)
-
-
 def exponents_beside(
     config: Configuration, change: Change, threads: int | None = None
 ) -> tuple[float, float]:
     """Return the largest exponents on both sides of a change, of all states of another scene.
 
     They are those of the periodic orbits to which the start of ``config`` leads, from their Floquet
-    multipliers; not a number where there is no such orbit.
+    multipliers. Raises ConfigurationError where there is no such orbit.
     """
-    sides = config.replace(
-        "sweep", {"parameter": PITCH_ERROR, "values": [change.before, change.after]}
-    )
+    sweep = {"parameter": PITCH_ERROR, "values": [change.before, change.after]}
     settling = max(SETTLING_PERIODS, config.integration.transient_periods)
-    sides = _states_only(sides).replace("integration.transient_periods", settling)
-    found = run(sides, threads)
-    return _exponents(sides, found[found.axis], found["end_state"])
+    sides = _states_only(config.replace("sweep", sweep))
+    found = run(sides.replace("integration.transient_periods", settling), threads)
+    return _orbit(found, change.before)[1].exponent, _orbit(found, change.after)[1].exponent
 
 
-def _exponents(config: Configuration, values: Floats, states: Floats) -> tuple[float, float]:
-    period, system = np.ones(2, dtype=np.int32), system_of(config, {PITCH_ERROR: values})
-    integration = config.integration
-    orbits = polish(system, states, period, integration.steps_per_period, integration.method)
-    before, after = orbit_exponent(orbits.multipliers, period, system.mesh_period).tolist()
-    return before, after
+def _end(sweep: Result, lane: int, step: float) -> tuple[float, StabilityLoss]:
+    """Follow the period-1 orbit of a carried sweep beyond its last value, to where it ends."""
+    value = float(sweep[sweep.axis][lane])
+    system, orbit = _orbit(sweep, value)
+    branch = system.follow(orbit, PITCH_ERROR, value, value + step, WIDTH)
+    # Of an orbit that is unstable where the sweep has it, nothing is known.
+    return (branch.value if math.isfinite(branch.value) else value), branch.loss
+
+
+def _orbit(found: Result, pitch_error: float) -> tuple[System, Orbit]:
+    """Find the period-1 orbit that a lane has come to."""
+    system = System.of_lane(found, pitch_error=pitch_error)
+    return system, system.orbit(guess=system.state)
 
 
 def _distance(found: Result, sweep: Result) -> Floats:

@@ -12,15 +12,14 @@ from gearchaos.figures.page import Page, column, few_ticks
 from gearchaos.figures.style import BLACK, BLUE, GREY, ORANGE
 from gearchaos.paper.computation import Reproduction
 from gearchaos.paper.our_numbers import contact_line_stiffness, printed_series
-from gearchaos.paper.published import Published
+from gearchaos.paper.published import published
 
 CYCLE = np.arange(1001) / 1000
 """Mesh phases, in parts of the mesh period."""
 
 
-def pitch_error_page(printed: Published, found: Reproduction) -> Page:
+def pitch_error_page(found: Reproduction) -> Page:
     """Draw one pitch error over one mesh cycle, with its two components (figure 3)."""
-    del printed
     amplitude = found.group("pitch_error_amplitude")
     beta = np.radians(found.group("base_helix_angle_deg"))
     error = amplitude * np.sin(2.0 * np.pi * CYCLE)  # eq. 14
@@ -35,14 +34,11 @@ def pitch_error_page(printed: Published, found: Reproduction) -> Page:
     return figure
 
 
-def mesh_stiffness_page(printed: Published, found: Reproduction) -> Page:
+def mesh_stiffness_page(found: Reproduction) -> Page:
     """Draw the mesh stiffness of the contact lines and its Fourier fit (figure 4)."""
-    mean = printed.numbers["mean_stiffness"].value
+    mean = published().numbers["mean_stiffness"].value
     scale = found.group("stiffness_variation_scale")
-    tables = (
-        stiffness.table(CYCLE.size - 1)
-        for stiffness in (contact_line_stiffness(printed), printed_series(printed))
-    )
+    tables = (one.table(CYCLE.size - 1) for one in (contact_line_stiffness(), printed_series()))
     trapezoid, series = (mean * np.append(table, table[0]) for table in tables)
     computed = mean + scale * (series - mean)
     with _cycle(62.0, mean, r"Mesh stiffness $k$ (N/(µm$\,$mm))") as (figure, axes):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from typing import Any
 
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
@@ -14,7 +15,7 @@ from gearchaos.figures.response import phase_portrait, poincare_section, time_hi
 from gearchaos.figures.response_lane import COORDINATE, coordinates_of, samples_per_period
 from gearchaos.figures.style import BLACK, BLUE, FONT_PT, SMALL_FONT_PT, VERMILION
 from gearchaos.paper.computation import Reproduction, lane_of, largest_acceleration
-from gearchaos.paper.published import Published, ShownMotion
+from gearchaos.paper.published import ShownMotion, published
 from gearchaos.paper.stages import motion_at
 from gearchaos.records.amplitude_spectrum import spectral_lines
 from gearchaos.results.response_variables import TIME, acceleration_of
@@ -33,60 +34,49 @@ WITHOUT_AND_WITH = ((0.0, BLUE, -0.07), (1.0, VERMILION, 0.07))
 """The pitch errors that figures 5 and 6 compare, their colours, and how far lines step aside."""
 
 
-def accelerations_page(printed: Published, found: Reproduction) -> Page:
+def accelerations_page(found: Reproduction) -> Page:
     """Draw the accelerations of all coordinates without and with pitch error (figure 5)."""
-    del printed
-    names = coordinates_of(found.response)
-    with _stack(found.response, names, 12.0) as (figure, panels):
-        for axes, name in zip(panels, names, strict=True):
-            for p, color, _ in WITHOUT_AND_WITH:
-                _history(axes, found.response, p, name).set(color=color, label=f"$P$ = {p:g}")
+    with _stack(found.response) as (figure, panels):
         legend_above(panels[0], panels[0].lines)
     return figure
 
 
-def spectra_page(printed: Published, found: Reproduction) -> Page:
+def spectra_page(found: Reproduction) -> Page:
     """Draw the amplitude spectra of those accelerations (figure 6)."""
-    del printed
-    names = coordinates_of(found.response)
-    with _stack(found.response, names, 18.0, spectra=True) as (figure, panels):
-        for axes, name in zip(panels, names, strict=True):
-            for p, color, shift in WITHOUT_AND_WITH:
-                _stems(axes, found.response, p, name, color, shift).set_label(f"$P$ = {p:g}")
+    with _stack(found.response, spectra=True) as (figure, panels):
         panels[0].legend(frameon=False, loc="upper right", ncols=2, handletextpad=0.0)
     return figure
 
 
-def growing_accelerations_page(printed: Published, found: Reproduction) -> Page:
+def growing_accelerations_page(found: Reproduction) -> Page:
     """Draw the torsional acceleration at growing pitch errors (figure 14)."""
-    values = printed.increments.pitch_errors
-    names = [COORDINATE] * len(values)
-    with _stack(found.response, names, 8.0, sharey=True) as (figure, panels):
-        for axes, p in zip(panels, values, strict=True):
-            _history(axes, found.response, p, COORDINATE)
+    with _stack(found.response, growing=True) as (figure, panels):
+        for axes, p in zip(panels, published().increments.pitch_errors, strict=True):
             largest = largest_acceleration(found.response, p)
             axes.axhline(largest, color=VERMILION, linewidth=0.6, dashes=(4, 2))
             remark(axes, f"$P$ = {p:g}, largest value {largest:.3f}")
     return figure
 
 
-def growing_spectra_page(printed: Published, found: Reproduction) -> Page:
+def growing_spectra_page(found: Reproduction) -> Page:
     """Draw the spectra of the torsional acceleration at growing pitch errors (figure 15)."""
-    values = printed.increments.pitch_errors
-    names = [COORDINATE] * len(values)
-    with _stack(found.response, names, 14.0, spectra=True, sharey=True) as (figure, panels):
-        for axes, p in zip(panels, values, strict=True):
-            _stems(axes, found.response, p, COORDINATE, BLACK, 0.0)
-            _write_inside(axes, 0.985, 0.93, f"$P$ = {p:g}", ha="right", fontsize=SMALL_FONT_PT)
+    with _stack(found.response, spectra=True, growing=True) as (figure, panels):
+        for axes, p in zip(panels, published().increments.pitch_errors, strict=True):
+            place: dict[str, Any] = {"transform": axes.transAxes, "va": "top", "ha": "right"}
+            axes.text(0.985, 0.93, f"$P$ = {p:g}", fontsize=SMALL_FONT_PT, **place)
     return figure
 
 
-def motion_page(printed: Published, found: Reproduction, shown: ShownMotion) -> Page:
+def motion_page(found: Reproduction, shown: ShownMotion) -> Page:
     """Draw history, phase portrait and Poincare section at one pitch error (figures 8 to 13)."""
-    del printed
-    result, begun = shown_response(found, shown)
+    both = found.motions, found.motions_from_contact
+    starts = [found.labelled(motions, strictly=True) for motions in both]
+    at_rest, from_contact = (motion_at(lanes, shown.pitch_error) for lanes in starts)
+    result, label = found.motions, at_rest
+    # Unless only the start from the contact flank comes to the motion that the paper shows.
+    if at_rest != shown.motion == from_contact:
+        result, label = found.motions_from_contact, f"{from_contact}, from the contact flank"
     lane = lane_of(result, shown.pitch_error)
-    label = motion_at(found.shown(result), shown.pitch_error)
     with column(86.0) as figure:
         grid = figure.add_gridspec(2, 2, height_ratios=(0.8, 1.0), wspace=0.1)
         history = figure.add_subplot(grid[0, :])
@@ -101,62 +91,59 @@ def motion_page(printed: Published, found: Reproduction, shown: ShownMotion) -> 
             axes.set(xlabel=r"$\delta_5$", ylabel=r"$\delta_5'$")
             few_ticks(axes, 5, 6)
         letter((history, portrait, section))
-        remark(history, f"$P$ = {shown.pitch_error:g}, {label}{begun}")
+        remark(history, f"$P$ = {shown.pitch_error:g}, {label}")
         remark(section, f"{result['section_delta_5'].shape[1]} points")
     return figure
 
 
-def shown_response(found: Reproduction, shown: ShownMotion) -> tuple[Result, str]:
-    """Return the response that a figure shows, and what is said of its start.
-
-    At rest as everywhere, unless only the start from the contact flank comes to the motion that
-    the paper shows.
-    """
-    at_rest, from_contact = (
-        motion_at(found.shown(result), shown.pitch_error)
-        for result in (found.motions, found.motions_from_contact)
-    )
-    if at_rest != shown.motion == from_contact:
-        return found.motions_from_contact, ", from the contact flank"
-    return found.motions, ""
-
-
 @contextmanager
 def _stack(
-    result: Result,
-    names: Sequence[str],
-    margin_mm: float,
-    *,
-    spectra: bool = False,
-    sharey: bool = False,
+    response: Result, *, spectra: bool = False, growing: bool = False
 ) -> Iterator[tuple[Page, Sequence[Axes]]]:
-    """Make panels one above another for the accelerations of coordinates, or their spectra."""
-    with column(PANEL_MM * len(names) + margin_mm) as figure:
-        panels = figure.subplots(len(names), 1, sharex=True, sharey=sharey)
+    """Draw accelerations or their spectra in panels one above another.
+
+    Those of all coordinates without and with pitch error, or the torsional one at growing ones.
+    """
+    shown: list[tuple[str, Sequence[tuple[float, str, float]]]] = (
+        [(COORDINATE, [(p, BLACK, 0.0)]) for p in published().increments.pitch_errors]
+        if growing
+        else [(name, WITHOUT_AND_WITH) for name in coordinates_of(response)]
+    )
+    margin_mm = 8.0 + (6.0 if spectra else 0.0) + (0.0 if growing else 4.0)
+    with column(PANEL_MM * len(shown) + margin_mm) as figure:
+        panels = figure.subplots(len(shown), 1, sharex=True, sharey=growing)
+        for axes, (name, curves) in zip(panels, shown, strict=True):
+            for p, color, shift in curves:
+                if spectra:
+                    drawn = _stems(axes, response, p, name, color, shift)
+                else:
+                    place = response, lane_of(response, p), acceleration_of(name)
+                    drawn = time_history(axes, *place, between=(0.0, SHOWN_PERIODS))
+                    drawn.set(color=color, linewidth=0.9)
+                drawn.set_label(f"$P$ = {p:g}")
         yield figure, panels
-        for axes, name, at in zip(panels, names, "abcdefgh", strict=False):
-            axes.set_ylabel(result.attributes(acceleration_of(name))["symbol"])
+        for axes, (name, _), at in zip(panels, shown, "abcdefgh", strict=False):
+            axes.set_ylabel(response.attributes(acceleration_of(name))["symbol"])
             axes.set_xlabel("")
             if spectra:
                 axes.set_yscale("log")
-                _write_inside(axes, 0.02, 0.94, f"({at})", fontweight="bold")
+                look: dict[str, Any] = {"va": "top", "fontweight": "bold"}
+                axes.text(0.02, 0.94, f"({at})", transform=axes.transAxes, **look)
             else:
                 few_ticks(axes)
         if spectra:
-            _frequency_axis(panels[0], float(result["mesh_period"][0]))
+            # The paper's frequency is in cycles per unit of tau.
+            period = float(response["mesh_period"][0])
+            to_and_fro = (lambda order: order / period, lambda frequency: frequency * period)
+            panels[0].tick_params(axis="x", which="both", top=False)
+            above = panels[0].secondary_xaxis("top", functions=to_and_fro)
+            above.set_xlabel(r"Frequency in cycles per unit of $\tau$")
         else:
             letter(panels)
         panels[-1].set_xlabel("Frequency over mesh frequency" if spectra else TIME_LABEL)
         quantity = "Amplitude of the acceleration" if spectra else "Acceleration"
         figure.supylabel(f"{quantity} (dimensionless)", fontsize=FONT_PT)
         figure.align_ylabels(panels)
-
-
-def _history(axes: Axes, result: Result, pitch_error: float, name: str) -> Line2D:
-    lane, between = lane_of(result, pitch_error), (0.0, SHOWN_PERIODS)
-    line = time_history(axes, result, lane, acceleration_of(name), between=between)
-    line.set_linewidth(0.9)
-    return line
 
 
 def _stems(
@@ -169,21 +156,9 @@ def _stems(
     seen = (lines.order > 0.0) & (lines.order <= HIGHEST_ORDER) & (lines.amplitude > 1e-4 * top)
     order, amplitude = lines.order[seen] + shift, lines.amplitude[seen]
     axes.vlines(order, 1e-12, amplitude, color=color, linewidth=0.9)
-    (heads,) = axes.plot(order, amplitude, "o", color=color, markersize=2.2, mew=0.0)
+    (heads,) = axes.plot(order, amplitude, "o", color=color, ms=2.2, mew=0.0)
     # Logarithms of the common scale of a panel: three decades below its highest line.
     bottom, highest = axes.get_ylim() if len(axes.lines) > 1 else (top, top)
     axes.set_ylim(min(bottom, 3e-4 * top), max(highest, 4.0 * top))
     axes.set_xlim(0.0, HIGHEST_ORDER + 0.5)
     return heads
-
-
-def _write_inside(axes: Axes, x: float, y: float, text: str, **look: str | float) -> None:
-    axes.text(x, y, text, transform=axes.transAxes, va="top", **look)  # type: ignore[arg-type]
-
-
-def _frequency_axis(axes: Axes, period: float) -> None:
-    """Put the paper's frequency, in cycles per unit of tau, above a panel."""
-    axes.tick_params(axis="x", which="both", top=False)
-    to_and_fro = (lambda order: order / period, lambda frequency: frequency * period)
-    above = axes.secondary_xaxis("top", functions=to_and_fro)
-    above.set_xlabel(r"Frequency in cycles per unit of $\tau$")

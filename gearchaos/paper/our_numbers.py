@@ -11,24 +11,23 @@ from gearchaos.gear.derivation import Quantities, derive_groups
 from gearchaos.gear.geometry import HelicalPair
 from gearchaos.gear.mesh_stiffness import FourierStiffness, TrapezoidalStiffness
 from gearchaos.paper.computation import Reproduction, lane_of, largest_acceleration
-from gearchaos.paper.published import Published
+from gearchaos.paper.published import published
 from gearchaos.records.amplitude_spectrum import spectral_lines
 
-NAN = float("nan")
 _N_PER_UM_MM = 1e9
 
 
-def our_numbers(printed: Published, found: Reproduction) -> dict[str, float]:
+def our_numbers(found: Reproduction) -> dict[str, float]:
     """Compute each number of `Published.numbers`; not a number where there is no such thing."""
-    pair, speed, response = pair_of(found), printed.driving_speed_rpm, found.response
-    harmonics = printed.harmonics
-    table_2 = FourierStiffness(harmonics.cosine, harmonics.sine).coefficients()
-    lines = contact_line_stiffness(printed).to_fourier(table_2.size).coefficients()
+    mean = published().numbers["mean_stiffness"].value
+    pair, speed, response = pair_of(found), published().driving_speed_rpm, found.response
+    table_2 = mean * printed_series().coefficients()
+    lines = contact_line_stiffness().to_fourier(table_2.size).coefficients()
     damping_ratio = found.group("damping_ratio")
-    whole_width = printed.numbers["mean_stiffness"].value * _N_PER_UM_MM * pair.face_width
+    whole_width = mean * _N_PER_UM_MM * pair.face_width
     driven = found.config.replace("operation", {"speed_rpm": speed})
-    change = None if found.hop is None else found.hop.changes.get("rest")
-    exponents = (NAN, NAN) if found.exponents is None else found.exponents
+    torsion = response["delta_5_acceleration"][lane_of(response, 1.0), :-1]
+    order, amplitude = spectral_lines(torsion, samples_per_period(response))
     numbers = {
         "driven_speed": speed * pair.teeth[0] / pair.teeth[1],
         "mesh_frequency_hz": speed / 60.0 * pair.teeth[0],
@@ -41,39 +40,31 @@ def our_numbers(printed: Published, found: Reproduction) -> dict[str, float]:
         # omega = 2 pi f / omega_h (eq. 9).
         "frequency": derive_groups(driven.physical())["mesh_frequency"],
         "mesh_period": response["mesh_period"][0],
-        **{
-            f"added_{name}": largest_acceleration(response, 1.0, name)
-            - largest_acceleration(response, 0.0, name)
-            for name in coordinates_of(response)
-        },
-        "spectral_peak": _highest_order(found) / response["mesh_period"][0],
-        "hop": NAN if change is None else change.after,
-        "hop_exponent_before": exponents[0],
-        "hop_exponent_after": exponents[1],
+        "spectral_peak": order[1:][np.argmax(amplitude[1:])] / response["mesh_period"][0],
+        "hop": found.hop.changes["rest"].after,
+        "hop_exponent_before": found.exponents[0],
+        "hop_exponent_after": found.exponents[1],
     }
+    for name in coordinates_of(response):
+        without, once = (largest_acceleration(response, p, name) for p in (0.0, 1.0))
+        numbers[f"added_{name}"] = once - without
     return {key: float(number) for key, number in numbers.items()}
 
 
-def contact_line_stiffness(printed: Published) -> TrapezoidalStiffness:
+def contact_line_stiffness() -> TrapezoidalStiffness:
     """Return the mesh stiffness of the contact lines as the paper counts them (eqs 15 to 18)."""
-    lines = printed.contact_lines
-    return TrapezoidalStiffness(*lines.parts, half_height=lines.half_height)
+    lines = published().contact_lines
+    # Half of the variation relative to its mean, with equal rise and fall.
+    half_height = (lines.longest - lines.shortest) / (lines.longest + lines.shortest)
+    return TrapezoidalStiffness(*lines.parts, half_height=half_height)
 
 
-def printed_series(printed: Published) -> FourierStiffness:
+def printed_series() -> FourierStiffness:
     """Return the mesh stiffness of Table 2 relative to its mean (eq. 19)."""
-    mean = printed.numbers["mean_stiffness"].value
-    harmonics = printed.harmonics
+    mean, harmonics = published().numbers["mean_stiffness"].value, published().harmonics
     return FourierStiffness(np.divide(harmonics.cosine, mean), np.divide(harmonics.sine, mean))
 
 
 def pair_of(found: Reproduction) -> HelicalPair:
     """Return the gear pair of the configuration (Table 1)."""
     return Quantities(found.config.physical()).pair
-
-
-def _highest_order(found: Reproduction) -> float:
-    """Order of the highest line of the torsional acceleration at one e(tau)."""
-    values = found.response["delta_5_acceleration"][lane_of(found.response, 1.0)]
-    lines = spectral_lines(values[:-1], samples_per_period(found.response))
-    return float(lines.order[1:][np.argmax(lines.amplitude[1:])])

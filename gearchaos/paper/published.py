@@ -3,16 +3,11 @@
 from __future__ import annotations
 
 import tomllib
-from dataclasses import dataclass
 from enum import StrEnum
 from functools import cache
 from importlib.resources import files
-from typing import Any
 
-CITATION = (
-    "Pan, Li, Wang: *Influence of Pitch Error on Vibration, Bifurcation, and Chaos "
-    "Characteristics of the Helical Gear Pair System*, 2021"
-)
+from pydantic.dataclasses import dataclass
 
 
 class Kind(StrEnum):
@@ -24,16 +19,37 @@ class Kind(StrEnum):
 
 
 @dataclass(frozen=True)
-class Number:
-    """One printed number: its unit (``"1"`` where dimensionless), place, rule and `Kind`."""
+class Printed:
+    """Where something is printed, the name of the rule by which it is judged, and its `Kind`."""
 
-    key: str
+    where: str
+    rule: str
+    kind: Kind
+
+
+@dataclass(frozen=True)
+class Number(Printed):
+    """One printed number and its unit, ``"1"`` where it is dimensionless."""
+
     quantity: str
     value: float
     unit: str
-    where: str
-    rule: str
-    kind: str
+
+
+@dataclass(frozen=True)
+class Harmonics(Printed):
+    """Table 2: harmonics 1, 2, ... of the mesh stiffness, in N/(um mm)."""
+
+    cosine: tuple[float, ...]
+    sine: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class Increments(Printed):
+    """Growth of the torsional acceleration between neighbours of ``pitch_errors``."""
+
+    pitch_errors: tuple[float, ...]
+    values: tuple[float, ...]
 
 
 @dataclass(frozen=True)
@@ -57,40 +73,12 @@ class ShownMotion:
 
 
 @dataclass(frozen=True)
-class Harmonics:
-    """Table 2: harmonics 1, 2, ... of the mesh stiffness, in N/(um mm)."""
-
-    where: str
-    rule: str
-    kind: str
-    cosine: tuple[float, ...]
-    sine: tuple[float, ...]
-
-
-@dataclass(frozen=True)
 class ContactLines:
     """Shortest and longest total contact line (in full lines) and the parts of the period."""
 
-    where: str
     shortest: float
     longest: float
     parts: tuple[float, float, float, float]
-
-    @property
-    def half_height(self) -> float:
-        """Half of the stiffness variation relative to its mean, with equal rise and fall."""
-        return (self.longest - self.shortest) / (self.longest + self.shortest)
-
-
-@dataclass(frozen=True)
-class Increments:
-    """Growth of the torsional acceleration between neighbours of ``pitch_errors``."""
-
-    where: str
-    rule: str
-    kind: str
-    pitch_errors: tuple[float, ...]
-    values: tuple[float, ...]
 
 
 @dataclass(frozen=True)
@@ -106,7 +94,7 @@ class Published:
     contact_lines: ContactLines
     harmonics: Harmonics
     increments: Increments
-    kinds: dict[str, str]
+    kinds: dict[str, Kind]
     stages: tuple[PrintedStage, ...]
     motions: tuple[ShownMotion, ...]
 
@@ -115,19 +103,9 @@ class Published:
 def published() -> Published:
     """Read the printed numbers."""
     text = files("gearchaos.paper").joinpath("published.toml").read_text(encoding="utf-8")
-    tables: dict[str, Any] = tomllib.loads(text)
-    return Published(
-        driving_speed_rpm=tables["given"]["driving_speed_rpm"],
-        numbers={row["key"]: Number(**row) for row in tables["number"]},
-        contact_lines=ContactLines(**_frozen(tables["contact_lines"])),
-        harmonics=Harmonics(**_frozen(tables["harmonics"])),
-        increments=Increments(**_frozen(tables["increments"])),
-        kinds=tables["kinds"],
+    tables = tomllib.loads(text)
+    tables |= tables["given"] | {"numbers": {row["key"]: row for row in tables["number"]}}
+    for name in ("stage", "motion"):
         # What the paper calls as this project does is written once.
-        stages=tuple(PrintedStage(**{"printed": row["motion"], **row}) for row in tables["stage"]),
-        motions=tuple(ShownMotion(**{"printed": row["motion"], **row}) for row in tables["motion"]),
-    )
-
-
-def _frozen(table: dict[str, Any]) -> dict[str, Any]:
-    return {key: tuple(entry) if isinstance(entry, list) else entry for key, entry in table.items()}
+        tables[f"{name}s"] = [{"printed": row["motion"], **row} for row in tables[name]]
+    return Published(**tables)

@@ -4,19 +4,17 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from importlib.resources import files
 
-import numpy as np
-
+from gearchaos.figures.labels import short
 from gearchaos.figures.response_lane import coordinates_of
-from gearchaos.paper.bands import OUT_OF_TURN
-from gearchaos.paper.comparison import NONE, Row, compare, short
+from gearchaos.paper.comparison import NONE, Row, compare
 from gearchaos.paper.computation import Reproduction, largest_acceleration
 from gearchaos.paper.explanations import hop_in_words, increments_in_words, stages_in_words
 from gearchaos.paper.our_numbers import our_numbers, pair_of
-from gearchaos.paper.published import CITATION, Kind, Published
-from gearchaos.paper.stages import WINDOW
+from gearchaos.paper.published import Kind, published
+from gearchaos.paper.stages import OUT_OF_TURN, WINDOW
 from gearchaos.paper.verdict import OVERLAP, RULES, Verdict
 from gearchaos.results.response_variables import acceleration_of
 from gearchaos.results.result import Result
@@ -30,29 +28,24 @@ TABLE_HEAD = (
 )
 
 
-def report(printed: Published, found: Reproduction, names: dict[str, str]) -> str:
+def report(found: Reproduction, names: dict[str, str]) -> str:
     """Write the report; ``names`` are the files beside it, with what each holds."""
-    tables = compare(printed, found)
+    printed, tables = published(), compare(found)
     rows = [row for table in tables.values() for row in table]
-    counts = Counter(row.verdict for row in rows)
-    zeros = sum(abs(value) < 1e-3 for value in (*printed.harmonics.cosine, *printed.harmonics.sine))
+    harmonics = (*printed.harmonics.cosine, *printed.harmonics.sine)
     values = {key: number.value for key, number in printed.numbers.items()}
-    groups = _shared(found.sweep)
     pair, lines = pair_of(found), printed.contact_lines
     per_mm, face_width = values["mean_stiffness"], float(pair.face_width) * 1e3
     damping = values["mesh_damping"] / (2.0 * values["damping_ratio"])
-    length_scale = TOLERANCE_MM / groups["pitch_error_amplitude"]
+    length_scale = TOLERANCE_MM / found.group("pitch_error_amplitude")
     template = files("gearchaos.paper").joinpath("report_text.md").read_text(encoding="utf-8")
     text = template.format(
-        citation=CITATION,
         version=software_version(),
-        steps=found.sweep.metadata["steps_per_period"],
-        integration=found.config.integration,
         rows=len(rows),
-        agrees=counts[Verdict.AGREES],
-        in_kind=counts[Verdict.IN_KIND],
-        does_not=counts[Verdict.DOES_NOT],
-        kinds=_kinds(rows, zeros),
+        counts=Counter(row.verdict for row in rows),
+        kinds={kind.value: _counts(row for row in rows if row.kind is kind) for kind in Kind},
+        harmonics=len(harmonics),
+        zeros=sum(abs(value) < 1e-3 for value in harmonics),
         disagreements=_disagreements(rows),
         rules=RULES,
         overlap=OVERLAP,
@@ -60,9 +53,8 @@ def report(printed: Published, found: Reproduction, names: dict[str, str]) -> st
         out_of_turn=OUT_OF_TURN,
         tables={name: _table(table) for name, table in tables.items()},
         printed=values,
-        ours=our_numbers(printed, found),
-        groups=groups,
-        axial=_shared(found.response),
+        ours=our_numbers(found),
+        found=found,
         printed_ratio=values["damping_ratio"] / face_width**0.5,
         pair=pair,
         lines=lines,
@@ -72,12 +64,12 @@ def report(printed: Published, found: Reproduction, names: dict[str, str]) -> st
         face_width=face_width,
         whole_stiffness=per_mm * face_width,
         length_scale=length_scale,
-        backlash=length_scale * groups["half_backlash"],
-        table_3=_table_3(printed, found),
-        stages=stages_in_words(printed, found),
-        motions=_motions(printed),
-        hop=hop_in_words(printed, found),
-        increments=increments_in_words(printed, found),
+        backlash=length_scale * found.group("half_backlash"),
+        table_3=_table_3(found.response),
+        stages=stages_in_words(found),
+        motions=_motions(),
+        hop=hop_in_words(found),
+        increments=increments_in_words(found),
         files="\n".join(f"- `{name}`: {words}" for name, words in names.items()),
     )
     # Who cannot see a picture is told how its caption begins.
@@ -85,32 +77,9 @@ def report(printed: Published, found: Reproduction, names: dict[str, str]) -> st
     return re.sub(without_words, lambda picture: f"![{picture[1].replace('*', '')}]", text)
 
 
-def _shared(result: Result) -> dict[str, float]:
-    """Return the groups that all lanes of a result share."""
-    return {
-        name: float(parameter.value)
-        for name, parameter in result.parameters.items()
-        if np.ndim(parameter.value) == 0
-    }
-
-
-KINDS = {
-    Kind.DERIVED: "taken over or derived: {harmonics} of them harmonics of Table 2, {zeros} of "
-    "which are zero but for rounding",
-    Kind.FITTED: "fitted: seen by the search for the groups",
-    Kind.PREDICTED: "predicted: depends on the groups, and no search has seen it",
-}
-
-
-def _kinds(rows: Sequence[Row], zeros: int) -> str:
-    lines = []
-    for kind, words in KINDS.items():
-        counts = Counter(row.verdict for row in rows if row.kind is kind)
-        harmonics = sum(row.where == "Table 2" for row in rows)
-        cells = [words.format(harmonics=harmonics, zeros=zeros), counts.total()]
-        cells += [counts[verdict] for verdict in Verdict]
-        lines.append(f"| {' | '.join(map(str, cells))} |")
-    return "\n".join(lines)
+def _counts(rows: Iterable[Row]) -> str:
+    counts = Counter(row.verdict for row in rows)
+    return " | ".join(map(str, (counts.total(), *(counts[verdict] for verdict in Verdict))))
 
 
 def _disagreements(rows: Iterable[Row]) -> str:
@@ -129,28 +98,31 @@ def _table(rows: Iterable[Row]) -> str:
     lines = []
     for row in rows:
         verdict = f"**{row.verdict}**" if row.verdict is Verdict.DOES_NOT else row.verdict
-        lines.append(f"| {' | '.join([*row[:-1], verdict])} |")
+        lines.append(_line(*row[:-1], verdict))
     return TABLE_HEAD + "\n".join(lines)
 
 
-def _motions(printed: Published) -> str:
+def _motions() -> str:
     return "\n\n".join(
         f"### Figure {motion.figure}\n\n![](figure_{motion.figure:02d}.png)\n\n"
         f"Torsional motion at *P* = {motion.pitch_error:g}, dimensionless: time history (a), phase "
         "portrait with one point per mesh period (b), Poincaré section (c). At rest at the start, "
         "or on the contact flank where the figure says so. "
         f"In the paper: {motion.printed}."
-        for motion in printed.motions
+        for motion in published().motions
     )
 
 
-def _table_3(printed: Published, found: Reproduction) -> str:
-    response = found.response
+def _table_3(response: Result) -> str:
     lines = []
     for name in coordinates_of(response):
         before, after = (largest_acceleration(response, p, name) for p in (0.0, 1.0))
-        theirs = short(printed.numbers[f"added_{name}"].value)
+        theirs = short(published().numbers[f"added_{name}"].value)
         wording = response.attributes(acceleration_of(name))["long_name"]
         added = short(after - before, sign="+")
-        lines.append(f"| {wording} | {short(before)} | {short(after)} | {added} | {theirs} |")
+        lines.append(_line(wording, short(before), short(after), added, theirs))
     return "\n".join(lines)
+
+
+def _line(*cells: object) -> str:
+    return f"| {' | '.join(map(str, cells))} |"

@@ -13,10 +13,7 @@ _FOLDERS = (_PACKAGE / "sweeps", _PACKAGE.parent / "sweeps")
 def sweep_file(name: str) -> Path:
     """Return the path of a configuration that comes with gearchaos, such as ``pan2021.toml``.
 
-    Raises
-    ------
-    FileError
-        If neither the installed package nor the clone has it.
+    Raises FileError if neither the installed package nor the clone has it.
     """
     for folder in _FOLDERS:
         if (folder / name).is_file():

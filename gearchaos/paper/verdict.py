@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from enum import StrEnum
-from types import MappingProxyType
 
 
 class Verdict(StrEnum):
@@ -53,15 +52,13 @@ class Rule:
         return f"agrees within {agrees} {self.measure}, in kind within {in_kind}"
 
 
-RULES = MappingProxyType(
-    {
-        "derived": Rule("of the printed number", 0.001, 0.1),
-        "coefficient": Rule("of the first harmonic", 0.001, 0.01),
-        "boundary": Rule("of the printed place", 0.1, 0.5, relative=False),
-        "amplitude": Rule("of the printed number", 0.05, 0.25),
-        "exponent": Rule("of the printed number", 0.1, 0.5),
-    }
-)
+RULES = {
+    "derived": Rule("of the printed number", 0.001, 0.1),
+    "coefficient": Rule("of the first harmonic", 0.001, 0.01),
+    "boundary": Rule("of the printed place", 0.1, 0.5, relative=False),
+    "amplitude": Rule("of the printed number", 0.05, 0.25),
+    "exponent": Rule("of the printed number", 0.1, 0.5),
+}
 """The rules by the names that `published.toml` uses."""
 
 OVERLAP = Rule("of both spans together that is not common to them", 0.1, 0.5)

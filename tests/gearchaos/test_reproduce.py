@@ -10,7 +10,6 @@ import pytest
 
 from gearchaos import FileError, load_config, open_result
 from gearchaos.figures.response_lane import coordinates_of
-from gearchaos.paper.bands import OUT_OF_TURN, out_of_turn
 from gearchaos.paper.comparison import compare
 from gearchaos.paper.computation import compute, lane_of, largest_acceleration
 from gearchaos.paper.gallery import check_folder, pictures, write_gallery
@@ -22,7 +21,13 @@ from gearchaos.paper.our_numbers import (
     printed_series,
 )
 from gearchaos.paper.published import Kind, published
-from gearchaos.paper.stages import WINDOW, counterparts, motion_at
+from gearchaos.paper.stages import (
+    OUT_OF_TURN,
+    WINDOW,
+    counterparts,
+    motion_at,
+    out_of_turn,
+)
 from gearchaos.paper.sweep_files import sweep_file
 from gearchaos.paper.verdict import (
     OVERLAP,
@@ -186,14 +191,14 @@ def test_every_printed_number_stands_in_the_file_once():
 
 
 def test_table_2_holds_the_harmonics_of_the_contact_lines():
-    series, trapezoid = printed_series(published()), contact_line_stiffness(published())
+    series, trapezoid = printed_series(), contact_line_stiffness()
     ours, theirs = trapezoid.to_fourier(6).coefficients(), series.coefficients()
     assert np.max(np.abs(ours - theirs)) < 1e-3 * abs(theirs[0])
 
 
 def test_the_fit_of_figure_4_leaves_the_trapezoid_by_its_missing_harmonics_alone():
     """Odd harmonics of a trapezoid in quarters have the amplitude 8 sqrt(2) h / (pi n)^2."""
-    trapezoid, series = contact_line_stiffness(published()), printed_series(published())
+    trapezoid, series = contact_line_stiffness(), printed_series()
     apart = np.max(np.abs(trapezoid.table(1000) - series.table(1000)))
     harmonics = np.abs(trapezoid.to_fourier(6).coefficients()[::2])
     size = 8.0 * np.sqrt(2.0) * trapezoid.half_height / np.pi**2
@@ -247,8 +252,8 @@ def test_what_was_printed_is_of_three_kinds():
 @pytest.mark.slow
 def test_every_printed_number_is_compared(found):
     printed = published()
-    assert our_numbers(printed, found).keys() == printed.numbers.keys()
-    rows = [row for table in compare(printed, found).values() for row in table]
+    assert our_numbers(found).keys() == printed.numbers.keys()
+    rows = [row for table in compare(found).values() for row in table]
     harmonics = len(printed.harmonics.cosine) + len(printed.harmonics.sine)
     spans = len(printed.stages) + (len(printed.stages) - 1) + len(printed.motions)
     assert len(rows) == len(printed.numbers) + harmonics + spans + len(printed.increments.values)
@@ -256,7 +261,7 @@ def test_every_printed_number_is_compared(found):
 
 @pytest.mark.slow
 def test_derived_numbers_follow_from_table_1(found):
-    ours, pair = our_numbers(published(), found), pair_of(found)
+    ours, pair = our_numbers(found), pair_of(found)
     assert ours["driven_speed"] == pytest.approx(2000.0 * 21 / 38)
     assert ours["mesh_frequency_hz"] == pytest.approx(700.0)
     assert ours["mesh_period"] == pytest.approx(1.0 / 0.1394)
@@ -339,7 +344,7 @@ def close(cell: str, value: float, digits: int = 6) -> bool:
 
 def contact_line_harmonics() -> np.ndarray:
     """The first six a_n and c_n of the contact lines, relative to the mean, off their table."""
-    table = contact_line_stiffness(published()).table(2**16)
+    table = contact_line_stiffness().table(2**16)
     spectrum = 2.0 * np.fft.rfft(table)[1:7] / table.size
     return np.concatenate([spectrum.real, -spectrum.imag])
 

@@ -1,0 +1,176 @@
+"""The diagrams of a sweep over its parameter: section points, and the largest Lyapunov exponent."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection, PolyCollection
+from matplotlib.colors import to_rgb
+from matplotlib.legend import Legend
+from matplotlib.lines import Line2D
+
+from gearchaos.errors import FigureError
+from gearchaos.figures.dots import MOST_DOTS, dots, portions
+from gearchaos.figures.labels import axis_label
+from gearchaos.figures.lanes import Between, Floats, diagram_lanes, outermost
+from gearchaos.figures.panel import DiagramArtists, Drawn, close_panel
+from gearchaos.figures.style import BLACK, GREY, VERMILION
+from gearchaos.results.result import Result, section_variables
+from gearchaos.results.variables import LARGEST_EXPONENT, RECORD, STANDARD_ERROR
+
+BAND_STANDARD_ERRORS = 2.0
+
+
+class LyapunovArtists(NamedTuple):
+    """What `lyapunov` has drawn, beside what a `DiagramArtists` has.
+
+    ``line``: the exponents drawn, by the parameter, not a number where a lane diverged;
+    ``points``: exponents without a neighbour to draw a line to, between diverged lanes, or all of
+    them where a parameter value has several starts; ``band``, ``bars``: two standard errors to
+    either side, of the line and of the points; ``positive``: between a positive exponent and zero.
+    """
+
+    line: Line2D
+    points: Line2D
+    band: PolyCollection
+    bars: LineCollection
+    positive: PolyCollection
+    zero: Line2D
+    diverged: Line2D | None
+    off_scale: list[Line2D]
+    legend: Legend | None
+
+
+def bifurcation(
+    axes: Axes,
+    result: Result,
+    variable: str | None = None,
+    *,
+    between: Between = (None, None),
+    full_range: bool = False,
+    color: str = BLACK,
+    label: str | None = None,
+    marker: str = ".",
+) -> DiagramArtists:
+    """Draw the bifurcation diagram of one section variable into axes.
+
+    Every section point is a small translucent dot: a periodic motion, whose points coincide,
+    shows as a crisp black line, and chaos as grey whose depth is the density of visits. The
+    dots are rasterised, so that a PDF stays small. Above `figures.dots.MOST_DOTS` they are counted
+    by pixel, and fainter the more there are, so that chaos stays grey.
+    Diverged lanes get a red tick at the bottom, lanes beyond robust limits a triangle at the edge,
+    and a legend above says so.
+
+    Parameters
+    ----------
+    axes : matplotlib.axes.Axes
+    result : Result
+        Over one swept parameter.
+    variable : str, optional
+        A section variable; default `section_delta_5`, or the first that the result has.
+    between : (float or None, float or None)
+        The part of the parameter range to show.
+    full_range : bool
+        Let the vertical axis reach every lane, however few lie far out.
+    color, label, marker : str
+        Of the dots, for diagrams of several results in the same axes: the limits then hold what
+        those of each would, the triangles follow them, and the legend names the labels.
+
+    Raises
+    ------
+    FigureError
+        If the result has no such section variable, no lane in the range, or two swept parameters.
+    """
+    names = section_variables(result)
+    if not names:
+        raise FigureError("the result has no section points: the sweep did not record any")
+    variable = names[0] if variable is None else variable
+    if variable not in names:
+        there = ", ".join(names)
+        raise FigureError(f"no section variable {variable!r} in the result; it has {there}")
+    lanes = diagram_lanes(result, between)
+    rows = result.lanes(variable)
+    total, of_a_lane = max(1, lanes.numbers.size * rows.shape[1]), max(1, rows.shape[1])
+    alpha = min(1.0, 4.0 / of_a_lane**0.5) * min(1.0, MOST_DOTS / total)
+    look = {"markersize": lanes.dot_size(0.8), "marker": marker, "color": color, "label": label}
+    points = dots(axes, lanes, rows, rasterized=True, alpha=alpha, **look)
+    axes.set_ylabel(axis_label(result, variable, line_length=34))
+    low, high = np.full((2, lanes.numbers.size), np.nan)
+    for part, values in portions(lanes, rows):
+        np.fmin.reduce(values, axis=1, out=low[part])
+        np.fmax.reduce(values, axis=1, out=high[part])
+    return close_panel(axes, result, Drawn(points, lanes, low, high, 0.0, full_range, [], []))
+
+
+def lyapunov(
+    axes: Axes,
+    result: Result,
+    *,
+    between: Between = (None, None),
+    full_range: bool = False,
+    color: str = BLACK,
+    label: str | None = None,
+    marker: str = ".",
+) -> LyapunovArtists:
+    """Draw the largest Lyapunov exponent into axes, with zero line and uncertainty.
+
+    Diverged lanes are gaps with a red tick at the bottom; a positive exponent is hatched down
+    to zero; the vertical axis always holds zero, and lanes beyond robust limits get a triangle.
+    Of more lanes than a page can tell apart (`figures.lanes.COLUMNS`), line, shades and bars are
+    those of the lowest and the highest exponent in each column.
+
+    Parameters
+    ----------
+    axes, result, between, full_range, color, label, marker
+        As for `bifurcation`.
+
+    Raises
+    ------
+    FigureError
+        If the result has no Lyapunov exponents, no lane in the range, or two swept parameters.
+    """
+    if LARGEST_EXPONENT not in result:
+        raise FigureError("the result has no Lyapunov exponents: the sweep left them out")
+    lanes = diagram_lanes(result, between)
+    stored: Floats = result.lanes(LARGEST_EXPONENT)
+    whole = stored[lanes.numbers]
+    whole[lanes.diverged | np.isinf(whole)] = np.nan
+    spread = np.full(whole.shape, np.nan)
+    if LARGEST_EXPONENT + STANDARD_ERROR in result:
+        error = result.lanes(LARGEST_EXPONENT + STANDARD_ERROR)[lanes.numbers]
+        spread = BAND_STANDARD_ERRORS * error
+    several_starts = bool(np.any(np.diff(lanes.parameter) == 0.0))
+    # Several starts may lie on different motions, which no line should join.
+    lonely = np.isfinite(whole)
+    if not several_starts:
+        beside = np.pad(lonely, 1)
+        lonely = lonely & ~(beside[2:] | beside[:-2])
+    drawn = outermost(lanes, whole)
+    x, exponent, reach, alone = (a[drawn] for a in (lanes.parameter, whole, spread, lonely))
+    joined = np.where(alone, np.nan, exponent)
+
+    zero = axes.axhline(0.0, color=GREY, linewidth=0.5, linestyle=(0, (4, 2)), zorder=1)
+    # Colours are those of the stages behind; what is said of an exponent is black and grey.
+    look: dict[str, Any] = {"where": joined > 0.0, "interpolate": True, "hatch": "////"}
+    positive = axes.fill_between(x, 0.0, joined, fc="none", ec=GREY, lw=0.0, **look)
+    pale: Any = 0.6 + 0.4 * np.array(to_rgb(color))
+    look = {"color": pale, "lw": 0.0, "label": "\N{PLUS-MINUS SIGN}2 standard errors"}
+    band = axes.fill_between(x, joined - reach, joined + reach, **look)
+    ends = (exponent - reach)[alone], (exponent + reach)[alone]
+    bars = axes.vlines(x[alone], *ends, colors=pale, lw=0.6)
+    line_style = "none" if several_starts and alone.any() else "-"
+    (line,) = axes.plot(x, exponent, ls=line_style, lw=0.6, color=color, label=label)
+    look = {"markersize": lanes.dot_size(1.0), "color": color, "marker": marker}
+    points = dots(axes, lanes._replace(diverged=~lonely), stored[:, np.newaxis], **look)
+    named: list[Artist] = [band] if np.isfinite(whole + spread).any() else []
+    if RECORD in result and (mixed := result.lanes(RECORD)[lanes.numbers][drawn] == 1).any():
+        # Orbits that were reached within the record.
+        look = {"ms": 3.0, "mfc": "none", "mew": 0.5, "color": VERMILION}
+        named += axes.plot(x[mixed], exponent[mixed], "o", label="came from another motion", **look)
+    axes.set_ylabel(axis_label(result, LARGEST_EXPONENT, line_length=20))
+    own = Drawn(line, lanes, whole, whole, np.nan_to_num(spread), full_range, named, [])
+    marks = close_panel(axes, result, own, hold_zero=True)[1:]
+    return LyapunovArtists(line, points, band, bars, positive, zero, *marks)
