@@ -14,13 +14,7 @@ from numpy.typing import NDArray
 from gearchaos.results.result import Result
 from gearchaos.results.result_file import Parameter
 from gearchaos.results.result_reader import read_result
-from gearchaos.results.stage_table import (
-    band_counts,
-    labelled_lanes,
-    one_axis,
-    slice_facts,
-    stage_table,
-)
+from gearchaos.results.stage_table import labelled_lanes, one_axis, slice_facts, stage_table
 from gearchaos.results.variables import (
     HARMONIC,
     LABELS,
@@ -87,11 +81,7 @@ def _stages(result: Result) -> tuple[dict[str, Any], list[dict[str, Any]]]:
         return {}, []
     part = one_axis(result)
     stages = stage_table(labelled_lanes(part))
-    facts = [
-        stage._asdict() | {"lanes": stage.lanes, "bands": bands}
-        for stage, bands in zip(stages, band_counts(part, stages), strict=True)
-    ]
-    return slice_facts(result, part), facts
+    return slice_facts(result, part), [stage._asdict() for stage in stages]
 
 
 def _range(values: NDArray[Any]) -> dict[str, float]:

@@ -33,6 +33,7 @@ def lanes(labels: str, values: list[float] | None = None) -> LabelledLanes:
         np.array(words),
         np.array([int(letter) if letter.isdigit() else 0 for letter in labels], dtype=np.int32),
         np.arange(float(len(labels))) - 3.0,
+        np.zeros(len(labels), dtype=np.int32),
     )
 
 
