@@ -24,7 +24,7 @@ from gearchaos.progress import Progress, say
 
 if TYPE_CHECKING:
     from gearchaos.identification.loading import Problem
-    from gearchaos.identification.searching import Judge
+    from gearchaos.identification.search import Judge
     from gearchaos.identification.tried import Tried
 
 
@@ -45,7 +45,7 @@ def _identify(options: Namespace) -> int:
     from gearchaos.engine.running import choose_threads, compiling
     from gearchaos.identification.loading import load_targets
     from gearchaos.identification.report import report
-    from gearchaos.identification.searching import Judge
+    from gearchaos.identification.search import Judge
 
     problem = load_targets(options.config, options.set)
     choose_threads(options.threads)
@@ -78,7 +78,7 @@ def _scored(problem: Problem, judge: Judge, path: str) -> Tried:
             )
         known[one.name] = np.array([value])
     require_stable(problem.config, judge.values, known)
-    return judge.judge_values(0, known)
+    return judge.judge(0, known)
 
 
 def _searched(problem: Problem, judge: Judge, options: Namespace) -> Tried:
@@ -86,8 +86,7 @@ def _searched(problem: Problem, judge: Judge, options: Namespace) -> Tried:
 
     from gearchaos.engine.provenance import provenance
     from gearchaos.identification.evaluation import require_stable
-    from gearchaos.identification.search import MOST_CENTRES, RUNGS
-    from gearchaos.identification.searching import decisive_facts, search
+    from gearchaos.identification.search import MOST_CENTRES, RUNGS, decisive_facts, search
     from gearchaos.identification.tried import read_tried, write_tried
     from gearchaos.results.atomic_file import check_output
     from gearchaos.results.manifest import require_same
