@@ -19,8 +19,7 @@ from gearchaos.command_line import OK, Command, coordinates, number, place
 if TYPE_CHECKING:
     from gearchaos.engine.refinement import Boundary
     from gearchaos.engine.survival import Survival
-    from gearchaos.results.crises import Crisis
-    from gearchaos.results.jumps import Jump
+    from gearchaos.results.jumps import Crisis, Jump
     from gearchaos.results.result import Result
     from gearchaos.results.stage_table import Stage
 
@@ -67,8 +66,7 @@ def _records(text: str) -> int:
 
 
 def _stages(options: argparse.Namespace) -> int:
-    from gearchaos.results.crises import crises
-    from gearchaos.results.jumps import jumps
+    from gearchaos.results.jumps import crises, jumps
     from gearchaos.results.overview import finite
     from gearchaos.results.result import open_result
     from gearchaos.results.stage_table import (

@@ -6,10 +6,10 @@ while it closes a file. So it is never told: it writes into a sink, whose error 
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Iterator
+from contextlib import contextmanager
 from io import FileIO
 from pathlib import Path
-from types import TracebackType
 from typing import Any
 
 
@@ -21,15 +21,11 @@ class Sink(FileIO):
         # Unbuffered: the error of a buffered write would surface in any later call.
         super().__init__(path, "w+")
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
-        self._try(self.close)
+    def __exit__(self, *fault: Any) -> None:
+        with self._remembering():
+            self.close()
         # An error that HDF5 has met in what it reads back is but a consequence of ours.
-        if kind is None or issubclass(kind, Exception):
+        if fault[0] is None or issubclass(fault[0], Exception):
             self.check()
 
     def check(self) -> None:
@@ -39,22 +35,23 @@ class Sink(FileIO):
 
     def write(self, data: Any) -> int:
         """Write all of it, or nothing once something has failed."""
-        self._try(lambda: self._write_all(memoryview(data).cast("B")))
+        with self._remembering():
+            left = memoryview(data).cast("B")
+            while left and self._error is None:
+                left = left[super().write(left) :]
         return len(data)
 
     def truncate(self, size: int | None = None) -> int:
         """Set the size, unless something has failed."""
-        self._try(lambda: super(Sink, self).truncate(size))
+        with self._remembering():
+            if self._error is None:
+                super().truncate(size)
         return size or 0
 
-    def _write_all(self, data: memoryview) -> None:
-        while data:
-            data = data[super().write(data) :]
-
-    def _try(self, action: Callable[[], object]) -> None:
-        if self._error is None:
-            try:
-                action()
-            except BaseException as error:
-                # An interrupt, too, must not reach the library.
-                self._error = error
+    @contextmanager
+    def _remembering(self) -> Iterator[None]:
+        try:
+            yield
+        except BaseException as error:
+            # An interrupt, too, must not reach the library.
+            self._error = self._error or error
