@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 import os
 import tomllib
@@ -31,11 +30,6 @@ def decisive_facts(software: Software, **facts: Any) -> dict[str, Any]:
     facts |= software._asdict()
     # As it is read again: with lists for tuples.
     return dict(json.loads(json.dumps({**versions, **facts})))
-
-
-def fingerprint(decisive: Mapping[str, Any]) -> str:
-    """Return a hash of all that decides the numbers."""
-    return hashlib.sha256(json.dumps(decisive, sort_keys=True).encode()).hexdigest()
 
 
 def settle_manifest(
@@ -106,22 +100,13 @@ def folder_of(output: str | os.PathLike[str]) -> Path:
     return Path(os.path.realpath(output) + ".blocks")
 
 
-def stored_manifest(output: str | os.PathLike[str]) -> dict[str, Any]:
-    """Return the manifest of the blocks beside an output, whoever computed them.
-
-    Raises FileError if there are no blocks, or if what describes them is damaged.
-    """
-    folder = folder_of(output)
+def read_manifest(folder: Path) -> dict[str, Any]:
+    """Read the manifest of a folder; FileError if there is none, or it is damaged."""
+    path = folder / MANIFEST
     if not folder.is_dir():
         raise FileError(
             f"{folder}: no such folder; name the result file to be, beside which the blocks are"
         )
-    return read_manifest(folder)
-
-
-def read_manifest(folder: Path) -> dict[str, Any]:
-    """Read the manifest of a folder; FileError if there is none."""
-    path = folder / MANIFEST
     try:
         manifest: dict[str, Any] = json.loads(unlinked_content(path, _LARGEST))
         tomllib.loads(manifest["configuration"])

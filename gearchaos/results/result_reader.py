@@ -14,32 +14,13 @@ from numpy.typing import NDArray
 
 from gearchaos.errors import FileError
 from gearchaos.gear.group_table import LARGEST_VALUE
+from gearchaos.results import stored_dataset as stored
+from gearchaos.results import variables as known
 from gearchaos.results.atomic_file import reason
 from gearchaos.results.checksum_line import checksum_fits
 from gearchaos.results.result_file import ORIGINS, PARAMETERS, SCHEMA, SCHEMA_VERSION, Parameter
-from gearchaos.results.stored_dataset import (
-    UnfitError,
-    datasets_of,
-    dims_of,
-    dtype_of,
-    scalars_of,
-    text_of,
-    values_of,
-)
-from gearchaos.results.variables import (
-    ALL_EXPONENTS,
-    HARMONIC,
-    LARGEST_EXPONENT,
-    RECORD,
-    SECTION,
-    SECTION_POINT,
-    START,
-    STATE,
-    STATUS,
-    Axis,
-    Variable,
-    sweep_variables,
-)
+from gearchaos.results.stored_dataset import UnfitError
+from gearchaos.results.variables import HARMONIC, STATE, Axis, Variable
 
 Contents = tuple[
     list[Variable], dict[str, NDArray[Any]], dict[str, Parameter], dict[str, str | int | float]
@@ -110,42 +91,42 @@ def printable(text: str) -> str:
 
 
 def _read(file: h5py.File, rows: bool) -> Contents:
-    metadata = scalars_of(file)
+    metadata = stored.scalars_of(file)
     _check_schema(metadata)
     axes = tuple(str(metadata.get("axes", "")).split())
-    datasets = datasets_of(file)
+    datasets = stored.datasets_of(file)
     grouped = {name: datasets.pop(name) for name in list(datasets) if "/" in name}
     variables: dict[str, Variable] = {}
     data: dict[str, NDArray[Any]] = {}
     sizes: dict[str, int] = {}
     for name, dataset in datasets.items():
-        text = text_of(dataset)
+        text = stored.text_of(dataset)
         if text is not None:
             metadata[name] = text
             continue
-        notes = scalars_of(dataset)
-        dims = dims_of(name, dataset, notes, sizes)
+        notes = stored.scalars_of(dataset)
+        dims = stored.dims_of(name, dataset, notes, sizes)
         if name != HARMONIC:
             if rows or len(dims) == 1 or set(dims) <= set(axes):
-                data[name] = values_of(name, dataset)
+                data[name] = stored.values_of(name, dataset)
             flags = tuple(str(notes.get("flag_meanings", "")).split())
             more: dict[str, Any] = {"fill_value": notes.get("_FillValue"), "flags": flags}
-            wording, dtype = _wording(notes), dtype_of(name, dataset)
-            variables[name] = Variable(name, dims, dtype, **wording, **more)
+            dtype = stored.dtype_of(name, dataset)
+            variables[name] = Variable(name, dims, dtype, **_wording(notes), **more)
     _check_variables(axes, variables, data)
     for dim in sizes.keys() - {HARMONIC}:
         if dim not in variables or variables[dim].dims != (dim,):
             raise UnfitError(f"lacks the variable {dim}, whose dimension others have")
     fixed_coordinates(metadata)
     parameters = {}
-    for name, dataset in grouped.items():
-        notes = scalars_of(dataset)
-        dims, name = dims_of(name, dataset, notes, sizes), name.removeprefix(f"{PARAMETERS}/")
+    for path, dataset in grouped.items():
+        notes, name = stored.scalars_of(dataset), path.removeprefix(f"{PARAMETERS}/")
+        dims = stored.dims_of(path, dataset, notes, sizes)
         origin = str(notes.get("origin"))
         of_the_model = dims == (HARMONIC,) or dims == tuple(a for a in axes if a in dims)
         if dataset.dtype.str[1:] != "f8" or not of_the_model or origin not in ORIGINS:
             raise UnfitError(f"holds a parameter {name} that is none")
-        values = values_of(name, dataset)
+        values = stored.values_of(name, dataset)
         value = values if dims else float(values)
         parameters[name] = Parameter(value, origin, **_wording(notes), dims=dims)
     return list(variables.values()), data, parameters, metadata
@@ -159,17 +140,18 @@ def _wording(notes: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _check_schema(metadata: Mapping[str, Any]) -> None:
-    if metadata.get("schema") == SEARCH:
+    schema, version = metadata.get("schema"), str(metadata.get("schema_version", ""))
+    own = SCHEMA_VERSION.split(".")[0]
+    if schema == SEARCH:
         raise UnfitError(
             "holds the candidates of a search, not the result of a sweep",
             "`gearchaos identify TARGETS.toml --resume` goes on with it and reports what it found",
         )
-    if metadata.get("schema") != SCHEMA:
+    if schema != SCHEMA:
         raise UnfitError(
             f'is not a gearchaos result: it lacks the attribute schema = "{SCHEMA}"',
             "give the name of a file that a sweep has written",
         )
-    version, own = str(metadata.get("schema_version", "")), SCHEMA_VERSION.split(".")[0]
     if version.split(".")[0] != own:
         raise UnfitError(
             f"has version {version!r} of the file format, of which this gearchaos reads {own}.x",
@@ -185,18 +167,23 @@ def _check_variables(
         raise UnfitError("does not name its axes, each once")
     if STATE not in data:
         raise UnfitError(f"lacks the variable {STATE}")
-    expected = sweep_variables(
-        [Axis(name, "", "", "", np.zeros(1, "i4" if name == START else "f8")) for name in axes],
+    expected = known.sweep_variables(
+        [
+            Axis(name, "", "", "", np.zeros(1, "i4" if name == known.START else "f8"))
+            for name in axes
+        ],
         states=found[STATE].flags,
-        section=[n.removeprefix(SECTION) for n in found if n.startswith(f"{SECTION}delta_")],
-        section_points=np.size(data.get(SECTION_POINT, ())),
-        lyapunov=LARGEST_EXPONENT in found,
+        section=[
+            n.removeprefix(known.SECTION) for n in found if n.startswith(f"{known.SECTION}delta_")
+        ],
+        section_points=np.size(data.get(known.SECTION_POINT, ())),
+        lyapunov=known.LARGEST_EXPONENT in found,
         status_meanings=(),
         crossings="crossings_per_period" in found,
-        exponents=ALL_EXPONENTS in found,
+        exponents=known.ALL_EXPONENTS in found,
         check_meanings=["same"] if "motion_changed" in found else [],
         motion_meanings=["periodic"] if "motion" in found else [],
-        record_meanings=["uniform"] if RECORD in found else [],
+        record_meanings=["uniform"] if known.RECORD in found else [],
     )
     for due in expected:
         got = found.get(due.name)
@@ -211,6 +198,6 @@ def _check_variables(
         if not is_coordinate(data[name]):
             rule = f"do not ascend, each once, between -{LARGEST_VALUE:g} and {LARGEST_VALUE:g}"
             raise UnfitError(f"holds values of {name} that {rule}")
-    for name in {STATUS, STATE, "motion"} & found.keys():
+    for name in {known.STATUS, STATE, "motion"} & found.keys():
         if data[name].max() >= max(1, len(found[name].flags)):
             raise UnfitError(f"holds a {name} without a meaning")
