@@ -26,8 +26,7 @@ def _arguments(parser: ArgumentParser) -> None:
 def _info(options: Namespace) -> int:
     # Imported only now: --help and --version answer at once, and an interrupt is caught.
     from gearchaos.progress import notice
-    from gearchaos.results.overview import overview
-    from gearchaos.results.overview_page import overview_page
+    from gearchaos.results.overview import overview, overview_page
     from gearchaos.results.verification import verify
 
     verified: list[str] = []
