@@ -32,11 +32,8 @@ def _arguments(parser: ArgumentParser) -> None:
     add = parser.add_argument
     add("config", metavar="TARGETS.toml", help="what was observed, and what is free")
     add("--resume", action="store_true", help="go on with a search that was stopped")
-    add(
-        "--score",
-        metavar="config.toml",
-        help="search nothing, but judge the parameters of this configuration by the targets",
-    )
+    text = "search nothing, but judge the parameters of this configuration by the targets"
+    add("--score", metavar="config.toml", help=text)
     replaced = "replace one key of the targets file, such as search.seed=2"
     add("--set", **{**COMMON_OPTIONS["set"], "help": replaced})
 
@@ -50,11 +47,11 @@ def _identify(options: Namespace) -> int:
     problem = load_targets(options.config, options.set)
     choose_threads(options.threads)
     judge = Judge(problem)
-    if options.score is not None:
+    if options.score is None:
+        tried = _searched(problem, judge, options)
+    else:
         with compiling():
             tried = _scored(problem, judge, options.score)
-    else:
-        tried = _searched(problem, judge, options)
     print("\n".join(report(judge, tried)), flush=True)
     return OK
 
@@ -97,8 +94,7 @@ def _searched(problem: Problem, judge: Judge, options: Namespace) -> Tried:
         )
     require_stable(problem.config, judge.values, problem.targets.corners())
     output, keys = output_of(options), [one.name for one in problem.targets.parameter]
-    known, kept = None, False
-    facts = decisive_facts(problem)
+    known, kept, facts = None, False, decisive_facts(problem)
     if options.resume and not options.overwrite and os.path.exists(output):
         (known, earlier), kept = read_tried(output, keys), True
         require_same(f"{output}: is the result", earlier, facts, "replace it with --overwrite")
@@ -121,10 +117,9 @@ def _searched(problem: Problem, judge: Judge, options: Namespace) -> Tried:
         write_tried(output, tried, keys, judge.observations, told)
         kept = True
 
-    tried_before = 0 if known is None else len(known)
     most = problem.targets.search.candidates + MOST_CENTRES * (1 + 2 * RUNGS * len(keys))
     try:
-        with Progress(most, tried_before, unit="candidate") as bar:
+        with Progress(most, 0 if known is None else len(known), unit="candidate") as bar:
             tried = search(judge, known, keep, bar.advance, output)
     except KeyboardInterrupt as interrupt:
         if kept:
@@ -135,9 +130,8 @@ def _searched(problem: Problem, judge: Judge, options: Namespace) -> Tried:
     return tried
 
 
-main = Command(
-    "identify", __doc__, _arguments, _identify, common=("output", "overwrite", "threads")
-)
+_COMMON = ("output", "overwrite", "threads")
+main = Command("identify", __doc__, _arguments, _identify, _COMMON)
 
 if __name__ == "__main__":
     sys.exit(main())

@@ -38,14 +38,8 @@ class Problem(NamedTuple):
 def load_targets(file: str | os.PathLike[str], overrides: Iterable[str] = ()) -> Problem:
     """Read a targets file and the configuration that it names.
 
-    ``overrides`` replace keys of the targets file, such as ``search.seed=2``.
-
-    Raises
-    ------
-    FileError
-        If one of the two cannot be read.
-    ConfigurationError
-        If one of them is not sound: one message per fault.
+    ``overrides`` replace keys of the targets file, such as ``search.seed=2``. Raises FileError if
+    one of the two cannot be read, ConfigurationError if one is not sound: one message per fault.
     """
     source = os.fspath(file)
     text = text_of_file(source)
@@ -57,8 +51,7 @@ def load_targets(file: str | os.PathLike[str], overrides: Iterable[str] = ()) ->
         keys = {one.path: one for one in keys_of(Targets)}
         worded = [fault_of(one, tables, keys) for one in found[:MOST_SHOWN]]
         raise ConfigurationError(texts(worded, source, len(found) - len(worded))) from None
-    faults = list(_faults(targets))
-    if faults:
+    if faults := list(_faults(targets)):
         raise ConfigurationError(texts(faults, source))
     config = observed_configuration(targets, Path(source).parent / targets.configuration)
     if problems := list(_unfit(config, targets, source)):

@@ -54,13 +54,9 @@ Proposals: TypeAlias = Generator[tuple[int, Floats], Floats, None]
 
 
 class Judge:
-    """Computes candidates and compares them with the observations of a problem.
+    """Computes candidates and compares them with the ``observations`` of a problem.
 
-    Attributes
-    ----------
-    observations : list of Observation
-    values : ndarray, shape (values,)
-        All values of the swept parameter at which something is looked at, ascending.
+    ``values``: all of the swept parameter at which something is looked at, ascending, (values,).
     """
 
     def __init__(self, problem: Problem) -> None:
@@ -112,12 +108,7 @@ def search(
     ``known`` are those of an earlier part of it, from the file ``source``, which are not computed
     again; ``keep`` is called with all there are from time to time, and where the search is
     interrupted, as soon as they are more than the known ones; ``advance`` with every number of
-    candidates done.
-
-    Raises
-    ------
-    FileError
-        If the known candidates are not the first ones of this search.
+    candidates done. Raises FileError if the known ones are not the first of this search.
     """
     parts: list[Tried] = []
     done, before, spoke = 0, 0 if known is None else len(known), time.monotonic()

@@ -19,7 +19,6 @@ from numpy.typing import NDArray
 from gearchaos.errors import FileError
 from gearchaos.results import manifest
 from gearchaos.results.atomic_file import PARTIAL
-from gearchaos.results.block_file import read_block, write_block
 from gearchaos.results.result_file import Metadata, Parameter, write_result
 from gearchaos.results.store_lock import LOCK, StoreLock
 from gearchaos.results.variables import Variable, lane_axes
@@ -160,14 +159,14 @@ class BlockStore:
             if (shape := np.shape(arrays[name])) != records[name].shape:
                 raise ValueError(f"{name} of lanes {first} to {last - 1} has shape {shape}")
             records[name] = arrays[name]
-        write_block(self._path(first, last), self._owner(first, last), records)
+        manifest.write_block(self._path(first, last), self._owner(first, last), records)
 
     def read(self, first: int, last: int) -> dict[str, NDArray[Any]]:
         """Give the arrays of one block; FileError if it is missing, damaged or of another sweep."""
         path = self._path(first, last)
         if not 0 <= first < last <= self.lanes:
             raise FileError(f"{path}: its lanes are none of the {self.lanes} of this sweep")
-        records = read_block(path, self._owner(first, last), self._record, last - first)
+        records = manifest.read_block(path, self._owner(first, last), self._record, last - first)
         return {name: records[name] for name in self._record.names or ()}
 
     def merge(

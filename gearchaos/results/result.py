@@ -60,7 +60,12 @@ class Result:
         self.axes = tuple(axes)
         self.parameters = dict(parameters)
         self.metadata = {**metadata, **own_metadata(self.axes)}
-        self._data = {variable.name: _array(variable, data) for variable in variables}
+        self._data: dict[str, NDArray[Any]] = {}
+        for variable in variables:
+            values = data.get(variable.name, variable.values)
+            if values is None:
+                raise ValueError(f"no values for the variable {variable.name}")
+            self._data[variable.name] = np.asarray(values, dtype=variable.dtype)
         for axis in self.axes:
             if axis not in self._data or not is_coordinate(self._data[axis]):
                 raise ValueError(f"{axis} is an axis, but there is no ascending row of its values")
@@ -209,13 +214,6 @@ class Result:
         if name not in self._data:
             raise KeyError(f"no variable {name!r} in this result; there are {', '.join(self)}")
         return name
-
-
-def _array(variable: Variable, data: Mapping[str, Any]) -> NDArray[Any]:
-    values = data.get(variable.name, variable.values)
-    if values is None:
-        raise ValueError(f"no values for the variable {variable.name}")
-    return np.asarray(values, dtype=variable.dtype)
 
 
 def section_variables(result: Result) -> tuple[str, ...]:

@@ -25,12 +25,10 @@ def verify(path: str | os.PathLike[str]) -> list[str]:
         variables, _, parameters, metadata = read_result(path, rows=False)
     except FileError as error:
         raise FileError([*error.problems, *damaged_pieces(path)]) from error
-    fits = checksum_fits(Path(path))
-    problems = list(damaged_pieces(path))
     # Of a large file the reader has not tried the checksum.
-    if fits is False:
-        problems.insert(0, f"{path}: is damaged (its checksum does not fit); run the sweep again")
-    if problems:
+    fits = checksum_fits(Path(path))
+    damage = f"{path}: is damaged (its checksum does not fit); run the sweep again"
+    if problems := [*([damage] if fits is False else []), *damaged_pieces(path)]:
         raise FileError(problems)
     with h5py.File(path, "r") as file:
         datasets = datasets_of(file).values()
@@ -50,13 +48,9 @@ def damaged_pieces(path: str | os.PathLike[str]) -> Iterator[str]:
     if Path(path).is_file():
         with suppress(Exception), h5py.File(path, "r") as file:
             for name, dataset in datasets_of(file).items():
-                for rows in _unreadable(dataset):
-                    yield f"{path}: is damaged in {name}{rows}"
-
-
-def _unreadable(dataset: h5py.Dataset) -> Iterator[str]:
-    for piece in dataset.iter_chunks() if dataset.chunks else [()]:
-        try:
-            dataset[piece]
-        except OSError:
-            yield f", rows {piece[0].start} to {piece[0].stop - 1}" if piece else ""
+                for piece in dataset.iter_chunks() if dataset.chunks else [()]:
+                    try:
+                        dataset[piece]
+                    except OSError:
+                        rows = f", rows {piece[0].start} to {piece[0].stop - 1}" if piece else ""
+                        yield f"{path}: is damaged in {name}{rows}"
