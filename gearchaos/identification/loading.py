@@ -109,11 +109,8 @@ def observed_configuration(targets: Targets, path: str | os.PathLike[str]) -> Co
     only where somebody looks at it.
     """
     coordinates = dict.fromkeys(("delta_5", *(one.coordinate for one in targets.increment)))
-    outputs = {
-        "section": list(coordinates),
-        "section_points": 1,
-        "lyapunov": bool(targets.exponent),
-    }
+    exponent = bool(targets.exponent)
+    outputs = {"section": list(coordinates), "section_points": 1, "lyapunov": exponent}
     return load_config(path, [*targets.set, f"outputs={toml_literal(outputs)}"])
 
 

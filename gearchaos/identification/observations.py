@@ -124,9 +124,9 @@ def _growth(records: Records) -> Floats:
 
 def exponent_at(exponent: Exponent) -> Observation:
     """The largest Lyapunov exponent at one value."""
-    name, values = f"exponent at {exponent.at:g}", np.array([exponent.at])
+    at, wanted, width = exponent.at, exponent.value, exponent.width
     return Observation(
-        name, exponent.value, exponent.width, values, lambda records: records.exponent[:, 0]
+        f"exponent at {at:g}", wanted, width, np.array([at]), lambda lanes: lanes.exponent[:, 0]
     )
 
 

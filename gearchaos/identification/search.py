@@ -88,11 +88,8 @@ class Judge:
 
 def decisive_facts(problem: Problem) -> dict[str, Any]:
     """Return what decides which candidates are tried and what they come to."""
-    tables = {
-        "cma_version": version("cma"),
-        "targets": problem.targets.model_dump(exclude_none=True),
-        "of": problem.config.tables(),
-    }
+    targets = problem.targets.model_dump(exclude_none=True)
+    tables = {"cma_version": version("cma"), "targets": targets, "of": problem.config.tables()}
     return {**SOFTWARE._asdict(), "configuration": toml_text(tables)}
 
 

@@ -185,15 +185,9 @@ class BlockStore:
         """
         found = found or self.finished()
         self.require_all(found, "use --resume")
-        write_result(
-            self.output,
-            variables,
-            ((first, last, self.read(first, last)) for first, last in found.bounds),
-            parameters,
-            metadata,
-            overwrite=overwrite,
-            scratch=self.folder,
-        )
+        blocks = ((first, last, self.read(first, last)) for first, last in found.bounds)
+        told = variables, blocks, parameters, metadata
+        write_result(self.output, *told, overwrite=overwrite, scratch=self.folder)
         self.remove()
         return self.output
 

@@ -9,7 +9,7 @@ import tomllib
 from collections.abc import Mapping
 from contextlib import suppress
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +19,7 @@ from gearchaos.errors import FileError
 from gearchaos.results.atomic_file import reason, replacing, unlinked_content
 from gearchaos.version import Software
 
+Facts: TypeAlias = Mapping[str, Any]
 STORE_SCHEMA, BLOCK_SCHEMA = "gearchaos-blocks", "gearchaos-block"
 SCHEMA_VERSION = "2.0"
 MANIFEST = "manifest.json"
@@ -37,12 +38,7 @@ def decisive_facts(software: Software, **facts: Any) -> dict[str, Any]:
 
 
 def settle_manifest(
-    folder: Path,
-    decisive: Mapping[str, Any],
-    beside: Mapping[str, Any],
-    *,
-    write: bool,
-    overwrite: bool,
+    folder: Path, decisive: Facts, beside: Facts, *, write: bool, overwrite: bool
 ) -> None:
     """Write the manifest of a folder, and refuse a folder of another sweep.
 
@@ -62,10 +58,7 @@ def settle_manifest(
 
 
 def require_same(
-    what: str,
-    earlier: Mapping[str, Any],
-    now: Mapping[str, Any],
-    otherwise: str = "delete the folder",
+    what: str, earlier: Facts, now: Facts, otherwise: str = "delete the folder"
 ) -> None:
     """Refuse what was computed for another configuration or by another gearchaos.
 
@@ -82,7 +75,7 @@ def require_same(
         )
 
 
-def _differing(*facts: Mapping[str, Any]) -> list[str]:
+def _differing(*facts: Facts) -> list[str]:
     """Word software and keys of the configuration in which two rows of facts differ."""
     first, second = map(_flat, facts)
     return [
@@ -92,7 +85,7 @@ def _differing(*facts: Mapping[str, Any]) -> list[str]:
     ]
 
 
-def _flat(facts: Mapping[str, Any]) -> dict[str, Any]:
+def _flat(facts: Facts) -> dict[str, Any]:
     flat = {key: facts[key] for key in (*Software._fields, "schema_version") if key in facts}
     with suppress(ValueError, RecursionError):  # Not written by us: all keys are absent.
         flat |= flat_tables(tomllib.loads(facts.get("configuration", "")))
@@ -122,31 +115,27 @@ def read_manifest(folder: Path) -> dict[str, Any]:
     return manifest
 
 
-def write_block(path: Path, owner: Mapping[str, Any], records: NDArray[Any]) -> None:
+def write_block(path: Path, owner: Facts, records: NDArray[Any]) -> None:
     """Write the records of the lanes of a block; the file appears complete or not at all.
 
     ``owner`` says of which sweep and which lanes they are, and ``records`` has shape (lanes,).
     Raises FileError if the file cannot be written.
     """
-    head = _head(owner)
     with (
         replacing(path, overwrite=True, through_links=False) as partial,
         partial.open("wb") as file,
     ):
-        file.write(head + _digest(head, records.data))
+        file.write(_beginning(owner, records.data))
         file.write(records.data)
 
 
-def read_block(
-    path: Path, owner: Mapping[str, Any], record: np.dtype[Any], lanes: int
-) -> NDArray[Any]:
+def read_block(path: Path, owner: Facts, record: np.dtype[Any], lanes: int) -> NDArray[Any]:
     """Give the records of so many lanes, shape (lanes,), verified.
 
     Raises FileError if the file is missing, damaged or of another owner.
     """
-    head = _head(owner)
-    start = len(head) + hashlib.sha256().digest_size
-    size = start + lanes * record.itemsize
+    start = len(_beginning(owner, b""))
+    head, size = start - hashlib.sha256().digest_size, start + lanes * record.itemsize
     try:
         # Not more: what claims to be a block may be larger than the memory.
         content = memoryview(unlinked_content(path, size + 1))
@@ -154,19 +143,17 @@ def read_block(
         raise FileError(f"{path}: cannot be read: {reason(error)}") from error
     if len(content) != size:
         raise FileError(f"{path}: has not the {size} bytes of its lanes")
-    if content[: len(head)] != head:
+    beginning = _beginning(owner, content[start:])
+    if content[:head] != beginning[:head]:
         raise FileError(f"{path}: belongs to another sweep or another version of the format")
-    if content[len(head) : start] != _digest(head, content[start:]):
+    if content[:start] != beginning:
         raise FileError(f"{path}: is damaged; its checksum does not fit")
     return np.frombuffer(content[start:], record)
 
 
-def _head(owner: Mapping[str, Any]) -> bytes:
+def _beginning(owner: Facts, records: bytes | memoryview) -> bytes:
     schema = {"schema": BLOCK_SCHEMA, "schema_version": SCHEMA_VERSION}
-    return json.dumps({**schema, **owner}).encode() + b"\n"
-
-
-def _digest(head: bytes, records: memoryview) -> bytes:
+    head = json.dumps({**schema, **owner}).encode() + b"\n"
     digest = hashlib.sha256(head)
     digest.update(records)
-    return digest.digest()
+    return head + digest.digest()

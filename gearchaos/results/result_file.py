@@ -59,12 +59,8 @@ class Parameter:
 
 def own_metadata(axes: Sequence[str]) -> dict[str, str]:
     """Give the root attributes that tell a reader what it has before it."""
-    return {
-        "schema": SCHEMA,
-        "schema_version": SCHEMA_VERSION,
-        "axes": " ".join(axes),
-        "axis": diagram_axis(axes),
-    }
+    schema = {"schema": SCHEMA, "schema_version": SCHEMA_VERSION}
+    return {**schema, "axes": " ".join(axes), "axis": diagram_axis(axes)}
 
 
 def write_result(
@@ -150,16 +146,9 @@ def _harmonics(parameters: Mapping[str, Parameter]) -> list[Variable]:
 
 
 def _create(file: h5py.File, variable: Variable, shape: tuple[int, ...]) -> None:
-    dataset = file.create_dataset(
-        variable.name,
-        shape,
-        variable.dtype,
-        data=variable.values,
-        fillvalue=variable.fill_value,
-        chunks=_chunks(shape, np.dtype(variable.dtype).itemsize),
-        track_order=True,
-        **_PACKED,
-    )
+    chunks = _chunks(shape, np.dtype(variable.dtype).itemsize)
+    how = {**_PACKED, "chunks": chunks, "fillvalue": variable.fill_value, "track_order": True}
+    dataset = file.create_dataset(variable.name, shape, variable.dtype, variable.values, **how)
     if variable.dims == (variable.name,):
         dataset.make_scale(variable.name)
     _describe(dataset, variable.attributes)

@@ -99,15 +99,12 @@ def one_axis(result: Result, **coordinates: float) -> Result:
 
 def slice_facts(result: Result, part: Result) -> dict[str, dict[str, float]]:
     """Tell of each axis that a slice lacks at which value, which of how many, it was fixed."""
-    return {
-        name: {
-            "value": part.fixed[name],
-            "number": int(np.searchsorted(result[name], part.fixed[name])) + 1,
-            "of": result[name].size,
-        }
-        for name in result.axes
-        if name not in part.axes
-    }
+    facts = {}
+    for name in (name for name in result.axes if name not in part.axes):
+        value, values = part.fixed[name], result[name]
+        number = int(np.searchsorted(values, value)) + 1
+        facts[name] = {"value": value, "number": number, "of": values.size}
+    return facts
 
 
 def slice_lines(facts: dict[str, dict[str, float]]) -> list[str]:
