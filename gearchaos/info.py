@@ -27,7 +27,7 @@ def _info(options: Namespace) -> int:
     # Imported only now: --help and --version answer at once, and an interrupt is caught.
     from gearchaos.progress import notice
     from gearchaos.results.overview import overview, overview_page
-    from gearchaos.results.verification import verify
+    from gearchaos.results.result_reader import verify
 
     verified: list[str] = []
     if options.verify:

@@ -1,10 +1,11 @@
-"""Reading a result file, and refusing with one sentence whatever is not one."""
+"""Reading and verifying a result file, and refusing with one sentence whatever is not one."""
 
 from __future__ import annotations
 
 import os
 import stat
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -71,6 +72,32 @@ def read_result(path: str | os.PathLike[str], *, rows: bool = True) -> Contents:
         raise FileError(f"{name}: is damaged ({why}); run the sweep again") from error
 
 
+def verify(path: str | os.PathLike[str]) -> list[str]:
+    """Read all of a result file, piece by piece, and say what was found sound, a phrase each.
+
+    Raises FileError if anything is damaged or contradicts the format; it names arrays and rows.
+    """
+    try:
+        variables, _, parameters, metadata = read_result(path, rows=False)
+    except FileError as error:
+        raise FileError([*error.problems, *_damaged_pieces(path)]) from error
+    # Of a large file the reader has not tried the checksum.
+    fits = checksum_fits(Path(path))
+    damage = f"{path}: is damaged (its checksum does not fit); run the sweep again"
+    if problems := [*([damage] if fits is False else []), *_damaged_pieces(path)]:
+        raise FileError(problems)
+    with h5py.File(path, "r") as file:
+        datasets = stored.datasets_of(file).values()
+        summed = sum(one.id.get_num_chunks() for one in datasets if one.fletcher32)
+    foreign = "there is no checksum of the file: another program than gearchaos has written to it"
+    return [
+        foreign if fits is None else "the checksum of the file fits",
+        f"{summed} chunks of numbers fit their checksums",
+        f"format {metadata['schema']} {metadata['schema_version']}: {len(variables)} variables and "
+        f"{len(parameters)} {PARAMETERS} have their types, dimensions and sizes",
+    ]
+
+
 def fixed_coordinates(metadata: Mapping[str, Any]) -> dict[str, float]:
     """Read the root attribute ``fixed``, such as ``start=1.0``; ValueError if it is none."""
     pairs = (entry.rpartition("=") for entry in str(metadata.get("fixed", "")).split())
@@ -88,6 +115,20 @@ def printable(text: str) -> str:
     """Return a text of a file, if long its start, without what acts on a terminal."""
     text = text if len(text) <= MOST_PRINTED else f"{text[:MOST_PRINTED]}..."
     return "".join(c if c.isprintable() else "\N{REPLACEMENT CHARACTER}" for c in text)
+
+
+def _damaged_pieces(path: str | os.PathLike[str]) -> Iterator[str]:
+    """Name the arrays, and the rows of them, that cannot be read; one sentence each."""
+    # Where the damage has reached further, the reader has said so already.
+    if Path(path).is_file():
+        with suppress(Exception), h5py.File(path, "r") as file:
+            for name, dataset in stored.datasets_of(file).items():
+                for piece in dataset.iter_chunks() if dataset.chunks else [()]:
+                    try:
+                        dataset[piece]
+                    except OSError:
+                        rows = f", rows {piece[0].start} to {piece[0].stop - 1}" if piece else ""
+                        yield f"{path}: is damaged in {name}{rows}"
 
 
 def _read(file: h5py.File, rows: bool) -> Contents:
