@@ -103,17 +103,12 @@ def _searched(problem: Problem, judge: Judge, options: Namespace) -> Tried:
             return known
     else:
         check_output(output, options.overwrite)
-    began = time.monotonic()
+    began, texts = time.monotonic(), {"title": problem.targets.title, "targets": problem.text}
 
     def keep(tried: Tried, complete: bool = False) -> None:
         nonlocal kept
-        told = {
-            "complete": int(complete),
-            **provenance(current_threads(), time.monotonic() - began),
-            **facts,
-            "title": problem.targets.title,
-            "targets": problem.text,
-        }
+        computed = provenance(current_threads(), time.monotonic() - began)
+        told = {"complete": int(complete), **computed, **facts, **texts}
         write_tried(output, tried, keys, judge.observations, told)
         kept = True
 

@@ -83,8 +83,7 @@ def evaluate(
         before = outcome.end_state
         looked_at = np.flatnonzero(np.tile(accelerated[line], candidates))
         found = _records(system, outcome, looked_at, plan)
-        arrays: Any = (array.reshape(candidates, line.size, *array.shape[1:]) for array in found)
-        parts.append(Records(*arrays))
+        parts.append([one.reshape(candidates, line.size, *one.shape[1:]) for one in found])
     order = np.argsort(np.ravel(lines))
     joined: Any = (np.concatenate(arrays, axis=1) for arrays in zip(*parts, strict=True))
     return Records(*joined).at(order)
@@ -123,8 +122,8 @@ def _records(system: System, outcome: Outcome, looked_at: NDArray[np.intp], plan
     sound = outcome.status == Status.OK
     # The torsion and its rate: the other coordinates follow them.
     distances = return_distances(outcome.section[..., :2])
-    returns = distances <= RETURN
-    period = np.where(returns.any(axis=1), np.argmax(returns, axis=1) + 1, 0)
+    returns = (distances <= RETURN) & sound[:, np.newaxis]
+    period = np.where(returns.any(axis=1), np.argmax(returns, axis=1) + 1, 0).astype(np.int32)
     exponent, _ = largest_exponent(outcome.growth, system.mesh_period)
     acceleration = np.full((sound.size, len(system.states) // 2), np.nan)
     finer = plan._replace(
@@ -141,5 +140,4 @@ def _records(system: System, outcome: Outcome, looked_at: NDArray[np.intp], plan
         assert motion.history is not None
         found = mesh_motion(some, motion.history, finer.steps_per_period).accelerations
         acceleration[lanes] = np.max(found, axis=1)
-    period = np.where(sound, period, 0).astype(np.int32)
     return Records(outcome.section[..., 0], period, exponent, acceleration, sound)

@@ -83,8 +83,7 @@ def _faults(targets: Targets) -> Iterator[Fault]:
         for number, place in enumerate(getattr(targets, table)):
             if not place.within[0] < place.at < place.within[1]:
                 rule = f"must hold {table}.at = {place.at}, low end first"
-                remedy = "widen it"
-                yield Fault(f"{table}[{number}].within", rule, remedy, place.within)
+                yield Fault(f"{table}[{number}].within", rule, "widen it", place.within)
     for number, increment in enumerate(targets.increment):
         if increment.coordinate.endswith("_rate"):
             remedy = f'such as "{increment.coordinate.removesuffix("_rate")}"'

@@ -9,9 +9,9 @@ import os
 import re
 from bisect import bisect_right
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import suppress
+from contextlib import AbstractContextManager, suppress
 from pathlib import Path
-from typing import Any, NamedTuple, Self
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,7 +24,8 @@ from gearchaos.results.store_lock import LOCK, StoreLock
 from gearchaos.results.variables import Variable, lane_axes
 from gearchaos.version import Software
 
-Bounds = tuple[int, int]
+Arrays: TypeAlias = Mapping[str, NDArray[Any]]
+Bounds: TypeAlias = tuple[int, int]
 """First lane of a range, and the one after its last."""
 
 _NAME = re.compile(r"\d{12}-\d{12}\.block")
@@ -37,7 +38,7 @@ class Finished(NamedTuple):
     problems: list[str]
 
 
-class BlockStore:
+class BlockStore(AbstractContextManager["BlockStore"]):
     """The finished blocks of one sweep, in the folder ``<output>.blocks``.
 
     As long as its context lasts, a lock keeps other sweeps away from the same output. `merge` makes
@@ -97,9 +98,6 @@ class BlockStore:
         if not shared:
             self._remove([partial.name for partial in self.folder.glob(f".*{PARTIAL}")])
 
-    def __enter__(self) -> Self:
-        return self
-
     def __exit__(self, *_: object) -> None:
         self.close()
 
@@ -121,9 +119,7 @@ class BlockStore:
         """Lanes of one's own blocks."""
         return sum(last - first for first, last in self._blocks)
 
-    def finished(
-        self, visit: Callable[[Mapping[str, NDArray[Any]]], None] | None = None
-    ) -> Finished:
+    def finished(self, visit: Callable[[Arrays], None] | None = None) -> Finished:
         """Verify one's own blocks that are there; `visit` gets the arrays of each sound one."""
         bounds: list[Bounds] = []
         problems: list[str] = []
@@ -149,7 +145,7 @@ class BlockStore:
             for start in range(first, last, block)
         ]
 
-    def write(self, first: int, last: int, arrays: Mapping[str, NDArray[Any]]) -> None:
+    def write(self, first: int, last: int, arrays: Arrays) -> None:
         """Keep the lanes first to last - 1 of every computed variable.
 
         Raises FileError if they cannot be kept, ValueError if an array has a wrong shape.
