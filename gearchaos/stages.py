@@ -11,7 +11,7 @@ import json
 import math
 import sys
 import textwrap
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Any
 
 from gearchaos.command_line import OK, Command, coordinates, number, place
@@ -102,10 +102,11 @@ def _stages(options: argparse.Namespace) -> int:
         print(json.dumps(finite(facts), indent=1, allow_nan=False))
         return OK
     mixed = int((result[RECORD] == 1).sum()) if RECORD in result else 0
-    told = band_lines(stages) + remarks(jumping, bursting, mixed)
+    told = [*band_lines(stages), *remarks(jumping, bursting, mixed)]
     told += [outlasting.text] if outlasting else []
-    parts = table(result.axis, stages, slice_lines(where)), told, boundary_list(boundaries or ())
-    print("\n\n".join("\n".join(lines) for lines in parts if lines))
+    first = table(result.axis, stages, slice_lines(where))
+    parts = map("\n".join, (first, told, boundary_list(boundaries or ())))
+    print("\n\n".join(filter(None, parts)))
     return OK
 
 
@@ -129,64 +130,54 @@ def _survival(result: Result, options: argparse.Namespace) -> Survival:
         return survival(config, result, options.survival, options.threads)
 
 
-def table(axis: str, stages: Sequence[Stage], where: Sequence[str] = ()) -> list[str]:
+def table(axis: str, stages: Sequence[Stage], where: Sequence[str]) -> Iterator[str]:
     """Word the stages of a slice as lines of a table, no longer than 80 characters."""
-    title = f"{'from':>10}  {'to':>10}  {'motion':15}{'lanes':>6}  {'exponent':>20}  narrower"
-    lines = [f"stages over {axis}", *where, title]
+    yield f"stages over {axis}"
+    yield from where
+    yield f"{'from':>10}  {'to':>10}  {'motion':15}{'lanes':>6}  {'exponent':>20}  narrower"
     for stage in stages:
         exponent = f"{stage.lowest_exponent:.4f} to {stage.highest_exponent:.4f}"
-        lines.append(
+        yield (
             f"{stage.start:10.6g}  {stage.end:10.6g}  {stage.label:15}{stage.lanes:6d}"
             f"  {'' if math.isnan(stage.lowest_exponent) else exponent:>20}"
             f"  {f'with {stage.narrower}' if stage.narrower else ''}".rstrip()
         )
-    return lines
 
 
-def band_lines(stages: Sequence[Stage]) -> list[str]:
+def band_lines(stages: Sequence[Stage]) -> Iterator[str]:
     """Word on how many bands the sections of a stage lie, where any lies on several."""
-    lines = []
     for stage in stages:
         several = [f"{lanes} on {bands}" for bands, lanes in stage.bands.items() if bands > 1]
         if several:
             line = f"{stage.start:.6g} to {stage.end:.6g}: of {sum(stage.bands.values())} "
-            lines += textwrap.wrap(f"{line}{stage.label} lanes {', '.join(several)} bands", WIDTH)
-    return lines
+            line += f"{stage.label} lanes {', '.join(several)} bands"
+            yield from textwrap.wrap(line, WIDTH)
 
 
-def remarks(jumping: Sequence[Jump], bursting: Sequence[Crisis], mixed: int) -> list[str]:
+def remarks(jumping: Sequence[Jump], bursting: Sequence[Crisis], mixed: int) -> Iterator[str]:
     """Word what the table does not show: jumps and crises in a stage, chaos that came to rest."""
-    lines = [
-        f"{jump.below:.6g} to {jump.above:.6g}: jumps to another motion of {jump.label}"
-        for jump in jumping
-    ]
-    lines += [
-        f"{crisis.below:.6g} to {crisis.above:.6g}: crisis, {crisis.section} spans\n"
-        f"{crisis.lowest_below:.3g} to {crisis.highest_below:.3g} below, "
-        f"{crisis.lowest_above:.3g} to {crisis.highest_above:.3g} above"
-        for crisis in bursting
-    ]
+    for jump in jumping:
+        yield f"{jump.below:.6g} to {jump.above:.6g}: jumps to another motion of {jump.label}"
+    for crisis in bursting:
+        yield f"{crisis.below:.6g} to {crisis.above:.6g}: crisis, {crisis.section} spans"
+        below = f"{crisis.lowest_below:.3g} to {crisis.highest_below:.3g} below"
+        yield f"{below}, {crisis.lowest_above:.3g} to {crisis.highest_above:.3g} above"
     if mixed:
-        lines.append(
-            f"{mixed} periodic lanes came to rest within their record, which holds another\n"
-            "motion before; integration.transient_periods leaves it out"
-        )
-    return lines
+        yield f"{mixed} periodic lanes came to rest within their record, which holds another"
+        yield "motion before; integration.transient_periods leaves it out"
 
 
-def boundary_list(boundaries: Sequence[Boundary]) -> list[str]:
+def boundary_list(boundaries: Sequence[Boundary]) -> Iterator[str]:
     """Word the refined boundaries, each with what the orbit beside it does."""
-    lines = []
     for boundary in boundaries:
         between = f"{boundary.label_below} | {boundary.label_above}"
-        lines.append(f"{boundary.below:.8g} to {boundary.above:.8g}: {between}")
+        yield f"{boundary.below:.8g} to {boundary.above:.8g}: {between}"
         if boundary.loss:
-            lines.append(f"    {boundary.loss}")
+            yield f"    {boundary.loss}"
         if not math.isnan(abs(boundary.multiplier)):
             real, imaginary = boundary.multiplier.real, abs(boundary.multiplier.imag)
             pair = f" +- {imaginary:.4f}i" if imaginary else ""
-            lines.append(f"    multiplier {real:.4f}{pair}")
-    return lines
+            yield f"    multiplier {real:.4f}{pair}"
 
 
 _NAMES = {

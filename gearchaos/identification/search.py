@@ -22,7 +22,7 @@ from gearchaos.identification.evaluation import coordinates_of, evaluate
 from gearchaos.identification.loading import Problem
 from gearchaos.identification.observations import misfit, observations_of
 from gearchaos.identification.targets import Search
-from gearchaos.identification.tried import MEANINGS, Tried, joined
+from gearchaos.identification.tried import COMPLETE, DIVERGED, Tried, joined
 from gearchaos.interrupts import check
 
 Floats = NDArray[np.float64]
@@ -75,14 +75,13 @@ class Judge:
         for one, places in zip(self.observations, self._places, strict=True):
             computed.append(one.computed(records.at(places)))
             residuals.append(one.residual(computed[-1]))
-        sound = np.all(records.sound, axis=1)
-        status = np.where(sound, MEANINGS.index("complete"), MEANINGS.index("diverged"))
+        diverged = ~np.all(records.sound, axis=1)
         return Tried(
-            np.full(sound.size, run, dtype=np.int32),
+            np.full(diverged.size, run, dtype=np.int32),
             np.stack(list(parameters.values()), axis=1),
             np.stack(computed, axis=1),
             misfit(np.stack(residuals, axis=1)),
-            status.astype(np.uint8),
+            np.where(diverged, DIVERGED, COMPLETE).astype(np.uint8),
         )
 
 

@@ -24,6 +24,7 @@ from gearchaos.results.variables import STATUS, Variable, axis_name
 Floats = NDArray[np.float64]
 
 CANDIDATE, OBSERVATION = "candidate", "observation"
+COMPLETE, DIVERGED = 0, 1
 MEANINGS = ("complete", "diverged")
 """Meanings of the status of a candidate: whether all of its lanes were integrated to the end."""
 

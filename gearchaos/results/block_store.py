@@ -126,7 +126,8 @@ class BlockStore(AbstractContextManager["BlockStore"]):
         for first, last in self._own_blocks():
             try:
                 if bounds and first < bounds[-1][1]:
-                    raise FileError(f"{self._path(first, last)}: overlaps the block before it")
+                    path, _ = self._block(first, last)
+                    raise FileError(f"{path}: overlaps the block before it")
                 arrays = self.read(first, last)
             except FileError as error:
                 problems += error.problems
@@ -155,14 +156,14 @@ class BlockStore(AbstractContextManager["BlockStore"]):
             if (shape := np.shape(arrays[name])) != records[name].shape:
                 raise ValueError(f"{name} of lanes {first} to {last - 1} has shape {shape}")
             records[name] = arrays[name]
-        manifest.write_block(self._path(first, last), self._owner(first, last), records)
+        manifest.write_block(*self._block(first, last), records)
 
     def read(self, first: int, last: int) -> dict[str, NDArray[Any]]:
         """Give the arrays of one block; FileError if it is missing, damaged or of another sweep."""
-        path = self._path(first, last)
+        path, owner = self._block(first, last)
         if not 0 <= first < last <= self.lanes:
             raise FileError(f"{path}: its lanes are none of the {self.lanes} of this sweep")
-        records = manifest.read_block(path, self._owner(first, last), self._record, last - first)
+        records = manifest.read_block(path, owner, self._record, last - first)
         return {name: records[name] for name in self._record.names or ()}
 
     def merge(
@@ -211,11 +212,9 @@ class BlockStore(AbstractContextManager["BlockStore"]):
             return sorted(filter(_NAME.fullmatch, os.listdir(self.folder)))
         return []
 
-    def _owner(self, first: int, last: int) -> dict[str, Any]:
-        return {"fingerprint": self._fingerprint, "first": first, "last": last}
-
-    def _path(self, first: int, last: int) -> Path:
-        return self.folder / f"{first:012d}-{last:012d}.block"
+    def _block(self, first: int, last: int) -> tuple[Path, dict[str, Any]]:
+        owner = {"fingerprint": self._fingerprint, "first": first, "last": last}
+        return self.folder / f"{first:012d}-{last:012d}.block", owner
 
 
 def uncovered(block: Bounds, finished: Sequence[Bounds]) -> Iterator[Bounds]:
