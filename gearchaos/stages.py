@@ -67,15 +67,9 @@ def _records(text: str) -> int:
 
 def _stages(options: argparse.Namespace) -> int:
     from gearchaos.results.jumps import crises, jumps
-    from gearchaos.results.overview import finite
+    from gearchaos.results.overview import finite, slice_lines
     from gearchaos.results.result import open_result
-    from gearchaos.results.stage_table import (
-        labelled_lanes,
-        one_axis,
-        slice_facts,
-        slice_lines,
-        stage_table,
-    )
+    from gearchaos.results.stage_table import labelled_lanes, one_axis, slice_facts, stage_table
     from gearchaos.results.variables import RECORD
 
     whole = open_result(options.result)

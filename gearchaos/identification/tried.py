@@ -116,10 +116,9 @@ def read_tried(path: str | os.PathLike[str], keys: Sequence[str]) -> tuple[Tried
             if facts.get("schema") != SEARCH or facts["parameters_searched"] != " ".join(keys):
                 raise UnfitError("is no result of this search", "choose another --output")
             columns = [values_of(key, datasets[axis_name(key)]) for key in keys]
-            rest = ("computed", "misfit", STATUS)
-            found = (values_of(variable, datasets[variable]) for variable in rest)
-            run = values_of("run", datasets["run"])
-            return Tried(run, np.stack(columns, axis=1), *found), facts
+            others = ("run", "computed", "misfit", STATUS)
+            run, *rest = (values_of(name, datasets[name]) for name in others)
+            return Tried(run, np.stack(columns, axis=1), *rest), facts
     except UnfitError as error:
         raise FileError(f"{name}: {error}") from error
     except (OSError, KeyError, ValueError, RuntimeError) as error:

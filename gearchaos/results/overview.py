@@ -17,13 +17,7 @@ from gearchaos.results import variables as known
 from gearchaos.results.result import Result
 from gearchaos.results.result_file import Parameter
 from gearchaos.results.result_reader import printable, read_result
-from gearchaos.results.stage_table import (
-    labelled_lanes,
-    one_axis,
-    slice_facts,
-    slice_lines,
-    stage_table,
-)
+from gearchaos.results.stage_table import labelled_lanes, one_axis, slice_facts, stage_table
 
 ERRORS = {
     "section_error": ("section error", "when the step is halved"),
@@ -145,6 +139,16 @@ def overview_page(
         if (lines := list(content))
     ]
     return "\n\n".join(pages)
+
+
+def slice_lines(facts: dict[str, dict[str, float]]) -> list[str]:
+    """Word what `slice_facts` tells, one line per axis."""
+    return [
+        f"slice {name} = {at['value']:.6g}, "
+        f"{'the first' if at['number'] == 1 else 'number {number}'.format(**at)} of {at['of']}; "
+        f"others with --at {name}=VALUE"
+        for name, at in facts.items()
+    ]
 
 
 def _number(value: float | None) -> str:

@@ -107,16 +107,6 @@ def slice_facts(result: Result, part: Result) -> dict[str, dict[str, float]]:
     return facts
 
 
-def slice_lines(facts: dict[str, dict[str, float]]) -> list[str]:
-    """Word `slice_facts`, one line per axis."""
-    return [
-        f"slice {name} = {at['value']:.6g}, "
-        f"{'the first' if at['number'] == 1 else 'number {number}'.format(**at)} of {at['of']}; "
-        f"others with --at {name}=VALUE"
-        for name, at in facts.items()
-    ]
-
-
 def label_text(meaning: str, period: int) -> str:
     """Word a label: "period 3", "quasi-periodic", "chaotic"."""
     return f"period {period}" if period > 0 else meaning.replace("_", "-")

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 
 from gearchaos.errors import ConfigurationError, FileError
 from gearchaos.results import stage_table as table_module
+from gearchaos.results.overview import slice_lines
 from gearchaos.results.result import Result
 from gearchaos.results.stage_table import (
     LabelledLanes,
@@ -18,7 +19,6 @@ from gearchaos.results.stage_table import (
     labelled_lanes,
     one_axis,
     slice_facts,
-    slice_lines,
     stage_table,
 )
 
