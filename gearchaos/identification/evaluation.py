@@ -18,6 +18,7 @@ from gearchaos.records.lyapunov import largest_exponent
 from gearchaos.records.period import return_distances
 
 Floats = NDArray[np.float64]
+Mask = NDArray[np.bool_]
 
 RETURN = 1e-3
 """Return distance that counts as periodic: what is compared are short runs on coarse grids."""
@@ -45,7 +46,7 @@ class Records(NamedTuple):
     period: NDArray[np.int32]
     exponent: Floats
     acceleration: Floats
-    sound: NDArray[np.bool_]
+    sound: Mask
 
     def at(self, values: NDArray[np.intp]) -> Records:
         """Return what there is at some of the swept values, by their numbers."""
@@ -54,10 +55,7 @@ class Records(NamedTuple):
 
 
 def evaluate(
-    config: Configuration,
-    values: Floats,
-    parameters: dict[str, Floats],
-    accelerated: NDArray[np.bool_],
+    config: Configuration, values: Floats, parameters: dict[str, Floats], accelerated: Mask
 ) -> Records:
     """Integrate every candidate at every swept value.
 

@@ -8,13 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gearchaos.identification.evaluation import Records
+from gearchaos.identification.evaluation import Mask, Records
 from gearchaos.identification.targets import Crisis, Exponent, Increment, Jump, Stage, Targets
 from gearchaos.records.period import section_distance
 from gearchaos.results.jumps import SMALLEST, STEEPEST
 
 Floats = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 GROWTH = 1.2
 """Least factor by which the section of a chaotic motion grows where there is a crisis."""

@@ -30,7 +30,6 @@ DIMS = "dims"
 ORIGINS = ("given", "derived", "default", "swept")
 Block: TypeAlias = tuple[int, int, Mapping[str, NDArray[Any]]]
 Metadata: TypeAlias = Mapping[str, str | int | float]
-Box: TypeAlias = tuple[slice, ...]
 
 _CHUNK_BYTES = 1 << 19
 _LONGEST_ATTRIBUTE = 32_000
@@ -115,7 +114,7 @@ def write_result(
         append_checksum(partial)
 
 
-def hyperslabs(first: int, last: int, shape: Sequence[int]) -> Iterator[Box]:
+def hyperslabs(first: int, last: int, shape: Sequence[int]) -> Iterator[tuple[slice, ...]]:
     """Cut the lanes first to last - 1 of an array in C order into boxes, in their order."""
     row = math.prod(shape[1:])
     # Whole rows in the middle, and what precedes and follows them in rows of their own.
