@@ -24,7 +24,7 @@ from gearchaos.progress import Progress, say
 
 if TYPE_CHECKING:
     from gearchaos.identification.loading import Problem
-    from gearchaos.identification.searching import Judge
+    from gearchaos.identification.search import Judge
     from gearchaos.identification.tried import Tried
 
 
@@ -32,11 +32,8 @@ def _arguments(parser: ArgumentParser) -> None:
     add = parser.add_argument
     add("config", metavar="TARGETS.toml", help="what was observed, and what is free")
     add("--resume", action="store_true", help="go on with a search that was stopped")
-    add(
-        "--score",
-        metavar="config.toml",
-        help="search nothing, but judge the parameters of this configuration by the targets",
-    )
+    text = "search nothing, but judge the parameters of this configuration by the targets"
+    add("--score", metavar="config.toml", help=text)
     replaced = "replace one key of the targets file, such as search.seed=2"
     add("--set", **{**COMMON_OPTIONS["set"], "help": replaced})
 
@@ -45,16 +42,16 @@ def _identify(options: Namespace) -> int:
     from gearchaos.engine.running import choose_threads, compiling
     from gearchaos.identification.loading import load_targets
     from gearchaos.identification.report import report
-    from gearchaos.identification.searching import Judge
+    from gearchaos.identification.search import Judge
 
     problem = load_targets(options.config, options.set)
     choose_threads(options.threads)
     judge = Judge(problem)
-    if options.score is not None:
+    if options.score is None:
+        tried = _searched(problem, judge, options)
+    else:
         with compiling():
             tried = _scored(problem, judge, options.score)
-    else:
-        tried = _searched(problem, judge, options)
     print("\n".join(report(judge, tried)), flush=True)
     return OK
 
@@ -78,7 +75,7 @@ def _scored(problem: Problem, judge: Judge, path: str) -> Tried:
             )
         known[one.name] = np.array([value])
     require_stable(problem.config, judge.values, known)
-    return judge.judge_values(0, known)
+    return judge.judge(0, known)
 
 
 def _searched(problem: Problem, judge: Judge, options: Namespace) -> Tried:
@@ -86,8 +83,7 @@ def _searched(problem: Problem, judge: Judge, options: Namespace) -> Tried:
 
     from gearchaos.engine.provenance import provenance
     from gearchaos.identification.evaluation import require_stable
-    from gearchaos.identification.search import MOST_CENTRES, RUNGS
-    from gearchaos.identification.searching import decisive_facts, search
+    from gearchaos.identification.search import MOST_CENTRES, RUNGS, decisive_facts, search
     from gearchaos.identification.tried import read_tried, write_tried
     from gearchaos.results.atomic_file import check_output
     from gearchaos.results.manifest import require_same
@@ -98,8 +94,7 @@ def _searched(problem: Problem, judge: Judge, options: Namespace) -> Tried:
         )
     require_stable(problem.config, judge.values, problem.targets.corners())
     output, keys = output_of(options), [one.name for one in problem.targets.parameter]
-    known, kept = None, False
-    facts = decisive_facts(problem)
+    known, kept, facts = None, False, decisive_facts(problem)
     if options.resume and not options.overwrite and os.path.exists(output):
         (known, earlier), kept = read_tried(output, keys), True
         require_same(f"{output}: is the result", earlier, facts, "replace it with --overwrite")
@@ -108,24 +103,18 @@ def _searched(problem: Problem, judge: Judge, options: Namespace) -> Tried:
             return known
     else:
         check_output(output, options.overwrite)
-    began = time.monotonic()
+    began, texts = time.monotonic(), {"title": problem.targets.title, "targets": problem.text}
 
     def keep(tried: Tried, complete: bool = False) -> None:
         nonlocal kept
-        told = {
-            "complete": int(complete),
-            **provenance(current_threads(), time.monotonic() - began),
-            **facts,
-            "title": problem.targets.title,
-            "targets": problem.text,
-        }
+        computed = provenance(current_threads(), time.monotonic() - began)
+        told = {"complete": int(complete), **computed, **facts, **texts}
         write_tried(output, tried, keys, judge.observations, told)
         kept = True
 
-    tried_before = 0 if known is None else len(known)
     most = problem.targets.search.candidates + MOST_CENTRES * (1 + 2 * RUNGS * len(keys))
     try:
-        with Progress(most, tried_before, unit="candidate") as bar:
+        with Progress(most, 0 if known is None else len(known), unit="candidate") as bar:
             tried = search(judge, known, keep, bar.advance, output)
     except KeyboardInterrupt as interrupt:
         if kept:
@@ -136,9 +125,8 @@ def _searched(problem: Problem, judge: Judge, options: Namespace) -> Tried:
     return tried
 
 
-main = Command(
-    "identify", __doc__, _arguments, _identify, common=("output", "overwrite", "threads")
-)
+_COMMON = ("output", "overwrite", "threads")
+main = Command("identify", __doc__, _arguments, _identify, _COMMON)
 
 if __name__ == "__main__":
     sys.exit(main())

@@ -26,9 +26,8 @@ def _arguments(parser: ArgumentParser) -> None:
 def _info(options: Namespace) -> int:
     # Imported only now: --help and --version answer at once, and an interrupt is caught.
     from gearchaos.progress import notice
-    from gearchaos.results.overview import overview
-    from gearchaos.results.overview_page import overview_page
-    from gearchaos.results.verification import verify
+    from gearchaos.results.overview import overview, overview_page
+    from gearchaos.results.result_reader import verify
 
     verified: list[str] = []
     if options.verify:
@@ -36,9 +35,12 @@ def _info(options: Namespace) -> int:
             verified = verify(options.result)
     summary = overview(options.result)
     if options.json:
-        _write(json.dumps({**summary, "verified": verified}, indent=1, allow_nan=False))
+        text = json.dumps({**summary, "verified": verified}, indent=1, allow_nan=False)
     else:
-        _write(overview_page(summary, _settings(summary["metadata"]), verified))
+        text = overview_page(summary, _settings(summary["metadata"]), verified)
+    # Where the terminal knows few characters, a title must not become a traceback.
+    encoding = getattr(sys.stdout, "encoding", None) or "utf-8"
+    print(text.encode(encoding, "replace").decode(encoding))
     return OK
 
 
@@ -58,19 +60,9 @@ def _settings(metadata: Mapping[str, Any]) -> list[str]:
         )
     except ConfigurationError:  # Not ours to judge here: the numbers are there all the same.
         return []
-    lines = []
-    for key, value in ran.items():
-        origin = "" if key in written else " (by default)"
-        if by_itself.get(key) != value:
-            origin = " (set for this run)"
-        lines.append(f"{key} = {shown(value)}{origin}")
-    return lines
-
-
-def _write(text: str) -> None:
-    # Where the terminal knows few characters, a title must not become a traceback.
-    encoding = getattr(sys.stdout, "encoding", None) or "utf-8"
-    print(text.encode(encoding, "replace").decode(encoding))
+    origins = {key: "" if key in written else " (by default)" for key in ran}
+    origins |= {key: " (set for this run)" for key in ran if by_itself.get(key) != ran[key]}
+    return [f"{key} = {shown(value)}{origins[key]}" for key, value in ran.items()]
 
 
 main = Command("info", __doc__, _arguments, _info, writes=False)

@@ -13,7 +13,6 @@ from argparse import ArgumentParser, Namespace
 from typing import TYPE_CHECKING
 
 from gearchaos.command_line import OK, Command
-from gearchaos.errors import FileError
 from gearchaos.finishing import complete_already, ending
 from gearchaos.progress import say
 
@@ -32,14 +31,15 @@ def _arguments(parser: ArgumentParser) -> None:
 def _merge(options: Namespace) -> int:
     output: str = options.output
     from gearchaos.results.atomic_file import check_output
-    from gearchaos.results.manifest import folder_of, require_same, stored_manifest
+    from gearchaos.results.manifest import folder_of, read_manifest, require_same
     from gearchaos.results.result import completed
 
+    folder = folder_of(output)
     finished_before = not options.overwrite and completed(output) is not None
-    if finished_before and not folder_of(output).is_dir():
+    if finished_before and not folder.is_dir():
         print(output, flush=True)
         return OK
-    manifest, folder = stored_manifest(output), folder_of(output)
+    manifest = read_manifest(folder)
     from gearchaos.configuration import Configuration
     from gearchaos.engine.error_check import Tally
     from gearchaos.engine.provenance import SOFTWARE
@@ -60,7 +60,7 @@ def _merge(options: Namespace) -> int:
         prepare(simulation, compile_now=False)
         tally = Tally()
         found = store.finished(tally.add)
-        _require_all(store, found)
+        _require_all(store, found, manifest.get("shards"))
         facts = {**metadata(simulation, 0.0), "configuration": manifest["text"] or config.text}
         # Who computed for how long is known to the shards alone.
         del facts["threads"], facts["wall_time_seconds"]
@@ -71,22 +71,19 @@ def _merge(options: Namespace) -> int:
     return ending(simulation, tally.diverged)
 
 
-def _require_all(store: BlockStore, found: Finished) -> None:
+def _require_all(store: BlockStore, found: Finished, shards: object) -> None:
     """Name the shards of which blocks are missing, as far as it is known how many there are."""
     from gearchaos.engine.sharding import shared_blocks
-    from gearchaos.results.lane_ranges import lanes_text, uncovered
+    from gearchaos.results.block_store import uncovered
 
-    gaps = store.missing(found.bounds, store.lanes)
-    if not gaps:
-        return
     remedy = "go on with the sweep and --resume"
-    if total := store.shards:
-        blocks = enumerate(shared_blocks(store.lanes, total))
-        lacking = {n % total + 1 for n, block in blocks if any(uncovered(block, found.bounds))}
-        flags = ", ".join(f"--shard {number}/{total}" for number in sorted(lacking)[:MOST_NAMED])
+    if isinstance(shards, int) and shards > 0:
+        blocks = enumerate(shared_blocks(store.lanes, shards))
+        lacking = {n % shards + 1 for n, block in blocks if any(uncovered(block, found.bounds))}
+        flags = ", ".join(f"--shard {number}/{shards}" for number in sorted(lacking)[:MOST_NAMED])
         more = f" and {len(lacking) - MOST_NAMED} more" if len(lacking) > MOST_NAMED else ""
         remedy = f"run the sweep with {flags}{more} and --resume"
-    raise FileError([*found.problems, f"{store.folder}: {lanes_text(gaps)} missing; {remedy}"])
+    store.require_all(found, remedy)
 
 
 main = Command("merge", __doc__, _arguments, _merge, common=("overwrite",))

@@ -18,6 +18,7 @@ from gearchaos.records.lyapunov import largest_exponent
 from gearchaos.records.period import return_distances
 
 Floats = NDArray[np.float64]
+Mask = NDArray[np.bool_]
 
 RETURN = 1e-3
 """Return distance that counts as periodic: what is compared are short runs on coarse grids."""
@@ -45,7 +46,7 @@ class Records(NamedTuple):
     period: NDArray[np.int32]
     exponent: Floats
     acceleration: Floats
-    sound: NDArray[np.bool_]
+    sound: Mask
 
     def at(self, values: NDArray[np.intp]) -> Records:
         """Return what there is at some of the swept values, by their numbers."""
@@ -54,31 +55,21 @@ class Records(NamedTuple):
 
 
 def evaluate(
-    config: Configuration,
-    values: Floats,
-    parameters: dict[str, Floats],
-    accelerated: NDArray[np.bool_],
+    config: Configuration, values: Floats, parameters: dict[str, Floats], accelerated: Mask
 ) -> Records:
     """Integrate every candidate at every swept value.
 
-    Parameters
-    ----------
-    config : Configuration
-        Gives the scene, the start, and how long and how finely is integrated.
-    values : ndarray, shape (values,)
-        Of the swept parameter, ascending.
-    parameters : mapping of str to ndarray, shape (candidates,)
-        The free parameters by their keys.
-    accelerated : ndarray of bool, shape (values,)
-        Where the largest acceleration is looked for.
+    The configuration gives the scene, the start, and how long and how finely is integrated;
+    ``values`` (values,) of the swept parameter ascend; ``parameters``: the free ones by their keys,
+    (candidates,); ``accelerated`` (values,): where the largest acceleration is looked for.
     """
     lines = np.arange(values.size)[np.newaxis]
     if config.start.carry != "none":
         # One value after the other, each from where the one before it ended.
         lines = lines.T[::-1] if config.start.carry == "downwards" else lines.T
     candidates = len(next(iter(parameters.values())))
-    before = None
-    parts = []
+    recorded = config.integration.recorded_periods
+    plan, before, parts = plan_of(config, section_points=recorded, tangent=True), None, []
     for line in lines:
         swept = {config.sweep.parameter: np.tile(values[line], candidates)}
         fixed = {key: np.repeat(value, line.size) for key, value in parameters.items()}
@@ -86,21 +77,11 @@ def evaluate(
         start = start_states(config, system, np.tile(line, candidates))
         if before is not None:
             start = np.where(np.isfinite(before).all(axis=1, keepdims=True), before, start)
-        recorded = config.integration.recorded_periods
-        plan = plan_of(config, section_points=recorded, tangent=True)
         outcome = integrate(system, start, plan)
         before = outcome.end_state
         looked_at = np.flatnonzero(np.tile(accelerated[line], candidates))
-        finer = plan._replace(
-            steps_per_period=FINER * plan.steps_per_period,
-            transient_periods=0,
-            recorded_periods=KEPT_PERIODS,
-            section_points=0,
-            history_periods=KEPT_PERIODS,
-        )
-        found = _records(system, outcome, looked_at, finer)
-        arrays: Any = (array.reshape(candidates, line.size, *array.shape[1:]) for array in found)
-        parts.append(Records(*arrays))
+        found = _records(system, outcome, looked_at, plan)
+        parts.append([one.reshape(candidates, line.size, *one.shape[1:]) for one in found])
     order = np.argsort(np.ravel(lines))
     joined: Any = (np.concatenate(arrays, axis=1) for arrays in zip(*parts, strict=True))
     return Records(*joined).at(order)
@@ -133,16 +114,23 @@ def coordinates_of(config: Configuration) -> tuple[str, ...]:
     return states_of(config.needed_effects)[::2]
 
 
-def _records(system: System, outcome: Outcome, looked_at: NDArray[np.intp], finer: Plan) -> Records:
+def _records(system: System, outcome: Outcome, looked_at: NDArray[np.intp], plan: Plan) -> Records:
     """Return what lanes came to, each array with the lanes first."""
     assert outcome.growth is not None
     sound = outcome.status == Status.OK
     # The torsion and its rate: the other coordinates follow them.
     distances = return_distances(outcome.section[..., :2])
-    returns = distances <= RETURN
-    period = np.where(returns.any(axis=1), np.argmax(returns, axis=1) + 1, 0)
+    returns = (distances <= RETURN) & sound[:, np.newaxis]
+    period = np.where(returns.any(axis=1), np.argmax(returns, axis=1) + 1, 0).astype(np.int32)
     exponent, _ = largest_exponent(outcome.growth, system.mesh_period)
     acceleration = np.full((sound.size, len(system.states) // 2), np.nan)
+    finer = plan._replace(
+        steps_per_period=FINER * plan.steps_per_period,
+        transient_periods=0,
+        recorded_periods=KEPT_PERIODS,
+        section_points=0,
+        history_periods=KEPT_PERIODS,
+    )
     for first in range(0, looked_at.size, MOTIONS_AT_ONCE):
         lanes = looked_at[first : first + MOTIONS_AT_ONCE]
         some = system.of(lanes)
@@ -150,10 +138,4 @@ def _records(system: System, outcome: Outcome, looked_at: NDArray[np.intp], fine
         assert motion.history is not None
         found = mesh_motion(some, motion.history, finer.steps_per_period).accelerations
         acceleration[lanes] = np.max(found, axis=1)
-    return Records(
-        outcome.section[..., 0],
-        np.where(sound, period, 0).astype(np.int32),
-        exponent,
-        acceleration,
-        sound,
-    )
+    return Records(outcome.section[..., 0], period, exponent, acceleration, sound)

@@ -38,14 +38,8 @@ class Problem(NamedTuple):
 def load_targets(file: str | os.PathLike[str], overrides: Iterable[str] = ()) -> Problem:
     """Read a targets file and the configuration that it names.
 
-    ``overrides`` replace keys of the targets file, such as ``search.seed=2``.
-
-    Raises
-    ------
-    FileError
-        If one of the two cannot be read.
-    ConfigurationError
-        If one of them is not sound: one message per fault.
+    ``overrides`` replace keys of the targets file, such as ``search.seed=2``. Raises FileError if
+    one of the two cannot be read, ConfigurationError if one is not sound: one message per fault.
     """
     source = os.fspath(file)
     text = text_of_file(source)
@@ -57,8 +51,7 @@ def load_targets(file: str | os.PathLike[str], overrides: Iterable[str] = ()) ->
         keys = {one.path: one for one in keys_of(Targets)}
         worded = [fault_of(one, tables, keys) for one in found[:MOST_SHOWN]]
         raise ConfigurationError(texts(worded, source, len(found) - len(worded))) from None
-    faults = list(_faults(targets))
-    if faults:
+    if faults := list(_faults(targets)):
         raise ConfigurationError(texts(faults, source))
     config = observed_configuration(targets, Path(source).parent / targets.configuration)
     if problems := list(_unfit(config, targets, source)):
@@ -90,8 +83,7 @@ def _faults(targets: Targets) -> Iterator[Fault]:
         for number, place in enumerate(getattr(targets, table)):
             if not place.within[0] < place.at < place.within[1]:
                 rule = f"must hold {table}.at = {place.at}, low end first"
-                remedy = "widen it"
-                yield Fault(f"{table}[{number}].within", rule, remedy, place.within)
+                yield Fault(f"{table}[{number}].within", rule, "widen it", place.within)
     for number, increment in enumerate(targets.increment):
         if increment.coordinate.endswith("_rate"):
             remedy = f'such as "{increment.coordinate.removesuffix("_rate")}"'
@@ -116,11 +108,8 @@ def observed_configuration(targets: Targets, path: str | os.PathLike[str]) -> Co
     only where somebody looks at it.
     """
     coordinates = dict.fromkeys(("delta_5", *(one.coordinate for one in targets.increment)))
-    outputs = {
-        "section": list(coordinates),
-        "section_points": 1,
-        "lyapunov": bool(targets.exponent),
-    }
+    exponent = bool(targets.exponent)
+    outputs = {"section": list(coordinates), "section_points": 1, "lyapunov": exponent}
     return load_config(path, [*targets.set, f"outputs={toml_literal(outputs)}"])
 
 

@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gearchaos.identification.evaluation import Records
+from gearchaos.identification.evaluation import Mask, Records
 from gearchaos.identification.targets import Crisis, Exponent, Increment, Jump, Stage, Targets
 from gearchaos.records.period import section_distance
 from gearchaos.results.jumps import SMALLEST, STEEPEST
 
 Floats = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 GROWTH = 1.2
 """Least factor by which the section of a chaotic motion grows where there is a crisis."""
@@ -23,27 +22,24 @@ NOWHERE = 100.0
 """Widths that a number is off which a candidate does not have."""
 
 
-class Observation(ABC):
-    """One observed number.
+@dataclass(frozen=True)
+class Observation:
+    """One observed number, and how it is read off the lanes of candidates.
 
-    ``name``; ``wanted``, ``width``: the number and its unit of misfit; ``missing``: how many
-    widths off is a candidate in which there is no such thing; ``values``: of the swept parameter,
-    ascending, shape (values,), at which it is looked at.
+    ``wanted``, ``width``: the number and its unit of misfit; ``values``: of the swept parameter,
+    ascending, shape (values,), at which it is looked at; ``computed``: gives the number of every
+    candidate, NaN where there is none, shape (candidates,), from the records at these values;
+    ``missing``: how many widths off is a candidate in which there is no such thing;
+    ``accelerated``: whether the records need the largest accelerations.
     """
 
     name: str
     wanted: float
     width: float
-    missing: float = NOWHERE
     values: Floats
-    accelerated = False
-
-    @abstractmethod
-    def computed(self, records: Records) -> Floats:
-        """Return the number of every candidate, NaN where there is none, shape (candidates,).
-
-        ``records`` are those at the values of the observation.
-        """
+    computed: Callable[[Records], Floats]
+    missing: float = NOWHERE
+    accelerated: bool = False
 
     def residual(self, computed: Floats) -> Floats:
         """Return how many widths off a number is, with its sign."""
@@ -51,123 +47,100 @@ class Observation(ABC):
         return np.clip(np.where(np.isnan(off), self.missing, off), -self.missing, self.missing)
 
 
-class StageLength(Observation):
+def stage_length(stage: Stage) -> Observation:
     """Over which length of a stage the motion is another one; none is wanted.
 
     The stage is cut into cells, small ones at its ends, each judged by the lane in its middle.
     """
+    length = stage.to - stage.from_
+    half = _spaced(length / 2.0, stage.width / 2.0, 1.5)
+    edges = np.concatenate([stage.from_ + half, stage.to - half[-2::-1]])
 
-    wanted = 0.0
+    def computed(records: Records) -> Floats:
+        wrong = ~has_motion(records, stage.motion)
+        return np.asarray(np.sum(wrong * np.diff(edges), axis=1))
 
-    def __init__(self, stage: Stage) -> None:
-        self.name = f"{stage.motion} from {stage.from_:g} to {stage.to:g}"
-        self.width = stage.width
-        half = _spaced((stage.to - stage.from_) / 2.0, stage.width / 2.0, 1.5)
-        edges = np.concatenate([stage.from_ + half, stage.to - half[-2::-1]])
-        self.values, self._lengths = (edges[1:] + edges[:-1]) / 2.0, np.diff(edges)
-        self.missing = (stage.to - stage.from_) / stage.width
-        self._motion = stage.motion
-
-    def computed(self, records: Records) -> Floats:
-        """Return the length over which the motion is another one."""
-        wrong = ~has_motion(records, self._motion)
-        return np.asarray(np.sum(wrong * self._lengths, axis=1))
+    name = f"{stage.motion} from {stage.from_:g} to {stage.to:g}"
+    values = (edges[1:] + edges[:-1]) / 2.0
+    return Observation(name, 0.0, stage.width, values, computed, length / stage.width)
 
 
-class JumpPlace(Observation):
-    """Where the sweep jumps from one motion to another of the same period."""
+def change_place(place: Jump | Crisis) -> Observation:
+    """Where the sweep jumps to another motion, or has a crisis: in the middle of two lanes."""
+    low, high = place.within
+    above, below = (
+        _spaced(way, place.width / 2.0, 1.25) for way in (high - place.at, place.at - low)
+    )
+    # The place itself lies between two lanes.
+    half = min(above[1], below[1]) / 2.0
+    around = np.concatenate([place.at - half - below, place.at + half + above])
+    values = np.unique(np.clip(around, low, high))
 
-    def __init__(self, place: Jump | Crisis) -> None:
-        self.name = f"{type(place).__name__.lower()} at {place.at:g}"
-        self.wanted, self.width = place.at, place.width
-        low, high = place.within
-        above, below = (
-            _spaced(way, place.width / 2.0, 1.25) for way in (high - place.at, place.at - low)
-        )
-        # The place itself lies between two lanes.
-        half = min(above[1], below[1]) / 2.0
-        self.values = np.unique(
-            np.clip(np.concatenate([place.at - half - below, place.at + half + above]), low, high)
-        )
-        self.missing = (high - low) / place.width
+    def computed(records: Records) -> Floats:
+        crisis = isinstance(place, Crisis)
+        steps = _growth(records) if crisis else _jumps(records, np.diff(values))
+        middle = (values[1:] + values[:-1]) / 2.0
+        there = np.max(steps, axis=1) > 0.0
+        return np.where(there, middle[np.argmax(steps, axis=1)], np.nan)
 
-    def computed(self, records: Records) -> Floats:
-        """Return the middle of the two lanes between which the section changes at once."""
-        steps = self._steps(records)
-        at = np.argmax(steps, axis=1)
-        middle = (self.values[1:] + self.values[:-1]) / 2.0
-        place: Floats = np.where(np.max(steps, axis=1) > 0.0, middle[at], np.nan)
-        return place
-
-    def _steps(self, records: Records) -> Floats:
-        """Return by how much motions beside each other differ, 0 where this is no jump."""
-        candidates, values, points = records.section.shape
-        period = records.period
-        common = np.where(period[:, 1:] == period[:, :-1], period[:, 1:], 0)
-        one, other = records.section[:, :-1], records.section[:, 1:]
-        apart = section_distance(
-            one.reshape(-1, points, 1), other.reshape(-1, points, 1), np.ravel(common)
-        ).reshape(candidates, values - 1)
-        size = np.max(np.abs(np.where(np.isfinite(one), one, 0.0)), axis=(1, 2))[:, np.newaxis]
-        cells = np.diff(self.values)
-        rate = np.nan_to_num(apart) / cells
-        nothing = np.zeros((candidates, 1))
-        beside = np.maximum(
-            np.concatenate([nothing, rate[:, :-1]], axis=1),
-            np.concatenate([rate[:, 1:], nothing], axis=1),
-        )
-        jumps = (apart > SMALLEST * size) & (apart > STEEPEST * beside * cells)
-        return np.where(jumps, apart, 0.0)
+    name = f"{type(place).__name__.lower()} at {place.at:g}"
+    return Observation(name, place.at, place.width, values, computed, (high - low) / place.width)
 
 
-class CrisisPlace(JumpPlace):
-    """Where the section of a motion first passes half of all that it grows within the span.
+def _jumps(records: Records, cells: Floats) -> Floats:
+    """Return by how much motions beside each other differ, 0 where this is no jump.
+
+    Shape (candidates, values - 1), as for ``cells``, the distances of the values (values - 1,).
+    """
+    candidates, _, points = records.section.shape
+    period = records.period
+    common = np.where(period[:, 1:] == period[:, :-1], period[:, 1:], 0)
+    one, other = records.section[:, :-1], records.section[:, 1:]
+    apart = section_distance(
+        one.reshape(-1, points, 1), other.reshape(-1, points, 1), np.ravel(common)
+    ).reshape(candidates, -1)
+    size = np.max(np.abs(np.where(np.isfinite(one), one, 0.0)), axis=(1, 2))[:, np.newaxis]
+    rate = np.pad(np.nan_to_num(apart) / cells, ((0, 0), (1, 1)))
+    beside = np.maximum(rate[:, :-2], rate[:, 2:])
+    jumps = (apart > SMALLEST * size) & (apart > STEEPEST * beside * cells)
+    return np.where(jumps, apart, 0.0)
+
+
+def _growth(records: Records) -> Floats:
+    """Return 1 where the section of a motion first passes half of all that it grows, else 0.
 
     Next to a crisis the motion leaves its former part of the section seldom, and the record of a
     single lane may miss it: so the growth is that over the span, and not from lane to lane.
     """
-
-    def _steps(self, records: Records) -> Floats:
-        extent = np.ptp(np.where(records.sound[..., np.newaxis], records.section, 0.0), axis=2)
-        chaotic = has_motion(records, "chaotic")
-        least = np.min(np.where(chaotic, extent, np.inf), axis=1, keepdims=True)
-        most = np.max(np.where(chaotic, extent, 0.0), axis=1, keepdims=True)
-        beyond = (most > GROWTH * least) & chaotic & (extent > (least + most) / 2.0)
-        first = beyond & (np.cumsum(beyond, axis=1) == 1)
-        steps: Floats = first[:, 1:].astype(np.float64)
-        return steps
+    extent = np.ptp(np.where(records.sound[..., np.newaxis], records.section, 0.0), axis=2)
+    chaotic = has_motion(records, "chaotic")
+    least = np.min(np.where(chaotic, extent, np.inf), axis=1, keepdims=True)
+    most = np.max(np.where(chaotic, extent, 0.0), axis=1, keepdims=True)
+    beyond = (most > GROWTH * least) & chaotic & (extent > (least + most) / 2.0)
+    first = beyond & (np.cumsum(beyond, axis=1) == 1)
+    return np.asarray(first[:, 1:], dtype=np.float64)
 
 
-class ExponentAt(Observation):
+def exponent_at(exponent: Exponent) -> Observation:
     """The largest Lyapunov exponent at one value."""
-
-    def __init__(self, exponent: Exponent) -> None:
-        self.name = f"exponent at {exponent.at:g}"
-        self.wanted, self.width = exponent.value, exponent.width
-        self.values = np.array([exponent.at])
-
-    def computed(self, records: Records) -> Floats:
-        """Return the exponent."""
-        return records.exponent[:, 0]
+    at, wanted, width = exponent.at, exponent.value, exponent.width
+    return Observation(
+        f"exponent at {at:g}", wanted, width, np.array([at]), lambda lanes: lanes.exponent[:, 0]
+    )
 
 
-class AccelerationIncrement(Observation):
-    """Growth of the largest acceleration of a coordinate between two values."""
+def acceleration_increment(increment: Increment, coordinates: Sequence[str]) -> Observation:
+    """Growth of the largest acceleration of a coordinate, one of these, between two values."""
+    ends, column = (increment.from_, increment.to), coordinates.index(increment.coordinate)
+    sign = 1.0 if ends[0] <= ends[1] else -1.0
 
-    accelerated = True
+    def computed(records: Records) -> Floats:
+        first, last = records.acceleration[:, :, column].T
+        return np.asarray(sign * (last - first))
 
-    def __init__(self, increment: Increment, coordinates: Sequence[str]) -> None:
-        ends = increment.from_, increment.to
-        self.name = f"{increment.coordinate}'' from {ends[0]:g} to {ends[1]:g}"
-        self.wanted, self.width = increment.value, increment.width
-        self.values = np.array(sorted(ends))
-        self._sign = 1.0 if ends[0] <= ends[1] else -1.0
-        self._column = coordinates.index(increment.coordinate)
-
-    def computed(self, records: Records) -> Floats:
-        """Return the growth."""
-        first, last = records.acceleration[:, :, self._column].T
-        return np.asarray(self._sign * (last - first))
+    name = f"{increment.coordinate}'' from {ends[0]:g} to {ends[1]:g}"
+    values = np.array(sorted(ends))
+    return Observation(name, increment.value, increment.width, values, computed, accelerated=True)
 
 
 def observations_of(targets: Targets, coordinates: Sequence[str]) -> list[Observation]:
@@ -176,11 +149,11 @@ def observations_of(targets: Targets, coordinates: Sequence[str]) -> list[Observ
     ``coordinates``: those of the records, see `coordinates_of`.
     """
     return [
-        *map(StageLength, targets.stage),
-        *map(JumpPlace, targets.jump),
-        *map(CrisisPlace, targets.crisis),
-        *map(ExponentAt, targets.exponent),
-        *(AccelerationIncrement(one, coordinates) for one in targets.increment),
+        *map(stage_length, targets.stage),
+        *map(change_place, targets.jump),
+        *map(change_place, targets.crisis),
+        *map(exponent_at, targets.exponent),
+        *(acceleration_increment(one, coordinates) for one in targets.increment),
     ]
 
 

@@ -9,8 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gearchaos.configuration.sweep_values import SWEEPABLE_GROUPS
-from gearchaos.identification.search import RUNGS, STEPS_ALONE, distinct
-from gearchaos.identification.searching import Judge
+from gearchaos.identification.search import RUNGS, STEPS_ALONE, Judge, distinct
 from gearchaos.identification.tried import Tried
 
 Floats = NDArray[np.float64]
@@ -39,13 +38,6 @@ class Reach(NamedTuple):
     surroundings: float
 
 
-def best_sets(judge: Judge, tried: Tried, most: int) -> list[int]:
-    """Return the numbers of the best candidates that differ, the best one first."""
-    columns = zip(judge.targets.parameter, tried.values.T, strict=True)
-    points = np.stack([[one.share(v) for v in values.tolist()] for one, values in columns], axis=1)
-    return distinct(points, tried.misfit, judge.targets.search.apart, most)
-
-
 def reach(tried: Tried) -> Reach:
     """Return how far each parameter can move.
 
@@ -55,14 +47,15 @@ def reach(tried: Tried) -> Reach:
     """
     parameters = tried.values.shape[1]
     alike = tried.values[tried.misfit <= np.min(tried.misfit) + ONE_UNIT]
+    among = alike.min(axis=0), alike.max(axis=0)
     steps = np.flatnonzero(tried.run == STEPS_ALONE)[-1 - 2 * RUNGS * parameters :]
     if not steps.size:
         unknown = np.full(parameters, np.nan)
-        return Reach(unknown, unknown, alike.min(axis=0), alike.max(axis=0), np.nan)
+        return Reach(unknown, unknown, *among, np.nan)
     centre, others = tried.values[steps[0]], tried.values[steps[1:]]
     misfit = tried.misfit[steps[1:]].reshape(parameters, 2, RUNGS)
     surroundings = float(np.median(misfit[..., :NEAREST]))
-    padded = np.concatenate([misfit[..., :1], misfit, misfit[..., -1:]], axis=2)
+    padded = np.pad(misfit, ((0, 0), (0, 0), (1, 1)), mode="edge")
     median = np.median(np.stack([padded[..., :-2], misfit, padded[..., 2:]]), axis=0)
     too_far = median > max(surroundings, tried.misfit[steps[0]]) + ONE_UNIT
     # The last step before the first one that is too far; 0 is the centre.
@@ -71,12 +64,15 @@ def reach(tried: Tried) -> Reach:
     moved = others.reshape(parameters, 2, RUNGS, parameters)[number, :, :, number]
     moved = np.concatenate([np.broadcast_to(centre[:, None, None], (parameters, 2, 1)), moved], 2)
     low, high = (moved[number, way, last[:, way]] for way in range(2))
-    return Reach(low, high, alike.min(axis=0), alike.max(axis=0), surroundings)
+    return Reach(low, high, *among, surroundings)
 
 
 def report(judge: Judge, tried: Tried, most: int = 4) -> Iterator[str]:
     """Word the best sets, what they come to, and how well the targets determine them."""
-    sets, keys = best_sets(judge, tried, most), [one.name for one in judge.targets.parameter]
+    free, apart = judge.targets.parameter, judge.targets.search.apart
+    columns = zip(free, tried.values.T, strict=True)
+    points = np.stack([[one.share(v) for v in values.tolist()] for one, values in columns], axis=1)
+    sets, keys = distinct(points, tried.misfit, apart, most), [one.name for one in free]
     titles = [f"set {number}" for number in range(1, len(sets) + 1)]
     yield f"{len(tried)} candidates; the best sets that differ:"
     yield _row("", titles)
@@ -89,21 +85,17 @@ def report(judge: Judge, tried: Tried, most: int = 4) -> Iterator[str]:
         yield _row(one.name, [one.wanted, one.width, *row])
     if len(tried) > 1:
         yield ""
-        yield from _determined(keys, tried)
+        found = reach(tried)
+        yield "how far each can move before the misfit grows by one, alone and with the others:"
+        yield _row("", ["alone from", "to", "all from", "to"])
+        for key, *ends in zip(keys, *found[:4], strict=True):
+            yield _row(key, ends)
+        beside = "a thousandth of the bounds beside where the last steps began"
+        yield f"({beside}: misfit {found.surroundings:.4g})"
     yield ""
     yield "set 1 in full, for a configuration:"
     for key, value in zip(keys, tried.values[sets[0]].tolist(), strict=True):
         yield f"{'groups.' if key in SWEEPABLE_GROUPS else ''}{key} = {value!r}"
-
-
-def _determined(keys: Iterable[str], tried: Tried) -> Iterator[str]:
-    found = reach(tried)
-    yield "how far each can move before the misfit grows by one, alone and with the others:"
-    yield _row("", ["alone from", "to", "all from", "to"])
-    for key, *ends in zip(keys, *found[:4], strict=True):
-        yield _row(key, ends)
-    beside = "a thousandth of the bounds beside where the last steps began"
-    yield f"({beside}: misfit {found.surroundings:.4g})"
 
 
 def _row(name: str, entries: Iterable[str | float]) -> str:

@@ -1,4 +1,4 @@
-"""Which candidates are tried: drawn ones, CMA-ES from the best of them, and steps from the best.
+"""The search: candidates are drawn, bred by CMA-ES and moved alone, computed, judged and kept.
 
 The candidates of a generation are yielded as points of the unit cube, and their misfits sent back:
 the same misfits lead to the same candidates, which is how a search that was stopped goes on.
@@ -6,14 +6,24 @@ the same misfits lead to the same candidates, which is how a search that was sto
 
 from __future__ import annotations
 
+import time
 import warnings
-from collections.abc import Generator
-from typing import Any, NamedTuple, TypeAlias
+from collections.abc import Callable, Generator
+from importlib.metadata import version
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
+from gearchaos.configuration.toml_text import toml_text
+from gearchaos.engine.provenance import SOFTWARE
+from gearchaos.errors import FileError
+from gearchaos.identification.evaluation import coordinates_of, evaluate
+from gearchaos.identification.loading import Problem
+from gearchaos.identification.observations import misfit, observations_of
 from gearchaos.identification.targets import Search
+from gearchaos.identification.tried import COMPLETE, DIVERGED, Tried, joined
+from gearchaos.interrupts import check
 
 Floats = NDArray[np.float64]
 
@@ -35,15 +45,99 @@ STARTS = 4
 MOST_CENTRES = 5
 """Where one of those steps is better than the best candidate, they begin again from it."""
 
+SECONDS_BETWEEN_SNAPSHOTS = 20.0
+LANES_AT_ONCE = 2**13
+"""Lanes of one batch: enough for all threads, and little memory."""
 
-class Generation(NamedTuple):
-    """Candidates that are tried together: the number of their run, and their points."""
-
-    run: int
-    points: Floats
+Proposals: TypeAlias = Generator[tuple[int, Floats], Floats, None]
+"""Candidates that are tried together: the number of their run, and their points."""
 
 
-Proposals: TypeAlias = Generator[Generation, Floats, None]
+class Judge:
+    """Computes candidates and compares them with the ``observations`` of a problem.
+
+    ``values``: all of the swept parameter at which something is looked at, ascending, (values,).
+    """
+
+    def __init__(self, problem: Problem) -> None:
+        self.targets, self._config = problem.targets, problem.config
+        self.observations = observations_of(self.targets, coordinates_of(self._config))
+        self.values = np.unique(np.concatenate([one.values for one in self.observations]))
+        self._places = [np.searchsorted(self.values, one.values) for one in self.observations]
+        self._accelerated = np.zeros(self.values.size, dtype=np.bool_)
+        for one, places in zip(self.observations, self._places, strict=True):
+            self._accelerated[places] |= one.accelerated
+
+    def judge(self, run: int, parameters: dict[str, Floats]) -> Tried:
+        """Compute candidates given by their parameters, each of shape (candidates,)."""
+        records = evaluate(self._config, self.values, parameters, self._accelerated)
+        computed, residuals = [], []
+        for one, places in zip(self.observations, self._places, strict=True):
+            computed.append(one.computed(records.at(places)))
+            residuals.append(one.residual(computed[-1]))
+        diverged = ~np.all(records.sound, axis=1)
+        return Tried(
+            np.full(diverged.size, run, dtype=np.int32),
+            np.stack(list(parameters.values()), axis=1),
+            np.stack(computed, axis=1),
+            misfit(np.stack(residuals, axis=1)),
+            np.where(diverged, DIVERGED, COMPLETE).astype(np.uint8),
+        )
+
+
+def decisive_facts(problem: Problem) -> dict[str, Any]:
+    """Return what decides which candidates are tried and what they come to."""
+    targets = problem.targets.model_dump(exclude_none=True)
+    tables = {"cma_version": version("cma"), "targets": targets, "of": problem.config.tables()}
+    return {**SOFTWARE._asdict(), "configuration": toml_text(tables)}
+
+
+def search(
+    judge: Judge,
+    known: Tried | None,
+    keep: Callable[[Tried], None],
+    advance: Callable[[int], None],
+    source: str,
+) -> Tried:
+    """Try all candidates of a search and return them.
+
+    ``known`` are those of an earlier part of it, from the file ``source``, which are not computed
+    again; ``keep`` is called with all there are from time to time, and where the search is
+    interrupted, as soon as they are more than the known ones; ``advance`` with every number of
+    candidates done. Raises FileError if the known ones are not the first of this search.
+    """
+    parts: list[Tried] = []
+    done, before, spoke = 0, 0 if known is None else len(known), time.monotonic()
+    at_once = max(1, LANES_AT_ONCE // judge.values.size)
+    asking = proposals(judge.targets.search, len(judge.targets.parameter))
+    try:
+        run, points = next(asking)
+        while True:
+            misfits = []
+            for first in range(0, len(points), at_once):
+                check()
+                piece = points[first : first + at_once]
+                parameters = judge.targets.values(piece)
+                if known is not None and done < before:
+                    found = known.part(done, done + len(piece))
+                    _require_these(parameters, found, source)
+                else:
+                    found = judge.judge(run, parameters)
+                    advance(len(found))
+                parts.append(found)
+                done += len(found)
+                misfits.append(found.misfit)
+                if done > before and time.monotonic() - spoke > SECONDS_BETWEEN_SNAPSHOTS:
+                    spoke = time.monotonic()
+                    parts = [joined(parts)]
+                    keep(parts[0])
+            run, points = asking.send(np.concatenate(misfits))
+    except StopIteration:
+        return joined(parts)
+    except KeyboardInterrupt:
+        if done > before:
+            keep(joined(parts))
+        raise
 
 
 def proposals(search: Search, parameters: int) -> Proposals:
@@ -53,7 +147,7 @@ def proposals(search: Search, parameters: int) -> Proposals:
     """
     random = np.random.default_rng(search.seed)
     drawn = random.random((search.drawn, parameters))
-    misfits = yield Generation(DRAWN, drawn)
+    misfits = yield DRAWN, drawn
     best, least = drawn[np.argmin(misfits)], float(np.min(misfits))
     starts = distinct(drawn, misfits, search.apart, most=STARTS * search.runs)
     left, run = search.candidates - search.drawn, 0
@@ -66,14 +160,14 @@ def proposals(search: Search, parameters: int) -> Proposals:
         while min(left, share) >= search.population and not strategy.stop():
             asked = strategy.ask()
             points = np.clip(np.array(asked), 0.0, 1.0)
-            misfits = yield Generation(run, points)
+            misfits = yield run, points
             strategy.tell(asked, misfits.tolist())
             left, share = left - search.population, share - search.population
             if np.min(misfits) < least:
                 best, least = points[np.argmin(misfits)], float(np.min(misfits))
     for _ in range(MOST_CENTRES):
         points = steps_alone(best)
-        misfits = yield Generation(STEPS_ALONE, points)
+        misfits = yield STEPS_ALONE, points
         if np.min(misfits) >= least:
             break
         best, least = points[np.argmin(misfits)], float(np.min(misfits))
@@ -101,12 +195,20 @@ def distinct(points: Floats, misfits: Floats, apart: float, most: int) -> list[i
     """
     found: list[int] = []
     for number in np.argsort(misfits, kind="stable").tolist():
+        if len(found) == most:
+            break
         far = np.max(np.abs(points[found] - points[number]), axis=1, initial=0.0) > apart
         if np.all(far):
             found.append(number)
-            if len(found) == most:
-                break
     return found
+
+
+def _require_these(parameters: dict[str, Floats], known: Tried, source: str) -> None:
+    if not np.array_equal(np.stack(list(parameters.values()), axis=1), known.values):
+        raise FileError(
+            f"{source}: its candidates are not those of this search here, which can differ between "
+            "machines; finish it where it began, or begin anew with --overwrite"
+        )
 
 
 def _strategy(begin: Floats, population: int, random: np.random.Generator) -> Any:
@@ -114,15 +216,12 @@ def _strategy(begin: Floats, population: int, random: np.random.Generator) -> An
         warnings.simplefilter("ignore")
         import cma
 
-        return cma.CMAEvolutionStrategy(
-            begin,
-            FIRST_SPREAD,
-            {
-                "bounds": [0.0, 1.0],
-                "popsize": population,
-                # A generator of its own instead of the seed of all of NumPy.
-                "randn": lambda *shape: random.standard_normal(shape),
-                "seed": np.nan,
-                "verbose": -9,
-            },
-        )
+        options = {
+            "bounds": [0.0, 1.0],
+            "popsize": population,
+            # A generator of its own instead of the seed of all of NumPy.
+            "randn": lambda *shape: random.standard_normal(shape),
+            "seed": np.nan,
+            "verbose": -9,
+        }
+        return cma.CMAEvolutionStrategy(begin, FIRST_SPREAD, options)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from itertools import product
-from typing import Annotated, Any, TypeAlias
+from typing import Annotated, TypeAlias, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +15,8 @@ from gearchaos.configuration.run_tables import State
 
 Floats = NDArray[np.float64]
 Pair: TypeAlias = Annotated[tuple[float, float], Field(strict=False)]
-
+Entry = TypeVar("Entry")
+Several: TypeAlias = Annotated[tuple[Entry, ...], Field(strict=False)]
 
 MOST_FREE = 16
 """Parameters that are free: 2^16 corners of their bounds are looked at before a search."""
@@ -102,27 +103,19 @@ class Search(Table):
     )
 
 
-def _many(description: str) -> Any:
-    return key(description, default=())
-
-
 class Targets(Table):
     """A targets file; one that exists is sound."""
 
     title: str = key("title, for people", default="")
     configuration: str = key("file with all that is known, beside this one", example="pair.toml")
-    set: Annotated[tuple[str, ...], Field(strict=False)] = key(
-        "keys of it that are replaced, as by --set", default=()
-    )
+    set: Several[str] = key("keys of it that are replaced, as by --set", default=())
     search: Search = key("how much is tried", default=Search())
-    parameter: Annotated[
-        tuple[Parameter, ...], Field(strict=False, min_length=1, max_length=MOST_FREE)
-    ] = key("what is free")
-    stage: Annotated[tuple[Stage, ...], Field(strict=False)] = _many("observed stages")
-    jump: Annotated[tuple[Jump, ...], Field(strict=False)] = _many("observed jumps")
-    crisis: Annotated[tuple[Crisis, ...], Field(strict=False)] = _many("observed crises")
-    exponent: Annotated[tuple[Exponent, ...], Field(strict=False)] = _many("observed exponents")
-    increment: Annotated[tuple[Increment, ...], Field(strict=False)] = _many("observed increments")
+    parameter: Several[Parameter] = key("what is free", min_length=1, max_length=MOST_FREE)
+    stage: Several[Stage] = key("observed stages", default=())
+    jump: Several[Jump] = key("observed jumps", default=())
+    crisis: Several[Crisis] = key("observed crises", default=())
+    exponent: Several[Exponent] = key("observed exponents", default=())
+    increment: Several[Increment] = key("observed increments", default=())
 
     def corners(self) -> dict[str, Floats]:
         """Return the free parameters at all corners of their bounds, each of shape (corners,)."""

@@ -18,12 +18,13 @@ from gearchaos.results.atomic_file import reason
 from gearchaos.results.checksum_line import checksum_fits
 from gearchaos.results.result_file import write_result
 from gearchaos.results.result_reader import SEARCH
-from gearchaos.results.stored_dataset import UnfitError, datasets_of, scalars_of, values_of
+from gearchaos.results.stored_dataset import UnfitError, datasets_of, scalars_of, text_of, values_of
 from gearchaos.results.variables import STATUS, Variable, axis_name
 
 Floats = NDArray[np.float64]
 
 CANDIDATE, OBSERVATION = "candidate", "observation"
+COMPLETE, DIVERGED = 0, 1
 MEANINGS = ("complete", "diverged")
 """Meanings of the status of a candidate: whether all of its lanes were integrated to the end."""
 
@@ -68,50 +69,34 @@ def write_tried(
 
     ``keys`` are those of the parameters. Raises FileError if it cannot be written.
     """
-    arrays: dict[str, NDArray[Any]] = {
-        "run": tried.run,
-        **{axis_name(key): tried.values[:, number] for number, key in enumerate(keys)},
-        "computed": tried.computed,
-        "misfit": tried.misfit,
-        STATUS: tried.status,
-    }
-    variables = _variables(len(tried), keys, observations)
-    metadata = {**facts, "parameters_searched": " ".join(keys)}
-    blocks = [(0, len(tried), arrays)]
-    write_result(path, variables, blocks, {}, metadata, overwrite=True, schema=SEARCH)
 
+    def column(
+        name: str, values: NDArray[Any], text: str, *dims: str, units: str = "1", **more: Any
+    ) -> Variable:
+        return Variable(name, dims, str(values.dtype), units, text, values=values, **more)
 
-def _variables(
-    count: int, keys: Sequence[str], observations: Sequence[Observation]
-) -> list[Variable]:
-    dims, row = (CANDIDATE,), (OBSERVATION,)
     names = tuple("_".join(one.name.split()) for one in observations)
-    numbers = (np.arange(size, dtype=np.int32) for size in (count, len(names)))
-    wanted, width = (
-        np.array([getattr(one, name) for one in observations]) for name in ("wanted", "width")
-    )
+    numbers, candidates = (np.arange(size, dtype=np.int32) for size in (len(names), len(tried)))
+    wanted, width = np.array([(one.wanted, one.width) for one in observations]).T
+    which = "number of the observation, which its meaning names"
     what = "run of the search, 0 drawn evenly, -1 steps away from the best candidate"
-    return [
-        Variable(CANDIDATE, dims, "int32", "1", "number of the candidate", values=next(numbers)),
-        Variable(
-            *(OBSERVATION, row, "int32", "1", "number of the observation, which its meaning names"),
-            flags=names,
-            values=next(numbers),
+    dims, row, axes = (CANDIDATE,), (OBSERVATION,), map(axis_of, keys, tried.values.T)
+    variables = [
+        column(CANDIDATE, candidates, "number of the candidate", *dims),
+        column(OBSERVATION, numbers, which, *row, flags=names),
+        column("wanted", wanted, "observed number", *row),
+        column("width", width, "unit of its misfit", *row),
+        column("run", tried.run, what, *dims),
+        *(
+            column(a.name, a.values, a.long_name, *dims, units=a.units, symbol=a.symbol)
+            for a in axes
         ),
-        Variable("wanted", row, "float64", "1", "observed number", values=wanted),
-        Variable("width", row, "float64", "1", "unit of its misfit", values=width),
-        Variable("run", dims, "int32", "1", what),
-        *map(_parameter, keys),
-        Variable("computed", (*dims, *row), "float64", "1", "computed number", "", np.nan),
-        Variable("misfit", dims, "float64", "1", "misfit of all observations together"),
-        Variable(STATUS, dims, "uint8", "1", "status of the candidate", flags=MEANINGS),
+        column("computed", tried.computed, "computed number", *dims, *row, fill_value=np.nan),
+        column("misfit", tried.misfit, "misfit of all observations together", *dims),
+        column(STATUS, tried.status, "status of the candidate", *dims, flags=MEANINGS),
     ]
-
-
-def _parameter(key: str) -> Variable:
-    axis = axis_of(key, np.zeros(0))
-    wording = axis.units, axis.long_name, axis.symbol
-    return Variable(axis.name, (CANDIDATE,), "float64", *wording)
+    metadata = {**facts, "parameters_searched": " ".join(keys)}
+    write_result(path, variables, [], {}, metadata, overwrite=True, schema=SEARCH)
 
 
 def read_tried(path: str | os.PathLike[str], keys: Sequence[str]) -> tuple[Tried, dict[str, Any]]:
@@ -126,15 +111,14 @@ def read_tried(path: str | os.PathLike[str], keys: Sequence[str]) -> tuple[Tried
         with h5py.File(name, "r") as file:
             facts = scalars_of(file)
             datasets = datasets_of(file)
-            text = {n: d for n, d in datasets.items() if d.dtype.kind in "OS"}
-            facts |= {n: d[()].decode("utf-8", "replace") for n, d in text.items()}
+            texts = {name: text_of(dataset) for name, dataset in datasets.items()}
+            facts |= {name: text for name, text in texts.items() if text is not None}
             if facts.get("schema") != SEARCH or facts["parameters_searched"] != " ".join(keys):
                 raise UnfitError("is no result of this search", "choose another --output")
             columns = [values_of(key, datasets[axis_name(key)]) for key in keys]
-            rest = ("computed", "misfit", STATUS)
-            found = (values_of(variable, datasets[variable]) for variable in rest)
-            run = values_of("run", datasets["run"])
-            return Tried(run, np.stack(columns, axis=1), *found), facts
+            others = ("run", "computed", "misfit", STATUS)
+            run, *rest = (values_of(name, datasets[name]) for name in others)
+            return Tried(run, np.stack(columns, axis=1), *rest), facts
     except UnfitError as error:
         raise FileError(f"{name}: {error}") from error
     except (OSError, KeyError, ValueError, RuntimeError) as error:

@@ -2,33 +2,31 @@
 
 from __future__ import annotations
 
+import hashlib
+import json
 import math
 import os
 import re
-from collections.abc import Callable, Mapping, Sequence
-from contextlib import suppress
+from bisect import bisect_right
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager, suppress
 from pathlib import Path
-from typing import Any, NamedTuple, Self
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gearchaos.errors import FileError
+from gearchaos.results import manifest
 from gearchaos.results.atomic_file import PARTIAL
-from gearchaos.results.block_file import read_block, write_block
-from gearchaos.results.lane_ranges import Bounds, lanes_text, uncovered
-from gearchaos.results.manifest import (
-    MANIFEST,
-    decisive_facts,
-    fingerprint,
-    folder_of,
-    read_manifest,
-    settle_manifest,
-)
 from gearchaos.results.result_file import Metadata, Parameter, write_result
 from gearchaos.results.store_lock import LOCK, StoreLock
 from gearchaos.results.variables import Variable, lane_axes
 from gearchaos.version import Software
+
+Arrays: TypeAlias = Mapping[str, NDArray[Any]]
+Bounds: TypeAlias = tuple[int, int]
+"""First lane of a range, and the one after its last."""
 
 _NAME = re.compile(r"\d{12}-\d{12}\.block")
 
@@ -40,7 +38,7 @@ class Finished(NamedTuple):
     problems: list[str]
 
 
-class BlockStore:
+class BlockStore(AbstractContextManager["BlockStore"]):
     """The finished blocks of one sweep, in the folder ``<output>.blocks``.
 
     As long as its context lasts, a lock keeps other sweeps away from the same output. `merge` makes
@@ -66,29 +64,26 @@ class BlockStore:
         blocks: Sequence[Bounds] | None = None,
         shards: int | None = None,
     ) -> None:
-        self.output = Path(output)
-        self.folder = folder_of(output)
+        self.output, self.folder = Path(output), manifest.folder_of(output)
         sizes = {v.name: len(v.values) for v in variables if v.values is not None}
-        axes = lane_axes(variables)
+        axes, of_the_lanes = lane_axes(variables), [v for v in variables if v.values is None]
         self.lanes = math.prod(sizes[axis] for axis in axes)
         self._record = np.dtype(
-            [
-                (v.name, np.dtype(v.dtype), tuple(sizes[dim] for dim in v.dims[len(axes) :]))
-                for v in variables
-                if v.values is None
-            ]
+            [(v.name, v.dtype, tuple(sizes[d] for d in v.dims[len(axes) :])) for v in of_the_lanes]
         ).newbyteorder("<")
         facts = {"lanes": self.lanes, "variables": self._record.descr}
-        decisive = decisive_facts(software, **facts, configuration=configuration)
-        self._fingerprint = fingerprint(decisive)
+        decisive = manifest.decisive_facts(software, **facts, configuration=configuration)
+        everything = json.dumps(decisive, sort_keys=True).encode()
+        self._fingerprint = hashlib.sha256(everything).hexdigest()
+        shared = blocks is not None
         self._blocks = [(0, self.lanes)] if blocks is None else list(blocks)
-        self._lock = StoreLock(self.folder, self.output, shared=blocks is not None)
+        self._lock = StoreLock(self.folder, self.output, shared)
         try:
             own = self._own_blocks()
+            beside = {"text": text, "shards": shards}
             # Of several shards, whoever comes first writes it.
-            shared, beside = blocks is not None, {"text": text, "shards": shards}
             how = {"write": shared or not own, "overwrite": not shared}
-            settle_manifest(self.folder, decisive, beside, **how)
+            manifest.settle_manifest(self.folder, decisive, beside, **how)
             if own and not resume:
                 raise FileError(
                     f"{self.folder}: holds {len(own)} finished blocks of an earlier run; continue "
@@ -100,11 +95,8 @@ class BlockStore:
             self._lock.release()
             raise
         # Those of other shards may be about to get their names.
-        if blocks is None:
+        if not shared:
             self._remove([partial.name for partial in self.folder.glob(f".*{PARTIAL}")])
-
-    def __enter__(self) -> Self:
-        return self
 
     def __exit__(self, *_: object) -> None:
         self.close()
@@ -118,7 +110,7 @@ class BlockStore:
     def remove(self) -> None:
         """Remove the blocks, the folder if nothing else is in it, and let go of the lock."""
         # Only what the store has made: the folder may hold files of the user.
-        self._remove([*self._names(), MANIFEST, LOCK])
+        self._remove([*self._names(), manifest.MANIFEST, LOCK])
         # What comes to be there from now on is another sweep's.
         self._lock.release()
 
@@ -127,22 +119,15 @@ class BlockStore:
         """Lanes of one's own blocks."""
         return sum(last - first for first, last in self._blocks)
 
-    @property
-    def shards(self) -> int | None:
-        """Into how many shards whoever began divided the sweep; None for one process."""
-        number = read_manifest(self.folder).get("shards")
-        return number if isinstance(number, int) and number > 0 else None
-
-    def finished(
-        self, visit: Callable[[Mapping[str, NDArray[Any]]], None] | None = None
-    ) -> Finished:
+    def finished(self, visit: Callable[[Arrays], None] | None = None) -> Finished:
         """Verify one's own blocks that are there; `visit` gets the arrays of each sound one."""
         bounds: list[Bounds] = []
         problems: list[str] = []
         for first, last in self._own_blocks():
             try:
                 if bounds and first < bounds[-1][1]:
-                    raise FileError(f"{self._path(first, last)}: overlaps the block before it")
+                    path, _ = self._block(first, last)
+                    raise FileError(f"{path}: overlaps the block before it")
                 arrays = self.read(first, last)
             except FileError as error:
                 problems += error.problems
@@ -161,7 +146,7 @@ class BlockStore:
             for start in range(first, last, block)
         ]
 
-    def write(self, first: int, last: int, arrays: Mapping[str, NDArray[Any]]) -> None:
+    def write(self, first: int, last: int, arrays: Arrays) -> None:
         """Keep the lanes first to last - 1 of every computed variable.
 
         Raises FileError if they cannot be kept, ValueError if an array has a wrong shape.
@@ -171,14 +156,14 @@ class BlockStore:
             if (shape := np.shape(arrays[name])) != records[name].shape:
                 raise ValueError(f"{name} of lanes {first} to {last - 1} has shape {shape}")
             records[name] = arrays[name]
-        write_block(self._path(first, last), self._owner(first, last), records)
+        manifest.write_block(*self._block(first, last), records)
 
     def read(self, first: int, last: int) -> dict[str, NDArray[Any]]:
         """Give the arrays of one block; FileError if it is missing, damaged or of another sweep."""
-        path = self._path(first, last)
+        path, owner = self._block(first, last)
         if not 0 <= first < last <= self.lanes:
             raise FileError(f"{path}: its lanes are none of the {self.lanes} of this sweep")
-        records = read_block(path, self._owner(first, last), self._record, last - first)
+        records = manifest.read_block(path, owner, self._record, last - first)
         return {name: records[name] for name in self._record.names or ()}
 
     def merge(
@@ -195,20 +180,21 @@ class BlockStore:
         The first four are those of `write_result`; ``found`` is what `finished` has just given.
         Raises FileError if blocks are missing or the file cannot be written; the blocks stay.
         """
-        bounds, problems = found or self.finished()
-        if gaps := self.missing(bounds, self.lanes):
-            raise FileError([*problems, f"{self.folder}: {lanes_text(gaps)} missing; use --resume"])
-        write_result(
-            self.output,
-            variables,
-            ((first, last, self.read(first, last)) for first, last in bounds),
-            parameters,
-            metadata,
-            overwrite=overwrite,
-            scratch=self.folder,
-        )
+        found = found or self.finished()
+        self.require_all(found, "use --resume")
+        blocks = ((first, last, self.read(first, last)) for first, last in found.bounds)
+        told = variables, blocks, parameters, metadata
+        write_result(self.output, *told, overwrite=overwrite, scratch=self.folder)
         self.remove()
         return self.output
+
+    def require_all(self, found: Finished, remedy: str, most: int = 3) -> None:
+        """Raise a FileError that names the lanes which `finished` has not found, with a remedy."""
+        if gaps := self.missing(found.bounds, self.lanes):
+            names = ", ".join(f"{first} to {last - 1}" for first, last in gaps[:most])
+            more = f" and {len(gaps) - most} more ranges" if len(gaps) > most else ""
+            missing = f"{self.folder}: lanes {names}{more} are missing; {remedy}"
+            raise FileError([*found.problems, missing])
 
     def _remove(self, names: Sequence[str]) -> None:
         for name in names:
@@ -226,8 +212,19 @@ class BlockStore:
             return sorted(filter(_NAME.fullmatch, os.listdir(self.folder)))
         return []
 
-    def _owner(self, first: int, last: int) -> dict[str, Any]:
-        return {"fingerprint": self._fingerprint, "first": first, "last": last}
+    def _block(self, first: int, last: int) -> tuple[Path, dict[str, Any]]:
+        owner = {"fingerprint": self._fingerprint, "first": first, "last": last}
+        return self.folder / f"{first:012d}-{last:012d}.block", owner
 
-    def _path(self, first: int, last: int) -> Path:
-        return self.folder / f"{first:012d}-{last:012d}.block"
+
+def uncovered(block: Bounds, finished: Sequence[Bounds]) -> Iterator[Bounds]:
+    """Give what finished blocks, sorted and without overlap, leave out of a block."""
+    first, last = block
+    for begin, end in finished[bisect_right(finished, first, key=lambda bounds: bounds[1]) :]:
+        if begin >= last:
+            break
+        if first < begin:
+            yield first, begin
+        first = end
+    if first < last:
+        yield first, last

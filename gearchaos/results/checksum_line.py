@@ -32,14 +32,13 @@ def checksum_fits(path: Path) -> bool | None:
     with path.open("rb") as file:
         size = file.seek(0, os.SEEK_END)
         file.seek(max(0, size - _LENGTH))
-        tail = file.read()
-        start = tail.rfind(_PREFIX)
-        if start < 0:
+        _, prefix, told = file.read().rpartition(_PREFIX)
+        if not prefix:
             return None
-        remaining = size - len(tail) + start
+        remaining = size - len(prefix) - len(told)
         file.seek(0)
         digest = hashlib.sha256()
         while remaining > 0 and (piece := file.read(min(_PIECE, remaining))):
             digest.update(piece)
             remaining -= len(piece)
-    return tail[start + len(_PREFIX) :] == digest.hexdigest().encode() + b"\n"
+    return told == digest.hexdigest().encode() + b"\n"

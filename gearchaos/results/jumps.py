@@ -1,4 +1,4 @@
-"""Jumps between two motions of the same period: what labels alone do not show."""
+"""Jumps between two motions of the same period, and crises of chaos: what labels do not show."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from gearchaos.records.crisis import BESIDE, grows_at
 from gearchaos.records.period import TOLERANCE, section_distance
 from gearchaos.results.result import Result, section_variables
 from gearchaos.results.stage_table import labelled_lanes
@@ -26,6 +27,22 @@ class Jump(NamedTuple):
     below: float
     above: float
     label: str
+
+
+class Crisis(NamedTuple):
+    """Two neighbouring values of the swept parameter between which chaos grows or shrinks at once.
+
+    ``section`` is the variable in which it does so most; the four others are the smallest and
+    largest value that it takes on the eight lanes below and above.
+    """
+
+    below: float
+    above: float
+    section: str
+    lowest_below: float
+    highest_below: float
+    lowest_above: float
+    highest_above: float
 
 
 def jumps(result: Result) -> list[Jump]:
@@ -63,3 +80,27 @@ def jumps_at(period: NDArray[np.int32], section: Floats) -> NDArray[np.intp]:
     # Where one side is missing, or another stage begins there, the other side must do.
     beside = np.fmax(np.concatenate([[np.nan], apart[:-1]]), np.concatenate([apart[1:], [np.nan]]))
     return np.flatnonzero((apart > SMALLEST) & (apart > STEEPEST * beside))
+
+
+def crises(result: Result) -> list[Crisis]:
+    """Find where a sweep has a crisis, see `grows_at`, with the parameter growing or falling.
+
+    The result has one axis and labels; without a section nothing is found.
+    """
+    lanes = labelled_lanes(result)
+    chaotic = lanes.labels == "chaotic"
+    found: dict[int, tuple[float, Crisis]] = {}
+    for name in section_variables(result):
+        lowest, highest = np.min(result[name], axis=1), np.max(result[name], axis=1)
+        extent = highest - lowest
+        upwards = grows_at(extent, chaotic)
+        downwards = extent.size - grows_at(extent[::-1], chaotic[::-1])
+        for lane in (*upwards.tolist(), *downwards.tolist()):
+            sides = slice(max(0, lane - BESIDE), lane), slice(lane, lane + BESIDE)
+            ends = [(np.nanmin(lowest[side]), np.nanmax(highest[side])) for side in sides]
+            one, other = (high - low for low, high in ends)
+            growth = max(one / other, other / one)
+            if lane not in found or growth > found[lane][0]:
+                place = lanes.values[lane - 1 : lane + 1].tolist()
+                found[lane] = growth, Crisis._make([*place, name, *np.ravel(ends).tolist()])
+    return [found[lane][1] for lane in sorted(found)]

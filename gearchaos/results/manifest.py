@@ -1,4 +1,4 @@
-"""What the finished blocks beside an output belong to: the manifest of their folder."""
+"""The files beside an unfinished output: finished blocks, and the manifest of whose they are."""
 
 from __future__ import annotations
 
@@ -9,15 +9,19 @@ import tomllib
 from collections.abc import Mapping
 from contextlib import suppress
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
 
 from gearchaos.configuration.toml_text import flat_tables
 from gearchaos.errors import FileError
 from gearchaos.results.atomic_file import reason, replacing, unlinked_content
-from gearchaos.results.block_file import BLOCK_SCHEMA_VERSION
 from gearchaos.version import Software
 
-STORE_SCHEMA = "gearchaos-blocks"
+Facts: TypeAlias = Mapping[str, Any]
+STORE_SCHEMA, BLOCK_SCHEMA = "gearchaos-blocks", "gearchaos-block"
+SCHEMA_VERSION = "2.0"
 MANIFEST = "manifest.json"
 _LARGEST = 64 << 20
 
@@ -27,24 +31,14 @@ def decisive_facts(software: Software, **facts: Any) -> dict[str, Any]:
 
     That is who computes, ``lanes``, ``variables`` and ``configuration``, the resolved one in TOML.
     """
-    versions = {"schema": STORE_SCHEMA, "schema_version": BLOCK_SCHEMA_VERSION}
+    versions = {"schema": STORE_SCHEMA, "schema_version": SCHEMA_VERSION}
     facts |= software._asdict()
     # As it is read again: with lists for tuples.
     return dict(json.loads(json.dumps({**versions, **facts})))
 
 
-def fingerprint(decisive: Mapping[str, Any]) -> str:
-    """Return a hash of all that decides the numbers."""
-    return hashlib.sha256(json.dumps(decisive, sort_keys=True).encode()).hexdigest()
-
-
 def settle_manifest(
-    folder: Path,
-    decisive: Mapping[str, Any],
-    beside: Mapping[str, Any],
-    *,
-    write: bool,
-    overwrite: bool,
+    folder: Path, decisive: Facts, beside: Facts, *, write: bool, overwrite: bool
 ) -> None:
     """Write the manifest of a folder, and refuse a folder of another sweep.
 
@@ -64,10 +58,7 @@ def settle_manifest(
 
 
 def require_same(
-    what: str,
-    earlier: Mapping[str, Any],
-    now: Mapping[str, Any],
-    otherwise: str = "delete the folder",
+    what: str, earlier: Facts, now: Facts, otherwise: str = "delete the folder"
 ) -> None:
     """Refuse what was computed for another configuration or by another gearchaos.
 
@@ -84,7 +75,7 @@ def require_same(
         )
 
 
-def _differing(*facts: Mapping[str, Any]) -> list[str]:
+def _differing(*facts: Facts) -> list[str]:
     """Word software and keys of the configuration in which two rows of facts differ."""
     first, second = map(_flat, facts)
     return [
@@ -94,7 +85,7 @@ def _differing(*facts: Mapping[str, Any]) -> list[str]:
     ]
 
 
-def _flat(facts: Mapping[str, Any]) -> dict[str, Any]:
+def _flat(facts: Facts) -> dict[str, Any]:
     flat = {key: facts[key] for key in (*Software._fields, "schema_version") if key in facts}
     with suppress(ValueError, RecursionError):  # Not written by us: all keys are absent.
         flat |= flat_tables(tomllib.loads(facts.get("configuration", "")))
@@ -106,22 +97,13 @@ def folder_of(output: str | os.PathLike[str]) -> Path:
     return Path(os.path.realpath(output) + ".blocks")
 
 
-def stored_manifest(output: str | os.PathLike[str]) -> dict[str, Any]:
-    """Return the manifest of the blocks beside an output, whoever computed them.
-
-    Raises FileError if there are no blocks, or if what describes them is damaged.
-    """
-    folder = folder_of(output)
+def read_manifest(folder: Path) -> dict[str, Any]:
+    """Read the manifest of a folder; FileError if there is none, or it is damaged."""
+    path = folder / MANIFEST
     if not folder.is_dir():
         raise FileError(
             f"{folder}: no such folder; name the result file to be, beside which the blocks are"
         )
-    return read_manifest(folder)
-
-
-def read_manifest(folder: Path) -> dict[str, Any]:
-    """Read the manifest of a folder; FileError if there is none."""
-    path = folder / MANIFEST
     try:
         manifest: dict[str, Any] = json.loads(unlinked_content(path, _LARGEST))
         tomllib.loads(manifest["configuration"])
@@ -131,3 +113,47 @@ def read_manifest(folder: Path) -> dict[str, Any]:
             f"{path}: is damaged or missing ({reason(error)}); delete the folder to start again"
         ) from error
     return manifest
+
+
+def write_block(path: Path, owner: Facts, records: NDArray[Any]) -> None:
+    """Write the records of the lanes of a block; the file appears complete or not at all.
+
+    ``owner`` says of which sweep and which lanes they are, and ``records`` has shape (lanes,).
+    Raises FileError if the file cannot be written.
+    """
+    with (
+        replacing(path, overwrite=True, through_links=False) as partial,
+        partial.open("wb") as file,
+    ):
+        file.write(_beginning(owner, records.data))
+        file.write(records.data)
+
+
+def read_block(path: Path, owner: Facts, record: np.dtype[Any], lanes: int) -> NDArray[Any]:
+    """Give the records of so many lanes, shape (lanes,), verified.
+
+    Raises FileError if the file is missing, damaged or of another owner.
+    """
+    start = len(_beginning(owner, b""))
+    head, size = start - hashlib.sha256().digest_size, start + lanes * record.itemsize
+    try:
+        # Not more: what claims to be a block may be larger than the memory.
+        content = memoryview(unlinked_content(path, size + 1))
+    except OSError as error:
+        raise FileError(f"{path}: cannot be read: {reason(error)}") from error
+    if len(content) != size:
+        raise FileError(f"{path}: has not the {size} bytes of its lanes")
+    beginning = _beginning(owner, content[start:])
+    if content[:head] != beginning[:head]:
+        raise FileError(f"{path}: belongs to another sweep or another version of the format")
+    if content[:start] != beginning:
+        raise FileError(f"{path}: is damaged; its checksum does not fit")
+    return np.frombuffer(content[start:], record)
+
+
+def _beginning(owner: Facts, records: bytes | memoryview) -> bytes:
+    schema = {"schema": BLOCK_SCHEMA, "schema_version": SCHEMA_VERSION}
+    head = json.dumps({**schema, **owner}).encode() + b"\n"
+    digest = hashlib.sha256(head)
+    digest.update(records)
+    return head + digest.digest()

@@ -1,38 +1,47 @@
-"""What a result file says about itself, as plain numbers, texts, lists and tables of them."""
+"""What a result file says about itself: plain numbers, texts, lists, and a page for a terminal."""
 
 from __future__ import annotations
 
 import json
 import math
 import os
+import textwrap
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from gearchaos.results import variables as known
 from gearchaos.results.result import Result
 from gearchaos.results.result_file import Parameter
-from gearchaos.results.result_reader import read_result
-from gearchaos.results.stage_table import (
-    band_counts,
-    labelled_lanes,
-    one_axis,
-    slice_facts,
-    stage_table,
-)
-from gearchaos.results.variables import (
-    HARMONIC,
-    LABELS,
-    LARGEST_EXPONENT,
-    REPEATS,
-    STANDARD_ERROR,
-    STEP_ERROR,
-    Variable,
-)
+from gearchaos.results.result_reader import printable, read_result
+from gearchaos.results.stage_table import labelled_lanes, one_axis, slice_facts, stage_table
 
-ERRORS = ("section_error", STEP_ERROR, LARGEST_EXPONENT + STANDARD_ERROR)
+ERRORS = {
+    "section_error": ("section error", "when the step is halved"),
+    known.STEP_ERROR: ("exponent error", "when the step is halved"),
+    known.LARGEST_EXPONENT + known.STANDARD_ERROR: (
+        "exponent error",
+        "one standard error of the finite record; orbits of periodic lanes have none",
+    ),
+}
+"""Variables that are errors, with what they are of, and from what they come."""
+
 _CANDIDATE = "candidate_"
+_SETTINGS = "title effects formulation start carry fixed"
+_INTEGRATION = (
+    "method steps_per_period crossings tolerance unstable transient_periods recorded_periods"
+)
+_RUN = "wall_time_seconds threads processor system software kernels git_commit created"
+"""Names of metadata that are shown together."""
+
+MOST_STAGES = 20
+"""Of more stages, the first and the last ones are shown."""
+
+WIDTH = 80
+_LABEL = 18
 
 
 def overview(path: str | os.PathLike[str]) -> dict[str, Any]:
@@ -57,41 +66,34 @@ def overview(path: str | os.PathLike[str]) -> dict[str, Any]:
         },
         "metadata": metadata,
         "parameters": {name: _parameter(entry) for name, entry in parameters.items()},
-        "counts": {},
-        "errors": {},
-        "step_choice": {},
-        "variables": {},
+        **{facts: {} for facts in ("counts", "errors", "step_choice", "variables")},
     }
     # What bears a known name may be something else in a file that others have changed.
     for v in read:
-        of_the_lanes = v.dims == result.axes and v.name not in result.axes
+        values, of_the_lanes = data[v.name], v.dims == result.axes and v.name not in result.axes
         if of_the_lanes and v.flags and v.dtype == "uint8":
-            summary["counts"][v.name] = _counts(v, data[v.name])
+            numbers = np.bincount(values.ravel(), minlength=len(v.flags)).tolist()
+            summary["counts"][v.name] = dict(zip(v.flags, numbers, strict=False))
         elif of_the_lanes and v.name in ERRORS and v.dtype == "float64":
-            values = data[v.name]
-            if v.name.endswith(STANDARD_ERROR):
-                # The exponents of orbits have none.
-                values = values[values > 0.0]
-            summary["errors"][v.name] = _spread(values)
+            # The exponents of orbits have no standard error.
+            counted = values > 0.0 if v.name.endswith(known.STANDARD_ERROR) else ...
+            summary["errors"][v.name] = _spread(values[counted])
         elif v.dims == (f"{_CANDIDATE}steps",) and v.dtype in ("float64", "int32"):
-            summary["step_choice"][v.name.removeprefix(_CANDIDATE)] = data[v.name].tolist()
+            summary["step_choice"][v.name.removeprefix(_CANDIDATE)] = values.tolist()
     for v in variables:
-        shape = {"dims": list(v.dims), "shape": [sizes.get(dim) for dim in v.dims]}
+        shape = {"dims": v.dims, "shape": [sizes.get(dim) for dim in v.dims]}
         summary["variables"][v.name] = {**shape, "dtype": v.dtype, **_wording(v)}
-    summary["slice"], summary["stages"] = _stages(result)
+    summary |= {"slice": {}, "stages": []}
+    if result.axis not in known.REPEATS and all(name in result for name in known.LABELS):
+        part = one_axis(result)
+        stages = [stage._asdict() for stage in stage_table(labelled_lanes(part))]
+        summary |= {"slice": slice_facts(result, part), "stages": stages}
     return dict(finite(summary))
 
 
-def _stages(result: Result) -> tuple[dict[str, Any], list[dict[str, Any]]]:
-    if result.axis in REPEATS or not all(name in result for name in LABELS):
-        return {}, []
-    part = one_axis(result)
-    stages = stage_table(labelled_lanes(part))
-    facts = [
-        stage._asdict() | {"lanes": stage.lanes, "bands": bands}
-        for stage, bands in zip(stages, band_counts(part, stages), strict=True)
-    ]
-    return slice_facts(result, part), facts
+def finite(value: Any) -> Any:
+    """Replace what is not finite in nested tables and lists by None."""
+    return json.loads(json.dumps(value), parse_constant=lambda _: None)
 
 
 def _range(values: NDArray[Any]) -> dict[str, float]:
@@ -101,27 +103,138 @@ def _range(values: NDArray[Any]) -> dict[str, float]:
 def _parameter(parameter: Parameter) -> dict[str, Any]:
     value = np.asarray(parameter.value)
     # What differs from lane to lane may be a million numbers.
-    along_axes = parameter.dims not in ((), (HARMONIC,))
+    along_axes = parameter.dims not in ((), (known.HARMONIC,))
     content = _range(value) if along_axes else {"value": value.tolist()}
     return {"origin": parameter.origin, **content, **_wording(parameter)}
 
 
-def _wording(entry: Variable | Parameter) -> dict[str, str]:
+def _wording(entry: known.Variable | Parameter) -> dict[str, str]:
     return {"units": entry.units, "long_name": entry.long_name}
 
 
-def _counts(variable: Variable, values: NDArray[Any]) -> dict[str, int]:
-    numbers = np.bincount(values.ravel(), minlength=len(variable.flags))
-    return {flag: int(number) for flag, number in zip(variable.flags, numbers, strict=False)}
-
-
 def _spread(values: NDArray[Any]) -> dict[str, Any]:
-    known = values[np.isfinite(values)]
-    if known.size == 0:
+    sound = values[np.isfinite(values)]
+    if sound.size == 0:
         return {"lanes": 0, "median": None, "greatest": None}
-    return {"lanes": known.size, "median": float(np.median(known)), "greatest": float(known.max())}
+    return {"lanes": sound.size, "median": float(np.median(sound)), "greatest": float(sound.max())}
 
 
-def finite(value: Any) -> Any:
-    """Replace what is not finite in nested tables and lists by None."""
-    return json.loads(json.dumps(value), parse_constant=lambda _: None)
+def overview_page(
+    overview: Mapping[str, Any], settings: Iterable[str], verified: Iterable[str]
+) -> str:
+    """Write an overview as text, with the keys of the configuration and what fits, a line each."""
+    sections = {
+        "": _file(overview),
+        "Accuracy": _accuracy(overview),
+        "Run": _metadata(overview, _RUN),
+        "Stages": _stages(overview),
+        "Dimensionless groups": _groups(overview["parameters"]),
+        "Configuration": (_wrapped(line, "  ") for line in settings),
+        "Variables": _variables(overview["variables"]),
+        "Verified": (_wrapped(line, "  ") for line in verified),
+    }
+    pages = [
+        "\n".join([title, *lines] if title else lines)
+        for title, content in sections.items()
+        if (lines := list(content))
+    ]
+    return "\n\n".join(pages)
+
+
+def slice_lines(facts: dict[str, dict[str, float]]) -> list[str]:
+    """Word what `slice_facts` tells, one line per axis."""
+    return [
+        f"slice {name} = {at['value']:.6g}, "
+        f"{'the first' if at['number'] == 1 else 'number {number}'.format(**at)} of {at['of']}; "
+        f"others with --at {name}=VALUE"
+        for name, at in facts.items()
+    ]
+
+
+def _number(value: float | None) -> str:
+    return "-" if value is None else f"{value:.6g}"
+
+
+def _file(overview: Mapping[str, Any]) -> Iterator[str]:
+    metadata = overview["metadata"]
+    size = f"{overview['bytes']:,} bytes, {metadata['schema']} {metadata['schema_version']}"
+    yield _entry("file", f"{overview['file']} ({size})")
+    yield from _metadata(overview, _SETTINGS)
+    for name, axis in overview["axes"].items():
+        values = "1 value" if axis["values"] == 1 else f"{axis['values']} values"
+        span = f"{_number(axis['least'])} to {_number(axis['greatest'])}{_units(axis)}"
+        yield _entry("axis", f"{name} ({axis['long_name']}), {values}, {span}")
+    yield _entry("lanes", f"{overview['lanes']}")
+    for name, counts in overview["counts"].items():
+        yield _entry(name, ", ".join(f"{n} {flag}" for flag, n in counts.items() if n))
+    for note in str(metadata.get("notes", "")).splitlines():
+        yield _entry("note", note)
+
+
+def _accuracy(overview: Mapping[str, Any]) -> Iterator[str]:
+    yield from _metadata(overview, _INTEGRATION)
+    for name, spread in overview["errors"].items():
+        if spread["lanes"]:
+            span = f"{spread['median']:.1e} (median) to {spread['greatest']:.1e}"
+            label, cause = ERRORS[name]
+            yield _entry(label, f"{span} in {spread['lanes']} lanes, {cause}")
+    choice = dict(overview["step_choice"])
+    for row, steps in enumerate(choice.pop("steps", [])):
+        measured = ", ".join(f"{name} {_number(values[row])}" for name, values in choice.items())
+        yield _entry("step choice", f"{steps} steps: {measured}")
+
+
+def _stages(overview: Mapping[str, Any]) -> Iterator[str]:
+    lines = []
+    for stage in overview["stages"]:
+        several = "s" if stage["lanes"] != 1 else ""
+        bands = max(map(int, stage["bands"]), default=1)
+        on_bands = f", on up to {bands} bands" if bands > 1 else ""
+        span = f"{stage['start']:.6g} to {stage['end']:.6g}"
+        lines.append(f"{stage['label']}: {span}, {stage['lanes']} lane{several}{on_bands}")
+    half = MOST_STAGES // 2
+    if len(lines) > MOST_STAGES:
+        more = f"{len(lines)} stages: the first {half} and the last {half}"
+        lines = [more, *lines[:half], *lines[-half:]]
+    yield from (_wrapped(line, "  ") for line in [*slice_lines(overview["slice"]), *lines])
+
+
+def _metadata(overview: Mapping[str, Any], names: str) -> Iterator[str]:
+    for name in names.split():
+        value = overview["metadata"].get(name)
+        if value not in (None, ""):
+            yield _entry(
+                name.replace("_", " "), value if isinstance(value, str) else _number(value)
+            )
+
+
+def _groups(parameters: Mapping[str, Any]) -> Iterator[str]:
+    for name, entry in parameters.items():
+        text = ", ".join(map(_number, np.ravel(entry.get("value", []))))
+        if "least" in entry:
+            text = f"{_number(entry['least'])} to {_number(entry['greatest'])}"
+        yield _wrapped(f"{name:26} {text}{_units(entry)} ({entry['origin']})", "  ", " " * 29)
+
+
+def _variables(variables: Mapping[str, Any]) -> Iterator[str]:
+    for name, variable in variables.items():
+        dims = ", ".join(
+            dim if size is None else f"{dim}: {size}"
+            for dim, size in zip(variable["dims"], variable["shape"], strict=True)
+        )
+        yield _wrapped(f"{name} ({dims}) {variable['dtype']}{_units(variable)}", "  ", "      ")
+
+
+def _units(entry: Mapping[str, Any]) -> str:
+    return "" if entry["units"] in ("", "1") else f" {entry['units']}"
+
+
+def _entry(label: str, text: str) -> str:
+    return _wrapped(f"{label:{_LABEL}}{text}", "  ", " " * (_LABEL + 2))
+
+
+def _wrapped(text: str, first: str, further: str = "    ") -> str:
+    text = printable(text)
+    return textwrap.fill(
+        text, WIDTH, initial_indent=first, subsequent_indent=further, break_on_hyphens=False
+    )

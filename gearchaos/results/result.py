@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gearchaos.errors import ConfigurationError, FileError
+from gearchaos.results import tables
 from gearchaos.results.checksum_line import checksum_fits
 from gearchaos.results.result_file import Parameter, own_metadata, write_result
 from gearchaos.results.result_reader import fixed_coordinates, is_coordinate, read_result
@@ -59,7 +60,12 @@ class Result:
         self.axes = tuple(axes)
         self.parameters = dict(parameters)
         self.metadata = {**metadata, **own_metadata(self.axes)}
-        self._data = {variable.name: _array(variable, data) for variable in variables}
+        self._data: dict[str, NDArray[Any]] = {}
+        for variable in variables:
+            values = data.get(variable.name, variable.values)
+            if values is None:
+                raise ValueError(f"no values for the variable {variable.name}")
+            self._data[variable.name] = np.asarray(values, dtype=variable.dtype)
         for axis in self.axes:
             if axis not in self._data or not is_coordinate(self._data[axis]):
                 raise ValueError(f"{axis} is an axis, but there is no ascending row of its values")
@@ -156,6 +162,7 @@ class Result:
         if not index:
             return self
         met = self.fixed | {name: float(self[name][at]) for name, at in index.items()}
+        fixed = " ".join(f"{name}={value!r}" for name, value in met.items())
 
         def part(values: Any, dims: Sequence[str]) -> Any:
             return values[tuple(index.get(dim, slice(None)) for dim in dims)] if dims else values
@@ -172,10 +179,7 @@ class Result:
                 name: replace(entry, value=part(entry.value, entry.dims), dims=rest(entry.dims))
                 for name, entry in self.parameters.items()
             },
-            {
-                **self.metadata,
-                "fixed": " ".join(f"{name}={value!r}" for name, value in met.items()),
-            },
+            {**self.metadata, "fixed": fixed},
         )
 
     def save(self, path: str | os.PathLike[str], overwrite: bool = False) -> None:
@@ -186,32 +190,12 @@ class Result:
         """
         if not self.axes:
             raise FileError(f"{path}: a single lane is no result file; leave one axis in sel")
-        of_the_lanes = [v.name for v in self.variables.values() if v.values is None]
-        arrays = {name: self.lanes(name) for name in of_the_lanes}
-        block = (0, math.prod(self[axis].size for axis in self.axes), arrays)
-        write_result(
-            path,
-            list(self.variables.values()),
-            [block],
-            self.parameters,
-            self.metadata,
-            overwrite=overwrite,
-        )
+        variables = list(self.variables.values())
+        arrays = {v.name: self.lanes(v.name) for v in variables if v.values is None}
+        blocks = [(0, math.prod(self[axis].size for axis in self.axes), arrays)]
+        write_result(path, variables, blocks, self.parameters, self.metadata, overwrite=overwrite)
 
-    def to_xarray(self) -> Any:
-        """Give an `xarray.Dataset` of everything; raises FileError if xarray is not installed."""
-        from gearchaos.results.tables import dataset
-
-        return dataset(self)
-
-    def to_dataframe(self, *along: str) -> Any:
-        """Give a `pandas.DataFrame` with a row per lane, or per lane and, say, "section_point".
-
-        Raises ConfigurationError if nothing runs along it, FileError if pandas is not installed.
-        """
-        from gearchaos.results.tables import table
-
-        return table(self, along)
+    to_xarray, to_dataframe = tables.to_xarray, tables.to_dataframe
 
     def _repr_html_(self) -> str:
         head, *_ = repr(self).splitlines()
@@ -230,13 +214,6 @@ class Result:
         if name not in self._data:
             raise KeyError(f"no variable {name!r} in this result; there are {', '.join(self)}")
         return name
-
-
-def _array(variable: Variable, data: Mapping[str, Any]) -> NDArray[Any]:
-    values = data.get(variable.name, variable.values)
-    if values is None:
-        raise ValueError(f"no values for the variable {variable.name}")
-    return np.asarray(values, dtype=variable.dtype)
 
 
 def section_variables(result: Result) -> tuple[str, ...]:

@@ -5,8 +5,11 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
+from io import FileIO
 from itertools import pairwise
+from pathlib import Path
 from typing import Any, TypeAlias
 
 import h5py
@@ -16,7 +19,6 @@ from numpy.typing import NDArray
 from gearchaos.interrupts import check
 from gearchaos.results.atomic_file import replacing
 from gearchaos.results.checksum_line import append_checksum
-from gearchaos.results.sink import Sink
 from gearchaos.results.variables import HARMONIC, Variable, diagram_axis, lane_axes
 
 SCHEMA = "gearchaos-sweep"
@@ -28,7 +30,6 @@ DIMS = "dims"
 ORIGINS = ("given", "derived", "default", "swept")
 Block: TypeAlias = tuple[int, int, Mapping[str, NDArray[Any]]]
 Metadata: TypeAlias = Mapping[str, str | int | float]
-Box: TypeAlias = tuple[slice, ...]
 
 _CHUNK_BYTES = 1 << 19
 _LONGEST_ATTRIBUTE = 32_000
@@ -59,12 +60,8 @@ class Parameter:
 
 def own_metadata(axes: Sequence[str]) -> dict[str, str]:
     """Give the root attributes that tell a reader what it has before it."""
-    return {
-        "schema": SCHEMA,
-        "schema_version": SCHEMA_VERSION,
-        "axes": " ".join(axes),
-        "axis": diagram_axis(axes),
-    }
+    schema = {"schema": SCHEMA, "schema_version": SCHEMA_VERSION}
+    return {**schema, "axes": " ".join(axes), "axis": diagram_axis(axes)}
 
 
 def write_result(
@@ -117,7 +114,7 @@ def write_result(
         append_checksum(partial)
 
 
-def hyperslabs(first: int, last: int, shape: Sequence[int]) -> Iterator[Box]:
+def hyperslabs(first: int, last: int, shape: Sequence[int]) -> Iterator[tuple[slice, ...]]:
     """Cut the lanes first to last - 1 of an array in C order into boxes, in their order."""
     row = math.prod(shape[1:])
     # Whole rows in the middle, and what precedes and follows them in rows of their own.
@@ -129,6 +126,54 @@ def hyperslabs(first: int, last: int, shape: Sequence[int]) -> Iterator[Box]:
         else:
             for box in hyperslabs(begin - number * row, end - number * row, shape[1:]):
                 yield slice(number, number + 1), *box
+
+
+class Sink(FileIO):
+    """A file that is emptied and open for writing, and remembers its first failure.
+
+    The HDF5 library ends the process with a segmentation fault when the disk turns out to be full
+    while it closes a file. So it is never told: it writes into a sink, whose error is raised later.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._error: BaseException | None = None
+        # Unbuffered: the error of a buffered write would surface in any later call.
+        super().__init__(path, "w+")
+
+    def __exit__(self, *fault: Any) -> None:
+        with self._remembering():
+            self.close()
+        # An error that HDF5 has met in what it reads back is but a consequence of ours.
+        if fault[0] is None or issubclass(fault[0], Exception):
+            self.check()
+
+    def check(self) -> None:
+        """Raise the first failure, if there was one."""
+        if self._error is not None:
+            raise self._error
+
+    def write(self, data: Any) -> int:
+        """Write all of it, or nothing once something has failed."""
+        with self._remembering():
+            left = memoryview(data).cast("B")
+            while left and self._error is None:
+                left = left[super().write(left) :]
+        return len(data)
+
+    def truncate(self, size: int | None = None) -> int:
+        """Set the size, unless something has failed."""
+        with self._remembering():
+            if self._error is None:
+                super().truncate(size)
+        return size or 0
+
+    @contextmanager
+    def _remembering(self) -> Iterator[None]:
+        try:
+            yield
+        except BaseException as error:
+            # An interrupt, too, must not reach the library.
+            self._error = self._error or error
 
 
 def _write_metadata(file: h5py.File, metadata: Metadata) -> None:
@@ -150,16 +195,9 @@ def _harmonics(parameters: Mapping[str, Parameter]) -> list[Variable]:
 
 
 def _create(file: h5py.File, variable: Variable, shape: tuple[int, ...]) -> None:
-    dataset = file.create_dataset(
-        variable.name,
-        shape,
-        variable.dtype,
-        data=variable.values,
-        fillvalue=variable.fill_value,
-        chunks=_chunks(shape, np.dtype(variable.dtype).itemsize),
-        track_order=True,
-        **_PACKED,
-    )
+    chunks = _chunks(shape, np.dtype(variable.dtype).itemsize)
+    how = {**_PACKED, "chunks": chunks, "fillvalue": variable.fill_value, "track_order": True}
+    dataset = file.create_dataset(variable.name, shape, variable.dtype, variable.values, **how)
     if variable.dims == (variable.name,):
         dataset.make_scale(variable.name)
     _describe(dataset, variable.attributes)

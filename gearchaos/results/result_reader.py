@@ -1,10 +1,11 @@
-"""Reading a result file, and refusing with one sentence whatever is not one."""
+"""Reading and verifying a result file, and refusing with one sentence whatever is not one."""
 
 from __future__ import annotations
 
 import os
 import stat
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -14,32 +15,13 @@ from numpy.typing import NDArray
 
 from gearchaos.errors import FileError
 from gearchaos.gear.group_table import LARGEST_VALUE
+from gearchaos.results import stored_dataset as stored
+from gearchaos.results import variables as known
 from gearchaos.results.atomic_file import reason
 from gearchaos.results.checksum_line import checksum_fits
 from gearchaos.results.result_file import ORIGINS, PARAMETERS, SCHEMA, SCHEMA_VERSION, Parameter
-from gearchaos.results.stored_dataset import (
-    UnfitError,
-    datasets_of,
-    dims_of,
-    dtype_of,
-    scalars_of,
-    text_of,
-    values_of,
-)
-from gearchaos.results.variables import (
-    ALL_EXPONENTS,
-    HARMONIC,
-    LARGEST_EXPONENT,
-    RECORD,
-    REPEATS,
-    SECTION,
-    SECTION_POINT,
-    STATE,
-    STATUS,
-    Axis,
-    Variable,
-    sweep_variables,
-)
+from gearchaos.results.stored_dataset import UnfitError
+from gearchaos.results.variables import HARMONIC, STATE, Axis, Variable
 
 Contents = tuple[
     list[Variable], dict[str, NDArray[Any]], dict[str, Parameter], dict[str, str | int | float]
@@ -90,6 +72,32 @@ def read_result(path: str | os.PathLike[str], *, rows: bool = True) -> Contents:
         raise FileError(f"{name}: is damaged ({why}); run the sweep again") from error
 
 
+def verify(path: str | os.PathLike[str]) -> list[str]:
+    """Read all of a result file, piece by piece, and say what was found sound, a phrase each.
+
+    Raises FileError if anything is damaged or contradicts the format; it names arrays and rows.
+    """
+    try:
+        variables, _, parameters, metadata = read_result(path, rows=False)
+    except FileError as error:
+        raise FileError([*error.problems, *_damaged_pieces(path)]) from error
+    # Of a large file the reader has not tried the checksum.
+    fits = checksum_fits(Path(path))
+    damage = f"{path}: is damaged (its checksum does not fit); run the sweep again"
+    if problems := [*([damage] if fits is False else []), *_damaged_pieces(path)]:
+        raise FileError(problems)
+    with h5py.File(path, "r") as file:
+        datasets = stored.datasets_of(file).values()
+        summed = sum(one.id.get_num_chunks() for one in datasets if one.fletcher32)
+    foreign = "there is no checksum of the file: another program than gearchaos has written to it"
+    return [
+        foreign if fits is None else "the checksum of the file fits",
+        f"{summed} chunks of numbers fit their checksums",
+        f"format {metadata['schema']} {metadata['schema_version']}: {len(variables)} variables and "
+        f"{len(parameters)} {PARAMETERS} have their types, dimensions and sizes",
+    ]
+
+
 def fixed_coordinates(metadata: Mapping[str, Any]) -> dict[str, float]:
     """Read the root attribute ``fixed``, such as ``start=1.0``; ValueError if it is none."""
     pairs = (entry.rpartition("=") for entry in str(metadata.get("fixed", "")).split())
@@ -109,43 +117,57 @@ def printable(text: str) -> str:
     return "".join(c if c.isprintable() else "\N{REPLACEMENT CHARACTER}" for c in text)
 
 
+def _damaged_pieces(path: str | os.PathLike[str]) -> Iterator[str]:
+    """Name the arrays, and the rows of them, that cannot be read; one sentence each."""
+    # Where the damage has reached further, the reader has said so already.
+    if Path(path).is_file():
+        with suppress(Exception), h5py.File(path, "r") as file:
+            for name, dataset in stored.datasets_of(file).items():
+                for piece in dataset.iter_chunks() if dataset.chunks else [()]:
+                    try:
+                        dataset[piece]
+                    except OSError:
+                        rows = f", rows {piece[0].start} to {piece[0].stop - 1}" if piece else ""
+                        yield f"{path}: is damaged in {name}{rows}"
+
+
 def _read(file: h5py.File, rows: bool) -> Contents:
-    metadata = scalars_of(file)
+    metadata = stored.scalars_of(file)
     _check_schema(metadata)
     axes = tuple(str(metadata.get("axes", "")).split())
-    datasets = datasets_of(file)
+    datasets = stored.datasets_of(file)
     grouped = {name: datasets.pop(name) for name in list(datasets) if "/" in name}
     variables: dict[str, Variable] = {}
     data: dict[str, NDArray[Any]] = {}
     sizes: dict[str, int] = {}
     for name, dataset in datasets.items():
-        text = text_of(dataset)
+        text = stored.text_of(dataset)
         if text is not None:
             metadata[name] = text
             continue
-        notes = scalars_of(dataset)
-        dims = dims_of(name, dataset, notes, sizes)
+        notes = stored.scalars_of(dataset)
+        dims = stored.dims_of(name, dataset, notes, sizes)
         if name != HARMONIC:
             if rows or len(dims) == 1 or set(dims) <= set(axes):
-                data[name] = values_of(name, dataset)
+                data[name] = stored.values_of(name, dataset)
             flags = tuple(str(notes.get("flag_meanings", "")).split())
             more: dict[str, Any] = {"fill_value": notes.get("_FillValue"), "flags": flags}
-            wording, dtype = _wording(notes), dtype_of(name, dataset)
-            variables[name] = Variable(name, dims, dtype, **wording, **more)
+            dtype = stored.dtype_of(name, dataset)
+            variables[name] = Variable(name, dims, dtype, **_wording(notes), **more)
     _check_variables(axes, variables, data)
     for dim in sizes.keys() - {HARMONIC}:
         if dim not in variables or variables[dim].dims != (dim,):
             raise UnfitError(f"lacks the variable {dim}, whose dimension others have")
     fixed_coordinates(metadata)
     parameters = {}
-    for name, dataset in grouped.items():
-        notes = scalars_of(dataset)
-        dims, name = dims_of(name, dataset, notes, sizes), name.removeprefix(f"{PARAMETERS}/")
+    for path, dataset in grouped.items():
+        notes, name = stored.scalars_of(dataset), path.removeprefix(f"{PARAMETERS}/")
+        dims = stored.dims_of(path, dataset, notes, sizes)
         origin = str(notes.get("origin"))
         of_the_model = dims == (HARMONIC,) or dims == tuple(a for a in axes if a in dims)
         if dataset.dtype.str[1:] != "f8" or not of_the_model or origin not in ORIGINS:
             raise UnfitError(f"holds a parameter {name} that is none")
-        values = values_of(name, dataset)
+        values = stored.values_of(name, dataset)
         value = values if dims else float(values)
         parameters[name] = Parameter(value, origin, **_wording(notes), dims=dims)
     return list(variables.values()), data, parameters, metadata
@@ -159,17 +181,18 @@ def _wording(notes: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _check_schema(metadata: Mapping[str, Any]) -> None:
-    if metadata.get("schema") == SEARCH:
+    schema, version = metadata.get("schema"), str(metadata.get("schema_version", ""))
+    own = SCHEMA_VERSION.split(".")[0]
+    if schema == SEARCH:
         raise UnfitError(
             "holds the candidates of a search, not the result of a sweep",
             "`gearchaos identify TARGETS.toml --resume` goes on with it and reports what it found",
         )
-    if metadata.get("schema") != SCHEMA:
+    if schema != SCHEMA:
         raise UnfitError(
             f'is not a gearchaos result: it lacks the attribute schema = "{SCHEMA}"',
             "give the name of a file that a sweep has written",
         )
-    version, own = str(metadata.get("schema_version", "")), SCHEMA_VERSION.split(".")[0]
     if version.split(".")[0] != own:
         raise UnfitError(
             f"has version {version!r} of the file format, of which this gearchaos reads {own}.x",
@@ -185,18 +208,23 @@ def _check_variables(
         raise UnfitError("does not name its axes, each once")
     if STATE not in data:
         raise UnfitError(f"lacks the variable {STATE}")
-    expected = sweep_variables(
-        [Axis(name, "", "", "", np.zeros(1, "i4" if name in REPEATS else "f8")) for name in axes],
+    expected = known.sweep_variables(
+        [
+            Axis(name, "", "", "", np.zeros(1, "i4" if name in known.REPEATS else "f8"))
+            for name in axes
+        ],
         states=found[STATE].flags,
-        section=[n.removeprefix(SECTION) for n in found if n.startswith(f"{SECTION}delta_")],
-        section_points=np.size(data.get(SECTION_POINT, ())),
-        lyapunov=LARGEST_EXPONENT in found,
+        section=[
+            n.removeprefix(known.SECTION) for n in found if n.startswith(f"{known.SECTION}delta_")
+        ],
+        section_points=np.size(data.get(known.SECTION_POINT, ())),
+        lyapunov=known.LARGEST_EXPONENT in found,
         status_meanings=(),
         crossings="crossings_per_period" in found,
-        exponents=ALL_EXPONENTS in found,
+        exponents=known.ALL_EXPONENTS in found,
         check_meanings=["same"] if "motion_changed" in found else [],
         motion_meanings=["periodic"] if "motion" in found else [],
-        record_meanings=["uniform"] if RECORD in found else [],
+        record_meanings=["uniform"] if known.RECORD in found else [],
     )
     for due in expected:
         got = found.get(due.name)
@@ -211,6 +239,6 @@ def _check_variables(
         if not is_coordinate(data[name]):
             rule = f"do not ascend, each once, between -{LARGEST_VALUE:g} and {LARGEST_VALUE:g}"
             raise UnfitError(f"holds values of {name} that {rule}")
-    for name in {STATUS, STATE, "motion"} & found.keys():
+    for name in {known.STATUS, STATE, "motion"} & found.keys():
         if data[name].max() >= max(1, len(found[name].flags)):
             raise UnfitError(f"holds a {name} without a meaning")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from heapq import heapify, heappop, heappush
 from itertools import pairwise
 from typing import NamedTuple
@@ -21,21 +20,24 @@ class LabelledLanes(NamedTuple):
     """Lanes in ascending order of the swept value, one per value.
 
     ``values``, ``exponent`` (lanes,): not a number where no exponent is known; ``labels`` (lanes,):
-    such as "period 3" or "chaotic"; ``period`` (lanes,) in mesh periods, 0 where not periodic.
+    such as "period 3" or "chaotic"; ``period`` (lanes,) in mesh periods, 0 where not periodic;
+    ``bands`` (lanes,): 0 where the motion has none, or nobody has counted them.
     """
 
     values: Floats
     labels: NDArray[np.str_]
     period: NDArray[np.int32]
     exponent: Floats
+    bands: NDArray[np.int32]
 
 
 class Stage(NamedTuple):
     """A stretch of the swept parameter with one kind of motion.
 
     ``first``, ``last``: the numbers of its outermost lanes; ``start``, ``end``: their values;
-    ``narrower``: stages between them that are too narrow to be told apart; the exponents
-    are those of the lanes with its own label.
+    ``narrower``: stages between them that are too narrow to be told apart; ``lanes``: their number,
+    those of narrower stages among them; the exponents, and ``bands``, which counts lanes by the
+    number of their bands, are those of the lanes with its own label.
     """
 
     first: int
@@ -47,11 +49,8 @@ class Stage(NamedTuple):
     narrower: int
     lowest_exponent: float
     highest_exponent: float
-
-    @property
-    def lanes(self) -> int:
-        """Number of its lanes, those of narrower stages among them."""
-        return self.last - self.first + 1
+    lanes: int
+    bands: dict[int, int]
 
 
 class _Stretch(NamedTuple):
@@ -77,14 +76,13 @@ def labelled_lanes(result: Result, *, name: str = "the result") -> LabelledLanes
             f"{name}: has {len(result.axes)} axes ({', '.join(result.axes)}), stages lie along "
             "one; fix the others with sel (--at)"
         )
-    meanings, period = result.variables["motion"].flags, result["period"]
-    labels = [
-        label_text(meanings[motion], int(n))
-        for motion, n in zip(result["motion"], period, strict=True)
-    ]
+    motion, period = result["motion"].tolist(), result["period"]
+    meanings = result.variables["motion"].flags
+    labels = [label_text(meanings[m], n) for m, n in zip(motion, period.tolist(), strict=True)]
     known = LARGEST_EXPONENT in result
     exponent = result[LARGEST_EXPONENT] if known else np.full(period.shape, np.nan)
-    return LabelledLanes(result[result.axis], np.array(labels), period, exponent)
+    bands = result[BANDS] if BANDS in result else np.zeros_like(period)
+    return LabelledLanes(result[result.axis], np.array(labels), period, exponent, bands)
 
 
 def one_axis(result: Result, **coordinates: float) -> Result:
@@ -101,25 +99,12 @@ def one_axis(result: Result, **coordinates: float) -> Result:
 
 def slice_facts(result: Result, part: Result) -> dict[str, dict[str, float]]:
     """Tell of each axis that a slice lacks at which value, which of how many, it was fixed."""
-    return {
-        name: {
-            "value": part.fixed[name],
-            "number": int(np.searchsorted(result[name], part.fixed[name])) + 1,
-            "of": result[name].size,
-        }
-        for name in result.axes
-        if name not in part.axes
-    }
-
-
-def slice_lines(facts: dict[str, dict[str, float]]) -> list[str]:
-    """Word `slice_facts`, one line per axis."""
-    return [
-        f"slice {name} = {at['value']:.6g}, "
-        f"{'the first' if at['number'] == 1 else 'number {number}'.format(**at)} of {at['of']}; "
-        f"others with --at {name}=VALUE"
-        for name, at in facts.items()
-    ]
+    facts = {}
+    for name in (name for name in result.axes if name not in part.axes):
+        value, values = part.fixed[name], result[name]
+        number = int(np.searchsorted(values, value)) + 1
+        facts[name] = {"value": value, "number": number, "of": values.size}
+    return facts
 
 
 def label_text(meaning: str, period: int) -> str:
@@ -150,16 +135,13 @@ def stage_table(lanes: LabelledLanes, narrowest: float = 0.0) -> list[Stage]:
         _, stretch = heappop(heap)
         if by_first.get(stretch.first) is not stretch:
             continue  # It has become part of another one since.
-        beside = [by_after.get(stretch.first), by_first.get(stretch.after)]
+        beside = by_after.get(stretch.first), by_first.get(stretch.after)
         there = [neighbour for neighbour in beside if neighbour is not None]
         label = lanes.labels[max(there, key=width).own]
         merged = [near for near in there if lanes.labels[near.own] == label] + [stretch]
-        whole = _Stretch(
-            min(old.first for old in merged),
-            max(old.after for old in merged),
-            merged[0].own,
-            1 + sum(old.narrower for old in merged),
-        )
+        first, after = min(old.first for old in merged), max(old.after for old in merged)
+        narrower = 1 + sum(old.narrower for old in merged)
+        whole = _Stretch(first, after, merged[0].own, narrower)
         for old in merged:
             del by_first[old.first], by_after[old.after]
         by_first[whole.first] = by_after[whole.after] = whole
@@ -167,35 +149,15 @@ def stage_table(lanes: LabelledLanes, narrowest: float = 0.0) -> list[Stage]:
     return [_stage(lanes, *by_first[first]) for first in sorted(by_first)]
 
 
-def band_counts(result: Result, stages: Sequence[Stage]) -> list[dict[int, int]]:
-    """Count in every stage the lanes with its own label by the number of their bands.
-
-    Empty where the motion has none, or the result, which has one axis, does not tell.
-    """
-    if BANDS not in result:
-        return [{} for _ in stages]
-    labels, counts = labelled_lanes(result).labels, []
-    for stage in stages:
-        inside = slice(stage.first, stage.last + 1)
-        bands = result[BANDS][inside][labels[inside] == stage.label]
-        numbers, lanes = np.unique(bands[bands > 0], return_counts=True)
-        counts.append(dict(zip(numbers.tolist(), lanes.tolist(), strict=True)))
-    return counts
-
-
 def _stage(lanes: LabelledLanes, first: int, after: int, own: int, narrower: int) -> Stage:
-    label = str(lanes.labels[own])
-    inside = slice(first, after)
-    exponents = lanes.exponent[inside][lanes.labels[inside] == label]
-    known = exponents[np.isfinite(exponents)]
+    label, period = str(lanes.labels[own]), int(lanes.period[own])
+    start, end = lanes.values[[first, after - 1]].tolist()
+    alike = first + np.flatnonzero(lanes.labels[first:after] == label)
+    exponent, bands = lanes.exponent[alike], lanes.bands[alike]
+    known = exponent[np.isfinite(exponent)]
+    low, high = (float(extreme.reduce(known, initial=np.nan)) for extreme in (np.fmin, np.fmax))
+    numbers, counts = np.unique(bands[bands > 0], return_counts=True)
+    by_bands = dict(zip(numbers.tolist(), counts.tolist(), strict=True))
     return Stage(
-        first,
-        after - 1,
-        float(lanes.values[first]),
-        float(lanes.values[after - 1]),
-        label,
-        int(lanes.period[own]),
-        narrower,
-        float(known.min()) if known.size else float("nan"),
-        float(known.max()) if known.size else float("nan"),
+        first, after - 1, start, end, label, period, narrower, low, high, after - first, by_bands
     )

@@ -24,18 +24,22 @@ def needed(package: str) -> Any:
         raise FileError(f"{text}; pip install gearchaos[export]") from error
 
 
-def dataset(result: Result) -> Any:
-    """Give the xarray.Dataset of a result, as `xarray.open_dataset` does of its file."""
+def to_xarray(result: Result) -> Any:
+    """Give an `xarray.Dataset` of everything, as `xarray.open_dataset` does of the file.
+
+    Raises FileError if xarray is not installed.
+    """
     xarray = needed("xarray")
     arrays = {name: (result.dims(name), result[name], result.attributes(name)) for name in result}
     coordinates = {name: arrays.pop(name) for name in result if result.dims(name) == (name,)}
     return xarray.Dataset(arrays, coordinates, result.metadata)
 
 
-def table(result: Result, along: Sequence[str] = ()) -> Any:
-    """Give the pandas.DataFrame of what runs over the axes and these dimensions, flags as words.
+def to_dataframe(result: Result, *along: str) -> Any:
+    """Give a `pandas.DataFrame` with a row per lane, or per lane and, say, "section_point".
 
-    Raises ConfigurationError if no variable runs over them, FileError if pandas is missing.
+    Flags are words. Raises ConfigurationError if nothing runs along it, FileError if pandas is not
+    installed.
     """
     pandas, dims = needed("pandas"), (*result.axes, *along)
     columns: dict[str, Any] = {}
@@ -60,7 +64,7 @@ def write(result: Result, path: Path, kind: str, along: Sequence[str] = ()) -> N
         arrays = {**{name: result[name] for name in result}, **words, "metadata": result.metadata}
         needed("scipy.io").savemat(path, arrays, appendmat=False)
     elif kind == "csv":
-        table(result, along).to_csv(path)
+        to_dataframe(result, *along).to_csv(path)
     else:
         needed("pyarrow")
-        table(result, along).to_parquet(path, engine="pyarrow")
+        to_dataframe(result, *along).to_parquet(path, engine="pyarrow")

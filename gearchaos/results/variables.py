@@ -142,84 +142,69 @@ def sweep_variables(
     computed twice to measure their error, and of ``motion`` and ``record`` where they are labelled.
     """
     names = tuple(axis.name for axis in axes)
-
-    def real(name: str, text: str, symbol: str = "", *dims: str) -> Variable:
-        return Variable(name, (*names, *dims), "float64", "1", text, symbol, float("nan"))
-
-    def count(name: str, text: str, symbol: str = "", fill_value: int | None = None) -> Variable:
-        return Variable(name, names, "int32", "1", text, symbol, fill_value)
-
-    def kind(name: str, text: str, meanings: Sequence[str]) -> Variable:
-        flags = tuple("_".join(meaning.split()) for meaning in meanings)
-        return Variable(name, names, "uint8", "1", text, flags=flags)
-
     variables = [
         _coordinate(one.name, one.values, one.long_name, one.symbol, one.units) for one in axes
     ]
+
+    def add(dtype: str, name: str, text: str, symbol: str = "", *dims: str, **more: Any) -> None:
+        variables.append(Variable(name, (*names, *dims), dtype, "1", text, symbol, **more))
+
+    def real(name: str, text: str, symbol: str = "", *dims: str) -> None:
+        add("float64", name, text, symbol, *dims, fill_value=float("nan"))
+
+    def kind(name: str, text: str, meanings: Sequence[str]) -> None:
+        add("uint8", name, text, flags=tuple("_".join(meaning.split()) for meaning in meanings))
+
     if section and section_points > 0:
         text = "number of the section point, one mesh period apart; the last one ends the lane"
         variables.append(_coordinate(SECTION_POINT, np.arange(section_points), text))
         for state in section:
             text, symbol = STATE_WORDING[state]
-            text += " at the stroboscopic section"
-            variables.append(real(SECTION + state, text, symbol, SECTION_POINT))
+            real(SECTION + state, f"{text} at the stroboscopic section", symbol, SECTION_POINT)
     if lyapunov:
         name, text = LARGEST_EXPONENT, "largest Lyapunov exponent"
-        error = f"standard error of the {text}, 0 where it is that of a periodic orbit"
-        variables.append(real(name, text, r"$\lambda_1$"))
-        variables.append(real(name + STANDARD_ERROR, error, r"$s_{\lambda_1}$"))
+        real(name, text, r"$\lambda_1$")
+        text = f"standard error of the {text}, 0 where it is that of a periodic orbit"
+        real(name + STANDARD_ERROR, text, r"$s_{\lambda_1}$")
     if motion_meanings:
-        period = "mesh periods after which the motion repeats, 0 where it is not periodic"
+        kind("motion", "kind of motion", motion_meanings)
+        text = "mesh periods after which the motion repeats, 0 where it is not periodic"
+        add("int32", "period", text, "$n$")
         text = "smallest distance after which the motion returns, of all states, scaled"
-        bands = (
-            "bands a chaotic or quasi-periodic section hops between in turn, 0 for other motions"
-        )
-        variables += [
-            kind("motion", "kind of motion", motion_meanings),
-            count("period", period, "$n$"),
-            real("return_distance", text),
-            count(BANDS, bands),
-        ]
+        real("return_distance", text)
+        text = "bands a chaotic or quasi-periodic section hops between in turn, 0 for other motions"
+        add("int32", BANDS, text)
     if record_meanings:
         text = "whether the record holds one kind of motion, or another one before the labelled one"
-        variables.append(kind(RECORD, text, record_meanings))
+        kind(RECORD, text, record_meanings)
     if exponents:
-        name, error = ALL_EXPONENTS, "standard error of each Lyapunov exponent"
         text = "number of the Lyapunov exponent, the largest first"
-        total = "sum of all Lyapunov exponents as the damping gives it, exactly"
-        variables += [
-            _coordinate(EXPONENT_NUMBER, np.arange(1, len(states) + 1), text, "$i$"),
-            real(name, "all Lyapunov exponents", r"$\lambda_i$", EXPONENT_NUMBER),
-            real(name + STANDARD_ERROR, error, "", EXPONENT_NUMBER),
-            real("lyapunov_sum", total, r"$\sum\lambda_i$"),
-        ]
+        numbers = np.arange(1, len(states) + 1)
+        variables.append(_coordinate(EXPONENT_NUMBER, numbers, text, "$i$"))
+        real(ALL_EXPONENTS, "all Lyapunov exponents", r"$\lambda_i$", EXPONENT_NUMBER)
+        text = "standard error of each Lyapunov exponent"
+        real(ALL_EXPONENTS + STANDARD_ERROR, text, "", EXPONENT_NUMBER)
+        text = "sum of all Lyapunov exponents as the damping gives it, exactly"
+        real("lyapunov_sum", text, r"$\sum\lambda_i$")
     if crossings:
         text = "clearance boundaries crossed per mesh period, tangential and axial together"
-        slow = "smallest speed of a gap at a crossing of its clearance boundary"
-        variables += [
-            real("crossings_per_period", text),
-            real("slowest_crossing", slow),
-            count("unsplit_steps", "steps with more crossings than they were split at"),
-        ]
+        real("crossings_per_period", text)
+        real("slowest_crossing", "smallest speed of a gap at a crossing of its clearance boundary")
+        add("int32", "unsplit_steps", "steps with more crossings than they were split at")
     if check_meanings:
-        text = "change of the section of a periodic lane when the step is halved"
-        exponent = "change of the largest Lyapunov exponent when the step is halved"
-        motion = "whether the lane moves in another way when the step is halved"
-        variables += [
-            real("section_error", text),
-            real(STEP_ERROR, exponent),
-            kind("motion_changed", motion, check_meanings),
-        ]
-    diverged = "mesh period in which the lane diverged, -1 where it did not"
+        halved = "when the step is halved"
+        real("section_error", f"change of the section of a periodic lane {halved}")
+        real(STEP_ERROR, f"change of the largest Lyapunov exponent {halved}")
+        kind("motion_changed", f"whether the lane moves in another way {halved}", check_meanings)
+    kind(STATUS, "status of the lane", status_meanings)
+    text = "mesh period in which the lane diverged, -1 where it did not"
+    add("int32", "diverged_period", text, fill_value=-1)
     text = "number of the state variable, which its meaning names"
-    return [
-        *variables,
-        kind(STATUS, "status of the lane", status_meanings),
-        count("diverged_period", diverged, fill_value=-1),
-        replace(_coordinate(STATE, np.arange(len(states)), text), flags=tuple(states)),
-        real("start_state", "state at the start of the lane", "", STATE),
-        real("end_state", "state at the end of the lane", "", STATE),
-    ]
+    numbered = _coordinate(STATE, np.arange(len(states)), text)
+    variables.append(replace(numbered, flags=tuple(states)))
+    for end in ("start", "end"):
+        real(f"{end}_state", f"state at the {end} of the lane", "", STATE)
+    return variables
 
 
 def step_choice_variables(

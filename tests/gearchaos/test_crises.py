@@ -5,7 +5,7 @@ import pytest
 
 from gearchaos.records.crisis import grows_at
 from gearchaos.records.label import CHAOTIC, MEANINGS, PERIODIC
-from gearchaos.results.crises import crises
+from gearchaos.results.jumps import crises
 from gearchaos.results.result import Result
 from gearchaos.results.variables import Axis, sweep_variables
 

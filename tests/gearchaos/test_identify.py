@@ -11,11 +11,12 @@ import numpy as np
 import pytest
 
 from gearchaos.errors import ConfigurationError, FileError
-from gearchaos.identification import evaluation, searching
+from gearchaos.identification import evaluation
+from gearchaos.identification import search as searching
 from gearchaos.identification.evaluation import require_stable
 from gearchaos.identification.loading import load_targets
 from gearchaos.identification.report import _row, reach
-from gearchaos.identification.searching import Judge, decisive_facts, search
+from gearchaos.identification.search import Judge, decisive_facts, search
 from gearchaos.identification.tried import Tried, read_tried, write_tried
 from gearchaos.identify import main
 from gearchaos.results.result import open_result
@@ -170,7 +171,7 @@ class TestALinearPair:
         tried, facts = tried_of(identified)
         judge = Judge(problem_of(identified))
         some = {"damping_ratio": tried.values[:5, 0], "pitch_error_amplitude": tried.values[:5, 1]}
-        again = judge.judge_values(0, some)
+        again = judge.judge(0, some)
         assert np.array_equal(again.misfit, tried.misfit[:5])
         assert np.array_equal(again.computed, tried.computed[:5])
         assert (tried.run == 0).sum() == 40

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 
 from gearchaos.errors import ConfigurationError, FileError
 from gearchaos.results import stage_table as table_module
+from gearchaos.results.overview import slice_lines
 from gearchaos.results.result import Result
 from gearchaos.results.stage_table import (
     LabelledLanes,
@@ -18,7 +19,6 @@ from gearchaos.results.stage_table import (
     labelled_lanes,
     one_axis,
     slice_facts,
-    slice_lines,
     stage_table,
 )
 
@@ -33,6 +33,7 @@ def lanes(labels: str, values: list[float] | None = None) -> LabelledLanes:
         np.array(words),
         np.array([int(letter) if letter.isdigit() else 0 for letter in labels], dtype=np.int32),
         np.arange(float(len(labels))) - 3.0,
+        np.zeros(len(labels), dtype=np.int32),
     )
 
 
