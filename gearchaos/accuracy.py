@@ -112,8 +112,6 @@ def _numbers_of_steps(text: str) -> list[int]:
 
 
 def _write(settings: Sequence[Setting], title: str, targets: list[str], overwrite: bool) -> None:
-    from gearchaos_kernels import current_threads
-
     from gearchaos.engine.provenance import provenance
     from gearchaos.figures.files import save_figure
     from gearchaos.figures.work_precision import work_precision_page
@@ -130,7 +128,7 @@ def _write(settings: Sequence[Setting], title: str, targets: list[str], overwrit
         "title": title,
         "truth": f"{TRUTH_STEPS} flow maps per mesh period",
         "settings": [setting._asdict() for setting in settings],
-        "machine": provenance(current_threads(), sum(setting.seconds for setting in settings)),
+        "machine": provenance(sum(setting.seconds for setting in settings)),
     }
     with replacing(table_file, overwrite=overwrite) as partial_file:
         partial_file.write_text(json.dumps(facts, indent=1), encoding="utf-8")

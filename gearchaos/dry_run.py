@@ -10,8 +10,9 @@ import time
 from datetime import timedelta
 from pathlib import Path
 
+import numba
 import numpy as np
-from gearchaos_kernels import LANES, current_threads
+from gearchaos_kernels import LANES
 from tqdm import tqdm
 
 from gearchaos.configuration import Configuration, swept_values
@@ -27,7 +28,7 @@ SAMPLE_PERIODS = 1000
 
 def describe(simulation: Simulation, output: str, shard: Shard | None, as_json: bool) -> None:
     """Say what a run, or one shard of it, would compute, judged by a sample of its lanes."""
-    config, lanes, threads = simulation.config, simulation.lanes, current_threads()
+    config, lanes, threads = simulation.config, simulation.lanes, numba.get_num_threads()
     every = len(lanes)
     own = every if shard is None else sum(last - first for first, last in shard.blocks(every))
     seconds = own * _seconds_per_lane(simulation)
@@ -77,7 +78,7 @@ def _seconds_per_lane(simulation: Simulation) -> float:
 
     A whole block: what is checked, or looked at again, is computed in vectors of lanes.
     """
-    lanes = simulation.block_lanes(current_threads()) / (8 if simulation.carried else 1)
+    lanes = simulation.block_lanes(numba.get_num_threads()) / (8 if simulation.carried else 1)
     periods = simulation.plan.transient_periods + simulation.plan.recorded_periods
     seconds = math.nan
     with notice("computing some lanes, to tell how long all take"):
@@ -119,7 +120,7 @@ def _thinned(simulation: Simulation, share: float, length: float) -> Configurati
 
 def _memory(simulation: Simulation) -> int:
     """Return about how many bytes the process takes at most: as many as so far, and a block."""
-    block = simulation.block_memory(current_threads())
+    block = simulation.block_memory(numba.get_num_threads())
     try:
         # Linux counts for getrusage what the process that began this one took.
         status = Path("/proc/self/status").read_text("utf-8")

@@ -82,8 +82,6 @@ def _scored(problem: Problem, judge: Judge, path: str) -> Tried:
 
 
 def _searched(problem: Problem, judge: Judge, options: Namespace) -> Tried:
-    from gearchaos_kernels import current_threads
-
     from gearchaos.engine.provenance import provenance
     from gearchaos.identification.evaluation import require_stable
     from gearchaos.identification.search import MOST_CENTRES, RUNGS
@@ -114,7 +112,7 @@ def _searched(problem: Problem, judge: Judge, options: Namespace) -> Tried:
         nonlocal kept
         told = {
             "complete": int(complete),
-            **provenance(current_threads(), time.monotonic() - began),
+            **provenance(time.monotonic() - began),
             **facts,
             "title": problem.targets.title,
             "targets": problem.text,

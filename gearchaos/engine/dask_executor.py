@@ -11,12 +11,12 @@ from contextlib import ExitStack
 from functools import lru_cache
 from importlib.util import find_spec
 from threading import Lock, Thread
-from typing import Any, NamedTuple, Self
+from typing import Any, Self
 
 import dask
 import distributed
+import numba
 from dask.utils import parse_timedelta
-from gearchaos_kernels import current_threads, most_threads, use_threads
 
 from gearchaos.configuration import Configuration
 from gearchaos.engine.executors import ExecutionError
@@ -26,10 +26,6 @@ from gearchaos.errors import ConfigurationError
 from gearchaos.interrupts import check
 from gearchaos.progress import notice, say
 from gearchaos.version import Software, software_version
-
-# Its constructors carry no annotations.
-_Client: Any = distributed.Client
-_LocalCluster: Any = distributed.LocalCluster
 
 BLOCKS_PER_WORKER = 2
 """One that is computed, and one that waits, so that a worker need not wait."""
@@ -43,18 +39,6 @@ _SECONDS_BETWEEN_LOOKS = 0.2
 _IGNORE_INTERRUPTS = "import signal; signal.signal(signal.SIGINT, signal.SIG_IGN)"
 
 
-class Recipe(NamedTuple):
-    """All that a worker must know to compute blocks of a sweep.
-
-    ``configuration`` is the resolved one in TOML; the steps are chosen once, not on every worker;
-    ``software`` is what decides the numbers beside it.
-    """
-
-    configuration: str
-    steps_per_period: int
-    software: Software
-
-
 class DaskExecutor:
     """Hands blocks to the workers of a cluster; blocks of a lost worker are run again.
 
@@ -65,9 +49,7 @@ class DaskExecutor:
 
     def __init__(self, simulation: Simulation, address: str) -> None:
         self._address = address
-        self._recipe = Recipe(
-            simulation.config.resolved_toml(), simulation.plan.steps_per_period, SOFTWARE
-        )
+        self._recipe = simulation.config.resolved_toml(), simulation.plan.steps_per_period
         for name in ("distributed", "distributed.client"):
             # What goes wrong comes as an exception.
             logging.getLogger(name).setLevel(logging.CRITICAL)
@@ -109,7 +91,8 @@ class DaskExecutor:
             except BaseException as error:
                 future.set_exception(self._worded(error))
 
-        self._executor.submit(compute_block, self._recipe, block).add_done_callback(pass_on)
+        inner = self._executor.submit(compute_block, SOFTWARE, *self._recipe, block)
+        inner.add_done_callback(pass_on)
         return future
 
     def __enter__(self) -> Self:
@@ -156,27 +139,33 @@ class DaskExecutor:
         return error
 
 
-def compute_block(recipe: Recipe, block: Bounds) -> dict[str, Any]:
-    """Compute a block on a worker; ExecutionError if its software is not that of the client."""
-    if recipe.software != SOFTWARE:
+def compute_block(
+    software: Software, configuration: str, steps: int, block: Bounds
+) -> dict[str, Any]:
+    """Compute a block on a worker; ExecutionError if its software is not that of the client.
+
+    ``configuration`` is the resolved one in TOML; the steps per period are chosen once, not on
+    every worker.
+    """
+    if software != SOFTWARE:
         raise ExecutionError(
             f"the worker {distributed.get_worker().address} has {SOFTWARE}, this process "
-            f"{recipe.software}: install the same on both"
+            f"{software}: install the same on both"
         )
     # A worker of several task threads is one of as many cores: its blocks take turns.
     with _ONE_AT_A_TIME:
-        tasks = distributed.get_worker().state.nthreads
-        use_threads(min(tasks, most_threads()) if tasks > 1 else most_threads())
-        return _simulation(recipe).compute(*block)
+        tasks, most = distributed.get_worker().state.nthreads, numba.config.NUMBA_NUM_THREADS
+        numba.set_num_threads(min(tasks, most) if tasks > 1 else most)
+        return _simulation(configuration, steps).compute(*block)
 
 
 _ONE_AT_A_TIME = Lock()
 
 
 @lru_cache(maxsize=1)
-def _simulation(recipe: Recipe) -> Simulation:
-    simulation = Simulation(Configuration.from_toml(recipe.configuration, "<client>"))
-    simulation.plan = simulation.plan._replace(steps_per_period=recipe.steps_per_period)
+def _simulation(configuration: str, steps: int) -> Simulation:
+    simulation = Simulation(Configuration.from_toml(configuration, "<client>"))
+    simulation.plan = simulation.plan._replace(steps_per_period=steps)
     return simulation
 
 
@@ -210,7 +199,7 @@ def _connected(stack: ExitStack, address: str) -> Any:
     if local is None:
         try:
             with notice(f"{address}: waits up to {_patience():g} s for an answer"):
-                return _answer(lambda: _Client(address), _patience())
+                return _answer(lambda: distributed.Client(address), _patience())
         except (ValueError, TypeError) as error:
             raise ConfigurationError(
                 f"--dask {address}: cannot be the address of a scheduler here ({error}); give one "
@@ -222,21 +211,22 @@ def _connected(stack: ExitStack, address: str) -> Any:
                 f"{address}: no dask scheduler answers ({error}); start one with `dask scheduler` "
                 "or give its address"
             ) from None
-    if not local[1].isdecimal() or not 1 <= int(local[1]) <= most_threads():
+    most = numba.config.NUMBA_NUM_THREADS
+    if not local[1].isdecimal() or not 1 <= int(local[1]) <= most:
         raise ConfigurationError(
-            f"--dask {address}: must be local:N with N from 1 to {most_threads()} workers, or the "
-            "address of a scheduler"
+            f"--dask {address}: must be local:N with N from 1 to {most} workers, or the address of "
+            "a scheduler"
         )
     workers = int(local[1])
-    cluster = _LocalCluster(
+    cluster = distributed.LocalCluster(
         n_workers=workers,
         threads_per_worker=1,
         processes=True,
         dashboard_address="127.0.0.1:0",
         memory_limit=0,
         silence_logs=logging.CRITICAL,
-        env={"NUMBA_NUM_THREADS": str(max(1, current_threads() // workers))},
+        env={"NUMBA_NUM_THREADS": str(max(1, numba.get_num_threads() // workers))},
         preload=[_IGNORE_INTERRUPTS],
     )
     stack.enter_context(cluster)
-    return _Client(cluster)
+    return distributed.Client(cluster)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from functools import partial
 
-from gearchaos_kernels import current_threads
+import numba
 
 from gearchaos.engine.error_check import Tally
 from gearchaos.engine.executors import BlockExecutor, LocalExecutor, compute_blocks
@@ -46,11 +46,11 @@ def fill(
         complain(f"{problem}; it is computed again")
     done = sum(last - first for first, last in finished)
     if cluster is None:
-        size = simulation.block_lanes(current_threads())
+        size = simulation.block_lanes(numba.get_num_threads())
         missing = simulation.in_order(store.missing(finished, size))
         readers = {block: partial(store.read, *block) for block in finished}
         executor: BlockExecutor = LocalExecutor(simulation, readers)
-        performed_by = {"threads": current_threads()}
+        performed_by = {}
     else:
         from gearchaos.engine.dask_executor import DaskExecutor
 

@@ -7,7 +7,6 @@ from gearchaos_kernels.evaluation import jacobian, mesh_motion
 from gearchaos_kernels.flow_map import maps_memory
 from gearchaos_kernels.status import STATUS_TEXTS, Status
 from gearchaos_kernels.system import STATES, Effects, Groups, MeshMotion, Outcome, Plan, System
-from gearchaos_kernels.threads import current_threads, most_threads, processor, use_threads
 
 __all__ = [
     "CACHE_FOLDER",
@@ -21,13 +20,9 @@ __all__ = [
     "Plan",
     "Status",
     "System",
-    "current_threads",
     "integrate",
     "jacobian",
     "maps_memory",
     "mesh_motion",
-    "most_threads",
-    "processor",
     "source_hash",
-    "use_threads",
 ]

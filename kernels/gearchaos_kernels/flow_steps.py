@@ -194,11 +194,11 @@ def gather(memory, slot, work, present):
 def scatter(memory, slot, table, at, work, present):
     """Write where a map leads what was read, state and tangent vector."""
     place = layout(present)
-    end_of(work, RESULT, INPUTS, table, at + place.end, present)
+    end_of(work, RESULT, INPUTS, table, at, present)
     for line in range(place.states):
         memory[(STATE + line) * STRIDE + slot] = work[RESULT + line]
     if present.tangent is not None:
-        tangent_end_of(work, RESULT, TANGENT_INPUTS, table, at + place.end, present)
+        tangent_end_of(work, RESULT, TANGENT_INPUTS, table, at, present)
         for line in range(place.states):
             memory[(TANGENT + line) * STRIDE + slot] = work[RESULT + line]
 
@@ -267,17 +267,11 @@ def cross(memory, slot, table, row, work, present):
 
         crossings += 1
         done = moment
-        gap = GAP_Y
-        columns = place.gap_y
-        switch = place.switch_y
-        speed = lane.tangential_speed
-        branch = branches.tangential
-        if axially:
-            gap = GAP_Z
-            columns = place.gap_z
-            switch = place.switch_z
-            speed = lane.axial_speed
-            branch = branches.axial
+        gap = GAP_Z if axially else GAP_Y
+        columns = place.gap_z if axially else place.gap_y
+        switch = place.switch_z if axially else place.switch_y
+        speed = lane.axial_speed if axially else lane.tangential_speed
+        branch = branches.axial if axially else branches.tangential
         value, slope = value_and_slope(work, gap, moment)
         # The step is 2 long in s.
         slowest = min(slowest, 2.0 * speed * abs(slope))
@@ -353,18 +347,9 @@ def first_below(work, gap, done, begin, end, bend, side, distance):
             # Their slopes differ by less than a fifth of the same number.
             steepest = max(width * slope_left, 3.0 * (point2 - point1), width * slope_right)
             if steepest < -stray * 0.2 and value_right < 0.0:
-                return falling_root(
-                    work,
-                    gap,
-                    side,
-                    distance,
-                    left,
-                    right,
-                    value_left,
-                    width * slope_left,
-                    value_right,
-                    width * slope_right,
-                )
+                slopes = width * slope_left, width * slope_right
+                guess = first_fall(value_left, slopes[0], value_right, slopes[1])
+                return falling_root(work, gap, side, distance, left, right, guess)
             clear = steepest < -stray * 0.2
             if not clear and width < _NARROW:
                 if value_right < 0.0:
@@ -386,9 +371,9 @@ def first_below(work, gap, done, begin, end, bend, side, distance):
 
 
 @scalar
-def falling_root(work, gap, side, distance, left, right, d0, r0, d1, r1):
+def falling_root(work, gap, side, distance, left, right, guess):
     """Return where a gap that falls from one end of a piece to the other passes zero."""
-    at = left + (right - left) * first_fall(d0, r0, d1, r1)
+    at = left + (right - left) * guess
     for _ in range(_ITERATIONS):
         value, slope = value_and_slope(work, gap, at)
         value = side * value + distance
