@@ -92,15 +92,15 @@ def refinable(result: Result, name: str) -> Configuration:
     As `computable`, and raises ConfigurationError if its lanes do not stand for themselves.
     """
     config = computable(result, name)
+    unfit = remedy = ""
     if config.start.carry != "none":
+        unfit, remedy = f'carry = "{config.start.carry}"', 'with start.carry = "none"'
+    elif config.start.kind == "random":
+        unfit, remedy = 'kind = "random"', "that starts otherwise"
+    if unfit:
         raise ConfigurationError(
-            f'{name}: start.carry = "{config.start.carry}": a lane between two others has no start '
-            'of its own; refine a sweep with start.carry = "none"'
-        )
-    if config.start.kind == "random":
-        raise ConfigurationError(
-            f'{name}: start.kind = "random": a lane between two others has no start of its own; '
-            "refine a sweep that starts otherwise"
+            f"{name}: start.{unfit}: a lane between two others has no start of its own; refine a "
+            f"sweep {remedy}"
         )
     return config
 
@@ -165,15 +165,14 @@ def _losses(
     told = []
     for number in range(spacing.size):
         sides = [
-            (_TELLING.index(StabilityLoss(int(losses.kind[number]))), losses.multiplier[number])
+            (StabilityLoss(losses.kind[number]), complex(losses.multiplier[number]))
             for losses, edge in ((upwards, below), (downwards, above))
             if edge["period"][number] > 0
         ]
-        if sides:
-            rank, multiplier = min(sides, key=lambda side: side[0])
-            told.append((STABILITY_LOSS_TEXTS[_TELLING[rank]], complex(multiplier)))
-        else:
-            told.append(("", complex("nan")))
+        tells, multiplier = min(
+            sides, key=lambda side: _TELLING.index(side[0]), default=(None, complex("nan"))
+        )
+        told.append((STABILITY_LOSS_TEXTS[tells] if tells is not None else "", multiplier))
     return told
 
 
