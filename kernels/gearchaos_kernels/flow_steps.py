@@ -33,7 +33,7 @@ from gearchaos_kernels.block_memory import (
     write_branches,
 )
 from gearchaos_kernels.compilation import scalar
-from gearchaos_kernels.contact import NEVER, branches_at, first_fall, next_branch
+from gearchaos_kernels.contact import NEVER, branches_at, first_fall, may_leave, next_branch
 from gearchaos_kernels.equations import gaps_at
 from gearchaos_kernels.flow_layout import BOUND_Y, BOUND_Z, HEADER, TERMS, layout
 from gearchaos_kernels.flow_vectors import (
@@ -75,11 +75,12 @@ def phases_of(table, row):
 
 @scalar
 def begin_forces(memory, slot, lane, present):
-    """Store what forces a lane; without clearance no flank has an offset."""
+    """Store what forces a lane, in the order of columns; without clearance no flank has offsets."""
     amplitude = 0.5 * lane.axial_error_amplitude
+    error = FORCES + 1 + layout(present).ways
     memory[FORCES * STRIDE + slot] = lane.load
-    memory[(FORCES + 3) * STRIDE + slot] = amplitude * lane.cos_phase
-    memory[(FORCES + 4) * STRIDE + slot] = amplitude * lane.sin_phase
+    memory[error * STRIDE + slot] = amplitude * lane.cos_phase
+    memory[(error + 1) * STRIDE + slot] = amplitude * lane.sin_phase
     branches = Branches(ALWAYS, ALWAYS)
     if present.resolved is not None:
         branches = read_branches(memory, slot, present)
@@ -91,7 +92,8 @@ def store_offsets(memory, slot, lane, branches, present):
     """Store by how much each gap exceeds the deflection on its branch."""
     y, z = offsets_of(lane, branches, present)
     memory[(FORCES + 1) * STRIDE + slot] = y
-    memory[(FORCES + 2) * STRIDE + slot] = z
+    if present.axial is not None:
+        memory[(FORCES + 2) * STRIDE + slot] = z
 
 
 @scalar
@@ -177,17 +179,8 @@ def gather(memory, slot, work, present):
         work[INPUTS + line] = memory[(BEFORE + STATE + line) * STRIDE + slot]
         if present.tangent is not None:
             work[TANGENT_INPUTS + line] = memory[(BEFORE + TANGENT + line) * STRIDE + slot]
-    column = place.states
-    work[INPUTS + column] = memory[FORCES * STRIDE + slot]
-    work[INPUTS + column + 1] = memory[(FORCES + 1) * STRIDE + slot]
-    column += 2
-    if present.axial is not None:
-        work[INPUTS + column] = memory[(FORCES + 2) * STRIDE + slot]
-        column += 1
-    if present.pitch_error is not None:
-        work[INPUTS + column] = memory[(FORCES + 3) * STRIDE + slot]
-    if present.phase is not None:
-        work[INPUTS + column + 1] = memory[(FORCES + 4) * STRIDE + slot]
+    for number in range(place.columns - place.states):
+        work[INPUTS + place.states + number] = memory[(FORCES + number) * STRIDE + slot]
 
 
 @scalar
@@ -222,16 +215,6 @@ def count_suspects(memory, slots, begin, end, present):
         suspects += 1 if suspect else 0
         memory[SUSPECT * STRIDE + slot] = 1.0 if suspect else 0.0
     return suspects
-
-
-@scalar
-def may_leave(begin, end, branch, margin):
-    """Tell whether a gap may leave its branch; its Bezier points in the middle have a margin."""
-    point1 = begin.value + _THIRD * begin.rate
-    point2 = end.value - _THIRD * end.rate
-    lowest = min(min(point1, point2) - margin, end.value)
-    highest = max(max(point1, point2) + margin, end.value)
-    return (lowest < branch.floor) | (highest > branch.ceiling)
 
 
 @scalar

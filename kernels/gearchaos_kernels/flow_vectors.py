@@ -48,10 +48,11 @@ def _scene(kind: Any) -> tuple[Any, Layout]:
     return present, layout.py_func(present)
 
 
-def _forces(present: Any) -> list[int]:
-    """Return the rows of what forces a lane, in the order of the columns of a map."""
-    there = ((), (), present.axial, present.pitch_error, present.phase)
-    return [FORCES + number for number, flag in enumerate(there) if flag is not None]
+def _inputs(first: int, place: Layout) -> list[int]:
+    """Return the rows of what is multiplied with a map: a state, and what forces a lane."""
+    return [first + n for n in range(place.states)] + [
+        FORCES + n for n in range(place.columns - place.states)
+    ]
 
 
 class _Writer:
@@ -137,7 +138,7 @@ def keep_before(_typing, memory, slot, table, row, present):
             for line in range(first, first + place.states):
                 w.store(w.load(lanes, line * STRIDE), lanes, (BEFORE + line) * STRIDE)
         if there.resolved is not None:
-            rows = [*range(STATE, STATE + place.states), *_forces(there)]
+            rows = _inputs(STATE, place)
             sizes = [builder.call(fabs, [w.load(lanes, row * STRIDE)]) for row in rows]
             for number, bound in enumerate((BOUND_Y, BOUND_Z)[: place.ways]):
                 bends = [w.spread(numbers, bound + column) for column in range(len(sizes))]
@@ -157,8 +158,7 @@ def move(_typing, memory, slot, table, at, engaged_y, engaged_z, present):
         lanes, numbers = w.element(0, arguments[1]), w.element(2, arguments[3])
 
         def apply(mask):
-            before = BEFORE + STATE
-            rows = {STATE: [*range(before, before + place.states), *_forces(there)]}
+            rows = {STATE: _inputs(BEFORE + STATE, place)}
             if there.tangent is not None:
                 rows[TANGENT] = [BEFORE + TANGENT + line for line in range(place.states)]
             given = {
