@@ -11,7 +11,7 @@ from contextlib import ExitStack
 from functools import lru_cache
 from importlib.util import find_spec
 from threading import Lock, Thread
-from typing import Any, Self
+from typing import Any
 
 import dask
 import distributed
@@ -39,7 +39,7 @@ _SECONDS_BETWEEN_LOOKS = 0.2
 _IGNORE_INTERRUPTS = "import signal; signal.signal(signal.SIGINT, signal.SIG_IGN)"
 
 
-class DaskExecutor:
+class DaskExecutor(ExitStack):
     """Hands blocks to the workers of a cluster; blocks of a lost worker are run again.
 
     The simulation is not carried and its number of steps has been chosen; the address is that of a
@@ -48,6 +48,7 @@ class DaskExecutor:
     """
 
     def __init__(self, simulation: Simulation, address: str) -> None:
+        super().__init__()
         self._address = address
         self._recipe = simulation.config.resolved_toml(), simulation.plan.steps_per_period
         for name in ("distributed", "distributed.client"):
@@ -58,7 +59,7 @@ class DaskExecutor:
             self._wait_for_workers()
             self._require_software()
             self._executor = self._client.get_executor(pure=False)
-            self._closing = stack.pop_all()
+            self.push(stack.pop_all())
         say(f"{self.workers} dask worker{'s' if self.workers > 1 else ''} at {address}")
 
     @property
@@ -76,7 +77,7 @@ class DaskExecutor:
             return BLOCKS_PER_WORKER * self._wait_for_workers()
         except KeyboardInterrupt:
             # Nobody computes what has been handed out.
-            self._closing.close()
+            self.close()
             raise
 
     def submit(self, block: Bounds) -> Future[Arrays]:
@@ -84,22 +85,9 @@ class DaskExecutor:
         future: Future[Arrays] = Future()
         # Which of them runs is known to the workers only: all that are handed out are finished.
         future.set_running_or_notify_cancel()
-
-        def pass_on(inner: Future[Arrays]) -> None:
-            try:
-                future.set_result(inner.result())
-            except BaseException as error:
-                future.set_exception(self._worded(error))
-
         inner = self._executor.submit(compute_block, SOFTWARE, *self._recipe, block)
-        inner.add_done_callback(pass_on)
+        inner.add_done_callback(lambda done: _settle(future, done.result, self._worded))
         return future
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._closing.close()
 
     def _wait_for_workers(self) -> int:
         workers, began = self.workers, time.monotonic()
@@ -122,21 +110,20 @@ class DaskExecutor:
             raise self._worded(error) from None
 
     def _worded(self, error: BaseException) -> BaseException:
-        if isinstance(error, TimeoutError):
-            return ExecutionError(f"{self._address}: {error}; are scheduler and workers alive?")
-        if isinstance(error, CancelledError | OSError):
-            return ExecutionError(f"{self._address}: the connection to the scheduler was lost")
-        if isinstance(error, distributed.KilledWorker):
-            return ExecutionError(
-                f"{self._address}: one block was lost with {error.allowed_failures + 1} workers "
-                "in turn; see their logs, and give them more memory if it is that"
-            )
-        if isinstance(error, ImportError):
-            return ExecutionError(
-                f"{self._address}: a worker lacks the software ({error}); install there what is "
-                f"here, gearchaos {software_version()}"
-            )
-        return error
+        match error:
+            case TimeoutError():
+                text = f"{error}; are scheduler and workers alive?"
+            case CancelledError() | OSError():
+                text = "the connection to the scheduler was lost"
+            case distributed.KilledWorker():
+                text = f"one block was lost with {error.allowed_failures + 1} workers in turn; see "
+                text += "their logs, and give them more memory if it is that"
+            case ImportError():
+                text = f"a worker lacks the software ({error}); install there what is here, "
+                text += f"gearchaos {software_version()}"
+            case _:
+                return error
+        return ExecutionError(f"{self._address}: {text}")
 
 
 def compute_block(
@@ -174,17 +161,18 @@ def _patience() -> float:
     return float(parse_timedelta(dask.config.get("distributed.comm.timeouts.connect")))
 
 
+def _settle(future: Future[Any], question: Callable[[], Any], worded: Callable[..., Any]) -> None:
+    """Give a future the answer to a question, or the error that comes instead, worded."""
+    try:
+        future.set_result(question())
+    except BaseException as error:
+        future.set_exception(worded(error))
+
+
 def _answer(question: Callable[[], Any], seconds: float) -> Any:
     """Ask in a thread, and heed interrupts meanwhile."""
     future: Future[Any] = Future()
-
-    def ask() -> None:
-        try:
-            future.set_result(question())
-        except BaseException as error:
-            future.set_exception(error)
-
-    Thread(target=ask, daemon=True).start()
+    Thread(target=_settle, args=(future, question, lambda error: error), daemon=True).start()
     began = time.monotonic()
     while not wait([future], _SECONDS_BETWEEN_LOOKS).done:
         check()

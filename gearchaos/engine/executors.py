@@ -9,10 +9,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from functools import partial
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Self, TypeAlias
+from typing import TYPE_CHECKING, TypeAlias
 
 import numba
 
@@ -35,7 +35,7 @@ class ExecutionError(GearchaosError):
     exit_code = FileError.exit_code
 
 
-class LocalExecutor:
+class LocalExecutor(ExitStack):
     """Computes in this process, one block at a time: all threads work within a block.
 
     The thread of its own leaves the main one free to write what is finished, and an interrupt,
@@ -50,11 +50,13 @@ class LocalExecutor:
         simulation: Simulation,
         finished: Mapping[Bounds, Callable[[], Arrays]] = MappingProxyType({}),
     ) -> None:
+        super().__init__()
         self._simulation = simulation
         # A carried block needs what the one before it yielded: it is handed out after that one.
         self._before = dict(finished) if simulation.carried else {}
         threads = (numba.get_num_threads(),)
         self._pool = ThreadPoolExecutor(1, initializer=numba.set_num_threads, initargs=threads)
+        self.callback(self._pool.shutdown, cancel_futures=True)
 
     def submit(self, block: Bounds) -> Future[Arrays]:
         """Begin a block once those before it are done, and return the future of its arrays.
@@ -63,20 +65,13 @@ class LocalExecutor:
         """
         return self._pool.submit(self._compute, block)
 
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._pool.shutdown(cancel_futures=True)
-
     def _compute(self, block: Bounds) -> Arrays:
         simulation, carried = self._simulation, None
-        if simulation.carried:
-            first, last = block
-            for before, read in self._before.items():
-                if before[0] == last if simulation.downwards else before[1] == first:
-                    carried = read()["end_state"]
-        arrays = simulation.compute(*block, carried)
+        first, last = block
+        for before, read in self._before.items():
+            if before[0] == last if simulation.downwards else before[1] == first:
+                carried = read()["end_state"]
+        arrays = simulation.compute(first, last, carried)
         if simulation.carried:
             self._before[block] = partial(dict, end_state=arrays["end_state"])
         return arrays

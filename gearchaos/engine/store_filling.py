@@ -45,19 +45,18 @@ def fill(
     for problem in problems:
         complain(f"{problem}; it is computed again")
     done = sum(last - first for first, last in finished)
+    performed_by = {}
     if cluster is None:
         size = simulation.block_lanes(numba.get_num_threads())
-        missing = simulation.in_order(store.missing(finished, size))
         readers = {block: partial(store.read, *block) for block in finished}
         executor: BlockExecutor = LocalExecutor(simulation, readers)
-        performed_by = {}
     else:
         from gearchaos.engine.dask_executor import DaskExecutor
 
         executor = DaskExecutor(simulation, cluster)
         size = shared_block_lanes(len(simulation.lanes), executor.workers)
-        missing = store.missing(finished, size)
         performed_by = {"threads": 1, "workers": executor.workers}
+    missing = simulation.in_order(store.missing(finished, size))
     with executor, Progress(store.own_lanes, done) as progress:
 
         def keep(block: Bounds, arrays: Arrays) -> None:

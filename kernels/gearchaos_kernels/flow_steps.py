@@ -130,18 +130,13 @@ def move_block(memory, table, row, slots, work, present):
     for slot in range(0, slots, VECTOR):
         keep_before(memory, slot, table, row, present)
     for pair in range(place.pairs):
-        engaged_y = 1.0 - pair % 2
-        engaged_z = 1.0 - pair // 2
         at = row + HEADER + pair * place.size
         for slot in range(0, slots, VECTOR):
-            move(memory, slot, table, at, engaged_y, engaged_z, present)
-    if present.resolved is None:
-        return 0
-    begin, end = phases_of(table, row)
+            move(memory, slot, table, at, 1.0 - pair % 2, 1.0 - pair // 2, present)
     # A known number of slots is what the compiler makes vector instructions of.
     if slots == VECTOR:
-        return count_suspects(memory, VECTOR, begin, end, present)
-    return count_suspects(memory, LANES, begin, end, present)
+        return count_suspects(memory, VECTOR, table, row, present)
+    return count_suspects(memory, LANES, table, row, present)
 
 
 @scalar
@@ -165,10 +160,7 @@ def move_lane(memory, table, row, work, present):
     if present.resolved is not None:
         at += pair_of(read_branches(memory, 0, present), present) * place.size
     scatter(memory, 0, table, at, work, present)
-    if present.resolved is None:
-        return 0
-    begin, end = phases_of(table, row)
-    return count_suspects(memory, 1, begin, end, present)
+    return count_suspects(memory, 1, table, row, present)
 
 
 @scalar
@@ -197,8 +189,11 @@ def scatter(memory, slot, table, at, work, present):
 
 
 @scalar
-def count_suspects(memory, slots, begin, end, present):
+def count_suspects(memory, slots, table, row, present):
     """Mark the lanes whose gaps may have left their branches since the step began."""
+    if present.resolved is None:
+        return 0
+    begin, end = phases_of(table, row)
     suspects = 0
     for slot in range(slots):
         lane = load(memory, COEFFICIENTS, slot, Lane)

@@ -183,12 +183,10 @@ def move(_typing, memory, slot, table, at, engaged_y, engaged_z, present):
         if place.pairs == 1:
             apply(None)
         else:
+            engaged = {TANGENTIAL_BRANCH: arguments[4], AXIAL_BRANCH: arguments[5]}
             same = [
-                builder.fcmp_ordered("==", w.load(lanes, row * STRIDE), w.splat(engaged))
-                for row, engaged in (
-                    (TANGENTIAL_BRANCH, arguments[4]),
-                    (AXIAL_BRANCH, arguments[5]),
-                )
+                builder.fcmp_ordered("==", w.load(lanes, row * STRIDE), w.splat(number))
+                for row, number in engaged.items()
             ]
             mask = same[0] if place.ways == 1 else builder.and_(*same)
             bits = builder.bitcast(mask, ir.IntType(VECTOR))
