@@ -59,7 +59,7 @@ class DaskExecutor(ExitStack):
             self._wait_for_workers()
             self._require_software()
             self._executor = self._client.get_executor(pure=False)
-            self.push(stack.pop_all())
+            self.callback(stack.pop_all().close)
         say(f"{self.workers} dask worker{'s' if self.workers > 1 else ''} at {address}")
 
     @property

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
-from gearchaos_kernels import integrate
+from gearchaos_kernels import System, integrate
 from numpy.typing import NDArray
 
 from gearchaos.configuration import Configuration, swept_values
@@ -176,28 +176,21 @@ def _losses(
     return told
 
 
-def _settled(config: Configuration, edge: NDArray[Any]) -> Floats:
-    """Return a state near the orbit of every periodic lane.
+def _followed(config: Configuration, edge: NDArray[Any], last: Floats) -> Losses:
+    def system(values: Floats) -> System:
+        return system_of(config, {config.sweep.parameter: values}, config.needed_effects)
 
-    Where a longer look told it, the end of the record may be far away.
-    """
-    state = edge["state"].copy()
+    first, state = edge["value"], edge["state"].copy()
     lanes = np.flatnonzero(edge["far"])
     if lanes.size:
+        # Where a longer look told the orbit, the end of the record may be far away.
         longer = sum(LOOKS) * config.integration.recorded_periods
         further = plan_of(config, transient_periods=longer, recorded_periods=0)
-        values = {config.sweep.parameter: edge["value"][lanes]}
-        system = system_of(config, values, config.needed_effects)
-        state[lanes] = integrate(system, state[lanes], further).end_state
-    return state
-
-
-def _followed(config: Configuration, edge: NDArray[Any], last: Floats) -> Losses:
-    first, parameter = edge["value"], config.sweep.parameter
+        state[lanes] = integrate(system(first[lanes]), state[lanes], further).end_state
     lowest, highest = swept_values(config.sweep)[[0, -1]]
     followed = follow(
-        lambda values: system_of(config, {parameter: values}, config.needed_effects),
-        _settled(config, edge),
+        system,
+        state,
         edge["period"],
         first,
         np.clip(last, lowest, highest),

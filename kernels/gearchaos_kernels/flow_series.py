@@ -214,12 +214,10 @@ def fill_pair(pair, row, right_side, forcing, place):
     tail = 0.0
     for k in range(ORDER, -1, -1):
         sign = 1.0 - 2.0 * (k % 2)
-        for line in range(states):
-            for column in range(columns):
-                first[line, column] += sign * psi[k, line, column]
-                last[line, column] += psi[k, line, column]
-            for column in range(states):
-                back[line, column] += sign * inverse[k, line, column]
+        # The first term of the inverse is 1.
+        add_product(sign, inverse[0], psi[k], first)
+        add_product(1.0, inverse[0], psi[k], last)
+        add_product(sign, inverse[0], inverse[k], back)
     for line in range(states):
         for column in range(states):
             tail = larger(tail, abs(psi[ORDER, line, column]))
