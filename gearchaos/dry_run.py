@@ -7,6 +7,7 @@ import math
 import os
 import sys
 import time
+from contextlib import suppress
 from datetime import timedelta
 from pathlib import Path
 
@@ -121,12 +122,10 @@ def _thinned(simulation: Simulation, share: float, length: float) -> Configurati
 def _memory(simulation: Simulation) -> int:
     """Return about how many bytes the process takes at most: as many as so far, and a block."""
     block = simulation.block_memory(numba.get_num_threads())
-    try:
+    with suppress(OSError):
         # Linux counts for getrusage what the process that began this one took.
         status = Path("/proc/self/status").read_text("utf-8")
         return block + 1024 * int(status.partition("VmHWM:")[2].split()[0])
-    except OSError:
-        pass
     try:
         from resource import RUSAGE_SELF, getrusage
     except ImportError:  # Windows.
