@@ -14,8 +14,9 @@ import statistics
 import time
 from pathlib import Path
 
+import numba
 import numpy as np
-from gearchaos_kernels import Effects, Plan, integrate, use_threads
+from gearchaos_kernels import Effects, Plan, integrate
 from gearchaos_kernels.block_memory import flags
 from gearchaos_kernels.flow_map import maps_of
 from machine import print_machine
@@ -39,7 +40,7 @@ def main() -> None:
     parser.add_argument("--rounds", type=int, default=7)
     rounds = parser.parse_args().rounds
     print_machine()
-    use_threads(1)
+    numba.set_num_threads(1)
     config = load_config(SWEEP, ["sweep.from=3.0", "sweep.to=11.0", f"sweep.count={LANES}"])
     lanes = Lanes(config).system_of(np.arange(LANES))
     for axial in (True, False):

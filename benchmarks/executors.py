@@ -15,7 +15,7 @@ import tempfile
 import time
 from pathlib import Path
 
-from gearchaos_kernels import most_threads, use_threads
+import numba
 from machine import machine_facts, print_machine
 
 from gearchaos import load_config
@@ -37,7 +37,7 @@ def main() -> None:
     parser.add_argument("--output", type=Path, help="file for all times in JSON")
     options = parser.parse_args()
     print_machine()
-    use_threads(most_threads())
+    numba.set_num_threads(numba.config.NUMBA_NUM_THREADS)
     simulation = Simulation(load_config(SWEEP, [f"sweep.count={options.lanes}", *SHORT]))
     simulation.rehearse()
     began = time.perf_counter()

@@ -4,13 +4,13 @@ import os
 import platform
 from pathlib import Path
 
+import llvmlite.binding
 import numba
-from gearchaos_kernels import most_threads, processor
 
 
 def machine_facts() -> dict[str, str | int]:
     """Return processor, cores, system and versions."""
-    name = processor()
+    name = str(llvmlite.binding.get_host_cpu_name())
     information = Path("/proc/cpuinfo")
     if information.exists():
         for line in information.read_text().splitlines():
@@ -20,7 +20,7 @@ def machine_facts() -> dict[str, str | int]:
     return {
         "processor": name,
         "cores": os.cpu_count() or 1,
-        "threads": most_threads(),
+        "threads": numba.config.NUMBA_NUM_THREADS,
         "system": f"{platform.system()} {platform.machine()}",
         "python": platform.python_version(),
         "numba": numba.__version__,

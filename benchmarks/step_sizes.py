@@ -14,8 +14,8 @@ import time
 from pathlib import Path
 
 import matplotlib
+import numba
 import numpy as np
-from gearchaos_kernels import most_threads
 from machine import machine_facts, print_machine
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullLocator
@@ -60,7 +60,7 @@ def main() -> None:
         {"mode": mode, "steps_per_period": steps, "boundaries": found, "seconds": seconds}
         for mode, steps, found, seconds in rows
     ]
-    facts = {"machine": machine_facts(), "threads": most_threads(), "runs": table}
+    facts = {"machine": machine_facts(), "threads": numba.config.NUMBA_NUM_THREADS, "runs": table}
     options.output.with_suffix(".json").write_text(json.dumps(facts, indent=1))
     _draw(rows, options.output.with_suffix(".png"))
 

@@ -12,8 +12,9 @@ import statistics
 import time
 from pathlib import Path
 
+import numba
 import numpy as np
-from gearchaos_kernels import Plan, System, integrate, use_threads
+from gearchaos_kernels import Plan, System, integrate
 from machine import print_machine
 from throughput import SCENES
 
@@ -34,7 +35,7 @@ def main() -> None:
     parser.add_argument("--rounds", type=int, default=15)
     rounds = parser.parse_args().rounds
     print_machine()
-    use_threads(1)
+    numba.set_num_threads(1)
     pairs = ["groups.pitch_error=0.01", "groups.axial_stiffness_p=1", "groups.axial_stiffness_g=1"]
     damping = [f"groups.axial_damping_{gear}=0.1" for gear in "pg"]
     lanes = Lanes(load_config(SWEEP, [*pairs, *damping, 'scene.effects=["pitch_error"]']))

@@ -13,8 +13,9 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
+import numba
 import numpy as np
-from gearchaos_kernels import Effects, Plan, System, integrate, most_threads, use_threads
+from gearchaos_kernels import Effects, Plan, System, integrate
 from machine import print_machine
 from textbook import run_textbook
 
@@ -62,8 +63,10 @@ def _contestants():
         for name, scene in SCENES.items():
             yield f"{name}, flow map", tangent, engine(scene, tangent, True, 1, **FLOW_MAP)
         for kind, how in THREADED.items():
-            everything = engine(Effects(), tangent, kind != "", most_threads(), **how)
-            yield f"full, {most_threads()} threads{kind}", tangent, everything
+            everything = engine(
+                Effects(), tangent, kind != "", numba.config.NUMBA_NUM_THREADS, **how
+            )
+            yield f"full, {numba.config.NUMBA_NUM_THREADS} threads{kind}", tangent, everything
 
 
 def _pan(lanes: int) -> System:
@@ -90,7 +93,7 @@ def engine(
     counted = lanes * PERIODS * (steps if method == "rk4" else STEPS)
 
     def work() -> int:
-        use_threads(threads)
+        numba.set_num_threads(threads)
         integrate(system, np.zeros((lanes, len(system.states))), plan)
         return counted
 
@@ -102,7 +105,7 @@ def _textbook(tangent: bool) -> Callable[[], int]:
     data = pan.groups, pan.stiffness_cosine, pan.stiffness_sine
 
     def work() -> int:
-        use_threads(1)
+        numba.set_num_threads(1)
         run_textbook(*data, PERIODS, STEPS, tangent)
         return TEXTBOOK_LANES * PERIODS * STEPS
 
@@ -127,11 +130,12 @@ def _print_table(rates: dict[tuple[str, bool], list[float]]) -> None:
         print(f"{name:34}{cells}")
     for kind in THREADED:
         for tangent in (False, True):
-            many = rates[f"full, {most_threads()} threads{kind}", tangent]
+            many = rates[f"full, {numba.config.NUMBA_NUM_THREADS} threads{kind}", tangent]
             pairs = zip(many, rates[f"full, 10 states{kind}", tangent], strict=True)
             speedup = statistics.median(a / b for a, b in pairs)
             with_tangent = ", with tangent" if tangent else ""
-            print(f"{most_threads()} threads over 1{kind}{with_tangent}: {speedup:.2f}")
+            threads = numba.config.NUMBA_NUM_THREADS
+            print(f"{threads} threads over 1{kind}{with_tangent}: {speedup:.2f}")
 
 
 if __name__ == "__main__":

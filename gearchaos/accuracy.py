@@ -79,14 +79,12 @@ def _accuracy(options: Namespace) -> int:
             f"{config.source}: outputs.section: a section is needed to measure errors on; keep a "
             'state, such as "delta_5"'
         )
+    config = config.replace("integration.method", "rk4")
+    stable = config.replace("integration.unstable", "refuse")
     for count in steps:
         # Each is refused as a sweep would refuse it.
-        stable = config.replace("integration.method", "rk4")
-        stable = stable.replace("integration.unstable", "refuse")
         Simulation(stable.replace("integration.steps_per_period", count))
-    settings = measure(
-        Simulation(config.replace("integration.method", "rk4")), steps, options.lanes
-    )
+    settings = measure(Simulation(config), steps, options.lanes)
     print("\n".join(table(settings)))
     if not any(setting.error > 0.0 for setting in settings):
         raise ConfigurationError(
@@ -112,16 +110,12 @@ def _numbers_of_steps(text: str) -> list[int]:
 
 
 def _write(settings: Sequence[Setting], title: str, targets: list[str], overwrite: bool) -> None:
-    from gearchaos_kernels import current_threads
-
     from gearchaos.engine.provenance import provenance
     from gearchaos.figures.files import save_figure
     from gearchaos.figures.work_precision import work_precision_page
     from gearchaos.results.atomic_file import replacing
 
-    points = {
-        mode: [(s.steps, s.seconds, s.error) for s in settings if s.mode == mode] for mode in MODES
-    }
+    points = {m: [(s.steps, s.seconds, s.error) for s in settings if s.mode == m] for m in MODES}
     page = work_precision_page(points)
     *pictures, table_file = targets
     for target in pictures:
@@ -130,7 +124,7 @@ def _write(settings: Sequence[Setting], title: str, targets: list[str], overwrit
         "title": title,
         "truth": f"{TRUTH_STEPS} flow maps per mesh period",
         "settings": [setting._asdict() for setting in settings],
-        "machine": provenance(current_threads(), sum(setting.seconds for setting in settings)),
+        "machine": provenance(sum(setting.seconds for setting in settings)),
     }
     with replacing(table_file, overwrite=overwrite) as partial_file:
         partial_file.write_text(json.dumps(facts, indent=1), encoding="utf-8")

@@ -8,6 +8,7 @@ import re
 import sys
 from argparse import ArgumentParser, ArgumentTypeError, Namespace
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from io import TextIOWrapper
 from typing import Any, NamedTuple, TextIO
 
@@ -177,9 +178,7 @@ def _report(fault: BaseException, texts: list[str], code: int) -> int:
 
 def _discard(stream: TextIO) -> None:
     # The interpreter flushes once more on its way out; what is left must have somewhere to go.
-    try:
+    with suppress(OSError, ValueError):
         sink = os.open(os.devnull, os.O_WRONLY)
         os.dup2(sink, stream.fileno())
         os.close(sink)
-    except (OSError, ValueError):
-        pass

@@ -7,11 +7,13 @@ import math
 import os
 import sys
 import time
+from contextlib import suppress
 from datetime import timedelta
 from pathlib import Path
 
+import numba
 import numpy as np
-from gearchaos_kernels import LANES, current_threads
+from gearchaos_kernels import LANES
 from tqdm import tqdm
 
 from gearchaos.configuration import Configuration, swept_values
@@ -27,7 +29,7 @@ SAMPLE_PERIODS = 1000
 
 def describe(simulation: Simulation, output: str, shard: Shard | None, as_json: bool) -> None:
     """Say what a run, or one shard of it, would compute, judged by a sample of its lanes."""
-    config, lanes, threads = simulation.config, simulation.lanes, current_threads()
+    config, lanes, threads = simulation.config, simulation.lanes, numba.get_num_threads()
     every = len(lanes)
     own = every if shard is None else sum(last - first for first, last in shard.blocks(every))
     seconds = own * _seconds_per_lane(simulation)
@@ -77,7 +79,7 @@ def _seconds_per_lane(simulation: Simulation) -> float:
 
     A whole block: what is checked, or looked at again, is computed in vectors of lanes.
     """
-    lanes = simulation.block_lanes(current_threads()) / (8 if simulation.carried else 1)
+    lanes = simulation.block_lanes(numba.get_num_threads()) / (8 if simulation.carried else 1)
     periods = simulation.plan.transient_periods + simulation.plan.recorded_periods
     seconds = math.nan
     with notice("computing some lanes, to tell how long all take"):
@@ -122,13 +124,11 @@ def _thinned(simulation: Simulation, share: float, length: float) -> Configurati
 
 def _memory(simulation: Simulation) -> int:
     """Return about how many bytes the process takes at most: as many as so far, and a block."""
-    block = simulation.block_memory(current_threads())
-    try:
+    block = simulation.block_memory(numba.get_num_threads())
+    with suppress(OSError):
         # Linux counts for getrusage what the process that began this one took.
         status = Path("/proc/self/status").read_text("utf-8")
         return block + 1024 * int(status.partition("VmHWM:")[2].split()[0])
-    except OSError:
-        pass
     try:
         from resource import RUSAGE_SELF, getrusage
     except ImportError:  # Windows.

@@ -33,8 +33,13 @@ def output_of(options: Namespace, suffix: str = ".h5") -> str:
     return output
 
 
-def ending(simulation: Simulation, diverged: int) -> int:
-    """Complain if too many lanes diverged, and return the exit code."""
+def ending(simulation: Simulation, output: str, diverged: int, *said: str) -> int:
+    """Print the path of the result, say these lines, and return the exit code.
+
+    Complains if too many lanes diverged.
+    """
+    print(output, flush=True)
+    say(*said)
     allowed = simulation.config.outputs.allowed_diverged_share
     if diverged <= allowed * len(simulation.lanes):
         return OK
@@ -70,7 +75,6 @@ def complete_already(simulation: Simulation, output: str) -> int | None:
         # A process that was killed while it tidied up has left its blocks.
         with suppress(FileError), open_store(simulation, output, resume=True) as store:
             store.remove()
-    print(output, flush=True)
     diverged = int((found["status"] != 0).sum())
-    say(f"complete already: {found['status'].size} lanes, {diverged} diverged")
-    return ending(simulation, diverged)
+    text = f"complete already: {found['status'].size} lanes, {diverged} diverged"
+    return ending(simulation, output, diverged, text)

@@ -79,8 +79,6 @@ def _scored(problem: Problem, judge: Judge, path: str) -> Tried:
 
 
 def _searched(problem: Problem, judge: Judge, options: Namespace) -> Tried:
-    from gearchaos_kernels import current_threads
-
     from gearchaos.engine.provenance import provenance
     from gearchaos.identification.evaluation import require_stable
     from gearchaos.identification.search import MOST_CENTRES, RUNGS, decisive_facts, search
@@ -107,7 +105,7 @@ def _searched(problem: Problem, judge: Judge, options: Namespace) -> Tried:
 
     def keep(tried: Tried, complete: bool = False) -> None:
         nonlocal kept
-        computed = provenance(current_threads(), time.monotonic() - began)
+        computed = provenance(time.monotonic() - began)
         told = {"complete": int(complete), **computed, **facts, **texts}
         write_tried(output, tried, keys, judge.observations, told)
         kept = True

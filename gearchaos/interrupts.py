@@ -45,12 +45,9 @@ def heeded(*, at_once: bool) -> Iterator[None]:
 
 
 def check() -> None:
-    """Raise what has arrived; only the main thread is interrupted.
+    """Raise what has arrived, a KeyboardInterrupt after Ctrl-C and a `Termination` after SIGTERM.
 
-    Raises
-    ------
-    KeyboardInterrupt
-        After Ctrl-C; `Termination` after SIGTERM.
+    Only the main thread is interrupted.
     """
     if _arrived and threading.current_thread() is threading.main_thread():
         raise Termination if _arrived[0] == signal.SIGTERM else KeyboardInterrupt

@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING
 
 from gearchaos.command_line import OK, Command
 from gearchaos.finishing import complete_already, ending
-from gearchaos.progress import say
 
 if TYPE_CHECKING:
     from gearchaos.results.block_store import BlockStore, Finished
@@ -66,9 +65,8 @@ def _merge(options: Namespace) -> int:
         del facts["threads"], facts["wall_time_seconds"]
         told = simulation.variables, simulation.lanes.parameters, facts
         store.merge(*told, overwrite=options.overwrite, found=found)
-    print(output, flush=True)
-    say(f"{store.lanes} lanes, {tally.diverged} diverged", *tally.remarks)
-    return ending(simulation, tally.diverged)
+    text = f"{store.lanes} lanes, {tally.diverged} diverged"
+    return ending(simulation, output, tally.diverged, text, *tally.remarks)
 
 
 def _require_all(store: BlockStore, found: Finished, shards: object) -> None:

@@ -62,13 +62,8 @@ class Progress:
         self._lanes, self._done, self._began_with = lanes, done, done
         self._lines = not sys.stderr.isatty()
         self._began = self._spoke = time.monotonic()
-        self._bar = tqdm(
-            total=lanes,
-            initial=done,
-            unit=unit,
-            disable=_quiet.get() or self._lines,
-            dynamic_ncols=True,
-        )
+        hidden = _quiet.get() or self._lines
+        self._bar = tqdm(total=lanes, initial=done, unit=unit, disable=hidden, dynamic_ncols=True)
 
     def advance(self, lanes: int) -> None:
         """Tell that more lanes are done."""

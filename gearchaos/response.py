@@ -16,7 +16,6 @@ from typing import TYPE_CHECKING
 from gearchaos.command_line import Command, coordinates, place
 from gearchaos.errors import ConfigurationError
 from gearchaos.finishing import ending, output_of
-from gearchaos.progress import say
 
 if TYPE_CHECKING:
     from gearchaos.configuration import Configuration
@@ -61,15 +60,13 @@ def _respond(options: Namespace) -> int:
     prepare(simulation, history_periods=1)
     result = compute_response(simulation, options.periods, text)
     result.save(output, overwrite=options.overwrite)
-    print(output, flush=True)
-    diverged = int((result["status"] != 0).sum())
-    lanes = len(simulation.lanes)
-    say(
+    diverged, lanes = int((result["status"] != 0).sum()), len(simulation.lanes)
+    text = (
         f"{lanes} lane{'s' if lanes != 1 else ''} over {' by '.join(result.axes)}, "
         f"{options.periods} mesh periods of {simulation.plan.steps_per_period} steps, "
         f"{diverged} diverged"
     )
-    return ending(simulation, diverged)
+    return ending(simulation, output, diverged, text)
 
 
 def _lane(options: Namespace) -> Asked:

@@ -65,11 +65,10 @@ def _sweep(options: Namespace) -> int:
         prepare(simulation)
         describe(simulation, output, shard, options.json)
         return OK
+    code = None
     if options.resume and not options.overwrite:
         code = complete_already(simulation, output)
-        if code is not None:
-            return code
-    return _compute(simulation, output, shard, options)
+    return _compute(simulation, output, shard, options) if code is None else code
 
 
 def _check_sharing(options: Namespace, config: Configuration) -> None:
@@ -122,11 +121,11 @@ def _compute(simulation: Simulation, output: str, shard: Shard | None, options: 
                 check_output(output, options.overwrite)
                 fault.add_note(f"go on with: {_command('sweep', *again, '--resume')}")
             raise
-    print(output if shard is None else store.folder, flush=True)
-    say(f"{store.own_lanes} lanes, {tally.diverged} diverged, {seconds:.1f} s", *tally.remarks)
+    said = [f"{store.own_lanes} lanes, {tally.diverged} diverged, {seconds:.1f} s", *tally.remarks]
     if shard is None:
-        return ending(simulation, tally.diverged)
-    say(f"this was shard {options.shard}; once all are there: {_command('merge', output)}")
+        return ending(simulation, output, tally.diverged, *said)
+    print(store.folder, flush=True)
+    say(*said, f"this was shard {options.shard}; once all are there: {_command('merge', output)}")
     return OK
 
 

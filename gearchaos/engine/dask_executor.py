@@ -11,12 +11,12 @@ from contextlib import ExitStack
 from functools import lru_cache
 from importlib.util import find_spec
 from threading import Lock, Thread
-from typing import Any, NamedTuple, Self
+from typing import Any
 
 import dask
 import distributed
+import numba
 from dask.utils import parse_timedelta
-from gearchaos_kernels import current_threads, most_threads, use_threads
 
 from gearchaos.configuration import Configuration
 from gearchaos.engine.executors import ExecutionError
@@ -26,10 +26,6 @@ from gearchaos.errors import ConfigurationError
 from gearchaos.interrupts import check
 from gearchaos.progress import notice, say
 from gearchaos.version import Software, software_version
-
-# Its constructors carry no annotations.
-_Client: Any = distributed.Client
-_LocalCluster: Any = distributed.LocalCluster
 
 BLOCKS_PER_WORKER = 2
 """One that is computed, and one that waits, so that a worker need not wait."""
@@ -43,19 +39,7 @@ _SECONDS_BETWEEN_LOOKS = 0.2
 _IGNORE_INTERRUPTS = "import signal; signal.signal(signal.SIGINT, signal.SIG_IGN)"
 
 
-class Recipe(NamedTuple):
-    """All that a worker must know to compute blocks of a sweep.
-
-    ``configuration`` is the resolved one in TOML; the steps are chosen once, not on every worker;
-    ``software`` is what decides the numbers beside it.
-    """
-
-    configuration: str
-    steps_per_period: int
-    software: Software
-
-
-class DaskExecutor:
+class DaskExecutor(ExitStack):
     """Hands blocks to the workers of a cluster; blocks of a lost worker are run again.
 
     The simulation is not carried and its number of steps has been chosen; the address is that of a
@@ -64,10 +48,9 @@ class DaskExecutor:
     """
 
     def __init__(self, simulation: Simulation, address: str) -> None:
+        super().__init__()
         self._address = address
-        self._recipe = Recipe(
-            simulation.config.resolved_toml(), simulation.plan.steps_per_period, SOFTWARE
-        )
+        self._recipe = simulation.config.resolved_toml(), simulation.plan.steps_per_period
         for name in ("distributed", "distributed.client"):
             # What goes wrong comes as an exception.
             logging.getLogger(name).setLevel(logging.CRITICAL)
@@ -76,7 +59,7 @@ class DaskExecutor:
             self._wait_for_workers()
             self._require_software()
             self._executor = self._client.get_executor(pure=False)
-            self._closing = stack.pop_all()
+            self.callback(stack.pop_all().close)
         say(f"{self.workers} dask worker{'s' if self.workers > 1 else ''} at {address}")
 
     @property
@@ -94,7 +77,7 @@ class DaskExecutor:
             return BLOCKS_PER_WORKER * self._wait_for_workers()
         except KeyboardInterrupt:
             # Nobody computes what has been handed out.
-            self._closing.close()
+            self.close()
             raise
 
     def submit(self, block: Bounds) -> Future[Arrays]:
@@ -102,21 +85,9 @@ class DaskExecutor:
         future: Future[Arrays] = Future()
         # Which of them runs is known to the workers only: all that are handed out are finished.
         future.set_running_or_notify_cancel()
-
-        def pass_on(inner: Future[Arrays]) -> None:
-            try:
-                future.set_result(inner.result())
-            except BaseException as error:
-                future.set_exception(self._worded(error))
-
-        self._executor.submit(compute_block, self._recipe, block).add_done_callback(pass_on)
+        inner = self._executor.submit(compute_block, SOFTWARE, *self._recipe, block)
+        inner.add_done_callback(lambda done: _settle(future, done.result, self._worded))
         return future
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._closing.close()
 
     def _wait_for_workers(self) -> int:
         workers, began = self.workers, time.monotonic()
@@ -139,44 +110,49 @@ class DaskExecutor:
             raise self._worded(error) from None
 
     def _worded(self, error: BaseException) -> BaseException:
-        if isinstance(error, TimeoutError):
-            return ExecutionError(f"{self._address}: {error}; are scheduler and workers alive?")
-        if isinstance(error, CancelledError | OSError):
-            return ExecutionError(f"{self._address}: the connection to the scheduler was lost")
-        if isinstance(error, distributed.KilledWorker):
-            return ExecutionError(
-                f"{self._address}: one block was lost with {error.allowed_failures + 1} workers "
-                "in turn; see their logs, and give them more memory if it is that"
-            )
-        if isinstance(error, ImportError):
-            return ExecutionError(
-                f"{self._address}: a worker lacks the software ({error}); install there what is "
-                f"here, gearchaos {software_version()}"
-            )
-        return error
+        match error:
+            case TimeoutError():
+                text = f"{error}; are scheduler and workers alive?"
+            case CancelledError() | OSError():
+                text = "the connection to the scheduler was lost"
+            case distributed.KilledWorker():
+                text = f"one block was lost with {error.allowed_failures + 1} workers in turn; see "
+                text += "their logs, and give them more memory if it is that"
+            case ImportError():
+                text = f"a worker lacks the software ({error}); install there what is here, "
+                text += f"gearchaos {software_version()}"
+            case _:
+                return error
+        return ExecutionError(f"{self._address}: {text}")
 
 
-def compute_block(recipe: Recipe, block: Bounds) -> dict[str, Any]:
-    """Compute a block on a worker; ExecutionError if its software is not that of the client."""
-    if recipe.software != SOFTWARE:
+def compute_block(
+    software: Software, configuration: str, steps: int, block: Bounds
+) -> dict[str, Any]:
+    """Compute a block on a worker; ExecutionError if its software is not that of the client.
+
+    ``configuration`` is the resolved one in TOML; the steps per period are chosen once, not on
+    every worker.
+    """
+    if software != SOFTWARE:
         raise ExecutionError(
             f"the worker {distributed.get_worker().address} has {SOFTWARE}, this process "
-            f"{recipe.software}: install the same on both"
+            f"{software}: install the same on both"
         )
     # A worker of several task threads is one of as many cores: its blocks take turns.
     with _ONE_AT_A_TIME:
-        tasks = distributed.get_worker().state.nthreads
-        use_threads(min(tasks, most_threads()) if tasks > 1 else most_threads())
-        return _simulation(recipe).compute(*block)
+        tasks, most = distributed.get_worker().state.nthreads, numba.config.NUMBA_NUM_THREADS
+        numba.set_num_threads(min(tasks, most) if tasks > 1 else most)
+        return _simulation(configuration, steps).compute(*block)
 
 
 _ONE_AT_A_TIME = Lock()
 
 
 @lru_cache(maxsize=1)
-def _simulation(recipe: Recipe) -> Simulation:
-    simulation = Simulation(Configuration.from_toml(recipe.configuration, "<client>"))
-    simulation.plan = simulation.plan._replace(steps_per_period=recipe.steps_per_period)
+def _simulation(configuration: str, steps: int) -> Simulation:
+    simulation = Simulation(Configuration.from_toml(configuration, "<client>"))
+    simulation.plan = simulation.plan._replace(steps_per_period=steps)
     return simulation
 
 
@@ -185,17 +161,18 @@ def _patience() -> float:
     return float(parse_timedelta(dask.config.get("distributed.comm.timeouts.connect")))
 
 
+def _settle(future: Future[Any], question: Callable[[], Any], worded: Callable[..., Any]) -> None:
+    """Give a future the answer to a question, or the error that comes instead, worded."""
+    try:
+        future.set_result(question())
+    except BaseException as error:
+        future.set_exception(worded(error))
+
+
 def _answer(question: Callable[[], Any], seconds: float) -> Any:
     """Ask in a thread, and heed interrupts meanwhile."""
     future: Future[Any] = Future()
-
-    def ask() -> None:
-        try:
-            future.set_result(question())
-        except BaseException as error:
-            future.set_exception(error)
-
-    Thread(target=ask, daemon=True).start()
+    Thread(target=_settle, args=(future, question, lambda error: error), daemon=True).start()
     began = time.monotonic()
     while not wait([future], _SECONDS_BETWEEN_LOOKS).done:
         check()
@@ -210,7 +187,7 @@ def _connected(stack: ExitStack, address: str) -> Any:
     if local is None:
         try:
             with notice(f"{address}: waits up to {_patience():g} s for an answer"):
-                return _answer(lambda: _Client(address), _patience())
+                return _answer(lambda: distributed.Client(address), _patience())
         except (ValueError, TypeError) as error:
             raise ConfigurationError(
                 f"--dask {address}: cannot be the address of a scheduler here ({error}); give one "
@@ -222,21 +199,22 @@ def _connected(stack: ExitStack, address: str) -> Any:
                 f"{address}: no dask scheduler answers ({error}); start one with `dask scheduler` "
                 "or give its address"
             ) from None
-    if not local[1].isdecimal() or not 1 <= int(local[1]) <= most_threads():
+    most = numba.config.NUMBA_NUM_THREADS
+    if not local[1].isdecimal() or not 1 <= int(local[1]) <= most:
         raise ConfigurationError(
-            f"--dask {address}: must be local:N with N from 1 to {most_threads()} workers, or the "
-            "address of a scheduler"
+            f"--dask {address}: must be local:N with N from 1 to {most} workers, or the address of "
+            "a scheduler"
         )
     workers = int(local[1])
-    cluster = _LocalCluster(
+    cluster = distributed.LocalCluster(
         n_workers=workers,
         threads_per_worker=1,
         processes=True,
         dashboard_address="127.0.0.1:0",
         memory_limit=0,
         silence_logs=logging.CRITICAL,
-        env={"NUMBA_NUM_THREADS": str(max(1, current_threads() // workers))},
+        env={"NUMBA_NUM_THREADS": str(max(1, numba.get_num_threads() // workers))},
         preload=[_IGNORE_INTERRUPTS],
     )
     stack.enter_context(cluster)
-    return _Client(cluster)
+    return distributed.Client(cluster)

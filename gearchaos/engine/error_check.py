@@ -9,7 +9,7 @@ import numpy as np
 from gearchaos_kernels import Status
 from numpy.typing import NDArray
 
-from gearchaos.dynamics.largest_exponents import MIXED
+from gearchaos.dynamics.largest_exponents import MIXED, UNIFORM
 from gearchaos.records.difference import Difference
 
 NOT_CHECKED, SAME, CHANGED = 0, 1, 2
@@ -51,22 +51,17 @@ class Tally:
     """What the blocks of a sweep add up to: diverged lanes, and the errors of the checked ones."""
 
     def __init__(self) -> None:
-        self.diverged = 0
-        self._unsplit_lanes = 0
-        self._unsplit_steps = 0
-        self._mixed = 0
-        self._too_fast = 0
+        self.diverged = self._too_fast = self._mixed = 0
+        self._unsplit_lanes = self._unsplit_steps = 0
         self._checked = {name: [np.zeros(0)] for name in (*CHECKED, _OF_THE_RECORD)}
 
     def add(self, arrays: Mapping[str, NDArray[Any]]) -> None:
         """Count the lanes of one block."""
         self.diverged += int(np.count_nonzero(arrays["status"]))
         self._too_fast += int(np.count_nonzero(arrays["status"] == Status.TOO_FAST))
-        if "unsplit_steps" in arrays:
-            self._unsplit_lanes += int(np.count_nonzero(arrays["unsplit_steps"]))
-            self._unsplit_steps += int(np.sum(arrays["unsplit_steps"]))
-        if "record" in arrays:
-            self._mixed += int(np.count_nonzero(arrays["record"] == MIXED))
+        self._unsplit_lanes += int(np.count_nonzero(arrays.get("unsplit_steps", 0)))
+        self._unsplit_steps += int(np.sum(arrays.get("unsplit_steps", 0)))
+        self._mixed += int(np.count_nonzero(arrays.get("record", UNIFORM) == MIXED))
         if "motion_changed" in arrays:
             checked = arrays["motion_changed"] != NOT_CHECKED
             for name, blocks in self._checked.items():
@@ -76,25 +71,27 @@ class Tally:
     @property
     def remarks(self) -> list[str]:
         """What a user should know of the lanes, a line each."""
-        remarks = [self.errors] if self.errors else []
-        if self._too_fast:
-            remarks.append(
+        remarks = (
+            (self.errors, self.errors),
+            (
+                self._too_fast,
                 f"{self._too_fast} of the diverged lanes did not diverge, but move faster than so "
-                "few flow maps can follow (status in the file); raise integration.steps_per_period"
-            )
-        if self._unsplit_steps:
-            remarks.append(
+                "few flow maps can follow (status in the file); raise integration.steps_per_period",
+            ),
+            (
+                self._unsplit_steps,
                 f"{self._unsplit_steps} steps of {self._unsplit_lanes} lanes crossed contact "
                 "boundaries too often to be split at each (unsplit_steps in the file); raise "
-                "integration.steps_per_period"
-            )
-        if self._mixed:
-            remarks.append(
+                "integration.steps_per_period",
+            ),
+            (
+                self._mixed,
                 f"{self._mixed} lanes are periodic in the end, but chaos or another motion came "
                 "before within their records (record in the file); their exponents are those of "
-                "the orbits"
-            )
-        return remarks
+                "the orbits",
+            ),
+        )
+        return [text for found, text in remarks if found]
 
     @property
     def errors(self) -> str:

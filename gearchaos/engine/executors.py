@@ -1,23 +1,29 @@
 """Where blocks of lanes are computed: ``submit(block)`` gives a future, and one loop waits for it.
 
-A `BlockExecutor` is used as those of `concurrent.futures` are. The loop neither knows nor cares
-whether a block is computed in this process or on a cluster.
+A `BlockExecutor` is used as those of `concurrent.futures` are: leaving its context ends what it has
+started. Its ``width`` is how many blocks to hand out at a time, so that nobody waits for the next
+one. The loop neither knows nor cares whether a block is computed in this process or on a cluster.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from functools import partial
 from types import MappingProxyType
-from typing import Protocol, Self
+from typing import TYPE_CHECKING, TypeAlias
 
-from gearchaos_kernels import current_threads, use_threads
+import numba
 
 from gearchaos.engine.simulation import Arrays, Bounds, Simulation
 from gearchaos.errors import FileError, GearchaosError
 from gearchaos.interrupts import check
+
+if TYPE_CHECKING:
+    from gearchaos.engine.dask_executor import DaskExecutor
+
+BlockExecutor: TypeAlias = "LocalExecutor | DaskExecutor"
 
 SECONDS_BETWEEN_LOOKS = 1.0
 """How often it is looked whether somebody is there to compute, while no block ends."""
@@ -29,22 +35,7 @@ class ExecutionError(GearchaosError):
     exit_code = FileError.exit_code
 
 
-class BlockExecutor(Protocol):
-    """Computes blocks of lanes; leaving its context ends what it has started."""
-
-    @property
-    def width(self) -> int:
-        """How many blocks to hand out at a time, so that nobody waits for the next one."""
-
-    def submit(self, block: Bounds) -> Future[Arrays]:
-        """Begin a block and return the future of its arrays; `cancel` succeeds until it runs."""
-
-    def __enter__(self) -> Self: ...
-
-    def __exit__(self, *_: object) -> None: ...
-
-
-class LocalExecutor:
+class LocalExecutor(ExitStack):
     """Computes in this process, one block at a time: all threads work within a block.
 
     The thread of its own leaves the main one free to write what is finished, and an interrupt,
@@ -59,31 +50,28 @@ class LocalExecutor:
         simulation: Simulation,
         finished: Mapping[Bounds, Callable[[], Arrays]] = MappingProxyType({}),
     ) -> None:
+        super().__init__()
         self._simulation = simulation
         # A carried block needs what the one before it yielded: it is handed out after that one.
         self._before = dict(finished) if simulation.carried else {}
-        self._pool = ThreadPoolExecutor(
-            max_workers=1, initializer=use_threads, initargs=(current_threads(),)
-        )
+        threads = (numba.get_num_threads(),)
+        self._pool = ThreadPoolExecutor(1, initializer=numba.set_num_threads, initargs=threads)
+        self.callback(self._pool.shutdown, cancel_futures=True)
 
     def submit(self, block: Bounds) -> Future[Arrays]:
-        """Begin a block once those before it are done, and return the future of its arrays."""
+        """Begin a block once those before it are done, and return the future of its arrays.
+
+        Its `cancel` succeeds until the block runs.
+        """
         return self._pool.submit(self._compute, block)
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._pool.shutdown(cancel_futures=True)
 
     def _compute(self, block: Bounds) -> Arrays:
         simulation, carried = self._simulation, None
-        if simulation.carried:
-            first, last = block
-            for before, read in self._before.items():
-                if before[0] == last if simulation.downwards else before[1] == first:
-                    carried = read()["end_state"]
-        arrays = simulation.compute(*block, carried)
+        first, last = block
+        for before, read in self._before.items():
+            if before[0] == last if simulation.downwards else before[1] == first:
+                carried = read()["end_state"]
+        arrays = simulation.compute(first, last, carried)
         if simulation.carried:
             self._before[block] = partial(dict, end_state=arrays["end_state"])
         return arrays

@@ -8,7 +8,9 @@ from datetime import UTC, datetime
 from importlib.metadata import version
 from pathlib import Path
 
-from gearchaos_kernels import processor, source_hash
+import llvmlite.binding
+import numba
+from gearchaos_kernels import source_hash
 
 from gearchaos.version import Software, software_version
 
@@ -16,18 +18,16 @@ SOFTWARE = Software(f"gearchaos {software_version()}", source_hash())
 """That of this process. Not asked for later: somebody may edit a source that was imported."""
 
 
-def provenance(threads: int, seconds: float) -> dict[str, str | int | float]:
+def provenance(seconds: float) -> dict[str, str | int | float]:
     """Return what a result file says about the run that made it in so many seconds."""
     facts: dict[str, str | int | float] = {
         "created": datetime.now(UTC).isoformat(timespec="seconds"),
         **SOFTWARE._asdict(),
         "python_version": platform.python_version(),
-        "numpy_version": version("numpy"),
-        "numba_version": version("numba"),
-        "h5py_version": version("h5py"),
+        **{f"{name}_version": version(name) for name in ("numpy", "numba", "h5py")},
         "system": f"{platform.system()} {platform.machine()}",
-        "processor": processor(),
-        "threads": threads,
+        "processor": str(llvmlite.binding.get_host_cpu_name()),
+        "threads": int(numba.get_num_threads()),
         "wall_time_seconds": round(seconds, 3),
     }
     commit = commit_of(Path(__file__).parents[2])

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
-from gearchaos_kernels import integrate
+from gearchaos_kernels import System, integrate
 from numpy.typing import NDArray
 
 from gearchaos.configuration import Configuration, swept_values
@@ -93,15 +93,15 @@ def refinable(result: Result, name: str) -> Configuration:
     As `computable`, and raises ConfigurationError if its lanes do not stand for themselves.
     """
     config = computable(result, name)
+    unfit = remedy = ""
     if config.start.carry != "none":
+        unfit, remedy = f'carry = "{config.start.carry}"', 'with start.carry = "none"'
+    elif config.start.kind == "random":
+        unfit, remedy = 'kind = "random"', "that starts otherwise"
+    if unfit:
         raise ConfigurationError(
-            f'{name}: start.carry = "{config.start.carry}": a lane between two others has no start '
-            'of its own; refine a sweep with start.carry = "none"'
-        )
-    if config.start.kind == "random":
-        raise ConfigurationError(
-            f'{name}: start.kind = "random": a lane between two others has no start of its own; '
-            "refine a sweep that starts otherwise"
+            f"{name}: start.{unfit}: a lane between two others has no start of its own; refine a "
+            f"sweep {remedy}"
         )
     return config
 
@@ -166,40 +166,32 @@ def _losses(
     told = []
     for number in range(spacing.size):
         sides = [
-            (_TELLING.index(StabilityLoss(int(losses.kind[number]))), losses.multiplier[number])
+            (StabilityLoss(losses.kind[number]), complex(losses.multiplier[number]))
             for losses, edge in ((upwards, below), (downwards, above))
             if edge["period"][number] > 0
         ]
-        if sides:
-            rank, multiplier = min(sides, key=lambda side: side[0])
-            told.append((STABILITY_LOSS_TEXTS[_TELLING[rank]], complex(multiplier)))
-        else:
-            told.append(("", complex("nan")))
+        tells, multiplier = min(
+            sides, key=lambda side: _TELLING.index(side[0]), default=(None, complex("nan"))
+        )
+        told.append((STABILITY_LOSS_TEXTS[tells] if tells is not None else "", multiplier))
     return told
 
 
-def _settled(config: Configuration, edge: NDArray[Any]) -> Floats:
-    """Return a state near the orbit of every periodic lane.
+def _followed(config: Configuration, edge: NDArray[Any], last: Floats) -> Losses:
+    def system(values: Floats) -> System:
+        return system_of(config, {config.sweep.parameter: values}, config.needed_effects)
 
-    Where a longer look told it, the end of the record may be far away.
-    """
-    state = edge["state"].copy()
+    first, state = edge["value"], edge["state"].copy()
     lanes = np.flatnonzero(edge["far"])
     if lanes.size:
+        # Where a longer look told the orbit, the end of the record may be far away.
         longer = sum(LOOKS) * config.integration.recorded_periods
         further = plan_of(config, transient_periods=longer, recorded_periods=0)
-        values = {config.sweep.parameter: edge["value"][lanes]}
-        system = system_of(config, values, config.needed_effects)
-        state[lanes] = integrate(system, state[lanes], further).end_state
-    return state
-
-
-def _followed(config: Configuration, edge: NDArray[Any], last: Floats) -> Losses:
-    first, parameter = edge["value"], config.sweep.parameter
+        state[lanes] = integrate(system(first[lanes]), state[lanes], further).end_state
     lowest, highest = swept_values(config.sweep)[[0, -1]]
     followed = follow(
-        lambda values: system_of(config, {parameter: values}, config.needed_effects),
-        _settled(config, edge),
+        system,
+        state,
         edge["period"],
         first,
         np.clip(last, lowest, highest),

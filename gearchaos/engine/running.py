@@ -10,8 +10,8 @@ from contextlib import contextmanager
 from contextvars import copy_context
 from typing import Any
 
+import numba
 import numpy as np
-from gearchaos_kernels import current_threads, most_threads, use_threads
 from numba.core import event
 
 from gearchaos.configuration import Given, configuration_of
@@ -79,26 +79,24 @@ def run(config: Given, threads: int | None = None, progress: bool = False) -> Re
     """
     choose_threads(threads)
     with speaking(quiet=not progress):
-        return _run(Simulation(configuration_of(config)))
+        simulation = Simulation(configuration_of(config))
+        prepare(simulation)
+        began = time.monotonic()
+        blocks: dict[Bounds, Arrays] = {}
+        every = simulation.blocks(simulation.block_lanes(numba.get_num_threads()))
+        tally = Tally()
+        with LocalExecutor(simulation) as executor, Progress(len(simulation.lanes)) as bar:
 
+            def keep(block: Bounds, arrays: Arrays) -> None:
+                blocks[block] = arrays
+                tally.add(arrays)
+                bar.advance(block[1] - block[0])
 
-def _run(simulation: Simulation) -> Result:
-    prepare(simulation)
-    began = time.monotonic()
-    blocks: dict[int, Arrays] = {}
-    tally = Tally()
-    with LocalExecutor(simulation) as executor, Progress(len(simulation.lanes)) as bar:
-
-        def keep(block: Bounds, arrays: Arrays) -> None:
-            blocks[block[0]] = arrays
-            tally.add(arrays)
-            bar.advance(block[1] - block[0])
-
-        compute_blocks(executor, simulation.blocks(simulation.block_lanes(current_threads())), keep)
-    if tally.errors:
-        say(tally.errors)
-    in_order = [blocks[first] for first in sorted(blocks)]
-    return result_of(simulation, in_order, metadata(simulation, time.monotonic() - began))
+            compute_blocks(executor, every, keep)
+        if tally.errors:
+            say(tally.errors)
+        in_order = [blocks[block] for block in sorted(blocks)]
+        return result_of(simulation, in_order, metadata(simulation, time.monotonic() - began))
 
 
 def result_of(
@@ -107,16 +105,9 @@ def result_of(
     facts: Mapping[str, Any],
     more: Sequence[Variable] = (),
 ) -> Result:
-    """Join blocks in the order of their lanes to a result.
+    """Join blocks in the order of their lanes to a result, which says these facts about itself.
 
-    Parameters
-    ----------
-    simulation : Simulation
-    blocks : sequence of mapping of str to ndarray
-    facts : mapping
-        What the result says about itself.
-    more : sequence of Variable
-        What the blocks hold beside the variables of the sweep.
+    ``more``: what the blocks hold beside the variables of the sweep.
     """
     data = {name: np.concatenate([arrays[name] for arrays in blocks]) for name in blocks[0]}
     axes = [axis.name for axis in simulation.lanes.axes]
@@ -127,10 +118,8 @@ def result_of(
 def prepare(simulation: Simulation, *, compile_now: bool = True, history_periods: int = 0) -> None:
     """Compile the kernel, choose the steps where a tolerance is wanted, and say what was found.
 
-    Raises
-    ------
-    ConfigurationError
-        If a block of lanes, where they are computed here, does not fit into memory.
+    Raises ConfigurationError if a block of lanes, where they are computed here, does not fit into
+    memory.
     """
     check()  # Imports take a while.
     if compile_now:
@@ -143,7 +132,7 @@ def prepare(simulation: Simulation, *, compile_now: bool = True, history_periods
 
 
 def _check_memory(simulation: Simulation) -> None:
-    wanted = simulation.block_memory(current_threads())
+    wanted = simulation.block_memory(numba.get_num_threads())
     # Windows does not tell.
     known = hasattr(os, "sysconf")
     memory = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE") if known else math.inf
@@ -158,31 +147,18 @@ def _check_memory(simulation: Simulation) -> None:
 
 
 def choose_threads(threads: int | None) -> None:
-    """Use so many threads from now on; all that there are by default.
-
-    Raises
-    ------
-    ConfigurationError
-        If there are not so many.
-    """
-    most = most_threads()
+    """Use so many threads from now on, by default all; ConfigurationError if there are fewer."""
+    most = numba.config.NUMBA_NUM_THREADS
     if threads is not None and not 1 <= threads <= most:
         raise ConfigurationError(
             f"threads = {threads}: must be between 1 and {most}, the number of cores here "
             "(the variable NUMBA_NUM_THREADS, if set, takes its place)"
         )
-    use_threads(most if threads is None else threads)
+    numba.set_num_threads(most if threads is None else threads)
 
 
 def metadata(simulation: Simulation, seconds: float) -> Mapping[str, Any]:
-    """Return what a result says about itself beside its arrays.
-
-    Parameters
-    ----------
-    simulation : Simulation
-    seconds : float
-        Wall time of the computation in s.
-    """
+    """Return what a result says of itself beside its arrays, after so many seconds of wall time."""
     config = simulation.config
     return {
         "axes": " ".join(axis.name for axis in simulation.lanes.axes),
@@ -198,7 +174,7 @@ def metadata(simulation: Simulation, seconds: float) -> Mapping[str, Any]:
         "recorded_periods": simulation.plan.recorded_periods,
         "excitation_period": simulation.lanes.repeats_after,
         "notes": "\n".join(simulation.notes),
-        **provenance(current_threads(), seconds),
+        **provenance(seconds),
         "configuration": config.text,
         "configuration_resolved": config.resolved_toml(),
     }

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from functools import partial
 
-from gearchaos_kernels import current_threads
+import numba
 
 from gearchaos.engine.error_check import Tally
 from gearchaos.engine.executors import BlockExecutor, LocalExecutor, compute_blocks
@@ -45,19 +45,18 @@ def fill(
     for problem in problems:
         complain(f"{problem}; it is computed again")
     done = sum(last - first for first, last in finished)
+    performed_by = {}
     if cluster is None:
-        size = simulation.block_lanes(current_threads())
-        missing = simulation.in_order(store.missing(finished, size))
+        size = simulation.block_lanes(numba.get_num_threads())
         readers = {block: partial(store.read, *block) for block in finished}
         executor: BlockExecutor = LocalExecutor(simulation, readers)
-        performed_by = {"threads": current_threads()}
     else:
         from gearchaos.engine.dask_executor import DaskExecutor
 
         executor = DaskExecutor(simulation, cluster)
         size = shared_block_lanes(len(simulation.lanes), executor.workers)
-        missing = store.missing(finished, size)
         performed_by = {"threads": 1, "workers": executor.workers}
+    missing = simulation.in_order(store.missing(finished, size))
     with executor, Progress(store.own_lanes, done) as progress:
 
         def keep(block: Bounds, arrays: Arrays) -> None:

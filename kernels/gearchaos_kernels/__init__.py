@@ -16,7 +16,6 @@ from gearchaos_kernels.system import (
     System,
     Teeth,
 )
-from gearchaos_kernels.threads import current_threads, most_threads, processor, use_threads
 
 __all__ = [
     "CACHE_FOLDER",
@@ -31,13 +30,9 @@ __all__ = [
     "Status",
     "System",
     "Teeth",
-    "current_threads",
     "integrate",
     "jacobian",
     "maps_memory",
     "mesh_motion",
-    "most_threads",
-    "processor",
     "source_hash",
-    "use_threads",
 ]

@@ -42,7 +42,7 @@ from gearchaos_kernels.block_memory import (
 from gearchaos_kernels.compilation import align_stack, part, scalar
 from gearchaos_kernels.contact import branches_at, step_may_leave
 from gearchaos_kernels.equations import gaps_at
-from gearchaos_kernels.flow_layout import step_size
+from gearchaos_kernels.flow_layout import layout
 from gearchaos_kernels.flow_steps import begin_forces, cross, move_block
 from gearchaos_kernels.flow_vectors import VECTOR, WORK
 from gearchaos_kernels.forcing import During, forcing_at, phase_on_grid
@@ -109,7 +109,7 @@ def integrate_block(number_of_block, batch, plan, outcome, present):
             if period >= periods - plan.history_periods and number % every == 0:
                 sample = (period - periods + plan.history_periods) * plan.steps_per_period
                 keep_state(block, batch, outcome.history, sample + number // every)
-            row = maps_at + number * step_size(present)
+            row = maps_at + number * layout(present).step_size
             if present.flow_map is None:
                 # Not in the loop over slots: nobody tells the compiler that its stores spare it.
                 phases = During(

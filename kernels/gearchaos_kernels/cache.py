@@ -122,6 +122,4 @@ class KernelCache(NullCache):  # type: ignore[misc]
 
 
 def _sealed(path: Path, data: bytes) -> bytes:
-    digest = hashlib.sha256(path.name.encode())
-    digest.update(data)
-    return digest.digest() + data
+    return hashlib.sha256(path.name.encode() + data).digest() + data

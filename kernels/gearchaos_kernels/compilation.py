@@ -39,8 +39,6 @@ FASTMATH = {"contract", "nsz"}
 CACHE_LINE = 64
 """Bytes that one aligned 512-bit vector occupies."""
 
-_SHARED_FLAGS: dict[str, Any] = {"fastmath": FASTMATH, "error_model": "numpy"}
-
 
 def source_hash() -> str:
     """Return a hash of every source file of this package and of Numba's version."""
@@ -51,14 +49,10 @@ def source_hash() -> str:
     return digest.hexdigest()[:16]
 
 
-def widest_vectors() -> str:
-    """Return the processor's features without the preference for 256-bit vectors."""
-    return str(llvmlite.binding.get_host_cpu_features().flatten()) + ",-prefer-256-bit"
-
-
 CACHE_FOLDER = cache_folder(source_hash())
 if config.CPU_FEATURES is None:
-    config.CPU_FEATURES = widest_vectors()
+    features = llvmlite.binding.get_host_cpu_features().flatten()
+    config.CPU_FEATURES = f"{features},-prefer-256-bit"
 
 
 @register_pass(mutates_CFG=False, analysis_only=False)
@@ -142,7 +136,8 @@ class _DriverCompiler(_Compiler):
 def _decorate(
     function: Callable[..., Any], compiler: type[CompilerBase] = _Compiler, **flags: Any
 ) -> Any:
-    dispatcher = numba.njit(pipeline_class=compiler, **_SHARED_FLAGS, **flags)(function)
+    flags |= {"fastmath": FASTMATH, "error_model": "numpy"}
+    dispatcher = numba.njit(pipeline_class=compiler, **flags)(function)
     # Numba would compile for every constant argument anew; LLVM knows them all the same.
     template = dispatcher.get_call_template
     dispatcher.get_call_template = lambda args, kws: template(

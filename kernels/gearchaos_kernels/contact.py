@@ -68,16 +68,17 @@ def step_may_leave(begin, end, branches, present):
 
 
 @scalar
-def may_leave(begin, end, branch):
+def may_leave(begin, end, branch, margin=0.0):
     """Tell whether a step may leave its branch, be it for a moment only.
 
     Rates are per step. The cubic through both ends lies between the smallest and the largest of its
     Bezier points; a step that begins on a branch, and whose other points lie there, stays there.
+    Where the gap is no cubic, those in the middle have a margin.
     """
     point1 = begin.value + _THIRD * begin.rate
     point2 = end.value - _THIRD * end.rate
-    lowest = min(min(point1, point2), end.value)
-    highest = max(max(point1, point2), end.value)
+    lowest = min(min(point1, point2) - margin, end.value)
+    highest = max(max(point1, point2) + margin, end.value)
     return (lowest < branch.floor) | (highest > branch.ceiling)
 
 

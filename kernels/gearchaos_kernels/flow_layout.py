@@ -19,14 +19,14 @@ class Layout(NamedTuple):
 
     ``columns``: those of x and then those of c: load, offset of the tangential and of the axial
     flank, sine and cosine part of the pitch error, as far as the scene has them; ``width``: of a
-    state, so that it fills vector registers; ``pairs``: of branches; ``ways``:
-    directions of the mesh; ``varies``: whether its stiffness does.
+    state, so that it fills vector registers; ``size``: of a pair of branches, whose map of the
+    state stands first; ``pairs``: of branches; ``ways``: directions of the mesh; ``varies``:
+    whether its stiffness does; ``step_size``: of all maps of a step.
     """
 
     states: int
     columns: int
     width: int
-    end: int
     gap_y: int
     gap_z: int
     switch_y: int
@@ -35,54 +35,26 @@ class Layout(NamedTuple):
     pairs: int
     ways: int
     varies: bool
+    step_size: int
 
 
 @scalar
 def layout(present):
     """Return the layout of the maps of a scene."""
-    states = 2
-    if present.transverse is not None:
-        states += 4
-    if present.axial is not None:
-        states += 4
-    columns = states + 2
+    transverse = 0 if present.transverse is None else 1
+    axial = 0 if present.axial is None else 1
+    error = 0 if present.pitch_error is None else 1
+    phase = 0 if present.phase is None else 1
+    resolved = 0 if present.resolved is None else 1
+    varies = present.stiffness_variation is not None
+    states = 2 + 4 * transverse + 4 * axial
+    columns = states + 2 + axial + error + phase
     width = 2 if states == 2 else 8 if states == 6 else 16
-    if present.pitch_error is not None:
-        columns += 1
-    if present.phase is not None:
-        columns += 1
-    pairs = 1
-    if present.resolved is not None:
-        pairs = 2
-    z = 0
-    if present.axial is not None:
-        columns += 1
-        pairs *= pairs
-        z = 1
-    end = 0
-    gap_y = end + columns * width
+    gap_y = columns * width
     gap_z = gap_y + columns * TERMS
-    switch_y = gap_z + z * columns * TERMS
+    switch_y = gap_z + axial * columns * TERMS
     switch_z = switch_y + TERMS * width
-    size = switch_z + z * TERMS * width
-    return Layout(
-        states,
-        columns,
-        width,
-        end,
-        gap_y,
-        gap_z,
-        switch_y,
-        switch_z,
-        size,
-        pairs,
-        1 + z,
-        present.stiffness_variation is not None,
-    )
-
-
-@scalar
-def step_size(present):
-    """Return how many numbers the maps of one step take."""
-    place = layout(present)
-    return HEADER + place.pairs * place.size
+    size = switch_z + axial * TERMS * width
+    pairs = (1 + resolved) * (1 + resolved * axial)
+    places = (gap_y, gap_z, switch_y, switch_z, size, pairs)
+    return Layout(states, columns, width, *places, 1 + axial, varies, HEADER + pairs * size)

@@ -32,13 +32,8 @@ from numpy.typing import NDArray
 
 from gearchaos_kernels.block_memory import Lane, Present, flags
 from gearchaos_kernels.coefficients import lane_coefficients
-from gearchaos_kernels.flow_layout import HEADER, Layout, layout
-from gearchaos_kernels.flow_series import (
-    RightSide,
-    differentiate,
-    fill_maps,
-    series_of_forcing,
-)
+from gearchaos_kernels.flow_layout import Layout, layout
+from gearchaos_kernels.flow_series import RightSide, differentiate, fill_maps, series_of_forcing
 from gearchaos_kernels.system import Floats, Groups, Plan, System
 
 TAIL = 2e-15
@@ -94,7 +89,7 @@ def maps_memory(system: System, plan: Plan, stable: NDArray[np.int64]) -> int:
     needed = stable[first] + 2.0 * system.stiffness_cosine.size * place.varies
     steps = plan.steps_per_period
     divided = steps * 2.0 ** np.ceil(np.log2(np.maximum(needed / steps, 1.0)))
-    sizes = 8 * (HEADER + place.pairs * place.size) * np.minimum(divided, max(steps, MOST_STEPS))
+    sizes = 8 * place.step_size * np.minimum(divided, max(steps, MOST_STEPS))
     # Those that are kept, and those that are used.
     return 2 * int(min(sizes.sum(), MOST_BYTES + sizes.max()))
 
@@ -153,13 +148,11 @@ def _make(system: System, steps: int, present: Present) -> Floats:
     states, count = place.states, steps
     while True:
         coefficients = lane_coefficients(system, system.mesh_period / count)[0]
-        right_side = RightSide(
-            *(np.zeros(shape) for shape in ((states, states), (states, 3))),
-            *(np.zeros(shape) for shape in ((states, 2), (2, states), (2, 3))),
-        )
+        shapes = (states, states + 3), (2, states + 3), (states, 2)
+        right_side = RightSide(*map(np.zeros, shapes))
         differentiate(coefficients, right_side, present)
         forcing = series_of_forcing(system, Lane(*coefficients), count, place.varies)
-        table = np.zeros((count, HEADER + place.pairs * place.size))
+        table = np.zeros((count, place.step_size))
         edges = 2.0 * np.pi / count * np.arange(count + 1)
         for column, values in enumerate((np.sin(edges), np.cos(edges))):
             table[:, column], table[:, column + 2] = values[:-1], values[1:]

@@ -30,7 +30,7 @@ from gearchaos_kernels.equations import (
     accelerations,
     gaps_at,
 )
-from gearchaos_kernels.flow_layout import BOUND_Y, BOUND_Z, HEADER, TERMS, Layout
+from gearchaos_kernels.flow_layout import BOUND_Y, BOUND_Z, HEADER, TERMS
 from gearchaos_kernels.forcing import Phase, forcing_at
 from gearchaos_kernels.system import Floats, System
 
@@ -69,30 +69,24 @@ def _bends() -> Floats:
 
 _BENDS = _bends()
 
-_ENGAGED = np.array([[1.0 - pair % 2, 1.0 - pair // 2] for pair in range(4)])
-"""Whether the flanks of both directions are engaged, on each pair of branches."""
-
 
 class RightSide(NamedTuple):
     """Eq. 13 as matrices: what every state and every forcing adds to rates and gaps.
 
-    ``constant`` (states, states), ``forced`` (states, 3): rates without mesh stiffness, by state
-    and by drive, sine and cosine of the error; ``mobility`` (states, 2): what a force of one in the
-    mesh takes away, the axial one with its share of the stiffness; ``gaps`` (2, states),
-    ``gaps_forced`` (2, 3): both gaps, by the same.
+    ``rates`` (states, states + 3): without mesh stiffness, by state and by drive, sine and cosine
+    of the error; ``gaps`` (2, states + 3): both gaps, by the same; ``mobility`` (states, 2): what a
+    force of one in the mesh takes away, the axial one with its share of the stiffness.
     """
 
-    constant: Floats
-    forced: Floats
-    mobility: Floats
+    rates: Floats
     gaps: Floats
-    gaps_forced: Floats
+    mobility: Floats
 
 
 @evaluator
 def differentiate(coefficients, right_side, present):
     """Apply the formulas of eq. 13 to one unit after the other."""
-    states = right_side.constant.shape[0]
+    states = right_side.rates.shape[0]
     memory = aligned_memory()
     fill_lane(memory, 0, coefficients)
     lane = load(memory, COEFFICIENTS, 0, Lane)
@@ -107,15 +101,8 @@ def differentiate(coefficients, right_side, present):
         state = read_state(memory, STATE, 0, present)
         acting = forcing_at(lane, Phase(0.0, sine, cosine, -sine), present)
         both = gaps_at(state, lane, acting, present)
-        gaps = right_side.gaps
-        rates = right_side.constant
-        at = column
-        if column >= states:
-            gaps = right_side.gaps_forced
-            rates = right_side.forced
-            at = column - states
-        gaps[0, at] = both.tangential.value
-        gaps[1, at] = both.axial.value
+        right_side.gaps[0, column] = both.tangential.value
+        right_side.gaps[1, column] = both.axial.value
         forces = Directions(
             lane.mesh_damping * both.tangential.rate,
             lane.axial_share * lane.mesh_damping * both.axial.rate,
@@ -125,7 +112,7 @@ def differentiate(coefficients, right_side, present):
         )
         write_state(memory, STATE, 0, result, present)
         for line in range(states):
-            rates[line, at] = memory[(STATE + line) * STRIDE]
+            right_side.rates[line, column] = memory[(STATE + line) * STRIDE]
     for way in range(2):
         forces = Directions(1.0 - way, lane.axial_share * way)
         result = State(zero, accelerations(rest, forces, 0.0, lane, present))
@@ -152,62 +139,48 @@ def series_of_forcing(system: System, lane: Lane, steps: int, varies: bool) -> F
     return np.stack([stiffness, turn.imag, turn.real], axis=1)
 
 
-def fill_maps(right_side: RightSide, forcing: Floats, table: Floats, place: Layout) -> float:
-    """Fill the maps of every step, shape (steps, size of a step); return what series leave."""
-    tails = np.zeros(table.shape[0])
-    _fill_maps(right_side, forcing, _ENGAGED, table, tails, _KEPT, _DROPPED, _BENDS, place)
-    return float(tails.max())
-
-
 @evaluator
-def _fill_maps(right_side, forcing, engaged, table, tails, kept, dropped, bends, place):
-    """Fill the maps of every step, shape (steps, size of a step)."""
+def fill_maps(right_side, forcing, table, place):
+    """Fill the maps of every step, shape (steps, size of a step); return what series leave."""
+    tail = 0.0
     for number in range(table.shape[0]):
-        row = table[number]
-        tail = 0.0
         for pair in range(place.pairs):
-            at = HEADER + pair * place.size
-            piece = row[at : at + place.size]
-            left = fill_pair(
-                piece, row, right_side, forcing[number], engaged[pair], kept, dropped, bends, place
-            )
+            left = fill_pair(pair, table[number], right_side, forcing[number], place)
             tail = larger(tail, left)
-        tails[number] = tail
+    return tail
 
 
 @part
-def fill_pair(piece, row, right_side, forcing, engaged, kept, dropped, bends, place):
+def fill_pair(pair, row, right_side, forcing, place):
     """Fill the maps of one step on one pair of branches; return what is left of the series."""
+    piece = row[HEADER + pair * place.size : HEADER + (pair + 1) * place.size]
+    engaged = (1.0 - pair % 2, 1.0 - pair // 2)
     states = place.states
     columns = place.columns
     stiffness = forcing[0]
-    mobility = right_side.mobility
-    rows = right_side.gaps
-    engaged_rows = np.zeros((2, states))
+    rates, gaps, mobility = right_side
+    engaged_gaps = np.zeros((2, states))
     for way in range(2):
         for line in range(states):
-            engaged_rows[way, line] = engaged[way] * rows[way, line]
+            engaged_gaps[way, line] = engaged[way] * gaps[way, line]
     ways = place.ways
     error = states + 1 + ways
 
-    # The motion by column, and what acts on it: gaps, forces times K, drive and error.
-    psi = np.zeros((ORDER + 1, states, columns))
+    # The motion by column with drive and error below it, the gaps, and the forces times K.
+    psi = np.zeros((ORDER + 1, states + 3, columns))
     gap = np.zeros((ORDER, ways, columns))
     force = np.zeros((ways, columns))
-    inputs = np.zeros((3, columns))
-    for column in range(states):
+    for column in range(states + 1):
         psi[0, column, column] = 1.0
     for k in range(ORDER):
         scale = 0.5 / (k + 1)
-        inputs[0, states] = 1.0 if k == 0 else 0.0
         if columns > error:
-            inputs[1, error] = forcing[1, k]
-            inputs[2, error] = forcing[2, k]
+            psi[k, states + 1, error] = forcing[1, k]
+            psi[k, states + 2, error] = forcing[2, k]
         if columns > error + 1:
-            inputs[1, error + 1] = forcing[2, k]
-            inputs[2, error + 1] = -forcing[1, k]
-        add_product(1.0, rows, psi[k], gap[k])
-        add_product(1.0, right_side.gaps_forced, inputs, gap[k])
+            psi[k, states + 1, error + 1] = forcing[2, k]
+            psi[k, states + 2, error + 1] = -forcing[1, k]
+        add_product(1.0, gaps, psi[k], gap[k])
         for way in range(ways):
             for column in range(columns):
                 force[way, column] = 0.0
@@ -216,8 +189,7 @@ def fill_pair(piece, row, right_side, forcing, engaged, kept, dropped, bends, pl
                 for column in range(columns):
                     force[way, column] += factor * gap[j, way, column]
             force[way, states + 1 + way] -= stiffness[k]
-        add_product(scale, right_side.constant, psi[k], psi[k + 1])
-        add_product(scale, right_side.forced, inputs, psi[k + 1])
+        add_product(scale, rates, psi[k], psi[k + 1])
         add_product(scale, mobility, force, psi[k + 1])
 
     # The inverse flow, and with K what it makes of the mobilities.
@@ -233,8 +205,8 @@ def fill_pair(piece, row, right_side, forcing, engaged, kept, dropped, bends, pl
             for line in range(states):
                 for way in range(ways):
                     switch[k, line, way] += stiffness[k - j] * moved[j, line, way]
-        add_product(scale, inverse[k], right_side.constant, inverse[k + 1])
-        add_product(scale, switch[k], engaged_rows, inverse[k + 1])
+        add_product(scale, inverse[k], rates, inverse[k + 1])
+        add_product(scale, switch[k], engaged_gaps, inverse[k + 1])
 
     first = np.zeros((states, columns))
     last = np.zeros((states, columns))
@@ -242,12 +214,10 @@ def fill_pair(piece, row, right_side, forcing, engaged, kept, dropped, bends, pl
     tail = 0.0
     for k in range(ORDER, -1, -1):
         sign = 1.0 - 2.0 * (k % 2)
-        for line in range(states):
-            for column in range(columns):
-                first[line, column] += sign * psi[k, line, column]
-                last[line, column] += psi[k, line, column]
-            for column in range(states):
-                back[line, column] += sign * inverse[k, line, column]
+        # The first term of the inverse is 1.
+        add_product(sign, inverse[0], psi[k], first)
+        add_product(1.0, inverse[0], psi[k], last)
+        add_product(sign, inverse[0], inverse[k], back)
     for line in range(states):
         for column in range(states):
             tail = larger(tail, abs(psi[ORDER, line, column]))
@@ -257,14 +227,14 @@ def fill_pair(piece, row, right_side, forcing, engaged, kept, dropped, bends, pl
     end = over_beginning(last, first, back)
     for line in range(states):
         for column in range(columns):
-            piece[place.end + column * place.width + line] = end[line, column]
+            piece[column * place.width + line] = end[line, column]
     along = over_beginning(gap.reshape((ways * ORDER, columns)), first, back)
-    cut, left = economised(along.reshape((ORDER, ways * columns)), kept, dropped)
+    cut, left = economised(along.reshape((ORDER, ways * columns)))
     tail = larger(tail, left)
     traced = np.zeros((ORDER, states, ways))
     for k in range(ORDER):
         add_product(0.5, first, switch[k], traced[k])
-    thrown, left = economised(traced.reshape((ORDER, ways * states)), kept, dropped)
+    thrown, left = economised(traced.reshape((ORDER, ways * states)))
     tail = larger(tail, left)
     for way in range(ways):
         at = place.gap_y if way == 0 else place.gap_z
@@ -274,7 +244,7 @@ def fill_pair(piece, row, right_side, forcing, engaged, kept, dropped, bends, pl
             bend = 0.0
             for term in range(TERMS):
                 terms[term] = cut[term, way * columns + column]
-                bend += bends[term] * abs(terms[term])
+                bend += _BENDS[term] * abs(terms[term])
             row[bound + column] = max(row[bound + column], bend)
         at = place.switch_y if way == 0 else place.switch_z
         for term in range(TERMS):
@@ -295,7 +265,7 @@ def add_product(scale, a, b, target):
 
     What one of them has more of than the target or the other one does not count: no axial pair.
     """
-    for line in range(target.shape[0]):
+    for line in range(min(a.shape[0], target.shape[0])):
         for source in range(min(a.shape[1], b.shape[0])):
             factor = scale * a[line, source]
             if factor != 0.0:
@@ -321,12 +291,12 @@ def over_beginning(rows, first, back):
 
 
 @part
-def economised(series, kept, dropped):
+def economised(series):
     """Cut Taylor series to fewer terms; return them, and the largest share that is lost."""
     target = np.zeros((TERMS, series.shape[1]))
-    lost = np.zeros((dropped.shape[0], series.shape[1]))
-    add_product(1.0, kept, series, target)
-    add_product(1.0, dropped, series, lost)
+    lost = np.zeros((ORDER - TERMS, series.shape[1]))
+    add_product(1.0, _KEPT, series, target)
+    add_product(1.0, _DROPPED, series, lost)
     largest = 1e-300
     most = 0.0
     for column in range(series.shape[1]):

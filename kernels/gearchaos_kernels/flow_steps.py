@@ -33,7 +33,7 @@ from gearchaos_kernels.block_memory import (
     write_branches,
 )
 from gearchaos_kernels.compilation import scalar
-from gearchaos_kernels.contact import NEVER, branches_at, first_fall, next_branch
+from gearchaos_kernels.contact import NEVER, branches_at, first_fall, may_leave, next_branch
 from gearchaos_kernels.equations import gaps_at
 from gearchaos_kernels.flow_layout import BOUND_Y, BOUND_Z, HEADER, TERMS, layout
 from gearchaos_kernels.flow_vectors import (
@@ -76,11 +76,12 @@ def phases_of(table, row):
 
 @scalar
 def begin_forces(memory, slot, lane, present):
-    """Store what forces a lane; without clearance no flank has an offset."""
+    """Store what forces a lane, in the order of columns; without clearance no flank has offsets."""
     amplitude = 0.5 * lane.axial_error_amplitude
+    error = FORCES + 1 + layout(present).ways
     memory[FORCES * STRIDE + slot] = lane.load
-    memory[(FORCES + 3) * STRIDE + slot] = amplitude * lane.cos_phase
-    memory[(FORCES + 4) * STRIDE + slot] = amplitude * lane.sin_phase
+    memory[error * STRIDE + slot] = amplitude * lane.cos_phase
+    memory[(error + 1) * STRIDE + slot] = amplitude * lane.sin_phase
     branches = Branches(ALWAYS, ALWAYS)
     if present.resolved is not None:
         branches = read_branches(memory, slot, present)
@@ -92,7 +93,8 @@ def store_offsets(memory, slot, lane, branches, present):
     """Store by how much each gap exceeds the deflection on its branch."""
     y, z = offsets_of(lane, branches, present)
     memory[(FORCES + 1) * STRIDE + slot] = y
-    memory[(FORCES + 2) * STRIDE + slot] = z
+    if present.axial is not None:
+        memory[(FORCES + 2) * STRIDE + slot] = z
 
 
 @scalar
@@ -129,18 +131,13 @@ def move_block(memory, table, row, slots, work, present):
     for slot in range(0, slots, VECTOR):
         keep_before(memory, slot, table, row, present)
     for pair in range(place.pairs):
-        engaged_y = 1.0 - pair % 2
-        engaged_z = 1.0 - pair // 2
         at = row + HEADER + pair * place.size
         for slot in range(0, slots, VECTOR):
-            move(memory, slot, table, at, engaged_y, engaged_z, present)
-    if present.resolved is None:
-        return 0
-    begin, end = phases_of(table, row)
+            move(memory, slot, table, at, 1.0 - pair % 2, 1.0 - pair // 2, present)
     # A known number of slots is what the compiler makes vector instructions of.
     if slots == VECTOR:
-        return count_suspects(memory, VECTOR, begin, end, present)
-    return count_suspects(memory, LANES, begin, end, present)
+        return count_suspects(memory, VECTOR, table, row, present)
+    return count_suspects(memory, LANES, table, row, present)
 
 
 @scalar
@@ -164,10 +161,7 @@ def move_lane(memory, table, row, work, present):
     if present.resolved is not None:
         at += pair_of(read_branches(memory, 0, present), present) * place.size
     scatter(memory, 0, table, at, work, present)
-    if present.resolved is None:
-        return 0
-    begin, end = phases_of(table, row)
-    return count_suspects(memory, 1, begin, end, present)
+    return count_suspects(memory, 1, table, row, present)
 
 
 @scalar
@@ -178,35 +172,29 @@ def gather(memory, slot, work, present):
         work[INPUTS + line] = memory[(BEFORE + STATE + line) * STRIDE + slot]
         if present.tangent is not None:
             work[TANGENT_INPUTS + line] = memory[(BEFORE + TANGENT + line) * STRIDE + slot]
-    column = place.states
-    work[INPUTS + column] = memory[FORCES * STRIDE + slot]
-    work[INPUTS + column + 1] = memory[(FORCES + 1) * STRIDE + slot]
-    column += 2
-    if present.axial is not None:
-        work[INPUTS + column] = memory[(FORCES + 2) * STRIDE + slot]
-        column += 1
-    if present.pitch_error is not None:
-        work[INPUTS + column] = memory[(FORCES + 3) * STRIDE + slot]
-    if present.phase is not None:
-        work[INPUTS + column + 1] = memory[(FORCES + 4) * STRIDE + slot]
+    for number in range(place.columns - place.states):
+        work[INPUTS + place.states + number] = memory[(FORCES + number) * STRIDE + slot]
 
 
 @scalar
 def scatter(memory, slot, table, at, work, present):
     """Write where a map leads what was read, state and tangent vector."""
     place = layout(present)
-    end_of(work, RESULT, INPUTS, table, at + place.end, present)
+    end_of(work, RESULT, INPUTS, table, at, present)
     for line in range(place.states):
         memory[(STATE + line) * STRIDE + slot] = work[RESULT + line]
     if present.tangent is not None:
-        tangent_end_of(work, RESULT, TANGENT_INPUTS, table, at + place.end, present)
+        tangent_end_of(work, RESULT, TANGENT_INPUTS, table, at, present)
         for line in range(place.states):
             memory[(TANGENT + line) * STRIDE + slot] = work[RESULT + line]
 
 
 @scalar
-def count_suspects(memory, slots, begin, end, present):
+def count_suspects(memory, slots, table, row, present):
     """Mark the lanes whose gaps may have left their branches since the step began."""
+    if present.resolved is None:
+        return 0
+    begin, end = phases_of(table, row)
     suspects = 0
     for slot in range(slots):
         lane = load(memory, COEFFICIENTS, slot, Lane)
@@ -223,16 +211,6 @@ def count_suspects(memory, slots, begin, end, present):
         suspects += 1 if suspect else 0
         memory[SUSPECT * STRIDE + slot] = 1.0 if suspect else 0.0
     return suspects
-
-
-@scalar
-def may_leave(begin, end, branch, margin):
-    """Tell whether a gap may leave its branch; its Bezier points in the middle have a margin."""
-    point1 = begin.value + _THIRD * begin.rate
-    point2 = end.value - _THIRD * end.rate
-    lowest = min(min(point1, point2) - margin, end.value)
-    highest = max(max(point1, point2) + margin, end.value)
-    return (lowest < branch.floor) | (highest > branch.ceiling)
 
 
 @scalar
@@ -268,17 +246,11 @@ def cross(memory, slot, table, row, work, present):
 
         crossings += 1
         done = moment
-        gap = GAP_Y
-        columns = place.gap_y
-        switch = place.switch_y
-        speed = lane.tangential_speed
-        branch = branches.tangential
-        if axially:
-            gap = GAP_Z
-            columns = place.gap_z
-            switch = place.switch_z
-            speed = lane.axial_speed
-            branch = branches.axial
+        gap = GAP_Z if axially else GAP_Y
+        columns = place.gap_z if axially else place.gap_y
+        switch = place.switch_z if axially else place.switch_y
+        speed = lane.axial_speed if axially else lane.tangential_speed
+        branch = branches.axial if axially else branches.tangential
         value, slope = value_and_slope(work, gap, moment)
         # The step is 2 long in s.
         slowest = min(slowest, 2.0 * speed * abs(slope))
@@ -354,18 +326,9 @@ def first_below(work, gap, done, begin, end, bend, side, distance):
             # Their slopes differ by less than a fifth of the same number.
             steepest = max(width * slope_left, 3.0 * (point2 - point1), width * slope_right)
             if steepest < -stray * 0.2 and value_right < 0.0:
-                return falling_root(
-                    work,
-                    gap,
-                    side,
-                    distance,
-                    left,
-                    right,
-                    value_left,
-                    width * slope_left,
-                    value_right,
-                    width * slope_right,
-                )
+                slopes = width * slope_left, width * slope_right
+                guess = first_fall(value_left, slopes[0], value_right, slopes[1])
+                return falling_root(work, gap, side, distance, left, right, guess)
             clear = steepest < -stray * 0.2
             if not clear and width < _NARROW:
                 if value_right < 0.0:
@@ -387,9 +350,9 @@ def first_below(work, gap, done, begin, end, bend, side, distance):
 
 
 @scalar
-def falling_root(work, gap, side, distance, left, right, d0, r0, d1, r1):
+def falling_root(work, gap, side, distance, left, right, guess):
     """Return where a gap that falls from one end of a piece to the other passes zero."""
-    at = left + (right - left) * first_fall(d0, r0, d1, r1)
+    at = left + (right - left) * guess
     for _ in range(_ITERATIONS):
         value, slope = value_and_slope(work, gap, at)
         value = side * value + distance

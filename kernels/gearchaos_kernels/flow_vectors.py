@@ -38,64 +38,57 @@ the step as polynomials, what the tangent vector adds to one of them, the state 
 the end of the step; and how many numbers that are."""
 
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(10)
-_DOUBLE = ir.DoubleType()
+_DOUBLE, _INTEGER = ir.DoubleType(), ir.IntType(types.intp.bitwidth)
 _FLAGS = tuple(sorted(FASTMATH))
 
 
-class _Scene:
-    """Layout and effects of a scene, read off the type of its flags."""
+def _scene(kind: Any) -> tuple[Any, Layout]:
+    """Read effects and layout of a scene off the type of its flags."""
+    present = kind.instance_class(*(None if flag is types.none else () for flag in kind.types))
+    return present, layout.py_func(present)
 
-    def __init__(self, present: Any) -> None:
-        flags = dict(zip(present.fields, present.types, strict=True))
-        there = {name: None if kind is types.none else () for name, kind in flags.items()}
-        self.present = present.instance_class(**there)
-        self.layout: Layout = layout.py_func(self.present)
 
-    @property
-    def forces(self) -> list[int]:
-        """Rows of what forces a lane, in the order of the columns of a map."""
-        p = self.present
-        there = (True, True, p.axial, p.pitch_error, p.phase)
-        return [FORCES + n for n, flag in enumerate(there) if flag is True or flag is not None]
+def _inputs(first: int, place: Layout) -> list[int]:
+    """Return the rows of what is multiplied with a map: a state, and what forces a lane."""
+    return [first + n for n in range(place.states)] + [
+        FORCES + n for n in range(place.columns - place.states)
+    ]
 
 
 class _Writer:
     """Writes the instructions of one function: loads, stores and sums of vectors."""
 
-    def __init__(self, context: Any, builder: Any) -> None:
+    def __init__(self, context: Any, builder: Any, signature: Any, arguments: Any) -> None:
         self.context, self.builder = context, builder
+        self.arguments = tuple(zip(signature.args, arguments, strict=True))
 
-    def data(self, kind: Any, array: Any) -> Any:
-        """Return the first address of an array."""
-        return self.context.make_array(kind)(self.context, self.builder, array).data
+    def element(self, number: int, at: Any) -> Any:
+        """Return the address of an element of the array that is this argument."""
+        kind, array = self.arguments[number]
+        first = self.context.make_array(kind)(self.context, self.builder, array).data
+        return self.builder.gep(first, [at])
 
-    def element(self, signature: Any, arguments: Any, number: int) -> Any:
-        """Return the address in an array argument that the argument behind it counts."""
-        array = self.data(signature.args[number], arguments[number])
-        return self.builder.gep(array, [arguments[number + 1]])
-
-    def at(self, pointer: Any, index: Any, more: int = 0) -> Any:
-        """Return the address of an element."""
-        index = self.builder.add(index, ir.Constant(index.type, more))
-        return self.builder.gep(pointer, [index])
-
-    def load(self, pointer: Any, width: int) -> Any:
-        """Load a vector."""
+    def load(self, pointer: Any, at: int, width: int = VECTOR) -> Any:
+        """Load a vector so many numbers behind an address."""
         kind = ir.VectorType(_DOUBLE, width).as_pointer()
-        return self.builder.load(self.builder.bitcast(pointer, kind), align=8)
+        place = self.builder.gep(pointer, [_INTEGER(at)])
+        return self.builder.load(self.builder.bitcast(place, kind), align=8)
 
-    def store(self, value: Any, pointer: Any) -> None:
-        """Store a vector."""
-        self.builder.store(value, self.builder.bitcast(pointer, value.type.as_pointer()), align=8)
+    def store(self, value: Any, pointer: Any, at: int) -> None:
+        """Store a vector so many numbers behind an address."""
+        place = self.builder.gep(pointer, [_INTEGER(at)])
+        self.builder.store(value, self.builder.bitcast(place, value.type.as_pointer()), align=8)
 
-    def splat(self, number: Any, width: int) -> Any:
+    def spread(self, pointer: Any, at: int, width: int = VECTOR) -> Any:
+        """Load a number, and return a vector of it."""
+        return self.splat(self.builder.load(self.builder.gep(pointer, [_INTEGER(at)])), width)
+
+    def splat(self, number: Any, width: int = VECTOR) -> Any:
         """Return a vector of one number."""
-        kind = ir.VectorType(_DOUBLE, width)
-        one = self.builder.insert_element(
-            ir.Constant(kind, ir.Undefined), number, ir.Constant(ir.IntType(32), 0)
-        )
+        nothing = ir.Constant(ir.VectorType(_DOUBLE, width), ir.Undefined)
+        one = self.builder.insert_element(nothing, number, ir.IntType(32)(0))
         order = ir.Constant(ir.VectorType(ir.IntType(32), width), [0] * width)
-        return self.builder.shuffle_vector(one, ir.Constant(kind, ir.Undefined), order)
+        return self.builder.shuffle_vector(one, nothing, order)
 
     def constant(self, numbers: Iterable[float]) -> Any:
         """Return a vector of known numbers."""
@@ -107,24 +100,22 @@ class _Writer:
         product = self.builder.fmul(a, b, flags=_FLAGS)
         return product if c is None else self.builder.fadd(product, c, flags=_FLAGS)
 
-    def add(self, a: Any, b: Any) -> Any:
-        """Return a + b, either None for nothing."""
-        if a is None or b is None:
-            return b if a is None else a
-        return self.builder.fadd(a, b, flags=_FLAGS)
+    def sum(self, factors: Iterable[tuple[int, Any]], terms: Sequence[Any]) -> Any:
+        """Return a sum of products with numbered terms, as two that do not wait for each other.
 
-    def sum(
-        self, factors: Sequence[Any], terms: Sequence[Any], columns: Sequence[int] | None = None
-    ) -> Any:
-        """Return a sum of products, as two sums that do not wait for each other.
-
-        Those of even and of odd columns: leaving out columns of zeros changes no bit.
+        Those of even and of odd numbers: leaving out columns of zeros changes no bit.
         """
         parts: list[Any] = [None, None]
-        numbers = range(len(factors)) if columns is None else columns
-        for number, factor, term in zip(numbers, factors, terms, strict=True):
-            parts[number % 2] = self.multiply_add(factor, term, parts[number % 2])
-        return self.add(*parts)
+        for number, factor in factors:
+            parts[number % 2] = self.multiply_add(factor, terms[number], parts[number % 2])
+        return self.builder.fadd(*parts, flags=_FLAGS)
+
+    def polynomial(self, terms: Sequence[Any], place: Any) -> Any:
+        """Return the value of a polynomial by Horner's rule."""
+        value = terms[-1]
+        for term in terms[-2::-1]:
+            value = self.multiply_add(value, place, term)
+        return value
 
 
 def _pieces(width: int) -> list[tuple[int, int]]:
@@ -133,138 +124,97 @@ def _pieces(width: int) -> list[tuple[int, int]]:
 
 
 @intrinsic
-def keep_before(_typing: Any, memory: Any, slot: Any, table: Any, row: Any, present: Any) -> Any:
+def keep_before(_typing, memory, slot, table, row, present):
     """Copy eight lanes as they are before a step, and bound how their gaps bend in it."""
-    scene = _Scene(present)
+    there, place = _scene(present)
 
-    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        w = _Writer(context, builder)
-        lanes, numbers = (w.element(signature, arguments, array) for array in (0, 2))
-        zero = ir.Constant(arguments[1].type, 0)
+    def generate(context, builder, signature, arguments):
+        w = _Writer(context, builder, signature, arguments)
+        lanes, numbers = w.element(0, arguments[1]), w.element(2, arguments[3])
         kind = ir.VectorType(_DOUBLE, VECTOR)
         name = f"llvm.fabs.v{VECTOR}f64"
         fabs = cgutils.get_or_insert_function(builder.module, ir.FunctionType(kind, [kind]), name)
-        sizes = []
-        for line in range(scene.layout.states):
-            value = w.load(w.at(lanes, zero, (STATE + line) * STRIDE), VECTOR)
-            w.store(value, w.at(lanes, zero, (BEFORE + STATE + line) * STRIDE))
-            sizes.append(builder.call(fabs, [value]))
-            if scene.present.tangent is not None:
-                value = w.load(w.at(lanes, zero, (TANGENT + line) * STRIDE), VECTOR)
-                w.store(value, w.at(lanes, zero, (BEFORE + TANGENT + line) * STRIDE))
-        if scene.present.resolved is not None:
-            for line in scene.forces:
-                value = w.load(w.at(lanes, zero, line * STRIDE), VECTOR)
-                sizes.append(builder.call(fabs, [value]))
-            for number in range(1 if scene.present.axial is None else 2):
-                first = (BOUND_Y, BOUND_Z)[number]
-                factors = [
-                    w.splat(builder.load(w.at(numbers, zero, first + column)), VECTOR)
-                    for column in range(len(sizes))
-                ]
-                w.store(w.sum(factors, sizes), w.at(lanes, zero, (MARGINS + number) * STRIDE))
+        for first in (STATE,) if there.tangent is None else (STATE, TANGENT):
+            for line in range(first, first + place.states):
+                w.store(w.load(lanes, line * STRIDE), lanes, (BEFORE + line) * STRIDE)
+        if there.resolved is not None:
+            rows = _inputs(STATE, place)
+            sizes = [builder.call(fabs, [w.load(lanes, row * STRIDE)]) for row in rows]
+            for number, bound in enumerate((BOUND_Y, BOUND_Z)[: place.ways]):
+                bends = [w.spread(numbers, bound + column) for column in range(len(sizes))]
+                w.store(w.sum(enumerate(bends), sizes), lanes, (MARGINS + number) * STRIDE)
         return context.get_dummy_value()
 
     return types.void(memory, types.intp, table, types.intp, present), generate
 
 
 @intrinsic
-def move(
-    _typing: Any,
-    memory: Any,
-    slot: Any,
-    table: Any,
-    at: Any,
-    engaged_y: Any,
-    engaged_z: Any,
-    present: Any,
-) -> Any:
+def move(_typing, memory, slot, table, at, engaged_y, engaged_z, present):
     """Apply a map to those of eight lanes that are on its branches, state and tangent vector."""
-    scene = _Scene(present)
+    there, place = _scene(present)
 
-    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        w = _Writer(context, builder)
-        lanes, numbers = (w.element(signature, arguments, array) for array in (0, 2))
-        zero = ir.Constant(arguments[1].type, 0)
-        place, mask = scene.layout, None
-        if place.pairs > 1:
-            for row, engaged in ((TANGENTIAL_BRANCH, 4), (AXIAL_BRANCH, 5))[
-                : 1 if scene.present.axial is None else 2
-            ]:
-                found = w.load(w.at(lanes, zero, row * STRIDE), VECTOR)
-                same = builder.fcmp_ordered("==", found, w.splat(arguments[engaged], VECTOR))
-                mask = same if mask is None else builder.and_(mask, same)
+    def generate(context, builder, signature, arguments):
+        w = _Writer(context, builder, signature, arguments)
+        lanes, numbers = w.element(0, arguments[1]), w.element(2, arguments[3])
 
-        def apply() -> None:
-            before = [BEFORE + STATE + line for line in range(place.states)]
-            inputs = [w.load(w.at(lanes, zero, r * STRIDE), VECTOR) for r in before + scene.forces]
-            tangents = []
-            if scene.present.tangent is not None:
-                tangents = [
-                    w.load(w.at(lanes, zero, (BEFORE + TANGENT + line) * STRIDE), VECTOR)
-                    for line in range(place.states)
-                ]
+        def apply(mask):
+            rows = {STATE: _inputs(BEFORE + STATE, place)}
+            if there.tangent is not None:
+                rows[TANGENT] = [BEFORE + TANGENT + line for line in range(place.states)]
+            given = {
+                target: [w.load(lanes, row * STRIDE) for row in sources]
+                for target, sources in rows.items()
+            }
             # The axial pair and the offset of its flank act on nothing else.
-            axial, apart = place.states, set[int]()
-            if scene.present.axial is not None:
-                axial = place.states - 4
-                apart = {*range(axial, place.states), place.states + 2}
+            axial = place.states - 4 * (place.ways - 1)
+            apart = {*range(axial, place.states), place.states + 2} if place.ways > 1 else set()
             for line in range(place.states):
-                there = [c for c in range(place.columns) if line >= axial or c not in apart]
-                factors = {
-                    column: w.splat(
-                        builder.load(w.at(numbers, zero, place.end + column * place.width + line)),
-                        VECTOR,
-                    )
-                    for column in there
-                }
-                for row, given in ((STATE, inputs), (TANGENT, tangents)):
-                    used = [column for column in there if column < len(given)]
-                    if not used:
-                        continue
-                    value = w.sum([factors[c] for c in used], [given[c] for c in used], used)
-                    target = w.at(lanes, zero, (row + line) * STRIDE)
+                factors = [
+                    (column, w.spread(numbers, column * place.width + line))
+                    for column in range(place.columns)
+                    if line >= axial or column not in apart
+                ]
+                for target, inputs in given.items():
+                    value = w.sum([one for one in factors if one[0] < len(inputs)], inputs)
                     if mask is not None:
-                        value = builder.select(mask, value, w.load(target, VECTOR))
-                    w.store(value, target)
+                        value = builder.select(mask, value, w.load(lanes, (target + line) * STRIDE))
+                    w.store(value, lanes, (target + line) * STRIDE)
 
-        if mask is None:
-            apply()
+        if place.pairs == 1:
+            apply(None)
         else:
+            engaged = {TANGENTIAL_BRANCH: arguments[4], AXIAL_BRANCH: arguments[5]}
+            same = [
+                builder.fcmp_ordered("==", w.load(lanes, row * STRIDE), w.splat(number))
+                for row, number in engaged.items()
+            ]
+            mask = same[0] if place.ways == 1 else builder.and_(*same)
             bits = builder.bitcast(mask, ir.IntType(VECTOR))
-            with builder.if_then(builder.icmp_unsigned("!=", bits, ir.Constant(bits.type, 0))):
-                apply()
+            with builder.if_then(builder.icmp_unsigned("!=", bits, bits.type(0))):
+                apply(mask)
         return context.get_dummy_value()
 
-    signature = types.void(
-        memory, types.intp, table, types.intp, types.float64, types.float64, present
-    )
-    return signature, generate
+    numbers = memory, types.intp, table, types.intp, types.float64, types.float64
+    return types.void(*numbers, present), generate
 
 
 def _combination(of_state: bool, forced: bool) -> Any:
     """Make a function that sums the columns of a map, each times an input of a lane."""
 
     @intrinsic
-    def combine(
-        _typing: Any, work: Any, target: Any, inputs: Any, table: Any, at: Any, present: Any
-    ) -> Any:
-        place = _Scene(present).layout
+    def combine(_typing, work, target, inputs, table, at, present):
+        place = _scene(present)[1]
         width = place.width if of_state else TERMS
-        count = place.columns if forced else place.states
+        columns = range(place.columns if forced else place.states)
 
-        def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-            w = _Writer(context, builder)
-            numbers = w.data(signature.args[0], arguments[0])
-            columns = w.data(signature.args[3], arguments[3])
-            given = [builder.load(w.at(numbers, arguments[2], column)) for column in range(count)]
+        def generate(context, builder, signature, arguments):
+            w = _Writer(context, builder, signature, arguments)
+            result, given = w.element(0, arguments[1]), w.element(0, arguments[2])
+            numbers = w.element(3, arguments[4])
             for first, size in _pieces(width):
-                terms = [
-                    w.load(w.at(columns, arguments[4], column * width + first), size)
-                    for column in range(count)
-                ]
-                value = w.sum([w.splat(number, size) for number in given], terms)
-                w.store(value, w.at(numbers, arguments[1], first))
+                factors = [w.spread(given, column, size) for column in columns]
+                terms = [w.load(numbers, column * width + first, size) for column in columns]
+                w.store(w.sum(enumerate(factors), terms), result, first)
             return context.get_dummy_value()
 
         return types.void(work, types.intp, types.intp, table, types.intp, present), generate
@@ -283,96 +233,67 @@ tangent_gap_along = _combination(of_state=False, forced=False)
 
 
 @intrinsic
-def add_switch(
-    _typing: Any,
-    work: Any,
-    gap: Any,
-    moment: Any,
-    factor: Any,
-    table: Any,
-    at: Any,
-    present: Any,
-) -> Any:
+def add_switch(_typing, work, gap, moment, factor, table, at, present):
     """Carry a lane to another branch: move its state, and tangent vector, at the step's beginning.
 
     To the state is added the factor times the integral from -1 to the moment of the `SWITCH` of the
     new branch times the polynomial at ``gap`` in the work of the lane, by Gauss's rule.
     """
-    scene = _Scene(present)
-    width = scene.layout.width
+    there, scene = _scene(present)
 
-    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        w = _Writer(context, builder)
-        numbers = w.data(signature.args[0], arguments[0])
-        columns = w.data(signature.args[4], arguments[4])
-        zero = ir.Constant(arguments[1].type, 0)
-        one = ir.Constant(_DOUBLE, 1.0)
-        half = builder.fmul(builder.fadd(arguments[2], one), ir.Constant(_DOUBLE, 0.5))
+    def generate(context, builder, signature, arguments):
+        w = _Writer(context, builder, signature, arguments)
+        columns = w.element(4, arguments[5])
+        half = builder.fmul(builder.fadd(arguments[2], _DOUBLE(1.0)), _DOUBLE(0.5))
         scale = builder.fmul(half, arguments[3])
-        sources = [(INPUTS, arguments[1])]
-        if scene.present.tangent is not None:
-            sources.append((TANGENT_INPUTS, ir.Constant(arguments[1].type, TANGENT_GAP)))
+        sources = {INPUTS: arguments[1]}
+        if there.tangent is not None:
+            sources[TANGENT_INPUTS] = _INTEGER(TANGENT_GAP)
         nodes: list[Any] = []
-        weighted: list[list[Any]] = [[] for _ in sources]
+        weighted: dict[int, list[Any]] = {target: [] for target in sources}
         for first, size in _pieces(len(_NODES)):
             shifted = w.constant(_NODES[first : first + size] + 1.0)
             place = w.multiply_add(shifted, w.splat(half, size), w.constant([-1.0] * size))
+            nodes += (builder.extract_element(place, ir.IntType(32)(n)) for n in range(size))
             weights = builder.fmul(w.constant(_WEIGHTS[first : first + size]), w.splat(scale, size))
-            values = []
-            for _, source in sources:
-                value = None
-                for term in range(TERMS - 1, -1, -1):
-                    number = w.splat(builder.load(w.at(numbers, source, term)), size)
-                    value = number if value is None else w.multiply_add(value, place, number)
-                values.append(builder.fmul(value, weights, flags=_FLAGS))
-            for number in range(size):
-                index = ir.Constant(ir.IntType(32), number)
-                nodes.append(builder.extract_element(place, index))
-                for kept, value in zip(weighted, values, strict=True):
-                    kept.append(builder.extract_element(value, index))
-        for first, size in _pieces(width):
+            for target, source in sources.items():
+                numbers = w.element(0, source)
+                terms = [w.spread(numbers, term, size) for term in range(TERMS)]
+                value = builder.fmul(w.polynomial(terms, place), weights, flags=_FLAGS)
+                for number in range(size):
+                    weighted[target].append(builder.extract_element(value, ir.IntType(32)(number)))
+        for first, size in _pieces(scene.width):
             wide = [w.splat(node, size) for node in nodes]
-            sums: list[Any] = [None] * len(nodes)
-            for term in range(TERMS - 1, -1, -1):
-                row = w.load(w.at(columns, arguments[5], term * width + first), size)
-                sums = [
-                    row if value is None else w.multiply_add(value, node, row)
-                    for value, node in zip(sums, wide, strict=True)
-                ]
-            for (target, _), factors in zip(sources, weighted, strict=True):
-                pointer = w.at(numbers, zero, target + first)
-                change = w.sum([w.splat(factor, size) for factor in factors], sums)
-                w.store(w.add(w.load(pointer, size), change), pointer)
+            *rows, last = (w.load(columns, n * scene.width + first, size) for n in range(TERMS))
+            sums = [last] * len(wide)
+            # Term by term: a register holds the sum of each node, and a row is needed once.
+            for row in reversed(rows):
+                sums = [w.multiply_add(*pair, row) for pair in zip(sums, wide, strict=True)]
+            for target, factors in weighted.items():
+                pointer = w.element(0, _INTEGER(target + first))
+                change = w.sum(enumerate(w.splat(factor, size) for factor in factors), sums)
+                moved = builder.fadd(w.load(pointer, 0, size), change, flags=_FLAGS)
+                w.store(moved, pointer, 0)
         return context.get_dummy_value()
 
-    signature = types.void(
-        work, types.intp, types.float64, types.float64, table, types.intp, present
-    )
-    return signature, generate
+    numbers = work, types.intp, types.float64, types.float64, table, types.intp
+    return types.void(*numbers, present), generate
 
 
 @intrinsic
-def value_and_slope(_typing: Any, work: Any, at: Any, place: Any) -> Any:
+def value_and_slope(_typing, work, at, place):
     """Evaluate a polynomial in the work of a lane, and its derivative, by its even and odd part."""
 
-    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        w = _Writer(context, builder)
-        numbers = w.data(signature.args[0], arguments[0])
-        s = arguments[2]
+    def generate(context, builder, signature, arguments):
+        w = _Writer(context, builder, signature, arguments)
+        numbers, s = w.element(0, arguments[1]), arguments[2]
         square = builder.fmul(s, s)
-        terms = [builder.load(w.at(numbers, arguments[1], term)) for term in range(TERMS)]
-        slopes = [
-            builder.fmul(terms[term], ir.Constant(_DOUBLE, float(term))) for term in range(1, TERMS)
-        ]
+        terms = [builder.load(builder.gep(numbers, [_INTEGER(term)])) for term in range(TERMS)]
+        slopes = [builder.fmul(terms[term], _DOUBLE(float(term))) for term in range(1, TERMS)]
         results = []
         for series in (terms, slopes):
-            parts = []
-            for first in (0, 1):
-                value = None
-                for term in reversed(series[first::2]):
-                    value = term if value is None else w.multiply_add(value, square, term)
-                parts.append(value)
-            results.append(w.multiply_add(parts[1], s, parts[0]))
+            even, odd = (w.polynomial(series[first::2], square) for first in (0, 1))
+            results.append(w.multiply_add(odd, s, even))
         return context.make_tuple(builder, signature.return_type, results)
 
     return types.UniTuple(types.float64, 2)(work, types.intp, types.float64), generate
