@@ -42,10 +42,13 @@ def share_table(teeth: Teeth, steps_per_period: int) -> Floats:
     one that came last, which has the rest, and of pairs that fill up, without a share. Raises
     ValueError with too many in mesh.
     """
-    if teeth.pairs_in_mesh > MOST_PAIRS:
-        raise ValueError(f"{teeth.pairs_in_mesh} tooth pairs in mesh at once, not {MOST_PAIRS}")
+    if teeth is NO_TEETH:
+        return np.zeros((1, 3, NARROW - 1))
+    most = teeth.pairs_in_mesh
+    if most > MOST_PAIRS:
+        raise ValueError(f"{most} tooth pairs in mesh at once, more than {MOST_PAIRS}")
     share = np.ascontiguousarray(teeth.share, dtype=np.float64).tobytes()
-    pairs = NARROW if teeth.pairs_in_mesh <= NARROW else MOST_PAIRS
+    pairs = NARROW if most <= NARROW else MOST_PAIRS
     return _table(share, teeth.cells_per_period, teeth.begins, pairs, steps_per_period)
 
 

@@ -34,7 +34,7 @@ def error_spline(teeth: Teeth, profile: int, periods: int) -> BSpline:
         pair = number - ago
         error = driven[pair % driven.size] - driving[pair % driving.size]
         weights[number * cells :][: teeth.share.size] += error * teeth.share
-    knots = np.arange(weights.size + 6) / cells + teeth.entry - ago
+    knots = np.arange(weights.size + 6) / cells + teeth.begins - ago
     return BSpline(knots, weights, 5)
 
 
@@ -93,7 +93,7 @@ class Exact(Twin):
         joint = np.where(self.present, np.concatenate([start[0::2], start[1::2]]), 0.0)
         self.branches = [int(gap) for gap in np.fix(self.gaps(0.0, joint)).clip(-1, 1)]
         cells, period = self.teeth.cells_per_period, 2.0 * np.pi / self.groups.mesh_frequency
-        knots = np.arange(-cells, periods * cells) / cells + self.teeth.entry
+        knots = np.arange(-cells, periods * cells) / cells + self.teeth.begins
         # Some knots are ends of periods but for their last digits.
         stops = np.unique(np.round(np.concatenate([knots, np.arange(1, periods + 1)]), 12))
         tau, crossings, states = 0.0, 0, []

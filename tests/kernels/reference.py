@@ -104,7 +104,7 @@ def drawn_teeth(driving: int, driven: int, lanes: int = 1, contact_ratio: float 
         np.arange(lanes)[::-1].copy(),
         np.array(share),
         cells_per_period,
-        0.3,
+        0.425,
     )
 
 

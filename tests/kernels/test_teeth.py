@@ -42,7 +42,7 @@ def whole():
 def test_the_shares_are_splines_that_add_up_to_one(teeth):
     table = share_table(teeth, STEPS)
     cells = teeth.cells_per_period
-    knots = teeth.entry + np.arange(-5, teeth.share.size + 11) / cells
+    knots = teeth.begins + np.arange(-5, teeth.share.size + 11) / cells
     spline = BSpline(knots, np.pad(teeth.share, 5), 5, extrapolate=False)
     phase = np.arange(2 * STEPS + 1) / (2 * STEPS)
     pairs = 1 + table.shape[2]

@@ -34,7 +34,7 @@ def share_wave(order: np.ndarray) -> np.ndarray:
     cells = np.exp(-1.0j * np.outer(angle, np.arange(SHARED.share.size))) @ SHARED.share
     # A spline of degree 5 is a rectangle of one cell, convolved with itself five times.
     spline = (np.exp(-0.5j * angle) * np.sinc(angle / (2.0 * np.pi))) ** 6
-    return np.exp(-2.0j * np.pi * order * SHARED.entry) * cells * spline / SHARED.cells_per_period
+    return np.exp(-2.0j * np.pi * order * SHARED.begins) * cells * spline / SHARED.cells_per_period
 
 
 def error_lines(teeth: Teeth, repeats: int, orders: np.ndarray) -> np.ndarray:
@@ -87,7 +87,7 @@ def test_one_wrong_tooth_gives_the_comb_of_its_gear(driving, driven, every, phys
 def test_a_sine_over_the_teeth_of_a_gear_tends_to_the_sine_of_its_shaft_order():
     # The shares smooth it like a weight over the phase, with this mean and variance.
     weight = SHARED.share / SHARED.cells_per_period
-    phase = SHARED.entry + (np.arange(weight.size) + 3.0) / SHARED.cells_per_period
+    phase = SHARED.begins + (np.arange(weight.size) + 3.0) / SHARED.cells_per_period
     delay = np.sum(weight * phase)
     variance = np.sum(weight * (phase - delay) ** 2) + 0.5 / SHARED.cells_per_period**2
     numbers = np.array([16, 32, 64, 128])
