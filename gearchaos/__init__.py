@@ -6,8 +6,6 @@
 >>> result["lyapunov_exponent"]
 """
 
-from __future__ import annotations
-
 import os
 import signal
 import sys

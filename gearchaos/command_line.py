@@ -1,7 +1,5 @@
 """The frame of every command: common options, lines on stderr, faults turned into exit codes."""
 
-from __future__ import annotations
-
 import math
 import os
 import re

@@ -1,7 +1,5 @@
 """Print the JSON Schema of a configuration file, for completion in editors."""
 
-from __future__ import annotations
-
 import sys
 from argparse import ArgumentParser, Namespace
 

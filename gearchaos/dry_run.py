@@ -1,7 +1,5 @@
 """What ``--dry-run`` tells: what a sweep would compute, and how much time and memory that takes."""
 
-from __future__ import annotations
-
 import json
 import math
 import os

@@ -1,7 +1,5 @@
 """Faults a user can cause, each with the exit code the commands give it."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 
 

@@ -3,8 +3,6 @@
 Exit codes: 0 done, 2 there is no such example, 4 the file exists already or cannot be written.
 """
 
-from __future__ import annotations
-
 import sys
 import tomllib
 from argparse import ArgumentParser, Namespace

@@ -5,8 +5,6 @@ per section point. Needs pip install gearchaos[export]. Exit codes: 0 done, 2 no
 that dimension or no such format, 4 a file cannot be read or written, or a package is missing.
 """
 
-from __future__ import annotations
-
 import os
 import sys
 from argparse import ArgumentParser, Namespace

@@ -5,8 +5,6 @@ what. Only the file is read.
 the command line asks for what cannot be, 4 the file cannot be read, is damaged or is not ours.
 """
 
-from __future__ import annotations
-
 import json
 import sys
 from argparse import ArgumentParser, Namespace

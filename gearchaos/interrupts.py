@@ -5,8 +5,6 @@ interpreter, or surface in a library as damage to a file. A command that writes 
 at moments of its own choice; one that only reads has nothing to put in order and just ends.
 """
 
-from __future__ import annotations
-
 import os
 import signal
 import threading

@@ -10,8 +10,6 @@ for diameters over 20 to 50 mm, 12 um over 50 to 125 mm). They have not been com
 entry of the tables of 1995, which leave out large modules on small diameters.
 """
 
-from __future__ import annotations
-
 import math
 from bisect import bisect_left
 

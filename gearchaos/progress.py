@@ -1,7 +1,5 @@
 """What is said on stderr while a command runs, and how far a sweep has come."""
 
-from __future__ import annotations
-
 import sys
 import threading
 import time

@@ -5,8 +5,6 @@ report with the comparison, report.md. The path of report.md goes to stdout,
 everything else to stderr. Exit codes: 0 done, 2 usage, 4 cannot read or write.
 """
 
-from __future__ import annotations
-
 import sys
 import time
 from argparse import ArgumentParser, Namespace

@@ -5,8 +5,6 @@
 >>> system.orbit(period=2).multipliers
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import NamedTuple, Self
 

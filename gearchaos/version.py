@@ -1,7 +1,5 @@
 """The version of gearchaos, as --version, results, figures and reports name it."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 

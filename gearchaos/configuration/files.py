@@ -1,7 +1,5 @@
 """Files of a user: texts read whole, and the pitch deviations in CSV files."""
 
-from __future__ import annotations
-
 import csv
 import os
 from collections.abc import Mapping

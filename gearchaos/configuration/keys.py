@@ -1,7 +1,5 @@
 """Tables of a configuration and their keys: how they are declared, and what is declared of them."""
 
-from __future__ import annotations
-
 import typing
 from collections.abc import Iterator
 from dataclasses import dataclass

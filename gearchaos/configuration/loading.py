@@ -1,7 +1,5 @@
 """A configuration file, read and checked."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Iterable
 from typing import TypeAlias

@@ -1,7 +1,5 @@
 """Faults of a configuration as sentences: file, key, value, rule, remedy."""
 
-from __future__ import annotations
-
 import datetime
 import difflib
 import re

@@ -3,8 +3,6 @@
 # The units are part of the keys, capitals and all.
 # ruff: noqa: N815
 
-from __future__ import annotations
-
 from functools import partial
 from typing import Annotated, Any, Literal, TypeAlias
 

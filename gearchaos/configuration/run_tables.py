@@ -1,7 +1,5 @@
 """The tables that say what is computed: groups given directly, scene, start, sweeps, outputs."""
 
-from __future__ import annotations
-
 from collections.abc import Collection
 from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias, get_args
 

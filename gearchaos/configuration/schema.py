@@ -1,7 +1,5 @@
 """The configuration described for others: JSON Schema for editors, a table of keys for people."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from gearchaos.configuration.keys import Key

@@ -1,7 +1,5 @@
 """TOML text to tables and back, with `key.path=value` overrides."""
 
-from __future__ import annotations
-
 import json
 import re
 import tomllib

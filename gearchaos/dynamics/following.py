@@ -5,8 +5,6 @@ multipliers may change fast next to a motion that grazes a flank, but they do no
 force is continuous, so that the map over a period has a continuous derivative.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from enum import IntEnum
 from typing import NamedTuple

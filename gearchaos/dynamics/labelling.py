@@ -1,7 +1,5 @@
 """Labels of integrated lanes: what their records tell, and Newton's method where they settle."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

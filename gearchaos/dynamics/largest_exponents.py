@@ -1,7 +1,5 @@
 """The largest exponent of the motion that lanes have come to: of its orbit where it is periodic."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """One periodic orbit, and how far it goes along a parameter; `orbits` has those of many lanes."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

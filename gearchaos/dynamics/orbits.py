@@ -1,7 +1,5 @@
 """Periodic orbits and their Floquet multipliers, found by Newton's method on the resolved map."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -5,8 +5,6 @@ Jacobian. None of them may lie outside the stable region of the Runge-Kutta meth
 the computed motion grows where the true one decays.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import NamedTuple
 

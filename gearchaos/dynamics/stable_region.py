@@ -6,8 +6,6 @@ steadily along a ray from 0: on the negative real axis it first falls. But on ev
 half plane it passes 1 only once, so that all steps shorter than the longest stable one are stable.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

@@ -1,7 +1,5 @@
 """From a configuration and values of its parameters to a system and a plan for the kernels."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Mapping
 from typing import Any
 

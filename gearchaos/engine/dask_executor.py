@@ -1,7 +1,5 @@
 """Blocks of lanes computed by the workers of a dask.distributed cluster."""
 
-from __future__ import annotations
-
 import logging
 import re
 import time

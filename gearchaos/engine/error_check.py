@@ -1,7 +1,5 @@
 """The error of some lanes of a sweep, measured by computing them again with half the step."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

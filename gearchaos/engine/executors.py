@@ -5,8 +5,6 @@ started. Its ``width`` is how many blocks to hand out at a time, so that nobody 
 one. The loop neither knows nor cares whether a block is computed in this process or on a cluster.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from contextlib import ExitStack, suppress

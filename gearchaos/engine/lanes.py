@@ -1,7 +1,5 @@
 """The lanes of a configured sweep: their axes, and the system and the start of any of them."""
 
-from __future__ import annotations
-
 import math
 from functools import cached_property
 from typing import Any

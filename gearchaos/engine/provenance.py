@@ -1,7 +1,5 @@
 """Where a result comes from: versions, processor, threads, time, commit."""
 
-from __future__ import annotations
-
 import platform
 import subprocess
 from datetime import UTC, datetime

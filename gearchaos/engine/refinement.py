@@ -1,7 +1,5 @@
 """The boundaries between the stages of a sweep, found more exactly than its lanes lie."""
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 import numpy as np

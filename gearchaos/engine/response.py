@@ -1,7 +1,5 @@
 """The time response: the motion at every step, after the transient."""
 
-from __future__ import annotations
-
 import time
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Run a sweep from Python: a configuration in, a result out."""
 
-from __future__ import annotations
-
 import math
 import os
 import time

@@ -1,7 +1,5 @@
 """The shards of a sweep that several jobs compute: ``--shard 2/8`` takes every eighth block."""
 
-from __future__ import annotations
-
 import re
 from typing import NamedTuple, Self
 

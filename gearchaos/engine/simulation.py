@@ -1,7 +1,5 @@
 """A configured sweep: what it yields, and the means to compute any block of its lanes."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Mapping
 from typing import Any

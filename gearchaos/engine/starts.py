@@ -1,7 +1,5 @@
 """The states in which lanes start."""
 
-from __future__ import annotations
-
 import numpy as np
 from gearchaos_kernels import System
 from numpy.typing import NDArray

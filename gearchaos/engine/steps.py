@@ -1,7 +1,5 @@
 """The number of steps per mesh period of a sweep: stable in every lane, and fine enough."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterator, Sequence
 from typing import NamedTuple

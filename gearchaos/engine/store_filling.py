@@ -1,7 +1,5 @@
 """The blocks that a store lacks, computed into it."""
 
-from __future__ import annotations
-
 from functools import partial
 
 import numba

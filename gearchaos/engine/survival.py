@@ -1,7 +1,5 @@
 """Whether chaos lasts: some chaotic lanes of a result go on from where their record ended."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

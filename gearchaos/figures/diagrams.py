@@ -1,7 +1,5 @@
 """The diagrams of a sweep over its parameter: section points, and the largest Lyapunov exponent."""
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Dots of lanes: drawn one by one, or counted by pixel where a page cannot tell them apart."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from math import ceil, floor
 from typing import Any

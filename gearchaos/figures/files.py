@@ -1,7 +1,5 @@
 """Figures as files: written completely or not at all, the same bits for the same input."""
 
-from __future__ import annotations
-
 import re
 from contextlib import suppress
 from io import BytesIO

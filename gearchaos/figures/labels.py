@@ -1,7 +1,5 @@
 """Axis labels from what the result file says about its variables."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping
 

@@ -1,7 +1,5 @@
 """Which lanes of a result a figure shows."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A page for a journal: its size and style, and what is written beside its panels."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from io import BytesIO

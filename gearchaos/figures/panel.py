@@ -1,7 +1,5 @@
 """How far the axes of a diagram reach, and how it marks what it cannot show."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 from weakref import WeakKeyDictionary

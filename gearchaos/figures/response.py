@@ -1,7 +1,5 @@
 """One lane of a response: time history, phase portrait, Poincare section, amplitude spectrum."""
 
-from __future__ import annotations
-
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection

@@ -1,7 +1,5 @@
 """What the figures of a response are drawn from: the motion of one lane, and when it repeats."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from gearchaos.errors import FigureError

@@ -1,7 +1,5 @@
 """A page for one lane of a response: history, phase portrait, Poincare section and spectrum."""
 
-from __future__ import annotations
-
 from gearchaos.figures.labels import form_in_words, in_words, place_of
 from gearchaos.figures.page import Page, few_ticks, footnote, letter, page, remark
 from gearchaos.figures.response import (

@@ -1,7 +1,5 @@
 """Stages of a sweep as shades behind a diagram, so that its parts can be named."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 from typing import Any, NamedTuple
 

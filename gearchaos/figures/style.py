@@ -1,7 +1,5 @@
 """How the figures look: sizes for a journal column, fonts, and colours that also print in grey."""
 
-from __future__ import annotations
-
 from typing import Any
 
 SINGLE_COLUMN_MM = 85.0

@@ -1,7 +1,5 @@
 """The page of a sweep: the bifurcation diagram over the Lyapunov chart, on one shared axis."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from itertools import cycle
 from typing import Any

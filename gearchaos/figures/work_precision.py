@@ -1,7 +1,5 @@
 """Error against steps and against time: what accuracy costs."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 

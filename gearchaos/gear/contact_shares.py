@@ -5,8 +5,6 @@ and shrinks again, until the pair has been in mesh for their sum, in mesh period
 together give the stiffness of Pan 2021, eqs 15-18.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

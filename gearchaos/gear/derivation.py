@@ -3,8 +3,6 @@
 Scales: length b', time 1 / omega_h with omega_h = sqrt(k_m / m_e).
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Collection, Mapping
 from contextlib import suppress
 from functools import cached_property

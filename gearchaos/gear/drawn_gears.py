@@ -1,7 +1,5 @@
 """Gears drawn at random that just pass their limits of pitch deviation."""
 
-from __future__ import annotations
-
 from typing import TypeAlias
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Geometry and inertia of a helical gear pair from catalogue data."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import TypeAlias
 

@@ -1,7 +1,5 @@
 """The table of the dimensionless groups: every fact about a group is written here, once."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterable
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """The dimensionless groups of a model: given directly, derived from physical data, or defaults."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, Literal, TypeAlias

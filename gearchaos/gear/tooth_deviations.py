@@ -1,7 +1,5 @@
 """Cumulative pitch deviations of both gears, in the order in which the teeth come into mesh."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple, TypeAlias
 

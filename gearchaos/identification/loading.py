@@ -1,7 +1,5 @@
 """Reading a targets file, with one message for every fault."""
 
-from __future__ import annotations
-
 import os
 import re
 from collections import Counter

@@ -1,7 +1,5 @@
 """How each kind of observation is read off the lanes of a candidate, and how far off it is."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """What a search has found, in words: the best sets that differ, and what the targets determine."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator
 from typing import NamedTuple
 

@@ -4,8 +4,6 @@ The candidates of a generation are yielded as points of the unit cube, and their
 the same misfits lead to the same candidates, which is how a search that was stopped goes on.
 """
 
-from __future__ import annotations
-
 import time
 import warnings
 from collections.abc import Callable, Generator

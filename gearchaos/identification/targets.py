@@ -1,7 +1,5 @@
 """The targets file: what was observed, which parameters are free, and how they are searched."""
 
-from __future__ import annotations
-
 import math
 from itertools import product
 from typing import Annotated, TypeAlias, TypeVar

@@ -1,7 +1,5 @@
 """Every number that the paper prints beside ours: the rows, worded, and their verdicts."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from itertools import pairwise

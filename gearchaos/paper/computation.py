@@ -1,7 +1,5 @@
 """Everything that the gallery shows, computed from two configurations."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

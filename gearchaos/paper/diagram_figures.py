@@ -1,7 +1,5 @@
 """Figure 7, shaded by the motions that the paper tells apart, and the two motions of its hop."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 from typing import Any
 

@@ -1,7 +1,5 @@
 """What the report explains in sentences, from what was computed: stages, hop, increments."""
 
-from __future__ import annotations
-
 from collections import Counter
 from itertools import pairwise
 

@@ -1,7 +1,5 @@
 """The folder of a gallery: figures, results and report, written once they are computed."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path

@@ -5,8 +5,6 @@ one into that of the other. The ends of the interval in which both exist belong 
 place of a hop between them belongs to the start state as much as to the pair.
 """
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """Figures 3 and 4: what the mesh imposes over one mesh period, its error and its stiffness."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from contextlib import contextmanager
 

@@ -1,7 +1,5 @@
 """Figures 5, 6 and 8 to 15: accelerations, spectra, and the motion at six pitch errors."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any

@@ -1,7 +1,5 @@
 """The single numbers that the paper prints, computed, by the key of the number."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What Pan 2021 prints, read from `published.toml`."""
 
-from __future__ import annotations
-
 import tomllib
 from enum import StrEnum
 from functools import cache

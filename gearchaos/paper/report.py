@@ -1,7 +1,5 @@
 """The report of a reproduction, in Markdown: `report_text.md` with its numbers filled in."""
 
-from __future__ import annotations
-
 import re
 from collections import Counter
 from collections.abc import Iterable

@@ -6,8 +6,6 @@ longer periods, then chaos on bands that are visited in turn, and that grow unti
 interior crisis ends it: the attractor takes in at once what was beside it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """Where the ready-to-run configurations lie: in the installed package, or in the clone."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from gearchaos.errors import FileError

@@ -1,7 +1,5 @@
 """By which rule a computed number agrees with a printed one."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from enum import StrEnum

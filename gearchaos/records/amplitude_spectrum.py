@@ -1,7 +1,5 @@
 """The single-sided amplitude spectrum of a motion, in multiples of the mesh frequency."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from types import MappingProxyType
 from typing import NamedTuple

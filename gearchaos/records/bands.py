@@ -6,8 +6,6 @@ doubled orbit, or every 3rd of a tripled one, stays on one side; on a curve with
 rotation every n-th point goes everywhere.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

@@ -5,8 +5,6 @@ beyond it (Grebogi, Ott, Yorke 1982). Close to it the bursts are rare, so that a
 hundred points may miss them: the lane beside the crisis is told from what several lanes visit.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

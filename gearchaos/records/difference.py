@@ -1,7 +1,5 @@
 """How far the motions that two grids give for the same lanes lie apart."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Largest Lyapunov exponent and its standard error from the growth of a tangent vector."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray

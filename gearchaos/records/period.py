@@ -1,7 +1,5 @@
 """The period of a motion, read off its stroboscopic section."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

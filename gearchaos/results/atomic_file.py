@@ -1,7 +1,5 @@
 """Files that appear complete or not at all, and operating system errors in one clear sentence."""
 
-from __future__ import annotations
-
 import errno
 import os
 import re

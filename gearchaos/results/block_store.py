@@ -1,7 +1,5 @@
 """Finished blocks of lanes, kept beside the output until all are there and become one file."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import math

@@ -5,8 +5,6 @@ damage in the latter can make its library run forever. A line after the end of t
 disturbs no reader, and is checked before the library sees the file.
 """
 
-from __future__ import annotations
-
 import hashlib
 import os
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Jumps between two motions of the same period, and crises of chaos: what labels do not show."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

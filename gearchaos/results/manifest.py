@@ -1,7 +1,5 @@
 """The files beside an unfinished output: finished blocks, and the manifest of whose they are."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import os

@@ -1,7 +1,5 @@
 """What a result file says about itself: plain numbers, texts, lists, and a page for a terminal."""
 
-from __future__ import annotations
-
 import json
 import math
 import os

@@ -1,7 +1,5 @@
 """What a response yields beside the variables of a sweep: the motion at every step."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

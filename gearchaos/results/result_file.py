@@ -1,7 +1,5 @@
 """The file of a result, one HDF5 file that is also netCDF-4: its rules, and how it is written."""
 
-from __future__ import annotations
-
 import math
 import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence

@@ -1,7 +1,5 @@
 """Reading and verifying a result file, and refusing with one sentence whatever is not one."""
 
-from __future__ import annotations
-
 import os
 import stat
 from collections.abc import Iterator, Mapping

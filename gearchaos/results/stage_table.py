@@ -1,7 +1,5 @@
 """Stages of a sweep: stretches of the swept parameter over which the motion keeps its label."""
 
-from __future__ import annotations
-
 from heapq import heapify, heappop, heappush
 from itertools import pairwise
 from typing import NamedTuple

@@ -1,7 +1,5 @@
 """Locks: two sweeps do not work on the same output, unless each knows its shard."""
 
-from __future__ import annotations
-
 import os
 import stat
 from contextlib import suppress

@@ -4,8 +4,6 @@ The global heap, where HDF5 keeps what has no fixed length and over which its li
 ever, is read for texts of other programs only: those of our own files have a fixed length.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from typing import Any

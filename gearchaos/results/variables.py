@@ -1,7 +1,5 @@
 """What a sweep yields: name, dimensions, type, unit and wording of every variable, in one place."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any

@@ -1,7 +1,5 @@
 """The batch driver: splits lanes into blocks, runs them side by side, returns arrays."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import Any
 

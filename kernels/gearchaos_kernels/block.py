@@ -7,8 +7,6 @@ takes the other kind. What is done once per mesh period (section, check for dive
 outside, and so does scaling the tangent vectors.
 """
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

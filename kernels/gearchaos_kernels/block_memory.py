@@ -15,8 +15,6 @@ and rates are displacements per step (h times d/d tau). Row r of a state is the 
 states; the last rows of a system with fewer than ten are unused.
 """
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np

@@ -5,8 +5,6 @@ end up with the names of files that another process has just written for another
 each signature has a file of its own, which begins with a checksum of its name and of the rest.
 """
 
-from __future__ import annotations
-
 import atexit
 import functools
 import hashlib

@@ -5,8 +5,6 @@ This is the only place that knows both the notation of Pan 2021 and the scaled c
 step. With a step of 1 they are those per unit of tau.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

@@ -10,8 +10,6 @@ Every flag is named here and nowhere else. Three facts about Numba shape this fi
   unaligned stack. Both cost up to half of the speed of the lane loop.
 """
 
-from __future__ import annotations
-
 import hashlib
 from collections.abc import Callable
 from pathlib import Path

@@ -5,8 +5,6 @@ on a flank and 0 between the flanks, offset is +b, -b or 0. A step that stays on
 smooth field, so that the method keeps its order; one that leaves it has to be split where it does.
 """
 
-from __future__ import annotations
-
 import math
 
 from gearchaos_kernels.block_memory import Branch, Branches

@@ -10,8 +10,6 @@ for the published formulation; the physical one multiplies the first e by 1 - 1/
 leaves the second line as it is. The clearance of both directions is then the same half backlash.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 from gearchaos_kernels.block_memory import Coordinates

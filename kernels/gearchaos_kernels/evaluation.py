@@ -3,8 +3,6 @@
 Both call the formulas that the Runge-Kutta steps call.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from gearchaos_kernels.block_memory import (

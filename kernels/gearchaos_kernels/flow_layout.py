@@ -1,7 +1,5 @@
 """Where the numbers of the maps of `flow_map` stand in their tables."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 from gearchaos_kernels.compilation import scalar

@@ -21,8 +21,6 @@ to unit vectors, and e is 1 on an engaged flank. Polynomials along the step are 
 as Chebyshev series are. Where the series do not converge to rounding, the step is divided.
 """
 
-from __future__ import annotations
-
 from collections import OrderedDict
 from collections.abc import Hashable
 from typing import NamedTuple

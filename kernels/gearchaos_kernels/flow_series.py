@@ -4,8 +4,6 @@ Two things enter: the formulas of `equations`, applied to unit vectors, and the 
 mesh phase (eqs 14 and 19). `flow_map` has the equations that are solved here.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

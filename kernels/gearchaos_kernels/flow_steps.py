@@ -10,8 +10,6 @@ and at last its end by the map of b. The tangent vector goes the same way, its m
 those of the motion: the field is continuous, so that no other term comes from them.
 """
 
-from __future__ import annotations
-
 import math
 
 from gearchaos_kernels.block_memory import (

@@ -5,8 +5,6 @@ that crosses needs alone are sums of columns, each a vector along a state or alo
 polynomial (`combine`, `add_switch`). The compiler finds neither by itself.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from typing import Any
 

@@ -6,8 +6,6 @@ one table: the inner loop evaluates no trigonometric function. Between the point
 series about the nearest one is as exact as the table itself.
 """
 
-from __future__ import annotations
-
 import math
 from functools import lru_cache
 from typing import NamedTuple

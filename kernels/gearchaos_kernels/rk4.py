@@ -13,8 +13,6 @@ fraction s of the step become::
 A whole step has the constant s = 1, which the compiler folds away.
 """
 
-from __future__ import annotations
-
 from gearchaos_kernels.block_memory import Coordinates, State
 from gearchaos_kernels.compilation import scalar
 from gearchaos_kernels.equations import accelerations, gaps_at, mesh_forces, tangent_forces

@@ -5,8 +5,6 @@ field is smooth. The few steps and lanes that may have left a branch come here o
 is repeated up to the crossing, then on the next branch, as often as it crosses.
 """
 
-from __future__ import annotations
-
 import math
 
 from gearchaos_kernels.block_memory import (

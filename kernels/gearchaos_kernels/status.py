@@ -1,7 +1,5 @@
 """What became of a lane."""
 
-from __future__ import annotations
-
 from enum import IntEnum
 
 

@@ -9,8 +9,6 @@ in place of the sine of eq. 14. The shares w belong to the mesh phase alone, and
 lane keeps the errors of the few pairs in mesh, which move on by one pair every mesh period.
 """
 
-from __future__ import annotations
-
 from functools import lru_cache
 from typing import NamedTuple
 
