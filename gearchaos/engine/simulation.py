@@ -41,7 +41,7 @@ from gearchaos.interrupts import check
 from gearchaos.records.difference import difference
 from gearchaos.records.label import MEANINGS as MOTION_MEANINGS
 from gearchaos.records.label import MOST_POINTS
-from gearchaos.records.period import POINTS_NEEDED, RETURNS
+from gearchaos.records.period import LONGEST_PERIOD, POINTS_NEEDED, RETURNS
 from gearchaos.results.variables import Variable, step_choice_variables, sweep_variables
 
 Arrays = Mapping[str, NDArray[Any]]
@@ -324,8 +324,12 @@ class Simulation:
             for name, length in lengths.items()
             if length != (asked := getattr(self.config.integration, name))
         ]
-        text = f"the pitch errors repeat after {repeats} mesh periods, the excitation period"
-        return f"{text}: {', '.join(changed)}, whole ones of it" if changed else text
+        told = min(lengths["recorded_periods"] // (RETURNS * repeats), LONGEST_PERIOD)
+        text = (
+            f"the pitch errors repeat after {repeats} mesh periods, the excitation period; the "
+            f"record tells motions of {told} of them{' or less' if told > 1 else ''}"
+        )
+        return f"{text}; {', '.join(changed)}, whole ones of it" if changed else text
 
     def _parting_pairs(self) -> str:
         """Tell where neighbouring tooth pairs differ by more than the load bends them."""
