@@ -162,6 +162,15 @@ def _plain_steps_are_those_of_rk4(config: Configuration) -> Iterator[Fault]:
         yield Fault("integration.crossings", rule, 'it goes with method = "rk4"', "plain")
 
 
+@reads("outputs", "scene", "integration")
+def _contact_is_told_by_crossings(config: Configuration) -> Iterator[Fault]:
+    crosses = "backlash" in config.scene.effects and config.integration.crossings == "resolved"
+    if config.outputs.contact and not crosses:
+        rule = "is told by the crossings of clearance boundaries, and there are none"
+        remedy = 'add "backlash" to scene.effects and set integration.crossings = "resolved"'
+        yield Fault("outputs.contact", rule, remedy, True)
+
+
 @reads("outputs", "integration")
 def _errors_are_measured_on_a_section(config: Configuration) -> Iterator[Fault]:
     if config.outputs.section:

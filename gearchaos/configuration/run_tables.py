@@ -212,6 +212,9 @@ class Outputs(Table):
         "whether the motion is labelled: its kind, its period, and the distance of its return",
         default=True,
     )
+    contact: bool = key(
+        "whether the shares of time on either flank and the impacts on it are told", default=False
+    )
     exponents: bool = key(
         "whether all Lyapunov exponents are computed, at about ten times the cost", default=False
     )

@@ -38,11 +38,17 @@ from gearchaos.engine.steps import (
 )
 from gearchaos.gear.mesh_stiffness import FourierStiffness
 from gearchaos.interrupts import check
+from gearchaos.records.contact import contact_told
 from gearchaos.records.difference import difference
 from gearchaos.records.label import MEANINGS as MOTION_MEANINGS
 from gearchaos.records.label import MOST_POINTS
 from gearchaos.records.period import LONGEST_PERIOD, POINTS_NEEDED, RETURNS
-from gearchaos.results.variables import Variable, step_choice_variables, sweep_variables
+from gearchaos.results.variables import (
+    DIRECTIONS,
+    Variable,
+    step_choice_variables,
+    sweep_variables,
+)
 
 Arrays = Mapping[str, NDArray[Any]]
 Bounds = tuple[int, int]
@@ -85,6 +91,7 @@ class Simulation:
             **lengths,
             section_points=outputs.section_points if outputs.section else 0,
             tangent=outputs.lyapunov,
+            contact=outputs.contact,
         )
         judged = outputs.lyapunov and integration.tolerance is None
         coarse = coarse_steps(self.lanes, steps) if judged else ""
@@ -149,6 +156,7 @@ class Simulation:
             section_points=outputs.section_points,
             lyapunov=outputs.lyapunov,
             crossings=self._splits_steps,
+            contact=self._contact_told,
             exponents=outputs.exponents,
             status_meanings=[status.name.lower() for status in STATUS_TEXTS],
             check_meanings=MEANINGS if checked else (),
@@ -160,6 +168,12 @@ class Simulation:
     @property
     def _splits_steps(self) -> bool:
         return self.plan.resolved and "backlash" in self.lanes.effects
+
+    @property
+    def _contact_told(self) -> tuple[str, ...]:
+        """Directions of which the contact is told."""
+        axial = "axial" in self.lanes.effects
+        return DIRECTIONS[: 1 + axial] if self.plan.contact and self._splits_steps else ()
 
     def rehearse(self, periods: int = 0) -> None:
         """Integrate the first lane, and so many mesh periods of it step by step.
@@ -254,6 +268,10 @@ class Simulation:
             slowest = np.where(outcome.crossings > 0, outcome.slowest_crossing, np.nan)
             arrays["slowest_crossing"] = np.where(sound, slowest, np.nan)
             arrays["unsplit_steps"] = outcome.overflows
+        for way, columns in zip(self._contact_told, np.split(outcome.contact, 2, 1), strict=False):
+            for name, values in contact_told(columns, plan.recorded_periods).items():
+                nothing = values if values.dtype == np.uint8 else np.nan
+                arrays[f"{name}_{way}"] = np.where(sound, values, nothing)
         for name in outputs.section:
             points = outcome.section[:, -plan.section_points :, system.states.index(name)]
             # A copy: a view would keep alive all that was recorded.

@@ -219,6 +219,7 @@ def _check_variables(
         lyapunov=known.LARGEST_EXPONENT in found,
         status_meanings=(),
         crossings="crossings_per_period" in found,
+        contact=[way for way in known.DIRECTIONS if f"contact_state_{way}" in found],
         exponents=known.ALL_EXPONENTS in found,
         check_meanings=["same"] if "motion_changed" in found else [],
         motion_meanings=["periodic"] if "motion" in found else [],

@@ -8,6 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gearchaos.gear.tooth_deviations import REALISATION
+from gearchaos.records.contact import MEANINGS as CONTACT_STATES
+from gearchaos.records.contact import WORDING
 
 START = "start"
 REPEATS = (REALISATION, START)
@@ -29,6 +31,8 @@ RECORD = "record"
 LABELS = ("motion", "period")
 BANDS = "bands"
 STATUS = "status"
+DIRECTIONS = ("tangential", "axial")
+"""Directions in which teeth have a clearance."""
 
 STATE_WORDING: dict[str, tuple[str, str]] = {
     "delta_5": ("relative torsional displacement", r"$\delta_5$"),
@@ -127,6 +131,7 @@ def sweep_variables(
     lyapunov: bool,
     status_meanings: Sequence[str],
     crossings: bool = False,
+    contact: Sequence[str] = (),
     exponents: bool = False,
     check_meanings: Sequence[str] = (),
     motion_meanings: Sequence[str] = (),
@@ -136,8 +141,9 @@ def sweep_variables(
 
     The axes are second swept parameter, first swept parameter, realisation, start, those there are;
     ``states`` those of the scene in its order, ``section`` those recorded at so many section
-    points. Meanings are those of 0, 1, ...: of ``status``, of ``motion_changed`` where lanes are
-    computed twice to measure their error, and of ``motion`` and ``record`` where they are labelled.
+    points, ``contact`` the directions of which it is told. Meanings are those of 0, 1, ...: of
+    ``status``, of ``motion_changed`` where lanes are computed twice to measure their error, and of
+    ``motion`` and ``record`` where they are labelled.
     """
     names = tuple(axis.name for axis in axes)
     variables = [
@@ -189,6 +195,10 @@ def sweep_variables(
         real("crossings_per_period", text)
         real("slowest_crossing", "smallest speed of a gap at a crossing of its clearance boundary")
         add("int32", "unsplit_steps", "steps with more crossings than they were split at")
+    for way in contact:
+        for name, text in WORDING.items():
+            real(f"{name}_{way}", f"{text}, {way}")
+        kind(f"contact_state_{way}", f"kind of {way} contact", CONTACT_STATES)
     if check_meanings:
         halved = "when the step is halved"
         real("section_error", f"change of the section of a periodic lane {halved}")

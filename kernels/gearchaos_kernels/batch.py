@@ -8,7 +8,7 @@ from numba import prange
 from numpy.typing import NDArray
 
 from gearchaos_kernels.block import Batch, integrate_block
-from gearchaos_kernels.block_memory import LANES, Present, flags
+from gearchaos_kernels.block_memory import CONTACT_ROWS, LANES, Present, flags
 from gearchaos_kernels.coefficients import (
     lane_coefficients,
     state_scales,
@@ -38,6 +38,7 @@ def _integrate_blocks(
     transverse,
     axial,
     resolved,
+    contact,
     tangent,
     flow_map,
 ):
@@ -53,6 +54,7 @@ def _integrate_blocks(
             transverse,
             axial,
             resolved,
+            contact,
             tangent,
             flow_map,
         )
@@ -99,6 +101,7 @@ def integrate(
         crossings=np.zeros(lanes, dtype=np.int64),
         slowest_crossing=np.full(lanes, np.inf),
         overflows=np.zeros(lanes, dtype=np.int64),
+        contact=np.zeros((lanes, 2 * CONTACT_ROWS if plan.contact else 0)),
         history=np.full((lanes, plan.history_periods * steps + 1, states), np.nan),
     )
     present = flags(system, plan)

@@ -16,6 +16,8 @@ from numpy.typing import NDArray
 from gearchaos_kernels.block_memory import (
     BEFORE,
     COEFFICIENTS,
+    CONTACT,
+    CONTACT_ROWS,
     CROSSINGS,
     GROWTH,
     LANES,
@@ -23,6 +25,7 @@ from gearchaos_kernels.block_memory import (
     STRIDE,
     SUSPECT,
     TANGENT,
+    TIMES,
     Block,
     Crossings,
     Lane,
@@ -38,7 +41,7 @@ from gearchaos_kernels.block_memory import (
     write_state,
 )
 from gearchaos_kernels.compilation import align_stack, part, scalar
-from gearchaos_kernels.contact import branches_at, step_may_leave
+from gearchaos_kernels.contact import branches_at, end_contact, step_may_leave
 from gearchaos_kernels.equations import gaps_at
 from gearchaos_kernels.flow_layout import layout
 from gearchaos_kernels.flow_steps import begin_forces, cross, move_block
@@ -128,8 +131,8 @@ def integrate_block(number_of_block, batch, plan, outcome, present):
                 last = number == steps - 1
                 if (number + 1) % interval == 0 or last:
                     scale_tangents(block, batch, number + 1, last)
-        end_period(block, batch, period, plan, outcome, present)
-    end(block, batch, plan, outcome)
+        end_period(block, batch, period, steps, plan, outcome, present)
+    end(block, batch, steps, plan, outcome, present)
 
 
 @scalar
@@ -157,6 +160,8 @@ def begin(block, batch, present):
         fill(memory, TANGENT, slot, batch.scales[index], batch.tangent_start[index])
         memory[GROWTH * STRIDE + slot] = 0.0
         store(memory, CROSSINGS, slot, Crossings(0.0, math.inf, 0.0))
+        for row in range(2 * CONTACT_ROWS):
+            memory[(CONTACT + row) * STRIDE + slot] = 0.0
         weights = shares_at(batch.shares, 0, present)
         point = with_teeth(memory, slot, weights, phase_on_grid(batch.table, 0), present)
         keep_shared(memory, slot, point, present)
@@ -219,9 +224,13 @@ def split(memory, table, shares, maps, row, work, lanes, number, recorded, prese
             continue
         before = load(memory, CROSSINGS, slot, Crossings)
         if present.flow_map is None:
-            count, slowest, overflow = split_step(memory, slot, table, shares, number, present)
+            count, slowest, overflow = split_step(
+                memory, slot, table, shares, number, recorded, present
+            )
         else:
-            count, slowest, overflow = cross(memory, slot, maps, row, work, present)
+            count, slowest, overflow = cross(
+                memory, slot, maps, row, work, number, recorded, present
+            )
         if not recorded:
             count = 0
             slowest = math.inf
@@ -253,7 +262,7 @@ def scale_tangents(block, batch, steps_done, last):
 
 
 @scalar
-def end_period(block, batch, period, plan, outcome, present):
+def end_period(block, batch, period, steps, plan, outcome, present):
     """Write section and growth of every lane, and stop those that have diverged."""
     memory, first, lanes = block
     recorded = period - plan.transient_periods
@@ -271,6 +280,11 @@ def end_period(block, batch, period, plan, outcome, present):
             for row in range(COEFFICIENTS):
                 memory[row * STRIDE + slot] = math.nan
             continue
+        if present.contact is not None:
+            if recorded >= 0:
+                branches = read_branches(memory, slot, present)
+                end_contact(memory, slot, 0, branches.tangential, steps)
+                end_contact(memory, slot, 1, branches.axial, steps)
         if point >= 0:
             take(memory, STATE, slot, batch.scales[index], outcome.section[index, point])
         if present.tangent is not None:
@@ -280,7 +294,7 @@ def end_period(block, batch, period, plan, outcome, present):
 
 
 @scalar
-def end(block, batch, plan, outcome):
+def end(block, batch, steps, plan, outcome, present):
     """Write the last state and tangent vector of every lane, and what it has crossed."""
     memory, first, lanes = block
     for slot in range(lanes):
@@ -292,6 +306,10 @@ def end(block, batch, plan, outcome):
         outcome.crossings[index] = int(crossings.crossed)
         outcome.slowest_crossing[index] = crossings.slowest
         outcome.overflows[index] = int(crossings.overflows)
+        if present.contact is not None:
+            for row in range(2 * CONTACT_ROWS):
+                unit = steps if row % CONTACT_ROWS < TIMES else 1
+                outcome.contact[index, row] = memory[(CONTACT + row) * STRIDE + slot] / unit
     if plan.history_periods > 0:
         keep_state(block, batch, outcome.history, plan.history_periods * plan.steps_per_period)
 

@@ -48,6 +48,7 @@ class Present(NamedTuple):
     transverse: tuple[()] | None
     axial: tuple[()] | None
     resolved: tuple[()] | None
+    contact: tuple[()] | None
     tangent: tuple[()] | None
     flow_map: tuple[()] | None
 
@@ -56,12 +57,14 @@ def flags(system: System, plan: Plan) -> Present:
     """Tell in types what the loop of a scene has, so that every scene is compiled for itself."""
     effects = system.effects
     teeth = system.teeth if effects.pitch_error else None
+    resolved = effects.backlash and (plan.resolved or plan.method == "flow_map")
     values = {
         **effects._asdict(),
         "phase": effects.pitch_error and teeth is None and bool(np.any(system.groups.error_phase)),
         "teeth": teeth is not None,
         "wide": teeth is not None and teeth.pairs_in_mesh > NARROW,
-        "resolved": effects.backlash and (plan.resolved or plan.method == "flow_map"),
+        "resolved": resolved,
+        "contact": resolved and plan.contact,
         "tangent": plan.tangent,
         "flow_map": plan.method == "flow_map",
     }
@@ -141,6 +144,20 @@ class Crossings(NamedTuple):
     overflows: float
 
 
+class Contact(NamedTuple):
+    """What the crossings of one direction tell: times on either flank in steps, impacts on it.
+
+    Of the speeds of approach the sum and the largest one, per step.
+    """
+
+    on_driving: float
+    on_back: float
+    driving_impacts: float
+    back_impacts: float
+    speeds: float
+    fastest: float
+
+
 STATE = 0
 TANGENT = STATE + len(STATES)
 BEFORE = TANGENT + len(STATES)
@@ -163,7 +180,11 @@ PAIRS = MARGINS + 2
 """First row of their errors; see `teeth`."""
 SHARED = PAIRS + MOST_PAIRS
 """Rows of the error that they share where the last step ended: value, slope and curvature."""
-ROWS = SHARED + 3
+CONTACT = SHARED + 3
+"""First row of what is told of the contact: tangential, then axial."""
+CONTACT_ROWS, TIMES = len(Contact._fields), 2
+"""Rows of one direction; the first ones are times."""
+ROWS = CONTACT + 2 * CONTACT_ROWS
 
 _ITEM = np.dtype(np.float64).itemsize
 

@@ -7,7 +7,15 @@ smooth field, so that the method keeps its order; one that leaves it has to be s
 
 import math
 
-from gearchaos_kernels.block_memory import Branch, Branches
+from gearchaos_kernels.block_memory import (
+    CONTACT,
+    CONTACT_ROWS,
+    Branch,
+    Branches,
+    Contact,
+    load,
+    store,
+)
 from gearchaos_kernels.compilation import scalar
 
 NEVER = 2.0
@@ -54,6 +62,61 @@ def next_branch(branch, gap, half_backlash):
     if branch.engaged != 0.0:
         return branch_at(0.0, half_backlash)
     return branch_at(math.copysign(half_backlash, gap), half_backlash)
+
+
+@scalar
+def tell_crossing(memory, slot, axially, branch, following, moment, speed):
+    """Enter a crossing into what is told of the contact, a moment in steps of the mesh period.
+
+    Time on a flank is the sum of all moments at which it is left less those at which it is met.
+    """
+    row = CONTACT + (CONTACT_ROWS if axially else 0)
+    told = load(memory, row, slot, Contact)
+    meets = following.engaged
+    flank = branch
+    if meets != 0.0:
+        flank = following
+    driving = is_driving(flank)
+    back = 1.0 - driving
+    passed = moment * (1.0 - 2.0 * meets)
+    told = Contact(
+        told.on_driving + driving * passed,
+        told.on_back + back * passed,
+        told.driving_impacts + driving * meets,
+        told.back_impacts + back * meets,
+        told.speeds + meets * speed,
+        max(told.fastest, meets * speed),
+    )
+    store(memory, row, slot, told)
+
+
+@scalar
+def end_contact(memory, slot, way, branch, steps):
+    """Count the flank on which a mesh period of so many steps ends until its end."""
+    row = CONTACT + way * CONTACT_ROWS
+    told = load(memory, row, slot, Contact)
+    left = steps * branch.engaged
+    on_driving = told.on_driving + is_driving(branch) * left
+    on_back = told.on_back + (1.0 - is_driving(branch)) * left
+    store(
+        memory,
+        row,
+        slot,
+        Contact(
+            on_driving,
+            on_back,
+            told.driving_impacts,
+            told.back_impacts,
+            told.speeds,
+            told.fastest,
+        ),
+    )
+
+
+@scalar
+def is_driving(branch):
+    """Return 1 for the driving flank, and where there is no clearance, 0 for the back flank."""
+    return 1.0 if branch.offset >= 0.0 else 0.0
 
 
 @scalar

@@ -101,7 +101,7 @@ def maps_of(system: System, steps: int, present: Present) -> Maps:
 
     Those used last are kept: the same lanes may be integrated again and again.
     """
-    present = present._replace(tangent=None)
+    present = present._replace(tangent=None, contact=None)
     waves = system.stiffness_cosine, system.stiffness_sine
     scene = (steps, present, system.physical, *(wave.tobytes() for wave in waves))
     rows = [row.tobytes() for row in _own_groups(system)]

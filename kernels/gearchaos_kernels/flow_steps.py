@@ -31,7 +31,14 @@ from gearchaos_kernels.block_memory import (
     write_branches,
 )
 from gearchaos_kernels.compilation import scalar
-from gearchaos_kernels.contact import NEVER, branches_at, first_fall, may_leave, next_branch
+from gearchaos_kernels.contact import (
+    NEVER,
+    branches_at,
+    first_fall,
+    may_leave,
+    next_branch,
+    tell_crossing,
+)
 from gearchaos_kernels.equations import gaps_at
 from gearchaos_kernels.flow_layout import BOUND_Y, BOUND_Z, HEADER, TERMS, layout
 from gearchaos_kernels.flow_vectors import (
@@ -212,7 +219,7 @@ def count_suspects(memory, slots, table, row, present):
 
 
 @scalar
-def cross(memory, slot, table, row, work, present):
+def cross(memory, slot, table, row, work, number, recorded, present):
     """Take the step of one lane from crossing to crossing; see `split_step` for what it returns."""
     place = layout(present)
     lane = load(memory, COEFFICIENTS, slot, Lane)
@@ -251,8 +258,13 @@ def cross(memory, slot, table, row, work, present):
         branch = branches.axial if axially else branches.tangential
         value, slope = value_and_slope(work, gap, moment)
         # The step is 2 long in s.
-        slowest = min(slowest, 2.0 * speed * abs(slope))
+        speed *= 2.0 * abs(slope)
+        slowest = min(slowest, speed)
         following = next_branch(branch, value, b)
+        if present.contact is not None:
+            if recorded:
+                at_step = number + 0.5 * (1.0 + moment)
+                tell_crossing(memory, slot, axially, branch, following, at_step, speed)
         if present.tangent is not None:
             tangent_gap_along(work, TANGENT_GAP, TANGENT_INPUTS, table, at + columns, present)
         if axially:

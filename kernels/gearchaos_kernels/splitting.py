@@ -21,7 +21,13 @@ from gearchaos_kernels.block_memory import (
     write_state,
 )
 from gearchaos_kernels.compilation import scalar
-from gearchaos_kernels.contact import NEVER, branches_at, leaving_fraction, next_branch
+from gearchaos_kernels.contact import (
+    NEVER,
+    branches_at,
+    leaving_fraction,
+    next_branch,
+    tell_crossing,
+)
 from gearchaos_kernels.equations import gaps_at
 from gearchaos_kernels.forcing import During, forcing_at, phase_on_grid, phase_within
 from gearchaos_kernels.rk4 import step, tangent_step
@@ -32,7 +38,7 @@ MOST_SPLITS = 16
 
 
 @scalar
-def split_step(memory, slot, table, shares, number, present):
+def split_step(memory, slot, table, shares, number, recorded, present):
     """Repeat one step of one lane in pieces that each stay on their contact branches.
 
     The state before the step is in the rows from `BEFORE` on, the one after it, which ignored the
@@ -80,14 +86,18 @@ def split_step(memory, slot, table, shares, number, present):
         begin = crossing
         crossings += 1
         gaps = gaps_at(state, lane, begin, present)
+        gap = gaps.axial if axially else gaps.tangential
+        branch = branches.axial if axially else branches.tangential
+        speed = (lane.axial_speed if axially else lane.tangential_speed) * abs(gap.rate)
+        slowest = min(slowest, speed)
+        following = next_branch(branch, gap.value, lane.half_backlash)
         if axially:
-            slowest = min(slowest, lane.axial_speed * abs(gaps.axial.rate))
-            following = next_branch(branches.axial, gaps.axial.value, lane.half_backlash)
             branches = Branches(branches.tangential, following)
         else:
-            slowest = min(slowest, lane.tangential_speed * abs(gaps.tangential.rate))
-            following = next_branch(branches.tangential, gaps.tangential.value, lane.half_backlash)
             branches = Branches(following, branches.axial)
+        if present.contact is not None:
+            if recorded:
+                tell_crossing(memory, slot, axially, branch, following, number + done, speed)
 
         left = 1.0 - done
         middle = forcing_within(

@@ -157,7 +157,7 @@ class Plan(NamedTuple):
     the steps that cross a clearance boundary; without it they are plain steps. Of the last
     ``history_periods`` every step is kept. ``method``: "rk4" or "flow_map", which resolves every
     crossing and whose steps are exact. ``first_period``: mesh periods that the teeth have turned
-    before tau = 0.
+    before tau = 0. ``contact``: whether crossings are told by flank, where they are resolved.
     """
 
     steps_per_period: int
@@ -169,6 +169,7 @@ class Plan(NamedTuple):
     history_periods: int = 0
     method: str = "rk4"
     first_period: int = 0
+    contact: bool = False
 
 
 class Schedule(NamedTuple):
@@ -205,6 +206,7 @@ class Outcome(NamedTuple):
     crossings: NDArray[np.int64]
     slowest_crossing: Floats
     overflows: NDArray[np.int64]
+    contact: Floats
     history: Floats | None
 
     def every(self, periods: int) -> Outcome:

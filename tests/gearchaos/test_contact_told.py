@@ -1,0 +1,74 @@
+"""The contact of a lane in a result: names, states in words, and when it can be told."""
+
+import numpy as np
+import pytest
+from gearchaos_kernels import Plan
+
+import gearchaos
+from gearchaos import load_config
+from gearchaos.records.contact import MEANINGS, contact_told
+
+from .commands import run_module
+from .short_sweeps import PAN2021, SHORT
+
+ASKED = ("outputs.contact=true", "integration.transient_periods=60", "sweep.count=6")
+
+
+def test_the_four_states_of_contact():
+    driving, back, on_driving, on_back = np.array(
+        [
+            [10.0, 0, 0, 0],
+            [0, 10.0, 0, 0],
+            [6.0, 0, 5, 0],
+            [0, 2.0, 0, 1],
+            [4.0, 3.0, 2, 2],
+            [0, 0, 0, 0],
+        ]
+    ).T
+    speeds = 0.5 * (on_driving + on_back)
+    contact = np.stack([driving, back, on_driving, on_back, speeds, 0.7 * speeds], axis=1)
+    found = contact_told(contact, 10)
+    assert [MEANINGS[state] for state in found["contact_state"]] == [
+        "held",
+        "held",
+        "single_sided_impact",
+        "single_sided_impact",
+        "double_sided_impact",
+        "free",
+    ]
+    assert found["time_apart"].tolist() == pytest.approx([0, 0, 0.4, 0.8, 0.3, 1])
+    assert found["approach_mean"][2:5].tolist() == [0.5, 0.5, 0.5]
+    assert np.isnan(found["approach_mean"][[0, 1, 5]]).all()
+
+
+def test_a_sweep_tells_the_contact_of_both_directions_and_its_file_keeps_it(tmp_path):
+    config = load_config(PAN2021, [*SHORT, *ASKED])
+    result = gearchaos.run(config)
+    names = [name for name in result.variables if name.endswith("_tangential")]
+    assert len(names) == 8
+    assert not any(name.endswith("_axial") for name in result.variables)
+    shares = sum(result[f"time_{where}_tangential"] for where in ("driving", "back", "apart"))
+    assert shares == pytest.approx(1.0)
+    crossed = result["crossings_per_period"]
+    impacts = result["impacts_driving_tangential"] + result["impacts_back_tangential"]
+    # Every impact is followed by a departure, but for one at the end of the record.
+    assert (
+        np.abs(crossed - 2.0 * impacts).max() <= 1.0 / config.integration.recorded_periods + 1e-12
+    )
+    settings = [f"--set={one}" for one in (*SHORT, *ASKED)]
+    assert run_module("gearchaos.sweep", str(PAN2021), *settings, cwd=tmp_path).code == 0
+    kept = gearchaos.open_result(next(tmp_path.glob("*.h5")))
+    for name in names:
+        assert np.array_equal(kept[name], result[name], equal_nan=True), name
+    assert kept.variables["contact_state_tangential"].flags == MEANINGS
+
+
+def test_contact_cannot_be_told_where_nothing_is_crossed():
+    for other in ('scene.effects=["pitch_error"]', "integration.crossings=plain"):
+        with pytest.raises(gearchaos.ConfigurationError, match=r"outputs\.contact = true: is told"):
+            load_config(PAN2021, ["outputs.contact=true", other])
+
+
+def test_a_plan_keeps_it_only_where_it_is_asked_for():
+    assert not Plan(200, 0, 1, 0).contact
+    assert "contact_state_tangential" not in gearchaos.run(load_config(PAN2021, SHORT)).variables

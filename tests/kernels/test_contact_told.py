@@ -1,0 +1,101 @@
+"""What crossings tell of the contact: shares of time and impacts, against the motion itself."""
+
+import numpy as np
+import pytest
+from gearchaos_kernels import Effects, Plan, integrate, mesh_motion
+
+from .reference import FLOW_MAP, FULL, TORSION_ONLY, assert_same_bits, pan2021, system_of
+
+PERIODS = 12
+DRIVING, BACK, ON_DRIVING, ON_BACK, SPEEDS, FASTEST = range(6)
+MODEL = pan2021([0.3, 2.0, 5.86, 10.75])
+"""Held, and on the driving flank once a period."""
+METHODS = {"rk4": 200, FLOW_MAP: 24}
+
+
+def told(system, start, periods=PERIODS, **plan):
+    """Integrate, and return times in shares and numbers a period, (lanes, directions, 6)."""
+    plan = {"transient_periods": 60, "recorded_periods": periods, "section_points": 1, **plan}
+    outcome = integrate(system, start, Plan(**plan, contact=True))
+    return outcome, outcome.contact.reshape(-1, 2, 6)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_shares_and_impacts_are_those_of_the_motion_at_sixteen_times_the_steps(method):
+    system, start = system_of(MODEL), np.zeros((4, 10))
+    _, found = told(system, start, steps_per_period=METHODS[method], method=method)
+    fine, _ = told(system, start, steps_per_period=3200, history_periods=PERIODS)
+    motion = mesh_motion(system, fine.history, 3200)
+    for way, contact in enumerate((motion.contact_tangential, motion.contact_axial)):
+        for flank, time, impacts in ((1, DRIVING, ON_DRIVING), (2, BACK, ON_BACK)):
+            here = contact == flank
+            # Two samples of a period may lie on either side of its crossings.
+            share = here[:, :-1].mean(axis=1)
+            assert found[:, way, time] / PERIODS == pytest.approx(share, rel=0, abs=2.0 / 3200)
+            meets = (here[:, 1:] & ~here[:, :-1]).sum(axis=1)
+            assert found[:, way, impacts].tolist() == meets.tolist()
+
+
+def test_the_speed_of_approach_is_that_of_the_gap_where_it_meets_the_flank():
+    system, start = system_of(MODEL), np.zeros((4, 10))
+    fine, found = told(system, start, steps_per_period=3200, history_periods=PERIODS)
+    states = fine.history[1:]
+    step = system.of(slice(1, 4)).mesh_period[:, np.newaxis] / 3200
+    # Printed gaps: delta_1 - delta_2 + delta_5 less cos(beta_b) e, which returns every period.
+    motion = states[..., 2] - states[..., 4] + states[..., 0]
+    groups = system.of(slice(1, 4)).groups
+    angle = 2.0 * np.pi * np.arange(motion.shape[1]) / 3200
+    error = groups.error_amplitude[:, np.newaxis] * np.sin(angle)
+    gap = motion - error * np.cos(groups.base_helix_angle[:, np.newaxis])
+    rate = np.gradient(gap, axis=1) / step
+    for lane in range(3):
+        limit = groups.half_backlash[lane] * np.cos(groups.base_helix_angle[lane])
+        meets = np.flatnonzero((gap[lane, 1:] >= limit) & (gap[lane, :-1] < limit))
+        speeds = rate[lane, meets]
+        assert found[lane + 1, 0, FASTEST] == pytest.approx(speeds.max(), rel=2e-3)
+        assert found[lane + 1, 0, SPEEDS] == pytest.approx(speeds.sum(), rel=2e-3)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_teeth_that_never_part_are_held_and_teeth_in_the_middle_are_free(method):
+    model = pan2021([0.0, 0.0, 0.0], load=[0.3, 0.0, -0.3], half_backlash=0.5)
+    start = np.zeros((3, 2))
+    start[:, 0] = [0.8, 0.0, -0.8]
+    steps = METHODS[method]
+    _, found = told(system_of(model, TORSION_ONLY), start, steps_per_period=steps, method=method)
+    shares = found[:, 0, :2] / PERIODS
+    assert shares == pytest.approx(np.array([[1.0, 0.0], [0.0, 0.0], [0.0, 1.0]]))
+    assert not found[:, 0, 2:].any()
+
+
+def test_a_free_flight_meets_the_flanks_when_it_should():
+    # No damping, no load: from the middle of the gap at speed v the flank is met after b / v.
+    scene = Effects(False, False, True, False, False)
+    speed, clearance = 0.37, 0.9
+    model = pan2021(0.0, load=0.0, damping_ratio=0.0, half_backlash=clearance, base_helix_angle=0.0)
+    system = system_of(model, scene)
+    start = np.array([[0.0, speed]])
+    periods = 20
+    _, found = told(system, start, periods, transient_periods=0, steps_per_period=400)
+    # On a flank of stiffness 1 half a turn takes pi, between the flanks 2 b / v.
+    flight, turn = 2.0 * clearance / speed, np.pi
+    total = periods * system.mesh_period[0]
+    landings = np.arange(1, 99) * (flight + turn) - flight / 2.0 - turn
+    landings = landings[landings < total]
+    on_flank = np.minimum(landings + turn, total) - landings
+    assert found[0, 0, ON_DRIVING] == landings[::2].size
+    assert found[0, 0, ON_BACK] == landings[1::2].size
+    times = found[0, 0, :2] * system.mesh_period[0]
+    assert times == pytest.approx([on_flank[::2].sum(), on_flank[1::2].sum()], rel=1e-7)
+    assert found[0, 0, FASTEST] == pytest.approx(speed, rel=1e-8)
+    assert found[0, 0, SPEEDS] == pytest.approx(landings.size * speed, rel=1e-8)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_telling_the_contact_changes_no_bit_of_the_motion(method):
+    system, start = system_of(MODEL, FULL), np.zeros((4, 10))
+    plan = Plan(METHODS[method], 5, 20, 20, method=method)
+    without = integrate(system, start, plan)
+    with_contact = integrate(system, start, plan._replace(contact=True))
+    assert with_contact.contact.any()
+    assert_same_bits(with_contact._replace(contact=without.contact), without)
