@@ -17,7 +17,7 @@ from gearchaos.figures.lanes import Between, Floats, diagram_lanes, outermost
 from gearchaos.figures.panel import DiagramArtists, Drawn, close_panel
 from gearchaos.figures.style import BLACK, GREY, VERMILION
 from gearchaos.results.result import Result, section_variables
-from gearchaos.results.variables import LARGEST_EXPONENT, RECORD, STANDARD_ERROR
+from gearchaos.results.variables import LARGEST_EXPONENT, RECORD, STANDARD_ERROR, STATUS
 
 BAND_STANDARD_ERRORS = 2.0
 
@@ -68,7 +68,8 @@ def bifurcation(
     result : Result
         Over one swept parameter.
     variable : str, optional
-        A section variable; default `section_delta_5`, or the first that the result has.
+        A section variable, or one with a number for each lane; default `section_delta_5`, or the
+        first section variable that the result has.
     between : (float or None, float or None)
         The part of the parameter range to show.
     full_range : bool
@@ -80,17 +81,20 @@ def bifurcation(
     Raises
     ------
     FigureError
-        If the result has no such section variable, no lane in the range, or two swept parameters.
+        If the result has no such variable, no lane in the range, or two swept parameters.
     """
     names = section_variables(result)
-    if not names:
+    numbers = (tuple(result.axes), "float64")
+    of_lanes = [v.name for v in result.variables.values() if (v.dims, v.dtype) == numbers]
+    of_lanes = [name for name in of_lanes if name not in result.axes]
+    if not names and variable is None:
         raise FigureError("the result has no section points: the sweep did not record any")
     variable = names[0] if variable is None else variable
-    if variable not in names:
-        there = ", ".join(names)
-        raise FigureError(f"no section variable {variable!r} in the result; it has {there}")
+    if variable not in (*names, *of_lanes):
+        there = ", ".join((*names, *of_lanes))
+        raise FigureError(f"no variable {variable!r} of the diagram in the result; it has {there}")
     lanes = diagram_lanes(result, between)
-    rows = result.lanes(variable)
+    rows = result.lanes(variable).reshape(result.lanes(STATUS).size, -1)
     total, of_a_lane = max(1, lanes.numbers.size * rows.shape[1]), max(1, rows.shape[1])
     alpha = min(1.0, 4.0 / of_a_lane**0.5) * min(1.0, MOST_DOTS / total)
     look = {"markersize": lanes.dot_size(0.8), "marker": marker, "color": color, "label": label}

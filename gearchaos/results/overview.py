@@ -228,7 +228,7 @@ def _units(entry: Mapping[str, Any]) -> str:
 
 
 def _entry(label: str, text: str) -> str:
-    return _wrapped(f"{label:{_LABEL}}{text}", "  ", " " * (_LABEL + 2))
+    return _wrapped(f"{label:{_LABEL - 1}} {text}", "  ", " " * (_LABEL + 2))
 
 
 def _wrapped(text: str, first: str, further: str = "    ") -> str:

@@ -3,9 +3,11 @@
 import numpy as np
 import pytest
 from gearchaos_kernels import Plan
+from matplotlib.figure import Figure
 
 import gearchaos
 from gearchaos import load_config
+from gearchaos.figures import bifurcation
 from gearchaos.records.contact import MEANINGS, contact_told
 
 from .commands import run_module
@@ -61,6 +63,16 @@ def test_a_sweep_tells_the_contact_of_both_directions_and_its_file_keeps_it(tmp_
     for name in names:
         assert np.array_equal(kept[name], result[name], equal_nan=True), name
     assert kept.variables["contact_state_tangential"].flags == MEANINGS
+
+
+def test_what_is_told_of_each_lane_can_be_drawn_over_the_parameter():
+    result = gearchaos.run(load_config(PAN2021, [*SHORT, *ASKED]))
+    axes = Figure().add_subplot()
+    drawn = bifurcation(axes, result, "time_apart_tangential")
+    assert drawn.points.get_ydata() == pytest.approx(result["time_apart_tangential"])
+    assert "between the flanks" in " ".join(axes.get_ylabel().split())
+    with pytest.raises(gearchaos.FigureError, match=r"no variable 'nothing'.*approach_largest"):
+        bifurcation(axes, result, "nothing")
 
 
 def test_contact_cannot_be_told_where_nothing_is_crossed():
