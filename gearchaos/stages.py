@@ -81,6 +81,7 @@ def _records(text: str) -> int:
 
 def _stages(options: argparse.Namespace) -> int:
     from gearchaos.results.crises import crises
+    from gearchaos.results.excitation import excitation_of
     from gearchaos.results.jumps import jumps
     from gearchaos.results.overview import finite
     from gearchaos.results.result import open_result
@@ -116,7 +117,9 @@ def _stages(options: argparse.Namespace) -> int:
         facts["survival"] = outlasting and outlasting._asdict()
         print(json.dumps(finite(facts), indent=1, allow_nan=False))
     else:
-        print("\n".join(table(result.axis, stages, slice_lines(where))))
+        unit = excitation_of(result.metadata).in_words
+        head = slice_lines(where) + ([unit] if unit else [])
+        print("\n".join(table(result.axis, stages, head)))
         told = band_lines(stages, bands) + remarks(jumping, bursting, mixed)
         told += [outlasting.text] if outlasting else []
         for lines in (told, boundary_list(boundaries or ())):

@@ -8,6 +8,7 @@ from gearchaos.errors import FigureError
 from gearchaos.figures.labels import place_of
 from gearchaos.figures.lanes import Floats
 from gearchaos.records.period import motion_period
+from gearchaos.results.excitation import excitation_of
 from gearchaos.results.response_variables import TIME, acceleration_of
 from gearchaos.results.result import Result, section_variables
 
@@ -36,9 +37,22 @@ def coordinates_of(result: Result) -> tuple[str, ...]:
 
 
 def repeats_after(result: Result, lane: int) -> int:
-    """Return after how many mesh periods the motion of a lane repeats, 0 for none up to 16."""
+    """Return after how many mesh periods the motion of a lane repeats.
+
+    0 for none up to 16 periods of the excitation, or a section with too few points to tell.
+    """
     section = np.stack([result.lanes(name)[lane] for name in section_variables(result)], axis=1)
-    return int(motion_period(section[np.newaxis])[0])
+    once = once_an_excitation(result, section.shape[0])
+    return once.step * int(motion_period(section[np.newaxis, once])[0])
+
+
+def once_an_excitation(result: Result, points: int, samples: int = 1) -> slice:
+    """Return which of so many points are once an excitation period; the last one ends the lane.
+
+    The points are ``samples`` to a mesh period.
+    """
+    step = samples * excitation_of(result.metadata).excitation_period
+    return slice((points - 1) % step, None, step)
 
 
 def samples_per_period(result: Result) -> int:

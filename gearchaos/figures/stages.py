@@ -14,6 +14,7 @@ from gearchaos.errors import FigureError
 from gearchaos.figures.labels import form_in_words
 from gearchaos.figures.lanes import swept_axes
 from gearchaos.figures.style import LEGEND, SMALL_FONT_PT
+from gearchaos.results.excitation import excitation_of
 from gearchaos.results.result import Result
 from gearchaos.results.stage_table import LabelledLanes, Stage, labelled_lanes, stage_table
 from gearchaos.results.variables import LABELS, REPEATS
@@ -125,7 +126,8 @@ def shade_stages(
     drawn = {kind for kind, _, _ in seen}
     handles = [Patch(linewidth=0.3, label=kind, **looks[kind]) for kind in looks if kind in drawn]
     # A line at the foot of the page would lie on the legend.
-    title = form_in_words(result) or None
+    words = (form_in_words(result), excitation_of(result.metadata).in_words)
+    title = "\n".join(filter(None, words)) or None
     if not legend:
         return StageArtists(stages, shades, None)
     assert axes.figure is not None

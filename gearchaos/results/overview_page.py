@@ -6,6 +6,7 @@ import textwrap
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
+from gearchaos.results.excitation import excitation_of
 from gearchaos.results.result_reader import printable
 from gearchaos.results.stage_table import slice_lines
 from gearchaos.results.variables import LARGEST_EXPONENT, STANDARD_ERROR, STEP_ERROR
@@ -101,7 +102,9 @@ def _stages(overview: Mapping[str, Any]) -> Iterator[str]:
     if len(lines) > MOST_STAGES:
         more = f"{len(lines)} stages: the first {half} and the last {half}"
         lines = [more, *lines[:half], *lines[-half:]]
-    yield from (_wrapped(line, "  ") for line in [*slice_lines(overview["slice"]), *lines])
+    unit = excitation_of(overview["metadata"]).in_words
+    head = slice_lines(overview["slice"]) + ([unit] if unit and lines else [])
+    yield from (_wrapped(line, "  ") for line in head + lines)
 
 
 def _bands(counts: Mapping[str, int]) -> str:

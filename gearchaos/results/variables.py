@@ -133,6 +133,7 @@ def sweep_variables(
     check_meanings: Sequence[str] = (),
     motion_meanings: Sequence[str] = (),
     record_meanings: Sequence[str] = (),
+    excitation_period: int = 1,
 ) -> list[Variable]:
     """List the variables of a sweep in the order of the file.
 
@@ -140,6 +141,7 @@ def sweep_variables(
     ``states`` those of the scene in its order, ``section`` those recorded at so many section
     points. Meanings are those of 0, 1, ...: of ``status``, of ``motion_changed`` where lanes are
     computed twice to measure their error, and of ``motion`` and ``record`` where they are labelled.
+    A motion repeats after whole excitation periods, of so many mesh periods each.
     """
     names = tuple(axis.name for axis in axes)
 
@@ -169,7 +171,9 @@ def sweep_variables(
         variables.append(real(name, text, r"$\lambda_1$"))
         variables.append(real(name + STANDARD_ERROR, error, r"$s_{\lambda_1}$"))
     if motion_meanings:
-        period = "mesh periods after which the motion repeats, 0 where it is not periodic"
+        of_teeth = f"periods of the excitation, {excitation_period} mesh periods each,"
+        period = "mesh periods" if excitation_period == 1 else of_teeth
+        period += " after which the motion repeats, 0 where it is not periodic"
         text = "smallest distance after which the motion returns, of all states, scaled"
         bands = (
             "bands a chaotic or quasi-periodic section hops between in turn, 0 for other motions"
