@@ -206,7 +206,8 @@ def metadata(simulation: Simulation, seconds: float) -> Mapping[str, Any]:
 
 def _excitation(simulation: Simulation) -> dict[str, float]:
     """Tell when the excitation repeats, and of teeth what their figures need, see `Excitation`."""
-    config, facts = simulation.config, {"excitation_period": simulation.lanes.repeats_after}
+    config = simulation.config
+    facts: dict[str, float] = {"excitation_period": simulation.lanes.repeats_after}
     if facts["excitation_period"] == 1 or config.pair is None:
         return facts
     facts |= dict(zip(("driving_teeth", "driven_teeth"), config.pair.teeth, strict=True))

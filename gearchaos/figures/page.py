@@ -16,9 +16,6 @@ from gearchaos.figures.style import MM_PER_INCH, SINGLE_COLUMN_MM, SMALL_FONT_PT
 
 NOTEBOOK_DPI = 200
 
-SIDE_BY_SIDE_MM = 120.0
-"""Width from which on two panels stand side by side."""
-
 
 class Page(Figure):
     """A matplotlib figure that a notebook shows by itself, without pyplot."""

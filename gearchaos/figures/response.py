@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
@@ -20,7 +22,6 @@ from gearchaos.figures.response_lane import (
     samples_per_period,
 )
 from gearchaos.figures.style import BLACK, BLUE, VERMILION
-from gearchaos.figures.teeth import other_points
 from gearchaos.records.amplitude_spectrum import spectral_lines
 from gearchaos.results.excitation import excitation_of
 from gearchaos.results.response_variables import TIME, acceleration_of
@@ -29,6 +30,17 @@ from gearchaos.results.result import Result
 HIGHEST_ORDER = 8.0
 DECADES = 5
 """Decades that a logarithmic spectrum shows, up to that of its highest line."""
+
+OTHER_POINTS: dict[str, Any] = {
+    "marker": "o",
+    "ms": 1.2,
+    "mew": 0.0,
+    "color": "0.65",
+    "zorder": 2.5,
+    "linestyle": "none",
+    "rasterized": True,
+}
+"""Look of the states once a mesh period, behind those once an excitation period."""
 
 _LINE_LENGTH = 26
 _MARGIN = 0.06
@@ -96,7 +108,7 @@ def phase_portrait(
     steps = samples_per_period(result)
     once = once_an_excitation(result, displacement.size, steps)
     if once.step > steps:
-        other_points(axes, displacement[::steps], velocity[::steps])
+        axes.plot(displacement[::steps], velocity[::steps], **OTHER_POINTS)
     points = _points(axes, displacement[once], velocity[once], markersize=2.4)
     _label_plane(axes, result, coordinate)
     return curve, points
@@ -116,7 +128,7 @@ def poincare_section(axes: Axes, result: Result, lane: int, coordinate: str = CO
     low, high = middle - reach, middle + reach
     once = once_an_excitation(result, section.shape[1])
     if once.step > 1:
-        other_points(axes, *section)
+        axes.plot(*section, **OTHER_POINTS)
         section = section[:, once]
     places = np.round((section.T - low) / (high - low), 3)
     # Few points are seen as such only if they are large.

@@ -43,7 +43,7 @@ def repeats_after(result: Result, lane: int) -> int:
     """
     section = np.stack([result.lanes(name)[lane] for name in section_variables(result)], axis=1)
     once = once_an_excitation(result, section.shape[0])
-    return once.step * int(motion_period(section[np.newaxis, once])[0])
+    return int(once.step * motion_period(section[np.newaxis, once])[0])
 
 
 def once_an_excitation(result: Result, points: int, samples: int = 1) -> slice:

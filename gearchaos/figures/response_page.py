@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from gearchaos.figures.labels import form_in_words, in_words, place_of
-from gearchaos.figures.page import SIDE_BY_SIDE_MM, Page, few_ticks, footnote, letter, page, remark
+from gearchaos.figures.page import Page, few_ticks, footnote, letter, page, remark
 from gearchaos.figures.response import (
     amplitude_spectrum,
     phase_portrait,
@@ -12,10 +12,13 @@ from gearchaos.figures.response import (
 )
 from gearchaos.figures.response_lane import COORDINATE, coordinates_of, repeats_after
 from gearchaos.figures.style import DOUBLE_COLUMN_MM
-from gearchaos.figures.teeth_page import teeth_page
+from gearchaos.figures.teeth import teeth_page
 from gearchaos.results.excitation import excitation_of
 from gearchaos.results.response_variables import TIME, acceleration_of
 from gearchaos.results.result import Result
+
+SIDE_BY_SIDE_MM = 120.0
+"""Width from which on two panels stand side by side."""
 
 SHOWN_PERIODS = 12
 """Mesh periods at the end of the record that the time history shows."""
@@ -34,8 +37,7 @@ def response_page(
     """Draw time history (a), phase portrait (b), Poincare section (c) and spectrum (d) of a lane.
 
     The spectrum is that of the acceleration: of a motion that repeats with a rectangular window, of
-    any other with that of Hann. A pair whose teeth have errors of their own has the page of
-    `teeth_page`.
+    any other with that of Hann. Where teeth have errors of their own, it is that of `teeth_page`.
 
     Parameters
     ----------
@@ -57,9 +59,9 @@ def response_page(
     """
     coordinate = COORDINATE if coordinate is None else coordinate
     whole = coordinate in coordinates_of(result)
-    if excitation_of(result.metadata).driving_teeth:
-        return teeth_page(result, lane, coordinate, width_mm, height_mm)
     columns, count = 2 if width_mm >= SIDE_BY_SIDE_MM else 1, 4 if whole else 2
+    if excitation_of(result.metadata).driving_teeth:
+        return teeth_page(result, lane, coordinate, columns, width_mm, height_mm)
     with page(width_mm, height_mm or _PANEL_HEIGHT_MM * count / columns) as figure:
         panels = figure.subplots(count // columns, columns, squeeze=False)
         history, *planes, spectrum = panels.ravel()
