@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
@@ -30,17 +28,6 @@ from gearchaos.results.result import Result
 HIGHEST_ORDER = 8.0
 DECADES = 5
 """Decades that a logarithmic spectrum shows, up to that of its highest line."""
-
-OTHER_POINTS: dict[str, Any] = {
-    "marker": "o",
-    "ms": 1.2,
-    "mew": 0.0,
-    "color": "0.65",
-    "zorder": 2.5,
-    "linestyle": "none",
-    "rasterized": True,
-}
-"""Look of the states once a mesh period, behind those once an excitation period."""
 
 _LINE_LENGTH = 26
 _MARGIN = 0.06
@@ -97,8 +84,7 @@ def phase_portrait(
 ) -> tuple[Line2D, Line2D]:
     """Draw velocity against displacement, with the points at the beginning of each mesh period.
 
-    Where the excitation repeats after several mesh periods, the points are those of its periods,
-    and those of the others are light grey.
+    Where the excitation repeats after several of them, other points than the first are light grey.
 
     Parameters and errors as for `time_history`, but for a coordinate such as ``"delta_5"``; returns
     the curve and the points.
@@ -106,10 +92,8 @@ def phase_portrait(
     displacement, velocity = (motion_of(result, lane, name) for name in _plane(coordinate))
     (curve,) = axes.plot(displacement, velocity, color=BLACK, linewidth=0.4)
     steps = samples_per_period(result)
-    once = once_an_excitation(result, displacement.size, steps)
-    if once.step > steps:
-        axes.plot(displacement[::steps], velocity[::steps], **OTHER_POINTS)
-    points = _points(axes, displacement[once], velocity[once], markersize=2.4)
+    strobe = displacement[::steps], velocity[::steps]
+    points = _points(axes, *strobe, 2.4, once_an_excitation(result, strobe[0].size))
     _label_plane(axes, result, coordinate)
     return curve, points
 
@@ -127,13 +111,10 @@ def poincare_section(axes: Axes, result: Result, lane: int, coordinate: str = CO
     middle = (section.min(axis=1) + section.max(axis=1)) / 2.0
     low, high = middle - reach, middle + reach
     once = once_an_excitation(result, section.shape[1])
-    if once.step > 1:
-        axes.plot(*section, **OTHER_POINTS)
-        section = section[:, once]
-    places = np.round((section.T - low) / (high - low), 3)
+    places = np.round((section.T[once] - low) / (high - low), 3)
     # Few points are seen as such only if they are large.
     markersize = float(np.clip(40.0 / len(np.unique(places, axis=0)), 1.5, 3.5))
-    points = _points(axes, section[0], section[1], markersize)
+    points = _points(axes, section[0], section[1], markersize, once)
     axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
     _label_plane(axes, result, coordinate)
     return points
@@ -202,10 +183,12 @@ def _plane(coordinate: str) -> tuple[str, str]:
     return coordinate, f"{coordinate}_rate"
 
 
-def _points(axes: Axes, x: Floats, y: Floats, markersize: float) -> Line2D:
+def _points(axes: Axes, x: Floats, y: Floats, markersize: float, once: slice) -> Line2D:
+    if once.step > 1:
+        axes.plot(x, y, "o", ms=1.2, mew=0.0, color="0.65", zorder=2.5, rasterized=True)
     (points,) = axes.plot(
-        x,
-        y,
+        x[once],
+        y[once],
         linestyle="none",
         marker="o",
         markersize=markersize,

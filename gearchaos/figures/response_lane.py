@@ -46,13 +46,13 @@ def repeats_after(result: Result, lane: int) -> int:
     return int(once.step * motion_period(section[np.newaxis, once])[0])
 
 
-def once_an_excitation(result: Result, points: int, samples: int = 1) -> slice:
-    """Return which of so many points are once an excitation period; the last one ends the lane.
+def once_an_excitation(result: Result, points: int) -> slice:
+    """Return which of so many points, a mesh period apart, are one period of the excitation apart.
 
-    The points are ``samples`` to a mesh period.
+    The last of them ends the lane, as it does a whole number of excitation periods.
     """
-    step = samples * excitation_of(result.metadata).excitation_period
-    return slice((points - 1) % step, None, step)
+    period = excitation_of(result.metadata).excitation_period
+    return slice((points - 1) % period, None, period)
 
 
 def samples_per_period(result: Result) -> int:

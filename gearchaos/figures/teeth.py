@@ -113,7 +113,7 @@ def _in_revolutions(axes: Axes, teeth: int) -> None:
     every = _ticks(axes.xaxis, teeth / 2, 1.0, begin)
     axes.xaxis.set_major_formatter(lambda x, _: f"{(x - begin) / teeth:.3g}")
     ticks = "a tick for each tooth" if every == 1 else f"a tick every {every} teeth"
-    axes.set_xlabel(f"Time in revolutions of the driving gear, {ticks}")
+    axes.set_xlabel(f"Revolutions of the driving gear, {ticks}")
 
 
 def _in_shaft_orders(
