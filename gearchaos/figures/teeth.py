@@ -145,8 +145,9 @@ def _in_shaft_orders(
         "mesh",
     )
     shown = [Line2D([], [], color=_LOOKS[n][0], label=names[n]) for n in (3, 2, 1, 0) if n in kind]
-    frame = {"frameon": True, "borderpad": 0.4, "fancybox": False}
-    axes.legend(handles=shown, loc="upper right", **LEGEND | frame)
+    # A decade more than the lines need has room for their legend.
+    axes.set_ylim(top=10.0 * axes.get_ylim()[1])
+    axes.legend(handles=shown, loc="upper right", ncols=2, **LEGEND | {"borderpad": 0.4})
 
 
 def _ticks(axis: Axis, coarse: float, fine: float, begin: float = 0.0) -> int:
