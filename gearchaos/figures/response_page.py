@@ -60,7 +60,7 @@ def response_page(
     coordinate = COORDINATE if coordinate is None else coordinate
     whole = coordinate in coordinates_of(result)
     columns, count = 2 if width_mm >= SIDE_BY_SIDE_MM else 1, 4 if whole else 2
-    if excitation_of(result.metadata).driving_teeth:
+    if excitation_of(result.metadata).of_teeth:
         return teeth_page(result, lane, coordinate, columns, width_mm, height_mm)
     with page(width_mm, height_mm or _PANEL_HEIGHT_MM * count / columns) as figure:
         panels = figure.subplots(count // columns, columns, squeeze=False)

@@ -41,11 +41,8 @@ def shares(
 
     Parameters
     ----------
-    axes : matplotlib.axes.Axes
-    result : Result
-        Over one swept parameter, with labels of the motion of several gear pairs or starts.
-    between : (float or None, float or None)
-        The part of the parameter range to show.
+    axes, result, between
+        As for `bifurcation`, with labels of the motion of several gear pairs or starts.
     contact : matplotlib.axes.Axes, optional
         Where to draw the share of motions whose teeth lose contact, if the result tells.
 

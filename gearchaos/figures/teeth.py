@@ -125,12 +125,14 @@ def _in_shaft_orders(
     shaft. A line has the colour of the shaft whose multiple it is, and is pale where it is that of
     neither, or of a record that does not hold a period of the excitation and resolves none.
     """
-    _, driving, driven, _ = excitation
+    period, driving, driven, _ = excitation
     segments = np.array(lines.get_segments())
     multiples = segments[:, :1, 0] * np.array([driven, driving, 1])
     near = np.abs(multiples - np.rint(multiples)) < 1e-6
-    # The last column that holds decides: the mesh is a multiple of both shafts.
-    kind = np.max(near * [resolved, 2 * resolved, 3], axis=1)
+    # The last column that holds decides: the mesh is a multiple of both shafts. A gear without
+    # errors has none in the period.
+    shafts = [resolved and period % teeth == 0 for teeth in (driven, driving)]
+    kind = np.max(near * [shafts[0], 2 * shafts[1], 3], axis=1)
     at = np.argsort(kind, kind="stable")
     colours, widths = zip(*(_LOOKS[number] for number in kind[at]), strict=True)
     lines.set_segments(list(segments[at]))

@@ -22,6 +22,11 @@ class Excitation(NamedTuple):
     length_scale_um: float = 0.0
 
     @property
+    def of_teeth(self) -> bool:
+        """Whether teeth have errors of their own, whose numbers are known."""
+        return self.driving_teeth > 0 and self.driven_teeth > 0
+
+    @property
     def in_words(self) -> str:
         """What the periods of motions are, where they are not mesh periods."""
         n = self.excitation_period
@@ -30,10 +35,9 @@ class Excitation(NamedTuple):
 
 def excitation_of(metadata: Mapping[str, Any]) -> Excitation:
     """Read the excitation from the metadata of a result; what makes no sense is not known."""
-    given = {name: (metadata.get(name), kind) for name, kind in Excitation._field_defaults.items()}
     sound = {
         name: value
-        for name, (value, default) in given.items()
-        if isinstance(value, type(default)) and 0 < value < LARGEST
+        for name, default in Excitation._field_defaults.items()
+        if isinstance(value := metadata.get(name), type(default)) and 0 < value < LARGEST
     }
     return Excitation(**sound)

@@ -7,7 +7,8 @@ import pytest
 from matplotlib.colors import to_hex
 from matplotlib.text import Text
 
-from gearchaos.figures import response_page
+import gearchaos
+from gearchaos.figures import response_page, shares_page
 from gearchaos.figures.response_lane import repeats_after
 from gearchaos.figures.style import BLACK, BLUE, VERMILION
 from gearchaos.info import main as info
@@ -17,6 +18,8 @@ from gearchaos.results.response_variables import response_variables
 from gearchaos.results.result import Result
 from gearchaos.results.variables import Axis, sweep_variables
 from gearchaos.stages import main as stages
+
+from .commands import small_config
 
 STEPS, DRIVING, DRIVEN = 8, 4, 6
 MEET = 12
@@ -243,6 +246,54 @@ def path(tmp_path: Path) -> Path:
     path = tmp_path / "teeth.h5"
     known_teeth().save(path)
     return path
+
+
+def test_a_gear_without_errors_has_no_lines_of_its_own():
+    """Half of the mesh order is a multiple of the other shaft, but there for another reason."""
+    result = known_teeth(recorded=8, extra_order=0.5, excitation_period=DRIVING)
+    *_, spectrum = response_page(result, 0).axes
+    assert BLUE not in coloured(spectrum)
+
+
+GRADES = (
+    "pair.teeth=[6, 9]",
+    'pitch_error={kind="grade",grade=7,realisations=3}',
+    'sweep={parameter="pitch_error.grade",values=[5,7]}',
+    'scene.effects=["pitch_error","backlash"]',
+    'outputs.section=["delta_5"]',
+    "integration.steps_per_period=120",
+)
+
+
+def test_a_sweep_and_a_response_know_their_teeth(tmp_path):
+    config = gearchaos.load_config(small_config(tmp_path), GRADES)
+    result = gearchaos.run(config)
+    assert excitation_of(result.metadata) == Excitation(18, 6, 9, 25.0)
+    assert result.attributes("period")["long_name"].startswith("periods of the excitation, 18 mesh")
+    assert shares_page(result).axes[0].get_title("right") == "3 gear pairs each"
+    response = gearchaos.respond(config.replace("integration.recorded_periods", 54), periods=18)
+    assert excitation_of(response.metadata) == excitation_of(result.metadata)
+    page = response_page(response, 0)
+    assert (
+        page.axes[0].get_title("right") == "accuracy grade of both gears = 5, drawn gear pair = 0"
+    )
+    assert page.axes[4].get_xlabel() == "Order of the driving shaft (mesh: 6)"
+
+
+def test_a_sine_says_nothing_of_teeth(tmp_path):
+    config = gearchaos.load_config(small_config(tmp_path), ["sweep.count=2"])
+    result = gearchaos.run(config)
+    assert excitation_of(result.metadata) == Excitation()
+    assert not {*Excitation._fields[1:]} & result.metadata.keys()
+    assert excitation_of(result.metadata).in_words == ""
+
+
+@pytest.mark.parametrize("swept", ["mesh.length_scale_um", "mesh.half_backlash_um"])
+def test_a_unit_of_lengths_that_is_swept_is_not_one(tmp_path, swept):
+    sweep = f'sweep={{parameter="{swept}",values=[20.0,30.0]}}'
+    config = gearchaos.load_config(small_config(tmp_path), [*GRADES[:2], sweep, *GRADES[3:]])
+    known = excitation_of(gearchaos.run(config).metadata).length_scale_um
+    assert known == (0.0 if swept == "mesh.length_scale_um" else 25.0)
 
 
 def test_the_commands_say_what_a_period_is(path, capsys):
