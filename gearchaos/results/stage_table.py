@@ -21,7 +21,7 @@ class LabelledLanes(NamedTuple):
     """Lanes in ascending order of the swept value, one per value.
 
     ``values``, ``exponent`` (lanes,): not a number where no exponent is known; ``labels`` (lanes,):
-    such as "period 3" or "chaotic"; ``period`` (lanes,) in those of the excitation, or 0.
+    such as "period 3" or "chaotic"; ``period`` (lanes,) in mesh periods, 0 where not periodic.
     """
 
     values: Floats
