@@ -34,6 +34,7 @@ RESULT_ENDINGS = (".h5", ".hdf5", ".nc")
 def _plot(options: argparse.Namespace) -> int:
     from gearchaos.figures import save_figure
     from gearchaos.figures.response_lane import is_response
+    from gearchaos.gear.tooth_deviations import REALISATION
     from gearchaos.results.result import open_result
 
     results = [_slice(open_result(path), options.at) for path in options.result]
@@ -52,7 +53,9 @@ def _plot(options: argparse.Namespace) -> int:
             print(path, flush=True)
     width, height = (25.4 * inches for inches in figure.get_size_inches())
     size = f"{width:.0f} mm x {height:.0f} mm at {options.dpi} dpi"
-    say(f"{'; '.join(map(_lanes_in_words, results))}, {size}")
+    hint = "; --shares draws how many of the gear pairs move in which way"
+    drawn_pairs = not options.shares and any(REALISATION in one.axes for one in results)
+    say(f"{'; '.join(map(_lanes_in_words, results))}, {size}{hint if drawn_pairs else ''}")
     return OK
 
 
@@ -63,7 +66,7 @@ def _titles(results: Sequence[Result], paths: Sequence[Path]) -> list[str]:
 
 
 def _sweep_sheets(results: Sequence[Result], options: argparse.Namespace) -> list[Sheet]:
-    from gearchaos.figures import bifurcation_page
+    from gearchaos.figures import bifurcation_page, shares_page
     from gearchaos.figures.labels import in_a_name
     from gearchaos.figures.style import SINGLE_COLUMN_MM
     from gearchaos.results.result import DEFAULT_VARIABLE
@@ -74,6 +77,13 @@ def _sweep_sheets(results: Sequence[Result], options: argparse.Namespace) -> lis
         name += f"_{options.variable}"
     for word, end in (("from", options.low), ("to", options.high)):
         name += "" if end is None else f"_{word}_{end:g}"
+    if options.shares:
+        if len(results) > 1 or options.variable or options.stages or options.full_range:
+            rule = "draws one result, and no diagram: leave --variable, --stages, --full-range out"
+            raise FigureError(f"--shares: {rule}")
+        width = options.width or SINGLE_COLUMN_MM
+        drawn = (options.low, options.high), width, options.height
+        return [(f"{name}_shares", partial(shares_page, results[0], *drawn))]
     name += "_stages" if options.stages else ""
     shown = {"between": (options.low, options.high), "full_range": options.full_range}
     shown |= {"stages": options.stages, "labels": _titles(results, options.result)}
@@ -88,7 +98,7 @@ def _response_sheets(results: Sequence[Result], options: argparse.Namespace) -> 
     from gearchaos.figures.response_lane import COORDINATE
     from gearchaos.figures.style import DOUBLE_COLUMN_MM
 
-    for option in ("full_range", "stages"):
+    for option in ("full_range", "stages", "shares"):
         if getattr(options, option):
             raise FigureError(
                 f"--{option.replace('_', '-')}: {options.result[0]} is a response; it belongs to "
@@ -146,6 +156,8 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
         "axis go into what surrounds them, or make it one of several motions"
     )
     add("--stages", action="store_true", help=text)
+    text = "draw which shares of the gear pairs and starts of each value move in which way instead"
+    add("--shares", action="store_true", help=text)
     add("--full-range", action="store_true", help="show every lane, however few lie far out")
     text = "width of the page (default: 85, one column of a journal; a response: 180, two)"
     add("--width", type=partial(millimetres, low=60.0), metavar="MM", help=text)

@@ -66,6 +66,7 @@ def _records(text: str) -> int:
 
 
 def _stages(options: argparse.Namespace) -> int:
+    from gearchaos.results.excitation import excitation_of
     from gearchaos.results.jumps import crises, jumps
     from gearchaos.results.overview import finite, slice_lines
     from gearchaos.results.result import open_result
@@ -98,7 +99,8 @@ def _stages(options: argparse.Namespace) -> int:
     mixed = int((result[RECORD] == 1).sum()) if RECORD in result else 0
     told = [*band_lines(stages), *remarks(jumping, bursting, mixed)]
     told += [outlasting.text] if outlasting else []
-    first = table(result.axis, stages, slice_lines(where))
+    head = [*slice_lines(where), excitation_of(result.metadata).in_words]
+    first = table(result.axis, stages, [*filter(None, head)])
     parts = map("\n".join, (first, told, boundary_list(boundaries or ())))
     print("\n\n".join(filter(None, parts)))
     return OK

@@ -170,9 +170,22 @@ def metadata(simulation: Simulation, seconds: float) -> Mapping[str, Any]:
         "steps_per_period": simulation.plan.steps_per_period,
         "transient_periods": simulation.plan.transient_periods,
         "recorded_periods": simulation.plan.recorded_periods,
-        "excitation_period": simulation.lanes.repeats_after,
+        **_excitation(simulation),
         "notes": "\n".join(simulation.notes),
         **provenance(seconds),
         "configuration": config.text,
         "configuration_resolved": config.resolved_toml(),
     }
+
+
+def _excitation(simulation: Simulation) -> dict[str, float]:
+    """Tell when the excitation repeats, and of teeth what their figures need, see `Excitation`."""
+    config = simulation.config
+    facts: dict[str, float] = {"excitation_period": simulation.lanes.repeats_after}
+    if facts["excitation_period"] == 1 or config.pair is None:
+        return facts
+    facts |= dict(zip(("driving_teeth", "driven_teeth"), config.pair.teeth, strict=True))
+    physical, scale = config.physical(), "mesh.length_scale_um"
+    length = physical[scale] or physical["mesh.half_backlash_um"]
+    one = length and scale not in [sweep.parameter for sweep in config.sweeps.values()]
+    return facts | ({"length_scale_um": length} if one else {})

@@ -162,6 +162,7 @@ class Simulation:
             check_meanings=MEANINGS if checked else (),
             motion_meanings=MOTION_MEANINGS if outputs.motion else (),
             record_meanings=RECORD_MEANINGS if outputs.motion and outputs.lyapunov else (),
+            excitation_period=self.lanes.repeats_after,
         )
         return of_the_lanes + self._choice
 

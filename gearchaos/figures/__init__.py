@@ -9,6 +9,7 @@ from gearchaos.figures.response import (
     time_history,
 )
 from gearchaos.figures.response_page import response_page
+from gearchaos.figures.shares import shares, shares_page
 from gearchaos.figures.stages import shade_stages
 from gearchaos.figures.sweep_page import bifurcation_page
 
@@ -22,5 +23,7 @@ __all__ = [
     "response_page",
     "save_figure",
     "shade_stages",
+    "shares",
+    "shares_page",
     "time_history",
 ]

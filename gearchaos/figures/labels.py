@@ -9,7 +9,7 @@ from gearchaos.results.result import Result
 
 DIMENSIONLESS = ("", "1")
 SCALES = {
-    r"(section_)?delta_\d": r"unit $b\prime$",
+    r"(section_)?delta_\d|mesh_error": r"unit $b\prime$",
     r"(section_)?delta_\d_rate": r"unit $b\prime\omega_h$",
     r"delta_\d_acceleration": r"unit $b\prime\omega_h^2$",
     r"mesh_force_\w+": r"unit $k_mb\prime$",

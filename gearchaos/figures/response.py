@@ -10,9 +10,16 @@ from gearchaos.errors import FigureError
 from gearchaos.figures.labels import axis_label, plain, unit_of
 from gearchaos.figures.lanes import Between, Floats
 from gearchaos.figures.page import remark
-from gearchaos.figures.response_lane import COORDINATE, motion_of, repeats_after, samples_per_period
+from gearchaos.figures.response_lane import (
+    COORDINATE,
+    motion_of,
+    once_an_excitation,
+    repeats_after,
+    samples_per_period,
+)
 from gearchaos.figures.style import BLACK, BLUE, VERMILION
 from gearchaos.records.amplitude_spectrum import spectral_lines
+from gearchaos.results.excitation import excitation_of
 from gearchaos.results.response_variables import TIME, acceleration_of
 from gearchaos.results.result import Result
 
@@ -74,19 +81,22 @@ def phase_portrait(
 ) -> tuple[Line2D, Line2D]:
     """Draw velocity against displacement, with the points at the beginning of each mesh period.
 
+    Where the excitation repeats after several of them, other points than the first are light grey.
+
     Parameters and errors as for `time_history`, but for a coordinate such as ``"delta_5"``; returns
     the curve and the points.
     """
     displacement, velocity = (motion_of(result, lane, name) for name in _plane(coordinate))
     (curve,) = axes.plot(displacement, velocity, color=BLACK, linewidth=0.4)
     steps = samples_per_period(result)
-    points = _points(axes, displacement[::steps], velocity[::steps], markersize=2.4)
+    strobe = displacement[::steps], velocity[::steps]
+    points = _points(axes, *strobe, 2.4, once_an_excitation(result, strobe[0].size))
     _label(axes, result, *_plane(coordinate))
     return curve, points
 
 
 def poincare_section(axes: Axes, result: Result, lane: int, coordinate: str = COORDINATE) -> Line2D:
-    """Draw the states at the beginning of all recorded mesh periods.
+    """Draw the states at the beginning of all recorded mesh periods, as `phase_portrait` does.
 
     Parameters and errors as for `phase_portrait`. The axes reach over at least a fifth of the phase
     portrait, so that the points of a periodic motion coincide.
@@ -97,10 +107,11 @@ def poincare_section(axes: Axes, result: Result, lane: int, coordinate: str = CO
     reach[reach == 0.0] = 1.0
     middle = (section.min(axis=1) + section.max(axis=1)) / 2.0
     low, high = middle - reach, middle + reach
-    places = np.round((section.T - low) / (high - low), 3)
+    once = once_an_excitation(result, section.shape[1])
+    places = np.round((section.T[once] - low) / (high - low), 3)
     # Few points are seen as such only if they are large.
     markersize = float(np.clip(40.0 / len(np.unique(places, axis=0)), 1.5, 3.5))
-    points = _points(axes, section[0], section[1], markersize)
+    points = _points(axes, section[0], section[1], markersize, once)
     axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
     _label(axes, result, *_plane(coordinate))
     return points
@@ -119,8 +130,9 @@ def amplitude_spectrum(
     """Draw the single-sided amplitude spectrum; a sine of amplitude A is a line of height A.
 
     A motion that repeats is transformed over as many of its periods as the record holds, so that
-    all its lines are those of the transform; any other one over the whole record. Errors as for
-    `time_history`; each of the lines that are returned begins at the bottom of the axes.
+    all its lines are those of the transform; any other one over as many periods of the excitation.
+    Errors as for `time_history`; each of the lines that are returned begins at the bottom of the
+    axes.
 
     Parameters
     ----------
@@ -137,8 +149,9 @@ def amplitude_spectrum(
     """
     variable = variable or acceleration_of(COORDINATE)
     values, steps = motion_of(result, lane, variable), samples_per_period(result)
-    period = repeats_after(result, lane) or 1
-    periods = values.size // (steps * period) * period or values.size // steps
+    held, excitation = values.size // steps, excitation_of(result.metadata).excitation_period
+    period = next((n for n in (repeats_after(result, lane), excitation) if 0 < n <= held), 1)
+    periods = held // period * period
     record = values[-1 - periods * steps : -1]
     order, amplitude = spectral_lines(record, steps, window)
     shown = order <= highest
@@ -167,8 +180,10 @@ def _plane(coordinate: str) -> tuple[str, str]:
     return coordinate, f"{coordinate}_rate"
 
 
-def _points(axes: Axes, x: Floats, y: Floats, markersize: float) -> Line2D:
-    return axes.plot(x, y, "o", ms=markersize, mew=0.0, color=VERMILION, zorder=3)[0]
+def _points(axes: Axes, x: Floats, y: Floats, markersize: float, once: slice) -> Line2D:
+    if once.step > 1:
+        axes.plot(x, y, "o", ms=1.2, mew=0.0, color="0.65", zorder=2.5, rasterized=True)
+    return axes.plot(x[once], y[once], "o", ms=markersize, mew=0.0, color=VERMILION, zorder=3)[0]
 
 
 def _label(axes: Axes, result: Result, along: str, upwards: str) -> None:

@@ -6,6 +6,7 @@ from gearchaos.errors import FigureError
 from gearchaos.figures.labels import place_of
 from gearchaos.figures.lanes import Floats
 from gearchaos.records.period import motion_period
+from gearchaos.results.excitation import excitation_of
 from gearchaos.results.response_variables import TIME, acceleration_of
 from gearchaos.results.result import Result, section_variables
 
@@ -34,9 +35,22 @@ def coordinates_of(result: Result) -> tuple[str, ...]:
 
 
 def repeats_after(result: Result, lane: int) -> int:
-    """Return after how many mesh periods the motion of a lane repeats, 0 for none up to 16."""
+    """Return after how many mesh periods the motion of a lane repeats.
+
+    0 for none up to 16 periods of the excitation, or a section with too few points to tell.
+    """
     section = np.stack([result.lanes(name)[lane] for name in section_variables(result)], axis=1)
-    return int(motion_period(section[np.newaxis])[0])
+    once = once_an_excitation(result, section.shape[0])
+    return int(once.step * motion_period(section[np.newaxis, once])[0])
+
+
+def once_an_excitation(result: Result, points: int) -> slice:
+    """Return which of so many points, a mesh period apart, are one period of the excitation apart.
+
+    The last of them ends the lane, as it does a whole number of excitation periods.
+    """
+    period = excitation_of(result.metadata).excitation_period
+    return slice((points - 1) % period, None, period)
 
 
 def samples_per_period(result: Result) -> int:

@@ -10,6 +10,8 @@ from gearchaos.figures.response import (
 )
 from gearchaos.figures.response_lane import COORDINATE, coordinates_of, repeats_after
 from gearchaos.figures.style import DOUBLE_COLUMN_MM
+from gearchaos.figures.teeth import teeth_page
+from gearchaos.results.excitation import excitation_of
 from gearchaos.results.response_variables import TIME, acceleration_of
 from gearchaos.results.result import Result
 
@@ -33,7 +35,7 @@ def response_page(
     """Draw time history (a), phase portrait (b), Poincare section (c) and spectrum (d) of a lane.
 
     The spectrum is that of the acceleration: of a motion that repeats with a rectangular window, of
-    any other with that of Hann.
+    any other with that of Hann. Where teeth have errors of their own, it is that of `teeth_page`.
 
     Parameters
     ----------
@@ -56,6 +58,8 @@ def response_page(
     coordinate = COORDINATE if coordinate is None else coordinate
     whole = coordinate in coordinates_of(result)
     columns, count = 2 if width_mm >= SIDE_BY_SIDE_MM else 1, 4 if whole else 2
+    if excitation_of(result.metadata).of_teeth:
+        return teeth_page(result, lane, coordinate, columns, width_mm, height_mm)
     with page(width_mm, height_mm or _PANEL_HEIGHT_MM * count / columns) as figure:
         panels = figure.subplots(count // columns, columns, squeeze=False)
         history, *planes, spectrum = panels.ravel()

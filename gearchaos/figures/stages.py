@@ -12,6 +12,7 @@ from gearchaos.errors import FigureError
 from gearchaos.figures.labels import form_in_words
 from gearchaos.figures.lanes import swept_axes
 from gearchaos.figures.style import LEGEND, SMALL_FONT_PT
+from gearchaos.results.excitation import excitation_of
 from gearchaos.results.result import Result
 from gearchaos.results.stage_table import LabelledLanes, Stage, labelled_lanes, stage_table
 from gearchaos.results.variables import LABELS, REPEATS
@@ -115,7 +116,9 @@ def shade_stages(
     # Above the axes are the panel's letter and the marks of lanes that cannot be shown; and a line
     # at the foot of the page would lie on the legend.
     look = {"loc": "outside lower center", "ncols": min(len(handles), 5), **LEGEND}
-    look |= {"title": form_in_words(result) or None, "title_fontsize": SMALL_FONT_PT}
+    words = (form_in_words(result), excitation_of(result.metadata).in_words)
+    title = "\n".join(filter(None, words)) or None
+    look |= {"title": title, "title_fontsize": SMALL_FONT_PT}
     return StageArtists(stages, shades, axes.figure.legend(handles=handles, **look))
 
 

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gearchaos.results import variables as known
+from gearchaos.results.excitation import excitation_of
 from gearchaos.results.result import Result
 from gearchaos.results.result_file import Parameter
 from gearchaos.results.result_reader import printable, read_result
@@ -194,7 +195,9 @@ def _stages(overview: Mapping[str, Any]) -> Iterator[str]:
     if len(lines) > MOST_STAGES:
         more = f"{len(lines)} stages: the first {half} and the last {half}"
         lines = [more, *lines[:half], *lines[-half:]]
-    yield from (_wrapped(line, "  ") for line in [*slice_lines(overview["slice"]), *lines])
+    unit = excitation_of(overview["metadata"]).in_words if lines else ""
+    head = filter(None, [*slice_lines(overview["slice"]), unit])
+    yield from (_wrapped(line, "  ") for line in [*head, *lines])
 
 
 def _metadata(overview: Mapping[str, Any], names: str) -> Iterator[str]:

@@ -136,6 +136,7 @@ def sweep_variables(
     check_meanings: Sequence[str] = (),
     motion_meanings: Sequence[str] = (),
     record_meanings: Sequence[str] = (),
+    excitation_period: int = 1,
 ) -> list[Variable]:
     """List the variables of a sweep in the order of the file.
 
@@ -143,7 +144,8 @@ def sweep_variables(
     ``states`` those of the scene in its order, ``section`` those recorded at so many section
     points, ``contact`` the directions of which it is told. Meanings are those of 0, 1, ...: of
     ``status``, of ``motion_changed`` where lanes are computed twice to measure their error, and of
-    ``motion`` and ``record`` where they are labelled.
+    ``motion`` and ``record`` where they are labelled. A motion repeats after whole excitation
+    periods, of so many mesh periods each.
     """
     names = tuple(axis.name for axis in axes)
     variables = [
@@ -172,7 +174,9 @@ def sweep_variables(
         real(name + STANDARD_ERROR, text, r"$s_{\lambda_1}$")
     if motion_meanings:
         kind("motion", "kind of motion", motion_meanings)
-        text = "mesh periods after which the motion repeats, 0 where it is not periodic"
+        of_teeth = f"periods of the excitation, {excitation_period} mesh periods each,"
+        text = "mesh periods" if excitation_period == 1 else of_teeth
+        text += " after which the motion repeats, 0 where it is not periodic"
         add("int32", "period", text, "$n$")
         text = "smallest distance after which the motion returns, of all states, scaled"
         real("return_distance", text)
