@@ -79,12 +79,11 @@ def _seconds_per_lane(simulation: Simulation) -> float:
     """
     lanes = simulation.block_lanes(numba.get_num_threads()) / (8 if simulation.carried else 1)
     periods = simulation.plan.transient_periods + simulation.plan.recorded_periods
-    share, seconds = lanes / len(simulation.lanes), math.nan
     with notice("computing some lanes, to tell how long all take"):
         # The first time, little is computed, and the kernels are loaded. It takes a step more, so
         # that flow maps are still to be made the second time: once, for however many periods.
-        for more, length in (1, 8.0 / periods), (0, SAMPLE_PERIODS / periods):
-            sample = Simulation(_thinned(simulation, share, min(1.0, length)))
+        for more, length in (1, min(1.0, 8.0 / periods)), (0, min(1.0, SAMPLE_PERIODS / periods)):
+            sample = Simulation(_thinned(simulation, lanes / len(simulation.lanes), length))
             plan, every = sample.plan, np.arange(len(sample.lanes))
             sample.plan = plan._replace(steps_per_period=plan.steps_per_period + more)
             began = time.perf_counter()
