@@ -44,7 +44,8 @@ def ending(simulation: Simulation, output: str, diverged: int, *said: str) -> in
     if diverged <= allowed * len(simulation.lanes):
         return OK
     complain(
-        f"{diverged} of {len(simulation.lanes)} lanes diverged, more than "
+        f"{diverged} of {len(simulation.lanes)} lanes diverged"
+        f"{' or were too fast' if simulation.plan.method == 'flow_map' else ''}, more than "
         f"outputs.allowed_diverged_share = {allowed:g} allows; the file marks them: "
         "raise integration.steps_per_period, or check the load and the start state"
     )

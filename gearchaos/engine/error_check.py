@@ -73,8 +73,8 @@ class Tally:
             (self.errors, self.errors),
             (
                 self._too_fast,
-                f"{self._too_fast} of the diverged lanes did not diverge, but move faster than so "
-                "few flow maps can follow (status in the file); raise integration.steps_per_period",
+                f"{self._too_fast} of the lanes counted as diverged move faster than so few flow "
+                "maps can follow (status in the file); raise integration.steps_per_period",
             ),
             (
                 self._unsplit_steps,

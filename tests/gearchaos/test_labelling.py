@@ -185,7 +185,7 @@ def test_a_lane_too_fast_for_its_flow_maps_is_no_diverged_one(tmp_path):
     assert np.isnan(arrays["end_state"][0]).all()
     tally = Tally()
     tally.add(arrays)
-    assert "1 of the diverged lanes did not diverge" in "".join(tally.remarks)
+    assert "1 of the lanes counted as diverged move faster" in "".join(tally.remarks)
 
 
 def test_the_meanings_of_the_labels_are_in_the_result():
