@@ -274,6 +274,21 @@ def test_ncdump_shows_the_dimensions(path: Path) -> None:
     run("ncdump", path)
 
 
+def test_octave_loads_all_of_it(path: Path, result: Result) -> None:
+    # Octave ends with 0 and complains on stderr where it cannot load one of the datasets.
+    program = (
+        f"s = load('{path}'); printf('%.17g %.17g ', s.section_delta_5(3, 5), s.parameters.load);"
+        "printf('%d ', size(s.end_state), s.state, s.status(8), columns(s.configuration));"
+        "printf('%s', s.configuration(1:18))"
+    )
+    text = run("octave-cli", "--norc", "--no-history", "--eval", program)
+    configuration = result.metadata["configuration"]
+    expected = [result["section_delta_5"][4, 2], 0.1, 2, LANES, 0, 1, 1, len(str(configuration))]
+    *numbers, comment = text.split(maxsplit=len(expected))
+    assert [float(number) for number in numbers] == expected
+    assert str(configuration).startswith(comment)
+
+
 def test_the_last_line_is_a_checksum_that_standard_tools_confirm(path: Path) -> None:
     if not all(map(shutil.which, ("sh", "head", "tail", "sha256sum"))):
         pytest.skip("sh, head, tail and sha256sum are not all installed")
