@@ -75,10 +75,7 @@ class System:
     """
 
     def __init__(
-        self,
-        config: Given,
-        at: Mapping[str, float] | None = None,
-        **groups: float,
+        self, config: Given, at: Mapping[str, float] | None = None, **groups: float
     ) -> None:
         config = configuration_of(config)
         values = {name: float(value) for name, value in {**(at or {}), **groups}.items()}

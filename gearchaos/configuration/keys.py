@@ -97,6 +97,11 @@ class Key:
         return Range(**{name: getattr(rule, name) for rule, name in rules if hasattr(rule, name)})
 
     @property
+    def choices(self) -> tuple[str, ...]:
+        """What the value, or each entry of it, may be, as TOML writes it; empty: no such list."""
+        return tuple(map(toml_literal, _choices(self.field.annotation)))
+
+    @property
     def remedy(self) -> str:
         """What belongs here, with an example where there is one."""
         example = f", such as {toml_literal(self.field.examples[0])}" if self.field.examples else ""
@@ -111,6 +116,13 @@ def keys_of(model: type[Table], path: str = "") -> Iterator[Key]:
         yield Key(here, field, tables)
         for table in tables:
             yield from keys_of(table, here)
+
+
+def _choices(annotation: Any) -> tuple[Any, ...]:
+    parts = typing.get_args(annotation)
+    if typing.get_origin(annotation) is typing.Literal:
+        return parts
+    return tuple(choice for part in parts for choice in _choices(part))
 
 
 def _tables(annotation: Any) -> Iterator[type[Table]]:

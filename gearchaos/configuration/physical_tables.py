@@ -43,7 +43,7 @@ class Pair(Table):
     face_width_mm: float = key("face width", "mm", 15.0, gt=0)
     density_kg_m3: float = key(
         "density of the gears, taken as solid discs on the reference circle",
-        "kg/m3",
+        "kg/m^3",
         STEEL_DENSITY,
         default=STEEL_DENSITY,
         gt=0,
@@ -53,7 +53,7 @@ class Pair(Table):
     )
     inertias_kg_m2: PositivePair | None = _optional(
         "moments of inertia [driving, driven] instead of those of solid discs",
-        "kg m2",
+        "kg m^2",
         [6.35e-5, 6.8e-4],
     )
 
@@ -61,7 +61,7 @@ class Pair(Table):
 class Operation(Table):
     """The point of operation."""
 
-    speed_rpm: float | None = _optional("speed of the driving gear", "rev/min", 2000.0, gt=0)
+    speed_rpm: float | None = _optional("speed of the driving gear", "rpm", 2000.0, gt=0)
     torque_Nm: float | None = _optional("torque on the driving gear", "N m", 50.0)
 
 

@@ -43,10 +43,17 @@ def key_tables() -> str:
 
 def _table(name: str, keys: list[Key]) -> str:
     title = f"### `[{name}]`" if name else "### Top level"
-    lines = [title, "", "| key | unit | range | default | meaning |", "|---|---|---|---|---|"]
+    lines = [
+        title,
+        "",
+        "| key | unit | range or choices | default | meaning |",
+        "|---|---|---|---|---|",
+    ]
     for key in keys:
         column, unit = key.path.rpartition(".")[2], "" if key.units == "1" else key.units
-        cells = [f"`{column}`", unit, key.valid.bounds, _default(key), key.wording]
+        # The one choice of a key that tells kinds of a table apart is that of the first kind.
+        choices = ", ".join(f"`{one}`" for one in key.choices if len(key.choices) > 1)
+        cells = [f"`{column}`", unit, key.valid.bounds or choices, _default(key), key.wording]
         lines.append(f"| {' | '.join(cells)} |")
     return "\n".join(lines)
 

@@ -43,12 +43,7 @@ from gearchaos.records.difference import difference
 from gearchaos.records.label import MEANINGS as MOTION_MEANINGS
 from gearchaos.records.label import MOST_POINTS
 from gearchaos.records.period import LONGEST_PERIOD, POINTS_NEEDED, RETURNS
-from gearchaos.results.variables import (
-    DIRECTIONS,
-    Variable,
-    step_choice_variables,
-    sweep_variables,
-)
+from gearchaos.results.variables import DIRECTIONS, Variable, step_choice_variables, sweep_variables
 
 Arrays = Mapping[str, NDArray[Any]]
 Bounds = tuple[int, int]

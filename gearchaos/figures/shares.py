@@ -25,11 +25,7 @@ MOST_BARS = 24
 
 
 def shares(
-    axes: Axes,
-    result: Result,
-    *,
-    between: Between = (None, None),
-    contact: Axes | None = None,
+    axes: Axes, result: Result, *, between: Between = (None, None), contact: Axes | None = None
 ) -> list[Drawn]:
     """Draw the shares of all motions of each value on top of each other, period 1 as the highest.
 

@@ -20,12 +20,7 @@ NO_CONTACT_STATE = 255
 
 
 def response_variables(
-    axes: Sequence[Axis],
-    *,
-    states: Sequence[str],
-    periods: int,
-    steps_per_period: int,
-    axial: bool,
+    axes: Sequence[Axis], *, states: Sequence[str], periods: int, steps_per_period: int, axial: bool
 ) -> list[Variable]:
     """List the variables that a response adds to those of a sweep, in the order of the file.
 

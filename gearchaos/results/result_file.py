@@ -20,7 +20,8 @@ from gearchaos.results.checksum_line import append_checksum
 from gearchaos.results.variables import HARMONIC, Variable, diagram_axis, lane_axes
 
 SCHEMA = "gearchaos-sweep"
-SCHEMA_VERSION = "3.0"
+SCHEMA_VERSION = "3.1"
+CONVENTIONS = "CF-1.9"  # The first one that knows uint8.
 PARAMETERS = "parameters"
 DIMS = "dims"
 """Attribute with the names of dimensions: HDF5 keeps its own list of them in the global heap."""
@@ -58,7 +59,7 @@ class Parameter:
 
 def own_metadata(axes: Sequence[str]) -> dict[str, str]:
     """Give the root attributes that tell a reader what it has before it."""
-    schema = {"schema": SCHEMA, "schema_version": SCHEMA_VERSION}
+    schema = {"Conventions": CONVENTIONS, "schema": SCHEMA, "schema_version": SCHEMA_VERSION}
     return {**schema, "axes": " ".join(axes), "axis": diagram_axis(axes)}
 
 

@@ -132,7 +132,7 @@ def _damaged_pieces(path: str | os.PathLike[str]) -> Iterator[str]:
 def _read(file: h5py.File, rows: bool) -> Contents:
     metadata = stored.scalars_of(file)
     _check_schema(metadata)
-    axes = tuple(str(metadata.get("axes", "")).split())
+    axes = _words(metadata, "axes")
     datasets = stored.datasets_of(file)
     grouped = {name: datasets.pop(name) for name in list(datasets) if "/" in name}
     variables: dict[str, Variable] = {}
@@ -140,18 +140,19 @@ def _read(file: h5py.File, rows: bool) -> Contents:
     sizes: dict[str, int] = {}
     for name, dataset in datasets.items():
         text = stored.text_of(dataset)
+        notes = stored.scalars_of(dataset)
         if text is not None:
             metadata[name] = text
+        if text is not None or str(notes.get("NAME", "")).startswith(stored.NO_COORDINATE):
             continue
-        notes = stored.scalars_of(dataset)
         dims = stored.dims_of(name, dataset, notes, sizes)
         if name != HARMONIC:
             if rows or len(dims) == 1 or set(dims) <= set(axes):
                 data[name] = stored.values_of(name, dataset)
-            flags = tuple(str(notes.get("flag_meanings", "")).split())
-            more: dict[str, Any] = {"fill_value": notes.get("_FillValue"), "flags": flags}
-            dtype = stored.dtype_of(name, dataset)
-            variables[name] = Variable(name, dims, dtype, **_wording(notes), **more)
+            more = {**_wording(notes), "fill_value": notes.get("_FillValue")}
+            more |= {"flags": _words(notes, "flag_meanings")}
+            more |= {"errors": _words(notes, "ancillary_variables")}
+            variables[name] = Variable(name, dims, stored.dtype_of(name, dataset), **more)
     _check_variables(axes, variables, data)
     for dim in sizes.keys() - {HARMONIC}:
         if dim not in variables or variables[dim].dims != (dim,):
@@ -169,6 +170,10 @@ def _read(file: h5py.File, rows: bool) -> Contents:
         value = values if dims else float(values)
         parameters[name] = Parameter(value, origin, **_wording(notes), dims=dims)
     return list(variables.values()), data, parameters, metadata
+
+
+def _words(notes: Mapping[str, Any], name: str) -> tuple[str, ...]:
+    return tuple(str(notes.get(name, "")).split())
 
 
 def _wording(notes: Mapping[str, Any]) -> dict[str, Any]:

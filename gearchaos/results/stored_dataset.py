@@ -21,6 +21,8 @@ _PACKED, _ROOM = 128, 1 << 20
 have come to rest are packed to a twentieth, labels to a thousandth."""
 
 _MOST_NAMES, _LONGEST = 1000, 1 << 16
+NO_COORDINATE = "This is a netCDF dimension but not a netCDF variable"
+"""What the name of a dimension scale without values begins with: netCDF makes them for others."""
 _LEAST_PIECE = 4096
 """Bytes for which a chunk counts at least: each costs time, even one that nobody has written."""
 
@@ -37,10 +39,13 @@ def datasets_of(file: h5py.File) -> dict[str, h5py.Dataset]:
 
     Raises UnfitError unless all of it are arrays in this file, which may have so many bytes.
     """
-    if not isinstance(_hard_linked(file, PARAMETERS), h5py.Group):
-        raise UnfitError(f"lacks the group {PARAMETERS}")
-    names = [name for name in _names(file) if name != PARAMETERS]
-    names += [f"{PARAMETERS}/{name}" for name in _names(file[PARAMETERS])]
+    names = _names(file)
+    # Whoever copies the root group alone leaves the parameters behind.
+    if PARAMETERS in names:
+        names.remove(PARAMETERS)
+        if not isinstance(_hard_linked(file, PARAMETERS), h5py.Group):
+            raise UnfitError(f"holds {PARAMETERS} as something else than a group")
+        names += [f"{PARAMETERS}/{name}" for name in _names(file[PARAMETERS])]
     datasets = {name: _hard_linked(file, name) for name in names}
     whole = file.id.get_filesize()
     left = _PACKED * (whole + _ROOM)
@@ -105,7 +110,9 @@ def values_of(name: str, dataset: h5py.Dataset) -> NDArray[Any]:
 
 
 def text_of(dataset: h5py.Dataset) -> str | None:
-    """Read a dataset that is one text; None if it is none."""
+    """Read a dataset that is one text, or one of its bytes a row; None if it is none."""
+    if dataset.dtype == "S1" and dataset.ndim == 1:
+        return str(_plain(dataset[()].tobytes()))
     if dataset.shape or h5py.check_string_dtype(dataset.dtype) is None:
         return None
     return str(_plain(dataset[()]))

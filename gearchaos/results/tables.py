@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from gearchaos.errors import ConfigurationError, FileError
+from gearchaos.results.result_file import DIMS
 
 if TYPE_CHECKING:
     from gearchaos.results.result import Result
@@ -30,7 +31,10 @@ def to_xarray(result: Result) -> Any:
     Raises FileError if xarray is not installed.
     """
     xarray = needed("xarray")
-    arrays = {name: (result.dims(name), result[name], result.attributes(name)) for name in result}
+    arrays = {
+        name: (dims, result[name], {**result.attributes(name), DIMS: " ".join(dims)})
+        for name, dims in ((name, result.dims(name)) for name in result)
+    }
     coordinates = {name: arrays.pop(name) for name in result if result.dims(name) == (name,)}
     return xarray.Dataset(arrays, coordinates, result.metadata)
 

@@ -56,7 +56,8 @@ class Variable:
     The dimensions of what differs from lane to lane begin with all axes; the type is ``"float64"``,
     ``"int32"`` or ``"uint8"``, the unit ``"1"`` where dimensionless, the symbol
     mathtext. The fill value stands for "none here", None where every value means something; flags
-    are the meanings of 0, 1, 2, ... of an enumeration, one word each. Values, of the shape of the
+    are the meanings of 0, 1, 2, ... of an enumeration, one word each, errors the variables that
+    tell how exact this one is. Values, of the shape of the
     dimensions, are there where they are known before the sweep, as those of coordinates are.
     """
 
@@ -68,6 +69,7 @@ class Variable:
     symbol: str = ""
     fill_value: float | int | None = None
     flags: tuple[str, ...] = ()
+    errors: tuple[str, ...] = ()
     values: NDArray[Any] | None = None
 
     @property
@@ -79,6 +81,8 @@ class Variable:
         if self.flags:
             attributes["flag_values"] = np.arange(len(self.flags), dtype=self.dtype)
             attributes["flag_meanings"] = " ".join(self.flags)
+        if self.errors:
+            attributes["ancillary_variables"] = " ".join(self.errors)
         return attributes
 
 
@@ -216,7 +220,14 @@ def sweep_variables(
     variables.append(replace(numbered, flags=tuple(states)))
     for end in ("start", "end"):
         real(f"{end}_state", f"state at the {end} of the lane", "", STATE)
-    return variables
+    errors = {
+        LARGEST_EXPONENT: (LARGEST_EXPONENT + STANDARD_ERROR, STEP_ERROR),
+        ALL_EXPONENTS: (ALL_EXPONENTS + STANDARD_ERROR,),
+        **dict.fromkeys((SECTION + state for state in section), ("section_error",)),
+    }
+    there = {variable.name for variable in variables}
+    told = {name: tuple(one for one in found if one in there) for name, found in errors.items()}
+    return [replace(variable, errors=told.get(variable.name, ())) for variable in variables]
 
 
 def step_choice_variables(

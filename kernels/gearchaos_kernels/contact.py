@@ -103,12 +103,7 @@ def end_contact(memory, slot, way, branch, steps):
         row,
         slot,
         Contact(
-            on_driving,
-            on_back,
-            told.driving_impacts,
-            told.back_impacts,
-            told.speeds,
-            told.fastest,
+            on_driving, on_back, told.driving_impacts, told.back_impacts, told.speeds, told.fastest
         ),
     )
 

@@ -23,11 +23,7 @@ from gearchaos_kernels.block_memory import (
     write_state,
 )
 from gearchaos_kernels.compilation import evaluator, part, scalar
-from gearchaos_kernels.equations import (
-    Directions,
-    accelerations,
-    gaps_at,
-)
+from gearchaos_kernels.equations import Directions, accelerations, gaps_at
 from gearchaos_kernels.flow_layout import BOUND_Y, BOUND_Z, HEADER, TERMS
 from gearchaos_kernels.forcing import Phase, forcing_at
 from gearchaos_kernels.system import Floats, System

@@ -401,5 +401,13 @@ def test_the_schema_knows_every_key_without_null():
     assert {path.rpartition(".")[2] for path in configuration_keys()} <= described
 
 
+def test_the_tables_of_keys_list_the_choices():
+    rows = {line.split("|")[1].strip(): line for line in key_tables().splitlines() if "|" in line}
+    assert '| `"none"`, `"upwards"`, `"downwards"` | `"none"` |' in rows["`carry`"]
+    assert '| `"resolved"`, `"plain"` |' in rows["`crossings`"]
+    assert "| `1995`, `2013` |" in rows["`edition`"]
+    assert '| `"pitch_error"`, `"stiffness_variation"`, `"backlash"`,' in rows["`effects`"]
+
+
 def test_the_documentation_has_the_tables_of_keys_as_the_models_declare_them():
     assert key_tables() in (ROOT / "docs" / "configuration.md").read_text(encoding="utf-8")

@@ -64,6 +64,12 @@ ONE_FAULT = [
     ),
     # words
     ('scene.effects=["backlsh"]', '[0] = "backlsh"', "must be one of", "did you mean `backlash`?"),
+    (
+        "start.carry=up",
+        'start.carry = "up"',
+        "one of 'none', 'upwards' or 'downwards'",
+        "expected: ",
+    ),
     ("start.kind=rset", 'start.kind = "rset"', "must be one of", "did you mean `rest`?"),
     ("formulation=printed", 'formulation = "printed"', "'physical'", "Pan 2021"),
     ('mesh.stiffness.shape="fourrier"', '"fourrier"', "must be one of", "`fourier`"),

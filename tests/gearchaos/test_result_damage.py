@@ -150,7 +150,7 @@ CHANGES: dict[str, tuple[Callable[[h5py.File], None], str]] = {
     "an axis that descends": (descending, "values of load that do not ascend"),
     "no status": (lambda file: file.__delitem__("status"), "lacks the variable status"),
     "no states": (lambda file: file.__delitem__("state"), "lacks the variable state"),
-    "no parameters": (lambda file: file.__delitem__("parameters"), "parameters"),
+    "parameters that are no group": (replace("parameters", data=0.1), "holds parameters as"),
     "a row as status": (scaled("status", (20, 5), "u1"), "status as uint8 over (load, section"),
     "a float as status": (scaled("status", (20,), "f8"), "status as float64"),
     "complex exponents": (scaled("lyapunov_exponent", (20,), "c16"), "lyapunov_exponent"),

@@ -15,7 +15,14 @@ import pytest
 import xarray as xr
 
 from gearchaos.results.result import Parameter, Result, open_result
-from gearchaos.results.variables import STATE_WORDING, Axis, axis_name, start_axis, sweep_variables
+from gearchaos.results.variables import (
+    STATE_WORDING,
+    Axis,
+    axis_name,
+    pair_axis,
+    start_axis,
+    sweep_variables,
+)
 
 LANES = 300
 POINTS = 1000
@@ -217,7 +224,8 @@ def test_every_dataset_follows_the_rules_of_the_format(path: Path) -> None:
     with h5py.File(path) as file:
         assert (file.attrs["axes"], file.attrs["axis"]) == (b"pitch_error", b"pitch_error")
         assert file.libver[0] == "earliest"
-        assert (file.attrs["schema"], file.attrs["schema_version"]) == (b"gearchaos-sweep", b"3.0")
+        assert file.attrs["Conventions"] == b"CF-1.9"
+        assert (file.attrs["schema"], file.attrs["schema_version"]) == (b"gearchaos-sweep", b"3.1")
         datasets: list[h5py.Dataset] = []
         file.visititems(lambda _, item: datasets.append(item) if hasattr(item, "shape") else None)
         assert len(datasets) == 30
@@ -274,6 +282,21 @@ def test_ncdump_shows_the_dimensions(path: Path) -> None:
     run("ncdump", path)
 
 
+def test_octave_loads_all_of_it(path: Path, result: Result) -> None:
+    # Octave ends with 0 and complains on stderr where it cannot load one of the datasets.
+    program = (
+        f"s = load('{path}'); printf('%.17g %.17g ', s.section_delta_5(3, 5), s.parameters.load);"
+        "printf('%d ', size(s.end_state), s.state, s.status(8), columns(s.configuration));"
+        "printf('%s', s.configuration(1:18))"
+    )
+    text = run("octave-cli", "--norc", "--no-history", "--eval", program)
+    configuration = result.metadata["configuration"]
+    expected = [result["section_delta_5"][4, 2], 0.1, 2, LANES, 0, 1, 1, len(str(configuration))]
+    *numbers, comment = text.split(maxsplit=len(expected))
+    assert [float(number) for number in numbers] == expected
+    assert str(configuration).startswith(comment)
+
+
 def test_the_last_line_is_a_checksum_that_standard_tools_confirm(path: Path) -> None:
     if not all(map(shutil.which, ("sh", "head", "tail", "sha256sum"))):
         pytest.skip("sh, head, tail and sha256sum are not all installed")
@@ -297,21 +320,42 @@ def test_another_program_may_change_the_file(path: Path, tmp_path: Path) -> None
     assert again["reference"].tolist() == [0, 1, 2]
 
 
+@pytest.mark.parametrize("length", [1, 10_000])
 @pytest.mark.parametrize("engine", ["netcdf4", "h5netcdf"])
-def test_xarray_may_write_the_file_anew(engine: Any, tmp_path: Path) -> None:
+def test_xarray_may_write_the_file_anew(engine: Any, length: int, tmp_path: Path) -> None:
     # Both engines give some texts a variable length, netcdf4 those beyond ASCII only.
-    small = make_result(swept(count=8), configuration="# é\n")
+    small = make_result(swept(count=8), configuration="# é\n" * length)
     small.save(tmp_path / "sweep.h5")
     with xr.open_datatree(tmp_path / "sweep.h5", engine=engine) as tree:
-        tree.load().to_netcdf(tmp_path / "anew.h5", engine=engine)
-    anew = open_result(tmp_path / "anew.h5")
-    assert anew.metadata.items() >= small.metadata.items()
-    for name in small:
-        np.testing.assert_array_equal(anew[name], small[name], strict=True)
-        assert anew.dims(name) == small.dims(name)
-        assert anew.variables[name].flags == small.variables[name].flags
+        tree.load().to_netcdf(tmp_path / "tree.h5", engine=engine)
+    with xr.open_dataset(tmp_path / "sweep.h5", engine=engine) as root:
+        root.load().to_netcdf(tmp_path / "root.h5", engine=engine)
+    small.to_xarray().to_netcdf(tmp_path / "made.h5", engine=engine)
     # To a tree, the swept one is the coordinate of the whole.
-    assert anew.parameters.keys() == small.parameters.keys() - {"pitch_error"}
+    left = {"tree": small.parameters.keys() - {"pitch_error"}}
+    for name in ("tree", "root", "made"):
+        anew = open_result(tmp_path / f"{name}.h5")
+        assert anew.metadata.items() >= small.metadata.items()
+        assert anew.parameters.keys() == left.get(name, set())
+        assert set(anew) == set(small)
+        for name in small:
+            np.testing.assert_array_equal(anew[name], small[name], strict=True)
+            assert anew.dims(name) == small.dims(name)
+            np.testing.assert_equal(anew.attributes(name), small.attributes(name))
+
+
+def test_what_has_an_error_names_where_it_is_told(path: Path) -> None:
+    with xr.open_dataset(path) as dataset:
+        named = {
+            name: variable.attrs["ancillary_variables"].split()
+            for name, variable in dataset.items()
+            if "ancillary_variables" in variable.attrs
+        }
+    assert named == {
+        "section_delta_5": ["section_error"],
+        "lyapunov_exponent": ["lyapunov_exponent_standard_error", "exponent_step_error"],
+        "lyapunov_exponents": ["lyapunov_exponents_standard_error"],
+    }
 
 
 def test_every_state_has_a_wording_of_its_own() -> None:
@@ -323,7 +367,7 @@ def test_the_documented_variables_are_those_that_are_written() -> None:
     lines = re.findall(r"^\| `\w+` \| \(.*$", page, re.M)
     rows = [[cell.strip(" `") for cell in line.split("|")[1:5]] for line in lines]
     documented = {name: (dims.strip("()"), dtype, fill) for name, dims, dtype, fill in rows}
-    result = make_result(swept("load", 3), swept(count=4), start_axis(2))
+    result = make_result(swept("load", 3), swept(count=4), pair_axis(np.arange(2)), start_axis(2))
     short = {"load": "B", "pitch_error": "A", "section_delta_5": "section_STATE"}
     for name, variable in result.variables.items():
         dims = ", ".join(variable.dims).replace(", ".join(result.axes), "axes")

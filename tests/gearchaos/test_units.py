@@ -1,0 +1,25 @@
+"""Every unit of a key or a group is one that other programs know, in the same sense."""
+
+import re
+import shutil
+import subprocess
+
+import pint
+import pytest
+
+from gearchaos.configuration.models import configuration_keys
+from gearchaos.gear.group_table import GROUP_TABLE
+
+UNITS = {one.units for one in (*configuration_keys().values(), *GROUP_TABLE)} - {""}
+REGISTRY = pint.UnitRegistry()
+
+
+@pytest.mark.parametrize("unit", sorted(UNITS))
+def test_pint_and_udunits_agree_on_a_unit(unit: str) -> None:
+    factor = float(REGISTRY(unit).to_base_units().magnitude) if unit != "1" else 1.0
+    if shutil.which("udunits2") is None:
+        pytest.skip("the program udunits2 is not installed")
+    done = subprocess.run(["udunits2", "-H", unit, "-W", ""], capture_output=True, text=True)
+    assert (done.returncode, done.stderr) == (0, "")
+    said = re.match(r"\s*([\d.e+-]+)(?= )", done.stdout)
+    assert (float(said[1]) if said else 1.0) == pytest.approx(factor, rel=1e-12)
