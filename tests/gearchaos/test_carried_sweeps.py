@@ -31,7 +31,7 @@ def test_carried_sweep_is_the_chain_of_its_lanes_made_by_hand(direction, method)
 
 
 @pytest.mark.parametrize("direction", ["upwards", "downwards"])
-@pytest.mark.parametrize("overrides", [(), RANDOM])
+@pytest.mark.parametrize("overrides", [(), RANDOM, ("integration.method=flow_map", *RANDOM)])
 def test_carried_sweep_does_not_depend_on_the_size_of_its_blocks(direction, overrides):
     sweep = simulation(f"start.carry={direction}", *overrides)
     whole = computed(sweep)

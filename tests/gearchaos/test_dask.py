@@ -16,7 +16,7 @@ import pytest
 
 import gearchaos
 
-from .commands import names_in, same_data, small_config, sweep
+from .commands import LINEAR, names_in, same_data, small_config, sweep
 
 pytest.importorskip("distributed")
 
@@ -123,6 +123,16 @@ def test_an_interrupt_keeps_what_local_workers_have_and_any_machine_goes_on(tmp_
     assert names_in(tmp_path) == [BLOCKS, "gears.toml"]
     assert sweep(tmp_path, *LONG, "--resume", "--quiet") == (0, "gears.h5\n", "")
     assert same_data(gearchaos.open_result(tmp_path / "gears.h5"), undisturbed)
+
+
+@pytest.mark.slow
+def test_flow_maps_that_workers_make_give_the_bits_of_those_made_here(tmp_path):
+    own = (*LINEAR, "--set", "integration.method=flow_map", "--quiet")
+    own += ("--set", 'sweep={parameter="mesh_frequency", from=0.2, to=2.0, count=600}')
+    assert sweep(tmp_path, *own, "--dask", "local:2") == (0, "gears.h5\n", "")
+    assert sweep(tmp_path, *own, "--output", "here.h5").code == 0
+    one, other = (gearchaos.open_result(tmp_path / name) for name in ("gears.h5", "here.h5"))
+    assert same_data(one, other)
 
 
 @pytest.mark.slow

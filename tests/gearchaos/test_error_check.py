@@ -14,7 +14,7 @@ from gearchaos.engine.error_check import (
     checked_lanes,
 )
 
-from .short_sweeps import assert_same, computed, simulation
+from .short_sweeps import METHODS, assert_same, computed, simulation
 
 LONG = (
     "integration.transient_periods=300",
@@ -40,9 +40,11 @@ def test_which_lanes_are_checked_does_not_depend_on_blocks():
     assert np.array_equal(np.concatenate(blocks), whole)
 
 
+@pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("carry", ["none", "upwards", "downwards"])
-def test_the_check_does_not_depend_on_the_size_of_blocks(carry):
-    sweep = simulation("integration.error_check=0.5", f"start.carry={carry}")
+def test_the_check_does_not_depend_on_the_size_of_blocks(carry, method):
+    how = f"start.carry={carry}", f"integration.method={method}"
+    sweep = simulation("integration.error_check=0.5", *how)
     assert_same(computed(sweep, 4), computed(sweep))
 
 

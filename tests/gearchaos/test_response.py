@@ -13,6 +13,7 @@ from gearchaos import ConfigurationError, Result, load_config, open_result, resp
 from gearchaos.response import main
 
 from .commands import run_module, same_data
+from .short_sweeps import PAN2021
 
 FULL = Path(__file__).resolve().parents[2] / "sweeps" / "pan2021_full.toml"
 STEPS, PERIODS, RECORDED = 192, 3, 6
@@ -75,6 +76,28 @@ def test_over_a_period_the_mesh_force_carries_the_load(result):
     force = result["mesh_force_tangential"][0, :STEPS]
     assert np.mean(force) == pytest.approx(load / np.cos(angle), rel=1e-7)
     assert np.ptp(force) > 0.01
+
+
+def test_a_response_of_flow_maps_is_as_exact_with_few_steps_as_with_many(tmp_path):
+    """A sum over the period of a smooth force has no error either."""
+    found = []
+    for steps in (24, 96):
+        how = ("integration.method=flow_map", f"integration.steps_per_period={steps}", *SHORT[2:])
+        how += ("integration.transient_periods=8000",)  # The bearings are damped but little.
+        sets = [word for override in how for word in ("--set", override)]
+        asked = [str(PAN2021), *sets, "--pitch-error", "0.2", "--periods", str(PERIODS), "-q"]
+        assert main([*asked, "-o", str(tmp_path / f"{steps}.h5")]) == 0
+        result = open_result(tmp_path / f"{steps}.h5")
+        section = result["section_delta_5"][:, -PERIODS - 1 :]
+        np.testing.assert_array_equal(result["delta_5"][:, ::steps], section)
+        force = result["mesh_force_tangential"][0, :steps].mean()
+        angle = np.radians(result.parameters["base_helix_angle_deg"].value)
+        carried = result.parameters["load"].value / np.cos(angle)
+        assert force == pytest.approx(carried, abs=1e-13)
+        found.append(result)
+    few, many = found
+    for name in ("delta_5", "delta_5_rate", "delta_5_acceleration", "mesh_force_tangential"):
+        np.testing.assert_allclose(few[name], many[name][:, ::4], rtol=0.0, atol=1e-13)
 
 
 def test_only_the_lane_that_hammers_loses_contact_and_reaches_the_back_flank(result):

@@ -10,7 +10,7 @@ from gearchaos import Result, load_config, open_result, run
 from gearchaos.engine.simulation import Simulation
 from gearchaos.response import main
 
-from .short_sweeps import PAN2021, SHORT
+from .short_sweeps import METHODS, PAN2021, SHORT
 
 RECORDED = 12
 LANE = 9
@@ -30,9 +30,10 @@ def going_on(folder: Path, result: Result, *at: str) -> Result:
     return open_result(output)
 
 
+@pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("carry", ["none", "upwards", "downwards"])
-def test_the_motion_goes_on_bit_for_bit_on_the_branch_of_the_lane(tmp_path, carry):
-    swept = config(f"start.carry={carry}")
+def test_the_motion_goes_on_bit_for_bit_on_the_branch_of_the_lane(tmp_path, carry, method):
+    swept = config(f"start.carry={carry}", f"integration.method={method}")
     result = run(swept)
     value = result["pitch_error"][LANE]
     found = going_on(tmp_path, result, f"pitch_error={value}")

@@ -10,6 +10,7 @@ from gearchaos.results.manifest import folder_of
 from gearchaos.results.store_lock import StoreLock
 
 from .commands import LINEAR, names_in, run_module, same_data, sweep
+from .short_sweeps import METHODS
 
 BLOCKS = "gears.h5.blocks"
 # Four blocks of lanes.
@@ -41,17 +42,19 @@ def test_what_is_no_shard_is_refused(text):
         Shard.from_text(text)
 
 
-def test_shards_computed_with_other_threads_join_to_the_undisturbed_result(tmp_path):
+@pytest.mark.parametrize("method", METHODS)
+def test_shards_computed_with_other_threads_join_to_the_undisturbed_result(tmp_path, method):
+    asked = (*COUNT, "--set", f"integration.method={method}")
     for number, threads in ((2, "2"), (3, "1"), (1, "1")):
         shard = f"{number}/3"
-        ended = sweep(tmp_path, *COUNT, "--shard", shard, "--threads", threads)
+        ended = sweep(tmp_path, *asked, "--shard", shard, "--threads", threads)
         if ended.code == 2:
             pytest.skip("a single core")
         assert ended == (0, f"{tmp_path / BLOCKS}\n", "")
         assert names_in(tmp_path) == [BLOCKS, "gears.toml"]
     assert run_module("gearchaos.merge", "gears.h5", "-q", cwd=tmp_path) == (0, "gears.h5\n", "")
     assert names_in(tmp_path) == ["gears.h5", "gears.toml"]
-    assert sweep(tmp_path, *COUNT, "--output", "one.h5").code == 0
+    assert sweep(tmp_path, *asked, "--output", "one.h5").code == 0
     one, joined = (gearchaos.open_result(tmp_path / name) for name in ("one.h5", "gears.h5"))
     assert same_data(joined, one)
     assert joined.names == one.names

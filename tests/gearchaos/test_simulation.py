@@ -15,7 +15,10 @@ from .short_sweeps import (
 )
 
 
-@pytest.mark.parametrize("overrides", [(), ("start.kind=contact",), RANDOM])
+@pytest.mark.parametrize(
+    "overrides",
+    [(), ("start.kind=contact",), RANDOM, ("integration.method=flow_map", *RANDOM)],
+)
 @pytest.mark.parametrize("values", [1, 4, 12])
 def test_a_sweep_does_not_depend_on_the_size_of_its_blocks(overrides, values):
     sweep = simulation(*overrides)

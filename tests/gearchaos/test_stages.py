@@ -10,7 +10,7 @@ import gearchaos
 from gearchaos.results.result import Result
 
 from .commands import run_module
-from .short_sweeps import PAN2021, SOFT_BEARINGS, SPEEDS
+from .short_sweeps import METHODS, PAN2021, SOFT_BEARINGS, SPEEDS
 from .test_result_axes import AXES, LOADS, result_over
 
 WHERE = (
@@ -226,11 +226,13 @@ def test_a_slice_that_there_is_not_is_refused(tmp_path, at, words):
 
 
 @pytest.mark.slow
-def test_a_slice_of_two_parameters_is_refined_where_it_was_taken(tmp_path):
+@pytest.mark.parametrize("method", METHODS)
+def test_a_slice_of_two_parameters_is_refined_where_it_was_taken(tmp_path, method):
     damping = 0.025819888974716113  # That of the file.
     where = [
         "sweep={parameter='pitch_error', values=[10.2, 10.3]}",
         f"second_sweep={{parameter='damping_ratio', values={[damping, 2.0 * damping]}}}",
+        f"integration={{method='{method}'}}",
     ]
     gearchaos.run(gearchaos.load_config(PAN2021, where)).save(tmp_path / "several.h5")
     facts = listed(tmp_path, "--at", f"damping_ratio={damping}", "--refine", "0.002")

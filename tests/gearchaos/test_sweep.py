@@ -141,6 +141,24 @@ def test_a_dry_run_tells_a_scheduler_as_json_what_one_shard_takes(tmp_path):
     assert "--json: only what --dry-run tells is JSON" in ended.err
 
 
+def test_a_dry_run_counts_the_memory_of_maps_of_every_lane(tmp_path):
+    """Each lane of a block has 100 maps of its own, or all have the same ones."""
+    told = {}
+    for parameter in ("load", "mesh_frequency"):
+        flags = ("--set", f'sweep={{parameter="{parameter}", from=0.2, to=0.4, count=256}}')
+        for override in ("method=flow_map", "steps_per_period=100"):
+            flags += ("--set", f"integration.{override}")
+        ended = sweep(tmp_path, *LINEAR, *flags, "--threads", "1", "--dry-run", "--json", "-q")
+        assert (ended.code, ended.err) == (0, "")
+        facts = json.loads(ended.out)
+        assert (facts["lanes"], facts["states"], facts["steps"]) == (256, 2, 256 * 100 * 15)
+        assert facts["seconds"] > 0.0
+        config = load_config(tmp_path / "gears.toml", [*LINEAR[1::2], *flags[1::2]])
+        told[parameter] = facts["memory_bytes"], Simulation(config).block_memory(1)
+    (shared, shared_block), (own, own_block) = told.values()
+    assert own - shared > own_block - shared_block > 1e7
+
+
 def test_what_a_dry_run_computes_is_the_sweep_with_fewer_lanes_and_periods():
     asked = ("start.kind=random", "start.count=9", "integration.error_check=0.5")
     second = 'second_sweep={parameter="load", from=0.2, to=0.3, count=30}'
@@ -187,6 +205,19 @@ def test_a_dry_run_says_that_the_output_exists_and_leaves_it_alone(tmp_path):
     (tmp_path / "gears.h5").write_bytes(b"precious")
     assert "gears.h5 (exists)\n" in sweep(tmp_path, "--dry-run").err
     assert (tmp_path / "gears.h5").read_bytes() == b"precious"
+
+
+def test_lanes_too_fast_for_flow_maps_are_told_apart_from_diverged_ones(tmp_path):
+    # Twice as many steps would be more than are tried.
+    how = "integration={method='flow_map', steps_per_period=2100, recorded_periods=5}"
+    slow = 'sweep={parameter="mesh_frequency", values=[1e-4, 0.8]}'
+    ended = sweep(tmp_path, *LINEAR, "--set", how, "--set", slow)
+    assert (ended.code, ended.out) == (3, "gears.h5\n")
+    assert "1 of the lanes counted as diverged move faster than so few flow maps" in ended.err
+    assert "1 of 2 lanes diverged or were too fast, more than outputs.allowed_div" in ended.err
+    result = gearchaos.open_result(tmp_path / "gears.h5")
+    meanings = result.variables["status"].flags
+    assert [meanings[status] for status in result["status"]] == ["too_fast", "ok"]
 
 
 def test_diverged_lanes_are_written_and_marked_and_make_the_exit_code_3(tmp_path):

@@ -113,9 +113,14 @@ def test_a_killed_sweep_leaves_nothing_that_looks_like_a_result_and_can_be_resum
     assert same_data(gearchaos.open_result(tmp_path / "gears.h5"), undisturbed)
 
 
-@pytest.mark.parametrize("direction", ["upwards", "downwards"])
-def test_a_carried_sweep_goes_on_from_the_end_states_of_the_finished_blocks(tmp_path, direction):
+@pytest.mark.parametrize(
+    ("direction", "method"), [("upwards", "rk4"), ("downwards", "rk4"), ("downwards", "flow_map")]
+)
+def test_a_carried_sweep_goes_on_from_the_end_states_of_the_finished_blocks(
+    tmp_path, direction, method
+):
     carried = ("--set", f"start.carry={direction}", "--set", "sweep.count=130")
+    carried += ("--set", f"integration.method={method}")
     carried += ("--set", "start.kind=random", "--set", "start.count=3")
     carried += ("--set", "integration.transient_periods=400")
     ended, _ = stop_half_way(tmp_path, signal.SIGINT, *carried)
@@ -125,6 +130,17 @@ def test_a_carried_sweep_goes_on_from_the_end_states_of_the_finished_blocks(tmp_
     overrides = [*LONG[3::2], *carried[1::2]]  # Without --threads.
     at_once = gearchaos.run(gearchaos.load_config(tmp_path / "gears.toml", overrides))
     assert same_data(pieces, at_once)
+
+
+def test_lanes_with_flow_maps_of_their_own_go_on_with_the_same_bits(tmp_path):
+    own = ("--set", "integration.method=flow_map", "--set", 'sweep.parameter="mesh_frequency"')
+    own += ("--set", "sweep.from=0.2", "--set", "integration.transient_periods=2000")
+    ended, _ = stop_half_way(tmp_path, signal.SIGINT, *own)
+    assert ended == 130
+    assert sweep(tmp_path, *LONG, *own, "--resume", "--quiet") == (0, "gears.h5\n", "")
+    overrides = [*LONG[3::2], *own[1::2]]  # Without --threads.
+    at_once = gearchaos.run(gearchaos.load_config(tmp_path / "gears.toml", overrides))
+    assert same_data(gearchaos.open_result(tmp_path / "gears.h5"), at_once)
 
 
 def test_resume_without_an_earlier_run_simply_computes(tmp_path):

@@ -99,6 +99,25 @@ def test_exponents_of_a_linear_system_add_up_to_what_its_damping_says(linear):
     assert linear.orbit().exponent == pytest.approx(found.values[0], abs=1e-5)
 
 
+def test_along_flow_maps_orbits_exponents_and_their_end_are_those_of_finer_ones_to_rounding():
+    lengths = ("integration.transient_periods=0", "integration.recorded_periods=20", *LINEAR[1:])
+    (guess,) = (o["section_points"][0] for o in ORBITS if o["pitch_error"] == 10.75)
+    found = []
+    for steps in (24, 60):
+        how = (f"integration={{method='flow_map', steps_per_period={steps}}}", *lengths)
+        system = gearchaos.System(gearchaos.load_config(PAN2021, how), pitch_error=10.75)
+        orbit = system.orbit(period=2, guess=guess)
+        exponents = system.exponents(start=orbit.point).values
+        # What crossings do to volumes is nothing, and each step is exact.
+        assert exponents.sum() == pytest.approx(system.sum_of_exponents(), abs=1e-12)
+        assert orbit.exponent == pytest.approx(
+            np.log(np.abs(orbit.multipliers).max()) / (2.0 * system.mesh_period), abs=1e-12
+        )
+        branch = system.follow(orbit, "pitch_error", 10.75, 11.6)
+        found.append([*orbit.point, orbit.exponent, *exponents, branch.value, branch.beyond])
+    assert found[0] == pytest.approx(found[1], rel=0.0, abs=1e-12)
+
+
 def test_a_linear_system_answers_a_sine_with_a_sine(linear):
     lines = linear.spectrum("delta_5", periods=8)
     highest = np.argsort(lines.amplitude)[-2:]
