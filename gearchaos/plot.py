@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING
 
 from gearchaos.command_line import OK, Command, coordinates, number, place
 from gearchaos.errors import FigureError, FileError
-from gearchaos.progress import say
+from gearchaos.progress import Progress, say
 
 if TYPE_CHECKING:
     from gearchaos.figures.page import Page
@@ -46,11 +46,13 @@ def _plot(options: argparse.Namespace) -> int:
     targets = [_targets(options, name, len(sheets) == 1) for name, _ in sheets]
     _check_targets([path for paths in targets for path in paths], options)
     title = ", ".join(_titles(results, options.result))
-    for (_, draw), paths in zip(sheets, targets, strict=True):
-        figure = draw()
-        for path in paths:
-            save_figure(figure, path, title=title, dpi=options.dpi)
-            print(path, flush=True)
+    with Progress(len(sheets), unit="page") as bar:
+        for (_, draw), paths in zip(sheets, targets, strict=True):
+            figure = draw()
+            for path in paths:
+                save_figure(figure, path, title=title, dpi=options.dpi)
+                bar.write(str(path))
+            bar.advance(1)
     width, height = (25.4 * inches for inches in figure.get_size_inches())
     size = f"{width:.0f} mm x {height:.0f} mm at {options.dpi} dpi"
     hint = "; --shares draws how many of the gear pairs move in which way"

@@ -51,16 +51,17 @@ def notice(text: str) -> Iterator[None]:
 
 
 class Progress:
-    """Lanes done of so many: a bar on a terminal, a plain line now and then elsewhere."""
+    """Lanes or pages done of so many: a bar on a terminal, a plain line now and then elsewhere."""
 
     def __init__(self, lanes: int, done: int = 0, unit: str = "lane") -> None:
         from tqdm import tqdm
 
         self._unit = unit
         self._lanes, self._done, self._began_with = lanes, done, done
-        self._lines = not sys.stderr.isatty()
+        # Of one there is nothing to tell but that it is done.
+        self._lines = lanes > 1 and not sys.stderr.isatty()
         self._began = self._spoke = time.monotonic()
-        hidden = _quiet.get() or self._lines
+        hidden = _quiet.get() or self._lines or lanes < 2
         self._bar = tqdm(total=lanes, initial=done, unit=unit, disable=hidden, dynamic_ncols=True)
 
     def advance(self, lanes: int) -> None:
@@ -73,7 +74,12 @@ class Progress:
             rate = (self._done - self._began_with) / max(now - self._began, 1e-9)
             left = (self._lanes - self._done) / rate
             done = f"{self._done} of {self._lanes} {self._unit}s"
-            say(f"{done}, {rate:.0f} {self._unit}s/s, {left:.0f} s left")
+            say(f"{done}, {rate:.{int(rate < 10)}f} {self._unit}s/s, {left:.0f} s left")
+
+    def write(self, text: str) -> None:
+        """Print a line on stdout, above the bar where both are on one terminal."""
+        self._bar.write(text)
+        sys.stdout.flush()
 
     def __enter__(self) -> Self:
         return self

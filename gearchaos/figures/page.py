@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
+from functools import partial
 from io import BytesIO
 
 import matplotlib as mpl
@@ -35,15 +36,13 @@ def page(width_mm: float, height_mm: float) -> Iterator[Page]:
         yield figure
         # Ticks are made at the first drawing, in the style of that moment.
         figure.draw_without_rendering()
+        # The layout is found; looking for it again takes longer than the drawing itself. The engine
+        # "none" would have every page drawn twice.
+        figure.set_layout_engine(None)
 
 
-@contextmanager
-def column(height_mm: float) -> Iterator[Page]:
-    """Make a page as wide as one column of a journal, and fix its layout at the end."""
-    with page(SINGLE_COLUMN_MM, height_mm) as figure:
-        yield figure
-    # The layout is found; looking for it again takes longer than the drawing itself.
-    figure.set_layout_engine("none")
+column = partial(page, SINGLE_COLUMN_MM)
+"""Make a page as wide as one column of a journal, of a height in millimetres."""
 
 
 def letter(panels: Iterable[Axes]) -> None:

@@ -64,8 +64,10 @@ STYLE: dict[Any, Any] = {
     "figure.constrained_layout.hspace": 0.02,
     "figure.facecolor": "white",
     "savefig.facecolor": "white",
-    # Whatever a user's matplotlibrc says, the saved page is as large as the figure.
+    # Whatever a user's matplotlibrc says: the page is as large as the figure, and laid out once.
     "savefig.bbox": None,
+    "figure.autolayout": False,
+    "figure.constrained_layout.use": False,
     # Journals ask for TrueType; matplotlib's default, Type 3, cannot be edited.
     "pdf.fonttype": 42,
     "ps.fonttype": 42,

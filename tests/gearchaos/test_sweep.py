@@ -35,7 +35,7 @@ def test_the_path_of_the_result_is_all_that_stdout_holds(tmp_path):
     assert names_in(tmp_path) == ["gears.h5", "gears.toml"]
     lines = [line for line in ended.err.splitlines() if "preparing the kernel" not in line]
     assert len(lines) == 2
-    assert re.fullmatch(r"gearchaos sweep: 40 of 40 lanes, \d+ lanes/s, 0 s left", lines[0])
+    assert re.fullmatch(r"gearchaos sweep: 40 of 40 lanes, [\d.]+ lanes/s, 0 s left", lines[0])
     assert re.fullmatch(r"gearchaos sweep: 40 lanes, 0 diverged, \d+\.\d s", lines[1])
 
 
