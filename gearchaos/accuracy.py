@@ -79,6 +79,11 @@ def _accuracy(options: Namespace) -> int:
             f"{config.source}: outputs.section: a section is needed to measure errors on; keep a "
             'state, such as "delta_5"'
         )
+    if config.pitch_error is not None and config.pitch_error.kind != "sine":
+        raise ConfigurationError(
+            f'{config.source}: pitch_error.kind = "{config.pitch_error.kind}": the truth comes '
+            "from flow maps, which know the sine alone; measure errors with integration.error_check"
+        )
     config = config.replace("integration.method", "rk4")
     stable = config.replace("integration.unstable", "refuse")
     for count in steps:

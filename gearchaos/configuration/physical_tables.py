@@ -26,7 +26,7 @@ _KIND = '"sine": at mesh frequency, "teeth": as measured, "grade": drawn by an a
 _optional = partial(key, default=None)
 _mean = partial(key, "mean of the pitch error", "um", 0.0, default=0.0)
 _smoothing = partial(
-    key, "share of the mesh period in which teeth take their load", "1", default=0.1, gt=0, le=1
+    key, "share of the mesh period in which teeth take their load", "1", default=0.1, ge=0.01, le=1
 )
 _share = partial(key, units="1", example=0.25, default=None, ge=0, le=1)
 

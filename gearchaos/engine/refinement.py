@@ -68,14 +68,15 @@ def computable(result: Result, name: str) -> Configuration:
     if not text:
         raise FileError(f"{name}: holds no configuration; run the sweep again")
     config = Configuration.from_toml(text, f"{name} (configuration_resolved)")
-    steps = int(result.metadata.get("steps_per_period", config.integration.steps_per_period))
     parameters = [REALISATION, *(sweep.parameter for sweep in config.sweeps.values())]
     fixed = {p: result.fixed[axis_name(p)] for p in parameters if axis_name(p) in result.fixed}
     if fixed:
         config = config.at(fixed)
+    # The steps and periods that were taken, not those from which they were chosen or raised.
+    for name in ("steps_per_period", "transient_periods", "recorded_periods"):
+        taken = int(result.metadata.get(name, getattr(config.integration, name)))
+        config = config.replace(f"integration.{name}", taken)
     for key, value in {
-        # The steps that were taken, not those from which they were chosen or raised.
-        "integration.steps_per_period": steps,
         "integration.tolerance": None,
         "integration.error_check": 0.0,
         "outputs.exponents": False,
@@ -91,6 +92,11 @@ def refinable(result: Result, name: str) -> Configuration:
     As `computable`, and raises ConfigurationError if its lanes do not stand for themselves.
     """
     config = computable(result, name)
+    if config.sweep.parameter == "pitch_error.grade":
+        raise ConfigurationError(
+            f"{name}: pitch_error.grade: nothing lies between two grades; refine a sweep of "
+            "another parameter, such as pitch_error"
+        )
     unfit = remedy = ""
     if config.start.carry != "none":
         unfit, remedy = f'carry = "{config.start.carry}"', 'with start.carry = "none"'

@@ -123,7 +123,8 @@ def _limits(lanes: Lanes, steps: int) -> Iterator[StabilityLimit]:
 
 def _fault(lanes: Lanes, worst: StabilityLimit, unstable: NDArray[np.intp], steps: int) -> Fault:
     places = []
-    for parameter, values in lanes.values_of(unstable).items():
+    for parameter in (sweep.parameter for sweep in lanes.config.sweeps.values()):
+        values = lanes.values_of(unstable)[parameter]
         low, high = np.min(values), np.max(values)
         places.append(
             f"{parameter} " + (f"= {low:.6g}" if low == high else f"from {low:.6g} to {high:.6g}")

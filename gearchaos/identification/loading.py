@@ -115,10 +115,15 @@ def _unfit(config: Configuration, targets: Targets, source: str) -> Iterator[str
     for key, several in {
         "second_sweep": config.second_sweep is not None,
         "start.count": config.start.count > 1,
-        "pitch_error.realisations": getattr(config.pitch_error, "realisations", 1) > 1,
     }.items():
         if several:
             yield f"{source}: configuration: {config.source} has {key}; observations have one axis"
+    if config.pitch_error is not None and config.pitch_error.kind != "sine":
+        yield (
+            f"{source}: configuration: {config.source} has pitch_error.kind = "
+            f'"{config.pitch_error.kind}"; candidates are compared once a mesh period, as a sine '
+            'at mesh frequency repeats; give kind = "sine"'
+        )
     if config.integration.recorded_periods < POINTS_NEEDED:
         yield (
             f"{source}: integration.recorded_periods = {config.integration.recorded_periods}: must "
@@ -128,9 +133,6 @@ def _unfit(config: Configuration, targets: Targets, source: str) -> Iterator[str
         return
     # A second sweep over the bounds obeys the rules that a free parameter must obey.
     for number, free in enumerate(targets.parameter):
-        if free.name == "pitch_error.grade":
-            rule = "takes whole numbers only; fit another parameter at each grade"
-            yield f"{source}: parameter[{number}].name = {free.name}: {rule}"
         bounds = {"parameter": free.name, "from": free.low, "to": free.high, "count": 2}
         try:
             config.replace("second_sweep", bounds)

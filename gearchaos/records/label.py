@@ -49,8 +49,8 @@ LATEST = 16
 class Record(NamedTuple):
     """What is known of some lanes after their transient.
 
-    ``section`` (lanes, points, states): all states of the scene, once a mesh period; ``growth``
-    (lanes, periods): logarithm of the tangent vector's growth over each period, or None;
+    ``section`` (lanes, points, states): all states of the scene, once an excitation period;
+    ``growth`` (lanes, mesh periods): logarithm of the tangent vector's growth, or None;
     ``diverged`` (lanes,); ``torus`` (lanes,): whether the scene admits quasi-periodic motion.
     """
 
@@ -63,8 +63,8 @@ class Record(NamedTuple):
 class Labels(NamedTuple):
     """Labels of some lanes.
 
-    ``motion`` (lanes,) of `MEANINGS`; ``period`` (lanes,) in mesh periods, 0 where the motion is
-    not periodic; ``return_distance`` (lanes,): that of the period, or else the smallest one;
+    ``motion`` (lanes,) of `MEANINGS`; ``period`` (lanes,) in excitation periods, 0 where the motion
+    is not periodic; ``return_distance`` (lanes,): that of the period, or else the smallest one;
     ``bands`` (lanes,): on how many a chaotic or quasi-periodic section lies, see `band_count`, 0
     where it is neither or has not been looked at.
     """
@@ -130,8 +130,9 @@ def settling_periods(record: Record, labels: Labels) -> NDArray[np.int32]:
     if not lanes.size:
         return found
     section = record.section[lanes]
-    now = return_distances(section)
-    before = return_distances(section[:, : section.shape[1] // 2])
+    half = section.shape[1] // 2
+    # Two halves of a short record: all of it returns no better than its begin.
+    now, before = return_distances(section[:, half:]), return_distances(section[:, :half])
     periods = np.arange(1, now.shape[1] + 1)
     own = labels.period[lanes, np.newaxis]
     looked_at = (own == 0) | ((own > periods) & (own % periods == 0))

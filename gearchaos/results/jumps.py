@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from gearchaos.records.crisis import BESIDE, grows_at
 from gearchaos.records.period import TOLERANCE, section_distance
+from gearchaos.results.excitation import excitation_of
 from gearchaos.results.result import Result, section_variables
 from gearchaos.results.stage_table import labelled_lanes
 
@@ -59,7 +60,9 @@ def jumps(result: Result) -> list[Jump]:
     # A lane still on its way to its orbit lies anywhere.
     arrived = ~(result["return_distance"] > TOLERANCE) if "return_distance" in result else True
     period = np.where(arrived, lanes.period, 0)
-    found = jumps_at(period, sections / np.where(size > 0.0, size, 1.0))
+    # Neighbours may be an excitation period apart on their orbit, but never a part of one.
+    once = sections[:, :: -excitation_of(result.metadata).excitation_period][:, ::-1]
+    found = jumps_at(period, once / np.where(size > 0.0, size, 1.0))
     return [
         Jump(float(lanes.values[at]), float(lanes.values[at + 1]), str(lanes.labels[at]))
         for at in found

@@ -319,7 +319,7 @@ def test_a_fault_of_the_targets_is_one_clear_message(sound, tmp_path):
     assert raised.value.exit_code in (2, 4)
 
 
-def test_drawn_gears_are_one_pair_and_their_grade_is_not_free(tmp_path):
+def test_errors_of_teeth_are_refused_as_they_do_not_repeat_once_a_mesh_period(tmp_path):
     pair = """\
 [pair]
 teeth = [21, 38]
@@ -333,20 +333,15 @@ length_scale_um = 20.0
 [pitch_error]
 kind = "grade"
 grade = 7
-realisations = 2
 
 """
     (tmp_path / "pair.toml").write_text(pair + PAIR.replace("pitch_error_amplitude = 1.0\n", ""))
-    grade = TARGETS.replace('"pitch_error_amplitude"', '"pitch_error.grade"', 1)
-    head, tail = grade.split('"pitch_error.grade"')
-    lines = tail.splitlines(keepends=True)
-    lines[1:3] = ["low = 5.0\n", "high = 9.0\n"]
-    (tmp_path / "targets.toml").write_text(head + '"pitch_error.grade"' + "".join(lines))
+    targets = TARGETS.replace('"pitch_error_amplitude"', '"pitch_error_mean"', 1)
+    (tmp_path / "targets.toml").write_text(targets)
     with pytest.raises(ConfigurationError) as raised:
         load_targets(tmp_path / "targets.toml")
-    axes, whole = raised.value.problems
-    assert axes.endswith("has pitch_error.realisations; observations have one axis")
-    assert "parameter[1].name = pitch_error.grade: takes whole numbers only; fit" in whole
+    (problem,) = raised.value.problems
+    assert 'has pitch_error.kind = "grade"; candidates are compared once a mesh' in problem
 
 
 def test_a_place_off_the_axis_is_refused(tmp_path):

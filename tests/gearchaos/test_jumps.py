@@ -70,3 +70,17 @@ def test_the_hop_of_figure_7_is_a_jump_within_period_1(hop, tmp_path):
     ]
     facts = json.loads(run_module("gearchaos.stages", "hop.h5", "--json", cwd=tmp_path).out)
     assert facts["jumps"] == [{"below": jump.below, "above": jump.above, "label": "period 1"}]
+
+
+def test_neighbours_an_excitation_period_apart_have_not_jumped():
+    gear = "pitch_error={kind='teeth', driving={file='inspection.csv', column='driving'}}"
+    starts = "start={kind='random', spread=1.0}"
+    lengths = ("integration.transient_periods=2100", "integration.recorded_periods=126")
+    values = "sweep={parameter='pitch_error', from=115.9, to=116.3, count=9}"
+    scene = "scene.effects=['pitch_error', 'stiffness_variation', 'backlash']"
+    overrides = [gear, starts, *lengths, values, scene, "outputs.section_points=42"]
+    result = gearchaos.run(gearchaos.load_config("sweeps/inspection.toml", overrides))
+    assert result["period"].tolist() == [2] * 9
+    apart = np.abs(result["section_delta_5"][1:, -1] - result["section_delta_5"][:-1, -1])
+    assert apart.max() > 0.02  # the starts lead to either half of the orbit
+    assert jumps(result) == []

@@ -187,6 +187,14 @@ def test_a_slow_approach_from_alternating_sides_returns_best_after_twice_the_per
     assert settling_periods(arrived, label(arrived)).tolist() == [0]
 
 
+def test_the_end_of_a_short_record_is_compared_with_its_begin():
+    # Of an excitation of many mesh periods a record holds few points.
+    slowly = 1.0 + 1e-5 * (-0.6) ** np.arange(24)[:, np.newaxis]
+    settling = record(slowly, np.full(24, np.log(0.6)))
+    assert label(settling).period.tolist() == [2]
+    assert settling_periods(settling, label(settling)).tolist() == [1]
+
+
 def test_a_record_too_short_for_anything_is_unresolved_without_a_distance():
     labels = label(record(np.ones((2, 2)), np.zeros(2)))
     assert labels.motion.tolist() == [UNRESOLVED]

@@ -85,6 +85,10 @@ def test_stability_is_that_of_all_gear_pairs():
     fine = Simulation(configured("integration.unstable=raise"))
     _, note = stable_steps(fine.lanes, 2)
     assert note.endswith("of 12 of 12 lanes")
+    with pytest.raises(
+        ConfigurationError, match=r"for 12 of 12 lanes \(pitch_error from \S+ to \S+\)"
+    ):
+        stable_steps(Simulation(configured()).lanes, 2)
 
 
 def test_commands_take_a_gear_pair_by_its_number(result, tmp_path):
@@ -114,6 +118,18 @@ def test_boundaries_are_refined_with_the_gear_pair_of_the_slice(tmp_path):
     gearchaos.run(configured("sweep.count=9")).save(tmp_path / "drawn.h5")
     arguments = ("drawn.h5", "--refine", "0.5", "--at", "realisation=2")
     assert run_module("gearchaos.stages", *arguments, cwd=tmp_path).code == 0
+    grades = "sweep={parameter='pitch_error.grade', values=[8.0, 9.0]}"
+    gearchaos.run(configured(grades)).save(tmp_path / "drawn.h5", overwrite=True)
+    ended = run_module("gearchaos.stages", *arguments, cwd=tmp_path)
+    assert (ended.code, ended.out) == (2, "")
+    assert "drawn.h5: pitch_error.grade: nothing lies between two grades" in ended.err
+
+
+def test_the_truth_of_flow_maps_is_not_asked_for(tmp_path):
+    (tmp_path / "gears.toml").write_text(text_of(DRAWN, "[21, 38]"))
+    ended = run_module("gearchaos.accuracy", "gears.toml", cwd=tmp_path)
+    assert (ended.code, ended.out) == (2, "")
+    assert 'pitch_error.kind = "grade": the truth comes from flow maps' in ended.err
 
 
 def test_a_response_holds_all_gear_pairs(tmp_path):

@@ -2,9 +2,12 @@
 
 import numpy as np
 import pytest
+from gearchaos_kernels import integrate
 
 import gearchaos
 from gearchaos.configuration import Configuration
+from gearchaos.dynamics.systems import plan_of, system_of
+from gearchaos.engine.refinement import computable
 
 DEVIATIONS = np.round(12.0 * np.sin(2.0 * np.pi * np.arange(21) / 21), 2) + [0, 5, -4] * 7
 
@@ -113,3 +116,13 @@ def test_a_contact_ratio_that_no_pair_of_gears_can_have_is_refused():
     wide = {**TABLES["pair"], "face_width_mm": 150.0}
     with pytest.raises(gearchaos.ConfigurationError, match="total contact ratio"):
         gearchaos.run(configured(pair=wide))
+
+
+def test_what_goes_on_from_a_result_begins_where_the_same_teeth_meet(result):
+    config = computable(result, "the result")
+    assert config.integration.transient_periods == 420
+    assert config.integration.recorded_periods == 210
+    once = plan_of(config, transient_periods=0)
+    system = system_of(config, {"pitch_error": result["pitch_error"]})
+    again = integrate(system, result["end_state"], once).end_state
+    assert again == pytest.approx(result["end_state"], abs=1e-9)

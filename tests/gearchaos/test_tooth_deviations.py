@@ -286,6 +286,11 @@ FAULTS = {
     ),
     "no pair": (GRADE, ["pair="], 'pair: is missing, and pitch_error.kind = "grade" takes teeth'),
     "kind": ("[pitch_error]\nkind = 3\n", (), "pitch_error.kind = 3: must be one of 'sine', 'te"),
+    "smoothing": (
+        GRADE,
+        ["pitch_error.smoothing=1e-7"],
+        "smoothing = 1e-07: must be at least 0.01",
+    ),
     "no kind": ("[pitch_error]\ngrade = 7\n", (), 'grade = 7: has no meaning with kind = "sine"'),
     "grade 0": (GRADE, ["pitch_error.grade=0"], "pitch_error.grade = 0: must be at least 1"),
     "grade 13": (GRADE, ["pitch_error.grade=13"], "pitch_error.grade = 13: must be at most 12"),
