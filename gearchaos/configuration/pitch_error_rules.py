@@ -1,9 +1,6 @@
 """Rules of pitch errors tooth by tooth, measured or drawn by a grade."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,10 +9,8 @@ from gearchaos.configuration.messages import Fault
 from gearchaos.configuration.physical_tables import GradeError, SineError, TeethError
 from gearchaos.configuration.rules import reads
 from gearchaos.configuration.sweep_values import SWEEPABLE_KEYS, FloatArray, swept_values
+from gearchaos.configuration.tables import Tables
 from gearchaos.gear.tooth_deviations import counted_deviations, tooth_deviations
-
-if TYPE_CHECKING:
-    from gearchaos.configuration.models import Configuration
 
 OF_DRAWN_GEARS = ("pitch_error.grade", "pitch_error.eccentricity")
 """Keys of which no group depends, but the gears that are drawn."""
@@ -24,12 +19,12 @@ _LARGEST_SUM_UM, _LARGEST_SUM_SHARE = 0.1, 0.01
 """What rounding in a list leaves of the sum of all single deviations, at most."""
 
 
-def _kind(config: Configuration) -> str:
+def _kind(config: Tables) -> str:
     return "sine" if config.pitch_error is None else config.pitch_error.kind
 
 
 @reads("pitch_error", "pair")
-def _every_tooth_has_one_sound_deviation(config: Configuration) -> Iterator[Fault]:
+def _every_tooth_has_one_sound_deviation(config: Tables) -> Iterator[Fault]:
     error, pair = config.pitch_error, config.pair
     if pair is None and _kind(config) != "sine":
         rule = f'is missing, and pitch_error.kind = "{_kind(config)}" takes teeth and angles of it'
@@ -79,20 +74,20 @@ def _unsound(
 
 
 @reads("pitch_error", "integration")
-def _flow_maps_know_the_sine(config: Configuration) -> Iterator[Fault]:
+def _flow_maps_know_the_sine(config: Tables) -> Iterator[Fault]:
     if _kind(config) != "sine" and config.integration.method == "flow_map":
         rule = 'cannot be computed with integration.method = "flow_map"'
         yield Fault("pitch_error.kind", rule, 'set integration.method = "rk4"', _kind(config))
 
 
 @reads("pitch_error", "groups")
-def _keys_belong_to_the_kind(config: Configuration) -> Iterator[Fault]:
+def _keys_belong_to_the_kind(config: Tables) -> Iterator[Fault]:
     kind, of_a_sine = _kind(config), ("pitch_error_amplitude", "pitch_error_phase_deg")
     own = SineError if config.pitch_error is None else type(config.pitch_error)
-    swept = {f"{table}.parameter": sweep.parameter for table, sweep in config.sweeps.items()}
-    given = {f"groups.{name}": name for name in config.groups.given()}
+    named = {f"groups.{name}": name for name in config.groups.given()}
+    named |= {f"{table}.parameter": sweep.parameter for table, sweep in config.sweeps.items()}
     rule = f'has no meaning with pitch_error.kind = "{kind}"'
-    for key, name in (given | swept).items():
+    for key, name in named.items():
         table, _, field = name.partition(".")
         if name in of_a_sine and kind != "sine":
             yield Fault(key, rule, "drop it: the teeth decide, and pitch_error multiplies them")
@@ -100,7 +95,7 @@ def _keys_belong_to_the_kind(config: Configuration) -> Iterator[Fault]:
             yield Fault(key, rule, "choose another pitch_error.kind, or sweep pitch_error", name)
 
 
-def grade_faults(config: Configuration, swept: Mapping[str, FloatArray]) -> Iterator[Fault]:
+def grade_faults(config: Tables, swept: Mapping[str, FloatArray]) -> Iterator[Fault]:
     """Yield what is wrong with the grades of the lanes; ``swept`` has both ends of every sweep."""
     if not isinstance(config.pitch_error, GradeError):
         return
