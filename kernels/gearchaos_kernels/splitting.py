@@ -23,9 +23,9 @@ from gearchaos_kernels.block_memory import (
 from gearchaos_kernels.compilation import scalar
 from gearchaos_kernels.contact import NEVER, branches_at, leaving_fraction, next_branch
 from gearchaos_kernels.equations import gaps_at
-from gearchaos_kernels.forcing import During, forcing_at, phase_on_grid, phase_within
+from gearchaos_kernels.forcing import During, forcing_at, phase_within
 from gearchaos_kernels.rk4 import step, tangent_step
-from gearchaos_kernels.teeth import between, shares_at, with_teeth
+from gearchaos_kernels.teeth import between, point_on_grid, shares_at, with_teeth
 
 MOST_SPLITS = 16
 """Crossings of one step; a step with more goes on with its last branches and is counted."""
@@ -52,8 +52,10 @@ def split_step(memory, slot, table, shares, number, present):
     tangent = state
     if present.tangent is not None:
         tangent = read_state(memory, BEFORE + TANGENT, slot, present)
-    begin = forcing_on_grid(memory, slot, lane, table, shares, 2 * number, present)
-    end = forcing_on_grid(memory, slot, lane, table, shares, 2 * number + 2, present)
+    point = point_on_grid(memory, slot, table, shares, 2 * number, present)
+    begin = forcing_at(lane, point, present)
+    point = point_on_grid(memory, slot, table, shares, 2 * number + 2, present)
+    end = forcing_at(lane, point, present)
     gaps = gaps_at(state, lane, begin, present)
     branches = read_branches(memory, slot, present)
     done = 0.0
@@ -80,13 +82,14 @@ def split_step(memory, slot, table, shares, number, present):
         begin = crossing
         crossings += 1
         gaps = gaps_at(state, lane, begin, present)
+        gap = gaps.axial if axially else gaps.tangential
+        branch = branches.axial if axially else branches.tangential
+        speed = lane.axial_speed if axially else lane.tangential_speed
+        slowest = min(slowest, speed * abs(gap.rate))
+        following = next_branch(branch, gap.value, lane.half_backlash)
         if axially:
-            slowest = min(slowest, lane.axial_speed * abs(gaps.axial.rate))
-            following = next_branch(branches.axial, gaps.axial.value, lane.half_backlash)
             branches = Branches(branches.tangential, following)
         else:
-            slowest = min(slowest, lane.tangential_speed * abs(gaps.tangential.rate))
-            following = next_branch(branches.tangential, gaps.tangential.value, lane.half_backlash)
             branches = Branches(following, branches.axial)
 
         left = 1.0 - done
@@ -114,14 +117,6 @@ def forcing_within(memory, slot, lane, table, shares, number, fraction, present)
         end = with_teeth(memory, slot, shares_at(shares, row + 1, present), point, present)
         width = 2.0 * math.pi / (table.shape[0] - 1)
         point = between(begin, end, 2.0 * fraction - half, width, point)
-    return forcing_at(lane, point, present)
-
-
-@scalar
-def forcing_on_grid(memory, slot, lane, table, shares, row, present):
-    """Return what acts on a lane at a row of the table."""
-    point = phase_on_grid(table, row)
-    point = with_teeth(memory, slot, shares_at(shares, row, present), point, present)
     return forcing_at(lane, point, present)
 
 
