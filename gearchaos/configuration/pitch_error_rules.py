@@ -6,7 +6,12 @@ import numpy as np
 
 from gearchaos.configuration.files import LISTS
 from gearchaos.configuration.messages import Fault
-from gearchaos.configuration.physical_tables import GradeError, SineError, TeethError
+from gearchaos.configuration.physical_tables import (
+    GearDeviations,
+    GradeError,
+    SineError,
+    TeethError,
+)
 from gearchaos.configuration.rules import reads
 from gearchaos.configuration.sweep_values import SWEEPABLE_KEYS, FloatArray, swept_values
 from gearchaos.configuration.tables import Tables
@@ -42,30 +47,24 @@ def _every_tooth_has_one_sound_deviation(config: Tables) -> Iterator[Fault]:
             yield Fault(here, f"holds {len(given)} lists of deviations, must be one", remedy)
         elif table is not None and pair is not None:
             file = "" if table.file is None else f"{table.file}, column {table.column}: "
-            of_gear = (pair.teeth[gear], pair.normal_module_mm)
-            for rule, remedy in _unsound(table.cumulative_um, table.single_um, *of_gear):
+            for rule, remedy in _unsound(table, pair.teeth[gear], pair.normal_module_mm):
                 yield Fault(f"{here}.{given[0]}", file + rule, remedy)
 
 
-def _unsound(
-    cumulative: tuple[float, ...] | None,
-    single: tuple[float, ...] | None,
-    teeth: int,
-    module_mm: float,
-) -> Iterator[tuple[str, str]]:
+def _unsound(table: GearDeviations, teeth: int, module_mm: float) -> Iterator[tuple[str, str]]:
     """Yield the rule that a list of deviations breaks, with its remedy."""
-    given = cumulative or single or ()
+    given = table.cumulative_um or table.single_um or ()
     if len(given) != teeth:
         yield f"holds {len(given)} values for {teeth} teeth", "give one for every tooth"
         return
-    if cumulative is None:
+    if table.cumulative_um is None:
         total, largest = sum(given), max(map(abs, given))
         if abs(total) > max(_LARGEST_SUM_UM, _LARGEST_SUM_SHARE * largest):
             rule = f"sum to {total:.6g} um, and single deviations around a circle sum to zero"
             yield rule, "look for a missing or a wrong one, or give cumulative_um"
             return
     with np.errstate(all="ignore"):
-        found = counted_deviations(cumulative, single)
+        found = counted_deviations(table)
     worst = found[np.argmax(np.abs(found))]
     # A tenth of the module in micrometres.
     if not abs(worst) <= 100.0 * module_mm:
