@@ -17,18 +17,18 @@ from gearchaos.configuration import Given, axis_values, configuration_of, swept_
 from gearchaos.dynamics.exponents import Exponents, exponents, sum_of_exponents
 from gearchaos.dynamics.following import (
     STABILITY_LOSS_TEXTS,
+    Branch,
+    Orbit,
     StabilityLoss,
     follow,
     loss_of_stability,
 )
-from gearchaos.dynamics.orbit import Branch, Orbit
-from gearchaos.dynamics.orbits import Orbits, orbit_exponent, polish
+from gearchaos.dynamics.orbits import Orbits, polish
 from gearchaos.dynamics.stability import fewest_stable_steps
 from gearchaos.dynamics.systems import plan_of, system_of
-from gearchaos.engine.lanes import Lanes
+from gearchaos.engine.lanes import Lanes, start_states
 from gearchaos.engine.refinement import computable
 from gearchaos.engine.response import respond
-from gearchaos.engine.starts import start_states
 from gearchaos.engine.steps import stable_steps
 from gearchaos.errors import ConfigurationError
 from gearchaos.records.amplitude_spectrum import SpectralLines, spectral_lines
@@ -286,13 +286,11 @@ class System:
         return np.atleast_2d(self.state if start is None else np.asarray(start, dtype=np.float64))
 
     def _orbit(self, found: Orbits, period: int) -> Orbit:
-        exponent = orbit_exponent(
-            found.multipliers, np.array([period], np.int32), self._record.excitation_period
-        )
+        duration = period * self._record.excitation_period[0]
         return Orbit(
             period,
             found.points[0],
             found.multipliers[0],
-            float(exponent[0]),
+            float(np.log(np.abs(found.multipliers[0, 0])) / duration),
             float(found.residual[0]),
         )

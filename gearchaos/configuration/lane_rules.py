@@ -1,10 +1,7 @@
 """Rules of what the lanes get: every group is known, in range, and moved by the sweeps."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator, Mapping
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,16 +9,14 @@ from gearchaos.configuration.messages import Fault
 from gearchaos.configuration.pitch_error_rules import OF_DRAWN_GEARS, grade_faults
 from gearchaos.configuration.run_tables import Sweep
 from gearchaos.configuration.sweep_values import SWEEPABLE_KEYS, FloatArray, groups_at
+from gearchaos.configuration.tables import Tables
 from gearchaos.errors import ConfigurationError
 from gearchaos.gear.derivation import derive_groups
 from gearchaos.gear.group_table import GROUPS_BY_NAME, GroupRow
 from gearchaos.gear.groups import HARMONICS, Groups
 
-if TYPE_CHECKING:
-    from gearchaos.configuration.models import Configuration
 
-
-def lane_faults(config: Configuration) -> Iterator[Fault]:
+def lane_faults(config: Tables) -> Iterator[Fault]:
     """Yield what is wrong with the groups of the lanes, where every table by itself is sound."""
     sweeps = config.sweeps
     # The groups are smooth in every parameter: both ends of a sweep and a value between them
@@ -62,7 +57,7 @@ def _some_values(sweep: Sweep) -> FloatArray:
     return np.unique(some) if values.size > 1 else some[:2]
 
 
-def _refused(config: Configuration, some: Mapping[str, FloatArray]) -> list[str]:
+def _refused(config: Tables, some: Mapping[str, FloatArray]) -> list[str]:
     """Name the sweeps that already alone would make the stiffness differ between lanes."""
     tables = []
     for table, sweep in config.sweeps.items():
@@ -73,7 +68,7 @@ def _refused(config: Configuration, some: Mapping[str, FloatArray]) -> list[str]
     return tables or list(config.sweeps)
 
 
-def _moved(config: Configuration, groups: Groups, axis: int, count: int) -> bool:
+def _moved(config: Tables, groups: Groups, axis: int, count: int) -> bool:
     """Whether a sweep of so many values, along this axis, changes a group that the scene needs."""
     for name, value in groups.values.items():
         row = GROUPS_BY_NAME[name]
@@ -84,9 +79,8 @@ def _moved(config: Configuration, groups: Groups, axis: int, count: int) -> bool
     return False
 
 
-def _without_effect(config: Configuration, table: str, values: FloatArray) -> Fault:
-    parameter = config.sweeps[table].parameter
-    swept = {sweep.parameter: f"{name}.parameter" for name, sweep in config.sweeps.items()}
+def _without_effect(config: Tables, table: str, values: FloatArray) -> Fault:
+    parameter, swept = config.sweeps[table].parameter, config.swept
     derived = derive_groups({**config.physical(), parameter: values}, without=HARMONICS)
     names = [name for name, value in derived.items() if np.ndim(value) > 0]
     winners = [name for name in names if name in swept]
@@ -106,7 +100,7 @@ def _without_effect(config: Configuration, table: str, values: FloatArray) -> Fa
     return Fault(f"{table}.parameter", rule, remedy, parameter)
 
 
-def _missing(config: Configuration, row: GroupRow) -> Fault:
+def _missing(config: Tables, row: GroupRow) -> Fault:
     effects = [f'"{name}"' for name in config.scene.effects if name in row.effects]
     because = f" for {' and '.join(effects)}" if effects else ""
     lacking = [entry for entry in row.derived_from if not _is_present(config, entry)]
@@ -116,12 +110,11 @@ def _missing(config: Configuration, row: GroupRow) -> Fault:
     return Fault(f"groups.{row.name}", rule, f"give {row.name} in [groups]{otherwise}")
 
 
-def _is_present(config: Configuration, entry: str) -> bool:
+def _is_present(config: Tables, entry: str) -> bool:
     """Whether one of the keys, or the table, that an entry of `derived_from` names is there."""
     given = [path for path, value in config.physical().items() if value is not None]
-    swept = [sweep.parameter for sweep in config.sweeps.values()]
     return any(
-        word in swept or any(f"{path}.".startswith(f"{word}.") for path in given)
+        word in config.swept or any(f"{path}.".startswith(f"{word}.") for path in given)
         for word in re.findall(r"[A-Za-z_][\w.]+", entry)
     )
 
@@ -136,7 +129,7 @@ def _out_of_range(groups: Groups) -> Iterator[Fault]:
             yield Fault(f"groups.{name}", rule, remedy, float(worst))
 
 
-def _decoupled(config: Configuration, groups: Groups) -> Iterator[Fault]:
+def _decoupled(config: Tables, groups: Groups) -> Iterator[Fault]:
     effects, angle = config.scene.effects, groups.base_helix_angle_deg
     if "axial" in effects and angle is not None and np.all(np.equal(angle, 0.0)):
         rule = '"axial" needs a helix angle: in a spur pair nothing drives the axial motion'

@@ -1,41 +1,22 @@
-"""The whole configuration of a sweep, checked."""
+"""The whole configuration of a sweep, read and checked."""
 
-from __future__ import annotations
-
+import os
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from functools import cache
-from typing import Any, Literal, Self
+from typing import Any, Self, TypeAlias
 
 from pydantic import PrivateAttr, TypeAdapter, ValidationError, ValidationInfo, model_validator
 
-from gearchaos.configuration.files import with_deviation_files
-from gearchaos.configuration.keys import Key, Table, key, keys_of
+from gearchaos.configuration.files import text_of_file, with_deviation_files
+from gearchaos.configuration.keys import Key, keys_of
 from gearchaos.configuration.lane_rules import lane_faults
 from gearchaos.configuration.messages import MOST_SHOWN, Fault, fault_of, texts
-from gearchaos.configuration.physical_tables import (
-    PHYSICAL_KEYS,
-    PHYSICAL_TABLES,
-    Bearings,
-    GradeError,
-    Mesh,
-    Operation,
-    Pair,
-    PitchError,
-)
+from gearchaos.configuration.physical_tables import GradeError
 from gearchaos.configuration.rules import RULES
-from gearchaos.configuration.run_tables import (
-    GivenGroups,
-    Integration,
-    Outputs,
-    Scene,
-    Start,
-    Sweep,
-    states_of,
-)
 from gearchaos.configuration.sweep_rules import unknown_parameter
 from gearchaos.configuration.sweep_values import SWEEPABLE_GROUPS
+from gearchaos.configuration.tables import PHYSICAL_TABLES, Tables
 from gearchaos.configuration.toml_text import (
-    flat_tables,
     tables_from_toml,
     toml_text,
     with_overrides,
@@ -45,35 +26,12 @@ from gearchaos.errors import ConfigurationError
 from gearchaos.gear.tooth_deviations import REALISATION
 
 
-class Configuration(Table):
+class Configuration(Tables):
     """A gear pair, the effects that exist, the sweeps, and what is kept of them.
 
     A Configuration that exists is sound: every rule has been checked, also those between tables.
     It cannot be changed; `replace` gives a changed copy.
     """
-
-    title: str = key("title of the sweep, for figures and files", default="")
-    formulation: Literal["physical", "published"] = key(
-        'gaps as the equations of motion give them, or as Pan 2021 prints them ("published")',
-        default="physical",
-    )
-    pair: Pair | None = key("catalogue data of the two gears", default=None)
-    operation: Operation | None = key("the point of operation", default=None)
-    mesh: Mesh | None = key("stiffness, damping and clearance of the mesh", default=None)
-    pitch_error: PitchError | None = key("the pitch error", default=None)
-    bearings: Bearings | None = key("the bearings", default=None)
-    groups: GivenGroups = key("dimensionless groups given directly", default=GivenGroups())
-    scene: Scene = key("which effects exist")
-    start: Start = key("the state in which the lanes start", default=Start())
-    sweep: Sweep = key("the swept parameter and its values")
-    second_sweep: Sweep | None = key(
-        "a second swept parameter: every value of it with every one of [sweep]", default=None
-    )
-    integration: Integration = key("the fixed grid of the integration", default=Integration())
-    outputs: Outputs = key("what is kept of every lane", default=Outputs())
-    files: dict[str, str] | None = key(
-        "files that are named above, word for word, as a result keeps them", default=None
-    )
 
     _source: str = PrivateAttr(default="<python>")
     _text: str | None = PrivateAttr(default=None)
@@ -91,28 +49,8 @@ class Configuration(Table):
         """
         return self.resolved_toml() if self._text is None else self._text
 
-    @property
-    def sweeps(self) -> dict[str, Sweep]:
-        """The sweeps that are there by the name of their table."""
-        tables = {name: self.__dict__.get(name) for name in ("sweep", "second_sweep")}
-        return {name: sweep for name, sweep in tables.items() if sweep is not None}
-
-    @property
-    def needed_effects(self) -> tuple[str, ...]:
-        """The effects of the scene that act on what is kept.
-
-        The axial pair is driven one way: without an axial state in the section and without the
-        exponent of the whole system, nothing that is kept depends on it.
-        """
-        without_axial = states_of({"transverse"})
-        if self.outputs.lyapunov or not set(self.outputs.section).issubset(without_axial):
-            return self.scene.effects
-        return tuple(effect for effect in self.scene.effects if effect != "axial")
-
     @classmethod
-    def from_toml(
-        cls, text: str, source: str = "<text>", overrides: Iterable[str] = ()
-    ) -> Configuration:
+    def from_toml(cls, text: str, source: str = "<text>", overrides: Iterable[str] = ()) -> Self:
         """Make a configuration from TOML text, which messages call ``source``.
 
         ``overrides`` are those of `load_config`. Raises ConfigurationError with one message per
@@ -125,7 +63,7 @@ class Configuration(Table):
         return config
 
     @classmethod
-    def from_tables(cls, tables: Mapping[str, Any], source: str = "<python>") -> Configuration:
+    def from_tables(cls, tables: Mapping[str, Any], source: str = "<python>") -> Self:
         """Make a configuration from nested mappings with the keys of the TOML file.
 
         Raises ConfigurationError with one message per fault, all faults at once.
@@ -146,7 +84,7 @@ class Configuration(Table):
         config._source = source
         return config
 
-    def replace(self, path: str, value: Any) -> Configuration:
+    def replace(self, path: str, value: Any) -> Self:
         """Return a copy in which one key, or table, at its dotted path has another value.
 
         A value of a table is a mapping; None removes the key. Raises ConfigurationError if the
@@ -158,7 +96,7 @@ class Configuration(Table):
             raise ConfigurationError(f"{self.source}: {error.args[0]} is not a table") from None
         return type(self).from_tables(tables, self.source)
 
-    def at(self, values: Mapping[str, float]) -> Configuration:
+    def at(self, values: Mapping[str, float]) -> Self:
         """Return a copy in which parameters, by name, are fixed at values in their units.
 
         Where [sweep] swept one, that becomes a sweep of this one value; where [second_sweep] did,
@@ -184,11 +122,6 @@ class Configuration(Table):
                 del tables["second_sweep"]
         return type(self).from_tables(tables, self.source)
 
-    def physical(self) -> dict[str, Any]:
-        """Return every key of the physical tables by its path, with its value or None."""
-        known = self.model_dump(include=set(PHYSICAL_TABLES), exclude_none=True)
-        return dict.fromkeys(PHYSICAL_KEYS) | flat_tables(known)
-
     def tables(self) -> dict[str, Any]:
         """Return the nested mappings of everything that is known, defaults included."""
         return self.model_dump(exclude_none=True)
@@ -211,15 +144,40 @@ class Configuration(Table):
     __hash__ = None  # type: ignore[assignment]
 
 
+Given: TypeAlias = Configuration | str | os.PathLike[str]
+
+
+def load_config(path: str | os.PathLike[str], overrides: Iterable[str] = ()) -> Configuration:
+    """Read a configuration from a TOML file.
+
+    The path ``-`` is standard input. Overrides are such as ``"integration.steps_per_period=100"``;
+    what is not TOML is taken as text.
+
+    Raises
+    ------
+    FileError
+        If the file cannot be read.
+    ConfigurationError
+        If it is not a sound configuration: one message per fault, all faults at once.
+    """
+    source = os.fspath(path)
+    return Configuration.from_toml(text_of_file(source), source, overrides)
+
+
+def configuration_of(given: Given) -> Configuration:
+    """Return a configuration, or read it from the TOML file at a path, see `load_config`."""
+    return given if isinstance(given, Configuration) else load_config(given)
+
+
 @cache
 def configuration_keys() -> dict[str, Key]:
     """Every key of a configuration by its dotted path."""
-    every = [(one.path, one) for one in keys_of(Configuration)]
+    every = [(one.path, one) for one in keys_of(Tables)]
     # Of a key that several kinds of a table have, the first counts: that of the default.
     return dict(every) | dict(reversed(every))
 
 
-def _broken_rules(config: Configuration, unreadable: Collection[str]) -> Iterator[Fault]:
+def _broken_rules(config: Tables, unreadable: Collection[str]) -> Iterator[Fault]:
     suspect = set(unreadable)
     for tables, broken in RULES:
         if tables.isdisjoint(unreadable):
@@ -230,11 +188,11 @@ def _broken_rules(config: Configuration, unreadable: Collection[str]) -> Iterato
         yield from lane_faults(config)
 
 
-def _readable(tables: Mapping[str, Any], unreadable: Collection[str]) -> Configuration:
-    """Make a configuration of the tables without a fault of their own, unchecked."""
+def _readable(tables: Mapping[str, Any], unreadable: Collection[str]) -> Tables:
+    """Return the tables without a fault of their own."""
     readable = {}
-    for name, field in Configuration.model_fields.items():
+    for name, field in Tables.model_fields.items():
         if name in tables and name not in unreadable:
             annotation: Any = field.annotation
             readable[name] = TypeAdapter(annotation).validate_python(tables[name])
-    return Configuration.model_construct(**readable)
+    return Tables.model_construct(**readable)

@@ -16,7 +16,6 @@ from gearchaos.configuration.keys import (
     Table,
     TeethPair,
     key,
-    keys_of,
 )
 from gearchaos.gear.geometry import STEEL_DENSITY
 from gearchaos.gear.mesh_stiffness import DEFAULT_HARMONICS
@@ -188,22 +187,3 @@ class Bearings(Table):
     axial_damping_N_s_per_m: NotNegativePair | None = _optional(
         "axial damping [driving, driven]", "N s/m", [500.0, 500.0]
     )
-
-
-PHYSICAL_TABLES: dict[str, tuple[type[Table], ...]] = {
-    "pair": (Pair,),
-    "operation": (Operation,),
-    "mesh": (Mesh,),
-    "pitch_error": (SineError, TeethError, GradeError),
-    "bearings": (Bearings,),
-}
-"""The physical tables by name: the kinds of each."""
-
-PHYSICAL_KEYS = {
-    key.path: key
-    for name, tables in PHYSICAL_TABLES.items()
-    for table in tables
-    for key in keys_of(table, name)
-    if not key.tables
-}
-"""Every value of the physical tables by its path."""

@@ -1,21 +1,21 @@
 """Rules of pitch errors tooth by tooth, measured or drawn by a grade."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from gearchaos.configuration.files import LISTS
 from gearchaos.configuration.messages import Fault
-from gearchaos.configuration.physical_tables import GradeError, SineError, TeethError
+from gearchaos.configuration.physical_tables import (
+    GearDeviations,
+    GradeError,
+    SineError,
+    TeethError,
+)
 from gearchaos.configuration.rules import reads
 from gearchaos.configuration.sweep_values import SWEEPABLE_KEYS, FloatArray, swept_values
+from gearchaos.configuration.tables import Tables
 from gearchaos.gear.tooth_deviations import counted_deviations, tooth_deviations
-
-if TYPE_CHECKING:
-    from gearchaos.configuration.models import Configuration
 
 OF_DRAWN_GEARS = ("pitch_error.grade", "pitch_error.eccentricity")
 """Keys of which no group depends, but the gears that are drawn."""
@@ -24,12 +24,12 @@ _LARGEST_SUM_UM, _LARGEST_SUM_SHARE = 0.1, 0.01
 """What rounding in a list leaves of the sum of all single deviations, at most."""
 
 
-def _kind(config: Configuration) -> str:
+def _kind(config: Tables) -> str:
     return "sine" if config.pitch_error is None else config.pitch_error.kind
 
 
 @reads("pitch_error", "pair")
-def _every_tooth_has_one_sound_deviation(config: Configuration) -> Iterator[Fault]:
+def _every_tooth_has_one_sound_deviation(config: Tables) -> Iterator[Fault]:
     error, pair = config.pitch_error, config.pair
     if pair is None and _kind(config) != "sine":
         rule = f'is missing, and pitch_error.kind = "{_kind(config)}" takes teeth and angles of it'
@@ -47,30 +47,24 @@ def _every_tooth_has_one_sound_deviation(config: Configuration) -> Iterator[Faul
             yield Fault(here, f"holds {len(given)} lists of deviations, must be one", remedy)
         elif table is not None and pair is not None:
             file = "" if table.file is None else f"{table.file}, column {table.column}: "
-            of_gear = (pair.teeth[gear], pair.normal_module_mm)
-            for rule, remedy in _unsound(table.cumulative_um, table.single_um, *of_gear):
+            for rule, remedy in _unsound(table, pair.teeth[gear], pair.normal_module_mm):
                 yield Fault(f"{here}.{given[0]}", file + rule, remedy)
 
 
-def _unsound(
-    cumulative: tuple[float, ...] | None,
-    single: tuple[float, ...] | None,
-    teeth: int,
-    module_mm: float,
-) -> Iterator[tuple[str, str]]:
+def _unsound(table: GearDeviations, teeth: int, module_mm: float) -> Iterator[tuple[str, str]]:
     """Yield the rule that a list of deviations breaks, with its remedy."""
-    given = cumulative or single or ()
+    given = table.cumulative_um or table.single_um or ()
     if len(given) != teeth:
         yield f"holds {len(given)} values for {teeth} teeth", "give one for every tooth"
         return
-    if cumulative is None:
+    if table.cumulative_um is None:
         total, largest = sum(given), max(map(abs, given))
         if abs(total) > max(_LARGEST_SUM_UM, _LARGEST_SUM_SHARE * largest):
             rule = f"sum to {total:.6g} um, and single deviations around a circle sum to zero"
             yield rule, "look for a missing or a wrong one, or give cumulative_um"
             return
     with np.errstate(all="ignore"):
-        found = counted_deviations(cumulative, single)
+        found = counted_deviations(table)
     worst = found[np.argmax(np.abs(found))]
     # A tenth of the module in micrometres.
     if not abs(worst) <= 100.0 * module_mm:
@@ -79,20 +73,20 @@ def _unsound(
 
 
 @reads("pitch_error", "integration")
-def _flow_maps_know_the_sine(config: Configuration) -> Iterator[Fault]:
+def _flow_maps_know_the_sine(config: Tables) -> Iterator[Fault]:
     if _kind(config) != "sine" and config.integration.method == "flow_map":
         rule = 'cannot be computed with integration.method = "flow_map"'
         yield Fault("pitch_error.kind", rule, 'set integration.method = "rk4"', _kind(config))
 
 
 @reads("pitch_error", "groups")
-def _keys_belong_to_the_kind(config: Configuration) -> Iterator[Fault]:
+def _keys_belong_to_the_kind(config: Tables) -> Iterator[Fault]:
     kind, of_a_sine = _kind(config), ("pitch_error_amplitude", "pitch_error_phase_deg")
     own = SineError if config.pitch_error is None else type(config.pitch_error)
-    swept = {f"{table}.parameter": sweep.parameter for table, sweep in config.sweeps.items()}
-    given = {f"groups.{name}": name for name in config.groups.given()}
+    named = {f"groups.{name}": name for name in config.groups.given()}
+    named |= {f"{table}.parameter": sweep.parameter for table, sweep in config.sweeps.items()}
     rule = f'has no meaning with pitch_error.kind = "{kind}"'
-    for key, name in (given | swept).items():
+    for key, name in named.items():
         table, _, field = name.partition(".")
         if name in of_a_sine and kind != "sine":
             yield Fault(key, rule, "drop it: the teeth decide, and pitch_error multiplies them")
@@ -100,7 +94,7 @@ def _keys_belong_to_the_kind(config: Configuration) -> Iterator[Fault]:
             yield Fault(key, rule, "choose another pitch_error.kind, or sweep pitch_error", name)
 
 
-def grade_faults(config: Configuration, swept: Mapping[str, FloatArray]) -> Iterator[Fault]:
+def grade_faults(config: Tables, swept: Mapping[str, FloatArray]) -> Iterator[Fault]:
     """Yield what is wrong with the grades of the lanes; ``swept`` has both ends of every sweep."""
     if not isinstance(config.pitch_error, GradeError):
         return

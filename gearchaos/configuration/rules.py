@@ -1,19 +1,16 @@
 """Rules that tie several keys of a configuration together, but for those of the sweeps."""
 
-from __future__ import annotations
-
 import math
 from collections import Counter
-from collections.abc import Callable, Collection, Iterator
-from typing import TYPE_CHECKING, TypeAlias
+from collections.abc import Callable, Iterator
+from functools import partial
+from typing import TypeAlias
 
 from gearchaos.configuration.messages import Fault
 from gearchaos.configuration.run_tables import Start
+from gearchaos.configuration.tables import Tables
 
-if TYPE_CHECKING:
-    from gearchaos.configuration.models import Configuration
-
-Rule: TypeAlias = "Callable[[Configuration], Iterator[Fault]]"
+Rule: TypeAlias = Callable[[Tables], Iterator[Fault]]
 
 RULES: list[tuple[frozenset[str], Rule]] = []
 """Each rule with the tables that it needs free of faults of their own."""
@@ -30,20 +27,18 @@ def reads(*tables: str) -> Callable[[Rule], Rule]:
 
 
 @reads("mesh")
-def _one_damping(config: Configuration) -> Iterator[Fault]:
+def _one_damping(config: Tables) -> Iterator[Fault]:
     ratio, damping = "mesh.damping_ratio", "mesh.damping_N_s_per_m"
-    swept = [sweep.parameter for sweep in config.sweeps.values()]
-    given = config.physical()
+    swept, given = config.swept, config.physical()
     if all(path in swept or given[path] is not None for path in (ratio, damping)):
         rule = f"{ratio} is swept" if ratio in swept else f"{ratio} = {given[ratio]} is given"
         yield Fault(damping, f"{rule} as well", "keep one of the two", given[damping])
 
 
 @reads("mesh")
-def _length_scale_is_known(config: Configuration) -> Iterator[Fault]:
+def _length_scale_is_known(config: Tables) -> Iterator[Fault]:
     scale, backlash = "mesh.length_scale_um", "mesh.half_backlash_um"
-    swept = {sweep.parameter: f"{table}.parameter" for table, sweep in config.sweeps.items()}
-    given = config.physical()
+    swept, given = config.swept, config.physical()
     if given[scale] is not None or scale in swept:
         return
     if given[backlash] == 0:
@@ -54,7 +49,7 @@ def _length_scale_is_known(config: Configuration) -> Iterator[Fault]:
 
 
 @reads("mesh")
-def _shares_fill_the_period(config: Configuration) -> Iterator[Fault]:
+def _shares_fill_the_period(config: Tables) -> Iterator[Fault]:
     shares = _shares(config)
     if shares is None:
         return
@@ -73,14 +68,14 @@ def _shares_fill_the_period(config: Configuration) -> Iterator[Fault]:
 
 
 @reads("mesh", "pair")
-def _contact_ratio_is_known(config: Configuration) -> Iterator[Fault]:
+def _contact_ratio_is_known(config: Tables) -> Iterator[Fault]:
     if config.pair is None and _shares(config) == []:
         rule = "a trapezoid without shares takes its shape from the contact ratio of [pair]"
         remedy = "give [pair], or rise, top, fall, bottom and half_height"
         yield Fault("mesh.stiffness", rule, remedy)
 
 
-def _shares(config: Configuration) -> list[float] | None:
+def _shares(config: Tables) -> list[float] | None:
     """Return the shares that are given of a trapezoid; None where there is no trapezoid."""
     given = config.physical()
     if given["mesh.stiffness.shape"] != "trapezoid":
@@ -89,43 +84,31 @@ def _shares(config: Configuration) -> list[float] | None:
     return [share for share in shares if share is not None]
 
 
-@reads("scene")
-def _effects_are_named_once(config: Configuration) -> Iterator[Fault]:
-    yield from _duplicates("scene.effects", config.scene.effects)
-
-
-@reads("outputs")
-def _section_states_are_named_once(config: Configuration) -> Iterator[Fault]:
-    yield from _duplicates("outputs.section", config.outputs.section)
-
-
-def _duplicates(key: str, names: tuple[str, ...]) -> Iterator[Fault]:
+def _named_once(table: str, key: str, config: Tables) -> Iterator[Fault]:
+    names = getattr(getattr(config, table), key)
     for name, times in Counter(names).items():
         if times > 1:
-            yield Fault(key, f"names `{name}` {times} times", "name it once", names)
+            yield Fault(f"{table}.{key}", f"names `{name}` {times} times", "name it once", names)
 
 
-@reads("scene", "outputs")
-def _section_states_exist(config: Configuration) -> Iterator[Fault]:
-    yield from _foreign("outputs.section", config.outputs.section, config)
-
-
-@reads("scene", "start")
-def _start_states_exist(config: Configuration) -> Iterator[Fault]:
-    yield from _foreign("start.state", config.start.state, config)
-
-
-def _foreign(key: str, names: Collection[str], config: Configuration) -> Iterator[Fault]:
-    states = config.scene.states
+def _states_exist(table: str, key: str, config: Tables) -> Iterator[Fault]:
+    names, states = getattr(getattr(config, table), key), config.scene.states
     for name in dict.fromkeys(names):
         if name not in states:
             effect = "transverse" if name.startswith(("delta_1", "delta_2")) else "axial"
             remedy = f'add "{effect}" to scene.effects, which now give {", ".join(states)}'
-            yield Fault(key, f"the scene has no state `{name}`", remedy, tuple(names))
+            rule = f"the scene has no state `{name}`"
+            yield Fault(f"{table}.{key}", rule, remedy, tuple(names))
+
+
+reads("scene")(partial(_named_once, "scene", "effects"))
+reads("outputs")(partial(_named_once, "outputs", "section"))
+reads("scene", "outputs")(partial(_states_exist, "outputs", "section"))
+reads("scene", "start")(partial(_states_exist, "start", "state"))
 
 
 @reads("start")
-def _start_keys_belong_to_the_kind(config: Configuration) -> Iterator[Fault]:
+def _start_keys_belong_to_the_kind(config: Tables) -> Iterator[Fault]:
     start, default = config.start, Start()
     if start.kind == "given" and not start.state:
         remedy = "such as state = { delta_5 = 1.0 }"
@@ -139,7 +122,7 @@ def _start_keys_belong_to_the_kind(config: Configuration) -> Iterator[Fault]:
 
 
 @reads("outputs", "integration")
-def _section_points_are_recorded(config: Configuration) -> Iterator[Fault]:
+def _section_points_are_recorded(config: Tables) -> Iterator[Fault]:
     points, periods = config.outputs.section_points, config.integration.recorded_periods
     if points > periods:
         rule = f"must be at most integration.recorded_periods = {periods}"
@@ -148,7 +131,7 @@ def _section_points_are_recorded(config: Configuration) -> Iterator[Fault]:
 
 
 @reads("outputs", "start")
-def _exponents_are_not_carried(config: Configuration) -> Iterator[Fault]:
+def _exponents_are_not_carried(config: Tables) -> Iterator[Fault]:
     if config.outputs.exponents and config.start.carry != "none":
         rule = f'cannot be computed with start.carry = "{config.start.carry}"'
         remedy = 'set start.carry = "none", or compute the exponents in a sweep of its own'
@@ -156,14 +139,14 @@ def _exponents_are_not_carried(config: Configuration) -> Iterator[Fault]:
 
 
 @reads("integration")
-def _plain_steps_are_those_of_rk4(config: Configuration) -> Iterator[Fault]:
+def _plain_steps_are_those_of_rk4(config: Tables) -> Iterator[Fault]:
     if config.integration.method == "flow_map" and config.integration.crossings == "plain":
         rule = 'has no meaning with integration.method = "flow_map", which resolves every crossing'
         yield Fault("integration.crossings", rule, 'it goes with method = "rk4"', "plain")
 
 
 @reads("outputs", "scene", "integration")
-def _contact_is_told_by_crossings(config: Configuration) -> Iterator[Fault]:
+def _contact_is_told_by_crossings(config: Tables) -> Iterator[Fault]:
     crosses = "backlash" in config.scene.effects and config.integration.crossings == "resolved"
     if config.outputs.contact and not crosses:
         rule = "is told by the crossings of clearance boundaries, and there are none"
@@ -172,7 +155,7 @@ def _contact_is_told_by_crossings(config: Configuration) -> Iterator[Fault]:
 
 
 @reads("outputs", "integration")
-def _errors_are_measured_on_a_section(config: Configuration) -> Iterator[Fault]:
+def _errors_are_measured_on_a_section(config: Tables) -> Iterator[Fault]:
     if config.outputs.section:
         return
     for name in ("tolerance", "error_check"):

@@ -1,10 +1,7 @@
 """Rules of each sweep: its parameter and its values."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,10 +9,8 @@ from gearchaos.configuration.messages import Fault, suggestion
 from gearchaos.configuration.rules import reads
 from gearchaos.configuration.run_tables import MOST_LANES
 from gearchaos.configuration.sweep_values import SWEEPABLE_GROUPS, SWEEPABLE_KEYS
+from gearchaos.configuration.tables import Tables
 from gearchaos.gear.group_table import GROUPS_BY_NAME, LARGEST_VALUE
-
-if TYPE_CHECKING:
-    from gearchaos.configuration.models import Configuration
 
 
 def unknown_parameter(key: str, parameter: str) -> Iterator[Fault]:
@@ -36,13 +31,13 @@ def unknown_parameter(key: str, parameter: str) -> Iterator[Fault]:
 
 
 @reads()
-def _parameter_is_known(config: Configuration) -> Iterator[Fault]:
+def _parameter_is_known(config: Tables) -> Iterator[Fault]:
     for table, sweep in config.sweeps.items():
         yield from unknown_parameter(f"{table}.parameter", sweep.parameter)
 
 
 @reads()
-def _parameters_differ(config: Configuration) -> Iterator[Fault]:
+def _parameters_differ(config: Tables) -> Iterator[Fault]:
     parameters = [sweep.parameter for sweep in config.sweeps.values()]
     if len(set(parameters)) < len(parameters):
         remedy = "sweep another parameter, or drop [second_sweep]"
@@ -51,7 +46,7 @@ def _parameters_differ(config: Configuration) -> Iterator[Fault]:
 
 
 @reads()
-def _values_or_span(config: Configuration) -> Iterator[Fault]:
+def _values_or_span(config: Tables) -> Iterator[Fault]:
     for table, sweep in config.sweeps.items():
         span = {"from": sweep.from_, "to": sweep.to, "count": sweep.count}
         for name, value in span.items():
@@ -64,7 +59,7 @@ def _values_or_span(config: Configuration) -> Iterator[Fault]:
 
 
 @reads()
-def _values_are_distinct(config: Configuration) -> Iterator[Fault]:
+def _values_are_distinct(config: Tables) -> Iterator[Fault]:
     for table, sweep in config.sweeps.items():
         first, last, count = sweep.from_, sweep.to, sweep.count or 0
         if sweep.values is not None:
@@ -84,7 +79,7 @@ def _values_are_distinct(config: Configuration) -> Iterator[Fault]:
 
 
 @reads()
-def _values_are_in_range(config: Configuration) -> Iterator[Fault]:
+def _values_are_in_range(config: Tables) -> Iterator[Fault]:
     for table, sweep in config.sweeps.items():
         known = SWEEPABLE_GROUPS.get(sweep.parameter) or SWEEPABLE_KEYS.get(sweep.parameter)
         named = [("from", sweep.from_), ("to", None if sweep.count == 1 else sweep.to)]
@@ -100,7 +95,7 @@ def _values_are_in_range(config: Configuration) -> Iterator[Fault]:
 
 
 @reads("scene")
-def _swept_effect_is_on(config: Configuration) -> Iterator[Fault]:
+def _swept_effect_is_on(config: Tables) -> Iterator[Fault]:
     for table, sweep in config.sweeps.items():
         row = SWEEPABLE_GROUPS.get(sweep.parameter)
         if row is not None and not row.needed_by(config.scene.effects):
@@ -110,7 +105,7 @@ def _swept_effect_is_on(config: Configuration) -> Iterator[Fault]:
 
 
 @reads("scene", "outputs")
-def _swept_effect_is_kept(config: Configuration) -> Iterator[Fault]:
+def _swept_effect_is_kept(config: Tables) -> Iterator[Fault]:
     for table, sweep in config.sweeps.items():
         row = SWEEPABLE_GROUPS.get(sweep.parameter)
         if row is None or row.needed_by(config.needed_effects):
@@ -122,7 +117,7 @@ def _swept_effect_is_kept(config: Configuration) -> Iterator[Fault]:
 
 
 @reads("start", "pitch_error")
-def _lanes_are_not_too_many(config: Configuration) -> Iterator[Fault]:
+def _lanes_are_not_too_many(config: Tables) -> Iterator[Fault]:
     counts = {f"values of [{table}]": sweep.size for table, sweep in config.sweeps.items()}
     counts["drawn gear pairs"] = getattr(config.pitch_error, "realisations", 1)
     counts["starts"] = config.start.count

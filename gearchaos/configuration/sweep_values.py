@@ -1,21 +1,16 @@
 """The swept values, and the dimensionless groups that follow from them."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 
-from gearchaos.configuration.physical_tables import PHYSICAL_KEYS
 from gearchaos.configuration.run_tables import Sweep
+from gearchaos.configuration.tables import PHYSICAL_KEYS, Tables
 from gearchaos.gear.group_table import GROUPS_BY_NAME
 from gearchaos.gear.groups import Groups, resolve_groups
 from gearchaos.gear.tooth_deviations import REALISATION
-
-if TYPE_CHECKING:
-    from gearchaos.configuration.models import Configuration
 
 FloatArray: TypeAlias = npt.NDArray[np.float64]
 
@@ -45,7 +40,7 @@ def swept_values(sweep: Sweep) -> FloatArray:
     return values
 
 
-def axis_values(config: Configuration) -> dict[str, FloatArray]:
+def axis_values(config: Tables) -> dict[str, FloatArray]:
     """Return the swept values by parameter, in the order of the axes: [second_sweep] first.
 
     Each has the shape (values,); a parameter is in its own unit.
@@ -53,7 +48,7 @@ def axis_values(config: Configuration) -> dict[str, FloatArray]:
     return {one.parameter: swept_values(one) for one in reversed(config.sweeps.values())}
 
 
-def groups_at(config: Configuration, values: Mapping[str, npt.ArrayLike]) -> Groups:
+def groups_at(config: Tables, values: Mapping[str, npt.ArrayLike]) -> Groups:
     """Resolve the groups for given values of parameters.
 
     ``values``, by parameter and in its unit, are arrays that broadcast against each other. A group
@@ -76,7 +71,7 @@ def groups_at(config: Configuration, values: Mapping[str, npt.ArrayLike]) -> Gro
     return resolve_groups(physical, given)
 
 
-def physical_at(config: Configuration, values: Mapping[str, npt.ArrayLike]) -> dict[str, Any]:
+def physical_at(config: Tables, values: Mapping[str, npt.ArrayLike]) -> dict[str, Any]:
     """Return every key of the physical tables by its path, with the values that are swept."""
     swept = {
         SWEEPABLE_KEYS[parameter].path: np.asarray(value, dtype=np.float64)

@@ -5,9 +5,7 @@ with a tangent vector of its own; the copies see the same motion bit for bit. Le
 tangent vectors are the Euclidean ones of the states of eq. 13.
 """
 
-from __future__ import annotations
-
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 import numpy as np
 from gearchaos_kernels import Plan, System, integrate, jacobian
@@ -27,24 +25,16 @@ class Exponents(NamedTuple):
     values: Floats
     standard_errors: Floats
 
-    def given(self, exact: Floats) -> Exponents:
+    def given(self, exact: Floats) -> Self:
         """Return them with all of a lane replaced of which the first one is known exactly.
 
         ``exact`` (lanes, states): not a number where none is known, or where rounding hides it.
         """
         known = np.broadcast_to(np.isfinite(exact[:, :1]), exact.shape)
-        return Exponents(
+        return type(self)(
             np.where(known, exact, self.values),
             np.where(known, np.where(np.isfinite(exact), 0.0, np.nan), self.standard_errors),
         )
-
-
-class _Carried(NamedTuple):
-    """End states (lanes, states), unit tangent vectors as columns, logarithms of their growth."""
-
-    end_state: Floats
-    vectors: Floats
-    growth: Floats
 
 
 def exponents(system: System, start: Floats, plan: Plan) -> Exponents:
@@ -115,13 +105,18 @@ def period_jacobian(system: System, start: Floats, plan: Plan) -> Floats:
         plan = plan._replace(first_period=plan.first_period + plan.transient_periods)
     lanes, states = start.shape
     frame = np.broadcast_to(np.eye(states), (lanes, states, states))
-    carried = _carry(system, start, frame, plan._replace(transient_periods=0))
-    lengths: Floats = np.exp(np.sum(carried.growth, axis=2))
-    return carried.vectors * lengths[:, np.newaxis, :]
+    _, vectors, growth = _carry(system, start, frame, plan._replace(transient_periods=0))
+    lengths: Floats = np.exp(np.sum(growth, axis=2))
+    return vectors * lengths[:, np.newaxis, :]
 
 
-def _carry(system: System, start: Floats, frame: Floats, plan: Plan) -> _Carried:
-    """Integrate every lane once for every column of its frame (lanes, states, states)."""
+def _carry(
+    system: System, start: Floats, frame: Floats, plan: Plan
+) -> tuple[Floats, Floats, Floats]:
+    """Integrate every lane once for every column of its frame (lanes, states, states).
+
+    Return end states (lanes, states), unit tangent vectors as columns, logarithms of their growth.
+    """
     lanes, states, _ = frame.shape
     outcome = integrate(
         system.repeated(states),
@@ -130,11 +125,8 @@ def _carry(system: System, start: Floats, frame: Floats, plan: Plan) -> _Carried
         tangent_start=frame.transpose(0, 2, 1).reshape(-1, states),
     )
     assert outcome.growth is not None
-    return _Carried(
-        outcome.end_state[::states],
-        outcome.end_tangent.reshape(lanes, states, states).transpose(0, 2, 1),
-        outcome.growth.reshape(lanes, states, -1),
-    )
+    vectors = outcome.end_tangent.reshape(lanes, states, states).transpose(0, 2, 1)
+    return outcome.end_state[::states], vectors, outcome.growth.reshape(lanes, states, -1)
 
 
 def _first_frame(states: int) -> Floats:

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from gearchaos.dynamics.orbits import Orbits, polish
 
 Floats = NDArray[np.float64]
+
 Complex = NDArray[np.complex128]
 
 LONGEST_STEP = 1.0 / 16.0
@@ -48,16 +49,52 @@ STABILITY_LOSS_TEXTS = {
 }
 
 
+class Orbit(NamedTuple):
+    """A periodic orbit.
+
+    ``period`` in excitation periods; ``point`` (states,) at its beginning; ``multipliers``
+    (states,): the Floquet multipliers, largest modulus first; ``exponent``: the largest Lyapunov
+    exponent per unit of tau; ``residual``: distance after one period, relative to the scale of each
+    coordinate.
+    """
+
+    period: int
+    point: Floats
+    multipliers: NDArray[np.complex128]
+    exponent: float
+    residual: float
+
+    @property
+    def stable(self) -> bool:
+        """Whether all multipliers lie inside the unit circle."""
+        return bool(abs(self.multipliers[0]) < 1.0)
+
+
+class Branch(NamedTuple):
+    """How far an orbit goes along a parameter.
+
+    ``value``, ``orbit``: the last value at which it is stable, and the orbit there; ``beyond``: the
+    first value at which it is unstable or not found, the end of the way if it stays stable;
+    ``loss``, ``text``: how it loses stability; ``multiplier``: the one that tells.
+    """
+
+    value: float
+    orbit: Orbit
+    beyond: float
+    loss: StabilityLoss
+    text: str
+    multiplier: complex
+
+
 class Losses(NamedTuple):
     """How the orbits of some lanes lose stability.
 
-    ``kind`` (lanes,) of `StabilityLoss`; ``multiplier`` (lanes,), complex, and ``modulus``
-    (lanes,): the one that tells, of a pair that with the positive imaginary part.
+    ``kind`` (lanes,) of `StabilityLoss`; ``multiplier`` (lanes,), complex: the one that tells, of a
+    pair that with the positive imaginary part.
     """
 
     kind: NDArray[np.uint8]
     multiplier: Complex
-    modulus: Floats
 
 
 class Followed(NamedTuple):
@@ -108,7 +145,7 @@ def loss_of_stability(stable: Complex, beyond: Complex) -> Losses:
         StabilityLoss.NEIMARK_SACKER,
     ).astype(np.uint8)
     multiplier[kind == StabilityLoss.NOT_FOLLOWED] = np.nan
-    return Losses(kind, multiplier, np.abs(multiplier))
+    return Losses(kind, multiplier)
 
 
 def follow(

@@ -81,19 +81,6 @@ def polish(
     return found
 
 
-def orbit_exponent(
-    multipliers: NDArray[np.complex128], period: NDArray[np.int32], excitation_period: Floats
-) -> Floats:
-    """Return the largest Lyapunov exponent of `Orbits`, per unit of tau, shape (lanes,).
-
-    ``period`` (lanes,) in excitation periods, ``excitation_period`` (lanes,) in units of tau; not a
-    number where the multipliers are not.
-    """
-    duration = np.maximum(period, 1) * excitation_period
-    exponent: Floats = np.log(np.abs(multipliers[:, 0])) / duration
-    return exponent
-
-
 def _polish(system: System, guess: Floats, plan: Plan) -> Orbits:
     """Polish lanes of one period."""
     lanes = np.arange(guess.shape[0])

@@ -36,13 +36,8 @@ def system_of(
 ) -> System:
     """Return the system of some lanes.
 
-    Parameters
-    ----------
-    config : Configuration
-    values : mapping of str to ndarray, shape (lanes,)
-        Value of each swept parameter in every lane, and the number of its drawn gear pair.
-    effects : collection of str, optional
-        Effects that exist; by default those of the scene.
+    ``values``: that of each swept parameter in every lane, (lanes,), and the number of its drawn
+    gear pair; ``effects``: those that exist, by default those of the scene.
     """
     found = groups_at(config, values)
     lanes = np.broadcast_shapes(*(np.shape(value) for value in values.values()))
@@ -80,8 +75,7 @@ def _teeth(
 ) -> Teeth | None:
     """Return the errors of the teeth of some lanes, None where the pitch error is a sine."""
     error = config.pitch_error
-    found = tooth_deviations(error, config.pair, values)
-    if found is None or error is None or error.kind == "sine":
+    if error is None or error.kind == "sine":
         return None
     pair = Quantities(physical_at(config, values)).pair
     ratios = [np.unique(r) for r in (pair.transverse_contact_ratio, pair.overlap_contact_ratio)]
@@ -92,4 +86,4 @@ def _teeth(
         )
     transverse, overlap = (float(ratio[0]) for ratio in ratios)
     shares = contact_shares(transverse, overlap, error.smoothing, fundamental)
-    return Teeth(*found, *shares)
+    return Teeth(*tooth_deviations(error, config.pair, values), *shares)

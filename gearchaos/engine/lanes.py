@@ -12,7 +12,6 @@ from gearchaos.configuration import Configuration, axis_values, swept_values
 from gearchaos.configuration.run_tables import states_of
 from gearchaos.configuration.sweep_values import SWEEPABLE_GROUPS, SWEEPABLE_KEYS, groups_at
 from gearchaos.dynamics.systems import system_of
-from gearchaos.engine.starts import start_states
 from gearchaos.gear.group_table import GROUP_TABLE
 from gearchaos.gear.tooth_deviations import REALISATION
 from gearchaos.results.result_file import Parameter
@@ -20,6 +19,11 @@ from gearchaos.results.variables import HARMONIC, Axis, axis_name, pair_axis, st
 
 Floats = NDArray[np.float64]
 Numbers = NDArray[np.intp]
+
+_DRAWS_PER_LANE = 12
+"""Random numbers set aside per lane: a multiple of the four that one Philox counter yields."""
+
+_PHILOX_WIDTH = 4
 
 
 class Lanes:
@@ -137,3 +141,38 @@ def axis_of(parameter: str, values: Floats) -> Axis:
         return Axis(name, row.units, row.long_name, row.mathtext, values)
     key = SWEEPABLE_KEYS[parameter]
     return Axis(name, key.units or "1", key.wording, "", values)
+
+
+def start_states(config: Configuration, system: System, numbers: Numbers) -> Floats:
+    """Return the start states, shape (lanes, states), of lanes with this system.
+
+    ``numbers`` (lanes,): those that they have in the whole sweep, ascending: the random state of a
+    lane depends on its number and the seed alone.
+    """
+    start = np.zeros((system.lanes, len(system.states)))
+    kind = config.start.kind
+    if kind == "given":
+        for name, value in config.start.state.items():
+            # What starts in a state that nothing kept depends on is not computed.
+            if name in system.states:
+                start[:, system.states.index(name)] = value
+    elif kind == "contact":
+        start[:, system.states.index("delta_5")] = _contact(system)
+    elif kind == "random":
+        first = int(numbers[0])
+        generator = np.random.Philox(config.start.seed)
+        generator.advance(first * (_DRAWS_PER_LANE // _PHILOX_WIDTH))
+        shape = (int(numbers[-1]) - first + 1, _DRAWS_PER_LANE)
+        draws = np.random.Generator(generator).uniform(-1.0, 1.0, shape)[numbers - first]
+        columns = [config.scene.states.index(name) for name in system.states]
+        start[:] = config.start.spread * draws[:, columns]
+    return start
+
+
+def _contact(system: System) -> Floats:
+    """Clearance taken up towards the load, and the deflection f_n of a mesh of stiffness 1."""
+    groups = system.groups
+    clearance = np.zeros(system.lanes)
+    if system.effects.backlash:
+        clearance = groups.half_backlash * np.cos(groups.base_helix_angle)
+    return np.copysign(clearance, groups.load) + groups.load

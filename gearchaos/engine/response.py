@@ -83,10 +83,7 @@ def continued(lane: Result, name: str) -> Configuration:
 def prepared(config: Configuration, periods: int) -> Simulation:
     """Return the simulation of a response, of which the step may still be chosen.
 
-    Raises
-    ------
-    ConfigurationError
-        If fewer periods are recorded.
+    Raises ConfigurationError if fewer periods are recorded.
     """
     recorded = config.integration.recorded_periods
     if not 1 <= periods <= recorded:
@@ -100,21 +97,10 @@ def prepared(config: Configuration, periods: int) -> Simulation:
 
 
 def compute_response(simulation: Simulation, periods: int, text: str) -> Result:
-    """Compute all lanes.
+    """Compute all lanes of a simulation from `prepared`; keep the last so many mesh periods.
 
-    Parameters
-    ----------
-    simulation : Simulation
-        From `prepared`.
-    periods : int
-        Mesh periods at the end of the recorded ones that are kept.
-    text : str
-        The configuration as it was written.
-
-    Raises
-    ------
-    ConfigurationError
-        If the motion does not fit into memory.
+    ``text``: the configuration as it was written. Raises ConfigurationError if the motion does not
+    fit into memory.
     """
     _check_size(simulation, periods)
     began = time.monotonic()

@@ -66,10 +66,8 @@ class Candidate(NamedTuple):
 def stable_steps(lanes: Lanes, steps: int) -> tuple[int, str]:
     """Return a number of steps with which the method does not blow up, and what to say of it.
 
-    Raises
-    ------
-    ConfigurationError
-        If so many steps are unstable in some lanes and may not be raised, or not far enough.
+    Raises ConfigurationError if so many steps are unstable in some lanes and may not be raised, or
+    not far enough.
     """
     limits = list(_limits(lanes, steps))
     if not limits:
@@ -212,12 +210,8 @@ def choose_steps(
 
     ``solution`` integrates the pilot lanes with so many steps per period, from one common state;
     ``tolerance``: of section and exponent; ``source``: what a message calls the configuration;
-    ``finest``: steps per period with which nothing is compared any more.
-
-    Raises
-    ------
-    ConfigurationError
-        If the tolerance is not reached, with what was reached, or if no lane moves periodically.
+    ``finest``: steps per period with which nothing is compared any more. Raises ConfigurationError
+    if the tolerance is not reached, with what was reached, or if no lane moves periodically.
     """
     found: dict[int, Solution] = {}
     candidates: list[Candidate] = []

@@ -5,8 +5,6 @@ and shrinks again, until the pair has been in mesh for their sum, in mesh period
 together give the stiffness of Pan 2021, eqs 15-18.
 """
 
-from typing import NamedTuple
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -24,18 +22,13 @@ _SAMPLES = 64
 """Places within a cell over which a share is averaged."""
 
 
-class ContactShares(NamedTuple):
-    """Mean shares (cells,) of a pair, so many cells a mesh period, from its entry (a phase) on."""
-
-    share: Floats
-    cells_per_period: int
-    entry: float
-
-
 def contact_shares(
     transverse: float, overlap: float, smoothing: float, fundamental: complex = 0.0
-) -> ContactShares:
+) -> tuple[Floats, int, float]:
     """Return the share of a tooth pair in the mesh force while it is in mesh.
+
+    Its mean shares (cells,) from its entry on, the cells of a mesh period, and the mesh
+    phase, in periods, at which it enters.
 
     Parameters
     ----------
@@ -67,7 +60,7 @@ def contact_shares(
     own = complex(np.mean(lines.sum(axis=0) * np.exp(-2j * np.pi * samples)))
     turned = fundamental * own.conjugate()
     entry = -np.angle(turned) / (2.0 * np.pi) % 1.0 if abs(turned) > 1e-9 else 0.0
-    return ContactShares(shares, per_period, float(entry))
+    return shares, per_period, float(entry)
 
 
 def _contact_line(place: Floats, transverse: float, overlap: float) -> Floats:
@@ -75,5 +68,4 @@ def _contact_line(place: Floats, transverse: float, overlap: float) -> Floats:
     if overlap == 0.0:
         return np.where(place < transverse, 1.0, 0.0)
     left = transverse + overlap - place
-    longest = min(transverse, overlap)
-    return np.clip(np.minimum(place, left), 0.0, longest)
+    return np.clip(np.minimum(place, left), 0.0, min(transverse, overlap))

@@ -4,25 +4,60 @@ Both forms give kappa = k / k_m, the stiffness relative to its mean, at a phase 
 periods. The stiffness follows the total length of the contact lines (Pan 2021, eq. 18).
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TypeAlias
+from typing import Self, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 
 FloatArray: TypeAlias = npt.NDArray[np.float64]
 
+
 DEFAULT_HARMONICS = 6
 """Harmonics of a trapezoid where their number is not given, as in Pan 2021, Table 2."""
 
 
+@dataclass(frozen=True, eq=False)
+class FourierStiffness:
+    """Stiffness as a Fourier series about its mean (Pan 2021, eq. 19).
+
+    kappa = 1 + sum over n of (cosine[n-1] cos n phi + sine[n-1] sin n phi), with phi the phase of
+    the mesh in rad.
+
+    Parameters
+    ----------
+    cosine, sine : sequence of float, shape (harmonics,)
+        Harmonics n = 1, 2, ... relative to k_m; the shorter one continues with zeros.
+    """
+
+    cosine: Sequence[float] | FloatArray = ()
+    sine: Sequence[float] | FloatArray = ()
+
+    def coefficients(self) -> npt.NDArray[np.complex128]:
+        """Return cosine - i sine, the coefficients of exp(i n phi), shape (harmonics,).
+
+        kappa = 1 + Re(sum of coefficient * exp(i n phi)).
+        """
+        result = np.zeros(max(len(self.cosine), len(self.sine)), dtype=np.complex128)
+        result.real[: len(self.cosine)] = self.cosine
+        result.imag[: len(self.sine)] = -np.asarray(self.sine, dtype=np.float64)
+        return result
+
+    def table(self, points: int) -> FloatArray:
+        """Return kappa at phases 0, 1/points, ..., shape (points,)."""
+        coefficients = self.coefficients()
+        n = np.arange(1, coefficients.size + 1)
+        # Whole numbers modulo points keep the phase exact for high harmonics.
+        turns = np.outer(np.arange(points), n) % points / points
+        variation: FloatArray = (np.exp(2j * np.pi * turns) @ coefficients).real
+        return 1.0 + variation
+
+
 @dataclass(frozen=True)
 class TrapezoidalStiffness:
-    """Stiffness that rises linearly, stays, falls, stays (Pan 2021, eqs 15-18).
+    """Stiffness that rises linearly from phase 0 on, stays, falls, stays (Pan 2021, eqs 15-18).
 
     Parameters
     ----------
@@ -30,8 +65,6 @@ class TrapezoidalStiffness:
         Fractions of the mesh period, which add up to one. A rise of zero is a jump.
     half_height : float
         Half of the difference between top and bottom, relative to k_m.
-    start : float
-        Phase at which the rise begins, in mesh periods.
 
     Raises
     ------
@@ -44,7 +77,6 @@ class TrapezoidalStiffness:
     fall: float
     bottom: float
     half_height: float
-    start: float = 0.0
 
     def __post_init__(self) -> None:
         """Refuse fractions that do not make up a mesh period."""
@@ -56,7 +88,7 @@ class TrapezoidalStiffness:
             )
 
     @classmethod
-    def from_contact_ratios(cls, transverse: float, overlap: float) -> TrapezoidalStiffness:
+    def from_contact_ratios(cls, transverse: float, overlap: float) -> Self:
         """Stiffness proportional to the total length of a helical pair's contact lines.
 
         Measured along the path of contact in base pitches, a tooth's contact line spans a window
@@ -95,7 +127,7 @@ class TrapezoidalStiffness:
     def table(self, points: int) -> FloatArray:
         """Return kappa at phases 0, 1/points, ..., shape (points,); after the jump at a jump."""
         ends_of_parts = np.cumsum([0.0, self.rise, self.top, self.fall])
-        phases = (np.arange(points) / points - self.start) % 1.0
+        phases = np.arange(points) / points
         shape = np.interp(phases, [*ends_of_parts, 1.0], [-1.0, 1.0, 1.0, -1.0, -1.0])
         mean_of_shape = self.top - self.bottom
         return 1.0 + self.half_height * (shape - mean_of_shape)
@@ -107,47 +139,10 @@ class TrapezoidalStiffness:
         coefficients are sinc functions; dividing them by 2 pi i n integrates.
         """
         n = np.arange(1, harmonics + 1)
-        middle_of_rise = self.start + self.rise / 2.0
-        middle_of_fall = self.start + self.rise + self.top + self.fall / 2.0
-        up = np.exp(-2j * np.pi * n * middle_of_rise) * np.sinc(n * self.rise)
+        middle_of_fall = self.rise + self.top + self.fall / 2.0
+        up = np.exp(-1j * np.pi * n * self.rise) * np.sinc(n * self.rise)
         down = np.exp(-2j * np.pi * n * middle_of_fall) * np.sinc(n * self.fall)
         coefficients = 2.0 * self.half_height * (up - down) / (1j * np.pi * n)
         return FourierStiffness(
             tuple(coefficients.real.tolist()), tuple((-coefficients.imag).tolist())
         )
-
-
-@dataclass(frozen=True, eq=False)
-class FourierStiffness:
-    """Stiffness as a Fourier series about its mean (Pan 2021, eq. 19).
-
-    kappa = 1 + sum over n of (cosine[n-1] cos n phi + sine[n-1] sin n phi), with phi the phase of
-    the mesh in rad.
-
-    Parameters
-    ----------
-    cosine, sine : sequence of float, shape (harmonics,)
-        Harmonics n = 1, 2, ... relative to k_m; the shorter one continues with zeros.
-    """
-
-    cosine: Sequence[float] | FloatArray = ()
-    sine: Sequence[float] | FloatArray = ()
-
-    def coefficients(self) -> npt.NDArray[np.complex128]:
-        """Return cosine - i sine, the coefficients of exp(i n phi), shape (harmonics,).
-
-        kappa = 1 + Re(sum of coefficient * exp(i n phi)).
-        """
-        result = np.zeros(max(len(self.cosine), len(self.sine)), dtype=np.complex128)
-        result.real[: len(self.cosine)] = self.cosine
-        result.imag[: len(self.sine)] = -np.asarray(self.sine, dtype=np.float64)
-        return result
-
-    def table(self, points: int) -> FloatArray:
-        """Return kappa at phases 0, 1/points, ..., shape (points,)."""
-        coefficients = self.coefficients()
-        n = np.arange(1, coefficients.size + 1)
-        # Whole numbers modulo points keep the phase exact for high harmonics.
-        turns = np.outer(np.arange(points), n) % points / points
-        variation: FloatArray = (np.exp(2j * np.pi * turns) @ coefficients).real
-        return 1.0 + variation

@@ -1,18 +1,20 @@
-"""Cumulative pitch deviations of both gears, in the order in which the teeth come into mesh."""
+"""Cumulative pitch deviations of both gears, listed or drawn, as teeth come into mesh."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 
-from gearchaos.gear.drawn_gears import drawn_gears
 from gearchaos.iso1328 import cumulative_pitch_um, single_pitch_um
 
 FloatArray: TypeAlias = npt.NDArray[np.float64]
 
 REALISATION = "realisation"
 """Name under which the values of lanes hold the number of the drawn gear pair."""
+
+_TINY = 1e-300
+"""Keeps the deviations of a single tooth, which are zero, from being divided by zero."""
 
 
 class Deviations(NamedTuple):
@@ -29,18 +31,14 @@ class Deviations(NamedTuple):
     profile: npt.NDArray[np.intp]
 
 
-def tooth_deviations(
-    error: Any, pair: Any, values: Mapping[str, npt.ArrayLike]
-) -> Deviations | None:
-    """Return the deviations of some lanes, None where the pitch error is a sine.
+def tooth_deviations(error: Any, pair: Any, values: Mapping[str, npt.ArrayLike]) -> Deviations:
+    """Return the deviations of some lanes.
 
     ``error``, ``pair``: the tables ``[pitch_error]`` and ``[pair]`` of a configuration; ``values``:
     those of swept parameters in every lane, which broadcast against each other, and the numbers of
     drawn gear pairs as `REALISATION`. Only profiles that occur are made. Raises ValueError if a
     grade, module or diameter is outside the ranges of ISO 1328-1.
     """
-    if error is None or error.kind == "sine":
-        return None
     lanes = np.broadcast_shapes(*map(np.shape, values.values()))
     if error.kind == "teeth":
         driving, driven = listed_deviations(error.driving), listed_deviations(error.driven)
@@ -75,23 +73,72 @@ def listed_deviations(gear: Any) -> FloatArray:
     """
     if gear is None:
         return np.zeros((1, 1))
-    deviations = counted_deviations(gear.cumulative_um, gear.single_um)
+    deviations = counted_deviations(gear)
     if gear.counted == "with_rotation":
         return np.roll(deviations[::-1], 1)[np.newaxis]
     return 0.0 - deviations[np.newaxis]
 
 
-def counted_deviations(
-    cumulative: Sequence[float] | None, single: Sequence[float] | None
-) -> FloatArray:
-    """Return cumulative deviations (teeth,) relative to tooth 0, as they were counted.
+def counted_deviations(gear: Any) -> FloatArray:
+    """Return cumulative deviations (teeth,) of a table relative to tooth 0, as they were counted.
 
     The single one of tooth k is that of the pitch from tooth k - 1 to it; what is left of their
     sum is spread evenly over all teeth.
     """
-    given = single if cumulative is None else cumulative
-    deviations: FloatArray = np.array(given, dtype=np.float64)
-    if cumulative is None:
+    deviations: FloatArray = np.array(gear.cumulative_um or gear.single_um, dtype=np.float64)
+    if gear.cumulative_um is None:
         deviations = np.cumsum(deviations - np.mean(deviations))
     deviations -= deviations[0]
     return deviations
+
+
+def drawn_gears(
+    numbers: npt.ArrayLike,
+    seed: int,
+    gear: int,
+    teeth: int,
+    single_um: npt.ArrayLike,
+    cumulative_um: npt.ArrayLike,
+    eccentricity: npt.ArrayLike = 0.5,
+) -> FloatArray:
+    """Draw cumulative pitch deviations, shape (realisations, teeth), in um, 0 on tooth 0.
+
+    The single deviations are independent and normal, made to sum to zero, and an eccentricity of
+    random phase is added. All is scaled until the largest single deviation or the range of the
+    cumulative ones is at its limit: the worst gear of its form that still passes.
+
+    Parameters
+    ----------
+    numbers, seed, gear : array_like of int, shape (realisations,), and int
+        A gear depends on its number, the seed and whether it drives (0) or is driven (1) alone, and
+        not on the machine.
+    teeth : int
+    single_um, cumulative_um, eccentricity : array_like, shape (realisations,) or ()
+        Limits of the single deviations' amount and of the cumulative ones' range, in um; share of
+        the eccentricity in the range, from 0 to 1.
+    """
+    numbers, single, range_, share = (
+        np.asarray(value)[..., np.newaxis]
+        for value in np.broadcast_arrays(numbers, single_um, cumulative_um, eccentricity)
+    )
+    # Every gear has a counter of its own; the last word keeps it apart from random start states.
+    counters = [[0, 0, int(number), 1 + gear] for number in numbers[:, 0]]
+    bits = (np.random.Philox(seed, counter=counter) for counter in counters)
+    uniform = np.array([np.random.Generator(one).random(2 * teeth + 1) for one in bits])
+    turns, phase = uniform[:, teeth:-1], uniform[:, -1:]
+    normal = np.sqrt(-2.0 * np.log1p(-uniform[:, :teeth])) * np.cos(2.0 * np.pi * turns)
+    around = np.cos(2.0 * np.pi * (phase + np.arange(teeth) / teeth))
+    random = np.cumsum(_exact(normal), axis=1)
+    random -= random[:, -1:] * (np.arange(1, teeth + 1) / teeth)
+    form = (1.0 - share) * random / (np.ptp(random, axis=1, keepdims=True) + _TINY)
+    form += share * _exact(around) / 2.0
+    steps = np.abs(form - np.roll(form, 1, axis=1)).max(axis=1, keepdims=True)
+    spread = np.ptp(form, axis=1, keepdims=True)
+    scale = np.minimum(single / (steps + _TINY), range_ / (spread + _TINY))
+    drawn: FloatArray = np.round(scale * (form - form[:, :1]), 6)
+    return drawn
+
+
+def _exact(values: FloatArray) -> FloatArray:
+    """Round where machines may differ, to a grid on which sums are exact in any order."""
+    return np.rint(values * 2.0**20) / 2.0**20

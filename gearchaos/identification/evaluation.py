@@ -12,7 +12,7 @@ from gearchaos.configuration import Configuration
 from gearchaos.configuration.run_tables import states_of
 from gearchaos.dynamics.stability import stability_limit
 from gearchaos.dynamics.systems import plan_of, system_of
-from gearchaos.engine.starts import start_states
+from gearchaos.engine.lanes import start_states
 from gearchaos.errors import ConfigurationError
 from gearchaos.records.lyapunov import largest_exponent
 from gearchaos.records.period import return_distances

@@ -12,8 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gearchaos.configuration import Configuration
-from gearchaos.dynamics.following import StabilityLoss
-from gearchaos.dynamics.orbit import Orbit
+from gearchaos.dynamics.following import Orbit, StabilityLoss
 from gearchaos.engine.running import run
 from gearchaos.results.result import Result
 from gearchaos.system import System

@@ -1,8 +1,6 @@
 """What kind of motion a lane has come to: periodic, quasi-periodic, chaotic, or not to be told."""
 
-from __future__ import annotations
-
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +10,7 @@ from gearchaos.records.lyapunov import largest_exponent
 from gearchaos.records.period import POINTS_NEEDED, period_of, return_distances
 
 Floats = NDArray[np.float64]
+
 Mask = NDArray[np.bool_]
 
 PERIODIC, QUASI_PERIODIC, CHAOTIC, UNRESOLVED, DIVERGED, GROWS = range(6)
@@ -74,10 +73,10 @@ class Labels(NamedTuple):
     return_distance: Floats
     bands: NDArray[np.int32]
 
-    def of(self, lanes: NDArray[np.intp]) -> Labels:
+    def of(self, lanes: NDArray[np.intp]) -> Self:
         """Return the labels of some lanes."""
         some: Any = (label[lanes] for label in self)
-        return Labels(*some)
+        return type(self)(*some)
 
 
 def label(record: Record) -> Labels:

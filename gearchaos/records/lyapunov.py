@@ -47,12 +47,8 @@ def largest_exponent(growth: Floats, period: Floats) -> tuple[Floats, Floats]:
 
 
 def _weighted_mean(growth: Floats) -> Floats:
+    periods = growth.shape[-1]
+    weights = np.sin(np.pi * (np.arange(periods) + 0.5) / periods) ** 2
     # A matrix product would sum in an order that depends on the number of lanes.
-    means: Floats = np.sum(growth * _weights(growth.shape[-1]), axis=-1)
+    means: Floats = np.sum(growth * (weights / np.sum(weights)), axis=-1)
     return means
-
-
-def _weights(periods: int) -> Floats:
-    weights: Floats = np.sin(np.pi * (np.arange(periods) + 0.5) / periods) ** 2
-    weights /= np.sum(weights)
-    return weights

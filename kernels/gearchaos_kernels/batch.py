@@ -15,7 +15,7 @@ from gearchaos_kernels.flow_map import maps_of, sharing
 from gearchaos_kernels.forcing import phase_table
 from gearchaos_kernels.status import Status
 from gearchaos_kernels.system import Floats, Outcome, Plan, Schedule, System
-from gearchaos_kernels.teeth import NO_TEETH, share_table
+from gearchaos_kernels.teeth import tables_of
 
 Integers = NDArray[np.intp]
 
@@ -103,7 +103,6 @@ def integrate(
     present = flags(system, plan)
     if present.flow_map is not None and present.teeth is not None:
         raise ValueError("flow maps know pitch errors that are a sine, not those of teeth")
-    teeth = NO_TEETH if present.teeth is None or system.teeth is None else system.teeth
     schedule = Schedule(*(getattr(plan, name) for name in Schedule._fields))
     for order, blocks, maps, steps_of in _shares(system, plan, present):
         step = system.mesh_period / steps_of
@@ -117,10 +116,7 @@ def integrate(
             order,
             blocks,
             maps,
-            share_table(teeth, steps),
-            np.ascontiguousarray(teeth.driving, dtype=np.float64),
-            np.ascontiguousarray(teeth.driven, dtype=np.float64),
-            np.ascontiguousarray(teeth.profile, dtype=np.intp),
+            *tables_of(system, present, steps),
         )
         _integrate_blocks(batch, schedule, outcome, *present)
         if maps.size:

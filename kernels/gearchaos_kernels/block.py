@@ -50,7 +50,14 @@ from gearchaos_kernels.forcing import During, forcing_at, phase_on_grid
 from gearchaos_kernels.rk4 import step, tangent_step
 from gearchaos_kernels.splitting import split_step
 from gearchaos_kernels.status import Status
-from gearchaos_kernels.teeth import engage, keep_shared, shares_at, with_kept, with_teeth
+from gearchaos_kernels.teeth import (
+    engage,
+    keep_shared,
+    point_on_grid,
+    shares_at,
+    with_kept,
+    with_teeth,
+)
 
 LARGEST_STATE = 1e100
 """A state beyond this has left every length scale: the lane is stopped as diverged."""
@@ -162,8 +169,7 @@ def begin(block, batch, present):
         store(memory, CROSSINGS, slot, Crossings(0.0, math.inf, 0.0))
         for row in range(2 * CONTACT_ROWS):
             memory[(CONTACT + row) * STRIDE + slot] = 0.0
-        weights = shares_at(batch.shares, 0, present)
-        point = with_teeth(memory, slot, weights, phase_on_grid(batch.table, 0), present)
+        point = point_on_grid(memory, slot, batch.table, batch.shares, 0, present)
         keep_shared(memory, slot, point, present)
         if present.resolved is not None:
             lane = load(memory, COEFFICIENTS, slot, Lane)

@@ -15,7 +15,8 @@ and rates are displacements per step (h times d/d tau). Row r of a state is the 
 states; the last rows of a system with fewer than ten are unused.
 """
 
-from typing import Any, NamedTuple, TypeAlias
+from collections import namedtuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from llvmlite import ir
@@ -33,24 +34,12 @@ LANES = 32
 STRIDE = LANES + 8
 """Distance between rows: no two rows fall on the same cache set at a distance of 4096 bytes."""
 
-Number: TypeAlias = float | NDArray[np.float64]
-
-
-class Present(NamedTuple):
-    """What a compiled loop has: ``()`` where it is there, None where the compiler removes it."""
-
-    pitch_error: tuple[()] | None
-    phase: tuple[()] | None
-    teeth: tuple[()] | None
-    wide: tuple[()] | None
-    stiffness_variation: tuple[()] | None
-    backlash: tuple[()] | None
-    transverse: tuple[()] | None
-    axial: tuple[()] | None
-    resolved: tuple[()] | None
-    contact: tuple[()] | None
-    tangent: tuple[()] | None
-    flow_map: tuple[()] | None
+Present = namedtuple(
+    "Present",
+    "pitch_error phase teeth wide stiffness_variation backlash transverse axial "
+    "resolved contact tangent flow_map",
+)
+"""What a compiled loop has: ``()`` where it is there, None where the compiler removes it."""
 
 
 def flags(system: System, plan: Plan) -> Present:
@@ -88,36 +77,17 @@ class State(NamedTuple):
     rate: Coordinates
 
 
-class Lane(NamedTuple):
-    """Coefficients of one lane (numbers) or of many (arrays), per step; see `coefficients`."""
-
-    mass_ratio_p: Number
-    mass_ratio_g: Number
-    transverse_damping_p: Number
-    transverse_damping_g: Number
-    transverse_stiffness_p: Number
-    transverse_stiffness_g: Number
-    axial_damping_p: Number
-    axial_damping_g: Number
-    axial_stiffness_p: Number
-    axial_stiffness_g: Number
-    mean_stiffness: Number
-    stiffness_variation: Number
-    mesh_damping: Number
-    axial_share: Number
-    half_backlash: Number
-    load: Number
-    error_inertia: Number
-    error_mean: Number
-    error_amplitude: Number
-    error_rate: Number
-    axial_error_mean: Number
-    axial_error_amplitude: Number
-    axial_error_rate: Number
-    cos_phase: Number
-    sin_phase: Number
-    tangential_speed: Number
-    axial_speed: Number
+Lane = namedtuple(
+    "Lane",
+    "mass_ratio_p mass_ratio_g "
+    "transverse_damping_p transverse_damping_g transverse_stiffness_p transverse_stiffness_g "
+    "axial_damping_p axial_damping_g axial_stiffness_p axial_stiffness_g "
+    "mean_stiffness stiffness_variation mesh_damping axial_share half_backlash load "
+    "error_inertia error_mean error_amplitude error_rate "
+    "axial_error_mean axial_error_amplitude axial_error_rate "
+    "cos_phase sin_phase tangential_speed axial_speed",
+)
+"""Coefficients of one lane (numbers) or of many (arrays), per step; see `coefficients`."""
 
 
 class Branch(NamedTuple):

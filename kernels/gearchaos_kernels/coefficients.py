@@ -9,7 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gearchaos_kernels.block_memory import Lane
-from gearchaos_kernels.system import Floats, System
+from gearchaos_kernels.system import Floats, Groups, System
+
+BEARING_DAMPING = [name for name in Groups._fields if "_damping_" in name]
+BEARING_STIFFNESS = [name for name in Groups._fields if "_stiffness_" in name]
 
 LARGEST_GROWTH = 200.0
 """Natural logarithm of the growth or decay allowed between scalings; numbers end near 700."""
@@ -43,14 +46,8 @@ def lane_coefficients(system: System, step: Floats) -> Floats:
     lane = Lane(
         mass_ratio_p=groups.mass_ratio_p,
         mass_ratio_g=groups.mass_ratio_g,
-        transverse_damping_p=2.0 * groups.transverse_damping_p * step,
-        transverse_damping_g=2.0 * groups.transverse_damping_g * step,
-        transverse_stiffness_p=groups.transverse_stiffness_p * step**2,
-        transverse_stiffness_g=groups.transverse_stiffness_g * step**2,
-        axial_damping_p=2.0 * groups.axial_damping_p * step,
-        axial_damping_g=2.0 * groups.axial_damping_g * step,
-        axial_stiffness_p=groups.axial_stiffness_p * step**2,
-        axial_stiffness_g=groups.axial_stiffness_g * step**2,
+        **{name: 2.0 * getattr(groups, name) * step for name in BEARING_DAMPING},
+        **{name: getattr(groups, name) * step**2 for name in BEARING_STIFFNESS},
         mean_stiffness=cosine * step**2,
         stiffness_variation=cosine * step**2 * groups.stiffness_variation_scale,
         mesh_damping=2.0 * groups.damping_ratio * cosine * step,
@@ -82,14 +79,7 @@ def steps_between_scalings(
     bearings only exchange energy and dissipate it.
     """
     groups = system.groups
-    bearings = np.maximum.reduce(
-        [
-            groups.transverse_damping_p,
-            groups.transverse_damping_g,
-            groups.axial_damping_p,
-            groups.axial_damping_g,
-        ]
-    )
+    bearings = np.maximum.reduce([getattr(groups, name) for name in BEARING_DAMPING])
     # How much a unit of mesh force accelerates the approach of the gears in one direction.
     mobility = 1.0 + groups.mass_ratio_p + groups.mass_ratio_g
     damping = 2.0 * groups.damping_ratio * mobility + 2.0 * bearings

@@ -29,9 +29,9 @@ from gearchaos_kernels.equations import (
     mesh_forces,
     tangent_forces,
 )
-from gearchaos_kernels.forcing import forcing_at, phase_on_grid, phase_table, shifted
+from gearchaos_kernels.forcing import forcing_at, phase_table, shifted
 from gearchaos_kernels.system import Effects, Floats, MeshMotion, Plan, System
-from gearchaos_kernels.teeth import NO_TEETH, engage, share_table, shares_at, with_teeth
+from gearchaos_kernels.teeth import engage, point_on_grid, tables_of
 
 _ALONE = Plan(1, 0, 0, 0, resolved=False)
 """No loop: nothing is split and no tangent vector carried along."""
@@ -106,15 +106,12 @@ def mesh_motion(
         np.zeros((lanes, samples)),
     )
     present = flags(system, _ALONE)
-    teeth = NO_TEETH if present.teeth is None or system.teeth is None else system.teeth
     _follow(
         lane_coefficients(system, step),
         state_scales(system, step),
         step,
         phase_table(system.stiffness_cosine, system.stiffness_sine, steps_per_period),
-        share_table(teeth, steps_per_period),
-        np.ascontiguousarray(teeth.driving[teeth.profile], dtype=np.float64),
-        np.ascontiguousarray(teeth.driven[teeth.profile], dtype=np.float64),
+        tables_of(system, present, steps_per_period),
         first_period,
         np.ascontiguousarray(states, dtype=np.float64),
         motion,
@@ -124,28 +121,24 @@ def mesh_motion(
 
 
 @evaluator
-def _follow(
-    coefficients, scales, steps, table, shares, driving, driven, first, states, motion, present
-):
+def _follow(coefficients, scales, steps, table, teeth, first, states, motion, present):
     """Evaluate eq. 13 at every sample, lane by lane."""
     memory = aligned_memory()
     change = np.empty(scales.shape[1])
+    shares, driving, driven, profile = teeth
     for index in range(states.shape[0]):
         step = steps[index]
         fill_lane(memory, 0, coefficients[index])
         lane = load(memory, COEFFICIENTS, 0, Lane)
-        half_backlash = lane.half_backlash
-        if present.backlash is None:
-            half_backlash = 0.0
+        half_backlash = 0.0 if present.backlash is None else lane.half_backlash
         for sample in range(states.shape[1]):
             fill(memory, STATE, 0, scales[index], states[index, sample])
             state = read_state(memory, STATE, 0, present)
             row = 2 * sample % (table.shape[0] - 1)
             if present.teeth is not None:
                 period = first + 2 * sample // (table.shape[0] - 1)
-                engage(memory, 0, driving[index], driven[index], period)
-            weights = shares_at(shares, row, present)
-            point = with_teeth(memory, 0, weights, phase_on_grid(table, row), present)
+                engage(memory, 0, driving[profile[index]], driven[profile[index]], period)
+            point = point_on_grid(memory, 0, table, shares, row, present)
             forcing = forcing_at(lane, point, present)
             if present.pitch_error is not None:
                 # Half of what twice the error is made of, whatever the form of the gaps.
@@ -155,9 +148,8 @@ def _follow(
             forces, _ = mesh_forces(gaps, lane, forcing.stiffness, None, present)
             # Scaled, N_y and N_z enter eq. 13 with coefficient -1, and per step squared.
             motion.force_tangential[index, sample] = forces.tangential / step**2
-            motion.contact_tangential[index, sample] = flank_at(
-                gaps.tangential.value, half_backlash
-            )
+            flank = flank_at(gaps.tangential.value, half_backlash)
+            motion.contact_tangential[index, sample] = flank
             if present.axial is not None:
                 motion.force_axial[index, sample] = forces.axial / step**2
                 motion.contact_axial[index, sample] = flank_at(gaps.axial.value, half_backlash)

@@ -29,9 +29,9 @@ from gearchaos_kernels.contact import (
     tell_crossing,
 )
 from gearchaos_kernels.equations import gaps_at
-from gearchaos_kernels.forcing import During, forcing_at, phase_on_grid, phase_within
+from gearchaos_kernels.forcing import During, forcing_at, phase_within
 from gearchaos_kernels.rk4 import step, tangent_step
-from gearchaos_kernels.teeth import between, shares_at, with_teeth
+from gearchaos_kernels.teeth import between, point_on_grid, shares_at, with_teeth
 
 MOST_SPLITS = 16
 """Crossings of one step; a step with more goes on with its last branches and is counted."""
@@ -58,8 +58,10 @@ def split_step(memory, slot, table, shares, number, recorded, present):
     tangent = state
     if present.tangent is not None:
         tangent = read_state(memory, BEFORE + TANGENT, slot, present)
-    begin = forcing_on_grid(memory, slot, lane, table, shares, 2 * number, present)
-    end = forcing_on_grid(memory, slot, lane, table, shares, 2 * number + 2, present)
+    point = point_on_grid(memory, slot, table, shares, 2 * number, present)
+    begin = forcing_at(lane, point, present)
+    point = point_on_grid(memory, slot, table, shares, 2 * number + 2, present)
+    end = forcing_at(lane, point, present)
     gaps = gaps_at(state, lane, begin, present)
     branches = read_branches(memory, slot, present)
     done = 0.0
@@ -124,14 +126,6 @@ def forcing_within(memory, slot, lane, table, shares, number, fraction, present)
         end = with_teeth(memory, slot, shares_at(shares, row + 1, present), point, present)
         width = 2.0 * math.pi / (table.shape[0] - 1)
         point = between(begin, end, 2.0 * fraction - half, width, point)
-    return forcing_at(lane, point, present)
-
-
-@scalar
-def forcing_on_grid(memory, slot, lane, table, shares, row, present):
-    """Return what acts on a lane at a row of the table."""
-    point = phase_on_grid(table, row)
-    point = with_teeth(memory, slot, shares_at(shares, row, present), point, present)
     return forcing_at(lane, point, present)
 
 

@@ -1,9 +1,7 @@
 """What is integrated, how long, and what comes of it: the records that go in and out."""
 
-from __future__ import annotations
-
 import math
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -139,13 +137,13 @@ class System(NamedTuple):
         """Duration of `repeats_after` mesh periods in units of tau, shape (lanes,)."""
         return self.repeats_after * self.mesh_period
 
-    def of(self, lanes: slice | NDArray[np.intp] | list[int]) -> System:
+    def of(self, lanes: slice | NDArray[np.intp] | list[int]) -> Self:
         """Return the system of some lanes, in the order given."""
         teeth = self.teeth and self.teeth._replace(profile=self.teeth.profile[lanes])
         groups = Groups(*(group[lanes] for group in self.groups))
         return self._replace(groups=groups, teeth=teeth)
 
-    def repeated(self, times: int) -> System:
+    def repeated(self, times: int) -> Self:
         """Return the system with every lane so many times in a row."""
         return self.of(np.repeat(np.arange(self.lanes), times))
 
@@ -209,7 +207,7 @@ class Outcome(NamedTuple):
     contact: Floats
     history: Floats | None
 
-    def every(self, periods: int) -> Outcome:
+    def every(self, periods: int) -> Self:
         """Return it with the section once every so many mesh periods, up to the end."""
         return self._replace(section=self.section[:, ::-periods][:, ::-1])
 

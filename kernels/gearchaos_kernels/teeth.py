@@ -10,27 +10,26 @@ lane keeps the errors of the few pairs in mesh, which move on by one pair every 
 """
 
 from functools import lru_cache
-from typing import NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gearchaos_kernels.block_memory import MOST_PAIRS, NARROW, PAIRS, SHARED, STRIDE, load, store
+from gearchaos_kernels.block_memory import MOST_PAIRS, NARROW, PAIRS, SHARED, STRIDE, Present, store
 from gearchaos_kernels.compilation import scalar
-from gearchaos_kernels.forcing import Phase
-from gearchaos_kernels.system import SPLINE_DEGREE, Floats, Teeth
-
-
-class Shared(NamedTuple):
-    """Value, slope and curvature of the error that the teeth in mesh share; see `Phase`."""
-
-    value: float
-    slope: float
-    curvature: float
-
+from gearchaos_kernels.forcing import Phase, phase_on_grid
+from gearchaos_kernels.system import SPLINE_DEGREE, Floats, System, Teeth
 
 NO_TEETH = Teeth(np.zeros((1, 1)), np.zeros((1, 1)), np.zeros(1, np.intp), np.zeros(1), 1, 0.0)
 """Stands where the pitch error is that of eq. 14."""
+
+
+def tables_of(system: System, present: Present, steps_per_period: int) -> tuple[Any, ...]:
+    """Return the table of shares of a system, its errors and profile: see `Teeth`."""
+    teeth = NO_TEETH if present.teeth is None or system.teeth is None else system.teeth
+    errors = (np.ascontiguousarray(gear, np.float64) for gear in (teeth.driving, teeth.driven))
+    profile = np.ascontiguousarray(teeth.profile, dtype=np.intp)
+    return share_table(teeth, steps_per_period), *errors, profile
 
 
 def share_table(teeth: Teeth, steps_per_period: int) -> Floats:
@@ -128,6 +127,13 @@ def with_teeth(memory, slot, shares, point, present):
 
 
 @scalar
+def point_on_grid(memory, slot, table, shares, row, present):
+    """Return the mesh phase at a row of both tables."""
+    weights = shares_at(shares, row, present)
+    return with_teeth(memory, slot, weights, phase_on_grid(table, row), present)
+
+
+@scalar
 def weigh(memory, slot, first, shares):
     """Weigh the errors of three pairs."""
     e1 = memory[(PAIRS + first) * STRIDE + slot]
@@ -145,7 +151,7 @@ def weigh(memory, slot, first, shares):
 def keep_shared(memory, slot, point, present):
     """Keep the error that the teeth share at the end of a step."""
     if present.teeth is not None:
-        store(memory, SHARED, slot, Shared(point.value, point.slope, point.curvature))
+        store(memory, SHARED, slot, (point.value, point.slope, point.curvature))
 
 
 @scalar
@@ -153,8 +159,8 @@ def with_kept(memory, slot, point, present):
     """Return a mesh phase with the error that the teeth shared where the last step ended."""
     if present.teeth is None:
         return point
-    shared = load(memory, SHARED, slot, Shared)
-    return Phase(point.variation, shared.value, shared.slope, shared.curvature)
+    at = SHARED * STRIDE + slot
+    return Phase(point.variation, memory[at], memory[at + STRIDE], memory[at + 2 * STRIDE])
 
 
 @scalar

@@ -5,7 +5,7 @@ import pickle
 import numpy as np
 import pytest
 
-from gearchaos.configuration.physical_tables import PHYSICAL_KEYS
+from gearchaos.configuration.tables import PHYSICAL_KEYS
 from gearchaos.errors import ConfigurationError
 from gearchaos.gear.derivation import derive_groups
 from gearchaos.gear.geometry import STEEL_DENSITY

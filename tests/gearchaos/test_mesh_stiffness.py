@@ -15,8 +15,8 @@ PAN_2021 = TrapezoidalStiffness(0.25, 0.25, 0.25, 0.25, half_height=1 / 9)
 SHAPES = [
     PAN_2021,
     TrapezoidalStiffness(0.1, 0.3, 0.1, 0.5, 0.2),
-    TrapezoidalStiffness(0.1, 0.45, 0.25, 0.2, 0.3, start=0.7),
-    TrapezoidalStiffness(0.5, 0.0, 0.5, 0.0, 0.05, start=0.2),
+    TrapezoidalStiffness(0.1, 0.45, 0.25, 0.2, 0.3),
+    TrapezoidalStiffness(0.5, 0.0, 0.5, 0.0, 0.05),
 ]
 
 

@@ -5,8 +5,7 @@ import pytest
 
 from gearchaos.configuration import Configuration, groups_at, load_config
 from gearchaos.engine.lanes import Lanes
-from gearchaos.gear.drawn_gears import drawn_gears
-from gearchaos.gear.tooth_deviations import tooth_deviations
+from gearchaos.gear.tooth_deviations import drawn_gears, tooth_deviations
 from gearchaos.iso1328 import cumulative_pitch_um, single_pitch_um
 
 from .commands import SMALL, run_module
@@ -77,7 +76,7 @@ def test_a_gear_without_deviations_has_one_column_of_zeros():
 
 
 def test_a_sine_has_no_deviations():
-    assert deviations_of(Configuration.from_toml(SMALL)) is None
+    assert Lanes(Configuration.from_toml(SMALL)).system_of(np.arange(1)).teeth is None
 
 
 @pytest.mark.parametrize("kind", ["teeth", "grade"])
