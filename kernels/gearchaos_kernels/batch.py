@@ -9,11 +9,7 @@ from numpy.typing import NDArray
 
 from gearchaos_kernels.block import Batch, integrate_block
 from gearchaos_kernels.block_memory import LANES, Present, flags
-from gearchaos_kernels.coefficients import (
-    lane_coefficients,
-    state_scales,
-    steps_between_scalings,
-)
+from gearchaos_kernels.coefficients import lane_coefficients, state_scales, steps_between_scalings
 from gearchaos_kernels.compilation import driver
 from gearchaos_kernels.flow_map import maps_of, sharing
 from gearchaos_kernels.forcing import phase_table
