@@ -22,6 +22,7 @@ STORE_SCHEMA, BLOCK_SCHEMA = "gearchaos-blocks", "gearchaos-block"
 SCHEMA_VERSION = "2.0"
 MANIFEST = "manifest.json"
 _LARGEST = 64 << 20
+_LONGEST = 60
 
 
 def decisive_facts(software: Software, **facts: Any) -> dict[str, Any]:
@@ -77,10 +78,16 @@ def _differing(*facts: Facts) -> list[str]:
     """Word software and keys of the configuration in which two rows of facts differ."""
     first, second = map(_flat, facts)
     return [
-        f"{key} ({first.get(key, 'absent')}, now {second.get(key, 'absent')})"
+        f"{key} ({_short(first.get(key, 'absent'))}, now {_short(second.get(key, 'absent'))})"
         for key in {**first, **second}
         if key not in first or key not in second or repr(first[key]) != repr(second[key])
     ]
+
+
+def _short(value: object) -> str:
+    """Word a value, of a list or the text of a file no more than where it begins."""
+    text = str(value)
+    return text if len(text) <= _LONGEST else f"{text[:_LONGEST]!r}..."
 
 
 def _flat(facts: Facts) -> dict[str, Any]:

@@ -1,6 +1,7 @@
 """Finished blocks survive whatever ends a sweep, are verified, and become one file."""
 
 import errno
+import json
 import os
 import resource
 import signal
@@ -590,3 +591,13 @@ def test_what_was_merged_leaves_the_next_sweep_alone(output: Path) -> None:
     following.close()
     with open_store(output, resume=True) as store:
         assert store.finished().bounds == BLOCKS
+
+
+def test_of_a_file_that_differs_only_the_beginning_is_shown() -> None:
+    files = ("tooth,Fp\n" + f"0,{n}\n" * 100 for n in range(2))
+    earlier, now = ({"configuration": f"[files]\ngear = {json.dumps(text)}"} for text in files)
+    with pytest.raises(FileError) as raised:
+        require_same("this", earlier, now)
+    assert r"files.gear ('tooth,Fp\n0,0\n" in str(raised.value)
+    assert len(str(raised.value)) < 400
+    assert "\n" not in str(raised.value)
