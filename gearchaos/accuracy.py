@@ -7,8 +7,6 @@ the name in --output.
 Exit codes: 0 done, 2 usage or configuration, 4 cannot read or write.
 """
 
-from __future__ import annotations
-
 import json
 import sys
 import time
@@ -135,7 +133,7 @@ def _write(settings: Sequence[Setting], title: str, targets: list[str], overwrit
         partial_file.write_text(json.dumps(facts, indent=1), encoding="utf-8")
 
 
-def measure(simulation: Simulation, steps: Sequence[int], lanes: int) -> list[Setting]:
+def measure(simulation: "Simulation", steps: Sequence[int], lanes: int) -> list[Setting]:
     """Measure error and time of every number of steps per mesh period, plain and resolved.
 
     Beside them those of `FLOW_MAP_STEPS`. So many lanes are tried, spread evenly over the sweep.

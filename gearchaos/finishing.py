@@ -1,7 +1,5 @@
 """How a command that computes names its output, and how it ends."""
 
-from __future__ import annotations
-
 import os
 from argparse import Namespace
 from contextlib import suppress
@@ -33,7 +31,7 @@ def output_of(options: Namespace, suffix: str = ".h5") -> str:
     return output
 
 
-def ending(simulation: Simulation, output: str, diverged: int, *said: str) -> int:
+def ending(simulation: "Simulation", output: str, diverged: int, *said: str) -> int:
     """Print the path of the result, say these lines, and return the exit code.
 
     Complains if too many lanes diverged.
@@ -52,7 +50,7 @@ def ending(simulation: Simulation, output: str, diverged: int, *said: str) -> in
     return TOO_MANY_DIVERGED
 
 
-def complete_already(simulation: Simulation, output: str) -> int | None:
+def complete_already(simulation: "Simulation", output: str) -> int | None:
     """Go on with a sweep whose result exists: nothing is left to be done.
 
     Returns the exit code that the sweep had, None if the file is no undamaged result. Raises

@@ -8,8 +8,6 @@ cannot be read or written, 130 interrupted and 143 terminated: candidates are ke
 goes on from them.
 """
 
-from __future__ import annotations
-
 import os
 import sys
 import time
@@ -56,7 +54,7 @@ def _identify(options: Namespace) -> int:
     return OK
 
 
-def _scored(problem: Problem, judge: Judge, path: str) -> Tried:
+def _scored(problem: "Problem", judge: "Judge", path: str) -> "Tried":
     import numpy as np
 
     from gearchaos.configuration import groups_at
@@ -78,7 +76,7 @@ def _scored(problem: Problem, judge: Judge, path: str) -> Tried:
     return judge.judge(0, known)
 
 
-def _searched(problem: Problem, judge: Judge, options: Namespace) -> Tried:
+def _searched(problem: "Problem", judge: "Judge", options: Namespace) -> "Tried":
     from gearchaos.engine.provenance import provenance
     from gearchaos.identification.evaluation import require_stable
     from gearchaos.identification.search import MOST_CENTRES, RUNGS, decisive_facts, search
@@ -103,7 +101,7 @@ def _searched(problem: Problem, judge: Judge, options: Namespace) -> Tried:
         check_output(output, options.overwrite)
     began, texts = time.monotonic(), {"title": problem.targets.title, "targets": problem.text}
 
-    def keep(tried: Tried, complete: bool = False) -> None:
+    def keep(tried: "Tried", complete: bool = False) -> None:
         nonlocal kept
         computed = provenance(time.monotonic() - began)
         told = {"complete": int(complete), **computed, **facts, **texts}

@@ -6,8 +6,6 @@ everything else to stderr. Exit codes as those of the sweep command; 4 names the
 missing, and everything stays as it is.
 """
 
-from __future__ import annotations
-
 import sys
 from argparse import ArgumentParser, Namespace
 from typing import TYPE_CHECKING
@@ -69,7 +67,7 @@ def _merge(options: Namespace) -> int:
     return ending(simulation, output, tally.diverged, text, *tally.remarks)
 
 
-def _require_all(store: BlockStore, found: Finished, shards: object) -> None:
+def _require_all(store: "BlockStore", found: "Finished", shards: object) -> None:
     """Name the shards of which blocks are missing, as far as it is known how many there are."""
     from gearchaos.engine.sharding import shared_blocks
     from gearchaos.results.block_store import uncovered

@@ -8,8 +8,6 @@ stdout. Exit codes: 0 done, 2 the command line asks for what cannot be, 4 a file
 or written.
 """
 
-from __future__ import annotations
-
 import argparse
 import sys
 from collections.abc import Callable, Sequence
@@ -61,13 +59,13 @@ def _plot(options: argparse.Namespace) -> int:
     return OK
 
 
-def _titles(results: Sequence[Result], paths: Sequence[Path]) -> list[str]:
+def _titles(results: "Sequence[Result]", paths: Sequence[Path]) -> list[str]:
     """Name results by their titles, or by their files where these do not tell them apart."""
     titles = [str(one.metadata.get("title", "")) for one in results]
     return titles if all(titles) and len({*titles}) == len(paths) else [one.stem for one in paths]
 
 
-def _sweep_sheets(results: Sequence[Result], options: argparse.Namespace) -> list[Sheet]:
+def _sweep_sheets(results: "Sequence[Result]", options: argparse.Namespace) -> "list[Sheet]":
     from gearchaos.figures import bifurcation_page, shares_page
     from gearchaos.figures.labels import in_a_name
     from gearchaos.figures.style import SINGLE_COLUMN_MM
@@ -93,7 +91,7 @@ def _sweep_sheets(results: Sequence[Result], options: argparse.Namespace) -> lis
     return [(name, partial(bifurcation_page, results, options.variable, **shown, **size))]
 
 
-def _response_sheets(results: Sequence[Result], options: argparse.Namespace) -> list[Sheet]:
+def _response_sheets(results: "Sequence[Result]", options: argparse.Namespace) -> "list[Sheet]":
     from gearchaos.figures import response_page
     from gearchaos.figures.labels import in_a_name, place_of
     from gearchaos.figures.lanes import select_lanes
@@ -119,7 +117,7 @@ def _response_sheets(results: Sequence[Result], options: argparse.Namespace) -> 
     ]
 
 
-def _slice(result: Result, at: Sequence[tuple[str, float]]) -> Result:
+def _slice(result: "Result", at: Sequence[tuple[str, float]]) -> "Result":
     """Fix the axes that --at names at the values next to those it gives."""
     from gearchaos.figures.lanes import swept_axes
 
@@ -220,7 +218,7 @@ def _check_targets(targets: Sequence[Path], options: argparse.Namespace) -> None
         raise FileError(problems)
 
 
-def _lanes_in_words(result: Result) -> str:
+def _lanes_in_words(result: "Result") -> str:
     from gearchaos.figures.lanes import swept_axes
 
     lanes = result.along(result.axis).size

@@ -7,8 +7,6 @@ it. Exit codes: 0 done, 2 the command line or the configuration asks for what ca
 more lanes diverged than outputs.allowed_diverged_share, 4 a file cannot be read or written.
 """
 
-from __future__ import annotations
-
 import sys
 from argparse import ArgumentParser, Namespace
 from typing import TYPE_CHECKING
@@ -69,7 +67,7 @@ def _respond(options: Namespace) -> int:
     return ending(simulation, output, diverged, text)
 
 
-def _lane(options: Namespace) -> Asked:
+def _lane(options: Namespace) -> "Asked":
     """Go on from where one lane of a result ended."""
     from gearchaos.engine.response import continued
     from gearchaos.results.result import open_result
@@ -87,7 +85,7 @@ def _lane(options: Namespace) -> Asked:
     return continued(lane, options.config), str(lane.metadata["configuration"]), [note]
 
 
-def _configuration(options: Namespace) -> Asked:
+def _configuration(options: Namespace) -> "Asked":
     """Take the place of what a configuration sweeps."""
     from gearchaos.configuration import load_config
     from gearchaos.configuration.toml_text import toml_literal

@@ -4,8 +4,6 @@ The table goes to stdout, everything else to stderr. Exit codes: 0 done, 2 the c
 for what cannot be, 4 the file cannot be read, is damaged or holds no labels.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import math
@@ -106,7 +104,9 @@ def _stages(options: argparse.Namespace) -> int:
     return OK
 
 
-def _refined(result: Result, stages: list[Stage], options: argparse.Namespace) -> list[Boundary]:
+def _refined(
+    result: "Result", stages: "list[Stage]", options: argparse.Namespace
+) -> "list[Boundary]":
     # Only here: reading a file needs no compiler.
     from gearchaos.engine.refinement import refinable, refined_boundaries
     from gearchaos.engine.running import compiling
@@ -116,7 +116,7 @@ def _refined(result: Result, stages: list[Stage], options: argparse.Namespace) -
         return refined_boundaries(config, result, stages, options.refine, options.threads)
 
 
-def _survival(result: Result, options: argparse.Namespace) -> Survival:
+def _survival(result: "Result", options: argparse.Namespace) -> "Survival":
     from gearchaos.engine.refinement import computable
     from gearchaos.engine.running import compiling
     from gearchaos.engine.survival import survival
@@ -126,7 +126,7 @@ def _survival(result: Result, options: argparse.Namespace) -> Survival:
         return survival(config, result, options.survival, options.threads)
 
 
-def table(axis: str, stages: Sequence[Stage], where: Sequence[str]) -> Iterator[str]:
+def table(axis: str, stages: "Sequence[Stage]", where: Sequence[str]) -> Iterator[str]:
     """Word the stages of a slice as lines of a table, no longer than 80 characters."""
     yield f"stages over {axis}"
     yield from where
@@ -140,7 +140,7 @@ def table(axis: str, stages: Sequence[Stage], where: Sequence[str]) -> Iterator[
         )
 
 
-def band_lines(stages: Sequence[Stage]) -> Iterator[str]:
+def band_lines(stages: "Sequence[Stage]") -> Iterator[str]:
     """Word on how many bands the sections of a stage lie, where any lies on several."""
     for stage in stages:
         several = [f"{lanes} on {bands}" for bands, lanes in stage.bands.items() if bands > 1]
@@ -150,7 +150,7 @@ def band_lines(stages: Sequence[Stage]) -> Iterator[str]:
             yield from textwrap.wrap(line, WIDTH)
 
 
-def remarks(jumping: Sequence[Jump], bursting: Sequence[Crisis], mixed: int) -> Iterator[str]:
+def remarks(jumping: "Sequence[Jump]", bursting: "Sequence[Crisis]", mixed: int) -> Iterator[str]:
     """Word what the table does not show: jumps and crises in a stage, chaos that came to rest."""
     for jump in jumping:
         yield f"{jump.below:.6g} to {jump.above:.6g}: jumps to another motion of {jump.label}"
@@ -163,7 +163,7 @@ def remarks(jumping: Sequence[Jump], bursting: Sequence[Crisis], mixed: int) -> 
         yield "motion before; integration.transient_periods leaves it out"
 
 
-def boundary_list(boundaries: Sequence[Boundary]) -> Iterator[str]:
+def boundary_list(boundaries: "Sequence[Boundary]") -> Iterator[str]:
     """Word the refined boundaries, each with what the orbit beside it does."""
     for boundary in boundaries:
         between = f"{boundary.label_below} | {boundary.label_above}"
@@ -188,7 +188,7 @@ _NAMES = {
 """Names in JSON of what stages and boundaries have, where they differ."""
 
 
-def _named(record: Stage | Boundary) -> dict[str, Any]:
+def _named(record: "Stage | Boundary") -> dict[str, Any]:
     facts = {_NAMES.get(name, name): value for name, value in record._asdict().items()}
     if "multiplier" in facts:
         multiplier = facts.pop("multiplier")

@@ -6,8 +6,6 @@ outputs.allowed_diverged_share, 4 a file cannot be read or written, 130 interrup
 terminated: finished blocks are kept and --resume goes on from them.
 """
 
-from __future__ import annotations
-
 import sys
 import time
 from argparse import ArgumentParser, Namespace
@@ -71,7 +69,7 @@ def _sweep(options: Namespace) -> int:
     return _compute(simulation, output, shard, options) if code is None else code
 
 
-def _check_sharing(options: Namespace, config: Configuration) -> None:
+def _check_sharing(options: Namespace, config: "Configuration") -> None:
     """Refuse what --dask and --shard cannot do."""
     for flag in ("dask", "shard"):
         if getattr(options, flag) is not None and config.start.carry != "none":
@@ -94,7 +92,9 @@ def _check_sharing(options: Namespace, config: Configuration) -> None:
         ) from None
 
 
-def _compute(simulation: Simulation, output: str, shard: Shard | None, options: Namespace) -> int:
+def _compute(
+    simulation: "Simulation", output: str, shard: "Shard | None", options: Namespace
+) -> int:
     from gearchaos.engine.executors import ExecutionError
     from gearchaos.engine.running import metadata, prepare
     from gearchaos.engine.store_filling import fill, open_store

@@ -29,25 +29,11 @@ _PHILOX_WIDTH = 4
 class Lanes:
     """The product of all axes as a flat list, the last axis running fastest.
 
-    A lane's result depends on its number in this list and nothing else.
-
-    Parameters
-    ----------
-    config : Configuration
-
-    Attributes
-    ----------
-    axes : list of Axis
-        One for each dimension: the second swept parameter, the first one, the drawn gear pair, the
-        start; those that there are.
-    effects : tuple of str
-        Effects that act on what is kept.
-    states : tuple of str
-        States of the scene that these effects leave.
-    starts : int
-        Starts of one value, or pair of values, with one gear pair.
-    repeats : int
-        Lanes of one value, or pair of values: of all its gear pairs and starts.
+    A lane's result depends on its number in this list and nothing else. ``axes``: one `Axis` for
+    each dimension, the second swept parameter, the first one, the drawn gear pair, the start, those
+    that there are; ``effects``: those that act on what is kept, and ``states``: those that they
+    leave; ``starts``: of one value, or pair of values, with one gear pair; ``repeats``: lanes of
+    one value, or pair of values, with all its gear pairs and starts.
     """
 
     def __init__(self, config: Configuration) -> None:

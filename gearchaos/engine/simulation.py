@@ -56,22 +56,9 @@ PHASES = 1001
 class Simulation:
     """The lanes of a configured sweep with a plan of their integration, and what is kept of them.
 
-    Parameters
-    ----------
-    config : Configuration
-
-    Attributes
-    ----------
-    lanes : Lanes
-    plan : Plan
-        Steps and periods, with the section that is kept.
-    notes : list of str
-        What a user should know before the sweep begins.
-
-    Raises
-    ------
-    ConfigurationError
-        If the number of steps per period is unstable and may not be raised.
+    ``plan``: steps and periods, with the section that is kept; ``notes``: what a user should know
+    before the sweep begins. Raises ConfigurationError if the number of steps per period is unstable
+    and may not be raised.
     """
 
     def __init__(self, config: Configuration) -> None:

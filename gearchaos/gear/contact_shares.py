@@ -27,23 +27,13 @@ def contact_shares(
 ) -> tuple[Floats, int, float]:
     """Return the share of a tooth pair in the mesh force while it is in mesh.
 
-    Its mean shares (cells,) from its entry on, the cells of a mesh period, and the mesh
-    phase, in periods, at which it enters.
-
-    Parameters
-    ----------
-    transverse, overlap : float
-        Contact ratios, eps_alpha > 0 and eps_beta >= 0.
-    smoothing : float
-        Mesh periods over which a pair takes load at least: shares jump otherwise in a spur pair.
-    fundamental : complex
-        cosine - i sine of the first harmonic of the mesh stiffness. The total length of the contact
-        lines has its phase; without one the first pair comes into mesh at phase 0.
-
-    Raises
-    ------
-    ConfigurationError
-        If there are moments without any pair in mesh, or too many are.
+    Its mean shares (cells,) from its entry on, the cells of a mesh period, and the mesh phase, in
+    periods, at which it enters. ``transverse``, ``overlap``: the contact ratios eps_alpha > 0 and
+    eps_beta >= 0; ``smoothing``: mesh periods over which a pair takes load at least, as shares jump
+    otherwise in a spur pair; ``fundamental``: cosine - i sine of the first harmonic of the mesh
+    stiffness, whose phase the total length of the contact lines has; without one the first pair
+    comes into mesh at phase 0. Raises ConfigurationError if there are moments without any pair in
+    mesh, or too many are.
     """
     if not 1.0 <= transverse + overlap <= MOST_CONTACT:
         raise ConfigurationError(

@@ -25,13 +25,8 @@ def derive_groups(physical: Mapping[str, Any], without: Collection[str] = ()) ->
     ``physical`` holds every key of the physical tables of a configuration by its path, such as
     ``pair.teeth``, with its value; None is not known, and a number may be an array over lanes,
     which broadcasts. A group whose inputs are not all known is absent, as are those ``without``.
-
-    Raises
-    ------
-    ConfigurationError
-        If the stiffness harmonics would differ between lanes.
-    KeyError
-        If the mapping lacks a path.
+    Raises ConfigurationError if the stiffness harmonics would differ between lanes, KeyError if the
+    mapping lacks a path.
     """
     quantities = Quantities(physical)
     groups: dict[str, Value] = {}

@@ -44,19 +44,13 @@ class Groups:
 def resolve_groups(physical: Mapping[str, Any], given: Mapping[str, Any]) -> Groups:
     """Combine groups given directly with those that follow from physical data.
 
-    A group given directly wins over a derived one, a derived one over the default. The
-    harmonics of the stiffness are one thing: where only one of cosine and sine is given, the
-    other is zero, and the shorter one continues with zeros.
+    A group given directly wins over a derived one, a derived one over the default. The harmonics of
+    the stiffness are one thing: where only one of cosine and sine is given, the other is zero, and
+    the shorter one continues with zeros.
 
     ``physical`` is as `derive_groups` takes it; ``given`` maps names of groups to a number, an
-    array over lanes, or a list of harmonics.
-
-    Raises
-    ------
-    ConfigurationError
-        If the stiffness harmonics would differ between lanes.
-    KeyError
-        If a given name is not a group.
+    array over lanes, or a list of harmonics. Raises ConfigurationError if the stiffness harmonics
+    would differ between lanes, KeyError if a given name is not a group.
     """
     direct = {GROUPS_BY_NAME[name].name: value for name, value in given.items()}
     without = {*direct, *(() if direct.keys().isdisjoint(HARMONICS) else HARMONICS)}

@@ -59,17 +59,9 @@ class FourierStiffness:
 class TrapezoidalStiffness:
     """Stiffness that rises linearly from phase 0 on, stays, falls, stays (Pan 2021, eqs 15-18).
 
-    Parameters
-    ----------
-    rise, top, fall, bottom : float
-        Fractions of the mesh period, which add up to one. A rise of zero is a jump.
-    half_height : float
-        Half of the difference between top and bottom, relative to k_m.
-
-    Raises
-    ------
-    ValueError
-        If a fraction is negative or their sum is not one.
+    The parts are fractions of the mesh period, which add up to one, a rise of zero is a jump;
+    ``half_height``: half of the difference between top and bottom, relative to k_m. Raises
+    ValueError if a fraction is negative or their sum is not one.
     """
 
     rise: float

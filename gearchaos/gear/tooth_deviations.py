@@ -105,17 +105,10 @@ def drawn_gears(
 
     The single deviations are independent and normal, made to sum to zero, and an eccentricity of
     random phase is added. All is scaled until the largest single deviation or the range of the
-    cumulative ones is at its limit: the worst gear of its form that still passes.
-
-    Parameters
-    ----------
-    numbers, seed, gear : array_like of int, shape (realisations,), and int
-        A gear depends on its number, the seed and whether it drives (0) or is driven (1) alone, and
-        not on the machine.
-    teeth : int
-    single_um, cumulative_um, eccentricity : array_like, shape (realisations,) or ()
-        Limits of the single deviations' amount and of the cumulative ones' range, in um; share of
-        the eccentricity in the range, from 0 to 1.
+    cumulative ones is at its limit: the worst gear of its form that still passes. A gear depends on
+    its number (realisations,), the seed and whether it drives (0) or is driven (1) alone, and not
+    on the machine; the limits, in um, and the share of the eccentricity in the range, from 0 to 1,
+    may differ between realisations.
     """
     numbers, single, range_, share = (
         np.asarray(value)[..., np.newaxis]

@@ -1,7 +1,5 @@
 """What the lanes of many candidates come to: all of a generation are one batch."""
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -48,7 +46,7 @@ class Records(NamedTuple):
     acceleration: Floats
     sound: Mask
 
-    def at(self, values: NDArray[np.intp]) -> Records:
+    def at(self, values: NDArray[np.intp]) -> "Records":
         """Return what there is at some of the swept values, by their numbers."""
         arrays: Any = (array[:, values] for array in self)
         return Records(*arrays)

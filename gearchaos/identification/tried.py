@@ -1,7 +1,5 @@
 """Every candidate that was tried, in memory and in a file."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -46,7 +44,7 @@ class Tried(NamedTuple):
     def __len__(self) -> int:
         return int(self.run.size)
 
-    def part(self, first: int, last: int) -> Tried:
+    def part(self, first: int, last: int) -> "Tried":
         """Return the candidates ``first`` to ``last - 1``."""
         arrays: Any = (array[first:last] for array in self)
         return Tried(*arrays)

@@ -40,24 +40,10 @@ def spectral_lines(
     keeps down what leaks from motions that do not repeat. A line at the order 0 has the height of
     the absolute mean; the mean is taken out before the window, so that it does not leak either.
 
-    Parameters
-    ----------
-    values : ndarray, shape (..., samples)
-        The last sample is followed by the first one of the next record: a repeated end is left off.
-    samples_per_period : int
-        Samples of one mesh period.
-    window : str
-        A name in `WINDOWS`.
-
-    Returns
-    -------
-    SpectralLines
-        Lines from 0 to half of the sampling frequency, one over the number of periods apart.
-
-    Raises
-    ------
-    ValueError
-        If the samples are not those of whole mesh periods, or there is no such window.
+    ``values`` (..., samples): the last sample is followed by the first one of the next record, a
+    repeated end is left off; ``window``: a name in `WINDOWS`. The lines go from 0 to half of the
+    sampling frequency, one over the number of periods apart. Raises ValueError if the samples are
+    not those of whole mesh periods, or there is no such window.
     """
     samples = values.shape[-1]
     if samples == 0 or samples % samples_per_period:

@@ -11,27 +11,19 @@ BLOCKS = 8
 
 
 def largest_exponent(growth: Floats, period: Floats) -> tuple[Floats, Floats]:
-    """Estimate the largest Lyapunov exponent of every lane, per unit of dimensionless time.
+    """Estimate the largest Lyapunov exponent of every lane, per unit of tau, with its error.
 
-    The growth rates of the single periods are averaged with weights sin^2 that fall off smoothly
-    at both ends (weighted Birkhoff average; Das, Saiki, Sander, Yorke 2017). On periodic and
+    The growth rates of the single periods are averaged with weights sin^2 that fall off smoothly at
+    both ends (weighted Birkhoff average; Das, Saiki, Sander, Yorke 2017). On periodic and
     quasi-periodic motions the error then falls like the third power of the number of periods
-    instead of the first; on chaotic motions the standard error is a factor sqrt(3/2) larger.
+    instead of the first; on chaotic motions the standard error is a factor sqrt(3/2) larger. It is
+    that of the same average over blocks of an eighth of the record that overlap by half (Welch
+    1967: nearly independent under these weights), widened such that two of it cover as much as two
+    of a normal distribution; it is not a number where fewer than two periods were recorded.
 
-    Parameters
-    ----------
-    growth : ndarray, shape (lanes, periods)
-        Logarithm of the tangent vector's growth over each recorded mesh period.
-    period : ndarray, shape (lanes,)
-        Mesh period in units of tau.
-
-    Returns
-    -------
-    exponent, standard_error : ndarray, shape (lanes,)
-        The standard error is that of the same average over blocks of an eighth of the record that
-        overlap by half (Welch 1967: nearly independent under these weights), widened such that two
-        of it cover as much as two of a normal distribution; it is not a number where fewer than two
-        periods were recorded. Both are not a number where the lane diverged.
+    ``growth`` (lanes, periods): logarithm of the tangent vector's growth over each recorded mesh
+    period; ``period`` (lanes,): its duration. Returned are two arrays (lanes,), both not a number
+    where the lane diverged.
     """
     periods = growth.shape[1]
     exponent = _weighted_mean(growth) / period

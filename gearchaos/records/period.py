@@ -19,23 +19,14 @@ _SMALLEST_SCALE = 1e-3
 
 
 def motion_period(section: NDArray[np.float64]) -> NDArray[np.int32]:
-    """Return after how many mesh periods the motion of each lane repeats.
+    """Return after how many mesh periods the motion of each lane repeats, shape (lanes,).
 
-    The smallest n <= 16 for which the last 48 section points, or all there are, each lie within
-    the tolerance of the one n points before; the section must hold the period three times. A
-    coordinate is measured by its largest magnitude, or by a thousandth of that of the largest
-    coordinate where this is more.
-
-    Parameters
-    ----------
-    section : ndarray, shape (lanes, points, states)
-        Once a mesh period, in the order of time.
-
-    Returns
-    -------
-    ndarray of int, shape (lanes,)
-        0 where no such period is found: chaos, quasi-periodic motion, a transient that has not
-        died away, longer periods, a section with NaN, or too few points.
+    The smallest n <= 16 for which the last 48 points of the section (lanes, points, states), or all
+    there are, each lie within the tolerance of the one n points before; the section must hold the
+    period three times. A coordinate is measured by its largest magnitude, or by a thousandth of
+    that of the largest coordinate where this is more. 0 where no such period is found: chaos,
+    quasi-periodic motion, a transient that has not died away, longer periods, a section with NaN,
+    or too few points.
     """
     return period_of(return_distances(section))
 

@@ -1,7 +1,5 @@
 """Results for other libraries: an xarray Dataset, a pandas DataFrame, arrays for MATLAB."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from importlib import import_module
 from pathlib import Path
@@ -25,7 +23,7 @@ def needed(package: str) -> Any:
         raise FileError(f"{text}; pip install gearchaos[export]") from error
 
 
-def to_xarray(result: Result) -> Any:
+def to_xarray(result: "Result") -> Any:
     """Give an `xarray.Dataset` of everything, as `xarray.open_dataset` does of the file.
 
     Raises FileError if xarray is not installed.
@@ -39,7 +37,7 @@ def to_xarray(result: Result) -> Any:
     return xarray.Dataset(arrays, coordinates, result.metadata)
 
 
-def to_dataframe(result: Result, *along: str) -> Any:
+def to_dataframe(result: "Result", *along: str) -> Any:
     """Give a `pandas.DataFrame` with a row per lane, or per lane and, say, "section_point".
 
     Flags are words. Raises ConfigurationError if nothing runs along it, FileError if pandas is not
@@ -60,7 +58,7 @@ def to_dataframe(result: Result, *along: str) -> Any:
     return pandas.DataFrame(columns, index.get_level_values(0) if len(dims) == 1 else index)
 
 
-def write(result: Result, path: Path, kind: str, along: Sequence[str] = ()) -> None:
+def write(result: "Result", path: Path, kind: str, along: Sequence[str] = ()) -> None:
     """Write a table as "csv" or "parquet", or every array and the words of flags as "mat"."""
     if kind == "mat":
         known = [v for v in result.variables.values() if v.flags]

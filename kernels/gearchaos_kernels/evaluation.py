@@ -84,16 +84,9 @@ def mesh_motion(
 ) -> MeshMotion:
     """Return forces, contact and accelerations along a motion (eqs 6, 7, 13, 22 and 23).
 
-    Without clearance teeth never part, and the sign of the gap tells the flank.
-
-    Parameters
-    ----------
-    system : System
-    states : ndarray, shape (lanes, samples, states)
-        Samples one step apart, the first one at mesh phase 0.
-    steps_per_period : int
-    first_period : int
-        Mesh periods that the teeth have turned before the first sample.
+    Without clearance teeth never part, and the sign of the gap tells the flank. ``states`` (lanes,
+    samples, states): one step apart, the first one at mesh phase 0, after so many mesh periods that
+    the teeth have turned.
     """
     lanes, samples, count = states.shape
     step = system.mesh_period / steps_per_period

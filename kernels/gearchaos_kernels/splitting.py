@@ -42,15 +42,9 @@ def split_step(memory, slot, table, shares, number, recorded, present):
     """Repeat one step of one lane in pieces that each stay on their contact branches.
 
     The state before the step is in the rows from `BEFORE` on, the one after it, which ignored the
-    crossing, in the ordinary rows. These are replaced where there is a crossing.
-
-    Returns
-    -------
-    crossings : int
-    slowest : float
-        Smallest speed of y_1 or y_2 at a crossing of this step; infinity without any.
-    overflow : int
-        1 if the step needed more than `MOST_SPLITS` splits.
+    crossing, in the ordinary rows. These are replaced where there is a crossing. Returned are the
+    number of crossings, the smallest speed of y_1 or y_2 at one of them, infinity without any, and
+    1 if the step needed more than `MOST_SPLITS` splits.
     """
     lane = load(memory, COEFFICIENTS, slot, Lane)
     state = read_state(memory, BEFORE + STATE, slot, present)
