@@ -31,9 +31,9 @@ def _reproduce(options: Namespace) -> int:
         )
     from gearchaos.configuration import load_config
     from gearchaos.engine.running import choose_threads
+    from gearchaos.example import sweep_file
     from gearchaos.paper.computation import compute
     from gearchaos.paper.gallery import check_folder, write_gallery
-    from gearchaos.paper.sweep_files import sweep_file
 
     began = time.monotonic()
     folder = Path(options.output or options.paper)

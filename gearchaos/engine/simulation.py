@@ -36,6 +36,7 @@ from gearchaos.engine.steps import (
     solution_of,
     stable_steps,
 )
+from gearchaos.errors import ConfigurationError
 from gearchaos.gear.mesh_stiffness import FourierStiffness
 from gearchaos.interrupts import check
 from gearchaos.records.contact import contact_told
@@ -48,6 +49,9 @@ from gearchaos.results.variables import DIRECTIONS, Variable, step_choice_variab
 Arrays = Mapping[str, NDArray[Any]]
 Bounds = tuple[int, int]
 Floats = NDArray[np.float64]
+
+LONGEST_EXCITATION = 50_000
+"""Mesh periods after which pitch errors repeat, at most: a record holds some of them."""
 
 PHASES = 1001
 """Mesh phases at which the sign of the mesh stiffness is looked at."""
@@ -311,6 +315,11 @@ class Simulation:
     def _whole_lengths(self) -> dict[str, int]:
         """Transient and record in whole excitation periods, enough of them to tell a period."""
         integration, repeats = self.config.integration, self.lanes.repeats_after
+        if repeats > LONGEST_EXCITATION:
+            raise ConfigurationError(
+                f"{self.config.source}: the pitch errors repeat after {repeats} mesh periods only, "
+                f"more than {LONGEST_EXCITATION}; give one gear deviations, or other teeth"
+            )
         least = {"transient_periods": 0, "recorded_periods": 1 if repeats == 1 else RETURNS}
         return {
             name: repeats * max(math.ceil(getattr(integration, name) / repeats), count)

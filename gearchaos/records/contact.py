@@ -25,10 +25,10 @@ WORDING = {
 def contact_told(contact: NDArray[np.float64], periods: int) -> dict[str, NDArray[Any]]:
     """Return what is told of one direction, each of shape (lanes,), by the names of `WORDING`.
 
-    With the ``contact_state``. ``contact`` (lanes, 6), see `Contact` of the kernels, is that of so
-    many mesh periods. Speeds are not a number without any impact.
+    With the ``contact_state``. ``contact`` (lanes, 6), one half of that of an `Outcome`, is that of
+    so many mesh periods. Speeds are not a number without any impact.
     """
-    driving, back, on_driving, on_back, speeds, largest = contact.T
+    driving, on_driving, back, on_back, speeds, largest = contact.T
     impacts = on_driving + on_back
     never = np.where(impacts > 0.0, 1.0, np.nan)
     apart = np.clip(1.0 - (driving + back) / periods, 0.0, 1.0)

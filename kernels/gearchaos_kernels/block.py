@@ -21,11 +21,11 @@ from gearchaos_kernels.block_memory import (
     CROSSINGS,
     GROWTH,
     LANES,
+    SPEEDS,
     STATE,
     STRIDE,
     SUSPECT,
     TANGENT,
-    TIMES,
     Block,
     Crossings,
     Lane,
@@ -314,7 +314,7 @@ def end(block, batch, steps, plan, outcome, present):
         outcome.overflows[index] = int(crossings.overflows)
         if present.contact is not None:
             for row in range(2 * CONTACT_ROWS):
-                unit = steps if row % CONTACT_ROWS < TIMES else 1
+                unit = steps if row % CONTACT_ROWS in (0, SPEEDS // 2) else 1
                 outcome.contact[index, row] = memory[(CONTACT + row) * STRIDE + slot] / unit
     if plan.history_periods > 0:
         keep_state(block, batch, outcome.history, plan.history_periods * plan.steps_per_period)

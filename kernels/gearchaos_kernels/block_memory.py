@@ -114,20 +114,6 @@ class Crossings(NamedTuple):
     overflows: float
 
 
-class Contact(NamedTuple):
-    """What the crossings of one direction tell: times on either flank in steps, impacts on it.
-
-    Of the speeds of approach the sum and the largest one, per step.
-    """
-
-    on_driving: float
-    on_back: float
-    driving_impacts: float
-    back_impacts: float
-    speeds: float
-    fastest: float
-
-
 STATE = 0
 TANGENT = STATE + len(STATES)
 BEFORE = TANGENT + len(STATES)
@@ -152,8 +138,8 @@ SHARED = PAIRS + MOST_PAIRS
 """Rows of the error that they share where the last step ended: value, slope and curvature."""
 CONTACT = SHARED + 3
 """First row of what is told of the contact: tangential, then axial."""
-CONTACT_ROWS, TIMES = len(Contact._fields), 2
-"""Rows of one direction; the first ones are times."""
+CONTACT_ROWS, SPEEDS = 6, 4
+"""Rows of one direction: time in steps and impacts on either flank, sum and largest of speeds."""
 ROWS = CONTACT + 2 * CONTACT_ROWS
 
 _ITEM = np.dtype(np.float64).itemsize

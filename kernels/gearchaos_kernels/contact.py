@@ -7,15 +7,7 @@ smooth field, so that the method keeps its order; one that leaves it has to be s
 
 import math
 
-from gearchaos_kernels.block_memory import (
-    CONTACT,
-    CONTACT_ROWS,
-    Branch,
-    Branches,
-    Contact,
-    load,
-    store,
-)
+from gearchaos_kernels.block_memory import CONTACT, CONTACT_ROWS, SPEEDS, STRIDE, Branch, Branches
 from gearchaos_kernels.compilation import scalar
 
 NEVER = 2.0
@@ -70,48 +62,28 @@ def tell_crossing(memory, slot, axially, branch, following, moment, speed):
 
     Time on a flank is the sum of all moments at which it is left less those at which it is met.
     """
-    row = CONTACT + (CONTACT_ROWS if axially else 0)
-    told = load(memory, row, slot, Contact)
+    first = CONTACT + (CONTACT_ROWS if axially else 0)
     meets = following.engaged
-    flank = branch
-    if meets != 0.0:
-        flank = following
-    driving = is_driving(flank)
-    back = 1.0 - driving
-    passed = moment * (1.0 - 2.0 * meets)
-    told = Contact(
-        told.on_driving + driving * passed,
-        told.on_back + back * passed,
-        told.driving_impacts + driving * meets,
-        told.back_impacts + back * meets,
-        told.speeds + meets * speed,
-        max(told.fastest, meets * speed),
-    )
-    store(memory, row, slot, told)
+    # One of the two offsets is that of the flank, the other one 0.
+    at = (first + row_of_flank(branch.offset + following.offset)) * STRIDE + slot
+    memory[at] += moment * (1.0 - 2.0 * meets)
+    memory[at + STRIDE] += meets
+    at = (first + SPEEDS) * STRIDE + slot
+    memory[at] += meets * speed
+    memory[at + STRIDE] = max(memory[at + STRIDE], meets * speed)
 
 
 @scalar
 def end_contact(memory, slot, way, branch, steps):
     """Count the flank on which a mesh period of so many steps ends until its end."""
-    row = CONTACT + way * CONTACT_ROWS
-    told = load(memory, row, slot, Contact)
-    left = steps * branch.engaged
-    on_driving = told.on_driving + is_driving(branch) * left
-    on_back = told.on_back + (1.0 - is_driving(branch)) * left
-    store(
-        memory,
-        row,
-        slot,
-        Contact(
-            on_driving, on_back, told.driving_impacts, told.back_impacts, told.speeds, told.fastest
-        ),
-    )
+    row = CONTACT + way * CONTACT_ROWS + row_of_flank(branch.offset)
+    memory[row * STRIDE + slot] += steps * branch.engaged
 
 
 @scalar
-def is_driving(branch):
-    """Return 1 for the driving flank, and where there is no clearance, 0 for the back flank."""
-    return 1.0 if branch.offset >= 0.0 else 0.0
+def row_of_flank(offset):
+    """Return the row of the driving flank, and where there is no clearance, or the back flank."""
+    return 0 if offset >= 0.0 else 2
 
 
 @scalar

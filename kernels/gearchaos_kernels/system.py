@@ -191,7 +191,10 @@ class Outcome(NamedTuple):
     ``crossings`` (lanes,): clearance boundaries crossed in the recorded periods;
     ``slowest_crossing`` (lanes,): smallest speed of y_1 or y_2 at one of them, or infinity;
     ``overflows`` (lanes,): steps that crossed more often than they were split, in all periods;
-    these three stay as they began in scenes without backlash and with plain steps; ``history``
+    these three stay as they began in scenes without backlash and with plain steps; ``contact``
+    (lanes, 12), or (lanes, 0) where the plan does not ask for it: tangential and then axial, mesh
+    periods on and impacts on the driving flank and on the back flank, sum and largest of the speeds
+    of approach, in the recorded periods; ``history``
     (lanes, history periods times steps + 1, states): the state at every step, or None.
     """
 

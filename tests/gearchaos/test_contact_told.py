@@ -28,7 +28,7 @@ def test_the_four_states_of_contact():
         ]
     ).T
     speeds = 0.5 * (on_driving + on_back)
-    contact = np.stack([driving, back, on_driving, on_back, speeds, 0.7 * speeds], axis=1)
+    contact = np.stack([driving, on_driving, back, on_back, speeds, 0.7 * speeds], axis=1)
     found = contact_told(contact, 10)
     assert [MEANINGS[state] for state in found["contact_state"]] == [
         "held",

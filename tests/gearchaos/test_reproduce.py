@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from gearchaos import FileError, load_config, open_result
+from gearchaos.example import sweep_file
 from gearchaos.figures.response_lane import coordinates_of
 from gearchaos.paper.comparison import compare
 from gearchaos.paper.computation import compute, lane_of, largest_acceleration
@@ -28,7 +29,6 @@ from gearchaos.paper.stages import (
     motion_at,
     out_of_turn,
 )
-from gearchaos.paper.sweep_files import sweep_file
 from gearchaos.paper.verdict import (
     OVERLAP,
     RULES,

@@ -126,3 +126,9 @@ def test_what_goes_on_from_a_result_begins_where_the_same_teeth_meet(result):
     system = system_of(config, {"pitch_error": result["pitch_error"]})
     again = integrate(system, result["end_state"], once).end_state
     assert again == pytest.approx(result["end_state"], abs=1e-9)
+
+
+def test_an_excitation_that_hardly_ever_repeats_is_refused():
+    many = {**TABLES["pair"], "teeth": [1999, 2000]}
+    with pytest.raises(gearchaos.ConfigurationError, match="after 3998000 mesh periods only"):
+        gearchaos.run(configured(pair=many, pitch_error=GRADES))

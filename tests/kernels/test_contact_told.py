@@ -7,7 +7,8 @@ from gearchaos_kernels import Effects, Plan, integrate, mesh_motion
 from .reference import FLOW_MAP, FULL, TORSION_ONLY, assert_same_bits, pan2021, system_of
 
 PERIODS = 12
-DRIVING, BACK, ON_DRIVING, ON_BACK, SPEEDS, FASTEST = range(6)
+DRIVING, ON_DRIVING, BACK, ON_BACK, SPEEDS, FASTEST = range(6)
+TIMES, IMPACTS = [DRIVING, BACK], [ON_DRIVING, ON_BACK, SPEEDS, FASTEST]
 MODEL = pan2021([0.3, 2.0, 5.86, 10.75])
 """Held, and on the driving flank once a period."""
 METHODS = {"rk4": 200, FLOW_MAP: 24}
@@ -63,9 +64,9 @@ def test_teeth_that_never_part_are_held_and_teeth_in_the_middle_are_free(method)
     start[:, 0] = [0.8, 0.0, -0.8]
     steps = METHODS[method]
     _, found = told(system_of(model, TORSION_ONLY), start, steps_per_period=steps, method=method)
-    shares = found[:, 0, :2] / PERIODS
+    shares = found[:, 0, TIMES] / PERIODS
     assert shares == pytest.approx(np.array([[1.0, 0.0], [0.0, 0.0], [0.0, 1.0]]))
-    assert not found[:, 0, 2:].any()
+    assert not found[:, 0, IMPACTS].any()
 
 
 def test_a_free_flight_meets_the_flanks_when_it_should():
@@ -85,7 +86,7 @@ def test_a_free_flight_meets_the_flanks_when_it_should():
     on_flank = np.minimum(landings + turn, total) - landings
     assert found[0, 0, ON_DRIVING] == landings[::2].size
     assert found[0, 0, ON_BACK] == landings[1::2].size
-    times = found[0, 0, :2] * system.mesh_period[0]
+    times = found[0, 0, TIMES] * system.mesh_period[0]
     assert times == pytest.approx([on_flank[::2].sum(), on_flank[1::2].sum()], rel=1e-7)
     assert found[0, 0, FASTEST] == pytest.approx(speed, rel=1e-8)
     assert found[0, 0, SPEEDS] == pytest.approx(landings.size * speed, rel=1e-8)
