@@ -8,6 +8,7 @@ from argparse import ArgumentParser, ArgumentTypeError, Namespace
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from io import TextIOWrapper
+from pathlib import Path
 from typing import Any, NamedTuple, TextIO
 
 from gearchaos.errors import ConfigurationError, FileError, GearchaosError
@@ -38,6 +39,9 @@ COMMON_OPTIONS: dict[str, dict[str, Any]] = {
     },
     "quiet": {"action": "store_true", "help": "say nothing on stderr unless something fails"},
 }
+
+_PACKAGE = Path(__file__).resolve().parent
+_SWEEPS = (_PACKAGE / "sweeps", _PACKAGE.parent / "sweeps")
 
 
 class Command(NamedTuple):
@@ -180,3 +184,15 @@ def _discard(stream: TextIO) -> None:
         sink = os.open(os.devnull, os.O_WRONLY)
         os.dup2(sink, stream.fileno())
         os.close(sink)
+
+
+def sweep_file(name: str) -> Path:
+    """Return the path of a configuration that comes with gearchaos, such as ``pan2021.toml``.
+
+    Raises FileError if neither the installed package nor the clone has it.
+    """
+    for folder in _SWEEPS:
+        if (folder / name).is_file():
+            return folder / name
+    places = " nor ".join(str(folder) for folder in _SWEEPS)
+    raise FileError(f"{name}: is neither in {places}; install gearchaos again")

@@ -6,25 +6,9 @@ Exit codes: 0 done, 2 there is no such example, 4 the file exists already or can
 import sys
 import tomllib
 from argparse import ArgumentParser, Namespace
-from pathlib import Path
 
-from gearchaos.command_line import OK, Command
-from gearchaos.errors import ConfigurationError, FileError
-
-_PACKAGE = Path(__file__).resolve().parent
-_FOLDERS = (_PACKAGE / "sweeps", _PACKAGE.parent / "sweeps")
-
-
-def sweep_file(name: str) -> Path:
-    """Return the path of a configuration that comes with gearchaos, such as ``pan2021.toml``.
-
-    Raises FileError if neither the installed package nor the clone has it.
-    """
-    for folder in _FOLDERS:
-        if (folder / name).is_file():
-            return folder / name
-    places = " nor ".join(str(folder) for folder in _FOLDERS)
-    raise FileError(f"{name}: is neither in {places}; install gearchaos again")
+from gearchaos.command_line import OK, Command, sweep_file
+from gearchaos.errors import ConfigurationError
 
 
 def _arguments(parser: ArgumentParser) -> None:

@@ -10,7 +10,7 @@ import time
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
-from gearchaos.command_line import OK, Command
+from gearchaos.command_line import OK, Command, sweep_file
 from gearchaos.errors import ConfigurationError
 from gearchaos.progress import say
 
@@ -31,7 +31,6 @@ def _reproduce(options: Namespace) -> int:
         )
     from gearchaos.configuration import load_config
     from gearchaos.engine.running import choose_threads
-    from gearchaos.example import sweep_file
     from gearchaos.paper.computation import compute
     from gearchaos.paper.gallery import check_folder, write_gallery
 

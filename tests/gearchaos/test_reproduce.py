@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from gearchaos import FileError, load_config, open_result
-from gearchaos.example import sweep_file
+from gearchaos.command_line import sweep_file
 from gearchaos.figures.response_lane import coordinates_of
 from gearchaos.paper.comparison import compare
 from gearchaos.paper.computation import compute, lane_of, largest_acceleration
