@@ -20,6 +20,7 @@ from gearchaos.dynamics.stability import (
 )
 from gearchaos.engine.lanes import Lanes
 from gearchaos.errors import ConfigurationError
+from gearchaos.gear.tooth_deviations import REALISATION
 from gearchaos.interrupts import check
 from gearchaos.records.difference import Solution, bound, difference, motions_by_period
 from gearchaos.records.period import POINTS_NEEDED, RETURNS, motion_period
@@ -121,8 +122,9 @@ def _limits(lanes: Lanes, steps: int) -> Iterator[StabilityLimit]:
 
 def _fault(lanes: Lanes, worst: StabilityLimit, unstable: NDArray[np.intp], steps: int) -> Fault:
     places = []
-    for parameter in (sweep.parameter for sweep in lanes.config.sweeps.values()):
-        values = lanes.values_of(unstable)[parameter]
+    swept = lanes.values_of(unstable)
+    swept.pop(REALISATION, None)
+    for parameter, values in swept.items():
         low, high = np.min(values), np.max(values)
         places.append(
             f"{parameter} " + (f"= {low:.6g}" if low == high else f"from {low:.6g} to {high:.6g}")

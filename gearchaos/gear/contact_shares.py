@@ -15,9 +15,6 @@ Floats = NDArray[np.float64]
 MOST_CONTACT = 5.0
 """Largest total contact ratio: the kernels have room for seven pairs in mesh or next to it."""
 
-_PIECES = 6
-"""Cells over which the splines between the shares reach."""
-
 _SAMPLES = 64
 """Places within a cell over which a share is averaged."""
 
@@ -40,7 +37,8 @@ def contact_shares(
             f"[pair]: its total contact ratio {transverse + overlap:.3g} must be between 1 and "
             f"{MOST_CONTACT:g} for pitch errors tooth by tooth; check the data of the gears"
         )
-    per_period = max(1, round(_PIECES / smoothing))
+    # A spline reaches over six cells.
+    per_period = max(1, round(6.0 / smoothing))
     cells = int(np.ceil((transverse + overlap) * per_period))
     samples = (np.arange(_SAMPLES * per_period) + 0.5) / (_SAMPLES * per_period)
     turns = np.arange(cells // per_period + 1)[:, np.newaxis]

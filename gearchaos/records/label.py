@@ -130,19 +130,20 @@ def settling_periods(record: Record, labels: Labels) -> NDArray[np.int32]:
         return found
     section = record.section[lanes]
     half = section.shape[1] // 2
-    # Two halves of a short record: all of it returns no better than its begin.
-    now, before = return_distances(section[:, half:]), return_distances(section[:, :half])
-    periods = np.arange(1, now.shape[1] + 1)
+    whole, late, before = map(return_distances, (section, section[:, half:], section[:, :half]))
+    periods = np.arange(1, before.shape[1] + 1)
     own = labels.period[lanes, np.newaxis]
     looked_at = (own == 0) | ((own > periods) & (own % periods == 0))
-    now[~(looked_at & (now < before))] = np.inf
-    nearest = np.argmin(now, axis=1)
-    settling = now[np.arange(lanes.size), nearest] <= SETTLING
+    falling = np.ones(lanes.size, dtype=np.bool_)
     if record.growth is not None:
         later = record.growth[lanes, record.growth.shape[1] // 2 :]
-        exponent, _ = largest_exponent(later, np.ones(lanes.size))
-        settling &= exponent < 0.0
-    found[lanes[settling]] = periods[nearest[settling]]
+        falling = largest_exponent(later, np.ones(lanes.size))[0] < 0.0
+    # All of a short record may return no better than its begin, and half of it tells fewer periods.
+    for now in (whole, late):
+        now = np.where(looked_at & (now < before), now, np.inf)
+        nearest = np.argmin(now, axis=1)
+        settling = falling & (now.min(axis=1) <= SETTLING) & (found[lanes] == 0)
+        found[lanes[settling]] = periods[nearest[settling]]
     return found
 
 

@@ -45,6 +45,7 @@ def make_result(*axes: Axis, **metadata: Any) -> Result:
         lyapunov=True,
         status_meanings=["ok", "diverged"],
         crossings=True,
+        contact=["tangential"],
         exponents=True,
         check_meanings=["not_checked", "same", "changed"],
         motion_meanings=["periodic", "chaotic"],
@@ -59,6 +60,7 @@ def make_result(*axes: Axis, **metadata: Any) -> Result:
     }
     data["unsplit_steps"] = np.zeros(lanes)
     data["motion_changed"] = np.arange(lanes) % 3
+    data["contact_state_tangential"] = np.arange(lanes) % 4
     data["motion"] = data["period"] = data["record"] = np.arange(lanes) % 2
     data["status"] = (np.arange(lanes) == 7).astype(np.uint8)
     data["diverged_period"] = np.where(data["status"], 12, -1)
@@ -228,7 +230,7 @@ def test_every_dataset_follows_the_rules_of_the_format(path: Path) -> None:
         assert (file.attrs["schema"], file.attrs["schema_version"]) == (b"gearchaos-sweep", b"3.1")
         datasets: list[h5py.Dataset] = []
         file.visititems(lambda _, item: datasets.append(item) if hasattr(item, "shape") else None)
-        assert len(datasets) == 30
+        assert len(datasets) == 38
         for dataset in datasets:
             assert {"units", "long_name"} <= set(dataset.attrs)
             assert dataset.dtype.kind == "S" or dataset.dtype.str in {"<f8", "<i4", "|u1"}
