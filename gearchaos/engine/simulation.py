@@ -337,7 +337,7 @@ class Simulation:
         told = min(lengths["recorded_periods"] // (RETURNS * repeats), LONGEST_PERIOD)
         text = (
             f"the pitch errors repeat after {repeats} mesh periods, the excitation period; the "
-            f"record tells motions of {told} of them{' or less' if told > 1 else ''}"
+            f"record is long enough to tell period {told}{' and shorter ones' if told > 1 else ''}"
         )
         return f"{text}; {', '.join(changed)}, whole ones of it" if changed else text
 
