@@ -73,9 +73,9 @@ def system_of(
 def _teeth(
     config: Configuration, values: Mapping[str, Floats], fundamental: complex
 ) -> Teeth | None:
-    """Return the errors of the teeth of some lanes, None where the pitch error is a sine."""
+    """Return the errors of the teeth of some lanes, None where they have none of their own."""
     error = config.pitch_error
-    if error is None or error.kind == "sine":
+    if error is None or error.kind == "sine" or "pitch_error" not in config.scene.effects:
         return None
     pair = Quantities(physical_at(config, values)).pair
     ratios = [np.unique(r) for r in (pair.transverse_contact_ratio, pair.overlap_contact_ratio)]

@@ -12,12 +12,14 @@ import numba
 import numpy as np
 from numba.core import event
 
-from gearchaos.configuration import Given, configuration_of
+from gearchaos.configuration import Given, axis_values, configuration_of
+from gearchaos.configuration.sweep_values import physical_at
 from gearchaos.engine.error_check import Tally
 from gearchaos.engine.executors import LocalExecutor, compute_blocks
 from gearchaos.engine.provenance import provenance
 from gearchaos.engine.simulation import Arrays, Bounds, Simulation
 from gearchaos.errors import ConfigurationError
+from gearchaos.gear.derivation import length_key
 from gearchaos.interrupts import check
 from gearchaos.progress import Progress, say, speaking
 from gearchaos.results.result import Result
@@ -185,7 +187,6 @@ def _excitation(simulation: Simulation) -> dict[str, float]:
     if facts["excitation_period"] == 1 or config.pair is None:
         return facts
     facts |= dict(zip(("driving_teeth", "driven_teeth"), config.pair.teeth, strict=True))
-    physical, scale = config.physical(), "mesh.length_scale_um"
-    length = physical[scale] or physical["mesh.half_backlash_um"]
-    one = length and scale not in [sweep.parameter for sweep in config.sweeps.values()]
-    return facts | ({"length_scale_um": length} if one else {})
+    physical = physical_at(config, axis_values(config))
+    length = physical[length_key(physical)]
+    return facts | ({} if np.ndim(length) else {"length_scale_um": length})

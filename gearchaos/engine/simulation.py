@@ -356,7 +356,7 @@ class Simulation:
         return (
             f"in {parting:.0%} of the lanes neighbouring tooth pairs differ by up to "
             f"{apart.max():.2g}, more than the static deflection there; single pairs may then part "
-            "while its neighbours carry, which the model leaves out"
+            "while their neighbours carry, which the model leaves out"
         )
 
     def _negative_stiffness(self) -> str:

@@ -5,6 +5,7 @@ from collections.abc import Mapping
 
 from matplotlib.mathtext import MathTextParser
 
+from gearchaos.results.excitation import excitation_of
 from gearchaos.results.result import Result
 
 DIMENSIONLESS = ("", "1")
@@ -58,6 +59,12 @@ def form_in_words(result: Result) -> str:
     """Name the form of the gaps where it is not the physical one, for the foot of a page."""
     published = result.metadata.get("formulation") == "published"
     return "gaps as printed in Pan 2021 (eqs 6 and 7), not the physical ones" if published else ""
+
+
+def legend_title(result: Result) -> str | None:
+    """Name the form of the gaps and the unit of periods where they need it, above a legend."""
+    words = (form_in_words(result), excitation_of(result.metadata).in_words)
+    return "\n".join(filter(None, words)) or None
 
 
 def in_words(result: Result, place: Mapping[str, float]) -> str:

@@ -8,12 +8,11 @@ from matplotlib.axes import Axes
 from matplotlib.container import Container
 from matplotlib.ticker import MaxNLocator, NullLocator
 
-from gearchaos.figures.labels import axis_label, form_in_words, in_words
+from gearchaos.figures.labels import axis_label, in_words, legend_title
 from gearchaos.figures.lanes import Between, Floats, diagram_lanes
 from gearchaos.figures.page import Page, few_ticks, letter, page, remark
-from gearchaos.figures.stages import HATCHES, SHADES
+from gearchaos.figures.stages import SHADES, look_of
 from gearchaos.figures.style import BLACK, LEGEND, SINGLE_COLUMN_MM, SMALL_FONT_PT
-from gearchaos.results.excitation import excitation_of
 from gearchaos.results.result import Result
 from gearchaos.results.shares import Counted, motion_shares
 from gearchaos.results.variables import REPEATS
@@ -88,9 +87,8 @@ def shares_page(
     with page(width_mm, height) as figure:
         ratios = (1.6, 1.0)[:panels]
         stack = figure.subplots(panels, 1, sharex=True, squeeze=False, height_ratios=ratios)[:, 0]
-        drawn = shares(
-            stack[0], result, between=between, contact=stack[-1] if panels == 2 else None
-        )
+        contact = stack[-1] if panels == 2 else None
+        drawn = shares(stack[0], result, between=between, contact=contact)
         if panels == 2:
             stack[0].set_xlabel("")
             letter(stack)
@@ -99,22 +97,15 @@ def shares_page(
         remark(stack[0], f"{' with '.join(sizes)} each")
         if result.fixed:
             figure.suptitle(in_words(result, result.fixed), fontsize=SMALL_FONT_PT)
-        words = (form_in_words(result), excitation_of(result.metadata).in_words)
-        title = "\n".join(filter(None, words)) or None
-        look = {"title": title, "title_fontsize": SMALL_FONT_PT, "ncols": 3, **LEGEND}
-        figure.legend(handles=drawn, loc="outside lower center", **look)
+        look = {"title_fontsize": SMALL_FONT_PT, "loc": "outside lower center", **LEGEND}
+        figure.legend(handles=drawn, title=legend_title(result), ncols=3, **look)
         figure.align_ylabels(stack)
     return figure
 
 
 def _layer(axes: Axes, values: Floats, base: Floats, top: Floats, motion: str) -> Drawn:
     """Draw the share of one motion from base to top, both (values,)."""
-    look: dict[str, Any] = {
-        "facecolor": SHADES.get(motion, SHADES["unresolved"]),
-        "edgecolor": "0.55",
-        "hatch": HATCHES.get(motion),
-        "label": motion,
-    }
+    look = {"label": motion, **look_of(motion)}
     if values.size <= MOST_BARS:
         width = 0.8 * (np.diff(values).min() if values.size > 1 else 1.0)
         return axes.bar(values, top - base, width, base, linewidth=0.3, **look)

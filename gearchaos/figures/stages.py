@@ -9,10 +9,9 @@ from matplotlib.legend import Legend
 from matplotlib.patches import Patch, Rectangle
 
 from gearchaos.errors import FigureError
-from gearchaos.figures.labels import form_in_words
+from gearchaos.figures.labels import legend_title
 from gearchaos.figures.lanes import swept_axes
 from gearchaos.figures.style import LEGEND, SMALL_FONT_PT
-from gearchaos.results.excitation import excitation_of
 from gearchaos.results.result import Result
 from gearchaos.results.stage_table import LabelledLanes, Stage, labelled_lanes, stage_table
 from gearchaos.results.variables import LABELS, REPEATS
@@ -105,24 +104,23 @@ def shade_stages(
     for kind, (left, right) in zip(kinds, pairwise(edges), strict=True):
         if left < high and right > low:
             place = max(left, low), min(right, high)
-            shades.append(axes.axvspan(*place, linewidth=0.0, zorder=0.0, **_look(kind)))
+            shades.append(axes.axvspan(*place, linewidth=0.0, zorder=0.0, **look_of(kind)))
             drawn.add(kind)
     axes.set_xlim(low, high)
     if not legend:
         return StageArtists(stages, shades, None)
     named = [kind for kind in dict.fromkeys([*SHADES, *kinds]) if kind in drawn]
-    handles = [Patch(linewidth=0.3, label=kind, **_look(kind)) for kind in named]
+    handles = [Patch(linewidth=0.3, label=kind, **look_of(kind)) for kind in named]
     assert axes.figure is not None
     # Above the axes are the panel's letter and the marks of lanes that cannot be shown; and a line
     # at the foot of the page would lie on the legend.
     look = {"loc": "outside lower center", "ncols": min(len(handles), 5), **LEGEND}
-    words = (form_in_words(result), excitation_of(result.metadata).in_words)
-    title = "\n".join(filter(None, words)) or None
-    look |= {"title": title, "title_fontsize": SMALL_FONT_PT}
+    look |= {"title": legend_title(result), "title_fontsize": SMALL_FONT_PT}
     return StageArtists(stages, shades, axes.figure.legend(handles=handles, **look))
 
 
-def _look(kind: str) -> dict[str, Any]:
+def look_of(kind: str) -> dict[str, Any]:
+    """Return how a kind of motion is filled, one unknown as one unresolved."""
     # A later version of the file format may know motions that this one does not.
     shade = SHADES.get(kind, SHADES["unresolved"])
     return {"facecolor": shade, "edgecolor": "0.55", "hatch": HATCHES.get(kind)}

@@ -37,6 +37,12 @@ def derive_groups(physical: Mapping[str, Any], without: Collection[str] = ()) ->
     return groups
 
 
+def length_key(physical: Mapping[str, Any]) -> str:
+    """Return the path of the length that b' is: the scale if it is known, else half backlash."""
+    scale = "mesh.length_scale_um"
+    return "mesh.half_backlash_um" if physical[scale] is None else scale
+
+
 class _UnknownError(Exception):
     """A physical quantity that a derivation needs is not known."""
 
@@ -80,8 +86,7 @@ class Quantities:
     @cached_property
     def length_scale(self) -> Any:
         """Length scale b' in m: the one given, else the half backlash."""
-        given = self.physical["mesh.length_scale_um"]
-        return (self["mesh.half_backlash_um"] if given is None else given) * _MICROMETRE
+        return self[length_key(self.physical)] * _MICROMETRE
 
     def over_length_scale(self, path: str) -> Any:
         """Length given in um, over b'."""

@@ -3,9 +3,6 @@
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
-LARGEST = 1e9
-"""Beyond any number of teeth, and any length in um."""
-
 
 class Excitation(NamedTuple):
     """The excitation of all lanes, by the attributes of these names.
@@ -33,9 +30,10 @@ class Excitation(NamedTuple):
 
 def excitation_of(metadata: Mapping[str, Any]) -> Excitation:
     """Read the excitation from the metadata of a result; what makes no sense is not known."""
+    # Beyond that is no number of teeth, and no length in um.
     sound = {
         name: value
         for name, default in Excitation._field_defaults.items()
-        if isinstance(value := metadata.get(name), type(default)) and 0 < value < LARGEST
+        if isinstance(value := metadata.get(name), type(default)) and 0 < value < 1e9
     }
     return Excitation(**sound)

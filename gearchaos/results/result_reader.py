@@ -223,7 +223,7 @@ def _check_variables(
         section_points=np.size(data.get(known.SECTION_POINT, ())),
         lyapunov=known.LARGEST_EXPONENT in found,
         status_meanings=(),
-        crossings="crossings_per_period" in found,
+        crossings=known.CROSSINGS in found,
         contact=[way for way in known.DIRECTIONS if f"contact_state_{way}" in found],
         exponents=known.ALL_EXPONENTS in found,
         check_meanings=["same"] if "motion_changed" in found else [],

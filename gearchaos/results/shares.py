@@ -9,11 +9,9 @@ from gearchaos.errors import ConfigurationError, FileError
 from gearchaos.records.wilson import wilson_interval
 from gearchaos.results.result import Result
 from gearchaos.results.stage_table import label_text
-from gearchaos.results.variables import LABELS, REPEATS
+from gearchaos.results.variables import CROSSINGS, LABELS, REPEATS
 
 Floats = NDArray[np.float64]
-
-CROSSINGS = "crossings_per_period"
 
 
 class Counted(NamedTuple):

@@ -30,6 +30,7 @@ STEP_ERROR = "exponent_step_error"
 RECORD = "record"
 LABELS = ("motion", "period")
 BANDS = "bands"
+CROSSINGS = "crossings_per_period"
 STATUS = "status"
 DIRECTIONS = ("tangential", "axial")
 """Directions in which teeth have a clearance."""
@@ -200,7 +201,7 @@ def sweep_variables(
         real("lyapunov_sum", text, r"$\sum\lambda_i$")
     if crossings:
         text = "clearance boundaries crossed per mesh period, tangential and axial together"
-        real("crossings_per_period", text)
+        real(CROSSINGS, text)
         real("slowest_crossing", "smallest speed of a gap at a crossing of its clearance boundary")
         add("int32", "unsplit_steps", "steps with more crossings than they were split at")
     for way in contact:

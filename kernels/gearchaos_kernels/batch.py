@@ -81,7 +81,7 @@ def integrate(
     Raises
     ------
     ValueError
-        If flow maps are asked for with pitch errors tooth by tooth.
+        If flow maps are asked for with pitch errors tooth by tooth, or too many pairs are in mesh.
     """
     lanes, states = start.shape[0], len(system.states)
     steps = plan.steps_per_period

@@ -112,7 +112,6 @@ def integrate_block(number_of_block, batch, plan, outcome, present):
     interval = begin(block, batch, present)
     periods = plan.transient_periods + plan.recorded_periods
     for period in range(periods):
-        turn(block, batch, plan.first_period + period, present)
         for number in range(steps):
             if period >= periods - plan.history_periods and number % every == 0:
                 sample = (period - periods + plan.history_periods) * plan.steps_per_period
@@ -125,8 +124,8 @@ def integrate_block(number_of_block, batch, plan, outcome, present):
                     phase_on_grid(table, 2 * number + 1),
                     phase_on_grid(table, 2 * number + 2),
                 )
-                middle_shares = shares_at(batch.shares, 2 * number + 1, present)
-                end_shares = shares_at(batch.shares, 2 * number + 2, present)
+                middle_shares = shares_at(shares, 2 * number + 1, present)
+                end_shares = shares_at(shares, 2 * number + 2, present)
                 suspects = step_block(memory, phases, middle_shares, end_shares, present)
             else:
                 suspects = move_block(memory, maps, row, slots, work, present)
@@ -139,6 +138,7 @@ def integrate_block(number_of_block, batch, plan, outcome, present):
                 if (number + 1) % interval == 0 or last:
                     scale_tangents(block, batch, number + 1, last)
         end_period(block, batch, period, steps, plan, outcome, present)
+        turn(block, batch, plan.first_period + period + 1, present)
     end(block, batch, steps, plan, outcome, present)
 
 

@@ -83,7 +83,7 @@ def end_contact(memory, slot, way, branch, steps):
 @scalar
 def row_of_flank(offset):
     """Return the row of the driving flank, and where there is no clearance, or the back flank."""
-    return 0 if offset >= 0.0 else 2
+    return 0 if offset >= 0.0 else SPEEDS // 2
 
 
 @scalar

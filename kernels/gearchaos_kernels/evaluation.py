@@ -129,8 +129,9 @@ def _follow(coefficients, scales, steps, table, teeth, first, states, motion, pr
             state = read_state(memory, STATE, 0, present)
             row = 2 * sample % (table.shape[0] - 1)
             if present.teeth is not None:
-                period = first + 2 * sample // (table.shape[0] - 1)
-                engage(memory, 0, driving[profile[index]], driven[profile[index]], period)
+                if row == 0:
+                    period = first + 2 * sample // (table.shape[0] - 1)
+                    engage(memory, 0, driving[profile[index]], driven[profile[index]], period)
             point = point_on_grid(memory, 0, table, shares, row, present)
             forcing = forcing_at(lane, point, present)
             if present.pitch_error is not None:

@@ -194,8 +194,8 @@ class Outcome(NamedTuple):
     these three stay as they began in scenes without backlash and with plain steps; ``contact``
     (lanes, 12), or (lanes, 0) where the plan does not ask for it: tangential and then axial, mesh
     periods on and impacts on the driving flank and on the back flank, sum and largest of the speeds
-    of approach, in the recorded periods; ``history``
-    (lanes, history periods times steps + 1, states): the state at every step, or None.
+    of approach, in the recorded periods; ``history`` (lanes, history periods times steps + 1,
+    states): the state at every step, or None.
     """
 
     section: Floats
