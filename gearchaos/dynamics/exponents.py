@@ -50,14 +50,14 @@ def exponents(system: System, start: Floats, plan: Plan) -> Exponents:
     two directions whose exponents times the mesh period differ by more than about 18 are parallel
     in double precision after one period. `sum_of_exponents` is an exact check.
     """
-    once = plan._replace(transient_periods=0, recorded_periods=1)
     lanes, states = start.shape
     logarithms = np.full((lanes, states, plan.recorded_periods), np.nan)
-    frame = np.broadcast_to(_first_frame(states), (lanes, states, states))
-    state = start
+    # The first vector is an equal share of every state, as a single vector is.
+    frame, _ = np.linalg.qr(np.column_stack([np.ones(states), np.eye(states)[:, 1:]]))
+    frame, state = np.broadcast_to(frame, (lanes, states, states)), start
     for period in range(-plan.transient_periods, plan.recorded_periods):
-        turned = plan.transient_periods + period
-        state, vectors, growth = _carry(system, state, frame, once._replace(first_period=turned))
+        once = plan._replace(recorded_periods=1, first_period=plan.transient_periods + period)
+        state, vectors, growth = _carry(system, state, frame, once)
         frame, triangle = np.linalg.qr(vectors)
         left = np.abs(np.diagonal(triangle, axis1=1, axis2=2))
         resolved = np.logical_and.accumulate(left > SMALLEST_RESOLVED, axis=1)
@@ -88,24 +88,15 @@ def sum_of_exponents(system: System) -> Floats:
 
 
 def period_jacobian(system: System, start: Floats, plan: Plan) -> Floats:
-    """Return the Jacobian of the map over the recorded mesh periods, taken after the transient.
+    """Return the Jacobian of the map over the recorded mesh periods, with no transient before.
 
     On a periodic orbit over its own number of periods this is the monodromy matrix, whose
     eigenvalues are the Floquet multipliers. Of shape (lanes, states, states), column j the
     derivative with respect to state j; not a number in lanes that diverged.
     """
-    if plan.transient_periods:
-        before = plan._replace(
-            transient_periods=0,
-            recorded_periods=plan.transient_periods,
-            section_points=0,
-            tangent=False,
-        )
-        start = integrate(system, start, before).end_state
-        plan = plan._replace(first_period=plan.first_period + plan.transient_periods)
     lanes, states = start.shape
     frame = np.broadcast_to(np.eye(states), (lanes, states, states))
-    _, vectors, growth = _carry(system, start, frame, plan._replace(transient_periods=0))
+    _, vectors, growth = _carry(system, start, frame, plan)
     lengths: Floats = np.exp(np.sum(growth, axis=2))
     return vectors * lengths[:, np.newaxis, :]
 
@@ -113,28 +104,18 @@ def period_jacobian(system: System, start: Floats, plan: Plan) -> Floats:
 def _carry(
     system: System, start: Floats, frame: Floats, plan: Plan
 ) -> tuple[Floats, Floats, Floats]:
-    """Integrate every lane once for every column of its frame (lanes, states, states).
+    """Integrate every lane over its recorded periods for every column of its frame, at once.
 
-    Return end states (lanes, states), unit tangent vectors as columns, logarithms of their growth.
+    The frame is of shape (lanes, states, states). Return end states (lanes, states), unit tangent
+    vectors as columns, logarithms of their growth.
     """
     lanes, states, _ = frame.shape
     outcome = integrate(
         system.repeated(states),
         np.repeat(start, states, axis=0),
-        plan._replace(section_points=0, tangent=True),
+        plan._replace(transient_periods=0, section_points=0, history_periods=0, tangent=True),
         tangent_start=frame.transpose(0, 2, 1).reshape(-1, states),
     )
     assert outcome.growth is not None
     vectors = outcome.end_tangent.reshape(lanes, states, states).transpose(0, 2, 1)
     return outcome.end_state[::states], vectors, outcome.growth.reshape(lanes, states, -1)
-
-
-def _first_frame(states: int) -> Floats:
-    """Orthonormal columns, the first an equal share of every state, as for a single vector."""
-    equal = np.ones(states) / np.sqrt(states)
-    # The reflection that exchanges this vector and the first axis.
-    difference = equal - np.eye(states)[0]
-    frame: Floats = np.eye(states) - 2.0 * np.outer(difference, difference) / (
-        difference @ difference
-    )
-    return frame

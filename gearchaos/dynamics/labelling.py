@@ -107,13 +107,7 @@ def _told_again(system: System, outcome: Outcome, plan: Plan) -> Labels:
 
 def _tell_linear(system: System, plan: Plan, labels: Labels) -> None:
     """Tell growth without bound by the multipliers, in place: what is linear is never chaotic."""
-    once = plan._replace(
-        transient_periods=0,
-        recorded_periods=system.repeats_after,
-        section_points=0,
-        history_periods=0,
-        tangent=True,
-    )
+    once = plan._replace(recorded_periods=system.repeats_after)
     jacobian = period_jacobian(system, np.zeros((system.lanes, len(system.states))), once)
     size = np.max(np.abs(np.linalg.eigvals(np.nan_to_num(jacobian))), axis=1)
     grows = size > 1.0 + MARGIN
