@@ -22,7 +22,8 @@ from gearchaos.engine.lanes import Lanes
 from gearchaos.errors import ConfigurationError
 from gearchaos.gear.tooth_deviations import REALISATION
 from gearchaos.interrupts import check
-from gearchaos.records.difference import Solution, bound, difference, motions_by_period
+from gearchaos.records.difference import Solution, bound, difference
+from gearchaos.records.label import PERIODIC, UNRESOLVED
 from gearchaos.records.period import POINTS_NEEDED, RETURNS, motion_period
 
 LANES_AT_ONCE = 2**14
@@ -155,7 +156,7 @@ def solution_of(
     outcome = outcome.every(system.repeats_after)
     if told is None:
         period, state = motion_period(outcome.section), outcome.end_state
-        motion = motions_by_period(period)
+        motion = np.where(period > 0, PERIODIC, UNRESOLVED)
     else:
         period, state, motion = told.labels.period, told.state, told.labels.motion
     exponent = None

@@ -23,7 +23,7 @@ def response_variables_of(result: Result) -> tuple[str, ...]:
     """Return the variables that run over time as numbers: all but the contact states."""
     return tuple(
         name
-        for name in result.names
+        for name in result
         if TIME in result.dims(name)[1:] and not result.variables[name].flags
     )
 

@@ -1,7 +1,6 @@
 """The single-sided amplitude spectrum of a motion, in multiples of the mesh frequency."""
 
 from collections.abc import Callable
-from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
@@ -9,13 +8,11 @@ from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 
-WINDOWS: MappingProxyType[str, Callable[[int], Floats]] = MappingProxyType(
-    {
-        "rectangular": np.ones,
-        # Periodic, unlike numpy.hanning: its transform is zero at all but three lines.
-        "hann": lambda samples: 0.5 - 0.5 * np.cos(2.0 * np.pi * np.arange(samples) / samples),
-    }
-)
+WINDOWS: dict[str, Callable[[int], Floats]] = {
+    "rectangular": np.ones,
+    # Periodic, unlike numpy.hanning: its transform is zero at all but three lines.
+    "hann": lambda samples: 0.5 - 0.5 * np.cos(2.0 * np.pi * np.arange(samples) / samples),
+}
 """Windows by name, each as a function of the number of samples."""
 
 

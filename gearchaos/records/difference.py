@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gearchaos.records.label import PERIODIC, UNRESOLVED
+from gearchaos.records.label import UNRESOLVED
 from gearchaos.records.period import section_distance
 
 Floats = NDArray[np.float64]
@@ -74,11 +74,6 @@ def difference(one: Solution, other: Solution) -> Difference:
         | (told & (one.motion != other.motion))
         | (one.diverged != other.diverged),
     )
-
-
-def motions_by_period(period: NDArray[np.int32]) -> NDArray[np.uint8]:
-    """Return the motion of lanes of which only the period is known, shape (lanes,)."""
-    return np.where(period > 0, PERIODIC, UNRESOLVED).astype(np.uint8)
 
 
 def bound(errors: Floats) -> float:

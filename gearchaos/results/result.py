@@ -94,11 +94,6 @@ class Result:
         """Coordinates of the axes that `sel` has fixed."""
         return fixed_coordinates(self.metadata)
 
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Names of the variables, in the order of the file."""
-        return tuple(self._data)
-
     def __contains__(self, name: object) -> bool:
         return name in self._data
 

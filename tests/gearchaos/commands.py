@@ -160,9 +160,9 @@ def names_in(folder: Path) -> list[str]:
 
 def same_data(one: gearchaos.Result, other: gearchaos.Result) -> bool:
     """Whether two results hold the same variables and parameters, bit for bit."""
-    assert one.names == other.names
+    assert list(one) == list(other)
     assert one.parameters.keys() == other.parameters.keys()
-    arrays = [(one[name], other[name]) for name in one.names]
+    arrays = [(one[name], other[name]) for name in one]
     arrays += [
         (np.asarray(parameter.value), np.asarray(other.parameters[name].value))
         for name, parameter in one.parameters.items()

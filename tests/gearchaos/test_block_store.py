@@ -108,7 +108,7 @@ def test_blocks_in_any_order_become_the_file_of_the_whole_sweep(output: Path) ->
     Result(["load"], VARIABLES, DATA, PARAMETERS, {"title": "t"}).save(whole)
     merged, saved = open_result(output), open_result(whole)
     assert merged.metadata == saved.metadata
-    assert merged.names == saved.names
+    assert list(merged) == list(saved)
     for name in saved:
         np.testing.assert_array_equal(merged[name], saved[name], strict=True)
 

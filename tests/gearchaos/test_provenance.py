@@ -37,7 +37,7 @@ def test_the_configuration_is_there_as_it_was_written_and_with_everything_filled
 def test_the_resolved_configuration_computes_the_same_again(result):
     resolved = result.metadata["configuration_resolved"]
     again = gearchaos.run(gearchaos.Configuration.from_toml(resolved, "resolved.toml"))
-    for name in result.names:
+    for name in result:
         assert np.array_equal(again[name], result[name]), name
 
 

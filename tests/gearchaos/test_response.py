@@ -110,8 +110,8 @@ def test_only_the_lane_that_hammers_loses_contact_and_reaches_the_back_flank(res
 def test_the_response_is_the_sweep_with_its_motion(result):
     """Labels, exponents, sections and end states are those of the same lanes in a sweep."""
     shorter = respond(load_config(FULL, at(0.2, 12.97)), 1)
-    assert set(shorter.names) == set(result.names)
-    for name in set(result.names) - {"time"}:
+    assert set(shorter) == set(result)
+    for name in set(result) - {"time"}:
         if "time" not in result.dims(name):
             np.testing.assert_array_equal(shorter[name], result[name])
         else:
@@ -137,7 +137,7 @@ def test_the_axial_motion_is_there_where_a_sweep_would_leave_it_out():
     assert "axial" not in config.needed_effects
     found = respond(config, 1)
     assert found.variables["state"].flags == STATES
-    assert {"delta_3_acceleration", "mesh_force_axial"} <= set(found.names)
+    assert {"delta_3_acceleration", "mesh_force_axial"} <= set(found)
 
 
 @pytest.mark.parametrize("periods", [0, -1, RECORDED + 1])

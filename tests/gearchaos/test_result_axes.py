@@ -96,7 +96,7 @@ def test_a_file_gives_back_what_was_saved(result, tmp_path) -> None:
     result.save(tmp_path / "r.h5")
     read = open_result(tmp_path / "r.h5")
     assert (read.axes, read.axis, read.metadata) == (result.axes, result.axis, result.metadata)
-    assert read.names == result.names
+    assert list(read) == list(result)
     for name in result:
         np.testing.assert_array_equal(read[name], result[name], strict=True)
         assert read.dims(name) == result.dims(name)

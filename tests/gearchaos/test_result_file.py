@@ -99,7 +99,7 @@ def path(result: Result, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def assert_same(one: Result, other: Result) -> None:
-    assert one.names == other.names
+    assert list(one) == list(other)
     assert one.metadata == other.metadata
     for name in one:
         np.testing.assert_array_equal(one[name], other[name], strict=True)

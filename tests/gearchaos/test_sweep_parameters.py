@@ -62,7 +62,7 @@ def test_a_sweep_moves_the_motion_and_each_lane_is_the_sweep_of_its_value_alone(
     ends = result["end_state"]
     assert not np.array_equal(ends[0], ends[2])
     alone = gearchaos.run(configured(parameter, high, high, count=1))
-    for name in result.names:
+    for name in result:
         if result.dims(name)[0] == result.axis:
             assert np.array_equal(result[name][2:], alone[name]), name
 
@@ -76,7 +76,7 @@ def test_a_sweep_of_two_parameters_is_the_sweep_of_the_first_at_every_value_of_t
     assert result["operation_speed_rpm"].tolist() == [8000.0, 9000.0]
     for row, speed in enumerate(result["operation_speed_rpm"]):
         alone = gearchaos.run(config.at({"operation.speed_rpm": speed}))
-        for name in alone.names:
+        for name in alone:
             if alone.dims(name)[0] == "pitch_error" and name != "pitch_error":
                 assert np.array_equal(result[name][row], alone[name]), name
 
