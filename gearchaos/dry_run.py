@@ -18,6 +18,7 @@ from gearchaos.configuration import Configuration, swept_values
 from gearchaos.engine.sharding import Shard
 from gearchaos.engine.simulation import Simulation
 from gearchaos.progress import notice
+from gearchaos.results.block_store import lanes_and_record
 from gearchaos.results.result_file import CACHE_BYTES
 from gearchaos.results.variables import START
 
@@ -28,17 +29,11 @@ SAMPLE_PERIODS = 1000
 def describe(simulation: Simulation, output: str, shard: Shard | None, as_json: bool) -> None:
     """Say what a run, or one shard of it, would compute, judged by a sample of its lanes."""
     config, lanes, threads = simulation.config, simulation.lanes, numba.get_num_threads()
-    every = len(lanes)
+    every, record = lanes_and_record(simulation.variables)
     own = every if shard is None else sum(last - first for first, last in shard.blocks(every))
     seconds = own * _seconds_per_lane(simulation)
-    sizes = {v.name: len(v.values) for v in simulation.variables if v.values is not None}
-    rows = [
-        np.dtype(v.dtype).itemsize * math.prod(sizes[dim] for dim in v.dims)
-        for v in simulation.variables
-        if v.values is None
-    ]
-    bytes_kept = own * sum(rows) // every
-    memory = _memory(simulation) + sum(min(CACHE_BYTES, row) for row in rows)
+    bytes_kept, kept = own * record.itemsize, [record[name] for name in record.names or ()]
+    memory = _memory(simulation) + sum(min(CACHE_BYTES, every * one.itemsize) for one in kept)
     # What HDF5 and the allocator keep while a file is written is not known beforehand.
     memory += memory // 20
     plan = simulation.plan

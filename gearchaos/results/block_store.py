@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from gearchaos.errors import FileError
 from gearchaos.results import manifest
-from gearchaos.results.atomic_file import PARTIAL
+from gearchaos.results.atomic_file import PARTIAL, reason, replacing, unlinked_content
 from gearchaos.results.result_file import Metadata, Parameter, write_result
 from gearchaos.results.store_lock import LOCK, StoreLock
 from gearchaos.results.variables import Variable, lane_axes
@@ -26,6 +26,8 @@ Arrays: TypeAlias = Mapping[str, NDArray[Any]]
 Bounds: TypeAlias = tuple[int, int]
 """First lane of a range, and the one after its last."""
 
+SCHEMA = {"schema": "gearchaos-blocks", "schema_version": "3.0"}
+_DIGEST = hashlib.sha256().digest_size
 _NAME = re.compile(r"\d{12}-\d{12}\.block")
 
 
@@ -63,16 +65,12 @@ class BlockStore(AbstractContextManager["BlockStore"]):
         shards: int | None = None,
     ) -> None:
         self.output, self.folder = Path(output), manifest.folder_of(output)
-        sizes = {v.name: len(v.values) for v in variables if v.values is not None}
-        axes, of_the_lanes = lane_axes(variables), [v for v in variables if v.values is None]
-        self.lanes = math.prod(sizes[axis] for axis in axes)
-        self._record = np.dtype(
-            [(v.name, v.dtype, tuple(sizes[d] for d in v.dims[len(axes) :])) for v in of_the_lanes]
-        ).newbyteorder("<")
-        facts = {"lanes": self.lanes, "variables": self._record.descr}
-        decisive = manifest.decisive_facts(software, **facts, configuration=configuration)
-        everything = json.dumps(decisive, sort_keys=True).encode()
-        self._fingerprint = hashlib.sha256(everything).hexdigest()
+        self.lanes, self._record = lanes_and_record(variables)
+        facts = {**SCHEMA, **software._asdict(), "configuration": configuration}
+        facts |= {"lanes": self.lanes, "variables": self._record.descr}
+        self._owner = json.dumps(facts)
+        # As it is read again: with lists for tuples.
+        decisive = json.loads(self._owner)
         shared = blocks is not None
         self._blocks = [(0, self.lanes)] if blocks is None else list(blocks)
         self._lock = StoreLock(self.folder, self.output, shared)
@@ -124,8 +122,7 @@ class BlockStore(AbstractContextManager["BlockStore"]):
         for first, last in self._own_blocks():
             try:
                 if bounds and first < bounds[-1][1]:
-                    path, _ = self._block(first, last)
-                    raise FileError(f"{path}: overlaps the block before it")
+                    raise FileError(f"{self._path(first, last)}: overlaps the block before it")
                 arrays = self.read(first, last)
             except FileError as error:
                 problems += error.problems
@@ -154,14 +151,30 @@ class BlockStore(AbstractContextManager["BlockStore"]):
             if (shape := np.shape(arrays[name])) != records[name].shape:
                 raise ValueError(f"{name} of lanes {first} to {last - 1} has shape {shape}")
             records[name] = arrays[name]
-        manifest.write_block(*self._block(first, last), records)
+        path = self._path(first, last)
+        with (
+            replacing(path, overwrite=True, through_links=False) as partial,
+            partial.open("wb") as file,
+        ):
+            file.write(self._digest(first, last, records.data))
+            file.write(records.data)
 
     def read(self, first: int, last: int) -> dict[str, NDArray[Any]]:
         """Give the arrays of one block; FileError if it is missing, damaged or of another sweep."""
-        path, owner = self._block(first, last)
+        path = self._path(first, last)
         if not 0 <= first < last <= self.lanes:
             raise FileError(f"{path}: its lanes are none of the {self.lanes} of this sweep")
-        records = manifest.read_block(path, owner, self._record, last - first)
+        size = _DIGEST + (last - first) * self._record.itemsize
+        try:
+            # Not more: what claims to be a block may be larger than the memory.
+            content = memoryview(unlinked_content(path, size + 1))
+        except OSError as error:
+            raise FileError(f"{path}: cannot be read: {reason(error)}") from error
+        if len(content) != size:
+            raise FileError(f"{path}: has not the {size} bytes of its lanes")
+        if content[:_DIGEST] != self._digest(first, last, content[_DIGEST:]):
+            raise FileError(f"{path}: is damaged or of another sweep; its checksum does not fit")
+        records = np.frombuffer(content[_DIGEST:], self._record)
         return {name: records[name] for name in self._record.names or ()}
 
     def merge(
@@ -210,9 +223,22 @@ class BlockStore(AbstractContextManager["BlockStore"]):
             return sorted(filter(_NAME.fullmatch, os.listdir(self.folder)))
         return []
 
-    def _block(self, first: int, last: int) -> tuple[Path, dict[str, Any]]:
-        owner = {"fingerprint": self._fingerprint, "first": first, "last": last}
-        return self.folder / f"{first:012d}-{last:012d}.block", owner
+    def _path(self, first: int, last: int) -> Path:
+        return self.folder / f"{first:012d}-{last:012d}.block"
+
+    def _digest(self, first: int, last: int, records: memoryview) -> bytes:
+        """Return what fits only these numbers of these lanes of this sweep."""
+        digest = hashlib.sha256(f"{self._owner} {first} {last}\n".encode())
+        digest.update(records)
+        return digest.digest()
+
+
+def lanes_and_record(variables: Sequence[Variable]) -> tuple[int, np.dtype[Any]]:
+    """Return how many lanes a sweep has, and the type of one: a field for all that it yields."""
+    sizes = {v.name: len(v.values) for v in variables if v.values is not None}
+    axes, of_the_lanes = lane_axes(variables), [v for v in variables if v.values is None]
+    record = [(v.name, v.dtype, tuple(sizes[d] for d in v.dims[len(axes) :])) for v in of_the_lanes]
+    return math.prod(sizes[axis] for axis in axes), np.dtype(record).newbyteorder("<")
 
 
 def uncovered(block: Bounds, finished: Sequence[Bounds]) -> Iterator[Bounds]:

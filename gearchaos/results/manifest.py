@@ -1,6 +1,5 @@
-"""The files beside an unfinished output: finished blocks, and the manifest of whose they are."""
+"""The manifest beside an unfinished output: whose its finished blocks are."""
 
-import hashlib
 import json
 import os
 import tomllib
@@ -9,31 +8,15 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any, TypeAlias
 
-import numpy as np
-from numpy.typing import NDArray
-
 from gearchaos.configuration.toml_text import flat_tables
 from gearchaos.errors import FileError
 from gearchaos.results.atomic_file import reason, replacing, unlinked_content
 from gearchaos.version import Software
 
 Facts: TypeAlias = Mapping[str, Any]
-STORE_SCHEMA, BLOCK_SCHEMA = "gearchaos-blocks", "gearchaos-block"
-SCHEMA_VERSION = "2.0"
 MANIFEST = "manifest.json"
 _LARGEST = 64 << 20
 _LONGEST = 60
-
-
-def decisive_facts(software: Software, **facts: Any) -> dict[str, Any]:
-    """Return what decides the numbers of a sweep, and with them whose blocks are whose.
-
-    That is who computes, ``lanes``, ``variables`` and ``configuration``, the resolved one in TOML.
-    """
-    versions = {"schema": STORE_SCHEMA, "schema_version": SCHEMA_VERSION}
-    facts |= software._asdict()
-    # As it is read again: with lists for tuples.
-    return dict(json.loads(json.dumps({**versions, **facts})))
 
 
 def settle_manifest(
@@ -118,47 +101,3 @@ def read_manifest(folder: Path) -> dict[str, Any]:
             f"{path}: is damaged or missing ({reason(error)}); delete the folder to start again"
         ) from error
     return manifest
-
-
-def write_block(path: Path, owner: Facts, records: NDArray[Any]) -> None:
-    """Write the records of the lanes of a block; the file appears complete or not at all.
-
-    ``owner`` says of which sweep and which lanes they are, and ``records`` has shape (lanes,).
-    Raises FileError if the file cannot be written.
-    """
-    with (
-        replacing(path, overwrite=True, through_links=False) as partial,
-        partial.open("wb") as file,
-    ):
-        file.write(_beginning(owner, records.data))
-        file.write(records.data)
-
-
-def read_block(path: Path, owner: Facts, record: np.dtype[Any], lanes: int) -> NDArray[Any]:
-    """Give the records of so many lanes, shape (lanes,), verified.
-
-    Raises FileError if the file is missing, damaged or of another owner.
-    """
-    start = len(_beginning(owner, b""))
-    head, size = start - hashlib.sha256().digest_size, start + lanes * record.itemsize
-    try:
-        # Not more: what claims to be a block may be larger than the memory.
-        content = memoryview(unlinked_content(path, size + 1))
-    except OSError as error:
-        raise FileError(f"{path}: cannot be read: {reason(error)}") from error
-    if len(content) != size:
-        raise FileError(f"{path}: has not the {size} bytes of its lanes")
-    beginning = _beginning(owner, content[start:])
-    if content[:head] != beginning[:head]:
-        raise FileError(f"{path}: belongs to another sweep or another version of the format")
-    if content[:start] != beginning:
-        raise FileError(f"{path}: is damaged; its checksum does not fit")
-    return np.frombuffer(content[start:], record)
-
-
-def _beginning(owner: Facts, records: bytes | memoryview) -> bytes:
-    schema = {"schema": BLOCK_SCHEMA, "schema_version": SCHEMA_VERSION}
-    head = json.dumps({**schema, **owner}).encode() + b"\n"
-    digest = hashlib.sha256(head)
-    digest.update(records)
-    return head + digest.digest()

@@ -212,7 +212,7 @@ def test_types_and_nans_are_told_apart_where_they_matter() -> None:
 
 @pytest.mark.parametrize(
     "content",
-    ["", "{", "[]", '{"schema_version": "2.0", "configuration": 3}', "[" * 100_000],
+    ["", "{", "[]", '{"schema_version": "3.0", "configuration": 3}', "[" * 100_000],
 )
 def test_a_damaged_manifest_is_named(content: str, output: Path) -> None:
     with open_store(output) as store:
@@ -228,9 +228,9 @@ def test_blocks_of_a_newer_format_are_refused_in_a_clear_sentence(output: Path) 
     with open_store(output) as store:
         fill(store)
     manifest = output.with_name("sweep.h5.blocks") / "manifest.json"
-    newer = manifest.read_text(encoding="utf-8").replace('"2.0"', '"3.0"')
+    newer = manifest.read_text(encoding="utf-8").replace('"3.0"', '"4.0"')
     manifest.write_text(newer, encoding="utf-8")
-    with pytest.raises(FileError, match=r"differs in schema_version \(3\.0, now 2\.0\); go back"):
+    with pytest.raises(FileError, match=r"differs in schema_version \(4\.0, now 3\.0\); go back"):
         open_store(output, resume=True)
 
 

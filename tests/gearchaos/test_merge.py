@@ -32,7 +32,7 @@ def test_missing_and_damaged_blocks_are_named_with_the_shards_to_run(tmp_path):
     damaged.write_bytes(content)
     ended = merge(tmp_path, "gears.h5")
     assert ended.code == 4
-    assert f"{damaged.name}: is damaged; its checksum does not fit" in ended.err
+    assert f"{damaged.name}: is damaged or of another sweep; its checksum does not fit" in ended.err
     assert "lanes 512 to 999 are missing; run the sweep with --shard 1/3, --shard 3/3" in ended.err
     assert names_in(tmp_path) == [BLOCKS, "gears.toml"]
 
