@@ -32,8 +32,7 @@ def _merge(options: Namespace) -> int:
     from gearchaos.results.result import completed
 
     folder = folder_of(output)
-    finished_before = not options.overwrite and completed(output) is not None
-    if finished_before and not folder.is_dir():
+    if not (options.overwrite or folder.is_dir() or completed(output) is None):
         print(output, flush=True)
         return OK
     manifest = read_manifest(folder)
@@ -48,10 +47,9 @@ def _merge(options: Namespace) -> int:
     require_same(f"{folder}: holds blocks", manifest, SOFTWARE._asdict())
     config = Configuration.from_toml(manifest["configuration"], f"{folder}: configuration")
     simulation = Simulation(config)
-    if finished_before:
-        code = complete_already(simulation, output)
-        if code is not None:
-            return code
+    code = None if options.overwrite else complete_already(simulation, output)
+    if code is not None:
+        return code
     check_output(output, options.overwrite)
     with open_store(simulation, output, resume=True) as store:
         prepare(simulation, compile_now=False)
