@@ -155,6 +155,13 @@ def _contact_is_told_by_crossings(config: Tables) -> Iterator[Fault]:
 
 
 @reads("outputs", "integration")
+def _loads_are_told_by_short_steps(config: Tables) -> Iterator[Fault]:
+    if config.outputs.loads and config.integration.method == "flow_map":
+        rule = "needs steps shorter than those of flow maps"
+        yield Fault("outputs.loads", rule, 'set integration.method = "rk4"', True)
+
+
+@reads("outputs", "integration")
 def _errors_are_measured_on_a_section(config: Tables) -> Iterator[Fault]:
     if config.outputs.section:
         return

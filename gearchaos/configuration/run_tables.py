@@ -215,6 +215,9 @@ class Outputs(Table):
     contact: bool = key(
         "whether the shares of time on either flank and the impacts on it are told", default=False
     )
+    loads: bool = key(
+        "whether mesh forces, load factors and the transmission error are told", default=False
+    )
     exponents: bool = key(
         "whether all Lyapunov exponents are computed, at about ten times the cost", default=False
     )

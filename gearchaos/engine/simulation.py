@@ -43,6 +43,7 @@ from gearchaos.records.contact import contact_told
 from gearchaos.records.difference import difference
 from gearchaos.records.label import MEANINGS as MOTION_MEANINGS
 from gearchaos.records.label import MOST_POINTS
+from gearchaos.records.loads import loads_told
 from gearchaos.records.period import LONGEST_PERIOD, POINTS_NEEDED, RETURNS
 from gearchaos.results.variables import DIRECTIONS, Variable, step_choice_variables, sweep_variables
 
@@ -78,6 +79,7 @@ class Simulation:
             section_points=outputs.section_points if outputs.section else 0,
             tangent=outputs.lyapunov,
             contact=outputs.contact,
+            loads=outputs.loads,
         )
         judged = outputs.lyapunov and integration.tolerance is None
         coarse = coarse_steps(self.lanes, steps) if judged else ""
@@ -142,7 +144,8 @@ class Simulation:
             section_points=outputs.section_points,
             lyapunov=outputs.lyapunov,
             crossings=self._splits_steps,
-            contact=self._contact_told,
+            contact=self._directions if self.plan.contact and self._splits_steps else (),
+            loads=self._directions if self.plan.loads else (),
             exponents=outputs.exponents,
             status_meanings=[status.name.lower() for status in STATUS_TEXTS],
             check_meanings=MEANINGS if checked else (),
@@ -157,10 +160,9 @@ class Simulation:
         return self.plan.resolved and "backlash" in self.lanes.effects
 
     @property
-    def _contact_told(self) -> tuple[str, ...]:
-        """Directions of which the contact is told."""
-        axial = "axial" in self.lanes.effects
-        return DIRECTIONS[: 1 + axial] if self.plan.contact and self._splits_steps else ()
+    def _directions(self) -> tuple[str, ...]:
+        """Directions in which teeth touch."""
+        return DIRECTIONS[: 1 + ("axial" in self.lanes.effects)]
 
     def rehearse(self, periods: int = 0) -> None:
         """Integrate the first lane, and so many mesh periods of it step by step.
@@ -255,10 +257,7 @@ class Simulation:
             slowest = np.where(outcome.crossings > 0, outcome.slowest_crossing, np.nan)
             arrays["slowest_crossing"] = np.where(sound, slowest, np.nan)
             arrays["unsplit_steps"] = outcome.overflows
-        for way, columns in zip(self._contact_told, np.split(outcome.contact, 2, 1), strict=False):
-            for name, values in contact_told(columns, plan.recorded_periods).items():
-                nothing = values if values.dtype == np.uint8 else np.nan
-                arrays[f"{name}_{way}"] = np.where(sound, values, nothing)
+        arrays |= self._told_of_teeth(system, outcome)
         for name in outputs.section:
             points = outcome.section[:, -plan.section_points :, system.states.index(name)]
             # A copy: a view would keep alive all that was recorded.
@@ -287,6 +286,24 @@ class Simulation:
             checked = checked_lanes(int(lanes[0]), int(lanes[-1]) + 1, share)
             arrays |= self._check(system, start, outcome, told, checked)
         return arrays
+
+    def _told_of_teeth(self, system: System, outcome: Outcome) -> dict[str, NDArray[Any]]:
+        """Return what is kept of contact and loads, and of lanes that diverged none of it."""
+        told: dict[str, NDArray[Any]] = {}
+        if self.plan.contact and self._splits_steps:
+            for way, columns in zip(
+                self._directions, np.split(outcome.contact, 2, 1), strict=False
+            ):
+                found = contact_told(columns, self.plan.recorded_periods)
+                told |= {f"{name}_{way}": values for name, values in found.items()}
+        if self.plan.loads:
+            static = system.groups.load / np.cos(system.groups.base_helix_angle)
+            told |= loads_told(outcome.loads, static, self._directions)
+        sound = outcome.status == Status.OK
+        return {
+            name: values if values.dtype == np.uint8 else np.where(sound, values, np.nan)
+            for name, values in told.items()
+        }
 
     def _check(
         self,

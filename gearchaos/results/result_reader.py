@@ -225,6 +225,7 @@ def _check_variables(
         status_meanings=(),
         crossings=known.CROSSINGS in found,
         contact=[way for way in known.DIRECTIONS if f"contact_state_{way}" in found],
+        loads=[way for way in known.DIRECTIONS if f"mesh_force_largest_{way}" in found],
         exponents=known.ALL_EXPONENTS in found,
         check_meanings=["same"] if "motion_changed" in found else [],
         motion_meanings=["periodic"] if "motion" in found else [],

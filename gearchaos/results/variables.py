@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 from gearchaos.gear.tooth_deviations import REALISATION
 from gearchaos.records.contact import MEANINGS as CONTACT_STATES
 from gearchaos.records.contact import WORDING
+from gearchaos.records.loads import FORCES
+from gearchaos.records.loads import WORDING as LOADS
 
 START = "start"
 REPEATS = (REALISATION, START)
@@ -137,6 +139,7 @@ def sweep_variables(
     status_meanings: Sequence[str],
     crossings: bool = False,
     contact: Sequence[str] = (),
+    loads: Sequence[str] = (),
     exponents: bool = False,
     check_meanings: Sequence[str] = (),
     motion_meanings: Sequence[str] = (),
@@ -147,10 +150,10 @@ def sweep_variables(
 
     The axes are second swept parameter, first swept parameter, realisation, start, those there are;
     ``states`` those of the scene in its order, ``section`` those recorded at so many section
-    points, ``contact`` the directions of which it is told. Meanings are those of 0, 1, ...: of
-    ``status``, of ``motion_changed`` where lanes are computed twice to measure their error, and of
-    ``motion`` and ``record`` where they are labelled. A motion repeats after whole excitation
-    periods, of so many mesh periods each.
+    points, ``contact`` and ``loads`` the directions of which they are told. Meanings are those of
+    0, 1, ...: of ``status``, of ``motion_changed`` where lanes are computed twice to measure their
+    error, and of ``motion`` and ``record`` where they are labelled. A motion repeats after whole
+    excitation periods, of so many mesh periods each.
     """
     names = tuple(axis.name for axis in axes)
     variables = [
@@ -208,6 +211,11 @@ def sweep_variables(
         for name, text in WORDING.items():
             real(f"{name}_{way}", f"{text}, {way}")
         kind(f"contact_state_{way}", f"kind of {way} contact", CONTACT_STATES)
+    for way in loads:
+        for name, text in FORCES.items():
+            real(f"{name}_{way}", f"{text}, {way}")
+    for name, text in LOADS.items() if loads else ():
+        real(name, text)
     if check_meanings:
         halved = "when the step is halved"
         real("section_error", f"change of the section of a periodic lane {halved}")

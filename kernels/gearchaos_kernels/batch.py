@@ -8,7 +8,7 @@ from numba import prange
 from numpy.typing import NDArray
 
 from gearchaos_kernels.block import Batch, integrate_block
-from gearchaos_kernels.block_memory import CONTACT_ROWS, LANES, Present, flags
+from gearchaos_kernels.block_memory import CONTACT_ROWS, LANES, SIGNAL_ROWS, SIGNALS, Present, flags
 from gearchaos_kernels.coefficients import lane_coefficients, state_scales, steps_between_scalings
 from gearchaos_kernels.compilation import driver
 from gearchaos_kernels.flow_map import maps_of, sharing
@@ -35,6 +35,7 @@ def _integrate_blocks(
     axial,
     resolved,
     contact,
+    loads,
     tangent,
     flow_map,
 ):
@@ -51,6 +52,7 @@ def _integrate_blocks(
             axial,
             resolved,
             contact,
+            loads,
             tangent,
             flow_map,
         )
@@ -81,7 +83,8 @@ def integrate(
     Raises
     ------
     ValueError
-        If flow maps are asked for with pitch errors tooth by tooth, or too many pairs are in mesh.
+        If flow maps are asked for with pitch errors tooth by tooth or with loads, or too many pairs
+        are in mesh.
     """
     lanes, states = start.shape[0], len(system.states)
     steps = plan.steps_per_period
@@ -98,11 +101,14 @@ def integrate(
         slowest_crossing=np.full(lanes, np.inf),
         overflows=np.zeros(lanes, dtype=np.int64),
         contact=np.zeros((lanes, 2 * CONTACT_ROWS if plan.contact else 0)),
+        loads=np.full((lanes, SIGNALS if plan.loads else 0, SIGNAL_ROWS), np.nan),
         history=np.full((lanes, plan.history_periods * steps + 1, states), np.nan),
     )
     present = flags(system, plan)
     if present.flow_map is not None and present.teeth is not None:
         raise ValueError("flow maps know pitch errors that are a sine, not those of teeth")
+    if present.flow_map is not None and plan.loads:
+        raise ValueError("the steps of flow maps are too long to tell loads from")
     schedule = Schedule(*(getattr(plan, name) for name in Schedule._fields))
     for order, blocks, maps, steps_of in _shares(system, plan, present):
         step = system.mesh_period / steps_of
@@ -122,6 +128,11 @@ def integrate(
         if maps.size:
             unmapped = np.repeat(np.isnan(maps[blocks[:, 3]]), blocks[:, 1])
             outcome.status[order[unmapped]] = Status.TOO_FAST
+    if plan.loads:
+        # Forces come per step squared, and the sums of Simpson's rule.
+        outcome.loads[:, :, 2:] /= 6.0 * steps * max(1, plan.recorded_periods)
+        outcome.loads[:, :2] /= (system.mesh_period / steps)[:, np.newaxis, np.newaxis] ** 2
+        outcome.loads[:, :2, 3] /= (system.mesh_period / steps)[:, np.newaxis] ** 2
     return outcome._replace(
         growth=outcome.growth if plan.tangent else None,
         history=outcome.history if plan.history_periods else None,

@@ -15,12 +15,16 @@ from numpy.typing import NDArray
 
 from gearchaos_kernels.block_memory import (
     BEFORE,
+    CARRIED,
     COEFFICIENTS,
     CONTACT,
     CONTACT_ROWS,
     CROSSINGS,
     GROWTH,
     LANES,
+    LOADS,
+    SIGNAL_ROWS,
+    SIGNALS,
     SPEEDS,
     STATE,
     STRIDE,
@@ -47,6 +51,7 @@ from gearchaos_kernels.flow_layout import layout
 from gearchaos_kernels.flow_steps import begin_forces, cross, move_block
 from gearchaos_kernels.flow_vectors import VECTOR, WORK
 from gearchaos_kernels.forcing import During, forcing_at, phase_on_grid
+from gearchaos_kernels.loads import begin_loads, tell_loads
 from gearchaos_kernels.rk4 import step, tangent_step
 from gearchaos_kernels.splitting import split_step
 from gearchaos_kernels.status import Status
@@ -112,6 +117,9 @@ def integrate_block(number_of_block, batch, plan, outcome, present):
     interval = begin(block, batch, present)
     periods = plan.transient_periods + plan.recorded_periods
     for period in range(periods):
+        if present.loads is not None:
+            if period == plan.transient_periods:
+                begin_loads(memory, table, shares, present)
         for number in range(steps):
             if period >= periods - plan.history_periods and number % every == 0:
                 sample = (period - periods + plan.history_periods) * plan.steps_per_period
@@ -133,6 +141,10 @@ def integrate_block(number_of_block, batch, plan, outcome, present):
                 if suspects > 0:
                     recorded = period >= plan.transient_periods
                     split(memory, table, shares, maps, row, work, lanes, number, recorded, present)
+            if present.loads is not None:
+                if period >= plan.transient_periods:
+                    middle, end_phase = phases.middle, phases.end
+                    tell_loads(memory, middle, middle_shares, end_phase, end_shares, present)
             if present.tangent is not None:
                 last = number == steps - 1
                 if (number + 1) % interval == 0 or last:
@@ -167,8 +179,8 @@ def begin(block, batch, present):
         fill(memory, TANGENT, slot, batch.scales[index], batch.tangent_start[index])
         memory[GROWTH * STRIDE + slot] = 0.0
         store(memory, CROSSINGS, slot, Crossings(0.0, math.inf, 0.0))
-        for row in range(2 * CONTACT_ROWS):
-            memory[(CONTACT + row) * STRIDE + slot] = 0.0
+        for row in range(CONTACT, CARRIED):
+            memory[row * STRIDE + slot] = 0.0
         point = point_on_grid(memory, slot, batch.table, batch.shares, 0, present)
         keep_shared(memory, slot, point, present)
         if present.resolved is not None:
@@ -211,6 +223,9 @@ def step_block(memory, phases, middle_shares, end_shares, present):
             suspects += 1 if suspect else 0
             memory[SUSPECT * STRIDE + slot] = 1.0 if suspect else 0.0
             write_state(memory, BEFORE + STATE, slot, state, present)
+        if present.resolved is None:
+            if present.loads is not None:
+                write_state(memory, BEFORE + STATE, slot, state, present)
         write_state(memory, STATE, slot, after, present)
         if present.tangent is not None:
             tangent = read_state(memory, TANGENT, slot, present)
@@ -316,6 +331,10 @@ def end(block, batch, steps, plan, outcome, present):
             for row in range(2 * CONTACT_ROWS):
                 unit = steps if row % CONTACT_ROWS in (0, SPEEDS // 2) else 1
                 outcome.contact[index, row] = memory[(CONTACT + row) * STRIDE + slot] / unit
+        if present.loads is not None:
+            for row in range(SIGNALS * SIGNAL_ROWS):
+                value = memory[(LOADS + row) * STRIDE + slot]
+                outcome.loads[index, row // SIGNAL_ROWS, row % SIGNAL_ROWS] = value
     if plan.history_periods > 0:
         keep_state(block, batch, outcome.history, plan.history_periods * plan.steps_per_period)
 

@@ -37,7 +37,7 @@ STRIDE = LANES + 8
 Present = namedtuple(
     "Present",
     "pitch_error phase teeth wide stiffness_variation backlash transverse axial "
-    "resolved contact tangent flow_map",
+    "resolved contact loads tangent flow_map",
 )
 """What a compiled loop has: ``()`` where it is there, None where the compiler removes it."""
 
@@ -54,6 +54,7 @@ def flags(system: System, plan: Plan) -> Present:
         "wide": teeth is not None and teeth.pairs_in_mesh > NARROW,
         "resolved": resolved,
         "contact": resolved and plan.contact,
+        "loads": plan.loads and plan.method == "rk4",
         "tangent": plan.tangent,
         "flow_map": plan.method == "flow_map",
     }
@@ -85,7 +86,7 @@ Lane = namedtuple(
     "mean_stiffness stiffness_variation mesh_damping axial_share half_backlash load "
     "error_inertia error_mean error_amplitude error_rate "
     "axial_error_mean axial_error_amplitude axial_error_rate "
-    "cos_phase sin_phase tangential_speed axial_speed",
+    "cos_phase sin_phase cosine tangential_speed axial_speed",
 )
 """Coefficients of one lane (numbers) or of many (arrays), per step; see `coefficients`."""
 
@@ -104,6 +105,16 @@ class Branches(NamedTuple):
 
     tangential: Branch
     axial: Branch
+
+
+class Carried(NamedTuple):
+    """Mesh forces and transmission error at one instant, and the slopes of the forces."""
+
+    tangential: float
+    axial: float
+    error: float
+    tangential_slope: float
+    axial_slope: float
 
 
 class Crossings(NamedTuple):
@@ -140,7 +151,12 @@ CONTACT = SHARED + 3
 """First row of what is told of the contact: tangential, then axial."""
 CONTACT_ROWS, SPEEDS = 6, 4
 """Rows of one direction: time in steps and impacts on either flank, sum and largest of speeds."""
-ROWS = CONTACT + 2 * CONTACT_ROWS
+LOADS = CONTACT + 2 * CONTACT_ROWS
+SIGNALS, SIGNAL_ROWS = 3, 4
+"""What is told of tangential force, axial force and transmission error: largest and smallest value,
+sums over the steps of six times the mean of itself and of its square; see `loads`."""
+CARRIED = LOADS + SIGNALS * SIGNAL_ROWS
+ROWS = CARRIED + len(Carried._fields)
 
 _ITEM = np.dtype(np.float64).itemsize
 

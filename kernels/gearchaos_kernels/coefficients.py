@@ -63,6 +63,7 @@ def lane_coefficients(system: System, step: Floats) -> Floats:
         axial_error_rate=2.0 * groups.error_amplitude * phase_step,
         cos_phase=np.cos(groups.error_phase),
         sin_phase=np.sin(groups.error_phase),
+        cosine=cosine,
         tangential_speed=cosine / step,
         axial_speed=sine / step,
     )

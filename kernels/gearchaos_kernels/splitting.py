@@ -30,6 +30,7 @@ from gearchaos_kernels.contact import (
 )
 from gearchaos_kernels.equations import gaps_at
 from gearchaos_kernels.forcing import During, forcing_at, phase_within
+from gearchaos_kernels.loads import tell_kink
 from gearchaos_kernels.rk4 import step, tangent_step
 from gearchaos_kernels.teeth import between, point_on_grid, shares_at, with_teeth
 
@@ -94,6 +95,9 @@ def split_step(memory, slot, table, shares, number, recorded, present):
         if present.contact is not None:
             if recorded:
                 tell_crossing(memory, slot, axially, branch, following, number + done, speed)
+        if present.loads is not None:
+            if recorded:
+                tell_kink(memory, slot, axially, lane, gap)
 
         left = 1.0 - done
         middle = forcing_within(

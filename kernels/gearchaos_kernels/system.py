@@ -156,6 +156,7 @@ class Plan(NamedTuple):
     ``history_periods`` every step is kept. ``method``: "rk4" or "flow_map", which resolves every
     crossing and whose steps are exact. ``first_period``: mesh periods that the teeth have turned
     before tau = 0. ``contact``: whether crossings are told by flank, where they are resolved.
+    ``loads``: whether mesh forces and transmission error are told, by RK4 alone.
     """
 
     steps_per_period: int
@@ -168,6 +169,7 @@ class Plan(NamedTuple):
     method: str = "rk4"
     first_period: int = 0
     contact: bool = False
+    loads: bool = False
 
 
 class Schedule(NamedTuple):
@@ -194,8 +196,9 @@ class Outcome(NamedTuple):
     these three stay as they began in scenes without backlash and with plain steps; ``contact``
     (lanes, 12), or (lanes, 0) where the plan does not ask for it: tangential and then axial, mesh
     periods on and impacts on the driving flank and on the back flank, sum and largest of the speeds
-    of approach, in the recorded periods; ``history`` (lanes, history periods times steps + 1,
-    states): the state at every step, or None.
+    of approach, in the recorded periods; ``loads`` (lanes, 3, 4), or (lanes, 0, 4): largest and
+    smallest value, mean and mean square of N_y, N_z and delta_5 + e there; ``history`` (lanes,
+    history periods times steps + 1, states): the state at every step, or None.
     """
 
     section: Floats
@@ -208,6 +211,7 @@ class Outcome(NamedTuple):
     slowest_crossing: Floats
     overflows: NDArray[np.int64]
     contact: Floats
+    loads: Floats
     history: Floats | None
 
     def every(self, periods: int) -> Self:

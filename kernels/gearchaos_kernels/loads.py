@@ -1,0 +1,127 @@
+"""What the teeth carry while a lane is recorded: mesh forces and transmission error.
+
+Of each its extremes and the integrals of itself and of its square. A step gives three values: at
+both ends, and in the middle, where the state is on the cubic through both. Integrals follow by
+Simpson's rule, extremes from the parabola through the three. Where teeth meet or part in between, a
+force has a kink; what it is there, damping alone, counts as a fourth value and the parabola not.
+"""
+
+from gearchaos_kernels.block_memory import (
+    BEFORE,
+    CARRIED,
+    COEFFICIENTS,
+    LANES,
+    LOADS,
+    SIGNAL_ROWS,
+    STATE,
+    STRIDE,
+    Carried,
+    Lane,
+    State,
+    load,
+    read_state,
+    store,
+)
+from gearchaos_kernels.compilation import scalar
+from gearchaos_kernels.equations import gaps_at, mesh_forces
+from gearchaos_kernels.forcing import forcing_at, shifted
+from gearchaos_kernels.rk4 import along, plus
+from gearchaos_kernels.teeth import point_on_grid, with_teeth
+
+
+@scalar
+def carried_at(state, lane, point, present):
+    """Return what a state carries at a mesh phase, forces per step squared."""
+    forcing = forcing_at(lane, point, present)
+    gaps = gaps_at(state, lane, forcing, present)
+    forces, slopes = mesh_forces(gaps, lane, forcing.stiffness, None, present)
+    error = lane.cosine * state.position.torsion
+    if present.pitch_error is not None:
+        # delta_5 is measured from e, twice of which the axial gap has.
+        value = lane.axial_error_amplitude * shifted(lane, point, present).value
+        error += 0.5 * (lane.axial_error_mean + value)
+    return Carried(forces.tangential, forces.axial, error, slopes.tangential, slopes.axial)
+
+
+@scalar
+def begin_loads(memory, table, shares, present):
+    """Begin the record of every slot with what it carries at the beginning of a mesh period."""
+    for slot in range(LANES):
+        lane = load(memory, COEFFICIENTS, slot, Lane)
+        state = read_state(memory, STATE, slot, present)
+        point = point_on_grid(memory, slot, table, shares, 0, present)
+        carried = carried_at(state, lane, point, present)
+        store(memory, CARRIED, slot, carried)
+        begin_signal(memory, slot, 0, carried.tangential)
+        begin_signal(memory, slot, 1, carried.axial)
+        begin_signal(memory, slot, 2, carried.error)
+
+
+@scalar
+def begin_signal(memory, slot, signal, value):
+    """Begin the record of one signal."""
+    store(memory, LOADS + signal * SIGNAL_ROWS, slot, (value, value, 0.0, 0.0))
+
+
+@scalar
+def tell_loads(memory, middle, middle_shares, end, end_shares, present):
+    """Add a step to the record of every slot; given are the mesh phases of its second half."""
+    for slot in range(LANES):
+        lane = load(memory, COEFFICIENTS, slot, Lane)
+        before = read_state(memory, BEFORE + STATE, slot, present)
+        after = read_state(memory, STATE, slot, present)
+        point = with_teeth(memory, slot, middle_shares, middle, present)
+        half = carried_at(halfway(before, after), lane, point, present)
+        point = with_teeth(memory, slot, end_shares, end, present)
+        last = carried_at(after, lane, point, present)
+        first = load(memory, CARRIED, slot, Carried)
+        store(memory, CARRIED, slot, last)
+        smooth = on_one_piece(first.tangential_slope, half.tangential_slope, last.tangential_slope)
+        tell_signal(memory, slot, 0, first.tangential, half.tangential, last.tangential, smooth)
+        if present.axial is not None:
+            smooth = on_one_piece(first.axial_slope, half.axial_slope, last.axial_slope)
+            tell_signal(memory, slot, 1, first.axial, half.axial, last.axial, smooth)
+        tell_signal(memory, slot, 2, first.error, half.error, last.error, True)
+
+
+@scalar
+def halfway(before, after):
+    """Return the state in the middle of a step, on the cubic through both ends."""
+    change = along(after.position, -1.0, before.position)
+    straight = along(before.position, 0.5, change)
+    return State(
+        along(straight, 0.125, along(before.rate, -1.0, after.rate)),
+        along(along(change, 0.5, change), -0.25, plus(before.rate, after.rate)),
+    )
+
+
+@scalar
+def on_one_piece(first, half, last):
+    """Tell whether three slopes of a mesh force are those of contact throughout, or of none."""
+    return ((first != 0.0) == (half != 0.0)) & ((half != 0.0) == (last != 0.0))
+
+
+@scalar
+def tell_signal(memory, slot, signal, first, half, last, smooth):
+    """Add the three values of a step to the record of one signal."""
+    bend = first - 2.0 * half + last
+    slope = 4.0 * half - 3.0 * first - last
+    turns = smooth & (slope * (slope + 4.0 * bend) < 0.0)
+    turn = first - slope * slope / (8.0 * bend) if turns else last
+    row = (LOADS + signal * SIGNAL_ROWS) * STRIDE + slot
+    memory[row] = max(max(memory[row], half), max(last, turn))
+    memory[row + STRIDE] = min(min(memory[row + STRIDE], half), min(last, turn))
+    memory[row + 2 * STRIDE] += first + 4.0 * half + last
+    memory[row + 3 * STRIDE] += first * first + 4.0 * half * half + last * last
+
+
+@scalar
+def tell_kink(memory, slot, axially, lane, gap):
+    """Enter the force of a direction at a crossing, where there is no deflection, only damping."""
+    force = lane.mesh_damping * gap.rate
+    row = LOADS * STRIDE + slot
+    if axially:
+        force *= lane.axial_share
+        row += SIGNAL_ROWS * STRIDE
+    memory[row] = max(memory[row], force)
+    memory[row + STRIDE] = min(memory[row + STRIDE], force)

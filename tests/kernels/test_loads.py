@@ -1,0 +1,96 @@
+"""Mesh forces and transmission error of a record, against analytic motions and finer ones."""
+
+import numpy as np
+import pytest
+from gearchaos_kernels import Effects, Plan, integrate, mesh_motion
+
+from .reference import FULL, TORSION_ONLY, assert_same_bits, pan2021, system_of
+
+FORCE, AXIAL, ERROR = range(3)
+LARGEST, SMALLEST, MEAN, SQUARE = range(4)
+MODEL = pan2021([0.3, 2.0, 5.86, 10.75])
+"""Held, and on the driving flank once a period."""
+PLAN = Plan(200, 60, 12, 1, loads=True)
+
+
+def test_teeth_at_rest_carry_the_static_load():
+    model = pan2021([0.0, 0.0], load=[0.3, -0.3], half_backlash=0.5)
+    model = model._replace(stiffness_variation_scale=np.zeros(2))
+    system = system_of(model)
+    cosine = np.cos(system.groups.base_helix_angle)
+    static = system.groups.load / cosine
+    start = np.zeros((2, 10))
+    start[:, 0] = 0.8 * np.sign(static)
+    loads = integrate(system, start, PLAN._replace(transient_periods=2000)).loads
+    for number in (LARGEST, SMALLEST, MEAN):
+        assert loads[:, FORCE, number] == pytest.approx(static, rel=1e-9)
+    assert loads[:, FORCE, SQUARE] == pytest.approx(static**2, rel=1e-9)
+    # Nothing but the deflection of the teeth and of the bearings, and half the backlash.
+    assert np.ptp(loads[:, ERROR, :3], axis=1) == pytest.approx(0.0, abs=1e-9)
+
+
+def test_a_swinging_mass_carries_its_own_inertia():
+    # Without clearance, damping and load delta_5 swings as A cos(w tau): N_y = A w^2 / cos(beta_b).
+    scene = Effects(False, False, False, False, False)
+    amplitude, periods = 0.7, 8
+    model = pan2021(0.0, load=0.0, damping_ratio=0.0)
+    system = system_of(model, scene)
+    cosine = float(np.cos(system.groups.base_helix_angle[0]))
+    # Whole swings in the record: cos(beta_b) is the natural frequency of delta_5.
+    groups = system.groups._replace(mesh_frequency=np.array([2.0 * cosine]))
+    system = system._replace(groups=groups)
+    start = np.array([[amplitude, 0.0]])
+    plan = PLAN._replace(transient_periods=0, recorded_periods=periods)
+    (loads,) = integrate(system, start, plan).loads
+    force = amplitude * cosine
+    # Of a step of h radians the parabola's height is wrong by less than (h / 2)^3.
+    assert loads[FORCE, [LARGEST, SMALLEST]] == pytest.approx([force, -force], rel=4e-6)
+    assert loads[FORCE, SQUARE] == pytest.approx(force**2 / 2.0, rel=1e-7)
+    assert loads[ERROR, [LARGEST, SMALLEST]] == pytest.approx([amplitude, -amplitude], rel=4e-6)
+    assert loads[ERROR, SQUARE] == pytest.approx(amplitude**2 / 2.0, rel=1e-7)
+    assert np.abs(loads[[FORCE, ERROR], MEAN]).max() < 1e-7
+
+
+def test_loads_are_those_of_the_motion_at_sixteen_times_the_steps():
+    system, start = system_of(MODEL), np.zeros((4, 10))
+    loads = integrate(system, start, PLAN).loads
+    fine = integrate(system, start, Plan(3200, 60, 12, 1, history_periods=12))
+    motion = mesh_motion(system, fine.history, 3200)
+    error = fine.history[..., 0] + motion.pitch_error
+    signals = motion.force_tangential, motion.force_axial, error
+    for number, values in enumerate(signals):
+        size = np.abs(values).max(axis=1)
+        extremes = loads[:, number, [LARGEST, SMALLEST]].T
+        # The samples of the motion may miss a kink by half their distance.
+        missed = np.abs(np.diff(values, axis=1)).max(axis=1)
+        difference = np.abs(extremes - [values.max(axis=1), values.min(axis=1)])
+        assert (difference <= missed + 1e-5 * size).all()
+        squares = (values[:, :-1] ** 2).mean(axis=1)
+        assert loads[:, number, SQUARE] == pytest.approx(squares, rel=1e-5)
+        mean = values[:, :-1].mean(axis=1)
+        assert (np.abs(loads[:, number, MEAN] - mean) < 1e-5 * size).all()
+
+
+def test_a_kink_is_not_missed():
+    # Teeth part where the force, then all damping, is smallest: only the crossing itself shows it.
+    system, start = system_of(MODEL), np.zeros((4, 10))
+    loads = integrate(system, start, PLAN).loads
+    fine = integrate(system, start, PLAN._replace(steps_per_period=3200)).loads
+    assert loads[1:, FORCE, SMALLEST] == pytest.approx(fine[1:, FORCE, SMALLEST], rel=5e-5)
+    assert (loads[1:, FORCE, SMALLEST] < 0.0).all()
+
+
+def test_loads_change_nothing_else_and_plain_steps_have_them_too():
+    system, start = system_of(MODEL, TORSION_ONLY), np.zeros((4, 2))
+    without = integrate(system, start, PLAN._replace(loads=False))
+    assert without.loads.size == 0
+    with_loads = integrate(system, start, PLAN)
+    assert_same_bits(with_loads._replace(loads=without.loads), without)
+    plain = integrate(system, start, PLAN._replace(resolved=False))
+    assert plain.loads[0, FORCE] == pytest.approx(with_loads.loads[0, FORCE], rel=1e-6)
+
+
+def test_flow_maps_refuse_them():
+    plan = PLAN._replace(steps_per_period=24, method="flow_map")
+    with pytest.raises(ValueError, match="too long to tell loads"):
+        integrate(system_of(MODEL, TORSION_ONLY), np.zeros((4, 2)), plan)
