@@ -46,6 +46,7 @@ def make_result(*axes: Axis, **metadata: Any) -> Result:
         status_meanings=["ok", "diverged"],
         crossings=True,
         contact=["tangential"],
+        loads=["tangential"],
         exponents=True,
         check_meanings=["not_checked", "same", "changed"],
         motion_meanings=["periodic", "chaotic"],
@@ -230,7 +231,7 @@ def test_every_dataset_follows_the_rules_of_the_format(path: Path) -> None:
         assert (file.attrs["schema"], file.attrs["schema_version"]) == (b"gearchaos-sweep", b"3.1")
         datasets: list[h5py.Dataset] = []
         file.visititems(lambda _, item: datasets.append(item) if hasattr(item, "shape") else None)
-        assert len(datasets) == 38
+        assert len(datasets) == 47
         for dataset in datasets:
             assert {"units", "long_name"} <= set(dataset.attrs)
             assert dataset.dtype.kind == "S" or dataset.dtype.str in {"<f8", "<i4", "|u1"}

@@ -1,0 +1,47 @@
+"""The loads of a lane in a result: names, factors, and when they can be told."""
+
+import numpy as np
+import pytest
+
+import gearchaos
+from gearchaos import load_config
+from gearchaos.records.loads import FORCES, WORDING, loads_told
+
+from .commands import run_module
+from .short_sweeps import PAN2021, SHORT
+
+
+def test_factors_are_those_of_the_static_force_in_the_direction_of_the_load():
+    record = [[3.0, -1.0, 2.0, 5.0], [0.5, -0.5, 0.0, 0.1], [4.0, 1.0, 2.0, 4.25]]
+    told = loads_told(np.array([record] * 3), np.array([2.0, -0.5, 0.0]), ["tangential", "axial"])
+    assert len(told) == 2 * len(FORCES) + len(WORDING)
+    assert told["load_factor_largest"] == pytest.approx([1.5, 2.0, np.nan], nan_ok=True)
+    rms = np.sqrt(5.0)
+    assert told["load_factor_rms"] == pytest.approx([rms / 2.0, 2.0 * rms, np.nan], nan_ok=True)
+    assert told["mesh_force_rms_axial"] == pytest.approx([np.sqrt(0.1)] * 3)
+    assert told["transmission_error_peak_to_peak"] == pytest.approx([3.0] * 3)
+    assert told["transmission_error_rms"] == pytest.approx([0.5] * 3)
+
+
+def test_a_sweep_tells_them_and_its_file_keeps_them(tmp_path):
+    asked = (*SHORT, "outputs.loads=true", "integration.transient_periods=60", "sweep.count=6")
+    result = gearchaos.run(load_config(PAN2021, asked))
+    names = [f"{name}_tangential" for name in FORCES] + list(WORDING)
+    assert not any(name.endswith("_axial") for name in result.variables)
+    # Over a record the mean force balances the load, but for what the mass still gains.
+    assert result["mesh_force_mean_tangential"] == pytest.approx(
+        result["mesh_force_largest_tangential"] / result["load_factor_largest"], rel=0.1
+    )
+    assert (result["load_factor_largest"] > result["load_factor_rms"]).all()
+    assert (result["load_factor_rms"] > 1.0).all()
+    settings = [f"--set={one}" for one in asked]
+    assert run_module("gearchaos.sweep", str(PAN2021), *settings, cwd=tmp_path).code == 0
+    kept = gearchaos.open_result(next(tmp_path.glob("*.h5")))
+    for name in names:
+        assert np.array_equal(kept[name], result[name], equal_nan=True), name
+
+
+def test_flow_maps_do_not_tell_them():
+    settings = ["outputs.loads=true", "integration.method=flow_map"]
+    with pytest.raises(gearchaos.ConfigurationError, match=r"outputs\.loads = true: needs steps"):
+        load_config(PAN2021, settings)
