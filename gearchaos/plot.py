@@ -36,11 +36,15 @@ def _plot(options: argparse.Namespace) -> int:
     from gearchaos.results.result import open_result
 
     results = [_slice(open_result(path), options.at) for path in options.result]
+    if options.units == "physical":
+        results = [one.physical() for one in results]
     responses = [is_response(one) for one in results]
     if any(responses) and len(results) > 1:
         path = options.result[responses.index(True)]
         raise FigureError(f"{path}: is a response; draw it alone, only sweeps share a page")
     sheets = (_response_sheets if responses[0] else _sweep_sheets)(results, options)
+    if options.units == "physical":
+        sheets = [(f"{name}_physical", draw) for name, draw in sheets]
     targets = [_targets(options, name, len(sheets) == 1) for name, _ in sheets]
     _check_targets([path for paths in targets for path in paths], options)
     title = ", ".join(_titles(results, options.result))
@@ -158,6 +162,8 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
     add("--stages", action="store_true", help=text)
     text = "draw which shares of the gear pairs and starts of each value move in which way instead"
     add("--shares", action="store_true", help=text)
+    text = "dimensionless (default), or physical: um, m/s, N and 1/s instead of their scales"
+    add("--units", choices=("dimensionless", "physical"), help=text)
     add("--full-range", action="store_true", help="show every lane, however few lie far out")
     text = "width of the page (default: 85, one column of a journal; a response: 180, two)"
     add("--width", type=partial(millimetres, low=60.0), metavar="MM", help=text)

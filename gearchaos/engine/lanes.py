@@ -10,8 +10,14 @@ from numpy.typing import NDArray
 
 from gearchaos.configuration import Configuration, axis_values, swept_values
 from gearchaos.configuration.run_tables import states_of
-from gearchaos.configuration.sweep_values import SWEEPABLE_GROUPS, SWEEPABLE_KEYS, groups_at
+from gearchaos.configuration.sweep_values import (
+    SWEEPABLE_GROUPS,
+    SWEEPABLE_KEYS,
+    groups_at,
+    physical_at,
+)
 from gearchaos.dynamics.systems import system_of
+from gearchaos.gear.derivation import SCALES, derive_scales
 from gearchaos.gear.group_table import GROUP_TABLE
 from gearchaos.gear.tooth_deviations import REALISATION
 from gearchaos.results.result_file import Parameter
@@ -19,6 +25,7 @@ from gearchaos.results.variables import HARMONIC, Axis, axis_name, pair_axis, st
 
 Floats = NDArray[np.float64]
 Numbers = NDArray[np.intp]
+Texts = tuple[str, str, str]
 
 _DRAWS_PER_LANE = 12
 """Random numbers set aside per lane: a multiple of the four that one Philox counter yields."""
@@ -98,24 +105,28 @@ class Lanes:
         sizes = [values.size for values in self._values.values()]
         others = [[n for n in range(len(names)) if n != own] for own in range(len(names))]
         swept = zip(self._values.items(), others, strict=True)
-        groups = groups_at(self.config, {p: np.expand_dims(v, axes) for (p, v), axes in swept})
-        parameters = {}
-        for row in GROUP_TABLE:
-            value = getattr(groups, row.name)
-            if value is None or not row.needed_by(self.effects):
-                continue
-            origin: str = groups.origin[row.name]
-            dims: tuple[str, ...] = (HARMONIC,) if row.is_list else ()
-            if np.ndim(value) > 0 and not row.is_list:
+        values = {p: np.expand_dims(v, axes) for (p, v), axes in swept}
+        groups = groups_at(self.config, values)
+
+        def entry(value: Any, origin: str, texts: Texts, is_list: bool = False) -> Parameter:
+            dims: tuple[str, ...] = (HARMONIC,) if is_list else ()
+            if np.ndim(value) > 0 and not is_list:
                 origin = "swept"
                 along = [n for n, size in enumerate(np.shape(value)) if size > 1]
                 # Of an axis with one value nothing tells whether the group depends on it.
                 along = along or list(range(len(names)))
                 dims = tuple(names[n] for n in along)
                 value = np.broadcast_to(np.squeeze(value), [sizes[n] for n in along])
-            parameters[row.name] = Parameter(
-                value, origin, row.units, row.long_name, row.mathtext, dims
-            )
+            return Parameter(value, origin, *texts, dims)
+
+        parameters = {}
+        for row in GROUP_TABLE:
+            value, texts = getattr(groups, row.name), (row.units, row.long_name, row.mathtext)
+            if value is not None and row.needed_by(self.effects):
+                origin = groups.origin[row.name]
+                parameters[row.name] = entry(value, origin, texts, row.is_list)
+        for name, value in derive_scales(physical_at(self.config, values)).items():
+            parameters[name] = entry(value, "derived", SCALES[name][:3])
         return parameters
 
 

@@ -12,14 +12,12 @@ import numba
 import numpy as np
 from numba.core import event
 
-from gearchaos.configuration import Given, axis_values, configuration_of
-from gearchaos.configuration.sweep_values import physical_at
+from gearchaos.configuration import Given, configuration_of
 from gearchaos.engine.error_check import Tally
 from gearchaos.engine.executors import LocalExecutor, compute_blocks
 from gearchaos.engine.provenance import provenance
 from gearchaos.engine.simulation import Arrays, Bounds, Simulation
 from gearchaos.errors import ConfigurationError
-from gearchaos.gear.derivation import length_key
 from gearchaos.interrupts import check
 from gearchaos.progress import Progress, say, speaking
 from gearchaos.results.result import Result
@@ -186,7 +184,4 @@ def _excitation(simulation: Simulation) -> dict[str, float]:
     facts: dict[str, float] = {"excitation_period": simulation.lanes.repeats_after}
     if facts["excitation_period"] == 1 or config.pair is None:
         return facts
-    facts |= dict(zip(("driving_teeth", "driven_teeth"), config.pair.teeth, strict=True))
-    physical = physical_at(config, axis_values(config))
-    length = physical[length_key(physical)]
-    return facts | ({} if np.ndim(length) else {"length_scale_um": length})
+    return facts | dict(zip(("driving_teeth", "driven_teeth"), config.pair.teeth, strict=True))

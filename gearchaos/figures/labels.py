@@ -5,21 +5,11 @@ from collections.abc import Mapping
 
 from matplotlib.mathtext import MathTextParser
 
+from gearchaos.results import units
 from gearchaos.results.excitation import excitation_of
 from gearchaos.results.result import Result
 
 DIMENSIONLESS = ("", "1")
-SCALES = {
-    r"(section_)?delta_\d|mesh_error": r"unit $b\prime$",
-    r"(section_)?delta_\d_rate": r"unit $b\prime\omega_h$",
-    r"delta_\d_acceleration": r"unit $b\prime\omega_h^2$",
-    r"mesh_force_\w+": r"unit $k_mb\prime$",
-    r"lyapunov_exponents?(_standard_error)?": r"per unit of $\tau$",
-}
-"""What one stands for in dimensionless variables, by a pattern of their names: docs/model.md.
-
-The prime is written out, since one in superscript stands apart from its letter.
-"""
 
 
 def axis_label(result: Result, name: str, line_length: int = 60) -> str:
@@ -44,10 +34,12 @@ def axis_label(result: Result, name: str, line_length: int = 60) -> str:
 
 def unit_of(result: Result, name: str) -> str:
     """Word the unit of a variable, or what its numbers are multiples of; "" of a pure number."""
-    units = str(result.attributes(name).get("units", ""))
-    if units in DIMENSIONLESS:
-        return next((unit for names, unit in SCALES.items() if re.fullmatch(names, name)), "")
-    return plain(re.sub(r"\bum\b", "\N{MICRO SIGN}m", units))
+    written = str(result.attributes(name).get("units", ""))
+    if written in DIMENSIONLESS:
+        unit = units.unit_of(name)
+        return unit.stands_for if unit else ""
+    words = plain(re.sub(r"\bum\b", "\N{MICRO SIGN}m", written))
+    return re.sub(r"\b([a-z]+)-(\d)", r"\1$^{-\2}$", words)
 
 
 def place_of(result: Result, lane: int) -> dict[str, float]:

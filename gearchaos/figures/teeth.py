@@ -1,5 +1,6 @@
 """The page of a response of teeth that each have an error of their own, and how its axes count."""
 
+from contextlib import suppress
 from math import ceil, log10
 from typing import Any
 
@@ -10,6 +11,7 @@ from matplotlib.collections import LineCollection
 from matplotlib.lines import Line2D
 from matplotlib.ticker import MultipleLocator
 
+from gearchaos.errors import ConfigurationError
 from gearchaos.figures.labels import form_in_words, in_words, place_of
 from gearchaos.figures.page import Page, few_ticks, footnote, letter, page, remark
 from gearchaos.figures.response import (
@@ -52,7 +54,9 @@ def teeth_page(
     error is in um where b' is known. Points once a mesh period stand behind those of the section.
     """
     excitation = excitation_of(result.metadata)
-    teeth, n, length = excitation.driving_teeth, excitation[0], excitation.length_scale_um
+    teeth, n = excitation.driving_teeth, excitation.excitation_period
+    with suppress(ConfigurationError):
+        result = result.physical(MESH_ERROR)
     whole = coordinate in coordinates_of(result)
     layout = ("e;h;f", "e;h;p;s;f", "ee;hh;ps;ff")[columns if whole else 0]
     heights = [_HEIGHTS_MM[row[0]] for row in layout.split(";")]
@@ -61,13 +65,8 @@ def teeth_page(
         top, below, *planes, spectrum = panels
         time, foot = result[TIME], [form_in_words(result)]
         shown = (max(0.0, time[-1] - SHOWN_REVOLUTIONS * teeth), time[-1])
-        error = time_history(top, result, lane, MESH_ERROR, between=shown)
+        time_history(top, result, lane, MESH_ERROR, between=shown)
         time_history(below, result, lane, coordinate, between=shown)
-        if length:
-            error.set_ydata(length * np.asarray(error.get_ydata()))
-            top.relim()
-            top.autoscale_view(scalex=False)
-            top.set_ylabel("Pitch error of\nthe mesh, $e$ (\N{MICRO SIGN}m)", linespacing=1.2)
         top.sharex(below)
         for axes, most in ((top, 4), (below, 6)):
             few_ticks(axes, None, most)
@@ -123,7 +122,7 @@ def _in_shaft_orders(
     shaft. A line has the colour of the shaft whose multiple it is, and is pale where it is that of
     neither, or of a record that does not hold a period of the excitation and resolves none.
     """
-    period, driving, driven, _ = excitation
+    period, driving, driven = excitation
     segments = np.array(lines.get_segments())
     multiples = segments[:, :1, 0] * np.array([driven, driving, 1])
     near = np.abs(multiples - np.rint(multiples)) < 1e-6

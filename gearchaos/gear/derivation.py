@@ -19,6 +19,11 @@ _MILLIMETRE = 1e-3
 _N_PER_UM_MM = 1e9  # stiffness per unit face width: 1 N/(um mm) = 1e9 N/m^2
 
 
+def derive_scales(physical: Mapping[str, Any]) -> dict[str, Value]:
+    """Compute those of the `SCALES` for which the physical data suffice; see `derive_groups`."""
+    return _derive(physical, {name: derivation for name, (*_, derivation) in SCALES.items()})
+
+
 def derive_groups(physical: Mapping[str, Any], without: Collection[str] = ()) -> dict[str, Value]:
     """Compute every group for which the physical data suffice.
 
@@ -28,13 +33,18 @@ def derive_groups(physical: Mapping[str, Any], without: Collection[str] = ()) ->
     Raises ConfigurationError if the stiffness harmonics would differ between lanes, KeyError if the
     mapping lacks a path.
     """
+    return _derive(physical, {name: _DERIVATIONS[name] for name in _DERIVATIONS.keys() - without})
+
+
+def _derive(
+    physical: Mapping[str, Any], derivations: Mapping[str, Callable[["Quantities"], Any]]
+) -> dict[str, Value]:
     quantities = Quantities(physical)
-    groups: dict[str, Value] = {}
-    for name, derivation in _DERIVATIONS.items():
-        if name not in without:
-            with suppress(_UnknownError):
-                groups[name] = derivation(quantities)
-    return groups
+    found: dict[str, Value] = {}
+    for name, derivation in derivations.items():
+        with suppress(_UnknownError):
+            found[name] = derivation(quantities)
+    return found
 
 
 def length_key(physical: Mapping[str, Any]) -> str:
@@ -158,6 +168,14 @@ def _common_to_lanes(value: Any) -> float:
         )
     return float(values[0])
 
+
+LENGTH, FREQUENCY, STIFFNESS = "length_scale", "scaling_frequency", "mean_mesh_stiffness"
+SCALES: dict[str, tuple[str, str, str, Callable[[Quantities], Any]]] = {
+    LENGTH: ("um", "length scale", r"$b\prime$", lambda q: q.length_scale / _MICROMETRE),
+    FREQUENCY: ("s-1", "scaling frequency", r"$\omega_h$", lambda q: q.scaling_frequency),
+    STIFFNESS: ("N m-1", "mean mesh stiffness", "$k_m$", lambda q: q.mean_stiffness),
+}
+"""What makes a model dimensionless: unit, wording, symbol and derivation of each, by name."""
 
 _DERIVATIONS: dict[str, Callable[[Quantities], Any]] = {
     "mesh_frequency": Quantities.mesh_frequency,

@@ -8,13 +8,12 @@ class Excitation(NamedTuple):
     """The excitation of all lanes, by the attributes of these names.
 
     ``excitation_period``: mesh periods after which it repeats, 1 for a sine; the others, 0 where
-    not known, are numbers of teeth that have errors of their own, and b'.
+    not known, are numbers of teeth that have errors of their own.
     """
 
     excitation_period: int = 1
     driving_teeth: int = 0
     driven_teeth: int = 0
-    length_scale_um: float = 0.0
 
     @property
     def of_teeth(self) -> bool:
@@ -30,7 +29,7 @@ class Excitation(NamedTuple):
 
 def excitation_of(metadata: Mapping[str, Any]) -> Excitation:
     """Read the excitation from the metadata of a result; what makes no sense is not known."""
-    # Beyond that is no number of teeth, and no length in um.
+    # Beyond that is no number of teeth.
     sound = {
         name: value
         for name, default in Excitation._field_defaults.items()

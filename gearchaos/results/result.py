@@ -19,6 +19,7 @@ from gearchaos.results import tables
 from gearchaos.results.checksum_line import checksum_fits
 from gearchaos.results.result_file import Parameter, own_metadata, write_result
 from gearchaos.results.result_reader import fixed_coordinates, is_coordinate, read_result
+from gearchaos.results.units import in_physical_units
 from gearchaos.results.variables import SECTION, SECTION_POINT, Variable, diagram_axis
 
 __all__ = ["Parameter", "Result", "open_result", "section_variables"]
@@ -176,6 +177,22 @@ class Result:
             },
             {**self.metadata, "fixed": fixed},
         )
+
+    def physical(self, *names: str) -> Result:
+        """Give these variables, by default all, in physical units: um, m/s, N, 1/s.
+
+        Pure numbers stay, and `parameters`, among them what the units are made of. Raises
+        ConfigurationError if the configuration gave no physical pair, KeyError if there is no such
+        variable.
+        """
+        wanted = [self._known(name) for name in names or self]
+        changed = {
+            name: in_physical_units(self.variables[name], self[name], self.parameters)
+            for name in wanted
+        }
+        variables = {**self.variables, **{name: one for name, (one, _) in changed.items()}}
+        data = {**self._data, **{name: values for name, (_, values) in changed.items()}}
+        return Result(self.axes, [*variables.values()], data, self.parameters, self.metadata)
 
     def save(self, path: str | os.PathLike[str], overwrite: bool = False) -> None:
         """Write the result to an HDF5 file, which appears complete or not at all.

@@ -132,14 +132,3 @@ def test_an_excitation_that_hardly_ever_repeats_is_refused():
     many = {**TABLES["pair"], "teeth": [1999, 2000]}
     with pytest.raises(gearchaos.ConfigurationError, match="after 3998000 mesh periods only"):
         gearchaos.run(configured(pair=many, pitch_error=GRADES))
-
-
-def test_a_file_names_the_length_of_one_only_where_it_is_the_same_in_all_lanes(result):
-    assert result.metadata["length_scale_um"] == 50.0
-    mesh = {name: value for name, value in TABLES["mesh"].items() if name != "length_scale_um"}
-    one = gearchaos.run(configured(mesh=mesh))
-    assert one.metadata["length_scale_um"] == 50.0
-    swept = {"parameter": "mesh.length_scale_um", "values": [40.0, 60.0]}
-    several = gearchaos.run(configured(sweep=swept))
-    assert several.metadata["excitation_period"] == 21
-    assert "length_scale_um" not in several.metadata

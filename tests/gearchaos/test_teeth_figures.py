@@ -15,7 +15,7 @@ from gearchaos.info import main as info
 from gearchaos.plot import main as plot
 from gearchaos.results.excitation import Excitation, excitation_of
 from gearchaos.results.response_variables import response_variables
-from gearchaos.results.result import Result
+from gearchaos.results.result import Parameter, Result
 from gearchaos.results.variables import Axis, sweep_variables
 from gearchaos.stages import main as stages
 
@@ -30,7 +30,11 @@ SCALE_UM = 25.0
 
 
 def known_teeth(
-    recorded: int = 4, kept: int = 2 * MEET, extra_order: float = 0.0, **facts: float | str
+    recorded: int = 4,
+    kept: int = 2 * MEET,
+    extra_order: float = 0.0,
+    scaled: bool = True,
+    **facts: float | str,
 ) -> Result:
     """Make a response with lines of mesh, both shafts and another order, of so many excitations.
 
@@ -53,7 +57,6 @@ def known_teeth(
         "excitation_period": MEET,
         "driving_teeth": DRIVING,
         "driven_teeth": DRIVEN,
-        "length_scale_um": SCALE_UM,
     } | facts
     meanings = ("periodic", "quasi_periodic", "chaotic", "unresolved", "diverged", "grows")
     variables = sweep_variables(
@@ -82,24 +85,24 @@ def known_teeth(
         "mesh_force_tangential": record["delta_5"],
         "contact_tangential": np.ones((1, kept * STEPS + 1)),
     }
-    return Result([axis.name], variables, data, {}, {"title": "teeth", **known})
+    scales = {"length_scale": Parameter(SCALE_UM, "derived", "um")} if scaled else {}
+    return Result([axis.name], variables, data, scales, {"title": "teeth", **known})
 
 
 @pytest.mark.parametrize(
     ("given", "understood"),
     [
-        ({}, Excitation(1, 0, 0, 0.0)),
-        ({"excitation_period": 1}, Excitation(1, 0, 0, 0.0)),
+        ({}, Excitation(1, 0, 0)),
+        ({"excitation_period": 1}, Excitation(1, 0, 0)),
         (
             {"excitation_period": 798, "driving_teeth": 21, "driven_teeth": 38},
-            Excitation(798, 21, 38, 0.0),
+            Excitation(798, 21, 38),
         ),
         (
-            {"excitation_period": 0, "driving_teeth": -3, "driven_teeth": "x"}
-            | {"length_scale_um": float("nan")},
-            Excitation(1, 0, 0, 0.0),
+            {"excitation_period": 0, "driving_teeth": -3, "driven_teeth": "x"},
+            Excitation(1, 0, 0),
         ),
-        ({"excitation_period": 2.5, "length_scale_um": 2.5}, Excitation(1, 0, 0, 2.5)),
+        ({"excitation_period": 2.5, "driving_teeth": 21}, Excitation(1, 21, 0)),
     ],
 )
 def test_what_attributes_tell_of_the_excitation(given, understood):
@@ -142,7 +145,7 @@ def test_error_and_history_share_revolutions_with_a_tick_for_each_tooth():
 
 
 def test_without_a_unit_of_lengths_the_error_is_dimensionless():
-    (error, *_) = response_page(known_teeth(length_scale_um=0.0), 0).axes
+    (error, *_) = response_page(known_teeth(scaled=False), 0).axes
     assert error.get_ylabel() == "Pitch error of the\nmesh, $e$ (unit $b\\prime$)"
 
 
@@ -268,7 +271,7 @@ GRADES = (
 def test_a_sweep_and_a_response_know_their_teeth(tmp_path):
     config = gearchaos.load_config(small_config(tmp_path), GRADES)
     result = gearchaos.run(config)
-    assert excitation_of(result.metadata) == Excitation(18, 6, 9, 25.0)
+    assert excitation_of(result.metadata) == Excitation(18, 6, 9)
     assert result.attributes("period")["long_name"].startswith("periods of the excitation, 18 mesh")
     assert shares_page(result).axes[0].get_title("right") == "3 gear pairs each"
     response = gearchaos.respond(config.replace("integration.recorded_periods", 54), periods=18)
@@ -286,14 +289,6 @@ def test_a_sine_says_nothing_of_teeth(tmp_path):
     assert excitation_of(result.metadata) == Excitation()
     assert not {*Excitation._fields[1:]} & result.metadata.keys()
     assert excitation_of(result.metadata).in_words == ""
-
-
-@pytest.mark.parametrize("swept", ["mesh.length_scale_um", "mesh.half_backlash_um"])
-def test_a_unit_of_lengths_that_is_swept_is_not_one(tmp_path, swept):
-    sweep = f'sweep={{parameter="{swept}",values=[20.0,30.0]}}'
-    config = gearchaos.load_config(small_config(tmp_path), [*GRADES[:2], sweep, *GRADES[3:]])
-    known = excitation_of(gearchaos.run(config).metadata).length_scale_um
-    assert known == (0.0 if swept == "mesh.length_scale_um" else 25.0)
 
 
 def test_the_commands_say_what_a_period_is(path, capsys):

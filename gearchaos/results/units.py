@@ -1,0 +1,72 @@
+"""What dimensionless variables are multiples of, and what they are in physical units."""
+
+import re
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gearchaos.errors import ConfigurationError
+from gearchaos.gear.derivation import FREQUENCY, LENGTH, STIFFNESS
+from gearchaos.results.result_file import Parameter
+from gearchaos.results.variables import Variable
+
+
+class Unit(NamedTuple):
+    """A product of scales of a pair, worded, and how many physical units it is."""
+
+    stands_for: str
+    units: str
+    factor: float
+    scales: tuple[str, ...]
+
+
+# The prime is written out, since one in superscript stands apart from its letter.
+_LENGTH = Unit(r"unit $b\prime$", "um", 1.0, (LENGTH,))
+_SPEED = Unit(r"unit $b\prime\omega_h$", "m s-1", 1e-6, (LENGTH, FREQUENCY))
+_ACCELERATION = Unit(r"unit $b\prime\omega_h^2$", "m s-2", 1e-6, (LENGTH, FREQUENCY, FREQUENCY))
+_FORCE = Unit(r"unit $k_mb\prime$", "N", 1e-6, (STIFFNESS, LENGTH))
+_GROWTH = Unit(r"per unit of $\tau$", "s-1", 1.0, (FREQUENCY,))
+_UNITS = {
+    r"(section_)?delta_\d|mesh_error|transmission_error_\w+": _LENGTH,
+    r"(section_)?delta_\d_rate|approach_\w+|slowest_crossing": _SPEED,
+    r"delta_\d_acceleration": _ACCELERATION,
+    r"mesh_force_\w+": _FORCE,
+    r"lyapunov_(exponent|sum)\w*|exponent_step_error": _GROWTH,
+    "mesh_frequency": Unit(r"unit $\omega_h$", "rad s-1", 1.0, (FREQUENCY,)),
+}
+"""By a pattern of the names of variables: docs/model.md."""
+
+
+def unit_of(name: str) -> Unit | None:
+    """Return what the numbers of a dimensionless variable are multiples of, None of pure ones."""
+    return next((unit for names, unit in _UNITS.items() if re.fullmatch(names, name)), None)
+
+
+def in_physical_units(
+    variable: Variable, values: NDArray[Any], parameters: Mapping[str, Parameter]
+) -> tuple[Variable, NDArray[Any]]:
+    """Return a variable and its values in physical units; pure numbers come as they are.
+
+    Raises ConfigurationError if a scale is not among the parameters, or varies along an axis that
+    the variable does not have.
+    """
+    unit = unit_of(variable.name)
+    if unit is None or variable.units != "1":
+        return variable, values
+    for name in unit.scales:
+        if name not in parameters:
+            raise ConfigurationError(
+                f"{variable.name}: the configuration of the result does not give the {name} of its "
+                "pair: give [pair] and [mesh] with mean_stiffness_N_per_um_mm and "
+                "length_scale_um, and run the sweep again"
+            )
+        scale = parameters[name]
+        if not {*scale.dims} <= {*variable.dims}:
+            varied = f"{name} varies along {', '.join(scale.dims)}"
+            raise ConfigurationError(f"{variable.name}: {varied}: select one value there first")
+        sizes = zip(variable.dims, values.shape, strict=True)
+        values = values * np.reshape(scale.value, [n if d in scale.dims else 1 for d, n in sizes])
+    return replace(variable, units=unit.units), unit.factor * values

@@ -1,0 +1,82 @@
+"""Results in physical units: their factors, their labels, and what cannot be converted."""
+
+import numpy as np
+import pytest
+
+import gearchaos
+from gearchaos.figures.labels import unit_of
+from gearchaos.plot import main as plot
+
+from .commands import small_config
+from .short_sweeps import PAN2021, SHORT
+
+ASKED = ("outputs.loads=true", "outputs.section=['delta_5', 'delta_5_rate']")
+
+
+@pytest.fixture(scope="module")
+def path(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("physical")
+    config = gearchaos.load_config(small_config(folder), ASKED)
+    gearchaos.run(config).save(folder / "pair.h5")
+    return folder / "pair.h5"
+
+
+@pytest.fixture(scope="module")
+def result(path):
+    return gearchaos.open_result(path)
+
+
+def test_lengths_times_and_forces_are_those_of_the_pair(result):
+    length, frequency, stiffness = (
+        result.parameters[name].value
+        for name in ("length_scale", "scaling_frequency", "mean_mesh_stiffness")
+    )
+    # small_config: 25 um, 13 N/(um mm) over the face width.
+    assert length == 25.0
+    found = result.physical()
+    for name, factor, units in (
+        ("section_delta_5", length, "um"),
+        ("section_delta_5_rate", 1e-6 * length * frequency, "m s-1"),
+        ("transmission_error_rms", length, "um"),
+        ("mesh_force_largest_tangential", 1e-6 * length * stiffness, "N"),
+        ("lyapunov_exponent", frequency, "s-1"),
+        ("lyapunov_exponent_standard_error", frequency, "s-1"),
+        ("load_factor_largest", 1.0, "1"),
+        ("return_distance", 1.0, "1"),
+    ):
+        assert found[name] == pytest.approx(factor * result[name], nan_ok=True), name
+        assert found.attributes(name)["units"] == units
+    # 50 Nm at the base radius of the driving gear, 22.5688 mm.
+    force = 1e-6 * length * stiffness * result.parameters["load"].value
+    assert force == pytest.approx(50.0 / 22.5688e-3, rel=1e-5)
+
+
+def test_one_variable_is_enough_and_twice_is_once(result):
+    one = result.physical("section_delta_5")
+    assert one.attributes("lyapunov_exponent")["units"] == "1"
+    assert unit_of(one, "section_delta_5") == "\N{MICRO SIGN}m"
+    again = one.physical()
+    assert np.array_equal(again["section_delta_5"], one["section_delta_5"])
+    assert unit_of(again, "section_delta_5_rate") == "m s$^{-1}$"
+
+
+def test_a_figure_says_micrometres_and_keeps_the_dimensionless_one(path, capsys):
+    assert plot([str(path), "--format=png"]) == 0
+    assert plot([str(path), "--format=png", "--units=physical"]) == 0
+    assert capsys.readouterr().out.split()[-1].endswith("pair_physical.png")
+    assert (path.parent / "pair.png").exists()
+
+
+def test_what_the_configuration_does_not_give_is_named():
+    result = gearchaos.run(gearchaos.load_config(PAN2021, SHORT))
+    with pytest.raises(gearchaos.ConfigurationError, match=r"section_delta_5: .*length_scale"):
+        result.physical()
+    rate = result.physical("lyapunov_exponent")
+    assert rate.attributes("lyapunov_exponent")["units"] == "s-1"
+
+
+def test_a_scale_that_is_swept_is_that_of_each_lane(tmp_path):
+    sweep = 'sweep={parameter="mesh.length_scale_um",values=[20.0,30.0]}'
+    result = gearchaos.run(gearchaos.load_config(small_config(tmp_path), [sweep]))
+    found = result.physical("section_delta_5", "state")["section_delta_5"]
+    assert found == pytest.approx(result["section_delta_5"] * [[20.0], [30.0]])
