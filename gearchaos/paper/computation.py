@@ -8,7 +8,7 @@ from gearchaos.configuration import Configuration
 from gearchaos.engine.response import respond
 from gearchaos.engine.running import run
 from gearchaos.errors import ConfigurationError
-from gearchaos.paper.hop import HIGH, LOW, STEP, Hop, exponents_beside, find_hop
+from gearchaos.paper.hop import HIGH, LOW, STARTS, STEP, Hop, exponents_beside, find_hop
 from gearchaos.paper.published import published
 from gearchaos.paper.stages import Crisis, crisis_of, lanes_as_printed
 from gearchaos.progress import say
@@ -27,7 +27,8 @@ class Reproduction:
     with the interval in which two motions coexist; ``exponents``: the largest ones of all ten
     states before and after it, starting at rest; ``response``: all effects, at rest at the start,
     without pitch error and at those of figures 5, 6, 14 and 15 and of Table 3;
-    ``motions``, ``motions_from_contact``: at the pitch errors of figures 8 to 13, by the start.
+    ``motions``, ``motions_from_contact``: at the pitch errors of figures 8 to 13, by the start;
+    ``crisis``: where the diagram of figure 7 widens at once.
     """
 
     config: Configuration
@@ -37,11 +38,7 @@ class Reproduction:
     response: Result
     motions: Result
     motions_from_contact: Result
-
-    @property
-    def crisis(self) -> Crisis | None:
-        """Where the diagram of figure 7 widens at once."""
-        return crisis_of(self.sweep)
+    crisis: Crisis
 
     def labelled(self, result: Result, *, strictly: bool = False) -> LabelledLanes:
         """Label the lanes of one of these results as the paper does, or figures of one lane."""
@@ -65,16 +62,17 @@ def compute(
     ``config``, ``full``: ``pan2021.toml`` and ``pan2021_full.toml``; coarser ones give a coarser
     gallery sooner; ``hop_step``: of the carried sweeps between which the hop lies; ``periods``:
     mesh periods of which every step is kept. Raises ConfigurationError if no two motions coexist,
-    or a start at rest does not hop from one to the other.
+    the starts do not hop from one to the other, or the motion on two bands ends in no crisis.
     """
     say("figure 7: the sweep over the pitch error")
     sweep = run(config, threads)
     say("the hop of figure 7: both motions, upwards and downwards")
     hop = find_hop(config, step=hop_step, threads=threads)
-    if hop is None or "rest" not in hop.changes:
+    crisis = crisis_of(sweep)
+    if crisis is None or hop is None or hop.changes.keys() != STARTS.keys():
         raise ConfigurationError(
-            f"{config.source}: from rest, there is no hop as in figure 7 between {LOW:g} and "
-            f"{HIGH:g} e(tau); take back what was changed in it"
+            f"{config.source}: there is no hop as in figure 7 between {LOW:g} and {HIGH:g} e(tau), "
+            "or no crisis after it; take back what was changed in it"
         )
     exponents = exponents_beside(full, hop.changes["rest"], threads)
     say("figures 5, 6, 14 and 15: accelerations of all coordinates")
@@ -85,7 +83,7 @@ def compute(
         respond(shown.replace("start", {"kind": kind}), periods, threads)
         for kind in ("rest", "contact")
     )
-    return Reproduction(config, sweep, hop, exponents, response, motions, from_contact)
+    return Reproduction(config, sweep, hop, exponents, response, motions, from_contact, crisis)
 
 
 def _at(config: Configuration, pitch_errors: list[float]) -> Configuration:

@@ -50,13 +50,11 @@ class Change(NamedTuple):
     """Where a kind of start changes from one motion to the other.
 
     ``before``, ``after``: last pitch error on the motion of the upward sweep, first one on the
-    other; ``returns``: how often the start comes back to the first motion at higher pitch errors;
-    ``exponents``: the largest Lyapunov exponents before and after, those of the periodic orbits.
+    other; ``exponents``: the largest Lyapunov exponents there, those of the periodic orbits.
     """
 
     before: float
     after: float
-    returns: int
     exponents: tuple[float, float]
 
 
@@ -115,7 +113,7 @@ def find_hop(config: Configuration, step: float = STEP, threads: int | None = No
         if places.size:
             before, after = found[found.axis][places[0] : places[0] + 2].tolist()
             exponents = _orbit(found, before)[1].exponent, _orbit(found, after)[1].exponent
-            changes[kind] = Change(before, after, places.size - 1, exponents)
+            changes[kind] = Change(before, after, exponents)
     return Hop(upwards, downwards, first, last, (falls, rises), changes)
 
 

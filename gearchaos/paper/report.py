@@ -2,18 +2,21 @@
 
 import re
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from importlib.resources import files
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
 
 from gearchaos.figures.labels import short
 from gearchaos.figures.response_lane import coordinates_of
-from gearchaos.paper.comparison import NONE, Row, compare
-from gearchaos.paper.computation import Reproduction, largest_acceleration
-from gearchaos.paper.explanations import hop_in_words, increments_in_words, stages_in_words
+from gearchaos.paper.comparison import NONE, Row, compare, signed
+from gearchaos.paper.computation import Reproduction, lane_of, largest_acceleration
 from gearchaos.paper.our_numbers import our_numbers, pair_of
 from gearchaos.paper.published import Kind, published
-from gearchaos.paper.stages import OUT_OF_TURN, WINDOW
-from gearchaos.paper.verdict import OVERLAP, RULES, Verdict
+from gearchaos.paper.stages import OUT_OF_TURN, TWO_BANDS, WINDOW, motions_between, out_of_turn
+from gearchaos.paper.verdict import RULES, Verdict
 from gearchaos.results.response_variables import acceleration_of
 from gearchaos.results.result import Result
 from gearchaos.version import software_version
@@ -30,7 +33,6 @@ def report(found: Reproduction, names: dict[str, str]) -> str:
     """Write the report; ``names`` are the files beside it, with what each holds."""
     printed, tables = published(), compare(found)
     rows = [row for table in tables.values() for row in table]
-    harmonics = (*printed.harmonics.cosine, *printed.harmonics.sine)
     values = {key: number.value for key, number in printed.numbers.items()}
     pair, lines = pair_of(found), printed.contact_lines
     per_mm, face_width = values["mean_stiffness"], float(pair.face_width) * 1e3
@@ -42,11 +44,8 @@ def report(found: Reproduction, names: dict[str, str]) -> str:
         rows=len(rows),
         counts=Counter(row.verdict for row in rows),
         kinds={kind.value: _counts(row for row in rows if row.kind is kind) for kind in Kind},
-        harmonics=len(harmonics),
-        zeros=sum(abs(value) < 1e-3 for value in harmonics),
         disagreements=_disagreements(rows),
         rules=RULES,
-        overlap=OVERLAP,
         window=WINDOW,
         out_of_turn=OUT_OF_TURN,
         tables={name: _table(table) for name, table in tables.items()},
@@ -56,7 +55,6 @@ def report(found: Reproduction, names: dict[str, str]) -> str:
         printed_ratio=values["damping_ratio"] / face_width**0.5,
         pair=pair,
         lines=lines,
-        inverse_omega=1.0 / values["frequency"],
         implied_contact_ratio=(lines.shortest + lines.longest) / 2.0,
         implied_mass=damping**2 / (per_mm * 1e6),
         face_width=face_width,
@@ -64,10 +62,11 @@ def report(found: Reproduction, names: dict[str, str]) -> str:
         length_scale=length_scale,
         backlash=length_scale * found.group("half_backlash"),
         table_3=_table_3(found.response),
-        stages=stages_in_words(found),
+        stages=" ".join(_chaotic_stages(found)),
         motions=_motions(),
-        hop=hop_in_words(found),
-        increments=increments_in_words(found),
+        **_of_the_bands(found),
+        **_of_the_hop(found),
+        **_of_the_increments(found),
         files="\n".join(f"- `{name}`: {words}" for name, words in names.items()),
     )
     # Who cannot see a picture is told how its caption begins.
@@ -124,3 +123,61 @@ def _table_3(response: Result) -> str:
 
 def _line(*cells: object) -> str:
     return f"| {' | '.join(map(str, cells))} |"
+
+
+def _chaotic_stages(found: Reproduction) -> Iterator[str]:
+    """Tell what lies in the stages that the paper calls chaotic or by a name of its own."""
+    for stage in published().stages:
+        if stage.printed != stage.motion or stage.motion == "chaotic":
+            motions = motions_between(found.labelled(found.sweep), stage.first, stage.last)
+            counts = Counter(motions).most_common(6)
+            worded = ", ".join(f"{count} {label}" for label, count in counts)
+            yield (
+                f'In the paper\'s stage "{stage.printed}", {stage.first:g} to {stage.last:g} e(τ), '
+                f"the {len(motions)} lanes of the sweep are: {worded}."
+            )
+
+
+def _of_the_bands(found: Reproduction) -> dict[str, Any]:
+    lanes = found.labelled(found.sweep)
+    on_two = lanes.labels == TWO_BANDS
+    values, exponents = lanes.values[on_two], lanes.exponent[on_two]
+    shares = out_of_turn(found.sweep["section_delta_5"])[on_two]
+    return {
+        "bands_apart": values[shares == 0.0].max(),
+        "last_on_bands": values.max(),
+        "most_out_of_turn": shares.max(),
+        "band_exponents": [signed(end, 3) for end in (exponents.min(), exponents.max())],
+    }
+
+
+def _of_the_hop(found: Reproduction) -> dict[str, Any]:
+    hop, paper = found.hop, published().numbers
+    place, rest = paper["hop"].value, hop.changes["rest"]
+    carried = hop.upwards, hop.downwards
+    before = found.sweep[found.sweep.axis] <= rest.before
+    return {
+        **hop.changes,
+        "losses": [loss.name.lower().replace("_", " ") for loss in hop.losses],
+        "crossings": [sweep["crossings_per_period"][lane_of(sweep, place)] for sweep in carried],
+        "hop_share": hop.share(place),
+        "exponents": [signed(exponent, 5) for exponent in (*found.exponents, *rest.exponents)],
+        "printed_exponent": signed(paper["hop_exponent_before"].value, 4),
+        "exponent_spread": np.ptp(found.sweep["lyapunov_exponent"][before]),
+    }
+
+
+def _of_the_increments(found: Reproduction) -> dict[str, Any]:
+    """Tell from which pitch error on the largest acceleration is that of teeth apart."""
+    response, steps = found.response, published().increments.pitch_errors
+    lanes = [lane_of(response, p) for p in steps]
+    motions = response["delta_5_acceleration"][lanes]
+    contact = response["contact_tangential"][lanes, np.argmax(motions, axis=1)]
+    apart = contact == response.variables["contact_tangential"].flags.index("apart")
+    magnitudes = pairwise(np.max(np.abs(motions), axis=1))
+    forcing = 2.0 * found.group("mesh_frequency") ** 2 * found.group("pitch_error_amplitude")
+    return {
+        "first_apart": steps[np.argmax(apart)],
+        "forcing": short(forcing),
+        "magnitudes": ", ".join(short(after - before) for before, after in magnitudes),
+    }

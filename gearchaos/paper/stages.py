@@ -59,16 +59,14 @@ def crisis_of(sweep: Result) -> Crisis | None:
     return Crisis(place, float(widest[last]), float(widest[last + 1]))
 
 
-def lanes_as_printed(
-    result: Result, crisis: Crisis | None, *, strictly: bool = False
-) -> LabelledLanes:
+def lanes_as_printed(result: Result, crisis: Crisis, *, strictly: bool = False) -> LabelledLanes:
     """Label as two bands what has more than two points, takes turns, and is as before a crisis.
 
     Narrower, that is, than the mean of the two widths of the crisis. If ``strictly``, bands that
     are not visited strictly in turn touch: the two of a single motion, as in figure 10, lie apart.
     """
     lanes, section = labelled_lanes(result), result["section_delta_5"]
-    widest = np.inf if crisis is None else (crisis.before + crisis.after) / 2.0
+    widest = (crisis.before + crisis.after) / 2.0
     shares = out_of_turn(section)
     on_two = _longer(lanes) & (shares <= OUT_OF_TURN) & (np.ptp(section, axis=1) < widest)
     names = np.where(strictly & (shares > 0.0), TOUCHING, TWO_BANDS)

@@ -56,18 +56,16 @@ RULES = {
     "boundary": Rule("of the printed place", 0.1, 0.5, relative=False),
     "amplitude": Rule("of the printed number", 0.05, 0.25),
     "exponent": Rule("of the printed number", 0.1, 0.5),
+    "stage": Rule("of both spans together that is not common to them", 0.1, 0.5),
 }
 """The rules by the names that `published.toml` uses."""
-
-OVERLAP = Rule("of both spans together that is not common to them", 0.1, 0.5)
-"""The rule of a stage: how much of what two spans cover is not covered by both."""
 
 
 def overlap_verdict(published: tuple[float, float], ours: tuple[float, float]) -> Verdict:
     """Judge a span, its first and last value, by how much of both together is common to them."""
     common = min(published[1], ours[1]) - max(published[0], ours[0])
     together = max(published[1], ours[1]) - min(published[0], ours[0])
-    return OVERLAP.verdict(1.0, max(common, 0.0) / together)
+    return RULES["stage"].verdict(1.0, max(common, 0.0) / together)
 
 
 def motion_verdict(published: str, ours: str, also: tuple[str, ...]) -> Verdict:

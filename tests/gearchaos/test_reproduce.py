@@ -30,7 +30,6 @@ from gearchaos.paper.stages import (
     out_of_turn,
 )
 from gearchaos.paper.verdict import (
-    OVERLAP,
     RULES,
     Rule,
     Verdict,
@@ -102,7 +101,7 @@ def test_a_boundary_is_judged_by_its_distance(ours, verdict):
     assert RULES["boundary"].verdict(1.12, ours) is verdict
 
 
-@pytest.mark.parametrize("rule", [*RULES.values(), OVERLAP])
+@pytest.mark.parametrize("rule", RULES.values())
 def test_what_was_not_found_does_not_agree(rule):
     assert rule.verdict(1.0, math.nan) is DOES_NOT
     assert 0.0 < rule.agrees < rule.in_kind
@@ -437,7 +436,7 @@ def test_the_hop_in_the_report_is_where_the_carried_sweeps_part(report, found):
 
 def labels_of(result, crisis, *, shared: bool = False) -> list[str]:
     """The label of every lane, from the arrays: two bands if points take turns about the median."""
-    widest = math.inf if crisis is None else (crisis.before + crisis.after) / 2.0
+    widest = (crisis.before + crisis.after) / 2.0
     meanings = result.variables["motion"].flags
     labels = []
     for kind, n, section in zip(
