@@ -10,7 +10,7 @@ import numpy as np
 from gearchaos.figures.labels import short
 from gearchaos.paper.computation import Reproduction, largest_acceleration
 from gearchaos.paper.our_numbers import contact_line_stiffness, our_numbers
-from gearchaos.paper.published import Kind, Printed, PrintedStage, published
+from gearchaos.paper.published import Printed, published
 from gearchaos.paper.stages import counterparts, motion_at, motions_between
 from gearchaos.paper.verdict import RULES, Verdict, motion_verdict, overlap_verdict
 from gearchaos.results.stage_table import Stage
@@ -23,7 +23,7 @@ class Row(NamedTuple):
 
     quantity: str
     where: str
-    kind: Kind
+    kind: str
     published: str
     ours: str
     difference: str
@@ -72,7 +72,7 @@ def _increments(found: Reproduction) -> Iterator[Row]:
         yield _row(quantity, table, value, after - before)
 
 
-def _stages(found: Reproduction, pairs: list[tuple[PrintedStage, Stage | None]]) -> Iterator[Row]:
+def _stages(found: Reproduction, pairs: list[tuple[Printed, Stage | None]]) -> Iterator[Row]:
     labels, kind = found.labelled(found.sweep).labels, published().kinds["stages"]
     for printed, stage in pairs:
         mine, difference, verdict = NONE, NONE, Verdict.DOES_NOT
@@ -89,8 +89,9 @@ def _stages(found: Reproduction, pairs: list[tuple[PrintedStage, Stage | None]])
         yield Row(printed.printed, "figure 7", kind, theirs, mine, difference, verdict)
 
 
-def _boundaries(pairs: list[tuple[PrintedStage, Stage | None]]) -> Iterator[Row]:
-    boundary = Printed("figure 7", "boundary", published().kinds["boundaries"])
+def _boundaries(pairs: list[tuple[Printed, Stage | None]]) -> Iterator[Row]:
+    kind = published().kinds["boundaries"]
+    boundary = Printed(where="figure 7", rule="boundary", kind=kind)
     for (before, ended), (after, begun) in pairwise(pairs):
         # A boundary has two sides.
         mine = math.nan if ended is None or begun is None else begun.start

@@ -13,7 +13,7 @@ from gearchaos.figures.response import phase_portrait, poincare_section, time_hi
 from gearchaos.figures.response_lane import COORDINATE, coordinates_of, samples_per_period
 from gearchaos.figures.style import BLACK, BLUE, FONT_PT, SMALL_FONT_PT, VERMILION
 from gearchaos.paper.computation import Reproduction, lane_of, largest_acceleration
-from gearchaos.paper.published import ShownMotion, published
+from gearchaos.paper.published import Printed, published
 from gearchaos.paper.stages import motion_at
 from gearchaos.records.amplitude_spectrum import spectral_lines
 from gearchaos.results.response_variables import TIME, acceleration_of
@@ -65,7 +65,7 @@ def growing_spectra_page(found: Reproduction) -> Page:
     return figure
 
 
-def motion_page(found: Reproduction, shown: ShownMotion) -> Page:
+def motion_page(found: Reproduction, shown: Printed) -> Page:
     """Draw history, phase portrait and Poincare section at one pitch error (figures 8 to 13)."""
     both = found.motions, found.motions_from_contact
     starts = [found.labelled(motions, strictly=True) for motions in both]

@@ -54,7 +54,7 @@ def contact_line_stiffness() -> TrapezoidalStiffness:
     lines = published().contact_lines
     # Half of the variation relative to its mean, with equal rise and fall.
     half_height = (lines.longest - lines.shortest) / (lines.longest + lines.shortest)
-    return TrapezoidalStiffness(*lines.parts, half_height=half_height)
+    return TrapezoidalStiffness(**lines.parts, half_height=half_height)
 
 
 def printed_series() -> FourierStiffness:

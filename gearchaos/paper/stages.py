@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gearchaos.paper.published import PrintedStage
+from gearchaos.paper.published import Printed
 from gearchaos.paper.verdict import RULES
 from gearchaos.results.result import Result
 from gearchaos.results.stage_table import LabelledLanes, Stage, labelled_lanes, stage_table
@@ -43,17 +43,13 @@ def crisis_of(sweep: Result) -> Crisis | None:
     Among the lanes from the first motion on two bands to the first that no longer takes turns; None
     where there are fewer than three.
     """
-    lanes, width = labelled_lanes(sweep), np.ptp(sweep["section_delta_5"], axis=1)
-    shares = out_of_turn(sweep["section_delta_5"])
-    strictly = np.flatnonzero(_longer(lanes) & (shares == 0.0))
-    if not strictly.size:
+    lanes, section = labelled_lanes(sweep), sweep["section_delta_5"]
+    shares = out_of_turn(section)
+    first = int(np.argmax(_longer(lanes) & (shares == 0.0)))
+    turning = np.logical_and.accumulate(shares[first:] <= OUT_OF_TURN)
+    widest = np.maximum.accumulate(np.ptp(section[first:][turning], axis=1))
+    if widest.size < 3:
         return None
-    first = int(strictly[0])
-    lost = np.flatnonzero(~(shares[first:] <= OUT_OF_TURN))
-    after = first + int(lost[0]) if lost.size else lanes.values.size
-    if after - first < 3:
-        return None
-    widest = np.maximum.accumulate(width[first:after])
     last = int(np.argmax(widest[1:] / widest[:-1]))
     place = float(lanes.values[first + last + 1])
     return Crisis(place, float(widest[last]), float(widest[last + 1]))
@@ -84,14 +80,20 @@ def out_of_turn(section: Floats) -> Floats:
     return np.asarray(np.mean(above[:, 1:] == above[:, :-1], axis=1))
 
 
-def counterparts(printed: Sequence[PrintedStage], lanes: LabelledLanes) -> list[Stage | None]:
+def counterparts(printed: Sequence[Printed], lanes: LabelledLanes) -> list[Stage | None]:
     """Find the stage of a sweep that answers each printed one.
 
     Of the stages with the printed motion, the one that has most in common with the printed one; if
     there is none that overlaps, the nearest one within reach of the rule for boundaries, or None.
     """
-    stages = stage_table(lanes, WINDOW)
-    return [_counterpart(one, [s for s in stages if s.label == one.motion]) for one in printed]
+    stages, found = stage_table(lanes, WINDOW), []
+    for one in printed:
+        alike = [stage for stage in stages if stage.label == one.motion]
+        common = [min(s.end, one.last) - max(s.start, one.first) for s in alike]
+        most = max(common, default=-np.inf)
+        near = most >= -RULES["boundary"].in_kind
+        found.append(alike[common.index(most)] if near else None)
+    return found
 
 
 def motion_at(lanes: LabelledLanes, value: float) -> str:
@@ -110,11 +112,3 @@ def motions_between(lanes: LabelledLanes, first: float, last: float) -> list[str
 def _longer(lanes: LabelledLanes) -> NDArray[np.bool_]:
     # What is unresolved may be a period 2 that is slow to settle.
     return np.asarray((lanes.period > 2) | np.isin(lanes.labels, ("chaotic", "quasi-periodic")))
-
-
-def _counterpart(printed: PrintedStage, alike: Sequence[Stage]) -> Stage | None:
-    def common(stage: Stage) -> float:
-        return min(stage.end, printed.last) - max(stage.start, printed.first)
-
-    best = max(alike, key=common, default=None)
-    return best if best is not None and common(best) >= -RULES["boundary"].in_kind else None
