@@ -24,9 +24,9 @@ class Reproduction:
     """What was computed to answer the paper.
 
     ``config``: of the torsional diagram, figure 7; ``sweep``: that diagram; ``hop``: the hop in it,
-    with the interval in which two motions coexist; ``exponents``: the largest ones of all ten
-    states before and after it, starting at rest; ``response``: all effects, at rest at the start,
-    without pitch error and at those of figures 5, 6, 14 and 15 and of Table 3;
+    with the interval in which two motions coexist; ``exponents``: the largest ones before and after
+    it, starting at rest, of all ten states and of six; ``response``: all effects, at rest at the
+    start, without pitch error and at those of figures 5, 6, 14 and 15 and of Table 3;
     ``motions``, ``motions_from_contact``: at the pitch errors of figures 8 to 13, by the start;
     ``crisis``: where the diagram of figure 7 widens at once.
     """
@@ -34,7 +34,7 @@ class Reproduction:
     config: Configuration
     sweep: Result
     hop: Hop
-    exponents: tuple[float, float]
+    exponents: tuple[list[float], list[float]]
     response: Result
     motions: Result
     motions_from_contact: Result
@@ -74,7 +74,7 @@ def compute(
             f"{config.source}: there is no hop as in figure 7 between {LOW:g} and {HIGH:g} e(tau), "
             "or no crisis after it; take back what was changed in it"
         )
-    exponents = exponents_beside(full, hop.changes["rest"], threads)
+    ten, six = (exponents_beside(scene, hop.changes["rest"], threads) for scene in (full, config))
     say("figures 5, 6, 14 and 15: accelerations of all coordinates")
     response = respond(_at(full, [0.0, *published().increments.pitch_errors]), periods, threads)
     say("figures 8 to 13: motions at six pitch errors")
@@ -83,7 +83,7 @@ def compute(
         respond(shown.replace("start", {"kind": kind}), periods, threads)
         for kind in ("rest", "contact")
     )
-    return Reproduction(config, sweep, hop, exponents, response, motions, from_contact, crisis)
+    return Reproduction(config, sweep, hop, (ten, six), response, motions, from_contact, crisis)
 
 
 def _at(config: Configuration, pitch_errors: list[float]) -> Configuration:

@@ -36,10 +36,10 @@ def hop_page(found: Reproduction) -> Page:
         ):
             points = sweep[sweep.axis], sweep["section_delta_5"][:, -1]
             axes.plot(*points, marker, color=color, ms=1.8, mew=0.0, label=label)
-        axes.axvspan(hop.first, hop.last, color=GREY, alpha=0.12, linewidth=0.0)
+        axes.axvspan(hop.first.value, hop.last.value, color=GREY, alpha=0.12, linewidth=0.0)
         middle = float(np.mean(axes.get_ylim()))
         places: list[tuple[str, float, str, tuple[int, ...]]] = [
-            (STARTS[kind], change.after, BLACK, (4, 2)) for kind, change in hop.changes.items()
+            (STARTS[kind], change[1], BLACK, (4, 2)) for kind, change in hop.changes.items()
         ]
         places.append(("Pan 2021", published().numbers["hop"].value, VERMILION, ()))
         for text, place, color, dashes in places:

@@ -39,9 +39,9 @@ def our_numbers(found: Reproduction) -> dict[str, float]:
         "frequency": derive_groups(driven.physical())["mesh_frequency"],
         "mesh_period": response["mesh_period"][0],
         "spectral_peak": order[1:][np.argmax(amplitude[1:])] / response["mesh_period"][0],
-        "hop": found.hop.changes["rest"].after,
-        "hop_exponent_before": found.exponents[0],
-        "hop_exponent_after": found.exponents[1],
+        "hop": found.hop.changes["rest"][1],
+        "hop_exponent_before": found.exponents[0][0],
+        "hop_exponent_after": found.exponents[0][1],
     }
     for name in coordinates_of(response):
         without, once = (largest_acceleration(response, p, name) for p in (0.0, 1.0))

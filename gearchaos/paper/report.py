@@ -4,7 +4,7 @@ import re
 from collections import Counter
 from collections.abc import Iterable, Iterator
 from importlib.resources import files
-from itertools import pairwise
+from itertools import chain, pairwise
 from typing import Any
 
 import numpy as np
@@ -156,15 +156,14 @@ def _of_the_bands(found: Reproduction) -> dict[str, Any]:
 
 def _of_the_hop(found: Reproduction) -> dict[str, Any]:
     hop, paper = found.hop, published().numbers
-    place, rest = paper["hop"].value, hop.changes["rest"]
-    carried = hop.upwards, hop.downwards
-    before = found.sweep[found.sweep.axis] <= rest.before
+    place, carried = paper["hop"].value, (hop.upwards, hop.downwards)
+    before = found.sweep[found.sweep.axis] <= hop.changes["rest"][0]
     return {
         **hop.changes,
-        "losses": [loss.name.lower().replace("_", " ") for loss in hop.losses],
+        "losses": [end.loss.name.lower().replace("_", " ") for end in (hop.first, hop.last)],
         "crossings": [sweep["crossings_per_period"][lane_of(sweep, place)] for sweep in carried],
         "hop_share": hop.share(place),
-        "exponents": [signed(exponent, 5) for exponent in (*found.exponents, *rest.exponents)],
+        "exponents": [signed(exponent, 5) for exponent in chain(*found.exponents)],
         "printed_exponent": signed(paper["hop_exponent_before"].value, 4),
         "exponent_spread": np.ptp(found.sweep["lyapunov_exponent"][before]),
     }
