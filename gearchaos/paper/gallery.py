@@ -44,8 +44,8 @@ def pictures() -> tuple[Picture, ...]:
         6: motion_figures.spectra_page,
         7: diagram_figures.diagram_page,
         **{motion.figure: partial(draw, shown=motion) for motion in published().motions},
-        14: motion_figures.growing_accelerations_page,
-        15: motion_figures.growing_spectra_page,
+        14: partial(motion_figures.accelerations_page, growing=True),
+        15: partial(motion_figures.spectra_page, growing=True),
     }
     own = Picture("figure_07_hop", "The hop of figure 7", diagram_figures.hop_page)
     shown = [Picture(f"figure_{n:02d}", f"Figure {n}", page) for n, page in numbered.items()]

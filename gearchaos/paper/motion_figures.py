@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from typing import Any
+from typing import Any, TypeAlias
 
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
@@ -28,40 +28,62 @@ SHOWN_PERIODS = 4.0
 LONG_HISTORY = 16.0
 """Mesh periods of the histories of figures 8 to 13."""
 
-WITHOUT_AND_WITH = ((0.0, BLUE, -0.07), (1.0, VERMILION, 0.07))
-"""The pitch errors that figures 5 and 6 compare, their colours, and how far lines step aside."""
+Curves: TypeAlias = Sequence[tuple[float, str, float]]
+"""Pitch errors, the colours of their curves, and how far the lines of their spectra step aside."""
+
+WITHOUT_AND_WITH: Curves = ((0.0, BLUE, -0.07), (1.0, VERMILION, 0.07))
+"""What figures 5 and 6 compare."""
 
 
-def accelerations_page(found: Reproduction) -> Page:
-    """Draw the accelerations of all coordinates without and with pitch error (figure 5)."""
-    with _stack(found.response) as (figure, panels):
-        legend_above(panels[0], panels[0].lines)
+def accelerations_page(found: Reproduction, *, growing: bool = False) -> Page:
+    """Draw the accelerations of all coordinates without and with pitch error (figure 5).
+
+    If ``growing``, the torsional one at growing pitch errors (figure 14).
+    """
+    response = found.response
+    with _stack(response, growing, 0.0) as (figure, panels):
+        for axes, name, curves in panels:
+            for p, color, _ in curves:
+                place = response, lane_of(response, p), acceleration_of(name)
+                drawn = time_history(axes, *place, between=(0.0, SHOWN_PERIODS))
+                drawn.set(color=color, linewidth=0.9, label=f"$P$ = {p:g}")
+                if growing:
+                    largest = largest_acceleration(response, p)
+                    axes.axhline(largest, color=VERMILION, linewidth=0.6, dashes=(4, 2))
+                    remark(axes, f"$P$ = {p:g}, largest value {largest:.3f}")
+            few_ticks(axes)
+        if not growing:
+            legend_above(figure.axes[0], figure.axes[0].lines)
+        letter(figure.axes)
+        axes.set_xlabel(TIME_LABEL)
+        figure.supylabel("Acceleration (dimensionless)", fontsize=FONT_PT)
     return figure
 
 
-def spectra_page(found: Reproduction) -> Page:
-    """Draw the amplitude spectra of those accelerations (figure 6)."""
-    with _stack(found.response, spectra=True) as (figure, panels):
-        panels[0].legend(frameon=False, loc="upper right", ncols=2, handletextpad=0.0)
-    return figure
-
-
-def growing_accelerations_page(found: Reproduction) -> Page:
-    """Draw the torsional acceleration at growing pitch errors (figure 14)."""
-    with _stack(found.response, growing=True) as (figure, panels):
-        for axes, p in zip(panels, published().increments.pitch_errors, strict=True):
-            largest = largest_acceleration(found.response, p)
-            axes.axhline(largest, color=VERMILION, linewidth=0.6, dashes=(4, 2))
-            remark(axes, f"$P$ = {p:g}, largest value {largest:.3f}")
-    return figure
-
-
-def growing_spectra_page(found: Reproduction) -> Page:
-    """Draw the spectra of the torsional acceleration at growing pitch errors (figure 15)."""
-    with _stack(found.response, spectra=True, growing=True) as (figure, panels):
-        for axes, p in zip(panels, published().increments.pitch_errors, strict=True):
-            place: dict[str, Any] = {"transform": axes.transAxes, "va": "top", "ha": "right"}
-            axes.text(0.985, 0.93, f"$P$ = {p:g}", fontsize=SMALL_FONT_PT, **place)
+def spectra_page(found: Reproduction, *, growing: bool = False) -> Page:
+    """Draw the amplitude spectra of those accelerations (figures 6 and 15)."""
+    response = found.response
+    with _stack(response, growing, 6.0) as (figure, panels):
+        for at, (axes, name, curves) in zip("abcdefgh", panels, strict=False):
+            inside: dict[str, Any] = {"transform": axes.transAxes, "va": "top"}
+            for p, color, shift in curves:
+                _stems(axes, response, p, name, color, shift).set_label(f"$P$ = {p:g}")
+                if growing:
+                    text = f"$P$ = {p:g}"
+                    axes.text(0.985, 0.93, text, ha="right", fontsize=SMALL_FONT_PT, **inside)
+            axes.set_yscale("log")
+            axes.text(0.02, 0.94, f"({at})", fontweight="bold", **inside)
+        first, *_ = figure.axes
+        if not growing:
+            first.legend(frameon=False, loc="upper right", ncols=2, handletextpad=0.0)
+        # The paper's frequency is in cycles per unit of tau.
+        period = float(response["mesh_period"][0])
+        to_and_fro = (lambda order: order / period, lambda frequency: frequency * period)
+        first.tick_params(axis="x", which="both", top=False)
+        above = first.secondary_xaxis("top", functions=to_and_fro)
+        above.set_xlabel(r"Frequency in cycles per unit of $\tau$")
+        axes.set_xlabel("Frequency over mesh frequency")
+        figure.supylabel("Amplitude of the acceleration (dimensionless)", fontsize=FONT_PT)
     return figure
 
 
@@ -96,51 +118,23 @@ def motion_page(found: Reproduction, shown: Printed) -> Page:
 
 @contextmanager
 def _stack(
-    response: Result, *, spectra: bool = False, growing: bool = False
-) -> Iterator[tuple[Page, Sequence[Axes]]]:
-    """Draw accelerations or their spectra in panels one above another.
+    response: Result, growing: bool, margin_mm: float
+) -> Iterator[tuple[Page, list[tuple[Axes, str, Curves]]]]:
+    """Make panels one above another, each with the coordinate and the curves that it is to show.
 
-    Those of all coordinates without and with pitch error, or the torsional one at growing ones.
+    Those are all without and with pitch error, or the torsional one at growing ones.
     """
-    shown: list[tuple[str, Sequence[tuple[float, str, float]]]] = (
-        [(COORDINATE, [(p, BLACK, 0.0)]) for p in published().increments.pitch_errors]
-        if growing
-        else [(name, WITHOUT_AND_WITH) for name in coordinates_of(response)]
-    )
-    margin_mm = 8.0 + (6.0 if spectra else 0.0) + (0.0 if growing else 4.0)
-    with column(PANEL_MM * len(shown) + margin_mm) as figure:
+    shown: list[tuple[str, Curves]] = [(n, WITHOUT_AND_WITH) for n in coordinates_of(response)]
+    if growing:
+        steps = published().increments.pitch_errors
+        shown = [(COORDINATE, [(p, BLACK, 0.0)]) for p in steps]
+    height_mm = PANEL_MM * len(shown) + margin_mm + (8.0 if growing else 12.0)
+    with column(height_mm) as figure:
         panels = figure.subplots(len(shown), 1, sharex=True, sharey=growing)
-        for axes, (name, curves) in zip(panels, shown, strict=True):
-            for p, color, shift in curves:
-                if spectra:
-                    drawn = _stems(axes, response, p, name, color, shift)
-                else:
-                    place = response, lane_of(response, p), acceleration_of(name)
-                    drawn = time_history(axes, *place, between=(0.0, SHOWN_PERIODS))
-                    drawn.set(color=color, linewidth=0.9)
-                drawn.set_label(f"$P$ = {p:g}")
-        yield figure, panels
-        for axes, (name, _), at in zip(panels, shown, "abcdefgh", strict=False):
+        yield figure, [(axes, *one) for axes, one in zip(panels, shown, strict=True)]
+        for axes, (name, _) in zip(panels, shown, strict=True):
             axes.set_ylabel(response.attributes(acceleration_of(name))["symbol"])
-            axes.set_xlabel("")
-            if spectra:
-                axes.set_yscale("log")
-                look: dict[str, Any] = {"va": "top", "fontweight": "bold"}
-                axes.text(0.02, 0.94, f"({at})", transform=axes.transAxes, **look)
-            else:
-                few_ticks(axes)
-        if spectra:
-            # The paper's frequency is in cycles per unit of tau.
-            period = float(response["mesh_period"][0])
-            to_and_fro = (lambda order: order / period, lambda frequency: frequency * period)
-            panels[0].tick_params(axis="x", which="both", top=False)
-            above = panels[0].secondary_xaxis("top", functions=to_and_fro)
-            above.set_xlabel(r"Frequency in cycles per unit of $\tau$")
-        else:
-            letter(panels)
-        panels[-1].set_xlabel("Frequency over mesh frequency" if spectra else TIME_LABEL)
-        quantity = "Amplitude of the acceleration" if spectra else "Acceleration"
-        figure.supylabel(f"{quantity} (dimensionless)", fontsize=FONT_PT)
+            axes.label_outer()
         figure.align_ylabels(panels)
 
 
