@@ -58,15 +58,13 @@ def _scored(problem: "Problem", judge: "Judge", path: str) -> "Tried":
     import numpy as np
 
     from gearchaos.configuration import groups_at
-    from gearchaos.configuration.sweep_values import SWEEPABLE_GROUPS
     from gearchaos.identification.evaluation import require_stable
     from gearchaos.identification.loading import observed_configuration
 
     config = observed_configuration(judge.targets, path)
-    groups, physical = groups_at(config, {}), config.physical()
-    known = {}
+    everything, known = {**config.physical(), **groups_at(config, {}).values}, {}
     for one in judge.targets.parameter:
-        value = groups.values.get(one.name) if one.name in SWEEPABLE_GROUPS else physical[one.name]
+        value = everything.get(one.name)
         if value is None:
             raise ConfigurationError(
                 f"--score {path}: has no {one.name}, which the targets leave free"

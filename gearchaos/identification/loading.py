@@ -5,7 +5,7 @@ import re
 from collections import Counter
 from collections.abc import Iterable, Iterator
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from pydantic import ValidationError
 
@@ -61,32 +61,26 @@ def _faults(targets: Targets) -> Iterator[Fault]:
     for name, times in Counter(one.name for one in targets.parameter).items():
         if times > 1:
             yield Fault("parameter.name", f"comes {times} times", "name it once", name)
+    for table, low, high in (("parameter", "low", "high"), ("stage", "from", "to")):
+        for number, one in enumerate(getattr(targets, table)):
+            ends = one.model_dump()
+            if ends[high] <= ends[low]:
+                rule = f"must be greater than {table}[{number}].{low} = {ends[low]}"
+                yield Fault(f"{table}[{number}].{high}", rule, "exchange the two", ends[high])
     for number, free in enumerate(targets.parameter):
-        here = f"parameter[{number}]"
-        if free.high <= free.low:
-            rule = f"must be greater than {here}.low = {free.low}"
-            yield Fault(f"{here}.high", rule, "exchange the two", free.high)
-        elif free.logarithmic and free.low <= 0.0:
+        if free.logarithmic and free.low <= 0.0:
             remedy = "raise it, or drop logarithmic"
-            yield Fault(f"{here}.low", "has no logarithm", remedy, free.low)
+            yield Fault(f"parameter[{number}].low", "has no logarithm", remedy, free.low)
     for number, stage in enumerate(targets.stage):
-        here, motion = f"stage[{number}]", MOTION.fullmatch(stage.motion)
+        motion = MOTION.fullmatch(stage.motion)
         if motion is None or int(motion["number"] or 1) > LONGEST_PERIOD:
             rule = 'must be "period n" or "bands n" with n up to 16, "chaotic" or "aperiodic"'
-            yield Fault(f"{here}.motion", rule, 'such as "period 2"', stage.motion)
-        if stage.to <= stage.from_:
-            rule = f"must be greater than {here}.from = {stage.from_}"
-            yield Fault(f"{here}.to", rule, "exchange the two", stage.to)
+            yield Fault(f"stage[{number}].motion", rule, 'such as "period 2"', stage.motion)
     for table in ("jump", "crisis"):
         for number, place in enumerate(getattr(targets, table)):
             if not place.within[0] < place.at < place.within[1]:
                 rule = f"must hold {table}.at = {place.at}, low end first"
                 yield Fault(f"{table}[{number}].within", rule, "widen it", place.within)
-    for number, increment in enumerate(targets.increment):
-        if increment.coordinate.endswith("_rate"):
-            remedy = f'such as "{increment.coordinate.removesuffix("_rate")}"'
-            key = f"increment[{number}].coordinate"
-            yield Fault(key, "must be a displacement", remedy, increment.coordinate)
     if not any(getattr(targets, table) for table in OBSERVATIONS):
         rule = "is missing, and so are the other observations"
         yield Fault("stage", rule, f"give at least one of {', '.join(OBSERVATIONS)}")
@@ -134,29 +128,33 @@ def _unfit(config: Configuration, targets: Targets, source: str) -> Iterator[str
     # A second sweep over the bounds obeys the rules that a free parameter must obey.
     for number, free in enumerate(targets.parameter):
         bounds = {"parameter": free.name, "from": free.low, "to": free.high, "count": 2}
-        try:
-            config.replace("second_sweep", bounds)
-        except ConfigurationError as error:
-            own_names = {"parameter": "name", "from": "low", "to": "high"}
-            for problem in error.problems:
-                told = problem.removeprefix(f"{config.source}: ")
-                for name, own in own_names.items():
-                    told = told.replace(f"second_sweep.{name}", f"parameter[{number}].{own}")
-                yield f"{source}: {told}"
+        names = {"parameter": "name", "from": "low", "to": "high"}
+        own = {f"second_sweep.{key}": f"parameter[{number}].{name}" for key, name in names.items()}
+        yield from _refusals(config, source, "second_sweep", bounds, own)
     for key, value in _places(targets):
-        try:
-            config.replace("sweep", {"parameter": config.sweep.parameter, "values": [value]})
-        except ConfigurationError as error:
-            for problem in error.problems:
-                told = problem.removeprefix(f"{config.source}: ")
-                yield f"{source}: {told.replace('sweep.values', key)}"
+        place = {"parameter": config.sweep.parameter, "values": [value]}
+        yield from _refusals(config, source, "sweep", place, {"sweep.values": key})
+
+
+def _refusals(
+    config: Configuration, source: str, table: str, value: Any, own: dict[str, str]
+) -> Iterator[str]:
+    """Word why a configuration cannot have such a table, with the file's own names of its keys."""
+    try:
+        config.replace(table, value)
+    except ConfigurationError as error:
+        for problem in error.problems:
+            told = problem.removeprefix(f"{config.source}: ")
+            for name, mine in own.items():
+                told = told.replace(name, mine)
+            yield f"{source}: {told}"
 
 
 def _places(targets: Targets) -> Iterator[tuple[str, float]]:
     """Yield where on the axis of the sweep something is looked at, each place with its key."""
     for table in OBSERVATIONS:
         for number, one in enumerate(getattr(targets, table)):
-            for name, value in one.model_dump(by_alias=True).items():
+            for name, value in one.model_dump().items():
                 if name in ("from", "to", "at", "within"):
                     for place in value if name == "within" else [value]:
                         yield f"{table}[{number}].{name}", place

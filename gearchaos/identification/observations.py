@@ -7,9 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gearchaos.identification.evaluation import Mask, Records
-from gearchaos.identification.targets import Crisis, Exponent, Increment, Jump, Stage, Targets
-from gearchaos.records.period import section_distance
-from gearchaos.results.jumps import SMALLEST, STEEPEST
+from gearchaos.identification.targets import Exponent, Increment, Place, Stage, Targets
+from gearchaos.results.jumps import jump_sizes
 
 Floats = NDArray[np.float64]
 
@@ -63,8 +62,8 @@ def stage_length(stage: Stage) -> Observation:
     return Observation(name, 0.0, stage.width, values, computed, length / stage.width)
 
 
-def change_place(place: Jump | Crisis) -> Observation:
-    """Where the sweep jumps to another motion, or has a crisis: in the middle of two lanes."""
+def change_place(kind: str, place: Place) -> Observation:
+    """Where the sweep has a change of this kind, a jump or a crisis: in the middle of two lanes."""
     low, high = place.within
     above, below = (
         _spaced(way, place.width / 2.0, 1.25) for way in (high - place.at, place.at - low)
@@ -75,14 +74,13 @@ def change_place(place: Jump | Crisis) -> Observation:
     values = np.unique(np.clip(around, low, high))
 
     def computed(records: Records) -> Floats:
-        crisis = isinstance(place, Crisis)
-        steps = _growth(records) if crisis else _jumps(records, np.diff(values))
+        steps = _growth(records) if kind == "crisis" else _jumps(records, np.diff(values))
         middle = (values[1:] + values[:-1]) / 2.0
         there = np.max(steps, axis=1) > 0.0
         return np.where(there, middle[np.argmax(steps, axis=1)], np.nan)
 
-    name = f"{type(place).__name__.lower()} at {place.at:g}"
-    return Observation(name, place.at, place.width, values, computed, (high - low) / place.width)
+    missing = (high - low) / place.width
+    return Observation(f"{kind} at {place.at:g}", place.at, place.width, values, computed, missing)
 
 
 def _jumps(records: Records, cells: Floats) -> Floats:
@@ -90,18 +88,11 @@ def _jumps(records: Records, cells: Floats) -> Floats:
 
     Shape (candidates, values - 1), as for ``cells``, the distances of the values (values - 1,).
     """
-    candidates, _, points = records.section.shape
-    period = records.period
-    common = np.where(period[:, 1:] == period[:, :-1], period[:, 1:], 0)
-    one, other = records.section[:, :-1], records.section[:, 1:]
-    apart = section_distance(
-        one.reshape(-1, points, 1), other.reshape(-1, points, 1), np.ravel(common)
-    ).reshape(candidates, -1)
-    size = np.max(np.abs(np.where(np.isfinite(one), one, 0.0)), axis=(1, 2))[:, np.newaxis]
-    rate = np.pad(np.nan_to_num(apart) / cells, ((0, 0), (1, 1)))
-    beside = np.maximum(rate[:, :-2], rate[:, 2:])
-    jumps = (apart > SMALLEST * size) & (apart > STEEPEST * beside * cells)
-    return np.where(jumps, apart, 0.0)
+    sound = np.where(records.sound[..., np.newaxis], records.section, 0.0)
+    size = np.max(np.abs(sound), axis=(1, 2), keepdims=True)
+    lanes = (records.section / np.where(size > 0.0, size, 1.0))[..., np.newaxis]
+    sizes = (jump_sizes(*one, cells, alone=0.0) for one in zip(records.period, lanes, strict=True))
+    return np.stack([*sizes])
 
 
 def _growth(records: Records) -> Floats:
@@ -148,8 +139,8 @@ def observations_of(targets: Targets, coordinates: Sequence[str]) -> list[Observ
     """
     return [
         *map(stage_length, targets.stage),
-        *map(change_place, targets.jump),
-        *map(change_place, targets.crisis),
+        *(change_place("jump", one) for one in targets.jump),
+        *(change_place("crisis", one) for one in targets.crisis),
         *map(exponent_at, targets.exponent),
         *(acceleration_increment(one, coordinates) for one in targets.increment),
     ]

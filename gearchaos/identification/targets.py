@@ -2,18 +2,18 @@
 
 import math
 from itertools import product
-from typing import Annotated, TypeAlias, TypeVar
+from typing import Annotated, Literal, TypeAlias, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
 from gearchaos.configuration.keys import Table, key
-from gearchaos.configuration.run_tables import State
 
 Floats = NDArray[np.float64]
 Pair: TypeAlias = Annotated[tuple[float, float], Field(strict=False)]
 Entry = TypeVar("Entry")
+Coordinate: TypeAlias = Literal["delta_5", "delta_1", "delta_2", "delta_3", "delta_4"]
 Several: TypeAlias = Annotated[tuple[Entry, ...], Field(strict=False)]
 
 MOST_FREE = 16
@@ -55,17 +55,11 @@ class Stage(_Observed):
     to: float = key("where it ends", example=11.16)
 
 
-class _Place(_Observed):
+class Place(_Observed):
+    """Where the sweep jumps to another motion of the same period, or chaos grows in a crisis."""
+
     at: float = key("where, on the axis of the sweep", example=1.12)
     within: Pair = key("the span in which it is looked for, and must be alone", example=[0.6, 2.0])
-
-
-class Jump(_Place):
-    """A place where the sweep jumps from one motion to another of the same period."""
-
-
-class Crisis(_Place):
-    """A place from which on a chaotic motion fills a larger part of its section."""
 
 
 class Exponent(_Observed):
@@ -78,7 +72,7 @@ class Exponent(_Observed):
 class Increment(_Observed):
     """Growth of the largest acceleration of a coordinate between two values."""
 
-    coordinate: State = key("whose acceleration", example="delta_5", default="delta_5")
+    coordinate: Coordinate = key("whose acceleration", example="delta_5", default="delta_5")
     from_: float = key("the one value of the swept parameter", example=1.0, alias="from")
     to: float = key("the other one", example=3.0)
     value: float = key("by how much the largest acceleration grows", example=0.2163)
@@ -110,8 +104,8 @@ class Targets(Table):
     search: Search = key("how much is tried", default=Search())
     parameter: Several[Parameter] = key("what is free", min_length=1, max_length=MOST_FREE)
     stage: Several[Stage] = key("observed stages", default=())
-    jump: Several[Jump] = key("observed jumps", default=())
-    crisis: Several[Crisis] = key("observed crises", default=())
+    jump: Several[Place] = key("observed jumps", default=())
+    crisis: Several[Place] = key("observed crises", default=())
     exponent: Several[Exponent] = key("observed exponents", default=())
     increment: Several[Increment] = key("observed increments", default=())
 

@@ -1,11 +1,15 @@
-"""Jumps between two motions of the same period, and crises of chaos: what labels do not show."""
+"""Jumps between two motions of the same period, and crises of chaos: what labels do not show.
+
+In an interior crisis a chaotic set collides with an unstable orbit and bursts out into what lies
+beyond it (Grebogi, Ott, Yorke 1982). Close to it the bursts are rare, so that a section of some
+hundred points may miss them: the lane beside the crisis is told from what several lanes visit.
+"""
 
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gearchaos.records.crisis import BESIDE, grows_at
 from gearchaos.records.period import TOLERANCE, section_distance
 from gearchaos.results.excitation import excitation_of
 from gearchaos.results.result import Result, section_variables
@@ -18,6 +22,15 @@ STEEPEST = 5.0
 
 SMALLEST = 0.02
 """Smallest jump, relative to the size of the section over the sweep."""
+
+BESIDE = 8
+"""Lanes on either side of a crisis that are compared."""
+
+FEWEST = 3
+"""Lanes that there must be on either side, two of them chaotic."""
+
+SMALLEST_GROWTH = 0.15
+"""Growth of the extent that counts, relative to the largest one before."""
 
 
 class Jump(NamedTuple):
@@ -62,25 +75,34 @@ def jumps(result: Result) -> list[Jump]:
     period = np.where(arrived, lanes.period, 0)
     # Neighbours may be an excitation period apart on their orbit, but never a part of one.
     once = sections[:, :: -excitation_of(result.metadata).excitation_period][:, ::-1]
-    found = jumps_at(period, once / np.where(size > 0.0, size, 1.0))
+    found = np.flatnonzero(jump_sizes(period, once / np.where(size > 0.0, size, 1.0)))
     return [
         Jump(float(lanes.values[at]), float(lanes.values[at + 1]), str(lanes.labels[at]))
         for at in found
     ]
 
 
-def jumps_at(period: NDArray[np.int32], section: Floats) -> NDArray[np.intp]:
-    """Return the lanes whose upper neighbour has the same period and moves on another branch.
+def jump_sizes(
+    period: NDArray[np.int32],
+    section: Floats,
+    cells: Floats | float = 1.0,
+    alone: float = np.nan,
+) -> Floats:
+    """Return how far neighbouring lanes move apart where they jump, else 0, shape (lanes - 1,).
 
-    ``period`` (lanes,) is 0 where the motion is not periodic; ``section`` (lanes, points, states)
-    is relative to the size of each state over the sweep.
+    Lanes of the same period, that is, that move on different branches. ``period`` (lanes,) is 0
+    where the motion is not periodic; ``section`` (lanes, points, states) is relative to the size of
+    each state over the sweep; ``cells`` (lanes - 1,): distances of the swept values; ``alone``: how
+    far apart lanes of different motions count, so that with 0 two that have no others beside them
+    may jump.
     """
     enough = (period[1:] > 0) & (period[1:] <= section.shape[1])
     common = np.where(enough & (period[1:] == period[:-1]), period[1:], 0).astype(np.int32)
     apart = section_distance(section[:-1], section[1:], common)
     # Where one side is missing, or another stage begins there, the other side must do.
-    beside = np.fmax(np.concatenate([[np.nan], apart[:-1]]), np.concatenate([apart[1:], [np.nan]]))
-    return np.flatnonzero((apart > SMALLEST) & (apart > STEEPEST * beside))
+    rate = np.pad(np.where(np.isnan(apart), alone, apart) / cells, 1, constant_values=alone)
+    beside = np.fmax(rate[:-2], rate[2:]) * cells
+    return np.where((apart > SMALLEST) & (apart > STEEPEST * beside), apart, 0.0)
 
 
 def crises(result: Result) -> list[Crisis]:
@@ -105,3 +127,27 @@ def crises(result: Result) -> list[Crisis]:
                 place = lanes.values[lane - 1 : lane + 1].tolist()
                 found[lane] = growth, Crisis._make([*place, name, *np.ravel(ends).tolist()])
     return [found[lane][1] for lane in sorted(found)]
+
+
+def grows_at(extent: Floats, chaotic: NDArray[np.bool_]) -> NDArray[np.intp]:
+    """Return the lanes at which the extent of chaotic sections grows at once, in ascending order.
+
+    ``extent`` (lanes,) of the section in one coordinate, in the order of the swept value;
+    ``chaotic`` (lanes,). Such a lane is chaotic, and extends by 15 % more than any of the eight
+    before it, half of the eight from it on do by something; these are level among themselves, their
+    largest extent nearer to the median than to that of the lane. Lanes before it may belong to
+    periodic windows.
+    """
+    found: list[int] = []
+    for lane in np.flatnonzero(chaotic):
+        before, after = slice(max(0, lane - BESIDE), lane), slice(lane, lane + BESIDE)
+        if any(np.sum(chaotic[side]) < 2 or extent[side].size < FEWEST for side in (before, after)):
+            continue
+        largest, usual = np.nanmax(extent[before]), np.nanmedian(extent[before])
+        grown = extent[lane] > (1.0 + SMALLEST_GROWTH) * largest
+        lasting = np.nanmedian(extent[after]) > largest
+        level = extent[lane] - largest > largest - usual
+        # The next lanes may show still more of what the same crisis has opened.
+        if grown and lasting and level and not (found and lane - found[-1] < BESIDE):
+            found.append(int(lane))
+    return np.array(found, dtype=np.intp)

@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 
-from gearchaos.records.crisis import grows_at
 from gearchaos.records.label import CHAOTIC, MEANINGS, PERIODIC
-from gearchaos.results.jumps import crises
+from gearchaos.results.jumps import crises, grows_at
 from gearchaos.results.result import Result
 from gearchaos.results.variables import Axis, sweep_variables
 
