@@ -11,7 +11,6 @@ from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
 from gearchaos.command_line import OK, Command, sweep_file
-from gearchaos.errors import ConfigurationError
 from gearchaos.progress import say
 
 PAPERS = {"pan2021": ("pan2021.toml", "pan2021_full.toml")}
@@ -20,15 +19,11 @@ PAPERS = {"pan2021": ("pan2021.toml", "pan2021_full.toml")}
 
 def _arguments(parser: ArgumentParser) -> None:
     add = parser.add_argument
-    add("paper", help=f"what to reproduce: {', '.join(PAPERS)}")
+    add("paper", choices=PAPERS, help="what to reproduce")
     add("-o", "--output", metavar="DIR", help="folder of the gallery (default: that of the name)")
 
 
 def _reproduce(options: Namespace) -> int:
-    if options.paper not in PAPERS:
-        raise ConfigurationError(
-            f"{options.paper!r} is no paper that can be reproduced; there is {', '.join(PAPERS)}"
-        )
     from gearchaos.configuration import load_config
     from gearchaos.engine.running import choose_threads
     from gearchaos.paper.computation import compute

@@ -1,6 +1,7 @@
 """Every number that the paper prints beside ours: the rows, worded, and their verdicts."""
 
 import math
+from collections import defaultdict
 from collections.abc import Iterator
 from itertools import pairwise
 from typing import NamedTuple
@@ -11,7 +12,7 @@ from gearchaos.figures.labels import short
 from gearchaos.paper.computation import Reproduction, largest_acceleration
 from gearchaos.paper.our_numbers import contact_line_stiffness, our_numbers
 from gearchaos.paper.published import Printed, published
-from gearchaos.paper.stages import counterparts, motion_at, motions_between
+from gearchaos.paper.stages import counterparts, motions_between
 from gearchaos.paper.verdict import RULES, Verdict, motion_verdict, overlap_verdict
 from gearchaos.results.stage_table import Stage
 
@@ -33,22 +34,17 @@ class Row(NamedTuple):
 def compare(found: Reproduction) -> dict[str, list[Row]]:
     """Compare a reproduction with all that the paper prints: the tables of the report, by name."""
     printed, ours = published(), our_numbers(found)
-    numbers = {}
+    numbers = defaultdict(list)
     for key, number in printed.numbers.items():
-        unit = "" if number.unit == "1" else f" {number.unit}"
-        numbers[key] = _row(number.quantity, number, number.value, ours[key], unit=unit)
-    stages = counterparts(printed.stages, found.labelled(found.sweep))
+        row = _row(number.quantity, number, number.value, ours[key], unit=number.unit)
+        numbers[number.table].append(row)
+    stages = counterparts(printed.stages, found.lanes)
     pairs = list(zip(printed.stages, stages, strict=True))
-    peak = numbers.pop("spectral_peak")
-    added, hop = (
-        [numbers.pop(key) for key in list(numbers) if key.startswith(group)]
-        for group in ("added", "hop")
-    )
     return {
-        "derived": [*numbers.values()],
+        "derived": numbers["derived"],
         "harmonics": [*_harmonics()],
-        "accelerations": [*added, *_increments(found), peak],
-        "hop": hop,
+        "accelerations": [*numbers["accelerations"], *_increments(found), *numbers["peak"]],
+        "hop": numbers["hop"],
         "stages": [*_stages(found, pairs)],
         "boundaries": [*_boundaries(pairs)],
         "motions": [*_motions(found)],
@@ -73,7 +69,7 @@ def _increments(found: Reproduction) -> Iterator[Row]:
 
 
 def _stages(found: Reproduction, pairs: list[tuple[Printed, Stage | None]]) -> Iterator[Row]:
-    labels, kind = found.labelled(found.sweep).labels, published().kinds["stages"]
+    labels, kind = found.lanes.labels, published().kinds["stages"]
     for printed, stage in pairs:
         mine, difference, verdict = NONE, NONE, Verdict.DOES_NOT
         if stage is not None:
@@ -96,17 +92,15 @@ def _boundaries(pairs: list[tuple[Printed, Stage | None]]) -> Iterator[Row]:
         # A boundary has two sides.
         mine = math.nan if ended is None or begun is None else begun.start
         quantity = f"{before.printed} → {after.printed}"
-        yield _row(quantity, boundary, after.first, mine, unit=" e(τ)", digits=2)
+        yield _row(quantity, boundary, after.first, mine, unit="e(τ)", digits=2)
 
 
 def _motions(found: Reproduction) -> Iterator[Row]:
-    reach, sweep = RULES["boundary"].in_kind, found.labelled(found.sweep)
-    both = found.motions, found.motions_from_contact
-    starts = [found.labelled(motions, strictly=True) for motions in both]
+    reach = RULES["boundary"].in_kind
     for shown in published().motions:
         p = shown.pitch_error
-        mine, other = (motion_at(lanes, p) for lanes in starts)
-        near = motions_between(sweep, p - reach, p + reach)
+        mine, other = found.motions_at(p)
+        near = motions_between(found.lanes, p - reach, p + reach)
         ours = mine if other == mine else f"{mine}; {other} from the contact flank"
         verdict = motion_verdict(shown.motion, mine, (other, *near))
         place = f"motion at {p:g} e(τ)", f"figure {shown.figure}", published().kinds["motions"]
@@ -132,14 +126,15 @@ def _row(
     """Compare two numbers; ``size`` is what a relative rule divides by, if not the printed one."""
     rule, mine, difference = RULES[printed.rule], NONE, NONE
     if math.isfinite(ours):
-        mine = _number(ours if digits is None else round(ours, digits)) + unit
+        mine = f"{_number(ours if digits is None else round(ours, digits))} {unit}".rstrip()
         difference = signed(ours - theirs)
         if rule.relative:
             share = 100.0 * (ours - theirs) / abs(theirs if size is None else size)
             difference = f"{signed(share, 1 if abs(share) >= 1.0 else 3)} %"
     verdict = rule.verdict(theirs, ours, size)
     where, kind = printed.where, printed.kind
-    return Row(quantity, where, kind, _number(theirs) + unit, mine, difference, verdict)
+    printed_number = f"{_number(theirs)} {unit}".rstrip()
+    return Row(quantity, where, kind, printed_number, mine, difference, verdict)
 
 
 def _number(value: float) -> str:

@@ -1,6 +1,7 @@
 """Everything that the gallery shows, computed from two configurations."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -40,9 +41,16 @@ class Reproduction:
     motions_from_contact: Result
     crisis: Crisis
 
-    def labelled(self, result: Result, *, strictly: bool = False) -> LabelledLanes:
-        """Label the lanes of one of these results as the paper does, or figures of one lane."""
-        return lanes_as_printed(result, self.crisis, strictly=strictly)
+    @cached_property
+    def lanes(self) -> LabelledLanes:
+        """The lanes of the diagram, labelled as the paper does."""
+        return lanes_as_printed(self.sweep, self.crisis)
+
+    def motions_at(self, pitch_error: float) -> list[str]:
+        """Return the motion at a pitch error, from rest and from contact, as a figure shows it."""
+        both = self.motions, self.motions_from_contact
+        lanes = [lanes_as_printed(result, self.crisis, strictly=True) for result in both]
+        return [str(one.labels[lane_of(self.motions, pitch_error)]) for one in lanes]
 
     def group(self, name: str) -> float:
         """Return a group that all lanes of the sweep share."""

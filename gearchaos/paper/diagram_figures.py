@@ -17,9 +17,7 @@ def diagram_page(found: Reproduction) -> Page:
     """Draw bifurcation diagram and exponent; ticks where the paper has boundaries and the hop."""
     boundaries = [after.first for _, after in pairwise(published().stages)]
     places = [published().numbers["hop"].value, *boundaries]
-    return bifurcation_page(
-        found.sweep, stages=found.labelled(found.sweep), marked=("changes in Pan 2021", places)
-    )
+    return bifurcation_page(found.sweep, stages=found.lanes, marked=("changes in Pan 2021", places))
 
 
 def hop_page(found: Reproduction) -> Page:

@@ -14,7 +14,6 @@ from gearchaos.figures.response_lane import COORDINATE, coordinates_of, samples_
 from gearchaos.figures.style import BLACK, BLUE, FONT_PT, SMALL_FONT_PT, VERMILION
 from gearchaos.paper.computation import Reproduction, lane_of, largest_acceleration
 from gearchaos.paper.published import Printed, published
-from gearchaos.paper.stages import motion_at
 from gearchaos.records.amplitude_spectrum import spectral_lines
 from gearchaos.results.response_variables import TIME, acceleration_of
 from gearchaos.results.result import Result
@@ -89,9 +88,7 @@ def spectra_page(found: Reproduction, *, growing: bool = False) -> Page:
 
 def motion_page(found: Reproduction, shown: Printed) -> Page:
     """Draw history, phase portrait and Poincare section at one pitch error (figures 8 to 13)."""
-    both = found.motions, found.motions_from_contact
-    starts = [found.labelled(motions, strictly=True) for motions in both]
-    at_rest, from_contact = (motion_at(lanes, shown.pitch_error) for lanes in starts)
+    at_rest, from_contact = found.motions_at(shown.pitch_error)
     result, label = found.motions, at_rest
     # Unless only the start from the contact flank comes to the motion that the paper shows.
     if at_rest != shown.motion == from_contact:

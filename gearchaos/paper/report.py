@@ -4,7 +4,7 @@ import re
 from collections import Counter
 from collections.abc import Iterable, Iterator
 from importlib.resources import files
-from itertools import chain, pairwise
+from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -132,7 +132,7 @@ def _chaotic_stages(found: Reproduction) -> Iterator[str]:
     """Tell what lies in the stages that the paper calls chaotic or by a name of its own."""
     for stage in published().stages:
         if stage.printed != stage.motion or stage.motion == "chaotic":
-            motions = motions_between(found.labelled(found.sweep), stage.first, stage.last)
+            motions = motions_between(found.lanes, stage.first, stage.last)
             counts = Counter(motions).most_common(6)
             worded = ", ".join(f"{count} {label}" for label, count in counts)
             yield (
@@ -142,9 +142,8 @@ def _chaotic_stages(found: Reproduction) -> Iterator[str]:
 
 
 def _of_the_bands(found: Reproduction) -> dict[str, Any]:
-    lanes = found.labelled(found.sweep)
-    on_two = lanes.labels == TWO_BANDS
-    values, exponents = lanes.values[on_two], lanes.exponent[on_two]
+    on_two = found.lanes.labels == TWO_BANDS
+    values, exponents = found.lanes.values[on_two], found.lanes.exponent[on_two]
     shares = out_of_turn(found.sweep["section_delta_5"])[on_two]
     return {
         "bands_apart": values[shares == 0.0].max(),
@@ -170,16 +169,10 @@ def _of_the_hop(found: Reproduction) -> dict[str, Any]:
 
 
 def _of_the_increments(found: Reproduction) -> dict[str, Any]:
-    """Tell from which pitch error on the largest acceleration is that of teeth apart."""
-    response, steps = found.response, published().increments.pitch_errors
-    lanes = [lane_of(response, p) for p in steps]
-    motions = response["delta_5_acceleration"][lanes]
-    contact = response["contact_tangential"][lanes, np.argmax(motions, axis=1)]
-    apart = contact == response.variables["contact_tangential"].flags.index("apart")
-    magnitudes = pairwise(np.max(np.abs(motions), axis=1))
+    lanes = [lane_of(found.response, p) for p in published().increments.pitch_errors]
+    largest = np.max(np.abs(found.response["delta_5_acceleration"][lanes]), axis=1)
     forcing = 2.0 * found.group("mesh_frequency") ** 2 * found.group("pitch_error_amplitude")
     return {
-        "first_apart": steps[np.argmax(apart)],
         "forcing": short(forcing),
-        "magnitudes": ", ".join(short(after - before) for before, after in magnitudes),
+        "magnitudes": ", ".join(map(short, np.diff(largest))),
     }

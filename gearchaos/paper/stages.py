@@ -96,11 +96,6 @@ def counterparts(printed: Sequence[Printed], lanes: LabelledLanes) -> list[Stage
     return found
 
 
-def motion_at(lanes: LabelledLanes, value: float) -> str:
-    """Return the motion of the lane next to a value, such as ``period 2`` or ``two bands``."""
-    return str(lanes.labels[np.argmin(np.abs(lanes.values - value))])
-
-
 def motions_between(lanes: LabelledLanes, first: float, last: float) -> list[str]:
     """Return the motions of the lanes from one value to another, both included."""
     # A value that is the first or the last but for rounding is inside.

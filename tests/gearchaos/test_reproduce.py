@@ -26,7 +26,6 @@ from gearchaos.paper.stages import (
     OUT_OF_TURN,
     WINDOW,
     counterparts,
-    motion_at,
     out_of_turn,
 )
 from gearchaos.paper.verdict import (
@@ -274,7 +273,7 @@ def test_increments_of_separated_teeth_are_those_of_the_forcing(found):
         if np.ndim(parameter.value) == 0
     }
     omega, cosine = group["mesh_frequency"], np.cos(np.radians(group["base_helix_angle_deg"]))
-    for p in (3.0, 5.0, 7.0, 9.0):
+    for p in (3.0, 5.0, 7.0, 9.0, 11.0):
         lane = lane_of(response, p)
         at = int(np.argmax(response["delta_5_acceleration"][lane]))
         phase, error = 2.0 * np.pi * response["time"][at], p * group["pitch_error_amplitude"]
@@ -311,9 +310,9 @@ def test_the_exponent_before_the_hop_is_that_of_the_sweep(found):
 
 @pytest.mark.slow
 def test_stages_are_found_where_the_labels_are(found):
-    first = counterparts(published().stages, found.labelled(found.sweep))[0]
+    first = counterparts(published().stages, found.lanes)[0]
     assert first is not None and first.start == 0.0
-    assert motion_at(found.labelled(found.sweep), first.end) == "period 1"
+    assert found.lanes.labels[first.last] == "period 1"
 
 
 @pytest.fixture(scope="module")
@@ -477,7 +476,7 @@ def test_every_stage_in_the_report_is_one_of_the_stage_table(report, found):
             own = inside.count(stage.motion) / len(inside)
             assert own > 0.5
             assert share == ("" if own == 1.0 else f"{math.floor(100.0 * own)} % of its lanes")
-            assert (first, last) in ends_of(stage.motion, found.labelled(found.sweep))
+            assert (first, last) in ends_of(stage.motion, found.lanes)
             assert numbers(row[5]) == pytest.approx(
                 [first - stage.first, last - stage.last], abs=0.006
             )
