@@ -26,8 +26,7 @@ class Observation:
     ``wanted``, ``width``: the number and its unit of misfit; ``values``: of the swept parameter,
     ascending, shape (values,), at which it is looked at; ``computed``: gives the number of every
     candidate, NaN where there is none, shape (candidates,), from the records at these values;
-    ``missing``: how many widths off is a candidate in which there is no such thing;
-    ``accelerated``: whether the records need the largest accelerations.
+    ``missing``: how many widths off is a candidate in which there is no such thing.
     """
 
     name: str
@@ -36,7 +35,6 @@ class Observation:
     values: Floats
     computed: Callable[[Records], Floats]
     missing: float = NOWHERE
-    accelerated: bool = False
 
     def residual(self, computed: Floats) -> Floats:
         """Return how many widths off a number is, with its sign."""
@@ -129,7 +127,7 @@ def acceleration_increment(increment: Increment, coordinates: Sequence[str]) -> 
 
     name = f"{increment.coordinate}'' from {ends[0]:g} to {ends[1]:g}"
     values = np.array(sorted(ends))
-    return Observation(name, increment.value, increment.width, values, computed, accelerated=True)
+    return Observation(name, increment.value, increment.width, values, computed)
 
 
 def observations_of(targets: Targets, coordinates: Sequence[str]) -> list[Observation]:

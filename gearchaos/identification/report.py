@@ -43,19 +43,19 @@ def reach(tried: Tried) -> Reach:
     smallest scale. So a parameter is too far where the median of three neighbouring steps exceeds
     that of the sets next to the best one, or the misfit of the best one if this is more, by one.
     """
-    parameters = tried.values.shape[1]
-    alike = tried.values[tried.misfit <= np.min(tried.misfit) + ONE_UNIT]
+    parameters = tried["values"].shape[1]
+    alike = tried["values"][tried["misfit"] <= np.min(tried["misfit"]) + ONE_UNIT]
     among = alike.min(axis=0), alike.max(axis=0)
-    steps = np.flatnonzero(tried.run == STEPS_ALONE)[-1 - 2 * RUNGS * parameters :]
+    steps = np.flatnonzero(tried["run"] == STEPS_ALONE)[-1 - 2 * RUNGS * parameters :]
     if not steps.size:
         unknown = np.full(parameters, np.nan)
         return Reach(unknown, unknown, *among, np.nan)
-    centre, others = tried.values[steps[0]], tried.values[steps[1:]]
-    misfit = tried.misfit[steps[1:]].reshape(parameters, 2, RUNGS)
+    centre, others = tried["values"][steps[0]], tried["values"][steps[1:]]
+    misfit = tried["misfit"][steps[1:]].reshape(parameters, 2, RUNGS)
     surroundings = float(np.median(misfit[..., :NEAREST]))
     padded = np.pad(misfit, ((0, 0), (0, 0), (1, 1)), mode="edge")
     median = np.median(np.stack([padded[..., :-2], misfit, padded[..., 2:]]), axis=0)
-    too_far = median > max(surroundings, tried.misfit[steps[0]]) + ONE_UNIT
+    too_far = median > max(surroundings, tried["misfit"][steps[0]]) + ONE_UNIT
     # The last step before the first one that is too far; 0 is the centre.
     last = np.where(too_far.any(axis=2), np.argmax(too_far, axis=2), RUNGS)
     number = np.arange(parameters)
@@ -68,18 +68,18 @@ def reach(tried: Tried) -> Reach:
 def report(judge: Judge, tried: Tried, most: int = 4) -> Iterator[str]:
     """Word the best sets, what they come to, and how well the targets determine them."""
     free, apart = judge.targets.parameter, judge.targets.search.apart
-    columns = zip(free, tried.values.T, strict=True)
+    columns = zip(free, tried["values"].T, strict=True)
     points = np.stack([[one.share(v) for v in values.tolist()] for one, values in columns], axis=1)
-    sets, keys = distinct(points, tried.misfit, apart, most), [one.name for one in free]
+    sets, keys = distinct(points, tried["misfit"], apart, most), [one.name for one in free]
     titles = [f"set {number}" for number in range(1, len(sets) + 1)]
     yield f"{len(tried)} candidates; the best sets that differ:"
     yield _row("", titles)
-    yield _row("misfit", tried.misfit[sets])
-    for key, values in zip(keys, tried.values[sets].T, strict=True):
+    yield _row("misfit", tried["misfit"][sets])
+    for key, values in zip(keys, tried["values"][sets].T, strict=True):
         yield _row(key, values)
     yield ""
     yield _row("observed", ["wanted", "width", *titles])
-    for one, row in zip(judge.observations, tried.computed[sets].T, strict=True):
+    for one, row in zip(judge.observations, tried["computed"][sets].T, strict=True):
         yield _row(one.name, [one.wanted, one.width, *row])
     if len(tried) > 1:
         yield ""
@@ -92,7 +92,7 @@ def report(judge: Judge, tried: Tried, most: int = 4) -> Iterator[str]:
         yield f"({beside}: misfit {found.surroundings:.4g})"
     yield ""
     yield "set 1 in full, for a configuration:"
-    for key, value in zip(keys, tried.values[sets[0]].tolist(), strict=True):
+    for key, value in zip(keys, tried["values"][sets[0]].tolist(), strict=True):
         yield f"{'groups.' if key in SWEEPABLE_GROUPS else ''}{key} = {value!r}"
 
 

@@ -20,7 +20,7 @@ from gearchaos.identification.evaluation import coordinates_of, evaluate
 from gearchaos.identification.loading import Problem
 from gearchaos.identification.observations import misfit, observations_of
 from gearchaos.identification.targets import Search
-from gearchaos.identification.tried import COMPLETE, DIVERGED, Tried, joined
+from gearchaos.identification.tried import COMPLETE, DIVERGED, Tried, tried_of
 from gearchaos.interrupts import check
 
 Floats = NDArray[np.float64]
@@ -62,9 +62,8 @@ class Judge:
         self.observations = observations_of(self.targets, coordinates_of(self._config))
         self.values = np.unique(np.concatenate([one.values for one in self.observations]))
         self._places = [np.searchsorted(self.values, one.values) for one in self.observations]
-        self._accelerated = np.zeros(self.values.size, dtype=np.bool_)
-        for one, places in zip(self.observations, self._places, strict=True):
-            self._accelerated[places] |= one.accelerated
+        ends = [end for one in self.targets.increment for end in (one.from_, one.to)]
+        self._accelerated = np.isin(self.values, ends)
 
     def judge(self, run: int, parameters: dict[str, Floats]) -> Tried:
         """Compute candidates given by their parameters, each of shape (candidates,)."""
@@ -74,12 +73,12 @@ class Judge:
             computed.append(one.computed(records.at(places)))
             residuals.append(one.residual(computed[-1]))
         diverged = ~np.all(records.sound, axis=1)
-        return Tried(
-            np.full(diverged.size, run, dtype=np.int32),
-            np.stack(list(parameters.values()), axis=1),
-            np.stack(computed, axis=1),
-            misfit(np.stack(residuals, axis=1)),
-            np.where(diverged, DIVERGED, COMPLETE).astype(np.uint8),
+        return tried_of(
+            run=np.full(diverged.size, run, dtype=np.int32),
+            values=np.stack(list(parameters.values()), axis=1),
+            computed=np.stack(computed, axis=1),
+            misfit=misfit(np.stack(residuals, axis=1)),
+            status=np.where(diverged, DIVERGED, COMPLETE).astype(np.uint8),
         )
 
 
@@ -117,24 +116,24 @@ def search(
                 piece = points[first : first + at_once]
                 parameters = judge.targets.values(piece)
                 if known is not None and done < before:
-                    found = known.part(done, done + len(piece))
+                    found = known[done : done + len(piece)]
                     _require_these(parameters, found, source)
                 else:
                     found = judge.judge(run, parameters)
                     advance(len(found))
                 parts.append(found)
                 done += len(found)
-                misfits.append(found.misfit)
+                misfits.append(found["misfit"])
                 if done > before and time.monotonic() - spoke > SECONDS_BETWEEN_SNAPSHOTS:
                     spoke = time.monotonic()
-                    parts = [joined(parts)]
+                    parts = [np.concatenate(parts)]
                     keep(parts[0])
             run, points = asking.send(np.concatenate(misfits))
     except StopIteration:
-        return joined(parts)
+        return np.concatenate(parts)
     except KeyboardInterrupt:
         if done > before:
-            keep(joined(parts))
+            keep(np.concatenate(parts))
         raise
 
 
@@ -202,7 +201,7 @@ def distinct(points: Floats, misfits: Floats, apart: float, most: int) -> list[i
 
 
 def _require_these(parameters: dict[str, Floats], known: Tried, source: str) -> None:
-    if not np.array_equal(np.stack(list(parameters.values()), axis=1), known.values):
+    if not np.array_equal(np.stack(list(parameters.values()), axis=1), known["values"]):
         raise FileError(
             f"{source}: its candidates are not those of this search here, which can differ between "
             "machines; finish it where it began, or begin anew with --overwrite"

@@ -3,7 +3,7 @@
 import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, TypeAlias
 
 import h5py
 import numpy as np
@@ -19,41 +19,28 @@ from gearchaos.results.result_reader import SEARCH
 from gearchaos.results.stored_dataset import UnfitError, datasets_of, scalars_of, text_of, values_of
 from gearchaos.results.variables import STATUS, Variable, axis_name
 
-Floats = NDArray[np.float64]
-
 CANDIDATE, OBSERVATION = "candidate", "observation"
 COMPLETE, DIVERGED = 0, 1
 MEANINGS = ("complete", "diverged")
 """Meanings of the status of a candidate: whether all of its lanes were integrated to the end."""
 
 
-class Tried(NamedTuple):
-    """Candidates, in the order in which they were tried.
+Tried: TypeAlias = NDArray[np.void]
+"""Candidates, in the order in which they were tried: an array with fields.
 
-    ``run`` (candidates,): see `search`; ``values`` (candidates, parameters), in their units;
-    ``computed`` (candidates, observations): what was observed of them, NaN where there is no such
-    thing; ``misfit`` (candidates,); ``status`` (candidates,) of `MEANINGS`.
-    """
-
-    run: NDArray[np.int32]
-    values: Floats
-    computed: Floats
-    misfit: Floats
-    status: NDArray[np.uint8]
-
-    def __len__(self) -> int:
-        return int(self.run.size)
-
-    def part(self, first: int, last: int) -> "Tried":
-        """Return the candidates ``first`` to ``last - 1``."""
-        arrays: Any = (array[first:last] for array in self)
-        return Tried(*arrays)
+``run``: see `search`; ``values`` (parameters,), in their units; ``computed`` (observations,): what
+was observed of them, NaN where there is no such thing; ``misfit``; ``status`` of `MEANINGS`.
+"""
 
 
-def joined(parts: Sequence[Tried]) -> Tried:
-    """Join candidates that were tried one after the other."""
-    arrays: Any = (np.concatenate(some) for some in zip(*parts, strict=True))
-    return Tried(*arrays)
+def tried_of(**fields: NDArray[Any]) -> Tried:
+    """Put the fields of candidates together, the candidates first in each."""
+    # One order, whoever gives them: NumPy joins no others.
+    types = [(name, fields[name].dtype, fields[name].shape[1:]) for name in sorted(fields)]
+    tried = np.empty(len(fields["run"]), types)
+    for name, field in fields.items():
+        tried[name] = field
+    return tried
 
 
 def write_tried(
@@ -78,20 +65,20 @@ def write_tried(
     wanted, width = np.array([(one.wanted, one.width) for one in observations]).T
     which = "number of the observation, which its meaning names"
     what = "run of the search, 0 drawn evenly, -1 steps away from the best candidate"
-    dims, row, axes = (CANDIDATE,), (OBSERVATION,), map(axis_of, keys, tried.values.T)
+    dims, row, axes = (CANDIDATE,), (OBSERVATION,), map(axis_of, keys, tried["values"].T)
     variables = [
         column(CANDIDATE, candidates, "number of the candidate", *dims),
         column(OBSERVATION, numbers, which, *row, flags=names),
         column("wanted", wanted, "observed number", *row),
         column("width", width, "unit of its misfit", *row),
-        column("run", tried.run, what, *dims),
+        column("run", tried["run"], what, *dims),
         *(
             column(a.name, a.values, a.long_name, *dims, units=a.units, symbol=a.symbol)
             for a in axes
         ),
-        column("computed", tried.computed, "computed number", *dims, *row, fill_value=np.nan),
-        column("misfit", tried.misfit, "misfit of all observations together", *dims),
-        column(STATUS, tried.status, "status of the candidate", *dims, flags=MEANINGS),
+        column("computed", tried["computed"], "computed number", *dims, *row, fill_value=np.nan),
+        column("misfit", tried["misfit"], "misfit of all observations together", *dims),
+        column(STATUS, tried["status"], "status of the candidate", *dims, flags=MEANINGS),
     ]
     metadata = {**facts, "parameters_searched": " ".join(keys)}
     write_result(path, variables, [], {}, metadata, overwrite=True, schema=SEARCH)
@@ -115,8 +102,8 @@ def read_tried(path: str | os.PathLike[str], keys: Sequence[str]) -> tuple[Tried
                 raise UnfitError("is no result of this search", "choose another --output")
             columns = [values_of(key, datasets[axis_name(key)]) for key in keys]
             others = ("run", "computed", "misfit", STATUS)
-            run, *rest = (values_of(name, datasets[name]) for name in others)
-            return Tried(run, np.stack(columns, axis=1), *rest), facts
+            fields = {name: values_of(name, datasets[name]) for name in others}
+            return tried_of(**fields, values=np.stack(columns, axis=1)), facts
     except UnfitError as error:
         raise FileError(f"{name}: {error}") from error
     except (OSError, KeyError, ValueError, RuntimeError) as error:

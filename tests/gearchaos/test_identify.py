@@ -17,7 +17,7 @@ from gearchaos.identification.evaluation import require_stable
 from gearchaos.identification.loading import load_targets
 from gearchaos.identification.report import _row, reach
 from gearchaos.identification.search import Judge, decisive_facts, search
-from gearchaos.identification.tried import Tried, read_tried, write_tried
+from gearchaos.identification.tried import read_tried, write_tried
 from gearchaos.identify import main
 from gearchaos.results.result import open_result
 
@@ -149,41 +149,44 @@ def tried_of(identified):
 class TestALinearPair:
     def test_its_damping_and_its_error_are_found_again(self, identified):
         tried, _ = tried_of(identified)
-        best = int(np.argmin(tried.misfit))
+        best = int(np.argmin(tried["misfit"]))
         # 2 (sqrt(1 + r^2) - 1) of each observation is at most the misfit.
-        widths = math.sqrt((1.0 + tried.misfit[best] / 2.0) ** 2 - 1.0)
+        widths = math.sqrt((1.0 + tried["misfit"][best] / 2.0) ** 2 - 1.0)
         assert widths < 1.0
         # The length of a tangent vector goes up and down by less than the damping, as a share; the
         # weights of the 48 periods, at most 2/48, rise to that and fall again.
         swinging = DAMPING * 2.0 * (2.0 / 48.0) / (2.0 * math.pi / FREQUENCY)
         off = widths * EXPONENT_WIDTH + swinging
-        assert tried.values[best, 0] == pytest.approx(DAMPING, abs=off)
+        assert tried["values"][best, 0] == pytest.approx(DAMPING, abs=off)
         # The largest of 240 samples a period is at most this share below the crest; the gain
         # changes with the damping by less than the damping does.
         crest = 1.0 - math.cos(math.pi / 240.0)
         share = crest + off / DAMPING
         share += widths * INCREMENT_WIDTH / (acceleration(3.0) - acceleration(1.0))
-        assert tried.values[best, 1] == pytest.approx(AMPLITUDE, rel=share)
+        assert tried["values"][best, 1] == pytest.approx(AMPLITUDE, rel=share)
 
     def test_every_candidate_is_kept(self, identified, monkeypatch):
         # However many motions are looked at together.
         monkeypatch.setattr(evaluation, "MOTIONS_AT_ONCE", 3)
         tried, facts = tried_of(identified)
         judge = Judge(problem_of(identified))
-        some = {"damping_ratio": tried.values[:5, 0], "pitch_error_amplitude": tried.values[:5, 1]}
+        some = {
+            "damping_ratio": tried["values"][:5, 0],
+            "pitch_error_amplitude": tried["values"][:5, 1],
+        }
         again = judge.judge(0, some)
-        assert np.array_equal(again.misfit, tried.misfit[:5])
-        assert np.array_equal(again.computed, tried.computed[:5])
-        assert (tried.run == 0).sum() == 40
+        assert np.array_equal(again["misfit"], tried["misfit"][:5])
+        assert np.array_equal(again["computed"], tried["computed"][:5])
+        assert (tried["run"] == 0).sum() == 40
         assert facts["targets"] == TARGETS
 
     def test_the_report_tells_what_the_targets_determine(self, identified):
         tried, _ = tried_of(identified)
         found = reach(tried)
-        best = tried.values[np.argmin(tried.misfit)]
+        best = tried["values"][np.argmin(tried["misfit"])]
         assert np.all(found.alone_low < best) and np.all(best < found.alone_high)
         # The misfit is 2 (sqrt(1 + r^2) - 1) of the exponent at least, and may grow by one.
-        limit = 1.0 + max(found.surroundings, tried.misfit.min())
+        limit = 1.0 + max(found.surroundings, tried["misfit"].min())
         most = EXPONENT_WIDTH * math.sqrt((1.0 + limit / 2.0) ** 2 - 1.0)
         assert found.alone_high[0] - best[0] < 2.0 * most
         for word in ("damping_ratio", "set 1", "exponent at 1", "groups.pitch_error_amplitude = "):
@@ -209,7 +212,7 @@ class TestASearchThatWasStopped:
         for name in ("pair.toml", "targets.toml"):
             (tmp_path / name).write_text((identified.folder / name).read_text())
         # As a killed process leaves it: whole pieces, in the middle of a run.
-        first = whole.part(0, 40 + 12 * 7)
+        first = whole[: 40 + 12 * 7]
         facts = decisive_facts(problem)
         write_tried(tmp_path / "targets.h5", first, keys, judge.observations, facts)
         ended = command(tmp_path, "--resume", "--quiet")
@@ -230,25 +233,27 @@ class TestASearchThatWasStopped:
             search(judge, None, kept.append, advance, "-")
         (part,) = kept
         again = search(judge, part, kept.append, lambda _: None, "-")
-        assert np.array_equal(again.misfit, whole.misfit)
-        assert np.array_equal(again.values, whole.values)
+        assert np.array_equal(again["misfit"], whole["misfit"])
+        assert np.array_equal(again["values"], whole["values"])
 
     def test_loses_no_candidate_while_it_is_taken_up_again(self, identified, monkeypatch):
-        class Stopping(Tried):
-            def part(self, first, last):
-                if first == 40 + 12:
-                    raise KeyboardInterrupt
-                return super().part(first, last)
+        def check():
+            if next(pieces) == 1:
+                raise KeyboardInterrupt
 
         def advance(_):
             raise KeyboardInterrupt
 
         monkeypatch.setattr(searching, "SECONDS_BETWEEN_SNAPSHOTS", 0.0)
         judge, kept = Judge(problem_of(identified)), []
-        known = tried_of(identified)[0].part(0, 40 + 12 * 3)
-        for before in (Stopping(*known), known):
-            with pytest.raises(KeyboardInterrupt):
-                search(judge, before, kept.append, advance, "-")
+        known = tried_of(identified)[0][: 40 + 12 * 3]
+        with pytest.raises(KeyboardInterrupt):
+            search(judge, known, kept.append, advance, "-")
+        # Now before the known ones are all taken up.
+        pieces = iter(range(100))
+        monkeypatch.setattr(searching, "check", check)
+        with pytest.raises(KeyboardInterrupt):
+            search(judge, known, kept.append, advance, "-")
         assert kept == []
 
     def test_is_complete_where_nothing_is_left(self, identified):
