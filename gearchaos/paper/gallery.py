@@ -3,7 +3,6 @@
 from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
-from typing import NamedTuple
 
 from gearchaos.errors import FileError
 from gearchaos.figures.files import FORMATS, save_figure
@@ -26,16 +25,11 @@ RESULTS = {
 """Result files by name: the attribute of `Reproduction`, and what they hold."""
 
 
-class Picture(NamedTuple):
-    """One figure: the name of its files without ending, its title, and how it is drawn."""
+def pictures() -> list[tuple[str, str, Callable[[Reproduction], Page]]]:
+    """List all figures: the name of the files without ending, the title, and how it is drawn.
 
-    name: str
-    title: str
-    draw: Callable[[Reproduction], Page]
-
-
-def pictures() -> tuple[Picture, ...]:
-    """Return all figures, in the paper's order; `report_text.md` holds their captions."""
+    In the paper's order; `report_text.md` holds their captions.
+    """
     draw = motion_figures.motion_page
     numbered: dict[int, Callable[[Reproduction], Page]] = {
         3: mesh_figures.pitch_error_page,
@@ -47,9 +41,8 @@ def pictures() -> tuple[Picture, ...]:
         14: partial(motion_figures.accelerations_page, growing=True),
         15: partial(motion_figures.spectra_page, growing=True),
     }
-    own = Picture("figure_07_hop", "The hop of figure 7", diagram_figures.hop_page)
-    shown = [Picture(f"figure_{n:02d}", f"Figure {n}", page) for n, page in numbered.items()]
-    return tuple(sorted([*shown, own]))
+    shown = [(f"figure_{n:02d}", f"Figure {n}", page) for n, page in numbered.items()]
+    return sorted([*shown, ("figure_07_hop", "The hop of figure 7", diagram_figures.hop_page)])
 
 
 def check_folder(folder: Path, overwrite: bool) -> None:
@@ -60,7 +53,7 @@ def check_folder(folder: Path, overwrite: bool) -> None:
     """
     if folder.exists() and not folder.is_dir():
         raise FileError(f"{folder}: is a file; give the name of a folder as --output")
-    figures = [f"{picture.name}.{kind}" for picture in pictures() for kind in FORMATS]
+    figures = [f"{name}.{kind}" for name, *_ in pictures() for kind in FORMATS]
     targets = [folder / name for name in (REPORT, *figures, *RESULTS)]
     present = [target.name for target in targets if target.exists()]
     if present and not overwrite:
@@ -85,12 +78,12 @@ def write_gallery(
     for name, (attribute, _) in RESULTS.items():
         say(f"writing {name}")
         getattr(found, attribute).save(folder / name, overwrite=overwrite)
-    for picture in pictures():
-        say(f"drawing {picture.title.lower()}")
-        page = picture.draw(found)
+    for name, title, draw in pictures():
+        say(f"drawing {title.lower()}")
+        page = draw(found)
         for kind in formats:
-            target = folder / f"{picture.name}.{kind}"
-            save_figure(page, target, title=picture.title, dpi=DPI, overwrite=overwrite)
+            target = folder / f"{name}.{kind}"
+            save_figure(page, target, title=title, dpi=DPI, overwrite=overwrite)
     text = report(found, {name: words for name, (_, words) in RESULTS.items()})
     with replacing(folder / REPORT, overwrite=overwrite) as partly_written:
         partly_written.write_text(text, encoding="utf-8")

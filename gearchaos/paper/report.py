@@ -34,12 +34,8 @@ TABLE_HEAD = (
 
 def report(found: Reproduction, names: dict[str, str]) -> str:
     """Write the report; ``names`` are the files beside it, with what each holds."""
-    printed, tables = published(), compare(found)
+    tables = compare(found)
     rows = [row for table in tables.values() for row in table]
-    values = {key: number.value for key, number in printed.numbers.items()}
-    pair, lines = pair_of(found), printed.contact_lines
-    per_mm, face_width = values["mean_stiffness"], float(pair.face_width) * 1e3
-    damping = values["mesh_damping"] / (2.0 * values["damping_ratio"])
     length_scale = TOLERANCE_MM / found.group("pitch_error_amplitude")
     template = files("gearchaos.paper").joinpath("report_text.md").read_text(encoding="utf-8")
     text = template.format(
@@ -52,16 +48,10 @@ def report(found: Reproduction, names: dict[str, str]) -> str:
         window=WINDOW,
         out_of_turn=OUT_OF_TURN,
         tables={name: _table(table) for name, table in tables.items()},
-        printed=values,
+        printed={key: number.value for key, number in published().numbers.items()},
         ours=our_numbers(found),
         found=found,
-        printed_ratio=values["damping_ratio"] / face_width**0.5,
-        pair=pair,
-        lines=lines,
-        implied_contact_ratio=(lines.shortest + lines.longest) / 2.0,
-        implied_mass=damping**2 / (per_mm * 1e6),
-        face_width=face_width,
-        whole_stiffness=per_mm * face_width,
+        pair=pair_of(found),
         length_scale=length_scale,
         backlash=length_scale * found.group("half_backlash"),
         table_3=_table_3(found.response),

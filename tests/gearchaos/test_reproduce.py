@@ -323,7 +323,7 @@ def report(folder):
 @pytest.mark.slow
 def test_the_report_shows_every_figure_and_leaves_nothing_open(report, folder):
     shown = re.findall(r"!\[[^\]]+\]\(([^)]+)\)", report)
-    assert shown == [f"{picture.name}.png" for picture in pictures()]
+    assert shown == [f"{name}.png" for name, *_ in pictures()]
     assert all((folder / name).read_bytes().startswith(b"\x89PNG") for name in shown)
     assert "![]" not in report and not set("${}") & set(report) and " nan" not in report
 
@@ -369,6 +369,25 @@ def test_every_derived_number_in_the_report_is_the_computed_one(report, found):
         assert close(row[4], value, 4)
         share = 100.0 * (value / numbers(row[3])[0] - 1.0)
         assert numbers(row[5])[0] == pytest.approx(share, abs=0.06 if abs(share) > 1.0 else 0.006)
+
+
+@pytest.mark.slow
+def test_what_the_report_says_of_the_slips_follows_from_what_is_printed(report, found):
+    printed, lines = published().numbers, published().contact_lines
+    width, stiffness = 1e3 * pair_of(found).face_width, printed["mean_stiffness"].value
+    xi, damping = printed["damping_ratio"].value, printed["mesh_damping"].value
+    said = {
+        r"m<sub>e</sub> = (\S+) kg; Table 1": (damping / (2.0 * xi)) ** 2 / (stiffness * 1e6),
+        r"stiffness of all (\S+) mm": width,
+        r"smaller by the root of (\S+), 0": width,
+        r"smaller by the root of \S+, (\S+)\. ": xi / np.sqrt(width),
+        r"from\s+(\S+) to \S+ lengths": lines.shortest,
+        r"to (\S+) lengths of a full line": lines.longest,
+        r"which is ε<sub>γ</sub> = (\S+)\. ": (lines.shortest + lines.longest) / 2.0,
+        r"whole face width, (\S+) N/µm": stiffness * width,
+    }
+    for pattern, value in said.items():
+        assert close(re.search(pattern, report)[1], value, 5), pattern
 
 
 @pytest.mark.slow
@@ -572,7 +591,7 @@ def test_the_gallery_in_the_documentation_is_whole():
     gallery = CLONE / "docs" / "gallery"
     text = (gallery / "report.md").read_text(encoding="utf-8")
     shown = re.findall(r"!\[[^\]]+\]\(([^)]+)\)", text)
-    assert shown == [f"{picture.name}.png" for picture in pictures()]
+    assert shown == [f"{name}.png" for name, *_ in pictures()]
     assert all((gallery / name).is_file() for name in shown)
 
 
