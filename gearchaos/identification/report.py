@@ -22,17 +22,15 @@ LABEL, COLUMN = 34, 12
 
 
 class Reach(NamedTuple):
-    """How far parameters can move before the fit is worse by one unit, each of shape (parameters,).
+    """From where to where parameters can move before the fit is worse by one unit.
 
-    ``alone_low``, ``alone_high``: one moved away from the centre of the last steps, the others
-    held, NaN where no steps were tried; ``low``, ``high``: among all candidates that were tried.
-    ``surroundings``: misfit of the sets next to that centre, the median.
+    ``alone`` (parameters, 2): one moved away from the centre of the last steps, the others held;
+    ``among`` (parameters, 2): among all candidates that were tried; ``surroundings``: misfit of the
+    sets next to that centre, the median.
     """
 
-    alone_low: Floats
-    alone_high: Floats
-    low: Floats
-    high: Floats
+    alone: Floats
+    among: Floats
     surroundings: float
 
 
@@ -45,11 +43,8 @@ def reach(tried: Tried) -> Reach:
     """
     parameters = tried["values"].shape[1]
     alike = tried["values"][tried["misfit"] <= np.min(tried["misfit"]) + ONE_UNIT]
-    among = alike.min(axis=0), alike.max(axis=0)
+    among = np.stack([alike.min(axis=0), alike.max(axis=0)], axis=1)
     steps = np.flatnonzero(tried["run"] == STEPS_ALONE)[-1 - 2 * RUNGS * parameters :]
-    if not steps.size:
-        unknown = np.full(parameters, np.nan)
-        return Reach(unknown, unknown, *among, np.nan)
     centre, others = tried["values"][steps[0]], tried["values"][steps[1:]]
     misfit = tried["misfit"][steps[1:]].reshape(parameters, 2, RUNGS)
     surroundings = float(np.median(misfit[..., :NEAREST]))
@@ -61,8 +56,8 @@ def reach(tried: Tried) -> Reach:
     number = np.arange(parameters)
     moved = others.reshape(parameters, 2, RUNGS, parameters)[number, :, :, number]
     moved = np.concatenate([np.broadcast_to(centre[:, None, None], (parameters, 2, 1)), moved], 2)
-    low, high = (moved[number, way, last[:, way]] for way in range(2))
-    return Reach(low, high, *among, surroundings)
+    alone = moved[number[:, np.newaxis], [0, 1], last]
+    return Reach(alone, among, surroundings)
 
 
 def report(judge: Judge, tried: Tried, most: int = 4) -> Iterator[str]:
@@ -86,8 +81,8 @@ def report(judge: Judge, tried: Tried, most: int = 4) -> Iterator[str]:
         found = reach(tried)
         yield "how far each can move before the misfit grows by one, alone and with the others:"
         yield _row("", ["alone from", "to", "all from", "to"])
-        for key, *ends in zip(keys, *found[:4], strict=True):
-            yield _row(key, ends)
+        for key, *ends in zip(keys, found.alone, found.among, strict=True):
+            yield _row(key, np.ravel(ends))
         beside = "a thousandth of the bounds beside where the last steps began"
         yield f"({beside}: misfit {found.surroundings:.4g})"
     yield ""

@@ -28,14 +28,8 @@ STEP = 0.01
 FINENESS = 10
 """Parts of a step between which the place of a hop is told."""
 
-WIDTH = 1e-4
-"""Width to which the ends of the interval are bisected."""
-
 FOLLOWING_PERIODS = 100
 """Mesh periods of a carried sweep per value: its motion changes little from one to the next."""
-
-SETTLING_PERIODS = 500
-"""Mesh periods in which a soft axial bearing comes to rest."""
 
 STARTS = {"rest": "at rest", "contact": "contact flank"}
 """Kinds of start states whose change from one motion to the other is looked for, worded."""
@@ -69,7 +63,9 @@ def find_hop(config: Configuration, step: float = STEP, threads: int | None = No
     ``config`` sweeps the pitch error; ``step``: of the carried sweeps. None where the sweeps
     upwards and downwards agree everywhere.
     """
-    carried = _over(_states_only(config, FOLLOWING_PERIODS), LOW, HIGH, step)
+    config = _states_only(config)
+    carried = _over(config, LOW, HIGH, step)
+    carried = carried.replace("integration.transient_periods", FOLLOWING_PERIODS)
     upwards, downwards = (
         run(carried.replace("start.carry", direction), threads)
         for direction in ("upwards", "downwards")
@@ -84,7 +80,7 @@ def find_hop(config: Configuration, step: float = STEP, threads: int | None = No
     last = _end(upwards, both[max(-2, -both.size)], 2.0 * step)
     fine = step / FINENESS
     low, high = math.ceil(first.value / fine) * fine, math.floor(last.value / fine) * fine
-    within = _over(_states_only(config, config.integration.transient_periods), low, high, fine)
+    within = _over(config, low, high, fine)
     changes = {}
     for kind in STARTS:
         found = run(within.replace("start", {"kind": kind}), threads)
@@ -101,18 +97,18 @@ def exponents_beside(
     """Return the largest exponents on both sides of a change, of the states of a scene.
 
     They are those of the periodic orbits to which the start of ``config`` leads, from their Floquet
-    multipliers. Raises ConfigurationError where there is no such orbit.
+    multipliers; soft axial bearings take long to come to rest. Raises ConfigurationError where
+    there is no such orbit.
     """
     sides = config.replace("sweep", {"parameter": "pitch_error", "values": change})
-    found = run(_states_only(sides, SETTLING_PERIODS), threads)
+    found = run(_states_only(sides), threads)
     lanes = [System.of_lane(found, pitch_error=value) for value in change]
     return [lane.orbit(guess=lane.state).exponent for lane in lanes]
 
 
-def _states_only(config: Configuration, transient_periods: int) -> Configuration:
+def _states_only(config: Configuration) -> Configuration:
     outputs = {"section": config.scene.states, "section_points": 1}
     config = config.replace("outputs", {**outputs, "lyapunov": False, "motion": False})
-    config = config.replace("integration.transient_periods", transient_periods)
     return config.replace("integration.recorded_periods", 1)
 
 
@@ -127,7 +123,7 @@ def _end(sweep: Result, lane: int, step: float) -> Branch:
     value = float(sweep[sweep.axis][lane])
     system = System.of_lane(sweep, pitch_error=value)
     orbit = system.orbit(guess=system.state)
-    return system.follow(orbit, "pitch_error", value, value + step, WIDTH)
+    return system.follow(orbit, "pitch_error", value, value + step)
 
 
 def _distance(found: Result, sweep: Result) -> Floats:

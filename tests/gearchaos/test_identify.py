@@ -184,11 +184,11 @@ class TestALinearPair:
         tried, _ = tried_of(identified)
         found = reach(tried)
         best = tried["values"][np.argmin(tried["misfit"])]
-        assert np.all(found.alone_low < best) and np.all(best < found.alone_high)
+        assert np.all(found.alone[:, 0] < best) and np.all(best < found.alone[:, 1])
         # The misfit is 2 (sqrt(1 + r^2) - 1) of the exponent at least, and may grow by one.
         limit = 1.0 + max(found.surroundings, tried["misfit"].min())
         most = EXPONENT_WIDTH * math.sqrt((1.0 + limit / 2.0) ** 2 - 1.0)
-        assert found.alone_high[0] - best[0] < 2.0 * most
+        assert found.alone[0, 1] - best[0] < 2.0 * most
         for word in ("damping_ratio", "set 1", "exponent at 1", "groups.pitch_error_amplitude = "):
             assert word in identified.out
 

@@ -210,7 +210,8 @@ def test_without_clearance_there_is_no_hop():
 def found():
     """A gallery of few lanes and periods: all that depends on neither."""
     coarse = ["sweep.count=76", *COARSE]
-    full = load_config(sweep_file("pan2021_full.toml"), ["sweep.count=1", *COARSE])
+    # Of the soft axial bearings the transient is a long one.
+    full = load_config(sweep_file("pan2021_full.toml"), ["sweep.count=1", *COARSE[1:]])
     return compute(load_config(sweep_file("pan2021.toml"), coarse), full, hop_step=0.1, periods=8)
 
 
