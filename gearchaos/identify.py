@@ -119,8 +119,7 @@ def _searched(problem: "Problem", judge: "Judge", options: Namespace) -> "Tried"
     return tried
 
 
-_COMMON = ("output", "overwrite", "threads")
-main = Command("identify", __doc__, _arguments, _identify, _COMMON)
+main = Command("identify", __doc__, _arguments, _identify, ("output", "overwrite", "threads"))
 
 if __name__ == "__main__":
     sys.exit(main())

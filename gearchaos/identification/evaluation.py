@@ -7,13 +7,12 @@ from gearchaos_kernels import Outcome, Plan, Status, System, integrate, mesh_mot
 from numpy.typing import NDArray
 
 from gearchaos.configuration import Configuration
-from gearchaos.configuration.run_tables import states_of
 from gearchaos.dynamics.stability import stability_limit
 from gearchaos.dynamics.systems import plan_of, system_of
 from gearchaos.engine.lanes import start_states
 from gearchaos.errors import ConfigurationError
 from gearchaos.records.lyapunov import largest_exponent
-from gearchaos.records.period import return_distances
+from gearchaos.records.period import period_of, return_distances
 
 Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -107,19 +106,13 @@ def require_stable(config: Configuration, values: Floats, parameters: dict[str, 
         )
 
 
-def coordinates_of(config: Configuration) -> tuple[str, ...]:
-    """Return the coordinates whose accelerations `Records` hold, in their order."""
-    return states_of(config.needed_effects)[::2]
-
-
 def _records(system: System, outcome: Outcome, looked_at: NDArray[np.intp], plan: Plan) -> Records:
     """Return what lanes came to, each array with the lanes first."""
     assert outcome.growth is not None
     sound = outcome.status == Status.OK
     # The torsion and its rate: the other coordinates follow them.
     distances = return_distances(outcome.section[..., :2])
-    returns = (distances <= RETURN) & sound[:, np.newaxis]
-    period = np.where(returns.any(axis=1), np.argmax(returns, axis=1) + 1, 0).astype(np.int32)
+    period = np.where(sound, period_of(distances, RETURN), np.int32(0))
     exponent, _ = largest_exponent(outcome.growth, system.mesh_period)
     acceleration = np.full((sound.size, len(system.states) // 2), np.nan)
     finer = plan._replace(

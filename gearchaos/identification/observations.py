@@ -133,7 +133,7 @@ def acceleration_increment(increment: Increment, coordinates: Sequence[str]) -> 
 def observations_of(targets: Targets, coordinates: Sequence[str]) -> list[Observation]:
     """Return all observations, in the order of the targets file's tables.
 
-    ``coordinates``: those of the records, see `coordinates_of`.
+    ``coordinates``: those whose accelerations the records hold.
     """
     return [
         *map(stage_length, targets.stage),

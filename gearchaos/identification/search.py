@@ -13,14 +13,15 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from gearchaos.configuration.run_tables import states_of
 from gearchaos.configuration.toml_text import toml_text
 from gearchaos.engine.provenance import SOFTWARE
 from gearchaos.errors import FileError
-from gearchaos.identification.evaluation import coordinates_of, evaluate
+from gearchaos.identification.evaluation import evaluate
 from gearchaos.identification.loading import Problem
 from gearchaos.identification.observations import misfit, observations_of
 from gearchaos.identification.targets import Search
-from gearchaos.identification.tried import COMPLETE, DIVERGED, Tried, tried_of
+from gearchaos.identification.tried import Tried, tried_of
 from gearchaos.interrupts import check
 
 Floats = NDArray[np.float64]
@@ -59,7 +60,8 @@ class Judge:
 
     def __init__(self, problem: Problem) -> None:
         self.targets, self._config = problem.targets, problem.config
-        self.observations = observations_of(self.targets, coordinates_of(self._config))
+        coordinates = states_of(self._config.needed_effects)[::2]
+        self.observations = observations_of(self.targets, coordinates)
         self.values = np.unique(np.concatenate([one.values for one in self.observations]))
         self._places = [np.searchsorted(self.values, one.values) for one in self.observations]
         ends = [end for one in self.targets.increment for end in (one.from_, one.to)]
@@ -78,7 +80,7 @@ class Judge:
             values=np.stack(list(parameters.values()), axis=1),
             computed=np.stack(computed, axis=1),
             misfit=misfit(np.stack(residuals, axis=1)),
-            status=np.where(diverged, DIVERGED, COMPLETE).astype(np.uint8),
+            status=diverged.astype(np.uint8),
         )
 
 

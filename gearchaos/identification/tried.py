@@ -20,9 +20,8 @@ from gearchaos.results.stored_dataset import UnfitError, datasets_of, scalars_of
 from gearchaos.results.variables import STATUS, Variable, axis_name
 
 CANDIDATE, OBSERVATION = "candidate", "observation"
-COMPLETE, DIVERGED = 0, 1
 MEANINGS = ("complete", "diverged")
-"""Meanings of the status of a candidate: whether all of its lanes were integrated to the end."""
+"""Meanings of the status of a candidate: whether one of its lanes was not integrated to the end."""
 
 
 Tried: TypeAlias = NDArray[np.void]

@@ -86,13 +86,11 @@ def _stages(found: Reproduction, pairs: list[tuple[Printed, Stage | None]]) -> I
 
 
 def _boundaries(pairs: list[tuple[Printed, Stage | None]]) -> Iterator[Row]:
-    kind = published().kinds["boundaries"]
-    boundary = Printed(where="figure 7", rule="boundary", kind=kind)
     for (before, ended), (after, begun) in pairwise(pairs):
         # A boundary has two sides.
         mine = math.nan if ended is None or begun is None else begun.start
         quantity = f"{before.printed} → {after.printed}"
-        yield _row(quantity, boundary, after.first, mine, unit="e(τ)", digits=2)
+        yield _row(quantity, published().boundaries, after.first, mine, unit="e(τ)", digits=2)
 
 
 def _motions(found: Reproduction) -> Iterator[Row]:

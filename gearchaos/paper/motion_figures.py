@@ -95,9 +95,8 @@ def motion_page(found: Reproduction, shown: Printed) -> Page:
         result, label = found.motions_from_contact, f"{from_contact}, from the contact flank"
     lane = lane_of(result, shown.pitch_error)
     with column(86.0) as figure:
-        grid = figure.add_gridspec(2, 2, height_ratios=(0.8, 1.0), wspace=0.1)
-        history = figure.add_subplot(grid[0, :])
-        portrait, section = figure.add_subplot(grid[1, 0]), figure.add_subplot(grid[1, 1])
+        look: dict[str, Any] = {"height_ratios": (0.8, 1.0), "gridspec_kw": {"wspace": 0.1}}
+        history, portrait, section = figure.subplot_mosaic("hh;ps", **look).values()
         end = float(result[TIME][-1])
         time_history(history, result, lane, between=(max(0.0, end - LONG_HISTORY), end))
         phase_portrait(portrait, result, lane)

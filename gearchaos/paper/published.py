@@ -16,7 +16,7 @@ def published() -> Printed:
     text = files("gearchaos.paper").joinpath("published.toml").read_text(encoding="utf-8")
     tables = tomllib.loads(text)
     tables["numbers"] = {key: Printed(**row) for key, row in tables["numbers"].items()}
-    for name in ("contact_lines", "harmonics", "increments"):
+    for name in ("contact_lines", "harmonics", "increments", "boundaries"):
         tables[name] = Printed(**tables[name])
     for name in ("stages", "motions"):
         # What the paper calls as this project does is written once.

@@ -56,7 +56,7 @@ def report(found: Reproduction, names: dict[str, str]) -> str:
         backlash=length_scale * found.group("half_backlash"),
         table_3=_table_3(found.response),
         stages=" ".join(_chaotic_stages(found)),
-        motions=_motions(),
+        shown={motion.figure: motion for motion in published().motions},
         **_of_the_bands(found),
         **_of_the_hop(found),
         **_of_the_increments(found),
@@ -90,17 +90,6 @@ def _table(rows: Iterable[Row]) -> str:
         verdict = f"**{row.verdict}**" if row.verdict is Verdict.DOES_NOT else row.verdict
         lines.append(_line(*row[:-1], verdict))
     return TABLE_HEAD + "\n".join(lines)
-
-
-def _motions() -> str:
-    return "\n\n".join(
-        f"### Figure {motion.figure}\n\n![](figure_{motion.figure:02d}.png)\n\n"
-        f"Torsional motion at *P* = {motion.pitch_error:g}, dimensionless: time history (a), phase "
-        "portrait with one point per mesh period (b), Poincaré section (c). At rest at the start, "
-        "or on the contact flank where the figure says so. "
-        f"In the paper: {motion.printed}."
-        for motion in published().motions
-    )
 
 
 def _table_3(response: Result) -> str:

@@ -31,9 +31,9 @@ def motion_period(section: NDArray[np.float64]) -> NDArray[np.int32]:
     return period_of(return_distances(section))
 
 
-def period_of(distances: NDArray[np.float64]) -> NDArray[np.int32]:
+def period_of(distances: NDArray[np.float64], tolerance: float = TOLERANCE) -> NDArray[np.int32]:
     """Return the smallest period whose return distance (lanes, 16) is within tolerance, or 0."""
-    returns = distances <= TOLERANCE
+    returns = distances <= tolerance
     first = np.argmax(returns, axis=1) + 1
     return np.where(returns.any(axis=1), first, 0).astype(np.int32)
 

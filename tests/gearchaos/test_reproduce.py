@@ -239,6 +239,7 @@ def test_what_was_printed_is_of_three_kinds():
     printed = published()
     kinds = [number.kind for number in printed.numbers.values()]
     kinds += [printed.harmonics.kind, printed.increments.kind, *printed.kinds.values()]
+    kinds.append(printed.boundaries.kind)
     assert {*kinds} == {*KINDS}
 
 
