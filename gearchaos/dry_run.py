@@ -108,7 +108,7 @@ def _thinned(simulation: Simulation, share: float, length: float) -> Configurati
         config = config.replace("pitch_error.realisations", math.ceil(share * repeats / starts))
     recorded = math.ceil(length * plan.recorded_periods)
     for key, value in {
-        "start.count": math.ceil(share * starts),
+        "start.count": math.ceil((share * starts) ** (1.0 / config.start.counted)),
         "integration.steps_per_period": plan.steps_per_period,
         "integration.tolerance": None,
         "integration.transient_periods": math.ceil(length * plan.transient_periods),

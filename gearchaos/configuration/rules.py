@@ -105,20 +105,49 @@ reads("scene")(partial(_named_once, "scene", "effects"))
 reads("outputs")(partial(_named_once, "outputs", "section"))
 reads("scene", "outputs")(partial(_states_exist, "outputs", "section"))
 reads("scene", "start")(partial(_states_exist, "start", "state"))
+reads("scene", "start")(partial(_states_exist, "start", "box"))
 
 
 @reads("start")
 def _start_keys_belong_to_the_kind(config: Tables) -> Iterator[Fault]:
     start, default = config.start, Start()
-    if start.kind == "given" and not start.state:
-        remedy = "such as state = { delta_5 = 1.0 }"
-        yield Fault("start.state", 'is missing with kind = "given"', remedy)
-    homes = {"state": "given", "spread": "random", "seed": "random", "count": "random"}
-    for name, kind in homes.items():
+    needed = {"given": ("state", "delta_5 = 1.0"), "grid": ("box", "delta_5 = [-2.0, 2.0]")}
+    name, example = needed.get(start.kind, ("kind", ""))
+    if not getattr(start, name):
+        rule, remedy = f'is missing with kind = "{start.kind}"', f"such as {name} = {{ {example} }}"
+        yield Fault(f"start.{name}", rule, remedy)
+    homes = {
+        "state": ("given", "grid", "random"),
+        "box": ("grid", "random"),
+        "count": ("grid", "random"),
+        "spread": ("random",),
+        "seed": ("random",),
+    }
+    for name, kinds in homes.items():
         value = getattr(start, name)
-        if start.kind != kind and value != getattr(default, name):
+        if start.kind not in kinds and value != getattr(default, name):
             rule = f'has no meaning with start.kind = "{start.kind}"'
-            yield Fault(f"start.{name}", rule, f'it goes with kind = "{kind}"', value)
+            words = " or ".join(f'"{kind}"' for kind in kinds)
+            yield Fault(f"start.{name}", rule, f"it goes with kind = {words}", value)
+
+
+@reads("start")
+def _box_and_others_fit(config: Tables) -> Iterator[Fault]:
+    start = config.start
+    for name, (low, high) in start.box.items():
+        if not low < high:
+            rule = "must be the lowest value and the highest one"
+            yield Fault(f"start.box.{name}", rule, "exchange or widen them", (low, high))
+        if name in start.state:
+            remedy = "keep one of the two"
+            yield Fault(f"start.state.{name}", "start.box has it as well", remedy)
+    if start.kind == "random":
+        if start.box and start.spread != Start().spread:
+            remedy = "put every state to be drawn into the box"
+            yield Fault("start.spread", "has no meaning beside start.box", remedy, start.spread)
+        if start.state and not start.box:
+            rule = "has no meaning where every state is drawn"
+            yield Fault("start.state", rule, "put those to be drawn into start.box", start.state)
 
 
 @reads("outputs", "integration")

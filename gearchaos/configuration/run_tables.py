@@ -88,29 +88,49 @@ class Scene(Table):
 class Start(Table):
     """The state in which the lanes start."""
 
-    kind: Literal["rest", "contact", "given", "random"] = key(
-        "all zero, on the contact flank, as in `state`, or at random", default="rest"
+    kind: Literal["rest", "contact", "given", "random", "grid"] = key(
+        "all zero, on the contact flank, as in `state`, at random, or on a grid", default="rest"
     )
     state: dict[State, float] = key(
-        'start values by state for kind = "given"; those not named are 0',
+        'start values by state for kind = "given", and beside a box; those not named are 0',
         example={"delta_5": 1.0},
         default={},
     )
+    box: dict[State, Annotated[tuple[float, float], Field(strict=False)]] = key(
+        "lowest and highest start value by state: where a grid reaches, both ends included, or "
+        "where random starts are uniform; those not named are as in `state`",
+        example={"delta_5": [-2.0, 2.0], "delta_5_rate": [-1.5, 1.5]},
+        default={},
+    )
     spread: float = key(
-        'for kind = "random": every state is uniform between minus and plus this',
+        'for kind = "random" without a box: every state is uniform between minus and plus this',
         "1",
         default=1.0,
         gt=0,
     )
     seed: int = key('for kind = "random": seed', default=0, ge=0, le=2**32 - 1)
     count: int = key(
-        'for kind = "random": starts per parameter value', default=1, ge=1, le=_MOST_STARTS
+        "random starts per parameter value, or points of a grid along each state of its box",
+        default=1,
+        ge=1,
+        le=_MOST_STARTS,
     )
     carry: Literal["none", "upwards", "downwards"] = key(
         "whether each value of [sweep] starts from the end state of the one before it, and in "
         "which direction",
         default="none",
     )
+
+    @property
+    def counted(self) -> int:
+        """Number of states along each of which `count` starts lie; 1 but on a grid."""
+        return len(self.box) if self.kind == "grid" else 1
+
+    @property
+    def size(self) -> int:
+        """Number of starts per parameter value."""
+        starts: int = self.count**self.counted
+        return starts
 
 
 class Sweep(Table):

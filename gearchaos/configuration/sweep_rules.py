@@ -120,7 +120,7 @@ def _swept_effect_is_kept(config: Tables) -> Iterator[Fault]:
 def _lanes_are_not_too_many(config: Tables) -> Iterator[Fault]:
     counts = {f"values of [{table}]": sweep.size for table, sweep in config.sweeps.items()}
     counts["drawn gear pairs"] = getattr(config.pitch_error, "realisations", 1)
-    counts["starts"] = config.start.count
+    counts["starts"] = config.start.size
     lanes = math.prod(counts.values())
     if lanes > MOST_LANES:
         product = " x ".join(f"{count} {name}" for name, count in counts.items() if count > 1)

@@ -54,7 +54,7 @@ class Lanes:
         if numbers.size > 1:
             self.axes.append(pair_axis(numbers))
             self._of_systems[REALISATION] = numbers
-        self.starts = config.start.count
+        self.starts = config.start.size
         self.repeats = numbers.size * self.starts
         if self.starts > 1:
             self.axes.append(start_axis(self.starts))
@@ -146,24 +146,31 @@ def start_states(config: Configuration, system: System, numbers: Numbers) -> Flo
     ``numbers`` (lanes,): those that they have in the whole sweep, ascending: the random state of a
     lane depends on its number and the seed alone.
     """
-    start = np.zeros((system.lanes, len(system.states)))
-    kind = config.start.kind
-    if kind == "given":
-        for name, value in config.start.state.items():
-            # What starts in a state that nothing kept depends on is not computed.
-            if name in system.states:
-                start[:, system.states.index(name)] = value
-    elif kind == "contact":
-        start[:, system.states.index("delta_5")] = _contact(system)
+    values: dict[Any, Any] = dict.fromkeys(system.states, 0.0)
+    values |= config.start.state
+    kind, spread = config.start.kind, config.start.spread
+    box: dict[Any, tuple[float, float]] = {**config.start.box}
+    if kind == "contact":
+        values["delta_5"] = _contact(system)
+    elif kind == "grid":
+        count = config.start.count
+        places = np.unravel_index(numbers % config.start.size, [count] * len(box))
+        for (name, bounds), at in zip(box.items(), places, strict=True):
+            values[name] = np.linspace(*bounds, count)[at]
     elif kind == "random":
         first = int(numbers[0])
         generator = np.random.Philox(config.start.seed)
         generator.advance(first * (_DRAWS_PER_LANE // _PHILOX_WIDTH))
         shape = (int(numbers[-1]) - first + 1, _DRAWS_PER_LANE)
         draws = np.random.Generator(generator).uniform(-1.0, 1.0, shape)[numbers - first]
-        columns = [config.scene.states.index(name) for name in system.states]
-        start[:] = config.start.spread * draws[:, columns]
-    return start
+        for name, (low, high) in (
+            box or dict.fromkeys(config.scene.states, (-spread, spread))
+        ).items():
+            place = draws[:, config.scene.states.index(name)]
+            values[name] = (low + high) / 2.0 + (high - low) / 2.0 * place
+    # What starts in a state that nothing kept depends on is not computed.
+    columns = [np.broadcast_to(values[name], system.lanes) for name in system.states]
+    return np.stack(columns, axis=1).astype(np.float64)
 
 
 def _contact(system: System) -> Floats:

@@ -1,0 +1,119 @@
+"""From a result with several starts to its basins of attraction."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gearchaos.dynamics.attractors import Attractor, find_attractors
+from gearchaos.dynamics.systems import plan_of
+from gearchaos.engine.lanes import Lanes
+from gearchaos.engine.refinement import arrived, computable, is_far
+from gearchaos.engine.running import choose_threads
+from gearchaos.errors import ConfigurationError, FileError
+from gearchaos.records.attractor_sets import numbers_along
+from gearchaos.records.basin_entropy import basin_entropy
+from gearchaos.records.label import UNRESOLVED
+from gearchaos.results.basins import Basin, Basins
+from gearchaos.results.result import Result
+from gearchaos.results.shares import Counted
+from gearchaos.results.stage_table import label_text
+from gearchaos.results.variables import (
+    LABELS,
+    LARGEST_EXPONENT,
+    STANDARD_ERROR,
+    START,
+    STEP_ERROR,
+    axis_name,
+)
+
+Numbers = NDArray[np.intp]
+
+NO_MEANS = (
+    *("return_distance", "section_error", STEP_ERROR, "lyapunov_sum"),
+    *(LARGEST_EXPONENT, LARGEST_EXPONENT + STANDARD_ERROR),
+)
+"""Numbers of a lane that tell of its computation, or that a basin has of its own."""
+
+
+def find_basins(result: Result, name: str = "the result", threads: int | None = None) -> Basins:
+    """Find the attractors of a result, their basins, and their numbers along the sweep.
+
+    Attractors are found as `find_attractors` does; those of one value are numbered by their shares,
+    the largest first, unless they go on as one of a lower value, see `numbers_along`. ``result``:
+    over one swept parameter or at a value of it, with several starts; messages call it ``name``.
+    Raises ConfigurationError if it has other axes, FileError if it holds no labels or not its
+    configuration.
+    """
+    if not all(label in result for label in LABELS):
+        raise FileError(f"{name}: holds no labels; run the sweep again with outputs.motion = true")
+    config = computable(result, name).replace("start.carry", "none")
+    parameter, starts = config.sweep.parameter, config.start.size
+    if result.axes not in ((axis_name(parameter), START), (START,)):
+        raise ConfigurationError(
+            f"{name}: has the axes {', '.join(result.axes)}; basins are those of several starts "
+            'over one parameter: set start.kind = "grid" or start.count, fix others with sel (--at)'
+        )
+    choose_threads(threads)
+    lanes = Lanes(config)
+    every = np.arange(len(lanes))
+    system, values = lanes.system_of(every), lanes.values_of(every[::starts])[parameter]
+    motion, period = (result.lanes(label) for label in LABELS)
+    state = arrived(config, system, result.lanes("end_state"), is_far(result).ravel())
+    at_value = every // starts
+    found, place = find_attractors(system, at_value, state, motion, period, plan_of(config))
+    # What has a motion, but no orbit next to its state, is not told either.
+    numbers = -np.maximum(motion, UNRESOLVED).astype(np.intp)
+    numbers[place >= 0] = _numbered(found, place, at_value)[place[place >= 0]]
+    told = [v.name for v in result.variables.values() if v.dims == result.axes]
+    told = [name for name in told if result[name].dtype == float and name not in NO_MEANS]
+    known = LARGEST_EXPONENT in result
+    exponents = result.lanes(LARGEST_EXPONENT) if known else np.full(every.size, np.nan)
+    rows: list[Basin] = []
+    for here in every.reshape(-1, starts):
+        # Those without an attractor come last.
+        for number in sorted({*numbers[here].tolist()}, key=lambda n: (n < 0, abs(n))):
+            mine = here[numbers[here] == number]
+            first, orbit = mine[0], found[place[mine[0]]] if number > 0 else None
+            code, repeats = (motion[first], int(period[first])) if orbit else (-number, 0)
+            multiplier = float(np.abs(orbit.multipliers[0])) if orbit else np.nan
+            exponent = _mean(exponents[mine])
+            if multiplier > 0.0:
+                exponent = np.log(multiplier) / (repeats * system.excitation_period[first])
+            rows.append(
+                Basin(
+                    value=float(values[at_value[first]]),
+                    number=max(number, 0),
+                    motion=label_text(result.variables["motion"].flags[code], repeats),
+                    period=repeats,
+                    multiplier=multiplier,
+                    exponent=float(exponent),
+                    starts=Counted(np.array(mine.size), np.array(starts)),
+                    means={name: _mean(result.lanes(name)[mine]) for name in told},
+                    section=orbit.points if orbit else np.zeros((0, len(system.states))),
+                )
+            )
+    box = config.start.box if config.start.kind == "grid" else {}
+    grid: dict[str, NDArray[np.float64]] = {
+        name: np.linspace(*bounds, config.start.count) for name, bounds in box.items()
+    }
+    shape = [along.size for along in grid.values()]
+    every_start = numbers.reshape(-1, starts)
+    entropy = [basin_entropy(row.reshape(shape)) for row in every_start] if grid else []
+    return Basins(result, axis_name(parameter), values, every_start, rows, grid, entropy)
+
+
+def _numbered(found: list[Attractor], place: Numbers, at_value: Numbers) -> Numbers:
+    """Number the attractors along the sweep, given the places of all lanes among them."""
+    sizes = np.bincount(place[place >= 0], minlength=len(found))
+    there: list[list[int]] = [[] for _ in range(at_value[-1] + 1)]
+    for at in np.argsort(-sizes, kind="stable").tolist():
+        there[at_value[found[at].lane]].append(at)
+    along = numbers_along([[found[at].points for at in some] for some in there])
+    number = np.zeros(len(found), dtype=np.intp)
+    for some, numbers in zip(there, along, strict=True):
+        number[some] = numbers
+    return number
+
+
+def _mean(values: NDArray[np.float64]) -> float:
+    known = values[np.isfinite(values)]
+    return float(known.mean()) if known.size else np.nan
