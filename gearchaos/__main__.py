@@ -10,6 +10,7 @@ COMMANDS = {
     "sweep": "compute a sweep from a configuration file",
     "plot": "draw a result file",
     "stages": "list the stages of a sweep, and refine their boundaries",
+    "basins": "find the attractors of a sweep from many starts, and their basins",
     "response": "compute a motion at every step of some mesh periods",
     "reproduce": "compute, draw and compare everything that a paper shows",
     "info": "tell what a result file holds, and verify it",

@@ -1,6 +1,6 @@
 """Attractors found from where lanes have come to: polished orbits, and long records of the rest."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from gearchaos_kernels import Plan, System, integrate
@@ -44,7 +44,8 @@ def find_attractors(
     state: Floats,
     motion: NDArray[np.uint8],
     period: NDArray[np.int32],
-    plan: Plan,
+    steps_per_period: int,
+    method: str = "rk4",
 ) -> tuple[list[Attractor], Lanes]:
     """Find the attractors of lanes, and to which of them each has come: its place in the list.
 
@@ -56,7 +57,7 @@ def find_attractors(
     within reach of the other. -1 where a lane has no such motion or no orbit is found.
 
     ``group`` (lanes,): lanes of the same parameters share a number; ``motion``, ``period``: labels;
-    ``plan``: steps per mesh period and method, resolved.
+    ``steps_per_period`` and ``method`` as for `polish`.
     """
     rows = np.stack([group, motion, period], axis=1)
     kind = np.unique(rows, axis=0, return_inverse=True)[1].ravel()
@@ -65,13 +66,13 @@ def find_attractors(
     number = np.full(len(state), -1)
     waiting = np.flatnonzero(np.isin(motion, (PERIODIC, QUASI_PERIODIC, CHAOTIC)))
     waiting = waiting[np.argsort(kind[waiting], kind="stable")]
-    tried = 1
+    tried, how = 1, (steps_per_period, method)
     while waiting.size:
         check()
         _, first, sizes = np.unique(kind[waiting], return_index=True, return_counts=True)
         rank = np.arange(waiting.size) - np.repeat(first, sizes)
         some = waiting[rank < tried][:AT_ONCE]
-        for one in _from(system.of(some), some, state[some], period[some], plan):
+        for one in _from(system.of(some), some, state[some], period[some], *how):
             if number[one.lane] >= 0:
                 continue
             mine = of_kind.setdefault(int(kind[one.lane]), [])
@@ -93,19 +94,24 @@ def _is_same(one: Attractor, other: Attractor) -> bool:
 
 
 def _from(
-    system: System, lanes: Lanes, state: Floats, period: NDArray[np.int32], plan: Plan
+    system: System, lanes: Lanes, state: Floats, period: NDArray[np.int32], *how: Any
 ) -> list[Attractor]:
     """Return the attractors of lanes, where there are some."""
-    found = []
-    orbits = polish(system, state, period, plan.steps_per_period, plan.method)
+    steps, method = how
+    repeats, found = system.repeats_after, []
+    orbits = polish(system, state, period, *how)
+    late = np.flatnonzero((period > 0) & ~orbits.stable)
+    if late.size:
+        # Where a longer look told the orbit, the lane may be far from it yet.
+        further = Plan(steps, LONG * repeats, 0, 0, tangent=True, method=method)
+        state[late] = integrate(system.of(late), state[late], further).end_state
+        orbits = polish(system, state, period, *how)
     start = np.where(period[:, np.newaxis] > 0, orbits.points, state)
     for n in np.unique(period).tolist():
         some = np.flatnonzero((period == n) & (orbits.stable | (n == 0)))
-        once, length = system.of(some), (n or LONG) * system.repeats_after
-        longer = plan._replace(
-            transient_periods=0, recorded_periods=length, section_points=length, tangent=True
-        )
-        sections = integrate(once, start[some], longer).every(system.repeats_after).section
+        length = (n or LONG) * repeats
+        plan = Plan(steps, 0, length, length, tangent=True, method=method)
+        sections = integrate(system.of(some), start[some], plan).every(repeats).section
         for at, points in zip(some.tolist(), sections, strict=True):
             if np.isfinite(points).all():
                 half = len(points) // 2

@@ -4,9 +4,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gearchaos.dynamics.attractors import Attractor, find_attractors
-from gearchaos.dynamics.systems import plan_of
 from gearchaos.engine.lanes import Lanes
-from gearchaos.engine.refinement import arrived, computable, is_far
+from gearchaos.engine.refinement import computable
 from gearchaos.engine.running import choose_threads
 from gearchaos.errors import ConfigurationError, FileError
 from gearchaos.records.attractor_sets import numbers_along
@@ -19,6 +18,7 @@ from gearchaos.results.stage_table import label_text
 from gearchaos.results.variables import (
     LABELS,
     LARGEST_EXPONENT,
+    REPEATS,
     STANDARD_ERROR,
     START,
     STEP_ERROR,
@@ -46,8 +46,8 @@ def find_basins(result: Result, name: str = "the result", threads: int | None = 
     if not all(label in result for label in LABELS):
         raise FileError(f"{name}: holds no labels; run the sweep again with outputs.motion = true")
     config = computable(result, name).replace("start.carry", "none")
-    parameter, starts = config.sweep.parameter, config.start.size
-    if result.axes not in ((axis_name(parameter), START), (START,)):
+    starts, swept = config.start.size, [axis for axis in result.axes if axis not in REPEATS]
+    if {*result.axes} != {*swept, START} or len(swept) > 1:
         raise ConfigurationError(
             f"{name}: has the axes {', '.join(result.axes)}; basins are those of several starts "
             'over one parameter: set start.kind = "grid" or start.count, fix others with sel (--at)'
@@ -55,11 +55,13 @@ def find_basins(result: Result, name: str = "the result", threads: int | None = 
     choose_threads(threads)
     lanes = Lanes(config)
     every = np.arange(len(lanes))
-    system, values = lanes.system_of(every), lanes.values_of(every[::starts])[parameter]
+    parameter = swept[0] if swept else axis_name(config.sweep.parameter)
+    values = {axis_name(p): v for p, v in lanes.values_of(every[::starts]).items()}[parameter]
+    system = lanes.system_of(every)
     motion, period = (result.lanes(label) for label in LABELS)
-    state = arrived(config, system, result.lanes("end_state"), is_far(result).ravel())
-    at_value = every // starts
-    found, place = find_attractors(system, at_value, state, motion, period, plan_of(config))
+    state, at_value = result.lanes("end_state"), every // starts
+    how = config.integration.steps_per_period, config.integration.method
+    found, place = find_attractors(system, at_value, state, motion, period, *how)
     # What has a motion, but no orbit next to its state, is not told either.
     numbers = -np.maximum(motion, UNRESOLVED).astype(np.intp)
     numbers[place >= 0] = _numbered(found, place, at_value)[place[place >= 0]]
@@ -81,7 +83,7 @@ def find_basins(result: Result, name: str = "the result", threads: int | None = 
             rows.append(
                 Basin(
                     value=float(values[at_value[first]]),
-                    number=max(number, 0),
+                    number=number,
                     motion=label_text(result.variables["motion"].flags[code], repeats),
                     period=repeats,
                     multiplier=multiplier,
@@ -98,7 +100,7 @@ def find_basins(result: Result, name: str = "the result", threads: int | None = 
     shape = [along.size for along in grid.values()]
     every_start = numbers.reshape(-1, starts)
     entropy = [basin_entropy(row.reshape(shape)) for row in every_start] if grid else []
-    return Basins(result, axis_name(parameter), values, every_start, rows, grid, entropy)
+    return Basins(result, parameter, values, every_start, rows, grid, entropy)
 
 
 def _numbered(found: list[Attractor], place: Numbers, at_value: Numbers) -> Numbers:

@@ -26,8 +26,6 @@ from gearchaos.results.variables import axis_name
 
 Floats = NDArray[np.float64]
 
-Mask = NDArray[np.bool_]
-
 MOST_ROUNDS = 60
 """Bisections after which two different numbers are neighbours."""
 
@@ -159,7 +157,9 @@ def _edges(result: Result) -> NDArray[Any]:
     fields = [("value", "f8"), ("label", object), ("period", "i4"), ("far", "?")]
     edges = np.empty(lanes.values.size, [*fields, ("state", "f8", states.shape[1:])])
     edges["value"], edges["label"], edges["period"] = lanes.values, lanes.labels, lanes.period
-    edges["state"], edges["far"] = states, is_far(result)
+    edges["state"], edges["far"] = states, False
+    if "return_distance" in result:
+        edges["far"] = (lanes.period > 0) & ~(result["return_distance"] <= TOLERANCE)
     return edges
 
 
@@ -184,28 +184,17 @@ def _losses(
     return told
 
 
-def arrived(config: Configuration, system: System, state: Floats, far: Mask) -> Floats:
-    """Let lanes go on whose orbit a longer look told: the end of their record may be far away."""
-    state, lanes = state.copy(), np.flatnonzero(far)
-    if lanes.size:
-        longer = sum(LOOKS) * config.integration.recorded_periods
-        further = plan_of(config, transient_periods=longer, recorded_periods=0)
-        state[lanes] = integrate(system.of(lanes), state[lanes], further).end_state
-    return state
-
-
-def is_far(result: Result) -> Mask:
-    """Whether the end of each lane may be far from the orbit that its label tells."""
-    distance = result["return_distance"] if "return_distance" in result else np.zeros(())
-    return (result["period"] > 0) & ~(distance <= TOLERANCE)
-
-
 def _followed(config: Configuration, edge: NDArray[Any], last: Floats) -> Losses:
     def system(values: Floats) -> System:
         return system_of(config, {config.sweep.parameter: values}, config.needed_effects)
 
-    first = edge["value"]
-    state = arrived(config, system(first), edge["state"], edge["far"])
+    first, state = edge["value"], edge["state"].copy()
+    lanes = np.flatnonzero(edge["far"])
+    if lanes.size:
+        # Where a longer look told the orbit, the end of the record may be far away.
+        longer = sum(LOOKS) * config.integration.recorded_periods
+        further = plan_of(config, transient_periods=longer, recorded_periods=0)
+        state[lanes] = integrate(system(first[lanes]), state[lanes], further).end_state
     lowest, highest = swept_values(config.sweep)[[0, -1]]
     followed = follow(
         system,

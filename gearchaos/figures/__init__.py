@@ -1,5 +1,6 @@
 """Figures drawn from result files alone: no kernel, no simulation, no pyplot."""
 
+from gearchaos.figures.basins import basins, basins_page, fractions
 from gearchaos.figures.diagrams import bifurcation, lyapunov
 from gearchaos.figures.files import save_figure
 from gearchaos.figures.response import (
@@ -15,8 +16,11 @@ from gearchaos.figures.sweep_page import bifurcation_page
 
 __all__ = [
     "amplitude_spectrum",
+    "basins",
+    "basins_page",
     "bifurcation",
     "bifurcation_page",
+    "fractions",
     "lyapunov",
     "phase_portrait",
     "poincare_section",

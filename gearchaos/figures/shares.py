@@ -56,7 +56,7 @@ def shares(
     base, layers = np.zeros(values.size), []
     for motion in sorted(counted.motions, key=known.index, reverse=True):
         top = base + counted.counts[:, counted.motions.index(motion)] / counted.other.lanes
-        layers.append(_layer(axes, values, base, top, motion))
+        layers.append(layer(axes, values, base, top, label=motion, **look_of(motion)))
         base = top
     layers.insert(0, _confidence(axes, values, counted.other, "none"))
     axes.set_ylabel("Share of motions")
@@ -103,9 +103,8 @@ def shares_page(
     return figure
 
 
-def _layer(axes: Axes, values: Floats, base: Floats, top: Floats, motion: str) -> Drawn:
-    """Draw the share of one motion from base to top, both (values,)."""
-    look = {"label": motion, **look_of(motion)}
+def layer(axes: Axes, values: Floats, base: Floats, top: Floats, **look: Any) -> Drawn:
+    """Draw one of several shares on top of each other, from base to top, both (values,)."""
     if values.size <= MOST_BARS:
         width = 0.8 * (np.diff(values).min() if values.size > 1 else 1.0)
         return axes.bar(values, top - base, width, base, linewidth=0.3, **look)
