@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from gearchaos.dynamics.orbits import polish
 from gearchaos.interrupts import check
-from gearchaos.records.attractor_sets import distances
+from gearchaos.records.attractor_sets import ENOUGH, distances
 from gearchaos.records.label import CHAOTIC, PERIODIC, QUASI_PERIODIC
 
 Floats = NDArray[np.float64]
@@ -19,6 +19,9 @@ REACH = 1e-3
 
 LONG = 2000
 """Section points by which an attractor that is not periodic is known."""
+
+SETTLING = 500
+"""Excitation periods after which a motion has come to the attractor to which it leads."""
 
 AT_ONCE = 1024
 """Lanes whose attractor is looked for at once: their long records have to be held."""
@@ -87,6 +90,19 @@ def find_attractors(
         waiting = waiting[(number[waiting] < 0) & ~np.isin(waiting, some)]
         tried *= 4
     return known, number
+
+
+def led_to(
+    system: System, start: Floats, steps_per_period: int, method: str = "rk4"
+) -> NDArray[np.float64]:
+    """Return the section (lanes, points, states) on which lanes move after `SETTLING` periods.
+
+    Once an excitation period; ``start`` (lanes, states) at tau = 0, the others as for `polish`.
+    """
+    repeats = system.repeats_after
+    length = ENOUGH * repeats
+    plan = Plan(steps_per_period, SETTLING * repeats, length, length, tangent=True, method=method)
+    return integrate(system, start, plan).every(repeats).section
 
 
 def _is_same(one: Attractor, other: Attractor) -> bool:

@@ -1,9 +1,12 @@
 """From a result with several starts to its basins of attraction."""
 
+from typing import Any
+
 import numpy as np
+from gearchaos_kernels import System
 from numpy.typing import NDArray
 
-from gearchaos.dynamics.attractors import Attractor, find_attractors
+from gearchaos.dynamics.attractors import Attractor, find_attractors, led_to
 from gearchaos.engine.lanes import Lanes
 from gearchaos.engine.refinement import computable
 from gearchaos.engine.running import choose_threads
@@ -64,7 +67,7 @@ def find_basins(result: Result, name: str = "the result", threads: int | None = 
     found, place = find_attractors(system, at_value, state, motion, period, *how)
     # What has a motion, but no orbit next to its state, is not told either.
     numbers = -np.maximum(motion, UNRESOLVED).astype(np.intp)
-    numbers[place >= 0] = _numbered(found, place, at_value)[place[place >= 0]]
+    numbers[place >= 0] = _numbered(system, found, place, at_value, *how)[place[place >= 0]]
     told = [v.name for v in result.variables.values() if v.dims == result.axes]
     told = [name for name in told if result[name].dtype == float and name not in NO_MEANS]
     known = LARGEST_EXPONENT in result
@@ -103,13 +106,20 @@ def find_basins(result: Result, name: str = "the result", threads: int | None = 
     return Basins(result, parameter, values, every_start, rows, grid, entropy)
 
 
-def _numbered(found: list[Attractor], place: Numbers, at_value: Numbers) -> Numbers:
+def _numbered(
+    system: System, found: list[Attractor], place: Numbers, at_value: Numbers, *how: Any
+) -> Numbers:
     """Number the attractors along the sweep, given the places of all lanes among them."""
     sizes = np.bincount(place[place >= 0], minlength=len(found))
+    lanes = np.array([one.lane for one in found], dtype=np.intp)
+    following = np.minimum(at_value[lanes] + 1, at_value[-1])
+    seeds = np.array([one.points[0] for one in found]).reshape(-1, len(system.states))
+    ahead = led_to(system.of(np.searchsorted(at_value, following)), seeds, *how)
     there: list[list[int]] = [[] for _ in range(at_value[-1] + 1)]
     for at in np.argsort(-sizes, kind="stable").tolist():
-        there[at_value[found[at].lane]].append(at)
-    along = numbers_along([[found[at].points for at in some] for some in there])
+        there[at_value[lanes[at]]].append(at)
+    sets = [[found[at].points for at in some] for some in there]
+    along = numbers_along(sets, [[ahead[at] for at in some] for some in there])
     number = np.zeros(len(found), dtype=np.intp)
     for some, numbers in zip(there, along, strict=True):
         number[some] = numbers

@@ -1,6 +1,7 @@
 """Attractors as sets of section points: how far they lie apart, and which goes on as which."""
 
 from collections.abc import Sequence
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,8 +10,10 @@ from gearchaos.records.period import coordinate_scale
 
 Floats = NDArray[np.float64]
 
-GOES_ON = 0.4
-"""Largest distance of one attractor at two neighbouring values, as `numbers_along` measures it."""
+Sets: TypeAlias = Sequence[Sequence[Floats]]
+
+GOES_ON = 0.1
+"""Largest distance of an attractor from where it is expected, as `numbers_along` measures it."""
 
 ENOUGH = 256
 """Section points by which attractors of different values are compared."""
@@ -35,42 +38,40 @@ def distances(points: Floats, others: Floats, scale: Floats | None = None) -> Fl
     return np.sqrt(nearest / len(scale))
 
 
-def numbers_along(sets: Sequence[Sequence[Floats]]) -> list[list[int]]:
+def numbers_along(sets: Sets, ahead: Sets) -> list[list[int]]:
     """Number the attractors of consecutive values such that what goes on keeps its number.
 
-    ``sets``: of every value the section points (points, states) of each attractor. An attractor
-    goes on as the one of the next value nearest to it, no farther than `GOES_ON`, that no other
-    lies nearer to; on average over the points of the set that has fewer: a period that doubles, and
-    a window in chaos, keep the number. One that is missing at some values returns with its number
-    where it is nearer than any that is not. A state is measured by its range over the whole sweep,
-    or half its largest size if that is more.
+    ``sets``: of every value the section points (points, states) of each attractor; ``ahead``: those
+    of the motion to which it leads at the next value. An attractor goes on as that on which this
+    motion lies, to `GOES_ON`, on average over the points of the set that has fewer; where several
+    lead to one, the nearest of them does. One that is missing at some values returns with its
+    number. A state is measured by its range over the sweep, or half its largest size if that is
+    more.
     """
     every = np.concatenate([points for found in sets for points in found] or [np.zeros((1, 1))])
     scale = np.maximum(np.ptp(every, axis=0), np.abs(every).max(axis=0) / 2.0)
     scale = np.where(scale > 0.0, scale, 1.0)
-    latest: list[Floats] = []
-    seen: list[int] = []
+    # Of each number: the value at which it was seen last, its points there and ahead.
+    latest: list[tuple[int, Floats, Floats]] = []
     numbers = []
     for value, found in enumerate(sets):
-        pairs = [
-            (value - seen[k], _apart(one[:ENOUGH], other[:ENOUGH], scale), i, k)
-            for i, one in enumerate(found)
-            for k, other in enumerate(latest)
-        ]
+        pairs = []
+        for i, one in enumerate(found):
+            for k, (seen, before, led) in enumerate(latest):
+                off = _apart(one, led, scale)
+                if off <= GOES_ON:
+                    pairs.append((value - seen, off + _apart(one, before, scale), i, k))
         own: dict[int, int] = {}
-        for _, apart, i, k in sorted(pairs):
-            if apart <= GOES_ON and i not in own and k not in own.values():
+        for _, _, i, k in sorted(pairs):
+            if i not in own and k not in own.values():
                 own[i] = k
         for i, points in enumerate(found):
-            if i not in own:
-                own[i] = len(latest)
-                latest.append(points)
-                seen.append(value)
-            latest[own[i]], seen[own[i]] = points, value
+            k = own.setdefault(i, len(latest))
+            latest[k:] = [(value, points, ahead[value][i]), *latest[k + 1 :]]
         numbers.append([own[i] + 1 for i in range(len(found))])
     return numbers
 
 
 def _apart(one: Floats, other: Floats, scale: Floats) -> float:
-    fewer, more = sorted((one, other), key=len)
+    fewer, more = sorted((one[:ENOUGH], other[:ENOUGH]), key=len)
     return float(np.mean(distances(fewer, more, scale)))
