@@ -38,7 +38,7 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
     add("--refine", type=_width, metavar="WIDTH", help=text)
     text = (
         "where to fix an axis of a result that has several, at the nearest of its values; may be "
-        "repeated (default: the first value of each but the first swept parameter)"
+        "repeated (default: the first value of a second parameter, all starts and gear pairs)"
     )
     add("--at", type=place, action="append", default=[], metavar="NAME=VALUE", help=text)
     text = (
@@ -68,19 +68,27 @@ def _stages(options: argparse.Namespace) -> int:
     from gearchaos.results.jumps import crises, jumps
     from gearchaos.results.overview import finite, slice_lines
     from gearchaos.results.result import open_result
-    from gearchaos.results.stage_table import labelled_lanes, one_axis, slice_facts, stage_table
-    from gearchaos.results.variables import RECORD
+    from gearchaos.results.stage_table import (
+        lanes_of_all_repeats,
+        one_axis,
+        slice_facts,
+        stage_table,
+    )
+    from gearchaos.results.variables import RECORD, REPEATS
 
     whole = open_result(options.result)
-    result = one_axis(whole, **coordinates(options.at, whole.axes, whole.axis))
+    # What is computed again is that of one pair and one start.
+    kept = REPEATS if options.refine is None and options.survival is None else ()
+    result = one_axis(whole, kept, **coordinates(options.at, whole.axes, whole.axis))
     where = slice_facts(whole, result)
-    stages = stage_table(labelled_lanes(result, name=options.result), options.narrowest)
+    stages = stage_table(lanes_of_all_repeats(result, name=options.result), options.narrowest)
     boundaries = _refined(result, stages, options) if options.refine is not None else None
     for at, boundary in enumerate(boundaries or ()):
         stages[at] = stages[at]._replace(end=boundary.below)
         stages[at + 1] = stages[at + 1]._replace(start=boundary.above)
     outlasting = _survival(result, options) if options.survival is not None else None
-    jumping, bursting = jumps(result), crises(result)
+    several = [axis for axis in result.axes if axis in REPEATS]
+    jumping, bursting = ([], []) if several else (jumps(result), crises(result))
     if options.json:
         refined = {} if boundaries is None else {"boundaries": [*map(_named, boundaries)]}
         facts = {
@@ -97,7 +105,11 @@ def _stages(options: argparse.Namespace) -> int:
     mixed = int((result[RECORD] == 1).sum()) if RECORD in result else 0
     told = [*band_lines(stages), *remarks(jumping, bursting, mixed)]
     told += [outlasting.text] if outlasting else []
-    head = [*slice_lines(where), excitation_of(result.metadata).in_words]
+    head = [
+        f"all {result[axis].size} values of {axis}, of which --at {axis}=VALUE chooses one"
+        for axis in several
+    ]
+    head += [*slice_lines(where), excitation_of(result.metadata).in_words]
     first = table(result.axis, stages, [*filter(None, head)])
     parts = map("\n".join, (first, told, boundary_list(boundaries or ())))
     print("\n\n".join(filter(None, parts)))

@@ -13,8 +13,12 @@ from gearchaos.figures.labels import legend_title
 from gearchaos.figures.lanes import swept_axes
 from gearchaos.figures.style import LEGEND, SMALL_FONT_PT
 from gearchaos.results.result import Result
-from gearchaos.results.stage_table import LabelledLanes, Stage, labelled_lanes, stage_table
-from gearchaos.results.variables import LABELS, REPEATS
+from gearchaos.results.stage_table import (
+    LabelledLanes,
+    Stage,
+    lanes_of_all_repeats,
+    stage_table,
+)
 
 # Blues that darken with the period, but for period 3, the window in chaos that is looked for. Those
 # without hatching differ in lightness, and all are light enough for black points to stand out.
@@ -94,7 +98,7 @@ def shade_stages(
             f"stages are those of one axis, but the result has {', '.join(result.axes)}; fix the "
             "others with result.sel"
         )
-    lanes = _of_all_repeats(result) if lanes is None else lanes
+    lanes = lanes_of_all_repeats(result) if lanes is None else lanes
     low, high = sorted(axes.get_xlim())
     stages = stage_table(lanes, NARROWEST_SHARE * (high - low) if narrowest is None else narrowest)
     # Neighbours meet halfway between their lanes, and the outermost reach to the ends of the axis.
@@ -130,13 +134,3 @@ def _kind(stage: Stage, lanes: LabelledLanes) -> str:
     if np.mean(lanes.labels[stage.first : stage.last + 1] == stage.label) < OWN_SHARE:
         return "several motions"
     return "period 4 or more" if stage.period > 3 else stage.label
-
-
-def _of_all_repeats(result: Result) -> LabelledLanes:
-    """Take the labels of all pairs and starts; where they differ, the motion has no period."""
-    first = {axis: result[axis][0] for axis in REPEATS if axis in result.axes}
-    lanes = labelled_lanes(result.sel(**first))
-    every = [result[name].reshape(lanes.values.size, -1) for name in LABELS]
-    differ = np.any([labels != labels[:, :1] for labels in every], axis=(0, 2))
-    labels = np.where(differ, "several motions", lanes.labels)
-    return lanes._replace(labels=labels, period=np.where(differ, 0, lanes.period))

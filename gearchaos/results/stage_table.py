@@ -1,5 +1,6 @@
 """Stages of a sweep: stretches of the swept parameter over which the motion keeps its label."""
 
+from collections.abc import Sequence
 from heapq import heapify, heappop, heappush
 from itertools import pairwise
 from typing import NamedTuple
@@ -83,16 +84,34 @@ def labelled_lanes(result: Result, *, name: str = "the result") -> LabelledLanes
     return LabelledLanes(result[result.axis], np.array(labels), period, exponent, bands)
 
 
-def one_axis(result: Result, **coordinates: float) -> Result:
+def lanes_of_all_repeats(result: Result, *, name: str = "the result") -> LabelledLanes:
+    """Take the labels of all pairs and starts, as `labelled_lanes` does those of one of each.
+
+    Where they differ, the motion is "several motions", without a period or an exponent.
+    """
+    first = {axis: result[axis][0] for axis in REPEATS if axis in result.axes}
+    lanes = labelled_lanes(result.sel(**first), name=name)
+    every = [result[label].reshape(lanes.values.size, -1) for label in LABELS]
+    differ = np.any([labels != labels[:, :1] for labels in every], axis=(0, 2))
+    return lanes._replace(
+        labels=np.where(differ, "several motions", lanes.labels),
+        period=np.where(differ, 0, lanes.period),
+        exponent=np.where(differ, np.nan, lanes.exponent),
+        bands=np.where(differ, 0, lanes.bands),
+    )
+
+
+def one_axis(result: Result, kept: Sequence[str] = (), /, **coordinates: float) -> Result:
     """Take the slice of a result along one swept parameter, at the coordinates nearest to these.
 
-    Other axes are fixed at their first value. Raises ConfigurationError if there is no such axis,
-    or if no swept parameter is left.
+    Other axes are fixed at their first value, but for those that are ``kept``. Raises
+    ConfigurationError if there is no such axis, or if no swept parameter is left.
     """
     part = result.sel("nearest", **coordinates)
     if part.axis in ("", *REPEATS):
         raise ConfigurationError(f"{', '.join(coordinates)}: fixed, no swept parameter is left")
-    return part.sel(**{name: part[name][0] for name in part.axes if name != part.axis})
+    kept = (part.axis, *kept)
+    return part.sel(**{name: part[name][0] for name in part.axes if name not in kept})
 
 
 def slice_facts(result: Result, part: Result) -> dict[str, dict[str, float]]:

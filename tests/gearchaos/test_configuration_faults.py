@@ -132,6 +132,31 @@ ONE_FAULT = [
         'add "axial"',
     ),
     ("start.seed=5", "start.seed = 5", 'no meaning with start.kind = "rest"', '"random"'),
+    ("start.kind=grid", "start.box", 'is missing with kind = "grid"', "box = {"),
+    (
+        "start={kind='grid', box={delta_5=[1.0, 1.0]}}",
+        "start.box.delta_5 = [1.0, 1.0]",
+        "must be the lowest value and the highest one",
+    ),
+    (
+        "start={kind='grid', box={delta_4=[0.0, 1.0]}}",
+        "start.box",
+        "the scene has no state `delta_4`",
+        'add "axial"',
+    ),
+    (
+        "start={kind='grid', box={delta_5=[0.0, 1.0]}, state={delta_5=1.0}}",
+        "start.state.delta_5",
+        "start.box has it as well",
+    ),
+    (
+        "start={kind='random', box={delta_5=[0.0, 1.0]}, spread=2.0}",
+        "start.spread = 2.0",
+        "no meaning beside start.box",
+    ),
+    ("start={kind='random', state={delta_5=1.0}}", "start.state", "every state is drawn"),
+    ("start={kind='contact', box={delta_5=[0.0, 1.0]}}", "start.box", '"grid" or "random"'),
+    ("start={kind='grid', count=20000, box={delta_5=[0, 1], delta_1=[0, 1]}}", "400000000 starts"),
     (
         "outputs.section_points=501",
         "outputs.section_points = 501",

@@ -4,9 +4,11 @@ import json
 import subprocess
 import sys
 
+import numpy as np
 import pytest
 
 import gearchaos
+from gearchaos.engine.refinement import refinable
 from gearchaos.results.result import Result
 
 from .commands import run_module
@@ -81,6 +83,23 @@ def test_boundaries_are_refined_and_the_period_doubling_is_told(folder):
     assert doubling["multiplier_real"] == pytest.approx(-1.0, abs=0.02)
     assert facts["stages"][0]["to"] == doubling["below"]
     assert facts["stages"][1]["from"] == doubling["above"]
+
+
+def test_a_start_of_a_grid_is_refined_as_it_started():
+    """Of pan2021_first.toml a start at rest hops at 1.044."""
+    grid = (
+        "sweep={parameter='pitch_error', values=[1.04, 1.05]}",
+        "start={kind='grid', count=3, box={delta_5=[-1.0, 1.0]}}",
+        "integration.transient_periods=200",
+        "integration.recorded_periods=48",
+        "outputs.section_points=1",
+    )
+    found = gearchaos.run(gearchaos.load_config(PAN2021, grid))
+    config = refinable(found.sel(start=1), "hop.h5")
+    assert (config.start.kind, config.start.size) == ("given", 1)
+    assert not any(config.start.state.values())
+    again = gearchaos.run(config)
+    assert np.array_equal(again["end_state"], found["end_state"][:, 1])
 
 
 def test_a_torus_is_born_in_a_neimark_sacker_bifurcation(tmp_path):
@@ -175,15 +194,24 @@ def test_a_slice_is_named_and_the_first_one_is_not_all(several, tmp_path):
     assert ended.code == 0
     assert ended.out.splitlines()[:3] == [
         "stages over pitch_error",
+        "all 2 values of start, of which --at start=VALUE chooses one",
         "slice load = 0.1, the first of 3; others with --at load=VALUE",
-        "slice start = 0, the first of 2; others with --at start=VALUE",
     ]
     facts = listed(tmp_path)
-    assert facts["slice"] == {
-        "load": {"value": 0.1, "number": 1, "of": 3},
-        "start": {"value": 0.0, "number": 1, "of": 2},
-    }
+    assert facts["slice"] == {"load": {"value": 0.1, "number": 1, "of": 3}}
     assert sum(stage["lanes"] for stage in facts["stages"]) == several["pitch_error"].size
+
+
+def test_where_starts_come_to_different_motions_the_stage_says_so(several, tmp_path):
+    labels = np.stack([several["motion"][0], several["period"][0]])
+    differ = (labels != labels[:, :, :1]).any(axis=(0, 2))
+    assert differ.any()
+    told = [stage for stage in listed(tmp_path)["stages"] if stage["motion"] == "several motions"]
+    assert sum(stage["lanes"] for stage in told) == differ.sum()
+    assert all(stage["highest_exponent"] is None for stage in told)
+    one = listed(tmp_path, "--at", "start=1")
+    assert one["slice"]["start"] == {"value": 1.0, "number": 2, "of": 2}
+    assert "several motions" not in {stage["motion"] for stage in one["stages"]}
 
 
 def test_another_slice_is_listed_at_the_nearest_values(several, tmp_path):

@@ -60,3 +60,33 @@ def test_random_starts_follow_from_the_seed_and_nothing_else():
 def test_random_start_of_a_lane_does_not_depend_on_its_block(first, last):
     sweep = simulation(*RANDOM)
     assert np.array_equal(starts_of(sweep, first, last), starts_of(sweep)[first:last])
+
+
+BOX = "start.box={delta_5=[-2.0, 1.0], delta_2_rate=[0.0, 0.5]}"
+
+
+def test_a_grid_holds_every_pair_of_its_values_the_last_state_running_fastest():
+    sweep = simulation("start.kind=grid", "start.count=4", BOX, "start.state={delta_1=0.3}")
+    start = starts_of(sweep).reshape(13, 16, 6)
+    columns = [sweep.lanes.states.index(name) for name in ("delta_5", "delta_2_rate")]
+    grid = np.stack(np.meshgrid([-2, -1, 0, 1], np.linspace(0.0, 0.5, 4), indexing="ij"), axis=2)
+    assert (start[:, :, columns] == grid.reshape(16, 2)).all()
+    assert (start[:, :, sweep.lanes.states.index("delta_1")] == 0.3).all()
+    assert np.count_nonzero(start.any(axis=(0, 1))) == 3
+    assert sweep.lanes.shape == (13, 16)
+
+
+def test_a_lane_of_a_grid_starts_where_it_does_in_any_block():
+    sweep = simulation("start.kind=grid", "start.count=4", BOX)
+    assert np.array_equal(starts_of(sweep, 21, 40), starts_of(sweep)[21:40])
+
+
+def test_random_starts_fill_a_box_and_leave_other_states_as_given():
+    more = ("start.count=200", BOX, "start.state={delta_1=0.3}")
+    sweep = simulation("start.kind=random", *more)
+    start = starts_of(sweep)
+    inside = {"delta_5": (-2.0, 1.0), "delta_2_rate": (0.0, 0.5)}
+    for name, column in zip(sweep.lanes.states, start.T, strict=True):
+        low, high = inside.get(name, (0.3, 0.3) if name == "delta_1" else (0.0, 0.0))
+        assert low <= column.min() <= low + 0.01 * (high - low)
+        assert high - 0.01 * (high - low) <= column.max() <= high
