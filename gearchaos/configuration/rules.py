@@ -111,43 +111,32 @@ reads("scene", "start")(partial(_states_exist, "start", "box"))
 @reads("start")
 def _start_keys_belong_to_the_kind(config: Tables) -> Iterator[Fault]:
     start, default = config.start, Start()
+    kind, boxed = start.kind, " and a box" if start.box else ""
     needed = {"given": ("state", "delta_5 = 1.0"), "grid": ("box", "delta_5 = [-2.0, 2.0]")}
-    name, example = needed.get(start.kind, ("kind", ""))
+    name, example = needed.get(kind, ("kind", ""))
     if not getattr(start, name):
-        rule, remedy = f'is missing with kind = "{start.kind}"', f"such as {name} = {{ {example} }}"
-        yield Fault(f"start.{name}", rule, remedy)
+        remedy = f"such as {name} = {{ {example} }}"
+        yield Fault(f"start.{name}", f'is missing with kind = "{kind}"', remedy)
+    drawn = kind == "random"
     homes = {
-        "state": ("given", "grid", "random"),
-        "box": ("grid", "random"),
-        "count": ("grid", "random"),
-        "spread": ("random",),
-        "seed": ("random",),
+        "state": (kind == "given" or boxed, 'kind = "given" or a box'),
+        "box": (kind == "grid" or drawn, 'kind = "grid" or "random"'),
+        "count": (kind == "grid" or drawn, 'kind = "grid" or "random"'),
+        "spread": (drawn and not boxed, 'kind = "random" without a box'),
+        "seed": (drawn, 'kind = "random"'),
     }
-    for name, kinds in homes.items():
+    for name, (at_home, home) in homes.items():
         value = getattr(start, name)
-        if start.kind not in kinds and value != getattr(default, name):
-            rule = f'has no meaning with start.kind = "{start.kind}"'
-            words = " or ".join(f'"{kind}"' for kind in kinds)
-            yield Fault(f"start.{name}", rule, f"it goes with kind = {words}", value)
-
-
-@reads("start")
-def _box_and_others_fit(config: Tables) -> Iterator[Fault]:
-    start = config.start
-    for name, (low, high) in start.box.items():
-        if not low < high:
+        if not at_home and value != getattr(default, name):
+            rule = f'has no meaning with start.kind = "{kind}"{boxed}'
+            yield Fault(f"start.{name}", rule, f"it goes with {home}", value)
+    for name, bounds in start.box.items():
+        if not bounds[0] < bounds[1]:
             rule = "must be the lowest value and the highest one"
-            yield Fault(f"start.box.{name}", rule, "exchange or widen them", (low, high))
+            yield Fault(f"start.box.{name}", rule, "exchange or widen them", bounds)
         if name in start.state:
-            remedy = "keep one of the two"
-            yield Fault(f"start.state.{name}", "start.box has it as well", remedy)
-    if start.kind == "random":
-        if start.box and start.spread != Start().spread:
-            remedy = "put every state to be drawn into the box"
-            yield Fault("start.spread", "has no meaning beside start.box", remedy, start.spread)
-        if start.state and not start.box:
-            rule = "has no meaning where every state is drawn"
-            yield Fault("start.state", rule, "put those to be drawn into start.box", start.state)
+            rule = "start.state has a value of it as well"
+            yield Fault(f"start.box.{name}", rule, "keep one of the two", bounds)
 
 
 @reads("outputs", "integration")

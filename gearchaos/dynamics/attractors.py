@@ -10,6 +10,7 @@ from gearchaos.dynamics.orbits import polish
 from gearchaos.interrupts import check
 from gearchaos.records.attractor_sets import ENOUGH, distances
 from gearchaos.records.label import CHAOTIC, PERIODIC, QUASI_PERIODIC
+from gearchaos.records.period import POINTS_NEEDED
 
 Floats = NDArray[np.float64]
 Lanes = NDArray[np.intp]
@@ -17,11 +18,9 @@ Lanes = NDArray[np.intp]
 REACH = 1e-3
 """Distance from a periodic orbit, relative to its size, within which a lane has come to it."""
 
-LONG = 2000
-"""Section points by which an attractor that is not periodic is known."""
-
-SETTLING = 500
-"""Excitation periods after which a motion has come to the attractor to which it leads."""
+LONG, SETTLING = 2000, 500
+"""Mesh periods by which an attractor that is not periodic is known, and after which a motion has
+come to the attractor to which it leads; whole excitation periods, see `_whole`."""
 
 AT_ONCE = 1024
 """Lanes whose attractor is looked for at once: their long records have to be held."""
@@ -55,7 +54,7 @@ def find_attractors(
     A lane whose ``state`` (lanes, states) at tau = 0 lies within reach of a known attractor of its
     group, motion and period has come to that, whatever its phase; from others the attractor is
     found anew, first one of each kind, then ever more. A periodic one is a polished stable orbit;
-    any other is the section of `LONG` excitation periods, and its reach the largest distance of the
+    any other is the section of `LONG` mesh periods, and its reach the largest distance of the
     later half from the earlier one. Two are the same where at least half of the points of one lie
     within reach of the other. -1 where a lane has no such motion or no orbit is found.
 
@@ -95,14 +94,19 @@ def find_attractors(
 def led_to(
     system: System, start: Floats, steps_per_period: int, method: str = "rk4"
 ) -> NDArray[np.float64]:
-    """Return the section (lanes, points, states) on which lanes move after `SETTLING` periods.
+    """Return the section (lanes, points, states) on which lanes move after `SETTLING`.
 
     Once an excitation period; ``start`` (lanes, states) at tau = 0, the others as for `polish`.
     """
-    repeats = system.repeats_after
-    length = ENOUGH * repeats
-    plan = Plan(steps_per_period, SETTLING * repeats, length, length, tangent=True, method=method)
-    return integrate(system, start, plan).every(repeats).section
+    length = _whole(ENOUGH, system)
+    before = _whole(SETTLING, system)
+    plan = Plan(steps_per_period, before, length, length, tangent=True, method=method)
+    return integrate(system, start, plan).every(system.repeats_after).section
+
+
+def _whole(periods: int, system: System) -> int:
+    """Round mesh periods down to whole excitation periods, enough of them to tell a period."""
+    return system.repeats_after * max(POINTS_NEEDED, periods // system.repeats_after)
 
 
 def _is_same(one: Attractor, other: Attractor) -> bool:
@@ -119,13 +123,13 @@ def _from(
     late = np.flatnonzero((period > 0) & ~orbits.stable)
     if late.size:
         # Where a longer look told the orbit, the lane may be far from it yet.
-        further = Plan(steps, LONG * repeats, 0, 0, tangent=True, method=method)
+        further = Plan(steps, _whole(LONG, system), 0, 0, tangent=True, method=method)
         state[late] = integrate(system.of(late), state[late], further).end_state
         orbits = polish(system, state, period, *how)
     start = np.where(period[:, np.newaxis] > 0, orbits.points, state)
     for n in np.unique(period).tolist():
         some = np.flatnonzero((period == n) & (orbits.stable | (n == 0)))
-        length = (n or LONG) * repeats
+        length = n * repeats or _whole(LONG, system)
         plan = Plan(steps, 0, length, length, tangent=True, method=method)
         sections = integrate(system.of(some), start[some], plan).every(repeats).section
         for at, points in zip(some.tolist(), sections, strict=True):

@@ -48,6 +48,7 @@ def find_basins(result: Result, name: str = "the result", threads: int | None = 
     """
     if not all(label in result for label in LABELS):
         raise FileError(f"{name}: holds no labels; run the sweep again with outputs.motion = true")
+    motion, period = (result.lanes(label) for label in LABELS)
     config = computable(result, name).replace("start.carry", "none")
     starts, swept = config.start.size, [axis for axis in result.axes if axis not in REPEATS]
     if {*result.axes} != {*swept, START} or len(swept) > 1:
@@ -57,11 +58,12 @@ def find_basins(result: Result, name: str = "the result", threads: int | None = 
         )
     choose_threads(threads)
     lanes = Lanes(config)
+    if (len(lanes), lanes.states) != (motion.size, result.variables["state"].flags):
+        raise FileError(f"{name}: holds the configuration of other lanes; run the sweep again")
     every = np.arange(len(lanes))
     parameter = swept[0] if swept else axis_name(config.sweep.parameter)
     values = {axis_name(p): v for p, v in lanes.values_of(every[::starts]).items()}[parameter]
     system = lanes.system_of(every)
-    motion, period = (result.lanes(label) for label in LABELS)
     state, at_value = result.lanes("end_state"), every // starts
     how = config.integration.steps_per_period, config.integration.method
     found, place = find_attractors(system, at_value, state, motion, period, *how)

@@ -136,6 +136,9 @@ def test_results_without_several_starts_labels_or_configuration_are_refused(grid
         find_basins(changed(grid, without="period"), "grid.h5")
     with pytest.raises(FileError, match="holds no configuration"):
         find_basins(changed(grid, configuration_resolved=""))
+    text = grid.metadata["configuration_resolved"].replace("count = 11", "count = 9")
+    with pytest.raises(FileError, match="the configuration of other lanes"):
+        find_basins(changed(grid, configuration_resolved=text))
 
 
 def run(folder, *arguments: str):

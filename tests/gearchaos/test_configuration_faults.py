@@ -146,15 +146,15 @@ ONE_FAULT = [
     ),
     (
         "start={kind='grid', box={delta_5=[0.0, 1.0]}, state={delta_5=1.0}}",
-        "start.state.delta_5",
-        "start.box has it as well",
+        "start.box.delta_5",
+        "start.state has a value of it as well",
     ),
     (
         "start={kind='random', box={delta_5=[0.0, 1.0]}, spread=2.0}",
         "start.spread = 2.0",
-        "no meaning beside start.box",
+        'no meaning with start.kind = "random" and a box',
     ),
-    ("start={kind='random', state={delta_5=1.0}}", "start.state", "every state is drawn"),
+    ("start={kind='random', state={delta_5=1.0}}", "start.state", '"given" or a box'),
     ("start={kind='contact', box={delta_5=[0.0, 1.0]}}", "start.box", '"grid" or "random"'),
     ("start={kind='grid', count=20000, box={delta_5=[0, 1], delta_1=[0, 1]}}", "400000000 starts"),
     (
