@@ -10,13 +10,14 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from gearchaos.errors import FigureError
-from gearchaos.figures.labels import axis_label, in_words, legend_title, scale_of
+from gearchaos.figures.labels import axis_label, in_words, legend_title
 from gearchaos.figures.lanes import diagram_lanes
 from gearchaos.figures.page import Page, few_ticks, page
 from gearchaos.figures.shares import Drawn, layer
 from gearchaos.figures.stages import look_of
 from gearchaos.figures.style import BLACK, LEGEND, SINGLE_COLUMN_MM, SMALL_FONT_PT
 from gearchaos.results.basins import Basin, Basins
+from gearchaos.results.units import unit_of
 from gearchaos.results.variables import STATE_WORDING
 
 COLORS = ("#D6E6F3", "#EDBE62", "#5DB898", "#C284AD", "#B4602F", "#4C6E8E")
@@ -148,7 +149,8 @@ def _marker(one: Basin) -> dict[str, Any]:
 
 def _label(state: str) -> str:
     wording, symbol = STATE_WORDING[state]
-    return f"{wording[:1].upper()}{wording[1:]}, {symbol} ({scale_of(state)})"
+    unit = unit_of(state)
+    return f"{wording[:1].upper()}{wording[1:]}, {symbol} ({unit.stands_for if unit else '1'})"
 
 
 def _in_words(one: Basin) -> str:
