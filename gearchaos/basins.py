@@ -7,6 +7,7 @@ the command line asks for what cannot be, 4 a file cannot be read or written or 
 
 import argparse
 import json
+import math
 import sys
 import textwrap
 from collections.abc import Iterator
@@ -16,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 from gearchaos.command_line import OK, Command, coordinates, place
 
 if TYPE_CHECKING:
-    from gearchaos.results.basins import Basin, Basins
+    from gearchaos.results.basins import Basins
 
 WIDTH = 80
 """Columns of a terminal."""
@@ -59,7 +60,8 @@ def _basins(options: argparse.Namespace) -> int:
         found = find_basins(part, options.result, options.threads)
     where = slice_facts(whole, part)
     if options.json:
-        facts = {"parameter": found.parameter, "slice": where, "values": [*_values(found)]}
+        values = [_facts(found, at) for at in range(found.values.size)]
+        facts = {"parameter": found.parameter, "slice": where, "values": values}
         print(json.dumps(finite(facts), indent=1, allow_nan=False))
     else:
         print("\n".join([*table(found, slice_lines(where))]))
@@ -76,42 +78,33 @@ def table(found: "Basins", where: list[str]) -> Iterator[str]:
     head = f"{'value':>10}  {'no':>3}  {'motion':15}{'multiplier':>10}  {'exponent':>9}"
     yield f"{head}  {'share':>7}  95 % confidence"
     for one in found.basins:
-        low, high = one.starts.intervals
         number = str(one.number) if one.number > 0 else "-"
-        yield (
-            f"{one.value:10.6g}  {number:>3}  {one.motion:15}{_known(one.multiplier, 10)}  "
-            f"{_known(one.exponent, 9)}  {one.starts.shares:7.4f}  {low:.4f} to {high:.4f}"
-        )
-    for value, entropy in zip(found.values, found.entropy, strict=False):
-        told = f"basin entropy {entropy.basin:.4f}, of the boundary alone {entropy.boundary:.4f}"
-        yield f"{value:10.6g}  {told}"
+        multiplier = "" if math.isnan(one.multiplier) else f"{one.multiplier:.4f}"
+        exponent = "" if math.isnan(one.exponent) else f"{one.exponent:.4f}"
+        words = f"{one.value:10.6g}  {number:>3}  {one.motion:15}{multiplier:>10}  {exponent:>9}"
+        low, high = one.starts.intervals
+        yield f"{words}  {one.starts.shares:7.4f}  {low:.4f} to {high:.4f}"
+    for value, (basin, boundary) in zip(found.values, found.entropy, strict=False):
+        yield f"{value:10.6g}  basin entropy {basin:.4f}, of the boundary alone {boundary:.4f}"
     for one in found.basins if found.values.size == 1 else ():
-        means = (f"{name} {mean:.4g}" for name, mean in one.means.items() if mean == mean)
-        if one.number > 0:
-            lead = f"{one.number}: "
-            yield from textwrap.wrap(lead + ", ".join(means), WIDTH, subsequent_indent="   ")
+        means = [f"{name} {mean:.4g}" for name, mean in one.means.items() if not math.isnan(mean)]
+        if one.number > 0 and means:
+            text = f"{one.number}: {', '.join(means)}"
+            yield from textwrap.wrap(text, WIDTH, subsequent_indent="   ")
 
 
-def _known(value: float, width: int) -> str:
-    return f"{value:{width}.4f}" if value == value else " " * width
-
-
-def _values(found: "Basins") -> Iterator[dict[str, Any]]:
-    for at, value in enumerate(found.values.tolist()):
-        facts: dict[str, Any] = {"value": value, "starts": found.numbers.shape[1]}
-        if found.entropy:
-            basin, boundary = found.entropy[at]
-            facts |= {"basin_entropy": basin, "boundary_basin_entropy": boundary}
-        here = [_facts(one) for one in found.basins if one.value == value]
-        yield facts | {"basins": here}
-
-
-def _facts(one: "Basin") -> dict[str, Any]:
-    facts = one._asdict() | {"number": one.number if one.number > 0 else None}
-    facts |= {"starts": int(one.starts.counts), "share": float(one.starts.shares)}
-    facts |= {"share_95_percent": one.starts.intervals.tolist()}
-    # That of a motion without a period would be thousands of points.
-    return facts | {"section": one.section.tolist() if one.period else None}
+def _facts(found: "Basins", at: int) -> dict[str, Any]:
+    value = float(found.values[at])
+    entropy = found.entropy[at]._asdict() if found.entropy else None
+    basins = []
+    for one in (one for one in found.basins if one.value == value):
+        facts = one._asdict() | {"number": one.number if one.number > 0 else None}
+        facts |= {"starts": int(one.starts.counts), "share": float(one.starts.shares)}
+        facts |= {"share_95_percent": one.starts.intervals.tolist()}
+        # That of a motion without a period would be thousands of points.
+        basins.append(facts | {"section": one.section.tolist() if one.period else None})
+    starts = found.numbers.shape[1]
+    return {"value": value, "starts": starts, "entropy": entropy, "basins": basins}
 
 
 main = Command("basins", __doc__, _arguments, _basins, common=("overwrite", "threads"))

@@ -176,16 +176,13 @@ def test_json_tells_all_of_it(folder, grid):
     (value,) = json.loads(run(folder, "grid.h5", "--json").out)["values"]
     found = find_basins(grid)
     assert (value["value"], value["starts"]) == (1.04, 121)
-    assert value["basin_entropy"] == pytest.approx(found.entropy[0].basin)
-    assert value["boundary_basin_entropy"] == pytest.approx(found.entropy[0].boundary)
+    assert value["entropy"] == pytest.approx(found.entropy[0]._asdict())
     for facts, one in zip(value["basins"], found.basins, strict=True):
         assert facts["number"] == one.number
         assert facts["starts"] == one.starts.counts
         assert facts["share_95_percent"] == pytest.approx(one.starts.intervals)
         assert facts["section"] == one.section.tolist()
-        assert facts["means"]["slowest_crossing"] == pytest.approx(
-            one.means["slowest_crossing"], nan_ok=True
-        ) or np.isnan(one.means["slowest_crossing"])
+        assert facts["means"]["crossings_per_period"] == one.means["crossings_per_period"]
 
 
 def test_figures_are_drawn_and_foreign_files_kept(folder):
