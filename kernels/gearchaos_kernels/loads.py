@@ -6,6 +6,8 @@ Simpson's rule, extremes from the parabola through the three. Where teeth meet o
 force has a kink; what it is there, damping alone, counts as a fourth value and the parabola not.
 """
 
+import numpy as np
+
 from gearchaos_kernels.block_memory import (
     BEFORE,
     CARRIED,
@@ -76,10 +78,10 @@ def tell_loads(memory, middle, middle_shares, end, end_shares, present):
         last = carried_at(after, lane, point, present)
         first = load(memory, CARRIED, slot, Carried)
         store(memory, CARRIED, slot, last)
-        smooth = on_one_piece(first.tangential_slope, half.tangential_slope, last.tangential_slope)
+        smooth = (first.tangential_slope == 0.0) == (last.tangential_slope == 0.0)
         tell_signal(memory, slot, 0, first.tangential, half.tangential, last.tangential, smooth)
         if present.axial is not None:
-            smooth = on_one_piece(first.axial_slope, half.axial_slope, last.axial_slope)
+            smooth = (first.axial_slope == 0.0) == (last.axial_slope == 0.0)
             tell_signal(memory, slot, 1, first.axial, half.axial, last.axial, smooth)
         tell_signal(memory, slot, 2, first.error, half.error, last.error, True)
 
@@ -96,21 +98,16 @@ def halfway(before, after):
 
 
 @scalar
-def on_one_piece(first, half, last):
-    """Tell whether three slopes of a mesh force are those of contact throughout, or of none."""
-    return ((first != 0.0) == (half != 0.0)) & ((half != 0.0) == (last != 0.0))
-
-
-@scalar
 def tell_signal(memory, slot, signal, first, half, last, smooth):
     """Add the three values of a step to the record of one signal."""
     bend = first - 2.0 * half + last
     slope = 4.0 * half - 3.0 * first - last
-    turns = smooth & (slope * (slope + 4.0 * bend) < 0.0)
-    turn = first - slope * slope / (8.0 * bend) if turns else last
+    # Where the parabola turns, or an end; next to there it is as high: single precision is enough.
+    at = min(1.0, max(0.0, np.float64(np.float32(slope) / np.float32(-4.0 * bend))))
+    turn = first + at * (slope + 2.0 * bend * at) if smooth else half
     row = (LOADS + signal * SIGNAL_ROWS) * STRIDE + slot
-    memory[row] = max(max(memory[row], half), max(last, turn))
-    memory[row + STRIDE] = min(min(memory[row + STRIDE], half), min(last, turn))
+    memory[row] = max(memory[row], max(last, turn))
+    memory[row + STRIDE] = min(memory[row + STRIDE], min(last, turn))
     memory[row + 2 * STRIDE] += first + 4.0 * half + last
     memory[row + 3 * STRIDE] += first * first + 4.0 * half * half + last * last
 
