@@ -37,7 +37,7 @@ from gearchaos.engine.steps import (
     stable_steps,
 )
 from gearchaos.errors import ConfigurationError
-from gearchaos.gear.mesh_stiffness import FourierStiffness
+from gearchaos.gear.mesh_stiffness import series_table
 from gearchaos.interrupts import check
 from gearchaos.records.contact import contact_told
 from gearchaos.records.difference import difference
@@ -382,7 +382,8 @@ class Simulation:
             return ""
         parameters = self.lanes.parameters
         waves = (parameters[f"stiffness_{part}"].value for part in ("cosine", "sine"))
-        variation = FourierStiffness(*map(np.atleast_1d, waves)).table(PHASES) - 1.0
+        cosine, sine = map(np.atleast_1d, waves)
+        variation = series_table(cosine - 1j * sine, PHASES) - 1.0
         scale = np.asarray(parameters["stiffness_variation_scale"].value)
         lowest = 1.0 + np.min(np.outer([scale.min(), scale.max()], variation))
         if lowest >= 0.0:

@@ -12,7 +12,7 @@ import numpy as np
 
 from gearchaos.errors import ConfigurationError
 from gearchaos.gear.geometry import HelicalPair, Value
-from gearchaos.gear.mesh_stiffness import FourierStiffness, TrapezoidalStiffness
+from gearchaos.gear.mesh_stiffness import TrapezoidalStiffness
 
 _MICROMETRE = 1e-6
 _MILLIMETRE = 1e-3
@@ -139,14 +139,12 @@ class Quantities:
         return np.cos(self.pair.transverse_pressure_angle) * _MICROMETRE / self.length_scale
 
     @cached_property
-    def mesh_stiffness(self) -> FourierStiffness:
-        """The stiffness harmonics relative to the mean (Pan 2021, eqs 15-19)."""
+    def stiffness_harmonics(self) -> tuple[Any, Any]:
+        """Cosine and sine harmonics of the stiffness relative to its mean (Pan 2021, eqs 15-19)."""
         if self["mesh.stiffness.shape"] == "fourier":
             mean = _common_to_lanes(self["mesh.mean_stiffness_N_per_um_mm"])
-            return FourierStiffness(
-                cosine=np.divide(self["mesh.stiffness.cosine_N_per_um_mm"], mean),
-                sine=np.divide(self["mesh.stiffness.sine_N_per_um_mm"], mean),
-            )
+            cosine = np.divide(self["mesh.stiffness.cosine_N_per_um_mm"], mean)
+            return cosine, np.divide(self["mesh.stiffness.sine_N_per_um_mm"], mean)
         if self.physical["mesh.stiffness.rise"] is None:
             trapezoid = TrapezoidalStiffness.from_contact_ratios(
                 _common_to_lanes(self.pair.transverse_contact_ratio),
@@ -155,7 +153,8 @@ class Quantities:
         else:
             parts = ("rise", "top", "fall", "bottom", "half_height")
             trapezoid = TrapezoidalStiffness(*(self[f"mesh.stiffness.{part}"] for part in parts))
-        return trapezoid.to_fourier(self["mesh.stiffness.harmonics"])
+        coefficients = trapezoid.coefficients(self["mesh.stiffness.harmonics"])
+        return coefficients.real, -coefficients.imag
 
 
 def _common_to_lanes(value: Any) -> float:
@@ -186,8 +185,8 @@ _DERIVATIONS: dict[str, Callable[[Quantities], Any]] = {
     "pitch_error_amplitude": Quantities.pitch_error_amplitude,
     "pitch_error_mean": lambda q: q.over_length_scale("pitch_error.mean_um"),
     "pitch_error_phase_deg": lambda q: q["pitch_error.phase_deg"],
-    "stiffness_cosine": lambda q: q.mesh_stiffness.coefficients().real,
-    "stiffness_sine": lambda q: -q.mesh_stiffness.coefficients().imag,
+    "stiffness_cosine": lambda q: q.stiffness_harmonics[0],
+    "stiffness_sine": lambda q: q.stiffness_harmonics[1],
     "mass_ratio_p": lambda q: q.pair.equivalent_mass / q.pair.masses[0],
     "mass_ratio_g": lambda q: q.pair.equivalent_mass / q.pair.masses[1],
     "transverse_stiffness_p": lambda q: q.bearing_stiffness("transverse", 0),

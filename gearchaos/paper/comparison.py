@@ -53,7 +53,7 @@ def compare(found: Reproduction) -> dict[str, list[Row]]:
 
 def _harmonics() -> Iterator[Row]:
     table, mean = published().harmonics, published().numbers["mean_stiffness"].value
-    ours = mean * contact_line_stiffness().to_fourier(len(table.cosine)).coefficients()
+    ours = mean * contact_line_stiffness().coefficients(len(table.cosine))
     first = math.hypot(table.cosine[0], table.sine[0])
     for letter, theirs, mine in (("a", table.cosine, ours.real), ("c", table.sine, -ours.imag)):
         for n, (one, other) in enumerate(zip(theirs, mine.tolist(), strict=True), 1):

@@ -8,8 +8,9 @@ from matplotlib.axes import Axes
 
 from gearchaos.figures.page import Page, column, few_ticks
 from gearchaos.figures.style import BLACK, BLUE, GREY, ORANGE
+from gearchaos.gear.mesh_stiffness import series_table
 from gearchaos.paper.computation import Reproduction
-from gearchaos.paper.our_numbers import contact_line_stiffness, printed_series
+from gearchaos.paper.our_numbers import contact_line_stiffness, printed_coefficients
 from gearchaos.paper.published import published
 
 CYCLE = np.arange(1001) / 1000
@@ -36,7 +37,8 @@ def mesh_stiffness_page(found: Reproduction) -> Page:
     """Draw the mesh stiffness of the contact lines and its Fourier fit (figure 4)."""
     mean = published().numbers["mean_stiffness"].value
     scale = found.group("stiffness_variation_scale")
-    tables = (one.table(CYCLE.size - 1) for one in (contact_line_stiffness(), printed_series()))
+    points = CYCLE.size - 1
+    tables = contact_line_stiffness().table(points), series_table(printed_coefficients(), points)
     trapezoid, series = (mean * np.append(table, table[0]) for table in tables)
     computed = mean + scale * (series - mean)
     with _cycle(62.0, mean, r"Mesh stiffness $k$ (N/(µm$\,$mm))") as (figure, axes):

@@ -3,11 +3,12 @@
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gearchaos.figures.response_lane import coordinates_of, samples_per_period
 from gearchaos.gear.derivation import Quantities, derive_groups
 from gearchaos.gear.geometry import HelicalPair
-from gearchaos.gear.mesh_stiffness import FourierStiffness, TrapezoidalStiffness
+from gearchaos.gear.mesh_stiffness import TrapezoidalStiffness
 from gearchaos.paper.computation import Reproduction, lane_of, largest_acceleration
 from gearchaos.paper.published import published
 from gearchaos.records.amplitude_spectrum import spectral_lines
@@ -19,8 +20,8 @@ def our_numbers(found: Reproduction) -> dict[str, float]:
     """Compute each number of `Published.numbers`; not a number where there is no such thing."""
     mean = published().numbers["mean_stiffness"].value
     pair, speed, response = pair_of(found), published().driving_speed_rpm, found.response
-    table_2 = mean * printed_series().coefficients()
-    lines = contact_line_stiffness().to_fourier(table_2.size).coefficients()
+    table_2 = mean * printed_coefficients()
+    lines = contact_line_stiffness().coefficients(table_2.size)
     damping_ratio = found.group("damping_ratio")
     whole_width = mean * _N_PER_UM_MM * pair.face_width
     driven = found.config.replace("operation", {"speed_rpm": speed})
@@ -57,10 +58,10 @@ def contact_line_stiffness() -> TrapezoidalStiffness:
     return TrapezoidalStiffness(**lines.parts, half_height=half_height)
 
 
-def printed_series() -> FourierStiffness:
-    """Return the mesh stiffness of Table 2 relative to its mean (eq. 19)."""
+def printed_coefficients() -> NDArray[np.complex128]:
+    """Return the coefficients of Table 2 relative to the mean stiffness, as `series_table` does."""
     mean, harmonics = published().numbers["mean_stiffness"].value, published().harmonics
-    return FourierStiffness(np.divide(harmonics.cosine, mean), np.divide(harmonics.sine, mean))
+    return np.divide(harmonics.cosine, mean) - 1j * np.divide(harmonics.sine, mean)
 
 
 def pair_of(found: Reproduction) -> HelicalPair:

@@ -16,7 +16,7 @@ from gearchaos.dynamics.stability import (
     sufficient_steps,
 )
 from gearchaos.dynamics.stable_region import steps_per_time
-from gearchaos.gear.mesh_stiffness import FourierStiffness
+from gearchaos.gear.mesh_stiffness import series_table
 
 from ..kernels.reference import (
     COSINE,
@@ -73,7 +73,7 @@ def test_mesh_damping_without_contact_is_a_branch_of_its_own():
 def test_the_stiffest_moment_of_the_mesh_decides():
     scale = np.array([0.0, 2.0 / 3.0, -1.0])
     model = oscillator(0.0, np.full(3, 0.001))._replace(stiffness_variation_scale=scale)
-    largest = [np.max(FourierStiffness(s * COSINE, s * SINE).table(20_000)) for s in scale]
+    largest = [np.max(series_table(s * (COSINE - 1j * SINE), 20_000)) for s in scale]
     wanted = 2.0 * np.pi / 0.001 * np.sqrt(largest) / np.sqrt(8.0)
     found = fewest(TORSION._replace(stiffness_variation=True), model)
     assert found == pytest.approx(wanted, rel=1e-3)
@@ -90,7 +90,7 @@ def test_a_mode_that_grows_by_itself_sets_no_limit():
 @pytest.mark.parametrize("scene", EVERY_SCENE, ids=name_of)
 def test_limit_of_every_scene_is_that_of_its_whole_jacobian_and_no_more_than_the_bound(scene):
     model = random_pairs(40, 7)
-    stiffness = FourierStiffness(COSINE * 2.0 / 3.0, SINE * 2.0 / 3.0).table(4096)
+    stiffness = series_table((COSINE - 1j * SINE) * 2.0 / 3.0, 4096)
     extremes = [np.min(stiffness), np.max(stiffness)] if scene.stiffness_variation else [1.0]
     branches = [*extremes, 0.0] if scene.backlash else extremes
     demand = np.zeros(40)
