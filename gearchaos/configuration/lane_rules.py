@@ -1,7 +1,6 @@
 """Rules of what the lanes get: every group is known, in range, and moved by the sweeps."""
 
-import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 
 import numpy as np
 
@@ -9,9 +8,9 @@ from gearchaos.configuration.messages import Fault
 from gearchaos.configuration.pitch_error_rules import OF_DRAWN_GEARS, grade_faults
 from gearchaos.configuration.run_tables import Sweep
 from gearchaos.configuration.sweep_values import SWEEPABLE_KEYS, FloatArray, groups_at
-from gearchaos.configuration.tables import Tables
+from gearchaos.configuration.tables import PHYSICAL_KEYS, Tables
 from gearchaos.errors import ConfigurationError
-from gearchaos.gear.derivation import derive_groups
+from gearchaos.gear.derivation import asked_for, derive_groups
 from gearchaos.gear.group_table import GROUPS_BY_NAME, GroupRow
 from gearchaos.gear.groups import HARMONICS, Groups
 
@@ -37,7 +36,7 @@ def lane_faults(config: Tables) -> Iterator[Fault]:
     missing = groups.missing(config.scene.effects)
     yield from grade_faults(config, by_parameter)
     yield from (_missing(config, row) for row in missing)
-    yield from _out_of_range(groups)
+    yield from _out_of_range(config, groups)
     yield from _decoupled(config, groups)
     for axis, (table, sweep) in enumerate(reversed(sweeps.items())):
         drawn = sweep.parameter in OF_DRAWN_GEARS and "pitch_error" in config.scene.effects
@@ -103,28 +102,32 @@ def _without_effect(config: Tables, table: str, values: FloatArray) -> Fault:
 def _missing(config: Tables, row: GroupRow) -> Fault:
     effects = [f'"{name}"' for name in config.scene.effects if name in row.effects]
     because = f" for {' and '.join(effects)}" if effects else ""
-    lacking = [entry for entry in row.derived_from if not _is_present(config, entry)]
+    lacking = [path for path in _asked_for(config, row.name) if _is_unknown(config, path)]
     otherwise = f", or derive it by giving {', '.join(lacking)} as well" if lacking else ""
     name = f"the {row.long_name} ({row.symbol})"
     rule = f"{name} is needed{because} and neither given nor derivable"
     return Fault(f"groups.{row.name}", rule, f"give {row.name} in [groups]{otherwise}")
 
 
-def _is_present(config: Tables, entry: str) -> bool:
-    """Whether one of the keys, or the table, that an entry of `derived_from` names is there."""
-    given = [path for path, value in config.physical().items() if value is not None]
-    return any(
-        word in config.swept or any(f"{path}.".startswith(f"{word}.") for path in given)
-        for word in re.findall(r"[A-Za-z_][\w.]+", entry)
-    )
+def _asked_for(config: Tables, name: str) -> Collection[str]:
+    declared = {path: key.field for path, key in PHYSICAL_KEYS.items()}
+    examples = {path: field.examples[0] for path, field in declared.items() if field.examples}
+    return asked_for(name, config.physical(), examples)
 
 
-def _out_of_range(groups: Groups) -> Iterator[Fault]:
+def _is_unknown(config: Tables, path: str) -> bool:
+    """Whether a physical key is neither given nor swept, and has no default either."""
+    field, value = PHYSICAL_KEYS[path].field, config.physical()[path]
+    has_default = not field.is_required() and field.default is not None
+    return value is None and path not in config.swept and not has_default
+
+
+def _out_of_range(config: Tables, groups: Groups) -> Iterator[Fault]:
     for name, value in groups.values.items():
         row = GROUPS_BY_NAME[name]
         if groups.origin[name] == "derived" and not row.valid.admits(value):
             worst = next(entry for entry in np.ravel(value) if not row.valid.admits(entry))
-            rule = f"derived from {', '.join(row.derived_from)}, must be {row.valid.rule}"
+            rule = f"derived from {', '.join(_asked_for(config, name))}, must be {row.valid.rule}"
             remedy = "check the magnitudes of those keys"
             yield Fault(f"groups.{name}", rule, remedy, float(worst))
 

@@ -67,7 +67,7 @@ class Operation(Table):
 class FourierStiffness(Table):
     """Mesh stiffness as a Fourier series over the mesh period (Pan 2021, eq. 19)."""
 
-    shape: Literal["fourier"] = key(_SHAPE)
+    shape: Literal["fourier"] = key(_SHAPE, example="fourier")
     cosine_N_per_um_mm: Harmonics = key(
         "cosine coefficients of harmonics 1, 2, ...", "N/(um mm)", [-1.202, 0.0]
     )
@@ -79,7 +79,7 @@ class FourierStiffness(Table):
 class TrapezoidStiffness(Table):
     """Mesh stiffness as a trapezoid over the mesh period (Pan 2021, eqs 15-18)."""
 
-    shape: Literal["trapezoid"] = key(_SHAPE)
+    shape: Literal["trapezoid"] = key(_SHAPE, example="fourier")
     rise: float | None = _share(
         "rising share of the mesh period; no shares: from the contact ratio of [pair]"
     )

@@ -6,6 +6,7 @@ Scales: length b', time 1 / omega_h with omega_h = sqrt(k_m / m_e).
 from collections.abc import Callable, Collection, Mapping
 from contextlib import suppress
 from functools import cached_property
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -47,6 +48,22 @@ def _derive(
     return found
 
 
+# Examples may not fit what is known.
+@np.errstate(all="ignore")
+def asked_for(
+    group: str, physical: Mapping[str, Any], examples: Mapping[str, Any]
+) -> Collection[str]:
+    """Return the paths of the physical data from which a group follows.
+
+    ``physical`` is as `derive_groups` takes it; where it does not know what the derivation asks
+    for, ``examples``, values by path, stand for it.
+    """
+    quantities = Quantities(physical, examples)
+    with suppress(_UnknownError, ArithmeticError, ValueError):
+        _DERIVATIONS[group](quantities)
+    return quantities.asked_for
+
+
 def length_key(physical: Mapping[str, Any]) -> str:
     """Return the path of the length that b' is: the scale if it is known, else half backlash."""
     scale = "mesh.length_scale_um"
@@ -60,11 +77,16 @@ class _UnknownError(Exception):
 class Quantities:
     """Physical data in SI units, and what follows from them."""
 
-    def __init__(self, physical: Mapping[str, Any]) -> None:
-        self.physical = physical
+    def __init__(
+        self, physical: Mapping[str, Any], examples: Mapping[str, Any] = MappingProxyType({})
+    ) -> None:
+        self.physical, self._examples = physical, examples
+        self.asked_for: dict[str, None] = {}
 
     def __getitem__(self, path: str) -> Any:
+        self.asked_for[path] = None
         value = self.physical[path]
+        value = self._examples.get(path) if value is None else value
         if value is None:
             raise _UnknownError(path)
         return value
@@ -114,9 +136,9 @@ class Quantities:
 
     def damping_ratio(self) -> Any:
         """The mesh damping ratio xi, or that of c_m = 2 xi sqrt(k_m m_e) (Pan 2021, eq. 20)."""
-        if self.physical["mesh.damping_ratio"] is not None:
-            return self.physical["mesh.damping_ratio"]
-        damping = self["mesh.damping_N_s_per_m"]
+        damping = self.physical["mesh.damping_N_s_per_m"]
+        if damping is None:
+            return self["mesh.damping_ratio"]
         return damping / (2.0 * np.sqrt(self.mean_stiffness * self.pair.equivalent_mass))
 
     def bearing_stiffness(self, direction: str, gear: int) -> Any:

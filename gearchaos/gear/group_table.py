@@ -9,8 +9,6 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-_OMEGA_H = ("pair", "mesh.mean_stiffness_N_per_um_mm")
-_LENGTH = ("mesh.length_scale_um or mesh.half_backlash_um",)
 _GEARS = (("p", 1, "driving"), ("g", 2, "driven"))
 
 
@@ -58,8 +56,8 @@ class GroupRow:
     ``name``: key in ``[groups]``, attribute of `Groups`, name in the result file; ``mathtext``: its
     symbol; ``long_name``, ``units``: for people and files, ``"1"`` is dimensionless; ``default``:
     where the group is neither given nor derivable, None: it has to be known; ``effects``: it is
-    needed when any of these is on, empty: always; ``derived_from``: configuration keys from which
-    it follows; ``is_list``: one entry per harmonic, which a sweep cannot vary.
+    needed when any of these is on, empty: always; ``is_list``: one entry per harmonic, which a
+    sweep cannot vary.
     """
 
     name: str
@@ -69,7 +67,6 @@ class GroupRow:
     units: str = "1"
     default: float | None = None
     effects: frozenset[str] = frozenset()
-    derived_from: tuple[str, ...] = ()
     is_list: bool = False
 
     @property
@@ -83,16 +80,14 @@ class GroupRow:
 
 
 def _bearing_rows(direction: str, digit: int) -> Iterable[GroupRow]:
-    kinds = (("stiffness", "k", "N_per_m"), ("damping", r"\eta", "N_s_per_m"))
     for gear, number, words in _GEARS:
-        for kind, letter, unit in kinds:
+        for kind, letter in (("stiffness", "k"), ("damping", r"\eta")):
             yield GroupRow(
                 f"{direction}_{kind}_{gear}",
                 f"${letter}_{{{number}{digit}}}$",
                 f"{direction} bearing {kind} of the {words} gear",
                 Range(ge=0.0),
                 effects=frozenset({direction}),
-                derived_from=(*_OMEGA_H, f"bearings.{direction}_{kind}_{unit}"),
             )
 
 
@@ -100,55 +95,22 @@ _ERROR = frozenset({"pitch_error"})
 _STIFFNESS = frozenset({"stiffness_variation"})
 
 GROUP_TABLE: tuple[GroupRow, ...] = (
-    GroupRow(
-        "mesh_frequency",
-        r"$\Omega$",
-        "angular mesh frequency",
-        Range(gt=0.0),
-        derived_from=(*_OMEGA_H, "operation.speed_rpm"),
-    ),
-    GroupRow(
-        "load", "$f_n$", "static load", derived_from=(*_OMEGA_H, "operation.torque_Nm", *_LENGTH)
-    ),
-    GroupRow(
-        "damping_ratio",
-        r"$\xi$",
-        "mesh damping ratio",
-        Range(ge=0.0),
-        derived_from=("mesh.damping_ratio, or mesh.damping_N_s_per_m", *_OMEGA_H),
-    ),
+    GroupRow("mesh_frequency", r"$\Omega$", "angular mesh frequency", Range(gt=0.0)),
+    GroupRow("load", "$f_n$", "static load"),
+    GroupRow("damping_ratio", r"$\xi$", "mesh damping ratio", Range(ge=0.0)),
     GroupRow(
         "base_helix_angle_deg",
         r"$\beta_b$",
         "base helix angle",
         Range(ge=0.0, lt=90.0),
         units="degree",
-        derived_from=("pair",),
     ),
     GroupRow(
-        "half_backlash",
-        "$b$",
-        "half backlash",
-        Range(ge=0.0),
-        effects=frozenset({"backlash"}),
-        derived_from=("mesh.half_backlash_um",),
+        "half_backlash", "$b$", "half backlash", Range(ge=0.0), effects=frozenset({"backlash"})
     ),
     GroupRow("pitch_error", "$P$", "multiple of the pitch error", default=1.0, effects=_ERROR),
-    GroupRow(
-        "pitch_error_amplitude",
-        "$e_r$",
-        "amplitude of one pitch error",
-        effects=_ERROR,
-        derived_from=("pitch_error.amplitude_um", *_LENGTH),
-    ),
-    GroupRow(
-        "pitch_error_mean",
-        "$e_0$",
-        "mean of one pitch error",
-        default=0.0,
-        effects=_ERROR,
-        derived_from=("pitch_error.mean_um", *_LENGTH),
-    ),
+    GroupRow("pitch_error_amplitude", "$e_r$", "amplitude of one pitch error", effects=_ERROR),
+    GroupRow("pitch_error_mean", "$e_0$", "mean of one pitch error", default=0.0, effects=_ERROR),
     GroupRow(
         "pitch_error_phase_deg",
         r"$\varphi$",
@@ -156,7 +118,6 @@ GROUP_TABLE: tuple[GroupRow, ...] = (
         units="degree",
         default=0.0,
         effects=_ERROR,
-        derived_from=("pitch_error.phase_deg",),
     ),
     GroupRow(
         "stiffness_variation_scale",
@@ -171,7 +132,6 @@ GROUP_TABLE: tuple[GroupRow, ...] = (
             f"${letter}_n/k_m$",
             f"{kind} harmonics of the mesh stiffness relative to its mean",
             effects=_STIFFNESS,
-            derived_from=("mesh.stiffness",),
             is_list=True,
         )
         for kind, letter in (("cosine", "a"), ("sine", "c"))
@@ -183,7 +143,6 @@ GROUP_TABLE: tuple[GroupRow, ...] = (
             f"equivalent mass over the mass of the {words} gear",
             Range(gt=0.0),
             effects=frozenset({"transverse", "axial"}),
-            derived_from=("pair",),
         )
         for gear, _, words in _GEARS
     ),
