@@ -17,8 +17,6 @@ from gearchaos.configuration.keys import (
     TeethPair,
     key,
 )
-from gearchaos.gear.geometry import STEEL_DENSITY
-from gearchaos.gear.mesh_stiffness import DEFAULT_HARMONICS
 
 _SHAPE = '"fourier" takes the coefficients, "trapezoid" takes rise, top, fall, bottom, half_height'
 _KIND = '"sine": at mesh frequency, "teeth": as measured, "grade": drawn by an accuracy grade'
@@ -43,8 +41,8 @@ class Pair(Table):
     density_kg_m3: float = key(
         "density of the gears, taken as solid discs on the reference circle",
         "kg/m^3",
-        STEEL_DENSITY,
-        default=STEEL_DENSITY,
+        7850.0,
+        default=7850.0,
         gt=0,
     )
     masses_kg: PositivePair | None = _optional(
@@ -89,9 +87,7 @@ class TrapezoidStiffness(Table):
     half_height: float | None = _optional(
         "half the height of the trapezoid relative to the mean stiffness", "1", 0.111, ge=0, lt=1
     )
-    harmonics: int = key(
-        "number of harmonics kept of the trapezoid", default=DEFAULT_HARMONICS, ge=1, le=1000
-    )
+    harmonics: int = key("number of harmonics kept of the trapezoid", default=6, ge=1, le=1000)
 
 
 class Mesh(Table):

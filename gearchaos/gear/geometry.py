@@ -9,9 +9,6 @@ import numpy.typing as npt
 Value: TypeAlias = float | npt.NDArray[np.float64]
 PairOfValues: TypeAlias = tuple[Value, Value]
 
-STEEL_DENSITY = 7850.0
-"""Density where none is given, in kg/m^3."""
-
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class HelicalPair:
@@ -39,7 +36,7 @@ class HelicalPair:
     normal_pressure_angle: Value
     helix_angle: Value
     face_width: Value
-    density: Value = STEEL_DENSITY
+    density: Value
     given_masses: PairOfValues | None = None
     given_inertias: PairOfValues | None = None
 

@@ -13,9 +13,6 @@ import numpy.typing as npt
 
 FloatArray: TypeAlias = npt.NDArray[np.float64]
 
-DEFAULT_HARMONICS = 6
-"""Harmonics of a trapezoid where their number is not given, as in Pan 2021, Table 2."""
-
 
 def series_table(coefficients: npt.NDArray[np.complex128], points: int) -> FloatArray:
     """Return kappa of a Fourier series at phases 0, 1/points, ..., shape (points,).

@@ -8,10 +8,8 @@ import pytest
 from gearchaos.configuration.tables import PHYSICAL_KEYS
 from gearchaos.errors import ConfigurationError
 from gearchaos.gear.derivation import derive_groups
-from gearchaos.gear.geometry import STEEL_DENSITY
 from gearchaos.gear.group_table import GROUP_TABLE, GROUPS_BY_NAME
 from gearchaos.gear.groups import resolve_groups
-from gearchaos.gear.mesh_stiffness import DEFAULT_HARMONICS
 
 MEAN_STIFFNESS = 13.3548 * 15 * 1e6  # N/m
 EQUIVALENT_MASS = 0.095448  # kg, to the digits of the geometry's own test
@@ -24,7 +22,7 @@ PHYSICAL = {
     "pair.normal_pressure_angle_deg": 20.0,
     "pair.helix_angle_deg": 20.0,
     "pair.face_width_mm": 15.0,
-    "pair.density_kg_m3": STEEL_DENSITY,
+    "pair.density_kg_m3": 7850.0,
     "pair.masses_kg": None,
     "pair.inertias_kg_m2": None,
     "operation.speed_rpm": 2000.0,
@@ -78,7 +76,7 @@ def physical(**changes):
 
 
 def trapezoid(**parts):
-    parts = {"shape": "trapezoid", "harmonics": DEFAULT_HARMONICS, **parts}
+    parts = {"shape": "trapezoid", "harmonics": 6, **parts}
     return {f"mesh__stiffness__{name}": value for name, value in parts.items()}
 
 
