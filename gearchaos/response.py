@@ -11,7 +11,7 @@ import sys
 from argparse import ArgumentParser, Namespace
 from typing import TYPE_CHECKING
 
-from gearchaos.command_line import Command, coordinates, place
+from gearchaos.command_line import Command, coordinates, number, place
 from gearchaos.errors import ConfigurationError
 from gearchaos.finishing import ending, output_of
 
@@ -32,7 +32,7 @@ def _arguments(parser: ArgumentParser) -> None:
     add("config", metavar="config.toml|RESULT.h5", help=text)
     values = parser.add_mutually_exclusive_group(required=True)
     text = "multiple of the pitch error, may be repeated"
-    values.add_argument("--pitch-error", type=float, action="append", metavar="P", help=text)
+    values.add_argument("--pitch-error", type=number, action="append", metavar="P", help=text)
     text = (
         "value of the parameter that the configuration sweeps, may be repeated; of a result the "
         "nearest lane, with NAME=VALUE for each axis where there are several"

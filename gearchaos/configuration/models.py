@@ -58,8 +58,9 @@ class Configuration(Tables):
         """
         tables = with_overrides(tables_from_toml(text, source), overrides, source)
         config = cls.from_tables(tables, source)
-        appended = config.files is not None and "files" not in tables
-        config._text = text + (toml_text({"files": config.files}) if appended else "")
+        config._text = text
+        if config.files is not None and "files" not in tables:
+            config._text += f"\n[files]\n{toml_text(config.files)}"
         return config
 
     @classmethod

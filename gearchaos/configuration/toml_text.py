@@ -3,7 +3,7 @@
 import json
 import re
 import tomllib
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 from gearchaos.errors import ConfigurationError
@@ -20,7 +20,7 @@ _ENDLESS_INTEGER = re.compile(r"0[xob][0-9A-Fa-f_]{1000}")
 
 def quoted_key(name: str) -> str:
     """Return a key as TOML writes it: bare where possible, else in quotes."""
-    return name if _BARE_KEY.fullmatch(name) else _string(name)
+    return name if _BARE_KEY.fullmatch(name) else toml_literal(name)
 
 
 def tables_from_toml(text: str, source: str) -> dict[str, Any]:
@@ -97,50 +97,26 @@ def with_value(tables: Mapping[str, Any], names: list[str], value: Any) -> dict[
 
 
 def flat_tables(tables: Mapping[str, Any], path: str = "") -> dict[str, Any]:
-    """Return the values of nested tables by their dotted paths."""
+    """Return the values of nested tables by their dotted paths; an empty table is a value."""
     flat: dict[str, Any] = {}
     for name, value in tables.items():
         here = f"{path}{quoted_key(name)}"
-        flat |= flat_tables(value, f"{here}.") if isinstance(value, Mapping) else {here: value}
+        inner = isinstance(value, Mapping) and len(value) > 0
+        flat |= flat_tables(value, f"{here}.") if inner else {here: value}
     return flat
 
 
 def toml_text(tables: Mapping[str, Any]) -> str:
-    """Write nested tables of texts, numbers, truth values and lists as TOML."""
-    return "\n".join(_lines(tables, ())) + "\n"
-
-
-def _lines(table: Mapping[str, Any], path: tuple[str, ...]) -> Iterator[str]:
-    inner = {name: value for name, value in table.items() if isinstance(value, Mapping)}
-    values = [
-        f"{quoted_key(name)} = {toml_literal(value)}"
-        for name, value in table.items()
-        if name not in inner
-    ]
-    if path and (values or not inner):
-        yield f"\n[{'.'.join(map(quoted_key, path))}]"
-    yield from values
-    for name, value in inner.items():
-        yield from _lines(value, (*path, name))
+    """Write nested tables of texts, numbers, truth values and lists as TOML, a line for each."""
+    flat = flat_tables(tables)
+    return "".join(f"{path} = {toml_literal(value)}\n" for path, value in flat.items())
 
 
 def toml_literal(value: Any) -> str:
     """Write one value as TOML; a mapping as an inline table."""
-    if isinstance(value, str):
-        return _string(value)
-    if isinstance(value, bool):
-        return "true" if value else "false"
-    if isinstance(value, (list, tuple)):
-        return f"[{', '.join(map(toml_literal, value))}]"
-    if isinstance(value, Mapping):
-        entries = [f"{quoted_key(name)} = {toml_literal(entry)}" for name, entry in value.items()]
-        return f"{{ {', '.join(entries)} }}"
-    return repr(value)
-
-
-def _string(text: str) -> str:
-    # A JSON string is a TOML basic string but for DEL, which TOML wants escaped.
-    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
+    # JSON is TOML but for the colon, and for DEL, which TOML wants escaped.
+    text = json.dumps(value, ensure_ascii=False, separators=(", ", " = "))
+    return text.replace("\x7f", "\\u007f")
 
 
 def _value(text: str) -> Any:

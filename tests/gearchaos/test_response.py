@@ -244,7 +244,7 @@ def test_diverged_lanes_are_kept_and_told(tmp_path, capsys):
             f'{FULL}: start.carry = "upwards": a lane goes on from the one before it, and values '
             "by themselves have none; run the sweep, then: gearchaos response RESULT.h5 --at VALUE",
         ),
-        (["--pitch-error", "nan"], "must be a finite number"),
+        (["--pitch-error", "nan"], "'nan' is not a finite number"),
         (["--pitch-error", "1", "--periods", "7"], "integration.recorded_periods = 6"),
         (["--pitch-error", "1", "--threads", "0"], "threads = 0"),
         (["--pitch-error", "1", "--set", 'scene.effects=["backlash"]'], "an effect that is off"),
