@@ -18,33 +18,7 @@ if (
 ):
     signal.signal(signal.SIGINT, signal.SIG_DFL)
 
-from typing import TYPE_CHECKING, Any
-
-if TYPE_CHECKING:
-    from gearchaos import iso1328
-    from gearchaos.configuration import Configuration, load_config
-    from gearchaos.engine.response import respond
-    from gearchaos.engine.running import run
-    from gearchaos.errors import ConfigurationError, FigureError, FileError, GearchaosError
-    from gearchaos.results.result import Result, open_result
-    from gearchaos.system import System
-    from gearchaos.version import software_version
-
-__all__ = [
-    "Configuration",
-    "ConfigurationError",
-    "FigureError",
-    "FileError",
-    "GearchaosError",
-    "Result",
-    "System",
-    "iso1328",
-    "load_config",
-    "open_result",
-    "respond",
-    "run",
-    "software_version",
-]
+from typing import Any
 
 # Each name is imported on first use: reading and drawing results needs neither Numba nor the
 # kernels, and a command that only prints its help imports nothing.
@@ -58,6 +32,7 @@ _HOMES = {
     "system": ("System",),
     "version": ("software_version",),
 }
+__all__ = sorted(name for names in _HOMES.values() for name in names)
 
 
 def __getattr__(name: str) -> Any:
@@ -71,4 +46,4 @@ def __getattr__(name: str) -> Any:
 
 
 def __dir__() -> list[str]:
-    return sorted(__all__)
+    return __all__
