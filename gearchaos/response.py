@@ -87,12 +87,18 @@ def _lane(options: Namespace) -> "Asked":
 
 def _configuration(options: Namespace) -> "Asked":
     """Take the place of what a configuration sweeps."""
-    from gearchaos.configuration import load_config
+    from gearchaos.configuration import Configuration
+    from gearchaos.configuration.files import text_of_file
     from gearchaos.configuration.toml_text import toml_literal
+
+    text = text_of_file(options.config)
+
+    def configured(*more: str) -> Configuration:
+        return Configuration.from_toml(text, options.config, [*options.set, *more])
 
     parameter, values = PITCH_ERROR, options.pitch_error
     if values is None:
-        parameter = load_config(options.config, options.set).sweep.parameter
+        parameter = configured().sweep.parameter
         values = [value for _, value in options.at]
         for name in {name for name, _ in options.at} - {"", parameter}:
             raise ConfigurationError(
@@ -101,9 +107,9 @@ def _configuration(options: Namespace) -> "Asked":
     # Repeating a value is no mistake worth a message.
     sweep = {"parameter": parameter, "values": sorted(set(values))}
     try:
-        config = load_config(options.config, [*options.set, f"sweep={toml_literal(sweep)}"])
+        config = configured(f"sweep={toml_literal(sweep)}")
     except ConfigurationError as error:
-        swept = load_config(options.config, options.set).sweep.parameter
+        swept = configured().sweep.parameter
         if parameter == swept:
             raise
         key = swept if "." in swept else f"groups.{swept}"

@@ -2,10 +2,9 @@
 
 import csv
 import os
+import re
 from collections.abc import Mapping
-from functools import cache
 from math import isfinite
-from pathlib import Path
 from typing import Any
 
 from gearchaos.configuration.messages import NUMBER, Fault, shown
@@ -29,19 +28,12 @@ def text_of_file(source: str, what: str = CONFIGURATION) -> str:
     if not source:
         raise FileError("no configuration file: the path is empty; name a TOML file")
     try:
-        if source == "-":
-            content = _standard_input()
-        else:
-            with Path(source).open("rb") as file:
-                content = file.read(LARGEST_FILE + 1)
-    except FileNotFoundError:
-        raise FileError(f"{source}: no such file; check the path of the {what}") from None
-    except IsADirectoryError:
-        kind = "TOML file" if own else "file"
-        raise FileError(f"{source}: is a directory; name a {kind} in it") from None
+        with open(0 if source == "-" else source, "rb", closefd=source != "-") as file:
+            content = file.read(LARGEST_FILE + 1)
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) else str(error)
-        raise FileError(f"{source!r}: cannot be read: {reason}") from None
+        rule = f"cannot be read: {reason}"
+        raise FileError(f"{source}: {rule}; check the path of the {what}") from None
     if content.startswith(b"\x89HDF") and own:
         remedy = f"`gearchaos info {source}` shows that of a result"
         raise ConfigurationError(f"{source}: is HDF5, and a configuration is TOML; {remedy}")
@@ -57,13 +49,6 @@ def text_of_file(source: str, what: str = CONFIGURATION) -> str:
         raise ConfigurationError(
             f"{source}: line {line} is not UTF-8 text; save the {what} as UTF-8"
         ) from None
-
-
-@cache
-def _standard_input() -> bytes:
-    """Read it for whoever asks first, and keep it for who asks again."""
-    with open(0, "rb", closefd=False) as stream:
-        return stream.read(LARGEST_FILE + 1)
 
 
 def with_deviation_files(
@@ -103,22 +88,23 @@ def _table(tables: Mapping[str, Any], name: str) -> dict[str, Any]:
 
 def _column(text: str, column: object) -> list[float]:
     """Return the numbers of a column; ValueError with rule and remedy where they are none."""
-    lines = [(number, line) for number, line in enumerate(text.splitlines(), start=1)]
-    lines = [(n, line) for n, line in lines if line.strip() and not line.lstrip().startswith("#")]
-    delimiter = next((mark for mark in ";\t," if lines and mark in lines[0][1]), ",")
-    reader = csv.reader((line for _, line in lines), delimiter=delimiter)
-    headings = [cell.strip() for cell in next(reader, [])]
+    # Notes become empty lines, of which there are no rows.
+    lines = [re.sub(r"^\s*(#.*)?$", "", line) for line in text.splitlines()]
+    headline = next(filter(None, lines), "")
+    delimiter = next((mark for mark in ";\t," if mark in headline), ",")
+    reader = csv.reader(lines, delimiter=delimiter)
+    rows = [(reader.line_num, [*map(str.strip, row)]) for row in reader if row]
+    headings = rows.pop(0)[1] if rows else []
     if column not in headings:
         asked = "column is missing" if column is None else f"has no column {shown(column)}"
         raise ValueError(asked, f"its first line has the headings {shown(headings)}")
-    place, cells = headings.index(column), {}
-    for row in reader:
-        cells[lines[reader.line_num - 1][0]] = "".join(row[place : place + 1]).strip()
+    place = headings.index(column)
+    cells = [(line, "".join(row[place : place + 1])) for line, row in rows]
     # Beside a gear with more teeth a column ends in empty cells.
-    while cells and not cells[max(cells)]:
-        cells.popitem()
-    for line, cell in cells.items():
+    while cells and not cells[-1][1]:
+        cells.pop()
+    for line, cell in cells:
         if not (NUMBER.fullmatch(cell) and isfinite(float(cell))):
             rule = f"line {line}, column {column}: must be a finite number, not {shown(cell)}"
             raise ValueError(rule, "give one for every tooth, decimals with a point")
-    return [float(cell) for cell in cells.values()]
+    return [float(cell) for _, cell in cells]

@@ -444,8 +444,8 @@ def test_a_thousand_faults_are_cut_to_a_hundred():
 
 def test_a_missing_file_a_directory_and_an_empty_path_cannot_be_read(tmp_path):
     for path, reason in (
-        (tmp_path / "none.toml", "no such file"),
-        (tmp_path, "is a directory"),
+        (tmp_path / "none.toml", "No such file or directory; check the path of the configuration"),
+        (tmp_path, "Is a directory"),
         ("", "the path is empty"),
         ("a\0b", "null byte"),
         (PAN2021 / "x", "cannot be read"),

@@ -287,7 +287,10 @@ class TestASearchThatWasStopped:
 
 
 FAULTS = {
-    'configuration = "pair.toml"': ('configuration = "other.toml"', "other.toml: no such file"),
+    'configuration = "pair.toml"': (
+        'configuration = "other.toml"',
+        "other.toml: cannot be read: No such file",
+    ),
     'name = "damping_ratio"': (
         'name = "dampng_ratio"',
         'parameter[0].name = "dampng_ratio": is not a parameter that can be swept; did you mean',

@@ -96,8 +96,11 @@ def test_a_fault_of_the_command_line_is_code_2(tmp_path, arguments, message):
 @pytest.mark.parametrize(
     ("config", "message"),
     [
-        ("none.toml", "none.toml: no such file; check the path of the configuration"),
-        (".", ".: is a directory; name a TOML file in it"),
+        (
+            "none.toml",
+            "none.toml: cannot be read: No such file or directory; check the path of the con",
+        ),
+        (".", ".: cannot be read: Is a directory; check the path of the configuration"),
         ("", "the path is empty; name a TOML file"),
     ],
 )

@@ -179,7 +179,7 @@ def test_a_configuration_and_its_result_stand_alone_without_the_file(tmp_path):
     # Who reads the configuration anew needs the file.
     ended = run_module("gearchaos.sweep", *arguments, "--overwrite", cwd=tmp_path)
     assert ended.code == 2
-    assert 'pitch_error.driving.file = "gear.csv": no such file; check the path of' in ended.err
+    assert 'pitch_error.driving.file = "gear.csv": cannot be read: No such file' in ended.err
 
 
 ROWS = "Fp\n" + "".join(f"{f}\n" for f in F)
@@ -220,10 +220,10 @@ def test_a_faulty_file_is_refused_with_its_line(content, message, tmp_path):
 @pytest.mark.parametrize(
     ("name", "message"),
     [
-        ("none.csv", 'driving.file = "none.csv": no such file; check'),
-        (".", ": is a directory; name a file in it"),
+        ("none.csv", 'driving.file = "none.csv": cannot be read: No such file or directory; check'),
+        (".", "cannot be read: Is a directory; check the path of the file of pitch deviations"),
         ("a\\u0000b", "cannot be read: embedded null byte"),
-        ("\\u001b[31m", r'driving.file = "\x1b[31m": no such file'),
+        ("\\u001b[31m", r'driving.file = "\x1b[31m": cannot be read: No such file'),
     ],
 )
 def test_a_missing_file_is_refused_with_its_key(name, message, tmp_path):
