@@ -7,7 +7,12 @@ import numpy as np
 from gearchaos.configuration.messages import Fault
 from gearchaos.configuration.pitch_error_rules import OF_DRAWN_GEARS, grade_faults
 from gearchaos.configuration.run_tables import Sweep
-from gearchaos.configuration.sweep_values import SWEEPABLE_KEYS, FloatArray, groups_at
+from gearchaos.configuration.sweep_values import (
+    SWEEPABLE_GROUPS,
+    FloatArray,
+    groups_at,
+    swept_values,
+)
 from gearchaos.configuration.tables import PHYSICAL_KEYS, Tables
 from gearchaos.errors import ConfigurationError
 from gearchaos.gear.derivation import asked_for, derive_groups
@@ -26,8 +31,7 @@ def lane_faults(config: Tables) -> Iterator[Fault]:
         groups = groups_at(config, some)
     except ConfigurationError as error:
         for table in _refused(config, some):
-            key = f"{table}.parameter"
-            yield from (Fault(key, text, "", sweeps[table].parameter) for text in error.problems)
+            yield Fault(f"{table}.parameter", str(error), "", sweeps[table].parameter)
         return
     except (ArithmeticError, ValueError) as error:
         remedy = "check the magnitudes in [pair], [mesh], [operation], [pitch_error], [bearings]"
@@ -40,18 +44,14 @@ def lane_faults(config: Tables) -> Iterator[Fault]:
     yield from _decoupled(config, groups)
     for axis, (table, sweep) in enumerate(reversed(sweeps.items())):
         drawn = sweep.parameter in OF_DRAWN_GEARS and "pitch_error" in config.scene.effects
-        derives = not missing and sweep.parameter in SWEEPABLE_KEYS and not drawn
-        if derives and not _moved(config, groups, axis, sweep.size):
+        known = sweep.parameter in SWEEPABLE_GROUPS or not missing
+        if known and not drawn and not _moved(config, groups, axis, sweep.size):
             yield _without_effect(config, table, some[sweep.parameter])
 
 
 def _some_values(sweep: Sweep) -> FloatArray:
     """Return the ends of a sweep and a value between them; a value that is alone comes twice."""
-    if sweep.values is None:
-        first, last, count = sweep.span
-        values = np.linspace(first, last, min(count, 3))
-    else:
-        values = np.sort(sweep.values)
+    values = swept_values(sweep)
     some = values[[0, values.size // 2, -1]]
     return np.unique(some) if values.size > 1 else some[:2]
 
@@ -68,10 +68,10 @@ def _refused(config: Tables, some: Mapping[str, FloatArray]) -> list[str]:
 
 
 def _moved(config: Tables, groups: Groups, axis: int, count: int) -> bool:
-    """Whether a sweep of so many values, along this axis, changes a group that the scene needs."""
+    """Whether a sweep of so many values, along this axis, changes a group that what is kept needs."""
     for name, value in groups.values.items():
         row = GROUPS_BY_NAME[name]
-        if not row.is_list and np.ndim(value) > 0 and row.needed_by(config.scene.effects):
+        if not row.is_list and np.ndim(value) > 0 and row.needed_by(config.needed_effects):
             along = np.moveaxis(np.asarray(value), axis, 0)
             if len(along) > 1 and (count == 1 or not np.allclose(along, along[:1], 1e-12, 0.0)):
                 return True
@@ -84,7 +84,8 @@ def _without_effect(config: Tables, table: str, values: FloatArray) -> Fault:
     names = [name for name, value in derived.items() if np.ndim(value) > 0]
     winners = [name for name in names if name in swept]
     given = [name for name in names if name in config.groups.given()]
-    off = [name for name in names if not GROUPS_BY_NAME[name].needed_by(config.scene.effects)]
+    rows = [GROUPS_BY_NAME[name] for name in names or [parameter] if name in GROUPS_BY_NAME]
+    off = [row for row in rows if not row.needed_by(config.scene.effects)]
     rule = "changes nothing in this scene"
     if winners:
         rule += f": {swept[winners[0]]} sweeps {winners[0]}, and a group wins over a derived one"
@@ -92,8 +93,12 @@ def _without_effect(config: Tables, table: str, values: FloatArray) -> Fault:
     elif given:
         remedy = f"remove {', '.join(given)} from [groups], where a group wins over a derived one"
     elif off:
-        effects = sorted(set().union(*(GROUPS_BY_NAME[name].effects for name in off)))
-        remedy = f"add {' or '.join(effects)} to scene.effects: it acts on {', '.join(off)} only"
+        effects = [f'"{name}"' for name in sorted(set().union(*(row.effects for row in off)))]
+        rule += ", for it acts on an effect that is off"
+        remedy = f"add {' or '.join(effects)} to scene.effects"
+    elif rows and not any(row.needed_by(config.needed_effects) for row in rows):
+        rule = "acts on the axial pair only, and nothing that is kept depends on that"
+        remedy = "keep delta_3 or the like in outputs.section, or set outputs.lyapunov = true"
     else:
         remedy = "no group follows from it with the tables given; sweep a group instead"
     return Fault(f"{table}.parameter", rule, remedy, parameter)

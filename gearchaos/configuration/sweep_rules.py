@@ -94,28 +94,6 @@ def _values_are_in_range(config: Tables) -> Iterator[Fault]:
                 yield Fault(f"{table}.{name}", rule, "sweep inside that range", value)
 
 
-@reads("scene")
-def _swept_effect_is_on(config: Tables) -> Iterator[Fault]:
-    for table, sweep in config.sweeps.items():
-        row = SWEEPABLE_GROUPS.get(sweep.parameter)
-        if row is not None and not row.needed_by(config.scene.effects):
-            effects = " or ".join(f'"{name}"' for name in sorted(row.effects))
-            rule = "belongs to an effect that is off, so sweeping it changes nothing"
-            yield Fault(f"{table}.parameter", rule, f"add {effects} to scene.effects", row.name)
-
-
-@reads("scene", "outputs")
-def _swept_effect_is_kept(config: Tables) -> Iterator[Fault]:
-    for table, sweep in config.sweeps.items():
-        row = SWEEPABLE_GROUPS.get(sweep.parameter)
-        if row is None or row.needed_by(config.needed_effects):
-            continue
-        if row.needed_by(config.scene.effects):
-            rule = "acts on the axial pair only, and nothing that is kept depends on that"
-            remedy = "keep delta_3 or the like in outputs.section, or set outputs.lyapunov = true"
-            yield Fault(f"{table}.parameter", rule, remedy, row.name)
-
-
 @reads("start", "pitch_error")
 def _lanes_are_not_too_many(config: Tables) -> Iterator[Fault]:
     counts = {f"values of [{table}]": sweep.size for table, sweep in config.sweeps.items()}

@@ -339,7 +339,7 @@ def test_a_swept_physical_key_without_its_effect_names_the_effect():
     (problem,) = problems_of(
         'sweep={parameter="pitch_error.phase_deg", values=[0, 90]}', 'scene.effects=["backlash"]'
     )
-    assert "add pitch_error to scene.effects" in problem
+    assert 'add "pitch_error" to scene.effects' in problem
 
 
 PHYSICAL_MESH = (
