@@ -68,7 +68,7 @@ def _refused(config: Tables, some: Mapping[str, FloatArray]) -> list[str]:
 
 
 def _moved(config: Tables, groups: Groups, axis: int, count: int) -> bool:
-    """Whether a sweep of so many values, along this axis, changes a group that what is kept needs."""
+    """Whether a sweep, along this axis, changes a group on which what is kept depends."""
     for name, value in groups.values.items():
         row = GROUPS_BY_NAME[name]
         if not row.is_list and np.ndim(value) > 0 and row.needed_by(config.needed_effects):
