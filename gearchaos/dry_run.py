@@ -92,7 +92,7 @@ def _seconds_per_lane(simulation: Simulation) -> float:
 
 def _thinned(simulation: Simulation, share: float, length: float) -> Configuration:
     """Return a sweep with this share of the lanes, and of the mesh periods."""
-    config, plan = simulation.config, simulation.plan
+    config, plan, tables = simulation.config, simulation.plan, simulation.config.tables()
     starts, repeats = simulation.lanes.starts, simulation.lanes.repeats
     # Of every axis that is one the same.
     share = min(1.0, share) ** (1.0 / max(1, sum(n > 1 for n in simulation.lanes.shape)))
@@ -103,20 +103,18 @@ def _thinned(simulation: Simulation, share: float, length: float) -> Configurati
         runs = math.ceil(share * values.size / run)
         first = np.linspace(0, values.size - run, runs + 2)[1:-1].round().astype(int)
         some = values[np.unique(np.add.outer(first, np.arange(run)))].tolist()
-        config = config.replace(table, {"parameter": sweep.parameter, "values": some})
+        tables[table] = {"parameter": sweep.parameter, "values": some}
     if repeats > starts:
-        config = config.replace("pitch_error.realisations", math.ceil(share * repeats / starts))
-    recorded = math.ceil(length * plan.recorded_periods)
-    for key, value in {
-        "start.count": math.ceil((share * starts) ** (1.0 / config.start.counted)),
-        "integration.steps_per_period": plan.steps_per_period,
-        "integration.tolerance": None,
-        "integration.transient_periods": math.ceil(length * plan.transient_periods),
-        "outputs.section_points": min(config.outputs.section_points, recorded),
-        "integration.recorded_periods": recorded,
-    }.items():
-        config = config.replace(key, value)
-    return config
+        tables["pitch_error"]["realisations"] = math.ceil(share * repeats / starts)
+    tables["start"]["count"] = math.ceil((share * starts) ** (1.0 / config.start.counted))
+    tables["integration"] |= {
+        "steps_per_period": plan.steps_per_period,
+        "transient_periods": math.ceil(length * plan.transient_periods),
+        "recorded_periods": (recorded := math.ceil(length * plan.recorded_periods)),
+    }
+    tables["integration"].pop("tolerance", None)
+    tables["outputs"]["section_points"] = min(config.outputs.section_points, recorded)
+    return Configuration.from_tables(tables, config.source)
 
 
 def _memory(simulation: Simulation) -> int:
