@@ -12,10 +12,11 @@ import sys
 import time
 from argparse import ArgumentParser, Namespace
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
-from gearchaos.command_line import OK, Command
+from gearchaos.command_line import OK, Command, whole_number
 from gearchaos.errors import ConfigurationError
 from gearchaos.interrupts import check
 from gearchaos.progress import notice, say
@@ -51,8 +52,9 @@ class Setting(NamedTuple):
 def _arguments(parser: ArgumentParser) -> None:
     add = parser.add_argument
     add("config", metavar="config.toml", help="the sweep whose lanes are tried")
-    add("--steps", default="50,100,200,400,800", metavar="N,N,...")
-    add("--lanes", type=int, default=64, metavar="N", help="lanes to try (default: 64)")
+    add("--steps", type=_numbers_of_steps, default="50,100,200,400,800", metavar="N,N,...")
+    count = partial(whole_number, low=1)
+    add("--lanes", type=count, default=64, metavar="N", help="lanes to try (default: 64)")
     add("-o", "--output", metavar="NAME", help="name of figure and JSON, without its ending")
 
 
@@ -63,9 +65,7 @@ def _accuracy(options: Namespace) -> int:
     from gearchaos.figures.files import FORMATS
     from gearchaos.results.atomic_file import check_output
 
-    steps = _numbers_of_steps(options.steps)
-    if options.lanes < 1:
-        raise ConfigurationError(f"--lanes {options.lanes}: must be at least 1")
+    steps = options.steps
     config = load_config(options.config, options.set)
     stem = options.output or f"{Path(options.config).stem}_accuracy"
     targets = [f"{stem}.{ending}" for ending in (*FORMATS, "json")]
@@ -100,15 +100,7 @@ def _accuracy(options: Namespace) -> int:
 
 
 def _numbers_of_steps(text: str) -> list[int]:
-    try:
-        steps = sorted({int(number) for number in text.split(",")})
-    except ValueError:
-        steps = [0]
-    if steps[0] < 1 or steps[-1] > MOST_STEPS:
-        raise ConfigurationError(
-            f"--steps {text}: give numbers from 1 to {MOST_STEPS}, separated by commas"
-        )
-    return steps
+    return sorted({whole_number(one, 1, MOST_STEPS) for one in text.split(",")})
 
 
 def _write(settings: Sequence[Setting], title: str, targets: list[str], overwrite: bool) -> None:

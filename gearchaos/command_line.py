@@ -135,6 +135,14 @@ def number(text: str, low: float = -math.inf, high: float = math.inf) -> float:
     return value
 
 
+def whole_number(text: str, low: float, high: float = math.inf) -> int:
+    """Read a whole number within bounds off the command line."""
+    value = number(text, low, high)
+    if value % 1.0:
+        raise ArgumentTypeError(f"{text} is not a whole number")
+    return int(value)
+
+
 def place(text: str) -> tuple[str, float]:
     """Read NAME=VALUE off the command line, or a VALUE, which has an empty name."""
     name, _, value = text.rpartition("=")

@@ -15,7 +15,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from gearchaos.command_line import OK, Command, coordinates, number, place
+from gearchaos.command_line import OK, Command, coordinates, number, place, whole_number
 from gearchaos.errors import FigureError, FileError
 from gearchaos.progress import Progress, say
 
@@ -169,7 +169,8 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
     add("--width", type=partial(millimetres, low=60.0), metavar="MM", help=text)
     text = "height of the page (default: by the width)"
     add("--height", type=partial(millimetres, low=70.0), metavar="MM", help=text)
-    add("--dpi", type=_dpi, default=300, help="pixels per inch (default: 300)")
+    dots = partial(whole_number, low=50, high=1200)
+    add("--dpi", type=dots, default=300, help="pixels per inch (default: 300)")
 
 
 def _targets(options: argparse.Namespace, name: str, alone: bool) -> list[Path]:
@@ -232,13 +233,6 @@ def _lanes_in_words(result: "Result") -> str:
     words += "".join(f" at {axis} = {value:.6g}" for axis, value in result.fixed.items())
     diverged = int((result["status"] != 0).sum()) if "status" in result else 0
     return f"{words}, {diverged} of them diverged" if diverged else words
-
-
-def _dpi(text: str) -> int:
-    value = number(text, 50.0, 1200.0)
-    if value != int(value):
-        raise argparse.ArgumentTypeError(f"{text} is not a whole number")
-    return int(value)
 
 
 main = Command("plot", __doc__, _arguments, _plot, common=("overwrite",))

@@ -10,9 +10,10 @@ import math
 import sys
 import textwrap
 from collections.abc import Iterator, Sequence
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
-from gearchaos.command_line import OK, Command, coordinates, number, place
+from gearchaos.command_line import OK, Command, coordinates, number, place, whole_number
 
 if TYPE_CHECKING:
     from gearchaos.engine.refinement import Boundary
@@ -45,7 +46,8 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
         "let up to 25 chaotic lanes go on for so many records of their own length, and tell which "
         "share is still chaotic then"
     )
-    add("--survival", type=_records, metavar="RECORDS", help=text)
+    records = partial(whole_number, low=1, high=1000)
+    add("--survival", type=records, metavar="RECORDS", help=text)
     add("--json", action="store_true", help="print JSON instead of a table")
 
 
@@ -54,13 +56,6 @@ def _width(text: str) -> float:
     if width <= 0.0:
         raise argparse.ArgumentTypeError(f"{text!r} is not a positive number")
     return width
-
-
-def _records(text: str) -> int:
-    records = number(text, 1, 1000)
-    if records % 1.0:
-        raise argparse.ArgumentTypeError(f"{text!r} is not a whole number")
-    return int(records)
 
 
 def _stages(options: argparse.Namespace) -> int:

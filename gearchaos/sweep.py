@@ -10,6 +10,7 @@ import sys
 import time
 from argparse import ArgumentParser, Namespace
 from contextlib import suppress
+from importlib.util import find_spec
 from typing import TYPE_CHECKING
 
 from gearchaos.command_line import OK, Command
@@ -84,12 +85,10 @@ def _check_sharing(options: Namespace, config: "Configuration") -> None:
             f"--threads {options.threads}: the workers of a cluster use the cores that they have; "
             "start them with the variable NUMBA_NUM_THREADS to use fewer"
         )
-    try:
-        import distributed  # noqa: F401
-    except ImportError:
+    if find_spec("distributed") is None:
         raise ConfigurationError(
             "--dask: dask.distributed is not installed; pip install gearchaos[dask]"
-        ) from None
+        )
 
 
 def _compute(
