@@ -24,7 +24,6 @@ def text_of_file(source: str, what: str = CONFIGURATION) -> str:
 
     Raises FileError or ConfigurationError if it cannot be read.
     """
-    own = what == CONFIGURATION
     if not source:
         raise FileError("no configuration file: the path is empty; name a TOML file")
     try:
@@ -34,13 +33,13 @@ def text_of_file(source: str, what: str = CONFIGURATION) -> str:
         reason = error.strerror if isinstance(error, OSError) else str(error)
         rule = f"cannot be read: {reason}"
         raise FileError(f"{source}: {rule}; check the path of the {what}") from None
-    if content.startswith(b"\x89HDF") and own:
+    if content.startswith(b"\x89HDF") and what == CONFIGURATION:
         remedy = f"`gearchaos info {source}` shows that of a result"
         raise ConfigurationError(f"{source}: is HDF5, and a configuration is TOML; {remedy}")
     if len(content) > LARGEST_FILE:
-        remedy = "give many swept values as sweep.from, sweep.to and sweep.count"
         size = f"larger than {LARGEST_FILE // 1024**2} MB, so hardly a {what}"
-        raise ConfigurationError(f"{source}: {size}; {remedy if own else 'name another file'}")
+        remedy = "give many swept values as sweep.from, sweep.to and sweep.count"
+        raise ConfigurationError(f"{source}: {size}; name another file, or {remedy}")
     try:
         # utf-8-sig: some editors begin a file with a byte order mark.
         return content.decode("utf-8-sig")

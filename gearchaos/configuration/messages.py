@@ -92,9 +92,7 @@ def shown(value: object) -> str:
         return f'"{text}..."' if len(value) > 60 else f'"{text}"'
     if isinstance(value, int) and value.bit_length() > 200:
         return "an integer of hundreds of digits"
-    if isinstance(value, (datetime.date, datetime.time)):
-        return value.isoformat()
-    return repr(value)
+    return str(value)
 
 
 def suggestion(word: str, words: Iterable[str]) -> str:
