@@ -3,8 +3,8 @@
 import datetime
 import difflib
 import re
-from collections.abc import Iterable, Mapping, Sequence
-from typing import Any, NamedTuple
+from collections.abc import Iterable, Mapping
+from typing import NamedTuple
 
 from pydantic_core import ErrorDetails
 
@@ -105,14 +105,10 @@ def suggestion(word: str, words: Iterable[str]) -> str:
     return f"did you mean `{by_lower[close[0]]}`?" if close else ""
 
 
-def fault_of(error: ErrorDetails, tables: Mapping[str, Any], keys: Mapping[str, Key]) -> Fault:
-    """Word one error that `ValidationError.errors` lists.
-
-    ``tables``, what was validated, tells the keys in the error's location from names that pydantic
-    adds; ``keys`` are all of a configuration by their paths.
-    """
+def fault_of(error: ErrorDetails, keys: Mapping[str, Key]) -> Fault:
+    """Word one error that `ValidationError.errors` lists; ``keys`` are all keys by their paths."""
     kind, value, rule = error["type"], error["input"], _rule(error)
-    names = _names(error["loc"], tables)
+    names = _names(error, keys)
     if kind.startswith("union_tag"):
         names.append(error["ctx"]["discriminator"].strip("'"))
         value = value.get(names[-1])
@@ -147,20 +143,16 @@ def _rule(error: ErrorDetails) -> str:
     return f"must be {_EXPECTED[kind]}, not {_FOUND.get(type(value), type(value).__name__)}"
 
 
-def _names(location: Sequence[int | str], tables: Mapping[str, Any]) -> list[int | str]:
-    # pydantic puts the tag of a union ("fourier") and "[key]" into the location of an error.
+def _names(error: ErrorDetails, keys: Mapping[str, Key]) -> list[int | str]:
+    """Return the names of the keys on the way to an error, numbers in lists among them."""
     names: list[int | str] = []
-    node: Any = tables
-    for position, name in enumerate(location):
-        tags = [node.get(tag) for tag in _TAGS] if isinstance(node, Mapping) else []
-        if name in tags and position < len(location) - 1:
-            continue
-        known = range(len(node)) if isinstance(node, (list, tuple)) else node
-        if isinstance(known, (Mapping, range)) and name in known:
-            node = node[name]
-        elif position < len(location) - 1 or name == "[key]":
-            continue
-        names.append(name)
+    tagged = False
+    for name in error["loc"]:
+        # pydantic adds the kind of a table that has several, and "[key]" for a key itself.
+        added = tagged or (name == "[key]" and error["type"] != "extra_forbidden")
+        names += [] if added else [name]
+        key = keys.get(".".join(map(str, names)))
+        tagged = not added and key is not None and len(key.tables) > 1
     return names
 
 

@@ -77,7 +77,7 @@ class Configuration(Tables):
         except ValidationError as error:
             found = error.errors(include_url=False)
             # A long list of nonsense can hold a million faults.
-            own = [fault_of(one, tables, configuration_keys()) for one in found[:MOST_SHOWN]]
+            own = [fault_of(one, configuration_keys()) for one in found[:MOST_SHOWN]]
             unreadable = {str(one["loc"][0]) for one in found}
             shared = _broken_rules(_readable(tables, unreadable), unreadable)
             more = len(found) - len(own)

@@ -47,7 +47,7 @@ def load_targets(file: str | os.PathLike[str], overrides: Iterable[str] = ()) ->
     except ValidationError as error:
         found = error.errors(include_url=False)
         keys = {one.path: one for one in keys_of(Targets)}
-        worded = [fault_of(one, tables, keys) for one in found[:MOST_SHOWN]]
+        worded = [fault_of(one, keys) for one in found[:MOST_SHOWN]]
         raise ConfigurationError(texts(worded, source, len(found) - len(worded))) from None
     if faults := list(_faults(targets)):
         raise ConfigurationError(texts(faults, source))
