@@ -61,7 +61,9 @@ def contact_line_stiffness() -> TrapezoidalStiffness:
 def printed_coefficients() -> NDArray[np.complex128]:
     """Return the coefficients of Table 2 relative to the mean stiffness, as `series_table` does."""
     mean, harmonics = published().numbers["mean_stiffness"].value, published().harmonics
-    return np.divide(harmonics.cosine, mean) - 1j * np.divide(harmonics.sine, mean)
+    cosine, sine = (np.divide(wave, mean) for wave in (harmonics.cosine, harmonics.sine))
+    series: NDArray[np.complex128] = cosine - 1j * sine
+    return series
 
 
 def pair_of(found: Reproduction) -> HelicalPair:
