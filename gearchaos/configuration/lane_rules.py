@@ -29,9 +29,8 @@ def lane_faults(config: Tables) -> Iterator[Fault]:
     some = dict(zip(by_parameter, np.ix_(*by_parameter.values()), strict=True))
     try:
         groups = groups_at(config, some)
-    except ConfigurationError as error:
-        for table in _refused(config, some):
-            yield Fault(f"{table}.parameter", str(error), "", sweeps[table].parameter)
+    except ConfigurationError:
+        yield from _refused(config, some)
         return
     except (ArithmeticError, ValueError) as error:
         remedy = "check the magnitudes in [pair], [mesh], [operation], [pitch_error], [bearings]"
@@ -56,15 +55,13 @@ def _some_values(sweep: Sweep) -> FloatArray:
     return np.unique(some) if values.size > 1 else some[:2]
 
 
-def _refused(config: Tables, some: Mapping[str, FloatArray]) -> list[str]:
-    """Name the sweeps that already alone would make the stiffness differ between lanes."""
-    tables = []
+def _refused(config: Tables, some: Mapping[str, FloatArray]) -> Iterator[Fault]:
+    """Yield the sweeps that make the stiffness differ between lanes; each does so alone."""
     for table, sweep in config.sweeps.items():
         try:
             groups_at(config, {sweep.parameter: some[sweep.parameter]})
-        except ConfigurationError:
-            tables.append(table)
-    return tables or list(config.sweeps)
+        except ConfigurationError as error:
+            yield Fault(f"{table}.parameter", str(error), "", sweep.parameter)
 
 
 def _moved(config: Tables, groups: Groups, axis: int, count: int) -> bool:
