@@ -6,7 +6,6 @@ Scales: length b', time 1 / omega_h with omega_h = sqrt(k_m / m_e).
 from collections.abc import Callable, Collection, Mapping
 from contextlib import suppress
 from functools import cached_property
-from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -78,9 +77,9 @@ class Quantities:
     """Physical data in SI units, and what follows from them."""
 
     def __init__(
-        self, physical: Mapping[str, Any], examples: Mapping[str, Any] = MappingProxyType({})
+        self, physical: Mapping[str, Any], examples: Mapping[str, Any] | None = None
     ) -> None:
-        self.physical, self._examples = physical, examples
+        self.physical, self._examples = physical, examples or {}
         self.asked_for: dict[str, None] = {}
 
     def __getitem__(self, path: str) -> Any:
