@@ -1,5 +1,6 @@
 """Who knows whom: results and figures work on a machine without the engine."""
 
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -7,6 +8,7 @@ from pathlib import Path
 import pytest
 from importlinter.cli import lint_imports
 
+import gearchaos
 from gearchaos.__main__ import COMMANDS
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -66,3 +68,9 @@ def test_running_needs_the_kernels_but_no_figures():
     packages = imported_by("from gearchaos import run")
     assert packages >= ENGINE
     assert "matplotlib" not in packages
+
+
+def test_editors_see_the_names_of_the_package():
+    stub = (ROOT / "gearchaos" / "__init__.pyi").read_text(encoding="utf-8")
+    assert sorted(re.findall(r"import \w+ as (\w+)$", stub, re.MULTILINE)) == gearchaos.__all__
+    assert all(hasattr(gearchaos, name) for name in gearchaos.__all__)
