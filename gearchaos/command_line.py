@@ -137,7 +137,11 @@ def number(text: str, low: float = -math.inf, high: float = math.inf) -> float:
 
 def place(text: str) -> tuple[str, float]:
     """Read NAME=VALUE off the command line, or a VALUE, which has an empty name."""
+    from gearchaos.results.variables import DIRECTION, WAYS
+
     name, _, value = text.rpartition("=")
+    if name.strip() == DIRECTION and value in WAYS:
+        return DIRECTION, float(WAYS.index(value))
     return name.strip(), number(value)
 
 
