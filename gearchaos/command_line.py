@@ -145,7 +145,11 @@ def whole_number(text: str, low: float, high: float = math.inf) -> int:
 
 def place(text: str) -> tuple[str, float]:
     """Read NAME=VALUE off the command line, or a VALUE, which has an empty name."""
+    from gearchaos.results.variables import DIRECTION, WAYS
+
     name, _, value = text.rpartition("=")
+    if name.strip() == DIRECTION and value in WAYS:
+        return DIRECTION, float(WAYS.index(value))
     return name.strip(), number(value)
 
 

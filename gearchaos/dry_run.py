@@ -18,9 +18,9 @@ from gearchaos.configuration import Configuration, swept_values
 from gearchaos.engine.sharding import Shard
 from gearchaos.engine.simulation import Simulation
 from gearchaos.progress import notice
-from gearchaos.results.block_store import lanes_and_record
+from gearchaos.results.block_store import PIECE_BYTES, lanes_and_record
 from gearchaos.results.result_file import CACHE_BYTES
-from gearchaos.results.variables import START
+from gearchaos.results.variables import DIRECTION, START
 
 SAMPLE_PERIODS = 1000
 """Mesh periods of a sample: over much fewer, labels cost more than their share."""
@@ -34,6 +34,7 @@ def describe(simulation: Simulation, output: str, shard: Shard | None, as_json: 
     seconds = own * _seconds_per_lane(simulation)
     bytes_kept, kept = own * record.itemsize, [record[name] for name in record.names or ()]
     memory = _memory(simulation) + sum(min(CACHE_BYTES, every * one.itemsize) for one in kept)
+    memory += min(PIECE_BYTES, bytes_kept) if simulation.carried else 0
     # What HDF5 and the allocator keep while a file is written is not known beforehand.
     memory += memory // 20
     plan = simulation.plan
@@ -48,10 +49,12 @@ def describe(simulation: Simulation, output: str, shard: Shard | None, as_json: 
     spans = [
         f"{axis.values.size} values of {axis.name} from {axis.values[0]:g} to {axis.values[-1]:g}"
         for axis in lanes.axes
-        if axis.name != START
+        if axis.name not in (START, DIRECTION)
     ]
     if lanes.starts > 1:
         spans.append(f"{lanes.starts} starts each")
+    if lanes.directions > 1:
+        spans.append("in both directions")
     unused = ", ".join(name for name in config.scene.effects if name not in lanes.effects)
     unused = f" (nothing that is kept needs {unused})" if unused else ""
     for key, value in {
@@ -93,20 +96,24 @@ def _seconds_per_lane(simulation: Simulation) -> float:
 def _thinned(simulation: Simulation, share: float, length: float) -> Configuration:
     """Return a sweep with this share of the lanes, and of the mesh periods."""
     config, plan, tables = simulation.config, simulation.plan, simulation.config.tables()
-    starts, repeats = simulation.lanes.starts, simulation.lanes.repeats
-    # Of every axis that is one the same.
-    share = min(1.0, share) ** (1.0 / max(1, sum(n > 1 for n in simulation.lanes.shape)))
+    lanes, carried = simulation.lanes, simulation.carried
+    pairs = lanes.repeats // (lanes.starts * lanes.directions)
+    # Of every axis that is one the same, but lines that are carried side by side remain so.
+    axes = 1 if carried else sum(n > 1 for n in lanes.shape)
+    share = min(1.0, share) ** (1.0 / max(1, axes))
+    others = 1.0 if carried else share
     for table, sweep in config.sweeps.items():
-        values = swept_values(sweep)
+        values, part = swept_values(sweep), share if table == "sweep" else others
         # Neighbours behave alike, which a vector of lanes profits from.
-        run = min(values.size, -(-LANES // repeats)) if table == "sweep" else 1
-        runs = math.ceil(share * values.size / run)
+        beside = lanes.side_by_side if carried else lanes.repeats
+        run = min(values.size, -(-LANES // beside)) if table == "sweep" else 1
+        runs = math.ceil(part * values.size / run)
         first = np.linspace(0, values.size - run, runs + 2)[1:-1].round().astype(int)
         some = values[np.unique(np.add.outer(first, np.arange(run)))].tolist()
         tables[table] = {"parameter": sweep.parameter, "values": some}
-    if repeats > starts:
-        tables["pitch_error"]["realisations"] = math.ceil(share * repeats / starts)
-    tables["start"]["count"] = math.ceil((share * starts) ** (1.0 / config.start.counted))
+    if pairs > 1:
+        tables["pitch_error"]["realisations"] = math.ceil(others * pairs)
+    tables["start"]["count"] = math.ceil((others * lanes.starts) ** (1.0 / config.start.counted))
     tables["integration"] |= {
         "steps_per_period": plan.steps_per_period,
         "transient_periods": math.ceil(length * plan.transient_periods),

@@ -80,8 +80,7 @@ def _lane(options: Namespace) -> "Asked":
     if lane.axes:
         rest = " and ".join(f"--at {axis}=VALUE" for axis in lane.axes)
         raise ConfigurationError(f"{options.config}: name one lane, with {rest} as well")
-    where = ", ".join(f"{axis} = {value:.12g}" for axis, value in lane.fixed.items())
-    note = f"goes on from the end of the lane {where} of {options.config}"
+    note = f"goes on from the end of the lane {lane.where} of {options.config}"
     return continued(lane, options.config), str(lane.metadata["configuration"]), [note]
 
 

@@ -9,7 +9,7 @@ import json
 import math
 import sys
 import textwrap
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -18,7 +18,7 @@ from gearchaos.command_line import OK, Command, coordinates, number, place, whol
 if TYPE_CHECKING:
     from gearchaos.engine.refinement import Boundary
     from gearchaos.engine.survival import Survival
-    from gearchaos.results.jumps import Crisis, Jump
+    from gearchaos.results.jumps import Apart, Crisis, Jump
     from gearchaos.results.result import Result
     from gearchaos.results.stage_table import Stage
 
@@ -34,7 +34,8 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
     add("--narrowest", type=_width, default=0.0, metavar="WIDTH", help=text)
     text = (
         "bisect every boundary to this width, and tell how the orbit beside it is lost; lanes are "
-        "computed again with the configuration in the file"
+        "computed again with the configuration in the file. Of a sweep in both directions, follow "
+        "the orbits to where each direction jumps"
     )
     add("--refine", type=_width, metavar="WIDTH", help=text)
     text = (
@@ -60,7 +61,7 @@ def _width(text: str) -> float:
 
 def _stages(options: argparse.Namespace) -> int:
     from gearchaos.results.excitation import excitation_of
-    from gearchaos.results.jumps import crises, jumps
+    from gearchaos.results.jumps import apart, crises, jumps
     from gearchaos.results.overview import finite, slice_lines
     from gearchaos.results.result import open_result
     from gearchaos.results.stage_table import (
@@ -69,16 +70,20 @@ def _stages(options: argparse.Namespace) -> int:
         slice_facts,
         stage_table,
     )
-    from gearchaos.results.variables import RECORD, REPEATS
+    from gearchaos.results.variables import DIRECTION, RECORD, REPEATS
 
     whole = open_result(options.result)
     # What is computed again is that of one pair and one start.
     kept = REPEATS if options.refine is None and options.survival is None else ()
-    result = one_axis(whole, kept, **coordinates(options.at, whole.axes, whole.axis))
+    places = coordinates(options.at, whole.axes, whole.axis)
+    part = one_axis(whole, (*kept, DIRECTION), **places)
+    result, both = one_axis(part, kept), DIRECTION in part.axes
     where = slice_facts(whole, result)
     stages = stage_table(lanes_of_all_repeats(result, name=options.result), options.narrowest)
-    boundaries = _refined(result, stages, options) if options.refine is not None else None
-    for at, boundary in enumerate(boundaries or ()):
+    stretches, boundaries = apart(part, options.narrowest), None
+    if options.refine is not None:
+        boundaries = _refined(part, stretches if both else stages, options)
+    for at, boundary in enumerate([] if both else boundaries or []):
         stages[at] = stages[at]._replace(end=boundary.below)
         stages[at + 1] = stages[at + 1]._replace(start=boundary.above)
     outlasting = _survival(result, options) if options.survival is not None else None
@@ -90,6 +95,7 @@ def _stages(options: argparse.Namespace) -> int:
             "parameter": result.axis,
             "slice": where,
             "stages": [*map(_named, stages)],
+            **({"directions_apart": [*map(_named, stretches)]} if both else {}),
             **refined,
             "jumps": [jump._asdict() for jump in jumping],
             "crises": [crisis._asdict() for crisis in bursting],
@@ -98,7 +104,7 @@ def _stages(options: argparse.Namespace) -> int:
         print(json.dumps(finite(facts), indent=1, allow_nan=False))
         return OK
     mixed = int((result[RECORD] == 1).sum()) if RECORD in result else 0
-    told = [*band_lines(stages), *remarks(jumping, bursting, mixed)]
+    told = [*band_lines(stages), *remarks(jumping, bursting, mixed), *directions_apart(stretches)]
     told += [outlasting.text] if outlasting else []
     head = [
         f"all {result[axis].size} values of {axis}, of which --at {axis}=VALUE chooses one"
@@ -112,15 +118,20 @@ def _stages(options: argparse.Namespace) -> int:
 
 
 def _refined(
-    result: "Result", stages: "list[Stage]", options: argparse.Namespace
+    result: "Result", found: "list[Stage] | list[Apart]", options: argparse.Namespace
 ) -> "list[Boundary]":
     # Only here: reading a file needs no compiler.
-    from gearchaos.engine.refinement import refinable, refined_boundaries
+    from gearchaos.engine import refinement
     from gearchaos.engine.running import compiling
+    from gearchaos.results.variables import DIRECTION
 
-    config = refinable(result, options.result)
+    refine: Callable[..., list[Boundary]] = refinement.refined_boundaries
+    config = refinement.refinable
+    if DIRECTION in result.axes:
+        refine, config = refinement.refined_jumps, refinement.computable
     with compiling():
-        return refined_boundaries(config, result, stages, options.refine, options.threads)
+        asked = config(result, options.result)
+        return refine(asked, result, found, options.refine, options.threads)
 
 
 def _survival(result: "Result", options: argparse.Namespace) -> "Survival":
@@ -170,11 +181,19 @@ def remarks(jumping: "Sequence[Jump]", bursting: "Sequence[Crisis]", mixed: int)
         yield "motion before; integration.transient_periods leaves it out"
 
 
+def directions_apart(stretches: "Sequence[Apart]") -> Iterator[str]:
+    """Word where a sweep comes to other motions upwards than downwards."""
+    for one in stretches:
+        line = f"{one.start:.6g} to {one.end:.6g}: other motions upwards ({one.motion_upwards}) "
+        yield from textwrap.wrap(f"{line}than downwards ({one.motion_downwards})", WIDTH)
+
+
 def boundary_list(boundaries: "Sequence[Boundary]") -> Iterator[str]:
     """Word the refined boundaries, each with what the orbit beside it does."""
     for boundary in boundaries:
         between = f"{boundary.label_below} | {boundary.label_above}"
-        yield f"{boundary.below:.8g} to {boundary.above:.8g}: {between}"
+        jumps = f", jumps {boundary.direction}" if boundary.direction else ""
+        yield f"{boundary.below:.8g} to {boundary.above:.8g}: {between}{jumps}"
         if boundary.loss:
             yield f"    {boundary.loss}"
         if not math.isnan(abs(boundary.multiplier)):
@@ -195,12 +214,13 @@ _NAMES = {
 """Names in JSON of what stages and boundaries have, where they differ."""
 
 
-def _named(record: "Stage | Boundary") -> dict[str, Any]:
+def _named(record: "Stage | Boundary | Apart") -> dict[str, Any]:
     facts = {_NAMES.get(name, name): value for name, value in record._asdict().items()}
     if "multiplier" in facts:
         multiplier = facts.pop("multiplier")
         facts |= {"multiplier_real": multiplier.real, "multiplier_imaginary": multiplier.imag}
         facts["loss_of_stability"] = facts["loss_of_stability"] or None
+        facts["direction"] = facts["direction"] or None
     return facts
 
 

@@ -110,7 +110,8 @@ def _compute(
             if shard is None:
                 facts = {**metadata(simulation, seconds), **performed_by}
                 told = simulation.variables, simulation.lanes.parameters, facts
-                store.merge(*told, overwrite=options.overwrite)
+                order = simulation.lanes.computed_at if simulation.carried else None
+                store.merge(*told, overwrite=options.overwrite, computed_at=order)
         except (KeyboardInterrupt, FileError, ExecutionError, OSError) as fault:
             kept = sum(last - first for first, last in store.finished().bounds)
             fault.add_note(f"{kept} of {store.own_lanes} lanes are kept")

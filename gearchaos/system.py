@@ -93,7 +93,7 @@ class System:
         self.state = start_states(self.config, self._record, np.zeros(1, dtype=np.intp))[0]
 
     @classmethod
-    def of_lane(cls, result: Result, **coordinates: float) -> Self:
+    def of_lane(cls, result: Result, **coordinates: float | str) -> Self:
         """Return the system of one lane of a result; it starts where the lane ended.
 
         Parameters

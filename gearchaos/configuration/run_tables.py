@@ -115,9 +115,9 @@ class Start(Table):
         ge=1,
         le=_MOST_STARTS,
     )
-    carry: Literal["none", "upwards", "downwards"] = key(
+    carry: Literal["none", "upwards", "downwards", "both"] = key(
         "whether each value of [sweep] starts from the end state of the one before it, and in "
-        "which direction",
+        "which direction; both are two sweeps side by side, the axis `direction` of one result",
         default="none",
     )
 

@@ -99,6 +99,7 @@ def _lanes_are_not_too_many(config: Tables) -> Iterator[Fault]:
     counts = {f"values of [{table}]": sweep.size for table, sweep in config.sweeps.items()}
     counts["drawn gear pairs"] = getattr(config.pitch_error, "realisations", 1)
     counts["starts"] = config.start.size
+    counts["directions"] = 2 if config.start.carry == "both" else 1
     lanes = math.prod(counts.values())
     if lanes > MOST_LANES:
         product = " x ".join(f"{count} {name}" for name, count in counts.items() if count > 1)

@@ -20,12 +20,11 @@ CHECKED = ("section_error", "exponent_step_error", "motion_changed")
 _OF_THE_RECORD = "lyapunov_exponent_standard_error"
 
 
-def checked_lanes(first: int, last: int, share: float) -> NDArray[np.intp]:
-    """Return which of the lanes ``first`` to ``last - 1`` are checked, counted from the first.
+def checked_lanes(numbers: NDArray[np.intp], share: float) -> NDArray[np.intp]:
+    """Return which of the lanes with these numbers, of shape (lanes,), are checked.
 
     The share is spread evenly over the whole sweep and depends on the number of a lane alone.
     """
-    numbers = np.arange(first, last)
     return np.flatnonzero(np.floor((numbers + 1) * share) > np.floor(numbers * share))
 
 

@@ -8,13 +8,13 @@ one. The loop neither knows nor cares whether a block is computed in this proces
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from contextlib import ExitStack, suppress
-from functools import partial
 from types import MappingProxyType
 from typing import TYPE_CHECKING, TypeAlias
 
 import numba
+import numpy as np
 
-from gearchaos.engine.simulation import Arrays, Bounds, Simulation
+from gearchaos.engine.simulation import Arrays, Bounds, Floats, Simulation
 from gearchaos.errors import FileError, GearchaosError
 from gearchaos.interrupts import check
 
@@ -50,8 +50,13 @@ class LocalExecutor(ExitStack):
     ) -> None:
         super().__init__()
         self._simulation = simulation
-        # A carried block needs what the one before it yielded: it is handed out after that one.
-        self._before = dict(finished) if simulation.carried else {}
+        if simulation.carried:
+            # Of all lanes, and before them of as many, side by side, which there are not.
+            lanes = simulation.lanes
+            size = lanes.side_by_side + len(lanes), len(lanes.states)
+            self._ends = np.full(size, np.nan)
+            for block, read in finished.items():
+                self._end_states(*block)[:] = read()["end_state"]
         threads = (numba.get_num_threads(),)
         self._pool = ThreadPoolExecutor(1, initializer=numba.set_num_threads, initargs=threads)
         self.callback(self._pool.shutdown, cancel_futures=True)
@@ -64,15 +69,17 @@ class LocalExecutor(ExitStack):
         return self._pool.submit(self._compute, block)
 
     def _compute(self, block: Bounds) -> Arrays:
-        simulation, carried = self._simulation, None
-        first, last = block
-        for before, read in self._before.items():
-            if before[0] == last if simulation.downwards else before[1] == first:
-                carried = read()["end_state"]
-        arrays = simulation.compute(first, last, carried)
-        if simulation.carried:
-            self._before[block] = partial(dict, end_state=arrays["end_state"])
+        simulation, (first, _) = self._simulation, block
+        if not simulation.carried:
+            return simulation.compute(*block)
+        before = first - simulation.lanes.side_by_side
+        arrays = simulation.compute(*block, self._end_states(before, first))
+        self._end_states(*block)[:] = arrays["end_state"]
         return arrays
+
+    def _end_states(self, first: int, last: int) -> Floats:
+        many = self._simulation.lanes.side_by_side
+        return self._ends[many + first : many + last]
 
 
 def compute_blocks(

@@ -21,7 +21,14 @@ from gearchaos.gear.derivation import SCALES, derive_scales
 from gearchaos.gear.group_table import GROUP_TABLE
 from gearchaos.gear.tooth_deviations import REALISATION
 from gearchaos.results.result_file import Parameter
-from gearchaos.results.variables import HARMONIC, Axis, axis_name, pair_axis, start_axis
+from gearchaos.results.variables import (
+    HARMONIC,
+    Axis,
+    axis_name,
+    direction_axis,
+    pair_axis,
+    start_axis,
+)
 
 Floats = NDArray[np.float64]
 Numbers = NDArray[np.intp]
@@ -37,10 +44,11 @@ class Lanes:
     """The product of all axes as a flat list, the last axis running fastest.
 
     A lane's result depends on its number in this list and nothing else. ``axes``: one `Axis` for
-    each dimension, the second swept parameter, the first one, the drawn gear pair, the start, those
-    that there are; ``effects``: those that act on what is kept, and ``states``: those that they
-    leave; ``starts``: of one value, or pair of values, with one gear pair; ``repeats``: lanes of
-    one value, or pair of values, with all its gear pairs and starts.
+    each dimension, the second swept parameter, the first one, the drawn gear pair, the start, the
+    direction, those that there are; ``effects``: those that act on what is kept, and ``states``:
+    those that they leave; ``starts``: of one value, or pair of values, with one gear pair;
+    ``directions``, in which states are carried; ``repeats``: lanes of one value, or pair of values,
+    with all its gear pairs, starts and directions.
     """
 
     def __init__(self, config: Configuration) -> None:
@@ -55,9 +63,12 @@ class Lanes:
             self.axes.append(pair_axis(numbers))
             self._of_systems[REALISATION] = numbers
         self.starts = config.start.size
-        self.repeats = numbers.size * self.starts
         if self.starts > 1:
             self.axes.append(start_axis(self.starts))
+        self.directions = 2 if config.start.carry == "both" else 1
+        if self.directions > 1:
+            self.axes.append(direction_axis())
+        self.repeats = numbers.size * self.starts * self.directions
         self.effects = config.needed_effects
         self.states = states_of(self.effects)
 
@@ -75,9 +86,28 @@ class Lanes:
         return self.system_of(np.arange(1)).repeats_after
 
     @property
-    def carried_along(self) -> int:
-        """Lanes of one line along the first swept parameter, along which a state may be carried."""
-        return self.repeats * swept_values(self.config.sweep).size
+    def side_by_side(self) -> int:
+        """Lanes that wait for no other: of a carried sweep one of each line, otherwise all."""
+        carried = self.config.start.carry != "none"
+        return len(self) // (swept_values(self.config.sweep).size if carried else 1)
+
+    def computed_at(self, places: Numbers) -> Numbers:
+        """Return the lanes at some places in the order of computation.
+
+        A carried sweep takes a lane of each line along the first swept parameter, then the next one
+        of each; any other sweep goes through its list.
+        """
+        carry, values = self.config.start.carry, swept_values(self.config.sweep).size
+        if carry == "none":
+            return places
+        directions, repeats = self.directions, self.repeats // self.directions
+        lines = self.side_by_side // self.repeats
+        shape = (values, directions, lines, repeats)
+        step, direction, line, repeat = np.unravel_index(places, shape)
+        downwards = direction == 1 if carry == "both" else carry == "downwards"
+        value = np.where(downwards, values - 1 - step, step)
+        place = (line, value, repeat, direction)
+        return np.ravel_multi_index(place, (lines, values, repeats, directions))
 
     def values_of(self, lanes: Numbers) -> dict[str, Floats]:
         """Return the value of each swept parameter in some lanes, and the number of the pair."""
@@ -91,7 +121,8 @@ class Lanes:
 
     def start_of(self, lanes: Numbers) -> Floats:
         """Return the configured start states of some lanes, shape (lanes, states)."""
-        return start_states(self.config, self.system_of(lanes), lanes)
+        # Both directions of a carried sweep begin alike.
+        return start_states(self.config, self.system_of(lanes), lanes // self.directions)
 
     def spread(self, count: int) -> Numbers:
         """Return the numbers of at most so many lanes, spread evenly over all."""
@@ -143,8 +174,8 @@ def axis_of(parameter: str, values: Floats) -> Axis:
 def start_states(config: Configuration, system: System, numbers: Numbers) -> Floats:
     """Return the start states, shape (lanes, states), of lanes with this system.
 
-    ``numbers`` (lanes,): those that they have in the whole sweep, ascending: the random state of a
-    lane depends on its number and the seed alone.
+    ``numbers`` (lanes,): those that they have in the whole sweep: the random state of a lane
+    depends on its number and the seed alone.
     """
     values: dict[Any, Any] = dict.fromkeys(system.states, 0.0)
     values |= config.start.state
@@ -158,11 +189,8 @@ def start_states(config: Configuration, system: System, numbers: Numbers) -> Flo
         for (name, bounds), at in zip(box.items(), places, strict=True):
             values[name] = np.linspace(*bounds, count)[at]
     elif kind == "random":
-        first = int(numbers[0])
-        generator = np.random.Philox(config.start.seed)
-        generator.advance(first * (_DRAWS_PER_LANE // _PHILOX_WIDTH))
-        shape = (int(numbers[-1]) - first + 1, _DRAWS_PER_LANE)
-        draws = np.random.Generator(generator).uniform(-1.0, 1.0, shape)[numbers - first]
+        runs = np.split(numbers, np.flatnonzero(np.diff(numbers) != 1) + 1)
+        draws = np.concatenate([_draws(config.start.seed, run) for run in runs])
         for name, (low, high) in (
             box or dict.fromkeys(config.scene.states, (-spread, spread))
         ).items():
@@ -171,6 +199,14 @@ def start_states(config: Configuration, system: System, numbers: Numbers) -> Flo
     # What starts in a state that nothing kept depends on is not computed.
     columns = [np.broadcast_to(values[name], system.lanes) for name in system.states]
     return np.stack(columns, axis=1).astype(np.float64)
+
+
+def _draws(seed: int, run: Numbers) -> Floats:
+    """Draw the random numbers of consecutive lanes, shape (lanes, draws)."""
+    generator = np.random.Philox(seed)
+    generator.advance(int(run[0]) * (_DRAWS_PER_LANE // _PHILOX_WIDTH))
+    shape = run.size, _DRAWS_PER_LANE
+    return np.random.Generator(generator).uniform(-1.0, 1.0, shape)
 
 
 def _contact(system: System) -> Floats:

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from gearchaos.configuration import Configuration, swept_values
 from gearchaos.dynamics.following import (
     STABILITY_LOSS_TEXTS,
+    Followed,
     Losses,
     StabilityLoss,
     follow,
@@ -16,13 +17,14 @@ from gearchaos.dynamics.following import (
 )
 from gearchaos.dynamics.labelling import LOOKS
 from gearchaos.dynamics.systems import plan_of, system_of
-from gearchaos.engine.running import run
+from gearchaos.engine.running import choose_threads, run
 from gearchaos.errors import ConfigurationError, FileError
 from gearchaos.gear.tooth_deviations import REALISATION
 from gearchaos.records.period import TOLERANCE
+from gearchaos.results.jumps import Apart, directions_of
 from gearchaos.results.result import Result
 from gearchaos.results.stage_table import Stage, labelled_lanes
-from gearchaos.results.variables import axis_name
+from gearchaos.results.variables import WAYS, axis_name
 
 Floats = NDArray[np.float64]
 
@@ -48,7 +50,8 @@ class Boundary(NamedTuple):
 
     ``below``, ``above``: values of the swept parameter; ``label_below``, ``label_above``: the
     labels there; ``loss``: how the periodic orbit beside it loses stability, empty where there is
-    none; ``multiplier``: the Floquet multiplier that tells, NaN where none does.
+    none; ``multiplier``: the Floquet multiplier that tells, NaN where none does; ``direction``: in
+    which a carried sweep jumps there.
     """
 
     below: float
@@ -57,6 +60,7 @@ class Boundary(NamedTuple):
     label_above: str
     loss: str
     multiplier: complex
+    direction: str = ""
 
 
 def computable(result: Result, name: str) -> Configuration:
@@ -151,6 +155,45 @@ def refined_boundaries(
     ]
 
 
+def refined_jumps(
+    config: Configuration,
+    result: Result,
+    stretches: list[Apart],
+    width: float,
+    threads: int | None = None,
+) -> list[Boundary]:
+    """Follow the motions of both directions to where they end and the sweep jumps.
+
+    ``config`` is from `computable`, the stretches, in which directions differ, are those of this
+    result. Where a motion has no orbit, or it goes on, a jump lies between two lanes; elsewhere its
+    place is known to the width.
+    """
+    choose_threads(threads)
+    found: list[Boundary] = []
+    outermost = np.array([(one.first, one.last) for one in stretches]).reshape(-1, 2).T
+    ways = zip(WAYS, directions_of(result), outermost[::-1], (1, -1), strict=True)
+    for way, one_way, end, step in ways:
+        edges = _edges(one_way)
+        # Next to its end a lane may still be on its way: the orbit is that of the lane before.
+        inner = np.clip(end - step, *outermost)
+        there = (end + step >= 0) & (end + step < edges.size)
+        last, beyond = edges[end[there]], edges[end[there] + step]
+        if not last.size:
+            continue
+        further = 2.0 * beyond["value"] - last["value"]
+        followed, losses = _followed(config, edges[inner[there]], further, width)
+        goes_on = np.isin(losses.kind, (StabilityLoss.STAYS_STABLE, StabilityLoss.NOT_FOLLOWED))
+        stable = np.where(goes_on, last["value"], followed.stable_value)
+        lost = np.where(goes_on, beyond["value"], followed.beyond_value)
+        for n, kind in enumerate(losses.kind):
+            told = STABILITY_LOSS_TEXTS[StabilityLoss(kind)] if last["period"][n] else ""
+            sides = (float(stable[n]), last["label"][n]), (float(lost[n]), beyond["label"][n])
+            (below, one), (above, other) = sides[::step]
+            multiplier = complex(losses.multiplier[n])
+            found.append(Boundary(below, above, one, other, told, multiplier, way))
+    return sorted(found, key=lambda boundary: boundary.below)
+
+
 def _edges(result: Result) -> NDArray[Any]:
     """Return of each lane value, label, period, end state, and if that is far from its orbit."""
     lanes, states = labelled_lanes(result), result["end_state"]
@@ -168,8 +211,8 @@ def _losses(
 ) -> list[tuple[str, complex]]:
     """Follow the orbits below a boundary upwards, and those above it downwards."""
     # Close to a bifurcation the label changes a little before or after it: one lane further.
-    upwards = _followed(config, below, above["value"] + spacing)
-    downwards = _followed(config, above, below["value"] - spacing)
+    _, upwards = _followed(config, below, above["value"] + spacing)
+    _, downwards = _followed(config, above, below["value"] - spacing)
     told = []
     for number in range(spacing.size):
         sides = [
@@ -184,7 +227,9 @@ def _losses(
     return told
 
 
-def _followed(config: Configuration, edge: NDArray[Any], last: Floats) -> Losses:
+def _followed(
+    config: Configuration, edge: NDArray[Any], last: Floats, width: float = np.inf
+) -> tuple[Followed, Losses]:
     def system(values: Floats) -> System:
         return system_of(config, {config.sweep.parameter: values}, config.needed_effects)
 
@@ -202,8 +247,8 @@ def _followed(config: Configuration, edge: NDArray[Any], last: Floats) -> Losses
         edge["period"],
         first,
         np.clip(last, lowest, highest),
-        float(np.min(np.abs(last - first))) * FOLLOWED_WIDTH,
+        min(width, float(np.min(np.abs(last - first))) * FOLLOWED_WIDTH),
         config.integration.steps_per_period,
         config.integration.method,
     )
-    return loss_of_stability(followed.stable.multipliers, followed.beyond.multipliers)
+    return followed, loss_of_stability(followed.stable.multipliers, followed.beyond.multipliers)

@@ -67,8 +67,9 @@ def continued(lane: Result, name: str) -> Configuration:
     """
     config, ended = computable(lane, name), lane["end_state"].tolist()
     if not np.isfinite(ended).all():
-        where = ", ".join(f"{axis} = {value:g}" for axis, value in lane.fixed.items())
-        raise ConfigurationError(f"{name}: {where}: this lane diverged, choose another with --at")
+        raise ConfigurationError(
+            f"{name}: {lane.where}: this lane diverged, choose another with --at"
+        )
     state = dict(zip(lane.variables["state"].flags, ended, strict=True))
     for key, value in {
         "start": {"kind": "given", "state": state},
@@ -104,7 +105,7 @@ def compute_response(simulation: Simulation, periods: int, text: str) -> Result:
     """
     _check_size(simulation, periods)
     began = time.monotonic()
-    lanes = np.arange(len(simulation.lanes))
+    lanes = simulation.lanes.computed_at(np.arange(len(simulation.lanes)))
     plan = simulation.recording._replace(history_periods=periods)
     start, outcome = simulation.integrate(lanes, plan)
     system = simulation.lanes.system_of(lanes)

@@ -103,14 +103,16 @@ def result_of(
     facts: Mapping[str, Any],
     more: Sequence[Variable] = (),
 ) -> Result:
-    """Join blocks in the order of their lanes to a result, which says these facts about itself.
+    """Join blocks in the order of computation to a result, which says these facts about itself.
 
     ``more``: what the blocks hold beside the variables of the sweep.
     """
-    data = {name: np.concatenate([arrays[name] for arrays in blocks]) for name in blocks[0]}
-    axes = [axis.name for axis in simulation.lanes.axes]
+    lanes = simulation.lanes
+    order = np.argsort(lanes.computed_at(np.arange(len(lanes)))) if simulation.carried else ...
+    data = {name: np.concatenate([arrays[name] for arrays in blocks])[order] for name in blocks[0]}
+    axes = [axis.name for axis in lanes.axes]
     variables = [*simulation.variables, *more]
-    return Result(axes, variables, data, simulation.lanes.parameters, facts)
+    return Result(axes, variables, data, lanes.parameters, facts)
 
 
 def prepare(simulation: Simulation, *, compile_now: bool = True, history_periods: int = 0) -> None:

@@ -1,7 +1,7 @@
 """A configured sweep: what it yields, and the means to compute any block of its lanes."""
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -121,11 +121,6 @@ class Simulation:
         return self.config.start.carry != "none"
 
     @property
-    def downwards(self) -> bool:
-        """Whether a carried sweep begins with the highest value."""
-        return self.config.start.carry == "downwards"
-
-    @property
     def recording(self) -> Plan:
         """The plan with all that is recorded: what is kept, and what the labels are read off."""
         checked = POINTS_NEEDED if self.config.integration.error_check > 0.0 else 0
@@ -193,53 +188,48 @@ class Simulation:
 
     def block_lanes(self, threads: int) -> int:
         """Return how many lanes make a block: work for every thread, and progress to be seen."""
-        lanes, repeats = LANES * max(8, 2 * threads), self.lanes.repeats
-        # A carried sweep hands on whole values.
-        return max(repeats, lanes - lanes % repeats) if self.carried else lanes
+        lanes = LANES * max(8, 2 * threads)
+        # What is left over of lanes side by side would fill no vector.
+        return lanes - lanes % min(lanes, self.lanes.side_by_side)
 
     def blocks(self, size: int) -> list[Bounds]:
         """Cut the sweep into blocks of so many lanes, in the order in which they are computed."""
         lanes = len(self.lanes)
-        return self.in_order((n, min(n + size, lanes)) for n in range(0, lanes, size))
-
-    def in_order(self, blocks: Iterable[Bounds]) -> list[Bounds]:
-        """Sort blocks into the order in which they are to be computed."""
-        return sorted(blocks, reverse=self.downwards)
+        return [(n, min(n + size, lanes)) for n in range(0, lanes, size)]
 
     def compute(self, first: int, last: int, carried: Floats | None = None) -> dict[str, Any]:
-        """Compute the lanes ``first`` to ``last - 1``: every variable over lanes by its name.
+        """Compute the lanes at the places ``first`` to ``last - 1`` of the order of computation.
 
-        ``carried`` (lanes of the block before, states): end states of the block before this one,
-        from which a carried sweep goes on.
+        Gives every variable over lanes by its name; ``carried``: as for `integrate`.
         """
-        lanes = np.arange(first, last)
+        lanes = self.lanes.computed_at(np.arange(first, last))
         return self.arrays(lanes, *self.integrate(lanes, self.recording, carried))
 
     def integrate(
         self, lanes: NDArray[np.intp], plan: Plan, carried: Floats | None = None
     ) -> tuple[Floats, Outcome]:
-        """Integrate consecutive lanes by a plan, and return their start states as well."""
+        """Integrate lanes by a plan, and return their start states as well.
+
+        The lanes are consecutive in the order of computation. ``carried`` (lanes side by side,
+        states): end states of those before them, from which a carried sweep goes on, not a number
+        where it begins.
+        """
         check()
-        start = self.lanes.start_of(lanes)
-        if not self.carried:
-            return start, integrate(self.lanes.system_of(lanes), start, plan)
-        repeats, downwards = self.lanes.repeats, self.downwards
+        many = self.lanes.side_by_side
+        start = np.full((lanes.size, len(self.lanes.states)), np.nan)
+        if carried is not None:
+            start[:many] = carried[: lanes.size]
         outcomes: list[Outcome] = []
-        before = None if carried is None else carried[:repeats] if downwards else carried[-repeats:]
-        line = self.lanes.carried_along
-        values = range(0, lanes.size, repeats)
-        for at in reversed(values) if downwards else values:
-            mine = slice(at, at + repeats)
-            number = int(lanes[at])
-            if (number + repeats) % line == 0 if downwards else number % line == 0:
-                before = None
-            if before is not None:
-                # A lane that diverged hands nothing on: its successor begins anew.
-                sound = np.isfinite(before).all(axis=1, keepdims=True)
-                start[mine] = np.where(sound, before, start[mine])
-            outcomes.append(integrate(self.lanes.system_of(lanes[mine]), start[mine], plan))
-            before = outcomes[-1].end_state
-        return start, joined(outcomes[::-1] if downwards else outcomes)
+        for at in range(0, lanes.size, many):
+            mine, begin = lanes[at : at + many], start[at : at + many]
+            if outcomes:
+                begin[:] = outcomes[-1].end_state[: mine.size]
+            # A lane that diverged hands nothing on: its successor begins anew.
+            anew = ~np.isfinite(begin).all(axis=1)
+            if anew.any():
+                begin[anew] = self.lanes.start_of(mine[anew])
+            outcomes.append(integrate(self.lanes.system_of(mine), begin, plan))
+        return start, joined(outcomes)
 
     def arrays(self, lanes: NDArray[np.intp], start: Floats, outcome: Outcome) -> dict[str, Any]:
         """Return what is kept of integrated lanes, by the name of the variable."""
@@ -283,7 +273,7 @@ class Simulation:
             arrays["lyapunov_sum"] = sum_of_exponents(system)
         share = self.config.integration.error_check
         if share > 0.0:
-            checked = checked_lanes(int(lanes[0]), int(lanes[-1]) + 1, share)
+            checked = checked_lanes(lanes // self.lanes.directions, share)
             arrays |= self._check(system, start, outcome, told, checked)
         return arrays
 
@@ -395,7 +385,9 @@ class Simulation:
 
 
 def joined(outcomes: list[Outcome]) -> Outcome:
-    """Join the outcomes of consecutive lanes."""
+    """Join the outcomes of lanes that come one after the other."""
+    if len(outcomes) == 1:
+        return outcomes[0]
     every: Any = zip(*outcomes, strict=True)
     arrays: Any = (None if some[0] is None else np.concatenate(some) for some in every)
     return Outcome(*arrays)

@@ -54,7 +54,7 @@ def fill(
         executor = DaskExecutor(simulation, cluster)
         size = shared_block_lanes(len(simulation.lanes), executor.workers)
         performed_by = {"threads": 1, "workers": executor.workers}
-    missing = simulation.in_order(store.missing(finished, size))
+    missing = store.missing(finished, size)
     with executor, Progress(store.own_lanes, done) as progress:
 
         def keep(block: Bounds, arrays: Arrays) -> None:

@@ -8,6 +8,7 @@ from matplotlib.mathtext import MathTextParser
 from gearchaos.results import units
 from gearchaos.results.excitation import excitation_of
 from gearchaos.results.result import Result
+from gearchaos.results.variables import DIRECTION, START, coordinate_text
 
 DIMENSIONLESS = ("", "1")
 
@@ -67,13 +68,14 @@ def in_words(result: Result, place: Mapping[str, float]) -> str:
         wording = str(attributes.get("long_name", "")) or axis.replace("_", " ")
         name = _formula(attributes.get("symbol", "")) or plain(wording)
         unit = f" {unit_of(result, axis)}".rstrip() if axis in result else ""
-        texts.append(f"start {value:g}" if axis == "start" else f"{name} = {value:.6g}{unit}")
+        words = {START: f"start {value:g}", DIRECTION: coordinate_text(axis, value)}
+        texts.append(words.get(axis, f"{name} = {value:.6g}{unit}"))
     return ", ".join(texts)
 
 
 def in_a_name(place: Mapping[str, float]) -> str:
     """Word a place for the name of a file: ``_pitch_error_5.86_start_0``."""
-    return "".join(f"_{axis}_{value:.12g}" for axis, value in place.items())
+    return "".join(f"_{axis}_{coordinate_text(axis, value)}" for axis, value in place.items())
 
 
 def short(value: float, digits: int = 4, sign: str = "-") -> str:

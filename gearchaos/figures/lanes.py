@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from gearchaos.errors import FigureError
 from gearchaos.results.result import Result
-from gearchaos.results.variables import REPEATS
+from gearchaos.results.variables import UNSWEPT
 
 Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -38,8 +38,8 @@ class Lanes(NamedTuple):
 
 
 def swept_axes(result: Result) -> list[str]:
-    """Return the axes of a result that are swept parameters: all but pairs and starts."""
-    return [axis for axis in result.axes if axis not in REPEATS]
+    """Return the axes of a result that are swept parameters."""
+    return [axis for axis in result.axes if axis not in UNSWEPT]
 
 
 def diagram_lanes(result: Result, between: Between = (None, None)) -> Lanes:

@@ -176,7 +176,7 @@ def legend_above(axes: Axes, handles: Sequence[Artist]) -> Legend | None:
         handles=handles,
         loc="lower right",
         bbox_to_anchor=(1.0, 1.0),
-        ncols=min(len(handles), 3),
+        ncols=-(-len(handles) // -(-len(handles) // 3)),
         borderaxespad=0.3,
         **LEGEND,
     )

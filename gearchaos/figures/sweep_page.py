@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from itertools import cycle
 from typing import Any
 
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 
 from gearchaos.errors import FigureError
@@ -11,14 +12,17 @@ from gearchaos.figures.diagrams import bifurcation, lyapunov
 from gearchaos.figures.labels import form_in_words, in_words, plain
 from gearchaos.figures.lanes import Between
 from gearchaos.figures.page import Page, few_ticks, footnote, letter, page
-from gearchaos.figures.panel import mark_values
-from gearchaos.figures.stages import shade_stages
+from gearchaos.figures.panel import legend_above, mark_values
+from gearchaos.figures.stages import NARROWEST_SHARE, shade_stages
 from gearchaos.figures.style import OVERLAID, SINGLE_COLUMN_MM, SMALL_FONT_PT
+from gearchaos.results.jumps import apart, directions_of
 from gearchaos.results.result import Result, section_variables
 from gearchaos.results.stage_table import LabelledLanes
-from gearchaos.results.variables import LARGEST_EXPONENT
+from gearchaos.results.variables import LABELS, LARGEST_EXPONENT, WAYS
 
 HEIGHT_RATIOS = (1.6, 1.0)
+SHADE = "0.92"
+"""Where directions differ."""
 MOST_INTERVALS = (7, 8)
 """Between the ticks of the lower panel, and of the one above it."""
 
@@ -71,11 +75,19 @@ def bifurcation_page(
         If stages are wanted and the result has no labels of the motion.
     """
     # A variable that was asked for and is not there is an error, not a page without it.
-    results = [result] if isinstance(result, Result) else list(result)
+    files = [result] if isinstance(result, Result) else list(result)
+    titles = labels or [str(one.metadata.get("title", "")) for one in files]
+    results, labels = [], []
+    for one, title in zip(files, titles, strict=True):
+        ways = directions_of(one)
+        results += ways
+        of_ways = [title] if len(ways) == 1 else [f"{title}, {way}" for way in WAYS]
+        labels += of_ways if len(files) > 1 else WAYS[: len(ways)]
     if len({one.axis for one in results}) > 1 or (stages and len(results) > 1):
         raise FigureError(
             f"{len(results)} results over {', '.join(one.axis for one in results)}: only results "
             "over the same parameter are drawn over each other, and without stages"
+            + ("; choose one with --at direction=upwards" if len(results) > len(files) else "")
         )
     has_section = variable is not None or any(map(section_variables, results))
     panels = has_section + any(LARGEST_EXPONENT in one for one in results)
@@ -84,7 +96,6 @@ def bifurcation_page(
             "nothing to draw: the result has neither section points nor Lyapunov exponents"
         )
     height = height_mm or (55.0 + 0.35 * width_mm) * (1.0 if panels == 2 else 0.7)
-    labels = labels or [str(one.metadata.get("title", "")) for one in results]
     with page(width_mm, height) as figure:
         ratios = HEIGHT_RATIOS if panels == 2 else (1.0,)
         grid = figure.subplots(panels, 1, sharex=True, squeeze=False, height_ratios=ratios)
@@ -96,7 +107,8 @@ def bifurcation_page(
             if variable is not None or section_variables(one):
                 bifurcation(stack[0], one, variable, **shown)
             if LARGEST_EXPONENT in one:
-                lyapunov(stack[-1], one, **shown)
+                # A legend of the colours is enough.
+                lyapunov(stack[-1], one, **shown | ({"label": None} if panels == 2 else {}))
         if panels == 2:
             stack[0].set_xlabel("")
             letter(stack)
@@ -105,6 +117,8 @@ def bifurcation_page(
             axes.yaxis.label.set_linespacing(1.0)
         if marked is not None:
             mark_values(stack, *marked)
+        if len(files) < len(results) == 2 and LABELS[0] in files[0]:
+            _mark_stretches(stack, files[0])
         if stages:
             given = None if isinstance(stages, bool) else stages
             for axes in stack:
@@ -114,8 +128,27 @@ def bifurcation_page(
             own = [name for name, form in zip(labels, forms, strict=True) if form]
             whose = f"{plain(', '.join(own))}: " if 0 < len(own) < len(forms) else ""
             footnote(figure, whose + max(forms))
-        places = dict.fromkeys(in_words(one, one.fixed) for one in results if one.fixed)
+        places = dict.fromkeys(in_words(one, one.fixed) for one in files if one.fixed)
         if places:
             figure.suptitle("; ".join(places), fontsize=SMALL_FONT_PT)
         figure.align_ylabels(stack)
     return figure
+
+
+def _mark_stretches(panels: Sequence[Axes], result: Result) -> None:
+    """Shade where both directions of a result differ, and tick where either jumps."""
+    low, high = panels[0].get_xlim()
+    stretches = apart(result, NARROWEST_SHARE * (high - low))
+    shades: list[Artist] = [
+        axes.axvspan(one.lower, one.upper, fc=SHADE, lw=0.0, zorder=0.0, label="directions differ")
+        for one in stretches
+        for axes in panels
+    ]
+    first, last = result[result.axis][[0, -1]]
+    ends = [end for one in stretches for end in (one.lower, one.upper) if first < end < last]
+    if ends:
+        mark_values(panels, "jumps", ends)
+    if shades:
+        before = panels[0].get_legend()
+        named = [*(before.legend_handles if before else ()), shades[0]]
+        legend_above(panels[0], sorted(named, key=lambda one: one.get_label() == "jumps"))

@@ -109,6 +109,7 @@ def _unfit(config: Configuration, targets: Targets, source: str) -> Iterator[str
     for key, several in {
         "second_sweep": config.second_sweep is not None,
         "start.count": config.start.count > 1,
+        'start.carry = "both"': config.start.carry == "both",
     }.items():
         if several:
             yield f"{source}: configuration: {config.source} has {key}; observations have one axis"

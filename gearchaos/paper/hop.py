@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from gearchaos.configuration import Configuration
 from gearchaos.dynamics.following import Branch
 from gearchaos.engine.running import run
+from gearchaos.results.jumps import directions_of
 from gearchaos.results.result import Result
 from gearchaos.system import System
 
@@ -66,10 +67,7 @@ def find_hop(config: Configuration, step: float = STEP, threads: int | None = No
     config = _states_only(config)
     carried = _over(config, LOW, HIGH, step)
     carried = carried.replace("integration.transient_periods", FOLLOWING_PERIODS)
-    upwards, downwards = (
-        run(carried.replace("start.carry", direction), threads)
-        for direction in ("upwards", "downwards")
-    )
+    upwards, downwards = directions_of(run(carried.replace("start.carry", "both"), threads))
     one, other = upwards["end_state"], downwards["end_state"]
     size = np.maximum(np.abs(one), np.abs(other)).max(axis=1)
     both = np.flatnonzero(np.abs(one - other).max(axis=1) > APART * size)

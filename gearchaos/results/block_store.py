@@ -26,7 +26,12 @@ Arrays: TypeAlias = Mapping[str, NDArray[Any]]
 Bounds: TypeAlias = tuple[int, int]
 """First lane of a range, and the one after its last."""
 
-SCHEMA = {"schema": "gearchaos-blocks", "schema_version": "3.0"}
+Numbers: TypeAlias = NDArray[np.intp]
+
+PIECE_BYTES = 1 << 28
+"""Memory in which lanes that were computed in another order are brought into their own."""
+
+SCHEMA = {"schema": "gearchaos-blocks", "schema_version": "4.0"}
 _DIGEST = hashlib.sha256().digest_size
 _NAME = re.compile(r"\d{12}-\d{12}\.block")
 
@@ -185,15 +190,20 @@ class BlockStore(AbstractContextManager["BlockStore"]):
         *,
         overwrite: bool = False,
         found: Finished | None = None,
+        computed_at: Callable[[Numbers], Numbers] | None = None,
     ) -> Path:
         """Make the result file of all blocks, one block in memory at a time, and tidy up.
 
-        The first four are those of `write_result`; ``found`` is what `finished` has just given.
-        Raises FileError if blocks are missing or the file cannot be written; the blocks stay.
+        The first four are those of `write_result`; ``found`` is what `finished` has just given;
+        ``computed_at`` gives the lanes at places in the order of computation, where that is not
+        their own, and takes the memory of a `PIECE_BYTES`. Raises FileError if blocks are missing
+        or the file cannot be written; the blocks stay.
         """
         found = found or self.finished()
         self.require_all(found, "use --resume")
-        blocks = ((first, last, self.read(first, last)) for first, last in found.bounds)
+        by_block = ((first, last, self.read(first, last)) for first, last in found.bounds)
+        ordered = computed_at and self._in_order_of_lanes(found.bounds, computed_at)
+        blocks = ordered or by_block
         told = variables, blocks, parameters, metadata
         write_result(self.output, *told, overwrite=overwrite, scratch=self.folder)
         self.remove()
@@ -206,6 +216,21 @@ class BlockStore(AbstractContextManager["BlockStore"]):
             more = f" and {len(gaps) - most} more ranges" if len(gaps) > most else ""
             missing = f"{self.folder}: lanes {names}{more} are missing; {remedy}"
             raise FileError([*found.problems, missing])
+
+    def _in_order_of_lanes(
+        self, bounds: Sequence[Bounds], computed_at: Callable[[Numbers], Numbers]
+    ) -> Iterator[tuple[int, int, dict[str, NDArray[Any]]]]:
+        size = max(1, PIECE_BYTES // self._record.itemsize)
+        for first in range(0, self.lanes, size):
+            last = min(first + size, self.lanes)
+            records = np.empty(last - first, self._record)
+            arrays = {name: records[name] for name in self._record.names or ()}
+            for block in bounds:
+                at = computed_at(np.arange(*block))
+                mine = (first <= at) & (at < last)
+                for name, values in self.read(*block).items() if mine.any() else ():
+                    arrays[name][at[mine] - first] = values[mine]
+            yield first, last, arrays
 
     def _remove(self, names: Sequence[str]) -> None:
         for name in names:

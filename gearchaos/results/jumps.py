@@ -1,4 +1,4 @@
-"""Jumps between two motions of the same period, and crises of chaos: what labels do not show.
+"""What labels do not show: jumps to a motion of the same period, crises, directions that differ.
 
 In an interior crisis a chaotic set collides with an unstable orbit and bursts out into what lies
 beyond it (Grebogi, Ott, Yorke 1982). Close to it the bursts are rare, so that a section of some
@@ -14,6 +14,7 @@ from gearchaos.records.period import TOLERANCE, section_distance
 from gearchaos.results.excitation import excitation_of
 from gearchaos.results.result import Result, section_variables
 from gearchaos.results.stage_table import labelled_lanes
+from gearchaos.results.variables import DIRECTION, WAYS
 
 Floats = NDArray[np.float64]
 
@@ -57,6 +58,25 @@ class Crisis(NamedTuple):
     highest_above: float
 
 
+class Apart(NamedTuple):
+    """Neighbouring values at which both directions come to different motions.
+
+    ``first``, ``last``: the numbers of its outermost lanes; ``start``, ``end``: their values;
+    ``lower``, ``upper``: halfway to the lanes beside them, where the sweep downwards and the one
+    upwards jump, or where the sweep ends; ``motion_upwards``, ``motion_downwards``: the labels of
+    the motions, in the order of the values.
+    """
+
+    first: int
+    last: int
+    start: float
+    end: float
+    lower: float
+    upper: float
+    motion_upwards: str
+    motion_downwards: str
+
+
 def jumps(result: Result) -> list[Jump]:
     """Find where a sweep jumps from one motion to another of the same period.
 
@@ -65,21 +85,36 @@ def jumps(result: Result) -> list[Jump]:
     has one axis and labels; without a section nothing is found.
     """
     lanes = labelled_lanes(result)
-    names = section_variables(result)
-    if not names or lanes.values.size < 3:
+    if lanes.values.size < 3:
         return []
-    sections = np.stack([result[name] for name in names], axis=2)
-    size = np.nanmax(np.abs(sections), axis=(0, 1), initial=0.0)
     # A lane still on its way to its orbit lies anywhere.
     arrived = ~(result["return_distance"] > TOLERANCE) if "return_distance" in result else True
+    sections = sections_of(result)
     period = np.where(arrived, lanes.period, 0)
-    # Neighbours may be an excitation period apart on their orbit, but never a part of one.
-    once = sections[:, :: -excitation_of(result.metadata).excitation_period][:, ::-1]
-    found = np.flatnonzero(jump_sizes(period, once / np.where(size > 0.0, size, 1.0)))
+    found = np.flatnonzero(jump_sizes(period, sections / size_of(sections)))
     return [
         Jump(float(lanes.values[at]), float(lanes.values[at + 1]), str(lanes.labels[at]))
         for at in found
     ]
+
+
+def sections_of(result: Result) -> Floats:
+    """Return all sections along one axis, a point for each excitation period.
+
+    Shape (lanes, points, states), with no states where there is no section.
+    """
+    names = section_variables(result)
+    if not names:
+        return np.zeros((result[result.axis].size, 0, 0))
+    # Neighbours may be an excitation period apart on their orbit, but never a part of one.
+    every = excitation_of(result.metadata).excitation_period
+    return np.stack([result[name][:, ::-every][:, ::-1] for name in names], axis=2)
+
+
+def size_of(sections: Floats) -> Floats:
+    """Return the size of each state over the lanes of sections, shape (states,)."""
+    size = np.nanmax(np.abs(sections), axis=(0, 1), initial=0.0)
+    return np.where(size > 0.0, size, 1.0)
 
 
 def jump_sizes(
@@ -151,3 +186,44 @@ def grows_at(extent: Floats, chaotic: NDArray[np.bool_]) -> NDArray[np.intp]:
         if grown and lasting and level and not (found and lane - found[-1] < BESIDE):
             found.append(int(lane))
     return np.array(found, dtype=np.intp)
+
+
+def directions_of(result: Result) -> list[Result]:
+    """Return the results of both directions, or the result itself where there are not two."""
+    both = DIRECTION in result.axes and result.axis != DIRECTION
+    return [result.sel(direction=way) for way in WAYS] if both else [result]
+
+
+def apart(result: Result, narrowest: float = 0.0) -> list[Apart]:
+    """Find the stretches in which both directions of a result with labels differ.
+
+    They do in their labels, or in sections or, of period 1, end states farther apart than the
+    smallest jump that is told. Chaos and quasi-periodic motions of one label count as one motion.
+    Stretches narrower than ``narrowest`` are left out; without directions, or with several starts
+    or gear pairs, there are none.
+    """
+    ways = directions_of(result)
+    if len(ways) == 1 or len(ways[0].axes) > 1:
+        return []
+    lanes = [labelled_lanes(one) for one in ways]
+    differ = lanes[0].labels != lanes[1].labels
+    period = np.where(differ, 0, lanes[0].period)
+    # Branches may cross in the states of a section, but not in all; the end state is one point.
+    ends = (one["end_state"][:, np.newaxis] for one in ways)
+    for one, other in map(sections_of, ways), ends:
+        size = size_of(np.concatenate([one, other]))
+        held = np.where(period <= one.shape[1], period, 0)
+        differ |= section_distance(one / size, other / size, held) > SMALLEST
+    values, changes = lanes[0].values, np.diff(differ, prepend=False, append=False)
+    borders = np.concatenate([values[:1], (values[1:] + values[:-1]) / 2.0, values[-1:]])
+    return [
+        Apart(
+            first,
+            after - 1,
+            *values[[first, after - 1]].tolist(),
+            *borders[[first, after]].tolist(),
+            *(", ".join(dict.fromkeys(way.labels[first:after].tolist())) for way in lanes),
+        )
+        for first, after in np.flatnonzero(changes).reshape(-1, 2).tolist()
+        if borders[after] - borders[first] >= narrowest
+    ]

@@ -61,6 +61,7 @@ def overview(path: str | os.PathLike[str]) -> dict[str, Any]:
         "lanes": math.prod(sizes[axis] for axis in result.axes),
         "axes": {
             axis: {"values": sizes[axis], **_range(data[axis]), **_wording(result.variables[axis])}
+            | ({"meanings": flags} if (flags := result.variables[axis].flags) else {})
             for axis in result.axes
         },
         "metadata": metadata,
@@ -83,7 +84,7 @@ def overview(path: str | os.PathLike[str]) -> dict[str, Any]:
         shape = {"dims": v.dims, "shape": [sizes.get(dim) for dim in v.dims]}
         summary["variables"][v.name] = {**shape, "dtype": v.dtype, **_wording(v)}
     summary |= {"slice": {}, "stages": []}
-    if result.axis not in known.REPEATS and all(name in result for name in known.LABELS):
+    if result.axis not in known.UNSWEPT and all(name in result for name in known.LABELS):
         part = one_axis(result)
         stages = [stage._asdict() for stage in stage_table(labelled_lanes(part))]
         summary |= {"slice": slice_facts(result, part), "stages": stages}
@@ -143,7 +144,7 @@ def overview_page(
 def slice_lines(facts: dict[str, dict[str, float]]) -> list[str]:
     """Word what `slice_facts` tells, one line per axis."""
     return [
-        f"slice {name} = {at['value']:.6g}, "
+        f"slice {name} = {known.coordinate_text(name, at['value'], 6)}, "
         f"{'the first' if at['number'] == 1 else 'number {number}'.format(**at)} of {at['of']}; "
         f"others with --at {name}=VALUE"
         for name, at in facts.items()
@@ -162,6 +163,7 @@ def _file(overview: Mapping[str, Any]) -> Iterator[str]:
     for name, axis in overview["axes"].items():
         values = "1 value" if axis["values"] == 1 else f"{axis['values']} values"
         span = f"{_number(axis['least'])} to {_number(axis['greatest'])}{_units(axis)}"
+        span = " and ".join(axis.get("meanings", [span]))
         yield _entry("axis", f"{name} ({axis['long_name']}), {values}, {span}")
     yield _entry("lanes", f"{overview['lanes']}")
     for name, counts in overview["counts"].items():

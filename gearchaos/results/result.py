@@ -20,7 +20,13 @@ from gearchaos.results.checksum_line import checksum_fits
 from gearchaos.results.result_file import Parameter, own_metadata, write_result
 from gearchaos.results.result_reader import fixed_coordinates, is_coordinate, read_result
 from gearchaos.results.units import in_physical_units
-from gearchaos.results.variables import SECTION, SECTION_POINT, Variable, diagram_axis
+from gearchaos.results.variables import (
+    SECTION,
+    SECTION_POINT,
+    Variable,
+    coordinate_text,
+    diagram_axis,
+)
 
 __all__ = ["Parameter", "Result", "open_result", "section_variables"]
 
@@ -95,6 +101,12 @@ class Result:
         """Coordinates of the axes that `sel` has fixed."""
         return fixed_coordinates(self.metadata)
 
+    @property
+    def where(self) -> str:
+        """Where `sel` has fixed axes, in words: ``pitch_error = 5.86, direction = upwards``."""
+        fixed = self.fixed.items()
+        return ", ".join(f"{axis} = {coordinate_text(axis, value)}" for axis, value in fixed)
+
     def __contains__(self, name: object) -> bool:
         return name in self._data
 
@@ -130,10 +142,11 @@ class Result:
         grid = np.meshgrid(*(self[name] for name in self.axes), indexing="ij")
         return np.ravel(grid[self.axes.index(axis)])
 
-    def sel(self, method: Literal["nearest"] | None = None, **coordinates: float) -> Result:
+    def sel(self, method: Literal["nearest"] | None = None, **coordinates: float | str) -> Result:
         """Fix axes at one of their values each; what is left runs over the other axes.
 
-        Coordinates are by the name of their axis; those that were met are in `fixed`. With
+        Coordinates are by the name of their axis, and directions by their own, such as
+        ``direction="upwards"``; those that were met are in `fixed`. With
         ``"nearest"`` the nearest value is taken, the larger of two; by default a value must be met
         exactly. Raises ConfigurationError if there is no such axis or value; the message names the
         nearest.
@@ -143,9 +156,11 @@ class Result:
             if name not in self.axes:
                 there = ", ".join(self.axes) or "none"
                 raise ConfigurationError(f"{name}: is no axis of the result; its axes: {there}")
-            values = self[name]
-            if not math.isfinite(wanted):
-                raise ConfigurationError(f"{name} = {wanted}: must be a number")
+            values, flags = self[name], self.variables[name].flags
+            wanted = flags.index(wanted) if wanted in flags else wanted
+            if isinstance(wanted, str) or not math.isfinite(wanted):
+                rule = " or ".join(["a number", *flags])
+                raise ConfigurationError(f"{name} = {wanted}: must be {rule}")
             # Far from all of them, every difference would be the same number.
             near = np.clip(wanted, values[0], values[-1])
             number = values.size - 1 - int(np.argmin(np.abs(values - near)[::-1]))

@@ -20,7 +20,7 @@ from gearchaos.results.checksum_line import append_checksum
 from gearchaos.results.variables import HARMONIC, Variable, diagram_axis, lane_axes
 
 SCHEMA = "gearchaos-sweep"
-SCHEMA_VERSION = "3.1"
+SCHEMA_VERSION = "3.2"
 CONVENTIONS = "CF-1.9"  # The first one that knows uint8.
 PARAMETERS = "parameters"
 DIMS = "dims"

@@ -213,7 +213,7 @@ def _check_variables(
         raise UnfitError(f"lacks the variable {STATE}")
     expected = known.sweep_variables(
         [
-            Axis(name, "", "", "", np.zeros(1, "i4" if name in known.REPEATS else "f8"))
+            Axis(name, "", "", "", np.zeros(1, "i4" if name in known.UNSWEPT else "f8"))
             for name in axes
         ],
         states=found[STATE].flags,
@@ -244,6 +244,6 @@ def _check_variables(
         if not is_coordinate(data[name]):
             rule = f"do not ascend, each once, between -{LARGEST_VALUE:g} and {LARGEST_VALUE:g}"
             raise UnfitError(f"holds values of {name} that {rule}")
-    for name in {known.STATUS, STATE, "motion"} & found.keys():
+    for name in {known.STATUS, STATE, known.DIRECTION, "motion"} & found.keys():
         if data[name].max() >= max(1, len(found[name].flags)):
             raise UnfitError(f"holds a {name} without a meaning")

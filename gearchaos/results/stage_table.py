@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from gearchaos.errors import ConfigurationError, FileError
 from gearchaos.results.result import Result
-from gearchaos.results.variables import BANDS, LABELS, LARGEST_EXPONENT, REPEATS
+from gearchaos.results.variables import BANDS, LABELS, LARGEST_EXPONENT, REPEATS, UNSWEPT
 
 Floats = NDArray[np.float64]
 
@@ -108,7 +108,7 @@ def one_axis(result: Result, kept: Sequence[str] = (), /, **coordinates: float) 
     ConfigurationError if there is no such axis, or if no swept parameter is left.
     """
     part = result.sel("nearest", **coordinates)
-    if part.axis in ("", *REPEATS):
+    if part.axis in ("", *UNSWEPT):
         raise ConfigurationError(f"{', '.join(coordinates)}: fixed, no swept parameter is left")
     kept = (part.axis, *kept)
     return part.sel(**{name: part[name][0] for name in part.axes if name not in kept})

@@ -54,7 +54,9 @@ def to_dataframe(result: "Result", *along: str) -> Any:
         others = {result.dims(name)[len(result.axes) :] for name in result}
         there = ", ".join(sorted(dim[0] for dim in others if len(dim) == 1 and dim[0] in result))
         raise ConfigurationError(f"{', '.join(along)}: no values along it; there are {there}")
-    index = pandas.MultiIndex.from_product([result[dim] for dim in dims], names=dims)
+    words = {dim: np.array(result.variables[dim].flags) for dim in dims}
+    levels = [words[dim][result[dim]] if words[dim].size else result[dim] for dim in dims]
+    index = pandas.MultiIndex.from_product(levels, names=dims)
     return pandas.DataFrame(columns, index.get_level_values(0) if len(dims) == 1 else index)
 
 

@@ -14,8 +14,13 @@ from gearchaos.records.loads import FORCES
 from gearchaos.records.loads import WORDING as LOADS
 
 START = "start"
+DIRECTION = "direction"
 REPEATS = (REALISATION, START)
-"""Axes along which no parameter is swept: drawn gear pairs and starts of one parameter value."""
+"""Axes of drawn gear pairs and of starts of one parameter value."""
+UNSWEPT = (*REPEATS, DIRECTION)
+"""Axes along which no parameter is swept."""
+WAYS = ("upwards", "downwards")
+"""Meanings of a direction in which a sweep carries its states."""
 SECTION_POINT = "section_point"
 STATE = "state"
 EXPONENT_NUMBER = "exponent"
@@ -93,7 +98,7 @@ class Variable:
 class Axis:
     """One dimension of the lanes of a sweep; values of shape (values,) ascend, none of them twice.
 
-    For the name see `axis_name`; the other texts are as of a variable.
+    For the name see `axis_name`; the other texts, and flags, are as of a variable.
     """
 
     name: str
@@ -101,6 +106,7 @@ class Axis:
     long_name: str
     symbol: str
     values: NDArray[Any]
+    flags: tuple[str, ...] = ()
 
 
 def axis_name(parameter: str) -> str:
@@ -119,9 +125,21 @@ def pair_axis(numbers: NDArray[Any]) -> Axis:
     return Axis(REALISATION, "1", "drawn gear pair", "", numbers)
 
 
+def direction_axis() -> Axis:
+    """Give the axis of both directions in which a sweep carries its states."""
+    text = "direction in which each value starts from the end state of its neighbour"
+    return Axis(DIRECTION, "1", text, "", np.arange(len(WAYS)), WAYS)
+
+
+def coordinate_text(axis: str, value: float, digits: int = 12) -> str:
+    """Word a coordinate; that of a direction is its name."""
+    named = axis == DIRECTION and value in range(len(WAYS))
+    return WAYS[int(value)] if named else f"{value:.{digits}g}"
+
+
 def diagram_axis(axes: Sequence[str]) -> str:
     """Name the axis along which a diagram runs: the first swept parameter, "" without axes."""
-    return ([*axes[:1]] + [name for name in axes if name not in REPEATS])[-1] if axes else ""
+    return ([*axes[:1]] + [name for name in axes if name not in UNSWEPT])[-1] if axes else ""
 
 
 def lane_axes(variables: Sequence[Variable]) -> tuple[str, ...]:
@@ -148,16 +166,17 @@ def sweep_variables(
 ) -> list[Variable]:
     """List the variables of a sweep in the order of the file.
 
-    The axes are second swept parameter, first swept parameter, realisation, start, those there are;
-    ``states`` those of the scene in its order, ``section`` those recorded at so many section
-    points, ``contact`` and ``loads`` the directions of which they are told. Meanings are those of
-    0, 1, ...: of ``status``, of ``motion_changed`` where lanes are computed twice to measure their
-    error, and of ``motion`` and ``record`` where they are labelled. A motion repeats after whole
-    excitation periods, of so many mesh periods each.
+    The axes are second swept parameter, first swept parameter, realisation, start, direction, those
+    there are; ``states`` those of the scene in its order, ``section`` those recorded at so many
+    section points, ``contact`` and ``loads`` the ways of which they are told. Meanings are those
+    of 0, 1, ...: of ``status``, of ``motion_changed`` where lanes are computed twice to measure
+    their error, and of ``motion`` and ``record`` where they are labelled. A motion repeats after
+    whole excitation periods, of so many mesh periods each.
     """
     names = tuple(axis.name for axis in axes)
     variables = [
-        _coordinate(one.name, one.values, one.long_name, one.symbol, one.units) for one in axes
+        replace(_coordinate(a.name, a.values, a.long_name, a.symbol, a.units), flags=a.flags)
+        for a in axes
     ]
 
     def add(dtype: str, name: str, text: str, symbol: str = "", *dims: str, **more: Any) -> None:

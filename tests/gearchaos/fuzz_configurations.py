@@ -42,7 +42,7 @@ OPTIONS = {
     "[integration]": ("error_check = 1.0", 'unstable = "raise"', "tolerance = 0.3"),
     "[outputs]": ("motion = false", "exponents = true", "allowed_diverged_share = 1.0"),
     "[start]": (
-        'kind = "contact"', 'carry = "upwards"', 'carry = "downwards"',
+        'kind = "contact"', 'carry = "upwards"', 'carry = "downwards"', 'carry = "both"',
         *(f'kind = "random"\n{more}' for more in ("count = 3", "spread = 1e-300", "seed = 1")),
         'kind = "given"\nstate = { delta_5 = -1e9, delta_3_rate = 1e-320 }',
     ),

@@ -59,7 +59,7 @@ def _later_words(file: h5py.File) -> None:
         file[name].attrs["flag_meanings"] = " ".join([*words, word])
         file[name].attrs["flag_values"] = np.arange(len(words) + 1, dtype="u1")
     file["period"][...] = 0
-    file.attrs["schema_version"] = "3.1"
+    file.attrs["schema_version"] = "3.2"
 
 
 def _axis(*ends: float) -> Callable[[h5py.File], None]:

@@ -43,13 +43,13 @@ def simulation(*overrides: str) -> Simulation:
 
 
 def blocks(sweep: Simulation, values: int) -> list[tuple[int, int]]:
-    """Return the bounds of blocks of so many swept values, in the order of computation."""
+    """Return the bounds of blocks of as many lanes as so many swept values have."""
     return sweep.blocks(values * sweep.lanes.repeats)
 
 
 def computed(sweep: Simulation, values: int = 13) -> dict[str, np.ndarray]:
     """Compute a whole sweep in blocks and join their arrays in the order of the lanes."""
-    return joined(computed_blocks(sweep, blocks(sweep, values)))
+    return joined(sweep, computed_blocks(sweep, blocks(sweep, values)))
 
 
 def computed_blocks(sweep: Simulation, bounds: list, finished: dict | None = None) -> dict:
@@ -60,9 +60,11 @@ def computed_blocks(sweep: Simulation, bounds: list, finished: dict | None = Non
     return kept
 
 
-def joined(found: dict) -> dict[str, np.ndarray]:
-    in_order = [found[bounds] for bounds in sorted(found)]
-    return {name: np.concatenate([block[name] for block in in_order]) for name in in_order[0]}
+def joined(sweep: Simulation, found: dict) -> dict[str, np.ndarray]:
+    """Join the blocks of a whole sweep in the order of its lanes."""
+    blocks = [found[bounds] for bounds in sorted(found)]
+    order = np.argsort(sweep.lanes.computed_at(np.arange(len(sweep.lanes))))
+    return {name: np.concatenate([block[name] for block in blocks])[order] for name in blocks[0]}
 
 
 def assert_same(one: dict[str, np.ndarray], other: dict[str, np.ndarray]) -> None:

@@ -8,9 +8,9 @@ from .short_sweeps import (
     METHODS,
     RANDOM,
     assert_same,
-    blocks,
     computed,
     computed_blocks,
+    joined,
     kernel,
     listing,
     simulation,
@@ -30,19 +30,32 @@ def test_carried_sweep_is_the_chain_of_its_lanes_made_by_hand(direction, method)
         assert np.array_equal(arrays["end_state"][value], state)
 
 
-@pytest.mark.parametrize("direction", ["upwards", "downwards"])
+@pytest.mark.parametrize("direction", ["upwards", "downwards", "both"])
 @pytest.mark.parametrize("overrides", [(), RANDOM, ("integration.method=flow_map", *RANDOM)])
 def test_carried_sweep_does_not_depend_on_the_size_of_its_blocks(direction, overrides):
     sweep = simulation(f"start.carry={direction}", *overrides)
     whole = computed(sweep)
     for values in (1, 4, 9):
         assert_same(computed(sweep, values), whole)
+    # Blocks may end between lanes that are side by side.
+    odd = computed_blocks(sweep, sweep.blocks(sweep.lanes.side_by_side + 1))
+    assert_same(joined(sweep, odd), whole)
 
 
-@pytest.mark.parametrize("direction", ["upwards", "downwards"])
+@pytest.mark.parametrize("overrides", [(), (*RANDOM, "integration.error_check=0.4")])
+def test_both_directions_at_once_are_the_two_sweeps_bit_for_bit(overrides):
+    second = 'second_sweep={parameter="mesh_frequency", values=[0.8, 0.9]}'
+    more = ("sweep.count=5", second, *overrides)
+    both = computed(simulation("start.carry=both", *more))
+    for number, direction in enumerate(("upwards", "downwards")):
+        one = {name: array[number::2] for name, array in both.items()}
+        assert_same(one, computed(simulation(f"start.carry={direction}", *more)))
+
+
+@pytest.mark.parametrize("direction", ["upwards", "downwards", "both"])
 def test_carried_sweep_goes_on_from_a_finished_block(direction):
     sweep = simulation(f"start.carry={direction}", *RANDOM)
-    bounds = blocks(sweep, 3)
+    bounds = sweep.blocks(8)
     everything = computed_blocks(sweep, bounds)
     finished = {block: lambda block=block: everything[block] for block in bounds[:2]}
     rest = computed_blocks(sweep, bounds[2:], finished)
@@ -66,8 +79,8 @@ def test_several_starts_are_carried_side_by_side():
 def test_sweeping_up_and_down_differ_where_two_motions_coexist():
     where = ("sweep.from=0.4", "sweep.to=2.4", "sweep.count=41")
     long = ("integration.transient_periods=150", *where)
-    up = computed(simulation("start.carry=upwards", *long))["section_delta_5"][:, -1]
-    down = computed(simulation("start.carry=downwards", *long))["section_delta_5"][:, -1]
+    section = computed(simulation("start.carry=both", *long))["section_delta_5"]
+    up, down = section[0::2, -1], section[1::2, -1]
     apart = np.abs(up - down) > 1e-3
     values = values_of(simulation(*long))
     assert apart[(values > 0.9) & (values < 1.5)].all()

@@ -403,7 +403,7 @@ def test_the_schema_knows_every_key_without_null():
 
 def test_the_tables_of_keys_list_the_choices():
     rows = {line.split("|")[1].strip(): line for line in key_tables().splitlines() if "|" in line}
-    assert '| `"none"`, `"upwards"`, `"downwards"` | `"none"` |' in rows["`carry`"]
+    assert '| `"none"`, `"upwards"`, `"downwards"`, `"both"` | `"none"` |' in rows["`carry`"]
     assert '| `"resolved"`, `"plain"` |' in rows["`crossings`"]
     assert "| `1995`, `2013` |" in rows["`edition`"]
     assert '| `"pitch_error"`, `"stiffness_variation"`, `"backlash"`,' in rows["`effects`"]

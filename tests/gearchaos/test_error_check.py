@@ -28,16 +28,16 @@ LONG = (
     ("share", "count"), [(0.0, 0), (0.1, 10), (0.25, 25), (1 / 3, 33), (1.0, 100)]
 )
 def test_the_share_of_lanes_is_checked_spread_evenly(share, count):
-    checked = checked_lanes(0, 100, share)
+    checked = checked_lanes(np.arange(100), share)
     assert checked.size == count
     if count > 1:
         assert np.ptp(np.diff(checked)) <= 1
 
 
 def test_which_lanes_are_checked_does_not_depend_on_blocks():
-    whole = checked_lanes(0, 100, 0.3)
-    blocks = [7 * n + checked_lanes(7 * n, min(7 * n + 7, 100), 0.3) for n in range(15)]
-    assert np.array_equal(np.concatenate(blocks), whole)
+    numbers = np.arange(100)
+    blocks = [first + checked_lanes(numbers[first : first + 7], 0.3) for first in range(0, 100, 7)]
+    assert np.array_equal(np.concatenate(blocks), checked_lanes(numbers, 0.3))
 
 
 @pytest.mark.parametrize("method", METHODS)

@@ -19,6 +19,7 @@ from gearchaos.results.variables import (
     STATE_WORDING,
     Axis,
     axis_name,
+    direction_axis,
     pair_axis,
     start_axis,
     sweep_variables,
@@ -228,7 +229,7 @@ def test_every_dataset_follows_the_rules_of_the_format(path: Path) -> None:
         assert (file.attrs["axes"], file.attrs["axis"]) == (b"pitch_error", b"pitch_error")
         assert file.libver[0] == "earliest"
         assert file.attrs["Conventions"] == b"CF-1.9"
-        assert (file.attrs["schema"], file.attrs["schema_version"]) == (b"gearchaos-sweep", b"3.1")
+        assert (file.attrs["schema"], file.attrs["schema_version"]) == (b"gearchaos-sweep", b"3.2")
         datasets: list[h5py.Dataset] = []
         file.visititems(lambda _, item: datasets.append(item) if hasattr(item, "shape") else None)
         assert len(datasets) == 47
@@ -370,7 +371,8 @@ def test_the_documented_variables_are_those_that_are_written() -> None:
     lines = re.findall(r"^\| `\w+` \| \(.*$", page, re.M)
     rows = [[cell.strip(" `") for cell in line.split("|")[1:5]] for line in lines]
     documented = {name: (dims.strip("()"), dtype, fill) for name, dims, dtype, fill in rows}
-    result = make_result(swept("load", 3), swept(count=4), pair_axis(np.arange(2)), start_axis(2))
+    repeats = pair_axis(np.arange(2)), start_axis(2), direction_axis()
+    result = make_result(swept("load", 3), swept(count=4), *repeats)
     short = {"load": "B", "pitch_error": "A", "section_delta_5": "section_STATE"}
     for name, variable in result.variables.items():
         dims = ", ".join(variable.dims).replace(", ".join(result.axes), "axes")

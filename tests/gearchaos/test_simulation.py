@@ -42,26 +42,32 @@ def test_two_parameters_of_which_one_changes_the_maps_are_those_of_fine_runge_ku
 def test_blocks_need_not_hold_whole_values_where_nothing_is_carried():
     sweep = simulation(*RANDOM)
     odd = [(first, min(first + 7, 39)) for first in range(0, 39, 7)]
-    assert_same(joined(computed_blocks(sweep, odd)), computed(sweep))
+    assert_same(joined(sweep, computed_blocks(sweep, odd)), computed(sweep))
 
 
 @pytest.mark.parametrize("threads", [1, 3, 64])
-def test_blocks_feed_every_thread_and_carried_ones_hold_whole_values(threads):
+def test_blocks_feed_every_thread_and_carried_ones_hold_whole_steps(threads):
     assert simulation(*RANDOM).block_lanes(threads) >= 32 * threads
-    carried = simulation(*RANDOM, "start.carry=upwards").block_lanes(threads)
+    carried = simulation(*RANDOM, "start.carry=both").block_lanes(threads)
     assert carried >= 32 * threads
-    assert carried % 3 == 0
+    assert carried % 6 == 0
+    # Where more lanes are side by side than a block holds, a step is divided.
+    many = simulation(*RANDOM, "start.carry=both", "start.count=5000")
+    assert many.lanes.side_by_side == 10_000
+    assert many.block_lanes(1) < 5000
 
 
-def test_a_value_with_more_starts_than_a_block_holds_is_carried_whole():
-    sweep = simulation(*RANDOM, "start.carry=upwards", "start.count=5000")
-    assert sweep.block_lanes(1) == 5000
-
-
-def test_blocks_are_computed_the_way_of_the_carrying():
-    bounds = [(4, 8), (0, 4), (8, 12)]
-    assert simulation("start.carry=upwards").in_order(bounds) == sorted(bounds)
-    assert simulation("start.carry=downwards").in_order(bounds) == sorted(bounds)[::-1]
+def test_all_lines_of_a_carried_sweep_are_computed_side_by_side():
+    sweep = simulation(*TWO, *RANDOM, "start.carry=both")
+    assert sweep.lanes.shape == (3, 4, 3, 2)
+    assert sweep.lanes.side_by_side == 18
+    places = sweep.lanes.computed_at(np.arange(72))
+    assert np.array_equal(np.sort(places), np.arange(72))
+    line, value, start, direction = np.unravel_index(places.reshape(4, 2, 3, 3), (3, 4, 3, 2))
+    step, way, *others = np.indices((4, 2, 3, 3))
+    assert np.array_equal(direction, way)
+    assert np.array_equal(value, np.where(way == 0, step, 3 - step))
+    assert np.array_equal([line, start], others)
 
 
 def test_finished_blocks_are_not_computed_again():

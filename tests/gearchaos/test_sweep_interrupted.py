@@ -114,7 +114,7 @@ def test_a_killed_sweep_leaves_nothing_that_looks_like_a_result_and_can_be_resum
 
 
 @pytest.mark.parametrize(
-    ("direction", "method"), [("upwards", "rk4"), ("downwards", "rk4"), ("downwards", "flow_map")]
+    ("direction", "method"), [("upwards", "rk4"), ("both", "rk4"), ("downwards", "flow_map")]
 )
 def test_a_carried_sweep_goes_on_from_the_end_states_of_the_finished_blocks(
     tmp_path, direction, method
