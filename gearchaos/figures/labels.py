@@ -66,7 +66,7 @@ def in_words(result: Result, place: Mapping[str, float]) -> str:
         attributes = result.attributes(axis) if axis in result else {}
         wording = str(attributes.get("long_name", "")) or axis.replace("_", " ")
         name = _formula(attributes.get("symbol", "")) or plain(wording)
-        unit = f" {unit_of(result, axis)}".rstrip() if axis in result else ""
+        unit = f" {unit_of(result, axis).removeprefix('unit ')}".rstrip() if axis in result else ""
         texts.append(f"start {value:g}" if axis == "start" else f"{name} = {value:.6g}{unit}")
     return ", ".join(texts)
 
