@@ -154,9 +154,9 @@ def place(text: str) -> tuple[str, float]:
 
 
 def coordinates(
-    places: Sequence[tuple[str, float]], axes: Sequence[str], free: str = ""
+    places: Sequence[tuple[str, float]], axes: Sequence[str], free: str = "", option: str = "--at"
 ) -> dict[str, float]:
-    """Name the axis of each place of --at; a bare value lies on the one axis beside ``free``.
+    """Name the axis of each place of an option; a bare value lies on the one beside ``free``.
 
     Raises ConfigurationError if that is not one, or an axis comes twice.
     """
@@ -168,8 +168,8 @@ def coordinates(
         axis = axis_name(name) or (others[0] if len(others) == 1 else "")
         if not axis or axis in found:
             raise ConfigurationError(
-                f"--at {name}{'=' if name else ''}{value:g}: must be NAME=VALUE, each of the axes "
-                f"{', '.join(axes)} once"
+                f"{option} {name}{'=' if name else ''}{value:g}: must be NAME=VALUE, each of the "
+                f"axes {', '.join(axes)} once"
             )
         found[axis] = value
     return found

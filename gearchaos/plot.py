@@ -1,6 +1,6 @@
 """Draw a result file as PNG and PDF beside it: of a sweep the bifurcation diagram over the Lyapunov
-chart, of a response one page for each lane, with time history, phase portrait, Poincare section
-and amplitude spectrum.
+chart, of two parameters maps of motion, exponent and contact, of a response one page for each lane,
+with time history, phase portrait, Poincare section and amplitude spectrum.
 
 A figure that this command drew before is replaced, so that it can be run again and again; any
 other file of that name is kept unless --overwrite is given. The paths of the figures go to
@@ -33,9 +33,8 @@ def _plot(options: argparse.Namespace) -> int:
     from gearchaos.figures import save_figure
     from gearchaos.figures.response_lane import is_response
     from gearchaos.gear.tooth_deviations import REALISATION
-    from gearchaos.results.result import open_result
 
-    results = [_slice(open_result(path), options.at) for path in options.result]
+    results = [_opened(path, options.at) for path in options.result]
     if options.units == "physical":
         results = [one.physical() for one in results]
     responses = [is_response(one) for one in results]
@@ -70,8 +69,9 @@ def _titles(results: "Sequence[Result]", paths: Sequence[Path]) -> list[str]:
 
 
 def _sweep_sheets(results: "Sequence[Result]", options: argparse.Namespace) -> "list[Sheet]":
-    from gearchaos.figures import bifurcation_page, shares_page
-    from gearchaos.figures.labels import in_a_name
+    from gearchaos.figures import bifurcation_page, map_page, shares_page
+    from gearchaos.figures.labels import in_a_name, in_words
+    from gearchaos.figures.lanes import swept_axes
     from gearchaos.figures.style import SINGLE_COLUMN_MM
     from gearchaos.results.result import DEFAULT_VARIABLE
 
@@ -81,6 +81,11 @@ def _sweep_sheets(results: "Sequence[Result]", options: argparse.Namespace) -> "
         name += f"_{options.variable}"
     for word, end in (("from", options.low), ("to", options.high)):
         name += "" if end is None else f"_{word}_{end:g}"
+    swept = swept_axes(results[0])
+    marked = coordinates(options.mark, swept, option="--mark")
+    if unknown := [axis for axis in marked if axis not in swept]:
+        rule = f"no swept parameter of the figure, which are {', '.join(swept)}"
+        raise FigureError(f"--mark {unknown[0]}: is {rule}")
     if options.shares:
         if len(results) > 1 or options.variable or options.stages or options.full_range:
             rule = "draws one result, and no diagram: leave --variable, --stages, --full-range out"
@@ -88,10 +93,21 @@ def _sweep_sheets(results: "Sequence[Result]", options: argparse.Namespace) -> "
         width = options.width or SINGLE_COLUMN_MM
         drawn = (options.low, options.high), width, options.height
         return [(f"{name}_shares", partial(shares_page, results[0], *drawn))]
-    name += "_stages" if options.stages else ""
-    shown = {"between": (options.low, options.high), "full_range": options.full_range}
-    shown |= {"stages": options.stages, "labels": _titles(results, options.result)}
     size = {"width_mm": options.width or SINGLE_COLUMN_MM, "height_mm": options.height}
+    shown = {"between": (options.low, options.high), "full_range": options.full_range}
+    if any(len(swept_axes(one)) > 1 for one in results):
+        if len(results) > 1 or options.stages:
+            raise FigureError(
+                f"{options.result[0]}: runs over {' and '.join(swept)}: a map is drawn alone and "
+                f"without --stages; --at {swept[0]}={results[0][swept[0]][0]:g} draws a diagram"
+            )
+        return [
+            (name, partial(map_page, results[0], options.variable, marked=marked, **shown, **size))
+        ]
+    name += "_stages" if options.stages else ""
+    shown |= {"stages": options.stages, "labels": _titles(results, options.result)}
+    if marked:
+        shown |= {"marked": (in_words(results[0], marked), [*marked.values()])}
     return [(name, partial(bifurcation_page, results, options.variable, **shown, **size))]
 
 
@@ -102,7 +118,7 @@ def _response_sheets(results: "Sequence[Result]", options: argparse.Namespace) -
     from gearchaos.figures.response_lane import COORDINATE
     from gearchaos.figures.style import DOUBLE_COLUMN_MM
 
-    for option in ("full_range", "stages", "shares"):
+    for option in ("full_range", "stages", "shares", "mark"):
         if getattr(options, option):
             raise FigureError(
                 f"--{option.replace('_', '-')}: {options.result[0]} is a response; it belongs to "
@@ -119,6 +135,15 @@ def _response_sheets(results: "Sequence[Result]", options: argparse.Namespace) -
         (f"{in_a_name(place_of(result, lane))}{coordinate}", partial(draw, lane))
         for lane in lanes.numbers[~lanes.diverged].tolist()
     ]
+
+
+def _opened(path: Path, at: Sequence[tuple[str, float]]) -> "Result":
+    from gearchaos.figures.lanes import swept_axes
+    from gearchaos.results.result import open_result
+
+    # Sections are most of a file, and a map has none.
+    of_lanes = _slice(open_result(path, rows=False), at)
+    return of_lanes if len(swept_axes(of_lanes)) > 1 else _slice(open_result(path), at)
 
 
 def _slice(result: "Result", at: Sequence[tuple[str, float]]) -> "Result":
@@ -145,7 +170,8 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
     add("--format", metavar="FORMATS", help="some of png, pdf, svg, eps, tiff (default: png,pdf)")
     text = (
         "section variable of a sweep (default: section_delta_5), coordinate of a response "
-        "(default: delta_5) or another of its variables over time, such as mesh_force_tangential"
+        "(default: delta_5) or another of its variables over time, such as mesh_force_tangential, "
+        "any number of the lanes of a map (default: motion, exponent and contact)"
     )
     add("--variable", metavar="NAME", help=text)
     add("--from", dest="low", type=number, metavar="VALUE", help="lowest parameter to show")
@@ -155,6 +181,11 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
         "repeated; VALUE is enough where there is one of them"
     )
     add("--at", type=place, action="append", default=[], metavar="NAME=VALUE", help=text)
+    text = (
+        "draw a line across a map, or a tick into a diagram, at this value of a swept parameter; "
+        "may be repeated; VALUE is enough where there is one"
+    )
+    add("--mark", type=place, action="append", default=[], metavar="NAME=VALUE", help=text)
     text = (
         "shade the stages behind the diagram of a sweep; those narrower than a 150th of the "
         "axis go into what surrounds them, or make it one of several motions"

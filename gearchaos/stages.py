@@ -14,6 +14,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from gearchaos.command_line import OK, Command, coordinates, number, place, whole_number
+from gearchaos.errors import ConfigurationError
 
 if TYPE_CHECKING:
     from gearchaos.engine.refinement import Boundary
@@ -35,7 +36,8 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
     text = (
         "bisect every boundary to this width, and tell how the orbit beside it is lost; lanes are "
         "computed again with the configuration in the file. Of a sweep in both directions, follow "
-        "the orbits to where each direction jumps"
+        "the orbits to where each direction jumps; of two parameters without --at, bisect those "
+        "along the first one in every row"
     )
     add("--refine", type=_width, metavar="WIDTH", help=text)
     text = (
@@ -73,6 +75,8 @@ def _stages(options: argparse.Namespace) -> int:
     from gearchaos.results.variables import DIRECTION, RECORD, REPEATS
 
     whole = open_result(options.result)
+    if options.refine is not None and not options.at and {*whole.axes} - {whole.axis, *REPEATS}:
+        return _map_boundaries(whole, options)
     # What is computed again is that of one pair and one start.
     kept = REPEATS if options.refine is None and options.survival is None else ()
     places = coordinates(options.at, whole.axes, whole.axis)
@@ -114,6 +118,39 @@ def _stages(options: argparse.Namespace) -> int:
     first = table(result.axis, stages, [*filter(None, head)])
     parts = map("\n".join, (first, told, boundary_list(boundaries or ())))
     print("\n\n".join(filter(None, parts)))
+    return OK
+
+
+def _map_boundaries(result: "Result", options: argparse.Namespace) -> int:
+    """Bisect the boundaries in all rows of a map, and tell what that saves."""
+    from gearchaos.engine.map_refinement import refined_map
+    from gearchaos.engine.refinement import refinable
+    from gearchaos.engine.running import compiling
+    from gearchaos.results.overview import finite
+
+    config = refinable(result, options.result)
+    if len(result.axes) > 2 or options.narrowest or options.survival is not None:
+        raise ConfigurationError(
+            f"--refine: {options.result} runs over {', '.join(result.axes)}; only two swept "
+            "parameters are refined as a whole, without --narrowest and --survival: choose a slice "
+            "with --at NAME=VALUE"
+        )
+    with compiling():
+        rows, lanes = refined_map(config, result, options.refine, options.threads)
+    second, first = result.axes
+    reach = float(result[first][-1] - result[first][0])
+    fine = result[second].size * (math.ceil(reach / options.refine) + 1)
+    if options.json:
+        listed = [
+            {"value": value, "boundaries": [*map(_named, found)]} for value, found in rows.items()
+        ]
+        facts: dict[str, Any] = {"parameter": first, "second_parameter": second, "rows": listed}
+        facts |= {"lanes": lanes, "lanes_of_a_map_as_fine": fine}
+        print(json.dumps(finite(facts), indent=1, allow_nan=False))
+        return OK
+    for value, found in rows.items():
+        print(f"{second} = {value:.6g}", *boundary_list(found), sep="\n")
+    print(f"{lanes} lanes were computed; a map as fine everywhere would have {fine}")
     return OK
 
 

@@ -1,5 +1,6 @@
 """The boundaries between the stages of a sweep, found more exactly than its lanes lie."""
 
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -137,22 +138,40 @@ def refined_boundaries(
     below = every[[stage.last for stage in stages[:-1]]]
     above = every[[stage.first for stage in stages[1:]]]
     spacing = above["value"] - below["value"]
+
+    def between(middle: Floats, _: NDArray[np.intp]) -> NDArray[Any]:
+        values = {"parameter": config.sweep.parameter, "values": middle.tolist()}
+        return _edges(run(config.replace("sweep", values), threads))
+
+    bisect(below, above, width, between)
+    losses = _losses(config, below, above, spacing)
+    return [
+        Boundary(float(one["value"]), float(other["value"]), one["label"], other["label"], *loss)
+        for one, other, loss in zip(below, above, losses, strict=True)
+    ]
+
+
+def bisect(
+    below: NDArray[Any],
+    above: NDArray[Any],
+    width: float,
+    between: Callable[[Floats, NDArray[np.intp]], NDArray[Any]],
+) -> None:
+    """Move the ends of boundaries towards each other, in place, until none is wider than that.
+
+    ``below``, ``above``: arrays with fields ``value`` and ``label``; ``between`` gives the same
+    at values in the middle of boundaries, and of these numbers.
+    """
     for _ in range(MOST_ROUNDS):
         middle = (below["value"] + above["value"]) / 2.0
         wide = above["value"] - below["value"] > width
         wide &= (below["value"] < middle) & (middle < above["value"])
         if not wide.any():
             break
-        values = {"parameter": config.sweep.parameter, "values": middle[wide].tolist()}
-        tried = _edges(run(config.replace("sweep", values), threads))
-        same = tried["label"] == below["label"][wide]
         numbers = np.flatnonzero(wide)
+        tried = between(middle[wide], numbers)
+        same = tried["label"] == below["label"][wide]
         below[numbers[same]], above[numbers[~same]] = tried[same], tried[~same]
-    losses = _losses(config, below, above, spacing)
-    return [
-        Boundary(float(one["value"]), float(other["value"]), one["label"], other["label"], *loss)
-        for one, other, loss in zip(below, above, losses, strict=True)
-    ]
 
 
 def refined_jumps(

@@ -3,6 +3,7 @@
 from gearchaos.figures.basins import basins, basins_page, fractions
 from gearchaos.figures.diagrams import bifurcation, lyapunov
 from gearchaos.figures.files import save_figure
+from gearchaos.figures.maps import map_page, parameter_map
 from gearchaos.figures.response import (
     amplitude_spectrum,
     phase_portrait,
@@ -22,6 +23,8 @@ __all__ = [
     "bifurcation_page",
     "fractions",
     "lyapunov",
+    "map_page",
+    "parameter_map",
     "phase_portrait",
     "poincare_section",
     "response_page",

@@ -67,7 +67,7 @@ def in_words(result: Result, place: Mapping[str, float]) -> str:
         attributes = result.attributes(axis) if axis in result else {}
         wording = str(attributes.get("long_name", "")) or axis.replace("_", " ")
         name = _formula(attributes.get("symbol", "")) or plain(wording)
-        unit = f" {unit_of(result, axis)}".rstrip() if axis in result else ""
+        unit = f" {unit_of(result, axis).removeprefix('unit ')}".rstrip() if axis in result else ""
         words = {START: f"start {value:g}", DIRECTION: coordinate_text(axis, value)}
         texts.append(words.get(axis, f"{name} = {value:.6g}{unit}"))
     return ", ".join(texts)

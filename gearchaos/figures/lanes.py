@@ -54,6 +54,20 @@ def diagram_lanes(result: Result, between: Between = (None, None)) -> Lanes:
     return select_lanes(result, between)
 
 
+def map_axes(result: Result) -> tuple[str, str]:
+    """Name the axes along x and y of a map; FigureError if the result has others, or too few."""
+    swept = swept_axes(result)
+    if len(swept) != 2:
+        raise FigureError(f"a map shows two swept parameters; the result has {', '.join(swept)}")
+    if more := [axis for axis in result.axes if axis not in swept]:
+        where = " ".join(f"--at {axis}={result[axis][0]:g}" for axis in more)
+        raise FigureError(
+            f"the result has several lanes for each pair of values, along {' and '.join(more)}, of "
+            f"which a map shows one; choose it, such as with {where} (in Python: result.sel)"
+        )
+    return swept[1], swept[0]
+
+
 def select_lanes(result: Result, between: Between = (None, None)) -> Lanes:
     """Select lanes by the swept parameter: its lowest and highest value, both included.
 
@@ -81,6 +95,16 @@ def select_lanes(result: Result, between: Between = (None, None)) -> Lanes:
         pad = abs(left) * PAD or 0.5
         left, right = left - pad, right + pad
     return Lanes(numbers, parameter, diverged, (left, right))
+
+
+def cell_edges(values: Floats) -> Floats:
+    """Return where the cells of ascending values end: halfway between them, shape (values + 1,)."""
+    if values.size == 1:
+        pad = abs(float(values[0])) * PAD or 0.5
+        return np.array([values[0] - pad, values[0] + pad])
+    halfway = (values[1:] + values[:-1]) / 2.0
+    outermost = 2.0 * values[[0, -1]] - halfway[[0, -1]]
+    return np.concatenate([outermost[:1], halfway, outermost[1:]])
 
 
 def columns(parameter: Floats, limits: tuple[float, float]) -> NDArray[np.intp]:

@@ -9,7 +9,7 @@ from matplotlib.container import Container
 from matplotlib.ticker import MaxNLocator, NullLocator
 
 from gearchaos.figures.labels import axis_label, in_words, legend_title
-from gearchaos.figures.lanes import Between, Floats, diagram_lanes
+from gearchaos.figures.lanes import Between, Floats, cell_edges, diagram_lanes
 from gearchaos.figures.page import Page, few_ticks, letter, page, remark
 from gearchaos.figures.stages import SHADES, look_of
 from gearchaos.figures.style import BLACK, LEGEND, SINGLE_COLUMN_MM, SMALL_FONT_PT
@@ -108,9 +108,7 @@ def layer(axes: Axes, values: Floats, base: Floats, top: Floats, **look: Any) ->
     if values.size <= MOST_BARS:
         width = 0.8 * (np.diff(values).min() if values.size > 1 else 1.0)
         return axes.bar(values, top - base, width, base, linewidth=0.3, **look)
-    halfway = (values[1:] + values[:-1]) / 2.0
-    edges = [2.0 * values[0] - halfway[0], *halfway, 2.0 * values[-1] - halfway[-1]]
-    return axes.stairs(top, edges, baseline=base, fill=True, linewidth=0.0, **look)
+    return axes.stairs(top, cell_edges(values), baseline=base, fill=True, linewidth=0.0, **look)
 
 
 def _confidence(axes: Axes, values: Floats, counted: Counted, marker: str) -> Drawn:

@@ -31,8 +31,8 @@ SHADES = {
     "quasi-periodic": "#DCEFD2",
     "chaotic": "#F5CC8E",
     "several motions": "#FFFFFF",
-    "unresolved": "#E6E6E6",
-    "diverged": "#F6CDBB",
+    "unresolved": "#BFBFBF",
+    "diverged": "#E78F81",
     "grows": "#F3C6DC",
 }
 """Colour of each kind of stage, in the order of the legend."""

@@ -47,16 +47,29 @@ class Shares(NamedTuple):
     apart: Counted | None
 
 
+def motion_kinds(result: Result) -> tuple[NDArray[np.int32], list[str]]:
+    """Number the kinds of motion: period 1, 2, 3, 4 or more, then those without a period.
+
+    Returns the number of each lane's kind, of the shape of the axes, and the names of 0, 1, ...
+    Raises FileError if the result has no labels.
+    """
+    if not all(name in result for name in LABELS):
+        raise FileError(
+            "the result has no labels of the motion; run the sweep with outputs.motion = true"
+        )
+    names = ["period 1", "period 2", "period 3", "period 4 or more"]
+    period, motion = result["period"], result["motion"].astype(np.int32)
+    kinds = np.where(period > 0, np.minimum(period, len(names)) - 1, len(names) + motion)
+    return kinds, names + [label_text(flag, 0) for flag in result.variables["motion"].flags]
+
+
 def motion_shares(result: Result) -> Shares:
     """Count the motions of each value of the one swept parameter of a result.
 
     Raises FileError if it has no labels, ConfigurationError if it has not one swept parameter, or
     neither several gear pairs nor several starts.
     """
-    if not all(name in result for name in LABELS):
-        raise FileError(
-            "shares need labels of the motion; run the sweep with outputs.motion = true"
-        )
+    kinds, names = motion_kinds(result)
     if len(result.axes) < 2 or sum(axis not in REPEATS for axis in result.axes) != 1:
         raise ConfigurationError(
             "shares are those of gear pairs or starts over one swept parameter, and the result has "
@@ -68,13 +81,10 @@ def motion_shares(result: Result) -> Shares:
     def rows(name: str) -> NDArray[Any]:
         return result[name].reshape(values.size, -1)
 
-    motion, period = rows("motion"), np.minimum(rows("period"), 4)
-    names = ("period 1", "period 2", "period 3", "period 4 or more")
-    found = {name: np.sum(period == n, axis=1) for n, name in enumerate(names, 1)}
-    for number, flag in enumerate(result.variables["motion"].flags):
-        found[label_text(flag, 0)] = np.sum((motion == number) & (period < 1), axis=1)
+    kinds = kinds.reshape(values.size, -1)
+    found = {name: np.sum(kinds == number, axis=1) for number, name in enumerate(names)}
     seen = {name: counts for name, counts in found.items() if counts.any()}
-    lanes = np.full(values.size, motion.shape[1])
+    lanes = np.full(values.size, kinds.shape[1])
     other, apart = Counted(lanes - found[names[0]], lanes), None
     if CROSSINGS in result:
         crossings = rows(CROSSINGS)

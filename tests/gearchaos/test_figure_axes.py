@@ -74,7 +74,6 @@ def test_the_command_draws_the_slice_it_names(axes, at, name, tmp_path, capsys):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ([], "--at load=0.1"),
         (["--at", "load"], "'load' is not a finite number"),
         (["--at", "load=much"], "'much' is not a finite number"),
         (["--at", "torque=3"], "torque: is no axis of the result"),

@@ -225,3 +225,53 @@ def test_a_slice_is_refined_like_the_sweep_of_one_parameter_that_it_is(tmp_path)
     assert light["boundaries"][0]["below"] == pytest.approx(10.6085, abs=0.01)
     assert all(0.0 < edge["above"] - edge["below"] <= 0.01 for edge in light["boundaries"])
     assert heavy["boundaries"] == []
+
+
+def test_a_row_of_a_map_is_the_sweep_of_that_row_bit_for_bit(tmp_path):
+    text = BOTH[: BOTH.index("[start]")] + BOTH[BOTH.index("[integration]") :]
+    (tmp_path / "both.toml").write_text(text, encoding="utf-8")
+    fewer = ["sweep.count=7", "second_sweep.count=3"]
+    assert sweep(tmp_path, *(word for one in fewer for word in ("--set", one))).code == 0
+    whole = gearchaos.open_result(tmp_path / "both.h5")
+    both = gearchaos.load_config(tmp_path / "both.toml", fewer)
+    for load in whole["load"]:
+        alone = tmp_path / "alone.toml"
+        alone.write_text(both.at({"load": float(load)}).resolved_toml(), encoding="utf-8")
+        ended = run_module("gearchaos.sweep", alone.name, "-q", "--overwrite", cwd=tmp_path)
+        assert ended.code == 0
+        row, sole = whole.sel(load=load), gearchaos.open_result(tmp_path / "alone.h5")
+        assert row.axes == sole.axes == ("pitch_error",)
+        assert same_data(row, sole)
+
+
+def test_the_boundaries_of_a_map_are_those_of_its_rows(tmp_path):
+    """Every row is bisected to where its own slice is; the lanes that this takes are told."""
+    text = BOTH[: BOTH.index("[start]")] + BOTH[BOTH.index("[integration]") :]
+    (tmp_path / "both.toml").write_text(text, encoding="utf-8")
+    overrides = [f"groups.{way}_damping_{g}=0.05" for way in ("transverse", "axial") for g in "pg"]
+    overrides += ["formulation=published", "sweep.from=9.0", "sweep.to=14.0", "sweep.count=5"]
+    overrides += ["second_sweep.count=3"]
+    flags = [word for override in overrides for word in ("--set", override)]
+    assert sweep(tmp_path, *flags).code == 0
+    path, width = tmp_path / "both.h5", ("--refine", "0.1")
+    whole = json.loads(of_the_file("stages", path, *width, "--json"))
+    assert (whole["parameter"], whole["second_parameter"]) == ("pitch_error", "load")
+    loads = gearchaos.open_result(path)["load"].tolist()
+    rows, count = [], 0
+    for load in loads:
+        sliced = json.loads(of_the_file("stages", path, "--at", f"{load}", *width, "--json"))
+        edges = ("below", "above", "motion_below", "motion_above")
+        ends = [[one[key] for key in edges] for one in sliced["boundaries"]]
+        count += len(ends)
+        rows += [(load, ends)] if ends else []
+    assert count > 1
+    found = [(row["value"], row["boundaries"]) for row in whole["rows"]]
+    assert [(value, [[one[key] for key in edges] for one in row]) for value, row in found] == rows
+    # Four halvings of 1.25 are no wider than 0.1, and each takes one lane.
+    assert whole["lanes"] == 4 * count
+    assert whole["lanes_of_a_map_as_fine"] == 3 * 51
+    told = of_the_file("stages", path, *width)
+    assert len(told.splitlines()) == count + len(rows) + 1
+    assert told.splitlines()[0] == f"load = {rows[0][0]:.6g}"
+    refused = run_module("gearchaos.stages", path.name, *width, "--survival", "3", cwd=tmp_path)
+    assert refused.code == 2 and "choose a slice with --at NAME=VALUE" in refused.err

@@ -1,0 +1,271 @@
+"""Maps over two swept parameters: motion and period, exponent, contact, or any number of a lane."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import Colormap, LinearSegmentedColormap, ListedColormap, Normalize
+from matplotlib.image import AxesImage
+from matplotlib.patches import Patch, PathPatch
+from matplotlib.path import Path
+from matplotlib.ticker import MaxNLocator
+from matplotlib.transforms import offset_copy
+from numpy.typing import NDArray
+
+from gearchaos.errors import FigureError
+from gearchaos.figures.labels import axis_label, in_words, legend_title
+from gearchaos.figures.lanes import Between, Floats, Mask, cell_edges, map_axes, select_lanes
+from gearchaos.figures.page import Page, few_ticks, footnote, page
+from gearchaos.figures.panel import robust_limits
+from gearchaos.figures.stages import look_of
+from gearchaos.figures.style import BLACK, LEGEND, SINGLE_COLUMN_MM, SMALL_FONT_PT
+from gearchaos.results.result import Result
+from gearchaos.results.shares import motion_kinds
+from gearchaos.results.variables import DIRECTIONS, LABELS, LARGEST_EXPONENT, STATUS
+
+SHOWN = (LABELS[0], LARGEST_EXPONENT, *(f"contact_state_{way}" for way in DIRECTIONS))
+"""What a page shows, if the result has it."""
+
+NO_VALUE = "no value"
+"""What there is of a lane that did not diverge, but has no number."""
+
+NUMBERS = "YlGn"
+"""Colours of numbers, and of kinds without colours of their own, the first ones light."""
+
+SIGNS = {-1.0: "#3C7FB8", -0.5: "#82B1DE", 0.0: "#F7F7F7"}
+SIGNS |= {0.3: "#E69F00", 0.65: "#A84300", 1.0: "#4A1500"}
+"""Colours of exponents, in parts of the way from zero to the lowest and to the highest: blue as
+periodic motions are, orange as chaos is, which alone is dark in grey."""
+
+NARROWEST_MM = 60.0
+"""Of panels side by side; narrower ones stand on top of each other."""
+
+KEY_COLUMNS = 3
+ROW_PT = 1.5 * SMALL_FONT_PT
+BAR_ROWS = 2
+"""Of what stands between a map and its title: columns and height of the rows of a legend, and how
+many rows a bar of colours takes."""
+
+
+def parameter_map(
+    axes: Axes,
+    result: Result,
+    variable: str = LABELS[0],
+    *,
+    between: Between = (None, None),
+    full_range: bool = False,
+) -> ScalarMappable:
+    """Draw one variable of the lanes as a map over two swept parameters into axes.
+
+    Each lane is a cell that reaches halfway to its neighbours. The motion is drawn with its period,
+    in the colours and hatches that diagrams have for them, an exponent in colours that part at
+    zero. Lanes without a number are grey or hatched, and the legend says why. The cells are an
+    image, so that a PDF stays small.
+
+    Parameters
+    ----------
+    axes : matplotlib.axes.Axes
+    result : Result
+        Over two swept parameters, the first one along x, with one lane for each pair of values.
+    variable : str
+        "motion", any other variable with flags, or one with a number for each lane.
+    between : (float or None, float or None)
+        The part of the first parameter's range to show.
+    full_range : bool
+        Let the colours reach every lane, however few lie far out.
+
+    Returns
+    -------
+    ScalarMappable
+        The image. Its array has the shape (values of the second parameter, values shown of the
+        first), with the number of the kind where there are kinds, masked where there is none.
+
+    Raises
+    ------
+    FigureError
+        If the result has no such variable, no lane in the range, or other axes than two parameters.
+    FileError
+        If the motion is wanted and the result has no labels.
+    """
+    x_axis, y_axis = map_axes(result)
+    lanes, y = select_lanes(result, between), np.asarray(result[y_axis], dtype=np.float64)
+    x = lanes.parameter[:: y.size]
+    edges = cell_edges(x), cell_edges(y)
+
+    def cells(values: NDArray[Any]) -> NDArray[Any]:
+        return values.ravel()[lanes.numbers].reshape(x.size, y.size).T
+
+    image: ScalarMappable
+    of_lanes = [one.name for one in result.variables.values() if one.dims == result.axes]
+    if variable not in (*of_lanes, *LABELS):
+        there = ", ".join(of_lanes)
+        raise FigureError(f"no number {variable!r} of each lane in the result; it has {there}")
+    if variable in LABELS or result.variables[variable].flags:
+        kinds, looks = _kinds(result, variable)
+        numbers = cells(kinds)
+        colours = ListedColormap([look["facecolor"] for look in looks.values()])
+        image = axes.pcolorfast(*edges, numbers, cmap=colours, vmin=-0.5, vmax=len(looks) - 0.5)
+        masks = {name: numbers == number for number, name in enumerate(looks)}
+    else:
+        numbers = cells(result[variable].astype(np.float64))
+        numbers[(numbers == result.variables[variable].fill_value) | np.isinf(numbers)] = np.nan
+        image = _number_cells(axes, edges, numbers, variable == LARGEST_EXPONENT, full_range)
+        none, ended = np.isnan(numbers), cells(result[STATUS]) != 0
+        masks = {"diverged": none & ended, NO_VALUE: none & ~ended}
+        looks = {name: look_of(name) for name in masks}
+    seen = {name: mask for name, mask in masks.items() if mask.any()}
+    for name, mask in seen.items():
+        if looks[name].get("hatch"):
+            # As a patch, each of its corners would be asked for the limits.
+            axes.add_artist(PathPatch(_outline(mask, *edges), linewidth=0.0, **looks[name]))
+    if type(image) is AxesImage:
+        # A PDF then has the cells themselves, not the pixels that they would be on paper.
+        image.set_interpolation("none")
+    low, high = between
+    axes.set_xlim(edges[0][0] if low is None else low, edges[0][-1] if high is None else high)
+    axes.set_ylim(edges[1][0], edges[1][-1])
+    axes.set(xlabel=axis_label(result, x_axis), ylabel=axis_label(result, y_axis))
+    _legend(axes, [Patch(linewidth=0.3, label=name, **looks[name]) for name in seen])
+    _title(axes, _name(result, variable), _rows(axes))
+    return image
+
+
+def map_page(
+    result: Result,
+    variable: str | None = None,
+    *,
+    between: Between = (None, None),
+    full_range: bool = False,
+    marked: Mapping[str, float] | None = None,
+    width_mm: float = SINGLE_COLUMN_MM,
+    height_mm: float | None = None,
+) -> Page:
+    """Draw the maps of motion and period (a), largest exponent (b) and state of contact (c).
+
+    A result without one of them gives the panels that it has data for; a ``variable`` gives one
+    panel, of itself.
+
+    Parameters
+    ----------
+    result, variable, between, full_range
+        As for `parameter_map`.
+    marked : mapping of str to float, optional
+        Values of the two parameters at which a line crosses the maps.
+    width_mm, height_mm : float
+        Size of the page. Panels for which it is wide enough stand side by side.
+
+    Raises
+    ------
+    FigureError, FileError
+        As for `parameter_map`, and if there is nothing to draw.
+    """
+    names = [name for name in SHOWN if name in result] if variable is None else [variable]
+    if not names:
+        raise FigureError(f"nothing to draw: the result has none of {', '.join(SHOWN)}; name one")
+    x_axis, _ = map_axes(result)
+    beside = width_mm >= NARROWEST_MM * len(names)
+    shape = (1, len(names)) if beside else (len(names), 1)
+    height = height_mm or 25.0 + 0.68 * width_mm * shape[0] / shape[1]
+    with page(width_mm, height) as figure:
+        panels = figure.subplots(*shape, sharex=True, sharey=True, squeeze=False).ravel().tolist()
+        for axes, name in zip(panels, names, strict=True):
+            parameter_map(axes, result, name, between=between, full_range=full_range)
+            few_ticks(axes)
+            axes.label_outer()
+            for axis, value in (marked or {}).items():
+                line = axes.axvline if axis == x_axis else axes.axhline
+                line(value, color="white", linewidth=1.4)
+                label = in_words(result, {axis: value})
+                line(value, color=BLACK, linewidth=0.7, linestyle=(0, (5, 2)), label=label)
+        if marked:
+            before, lines = panels[0].get_legend(), panels[0].get_legend_handles_labels()[0]
+            _legend(panels[0], [*(before.legend_handles if before else ()), *lines])
+        titles = [_name(result, name, 34 if beside else 80) for name in names]
+        pairs = list(zip(panels, titles, strict=True))
+        most = max(_rows(axes) + title.count("\n") for axes, title in pairs)
+        for letter, (axes, title) in zip("abcd", pairs, strict=False):
+            head = rf"$\mathbf{{({letter})}}$ " if len(panels) > 1 else ""
+            # Side by side, the first lines are at the same height.
+            _title(axes, head + title, most - title.count("\n") if beside else _rows(axes))
+        footnote(figure, legend_title(result) or "")
+        if result.fixed:
+            figure.suptitle(in_words(result, result.fixed), fontsize=SMALL_FONT_PT)
+    return figure
+
+
+def _kinds(result: Result, variable: str) -> tuple[NDArray[Any], dict[str, dict[str, Any]]]:
+    """Return the number of each lane's kind, and by the names of 0, 1, ... how it is filled."""
+    if variable in LABELS:
+        kinds, names = motion_kinds(result)
+        return kinds, {name: look_of(name) for name in names}
+    flags = result.variables[variable].flags
+    shades = mpl.colormaps[NUMBERS](np.linspace(0.0, 1.0, len(flags)))
+    looks = [{"facecolor": shade, "edgecolor": "0.55"} for shade in shades]
+    names = [flag.replace("_", " ") for flag in flags]
+    return result[variable], dict(zip(names, looks, strict=True))
+
+
+def _number_cells(
+    axes: Axes, edges: tuple[Floats, Floats], numbers: Floats, signed: bool, full_range: bool
+) -> ScalarMappable:
+    """Draw numbers (rows, columns), with the bar of their colours; robust limits may cut it."""
+    there = numbers[np.isfinite(numbers)]
+    there = there if there.size else np.zeros(1)
+    ends = lowest, highest = there.min(), there.max()
+    low, high = np.clip(robust_limits(there, there, full_range=full_range), *ends)
+    colours: Colormap = mpl.colormaps[NUMBERS]
+    if signed:
+        # Neither way is so short that zero would lie on the edge of the bar.
+        low, high = min(low, -high / 50.0, -1e-9), max(high, -low / 50.0, 1e-9)
+        values = [share * high if share > 0.0 else -share * low for share in SIGNS]
+        shades = zip((np.array(values) - low) / (high - low), SIGNS.values(), strict=True)
+        colours = LinearSegmentedColormap.from_list("signs", list(shades), N=1024)
+    colours = colours.with_extremes(bad=look_of(NO_VALUE)["facecolor"])
+    look: Any = {"cmap": colours, "norm": Normalize(low, high)}
+    image = axes.pcolorfast(*edges, np.ma.masked_invalid(numbers), **look)
+    cut = [["neither", "max"], ["min", "both"]][int(lowest < low)][int(highest > high)]
+    bar: Any = {"extend": cut, "location": "top", "ticks": MaxNLocator(6)}
+    assert axes.figure is not None
+    axes.figure.colorbar(image, cax=axes.inset_axes((0.0, 1.025, 1.0, 0.04)), **bar)
+    return image
+
+
+def _legend(axes: Axes, handles: list[Any]) -> None:
+    """Place a legend above the left end of the axes, and of the bar of colours if they have one."""
+    if handles:
+        above = 2.0 + BAR_ROWS * ROW_PT * len(axes.child_axes)
+        figure: Any = axes.figure
+        raised = offset_copy(axes.transAxes, figure, y=above, units="points")
+        place: Any = {"bbox_to_anchor": (0.0, 1.0), "bbox_transform": raised, "borderaxespad": 0.0}
+        axes.legend(handles=handles, loc="lower left", ncols=KEY_COLUMNS, **place, **LEGEND)
+
+
+def _rows(axes: Axes) -> int:
+    """Return how many rows stand above axes, below their title."""
+    legend = axes.get_legend()
+    entries = len(legend.legend_handles) if legend else 0
+    return BAR_ROWS * len(axes.child_axes) + -(-entries // KEY_COLUMNS)
+
+
+def _name(result: Result, variable: str, line_length: int = 80) -> str:
+    if variable in LABELS:
+        return "Motion and period"
+    return axis_label(result, variable, line_length)
+
+
+def _title(axes: Axes, text: str, rows: int) -> None:
+    look: Any = {"fontsize": SMALL_FONT_PT, "fontweight": "normal", "linespacing": 1.5}
+    axes.set_title(text, loc="left", pad=4.0 + ROW_PT * rows, **look)
+
+
+def _outline(mask: Mask, x: Floats, y: Floats) -> Path:
+    """Outline the cells of a mask (rows, columns), those side by side as one rectangle."""
+    ends = np.diff(np.pad(mask, ((0, 0), (1, 1))).astype(np.int8), axis=1)
+    (row, first), after = np.nonzero(ends == 1), np.nonzero(ends == -1)[1]
+    left, right, bottom, top = x[first], x[after], y[row], y[row + 1]
+    across, up = (left, right, right, left, left), (bottom, bottom, top, top, bottom)
+    codes = np.tile([Path.MOVETO, *[Path.LINETO] * 3, Path.CLOSEPOLY], row.size)
+    return Path(np.array([across, up]).T.reshape(-1, 2), codes)
