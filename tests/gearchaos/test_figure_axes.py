@@ -68,7 +68,7 @@ def test_the_command_draws_the_slice_it_names(axes, at, name, tmp_path, capsys):
     assert main([str(tmp_path / "r.h5"), "--format", "png", "--dpi", "50", *asked]) == 0
     out, err = capsys.readouterr()
     assert out == f"{tmp_path / name}.png\n"
-    assert all(f" at {value.split('=')[0]} = " in err for value in at if "=" in value)
+    assert all(f" {value.split('=')[0]} = " in err for value in at if "=" in value)
 
 
 @pytest.mark.parametrize(
