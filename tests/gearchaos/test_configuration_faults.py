@@ -67,7 +67,7 @@ ONE_FAULT = [
     (
         "start.carry=up",
         'start.carry = "up"',
-        "one of 'none', 'upwards' or 'downwards'",
+        "one of 'none', 'upwards', 'downwards' or 'both'",
         "expected: ",
     ),
     ("start.kind=rset", 'start.kind = "rset"', "must be one of", "did you mean `rest`?"),
@@ -479,7 +479,7 @@ def test_what_is_no_value_of_toml_is_called_what_it_is():
 
 
 def test_a_choice_is_refused_with_the_choices():
-    with pytest.raises(ConfigurationError, match="one of 'none', 'upwards' or 'downwards'"):
+    with pytest.raises(ConfigurationError, match="one of 'none', 'upwards', 'downwards' or 'both'"):
         load_config(PAN2021, ["start.carry=up"])
 
 

@@ -101,7 +101,7 @@ def test_commands_take_a_gear_pair_by_its_number(result, tmp_path):
 
     where = ("--at", "realisation=1", "--at", "start=0")
     assert "slice realisation = 1, number 2 of 3" in run("stages", "drawn.h5", *where)
-    assert "slice realisation = 0, the first of 3" in run("stages", "drawn.h5")
+    assert "all 3 values of realisation, of which --at" in run("stages", "drawn.h5")
     assert "realisation (realisation: 3) int32" in run("info", "drawn.h5")
     assert "drawn_realisation_1" in run("plot", "drawn.h5", "--at", "realisation=1")
     run("plot", "drawn.h5", "--stages")
