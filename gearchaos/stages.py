@@ -72,10 +72,10 @@ def _stages(options: argparse.Namespace) -> int:
         slice_facts,
         stage_table,
     )
-    from gearchaos.results.variables import DIRECTION, RECORD, REPEATS
+    from gearchaos.results.variables import DIRECTION, RECORD, REPEATS, UNSWEPT
 
     whole = open_result(options.result)
-    if options.refine is not None and not options.at and {*whole.axes} - {whole.axis, *REPEATS}:
+    if options.refine is not None and not options.at and {*whole.axes} - {whole.axis, *UNSWEPT}:
         return _map_boundaries(whole, options)
     # What is computed again is that of one pair and one start.
     kept = REPEATS if options.refine is None and options.survival is None else ()
