@@ -34,18 +34,8 @@ def basins(axes: Axes, found: Basins, value: int = 0) -> AxesImage:
     Every start is a cell in the colour of its attractor; markers are the section points of the
     attractors that lie within the axes.
 
-    Parameters
-    ----------
-    axes : matplotlib.axes.Axes
-    found : Basins
-        From `find_basins`, of starts on a grid over two states.
-    value : int
-        Which of its values of the parameter.
-
-    Raises
-    ------
-    FigureError
-        If the starts are no such grid.
+    ``found``: from `find_basins`, of which ``value``, the place of its parameter's, is drawn.
+    Raises FigureError if the starts are not on a grid over two states.
     """
     if len(found.grid) != 2:
         raise FigureError(
@@ -53,25 +43,24 @@ def basins(axes: Axes, found: Basins, value: int = 0) -> AxesImage:
             "start.box; of other starts, their shares are drawn over several values of a parameter"
         )
     here = [one for one in found.basins if one.value == found.values[value]]
-    numbers = [one.number for one in here]
-    place = np.argsort(numbers)[np.searchsorted(np.sort(numbers), found.numbers[value])]
+    colours = {one.number: _look(one)["facecolor"] for one in here}
+    numbers, cells = np.unique(found.numbers[value], return_inverse=True)
     (x, along), (y, up) = found.grid.items()
     steps = [np.ptp(v) / max(1, v.size - 1) / 2.0 for v in (along, up)]
     ends = [(v[0] - step, v[-1] + step) for v, step in zip((along, up), steps, strict=True)]
     image = axes.imshow(
-        place.reshape(along.size, up.size).T,
-        cmap=ListedColormap([_look(one)["facecolor"] for one in here]),
+        cells.reshape(along.size, up.size).T,
+        cmap=ListedColormap([colours[number] for number in numbers.tolist()]),
         vmin=-0.5,
-        vmax=len(here) - 0.5,
+        vmax=len(numbers) - 0.5,
         extent=(*ends[0], *ends[1]),
         origin="lower",
         aspect="auto",
         interpolation="nearest",
     )
-    states = found.result.variables["state"].flags
+    columns = [found.result.variables["state"].flags.index(state) for state in (x, y)]
     for one in here:
-        points = one.section[:MOST_POINTS]
-        axes.plot(*(points[:, states.index(state)] for state in (x, y)), **_marker(one))
+        axes.plot(*one.section[:MOST_POINTS, columns].T, **_marker(one))
     axes.set(xlim=ends[0], ylim=ends[1], xlabel=_label(x), ylabel=_label(y))
     return image
 
@@ -79,24 +68,16 @@ def basins(axes: Axes, found: Basins, value: int = 0) -> AxesImage:
 def fractions(axes: Axes, found: Basins) -> list[Drawn]:
     """Draw the shares of all basins over the parameter on top of each other, number 1 lowest.
 
-    Parameters
-    ----------
-    axes : matplotlib.axes.Axes
-    found : Basins
-        From `find_basins`, of several values.
-
-    Returns
-    -------
-    list
-        What is drawn, with labels, in the order of the numbers.
+    ``found``: from `find_basins`, of several values. Returns what is drawn, with labels, in the
+    order of the numbers.
     """
     base, layers = np.zeros(found.values.size), []
-    named = {one.number: one for one in found.basins}
-    for number in sorted(named, key=lambda number: (number < 0, abs(number))):
-        top = base + np.mean(found.numbers == number, axis=1)
-        motions = [*dict.fromkeys(one.motion for one in found.basins if one.number == number)]
+    for number in sorted({one.number for one in found.basins}, key=lambda n: (n < 0, abs(n))):
+        mine = [one for one in found.basins if one.number == number]
+        motions = [*dict.fromkeys(one.motion for one in mine)]
         words = ", ".join(motions[:3]) + (", ..." if len(motions) > 3 else "")
-        look = _look(named[number]) | {"label": f"{number}: {words}" if number > 0 else words}
+        look = _look(mine[0]) | {"label": f"{number}: {words}" if number > 0 else words}
+        top = base + np.mean(found.numbers == number, axis=1)
         layers.append(layer(axes, found.values, base, top, **look))
         base = top
     limits = diagram_lanes(found.result).limits
@@ -112,11 +93,12 @@ def basins_page(
 
     Width and height are those of the page; raises FigureError as `basins`.
     """
-    share = 0.85 if found.values.size == 1 else 0.55
-    with page(width_mm, height_mm or 20.0 + share * width_mm) as figure:
-        axes, fixed, labels = figure.subplots(), found.result.fixed, None
-        if found.values.size > 1:
+    several, fixed = found.values.size > 1, found.result.fixed
+    with page(width_mm, height_mm or 20.0 + (0.55 if several else 0.85) * width_mm) as figure:
+        axes = figure.subplots()
+        if several:
             drawn: list[Any] = fractions(axes, found)
+            labels = [str(one.get_label()) for one in drawn]
         else:
             basins(axes, found)
             drawn = [
@@ -127,7 +109,6 @@ def basins_page(
         few_ticks(axes, 8, 6)
         figure.suptitle(in_words(found.result, fixed), fontsize=SMALL_FONT_PT)
         look = {"title_fontsize": SMALL_FONT_PT, "loc": "outside lower center", **LEGEND}
-        labels = labels or [str(one.get_label()) for one in drawn]
         figure.legend(drawn, labels, title=legend_title(found.result), ncols=2, **look)
     return figure
 
@@ -139,21 +120,21 @@ def _look(one: Basin) -> dict[str, Any]:
 
 
 def _marker(one: Basin) -> dict[str, Any]:
-    marker = MARKERS[(one.number - 1) % len(MARKERS)] if one.number > 0 else "none"
-    color = _look(one)["facecolor"]
-    look: dict[str, Any] = {"ls": "none", "marker": marker, "ms": 5.0, "mfc": color}
-    # Of chaos there are hundreds of points.
-    size = {"mec": BLACK, "mew": 0.6} if one.period else {"ms": 1.0, "mfc": BLACK, "mew": 0.0}
-    return look | size
+    look: dict[str, Any] = {"ls": "none", "mfc": _look(one)["facecolor"], "mec": BLACK, "mew": 0.6}
+    if one.number < 0:
+        return look
+    look |= {"marker": MARKERS[(one.number - 1) % len(MARKERS)], "ms": 5.0}
+    # Of a motion without a period there are hundreds of points.
+    return look if one.period else look | {"ms": 1.0, "mfc": BLACK, "mew": 0.0}
 
 
 def _label(state: str) -> str:
     wording, symbol = STATE_WORDING[state]
     unit = unit_of(state)
-    return f"{wording[:1].upper()}{wording[1:]}, {symbol} ({unit.stands_for if unit else '1'})"
+    return f"{wording.capitalize()}, {symbol} ({unit.stands_for if unit else '1'})"
 
 
 def _in_words(one: Basin) -> str:
-    share, (low, high) = 100.0 * one.starts.shares, 100.0 * one.starts.intervals
+    share, low, high = (100.0 * part for part in (one.share, *one.share_95_percent))
     number = f"{one.number}: " if one.number > 0 else ""
     return f"{number}{one.motion}, {share:.3g} % ({low:.3g} to {high:.3g})"
