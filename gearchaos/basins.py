@@ -59,7 +59,7 @@ def _basins(options: argparse.Namespace) -> int:
     if options.json:
         facts = {"parameter": found.parameter, "slice": where, "starts": found.numbers.shape[1]}
         basins = [one._asdict() | {"section": one.section.tolist()} for one in found.basins]
-        facts |= {"basins": basins, "entropy": [one._asdict() for one in found.entropy]}
+        facts |= {"basins": basins, "entropy": found.entropy}
         print(json.dumps(finite(facts), indent=1, allow_nan=False))
     else:
         print("\n".join([*table(found, slice_lines(where))]))

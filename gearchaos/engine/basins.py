@@ -1,7 +1,6 @@
 """From a result with several starts to its basins of attraction."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gearchaos.dynamics.attractors import find_attractors, numbers_along
 from gearchaos.engine.lanes import Lanes
@@ -64,8 +63,10 @@ def find_basins(result: Result, name: str = "the result", threads: int | None = 
     numbers[place >= 0] = numbers_along(value, sizes, averages)[place[place >= 0]]
     parameter = swept[0] if swept else axis_name(config.sweep.parameter)
     values = np.atleast_1d(result[parameter] if swept else result.fixed[parameter])
-    told = [v.name for v in result.variables.values() if v.dims == result.axes]
-    told = [name for name in told if result[name].dtype == float and name not in NO_MEANS]
+    of_lanes = [
+        v for v in result.variables.values() if (v.dims, v.dtype) == (result.axes, "float64")
+    ]
+    told = [v.name for v in of_lanes if v.name not in NO_MEANS]
     basins: list[Basin] = []
     for here in every.reshape(-1, starts):
         # Those without an attractor come last.
@@ -73,7 +74,8 @@ def find_basins(result: Result, name: str = "the result", threads: int | None = 
             mine = here[numbers[here] == number]
             first, orbit = mine[0], found[place[mine[0]]] if number > 0 else None
             code, repeats = (motion[first], int(period[first])) if orbit else (-number, 0)
-            means = {one: _mean(result.lanes(one)[mine]) for one in told}
+            known = {one: np.ma.masked_invalid(result.lanes(one)[mine]) for one in told}
+            means = {one: float(np.ma.filled(kept.mean(), np.nan)) for one, kept in known.items()}
             exponent = means.pop(LARGEST_EXPONENT, np.nan)
             multiplier = float(np.abs(orbit.multipliers[0])) if orbit else np.nan
             if multiplier > 0.0:
@@ -99,8 +101,3 @@ def find_basins(result: Result, name: str = "the result", threads: int | None = 
     rows, shape = numbers.reshape(-1, starts), [config.start.count] * len(box)
     entropy = [basin_entropy(row.reshape(shape)) for row in rows] if grid else []
     return Basins(result, parameter, values, rows, basins, grid, entropy)
-
-
-def _mean(values: NDArray[np.float64]) -> float:
-    known = values[np.isfinite(values)]
-    return float(known.mean()) if known.size else np.nan

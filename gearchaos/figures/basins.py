@@ -6,7 +6,6 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import ListedColormap
 from matplotlib.image import AxesImage
-from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from gearchaos.errors import FigureError
@@ -21,7 +20,6 @@ from gearchaos.results.units import unit_of
 from gearchaos.results.variables import STATE_WORDING
 
 COLORS = ("#D6E6F3", "#EDBE62", "#5DB898", "#C284AD", "#B4602F", "#4C6E8E")
-MARKERS = ("o", "^", "s", "D", "v", "P")
 """Of attractors by their numbers, over and over again; lightness tells them apart in grey."""
 
 MOST_POINTS = 500
@@ -31,26 +29,23 @@ MOST_POINTS = 500
 def basins(axes: Axes, found: Basins, value: int = 0) -> AxesImage:
     """Draw the basins over the two states of a grid of starts, with the attractors on top.
 
-    Every start is a cell in the colour of its attractor; markers are the section points of the
-    attractors that lie within the axes.
-
-    ``found``: from `find_basins`, of which ``value``, the place of its parameter's, is drawn.
-    Raises FigureError if the starts are not on a grid over two states.
+    Every start is a cell in the colour of its attractor, circles are the points of a periodic one
+    that lie within the axes, dots those of any other. ``found``: from `find_basins`, ``value``:
+    which of its values. Raises FigureError if the starts are not on a grid over two states.
     """
     if len(found.grid) != 2:
         raise FigureError(
             'basins are drawn over two states: set start.kind = "grid" and name two states in '
             "start.box; of other starts, their shares are drawn over several values of a parameter"
         )
-    here = [one for one in found.basins if one.value == found.values[value]]
-    colours = {one.number: _look(one)["facecolor"] for one in here}
+    here = {one.number: one for one in found.basins if one.value == found.values[value]}
     numbers, cells = np.unique(found.numbers[value], return_inverse=True)
     (x, along), (y, up) = found.grid.items()
     steps = [np.ptp(v) / max(1, v.size - 1) / 2.0 for v in (along, up)]
     ends = [(v[0] - step, v[-1] + step) for v, step in zip((along, up), steps, strict=True)]
     image = axes.imshow(
         cells.reshape(along.size, up.size).T,
-        cmap=ListedColormap([colours[number] for number in numbers.tolist()]),
+        cmap=ListedColormap([_look(here[number])["facecolor"] for number in numbers.tolist()]),
         vmin=-0.5,
         vmax=len(numbers) - 0.5,
         extent=(*ends[0], *ends[1]),
@@ -59,8 +54,10 @@ def basins(axes: Axes, found: Basins, value: int = 0) -> AxesImage:
         interpolation="nearest",
     )
     columns = [found.result.variables["state"].flags.index(state) for state in (x, y)]
-    for one in here:
-        axes.plot(*one.section[:MOST_POINTS, columns].T, **_marker(one))
+    for one in here.values():
+        face, size, edge = (_look(one)["facecolor"], 5.0, 0.6) if one.period else (BLACK, 1.0, 0.0)
+        points = one.section[:MOST_POINTS, columns].T
+        axes.plot(*points, "o", ms=size, mfc=face, mec=BLACK, mew=edge)
     axes.set(xlim=ends[0], ylim=ends[1], xlabel=_label(x), ylabel=_label(y))
     return image
 
@@ -80,9 +77,8 @@ def fractions(axes: Axes, found: Basins) -> list[Drawn]:
         top = base + np.mean(found.numbers == number, axis=1)
         layers.append(layer(axes, found.values, base, top, **look))
         base = top
-    limits = diagram_lanes(found.result).limits
-    axes.set(xlim=limits, ylim=(0.0, 1.0), xlabel=axis_label(found.result, found.parameter))
-    axes.set_ylabel("Share of starts")
+    axes.set(ylim=(0.0, 1.0), xlabel=axis_label(found.result, found.parameter))
+    axes.set(xlim=diagram_lanes(found.result).limits, ylabel="Share of starts")
     return layers
 
 
@@ -98,18 +94,14 @@ def basins_page(
         axes = figure.subplots()
         if several:
             drawn: list[Any] = fractions(axes, found)
-            labels = [str(one.get_label()) for one in drawn]
         else:
             basins(axes, found)
-            drawn = [
-                (Patch(**_look(b), lw=0.3), Line2D([], [], **_marker(b))) for b in found.basins
-            ]
-            labels = [_in_words(one) for one in found.basins]
+            drawn = [Patch(**_look(b), lw=0.3, label=_in_words(b)) for b in found.basins]
             fixed = fixed | {found.parameter: float(found.values[0])}
         few_ticks(axes, 8, 6)
         figure.suptitle(in_words(found.result, fixed), fontsize=SMALL_FONT_PT)
         look = {"title_fontsize": SMALL_FONT_PT, "loc": "outside lower center", **LEGEND}
-        figure.legend(drawn, labels, title=legend_title(found.result), ncols=2, **look)
+        figure.legend(handles=drawn, title=legend_title(found.result), ncols=2, **look)
     return figure
 
 
@@ -117,15 +109,6 @@ def _look(one: Basin) -> dict[str, Any]:
     if one.number < 0:
         return look_of(one.motion)
     return {"facecolor": COLORS[(one.number - 1) % len(COLORS)], "edgecolor": "0.55"}
-
-
-def _marker(one: Basin) -> dict[str, Any]:
-    look: dict[str, Any] = {"ls": "none", "mfc": _look(one)["facecolor"], "mec": BLACK, "mew": 0.6}
-    if one.number < 0:
-        return look
-    look |= {"marker": MARKERS[(one.number - 1) % len(MARKERS)], "ms": 5.0}
-    # Of a motion without a period there are hundreds of points.
-    return look if one.period else look | {"ms": 1.0, "mfc": BLACK, "mew": 0.0}
 
 
 def _label(state: str) -> str:

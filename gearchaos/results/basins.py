@@ -37,19 +37,12 @@ class Basin(NamedTuple):
     section: Floats
 
 
-class BasinEntropy(NamedTuple):
-    """Entropy of the boxes that cover a region, and of those on the boundary of basins alone."""
-
-    basin: float
-    boundary: float
-
-
 class Basins(NamedTuple):
     """All basins of a result.
 
     ``parameter``: name of the axis of the ``values`` (values,); ``numbers`` (values, starts) of the
     basin that each start is in; ``grid``: start values by state where the starts are a grid, in C
-    order; ``entropy`` of every value, none without a grid.
+    order; ``entropy`` of every value, see `basin_entropy`, none without a grid.
     """
 
     result: Result
@@ -58,11 +51,11 @@ class Basins(NamedTuple):
     numbers: NDArray[np.intp]
     basins: list[Basin]
     grid: dict[str, Floats]
-    entropy: list[BasinEntropy]
+    entropy: list[tuple[float, float]]
 
 
-def basin_entropy(attractors: NDArray[np.integer], box: int = BOX) -> BasinEntropy:
-    r"""Return the basin entropy and the boundary basin entropy of starts on a grid.
+def basin_entropy(attractors: NDArray[np.integer], box: int = BOX) -> tuple[float, float]:
+    r"""Return the basin entropy of starts on a grid, and that of the boundary of basins alone.
 
     The grid is cut into boxes with ``box`` starts along each side; in each, with p_ij the share of
     starts that lead to attractor j::
@@ -75,12 +68,10 @@ def basin_entropy(attractors: NDArray[np.integer], box: int = BOX) -> BasinEntro
     Guery-Odelin, Sanjuan 2016.)
     """
     whole = attractors[tuple(slice(size // box * box) for size in attractors.shape)]
+    if not whole.size:
+        return np.nan, np.nan
     cut = whole.reshape([part for size in whole.shape for part in (size // box, box)])
-    boxes = cut.transpose([*range(0, cut.ndim, 2), *range(1, cut.ndim, 2)])
-    boxes = boxes.reshape(-1, box**attractors.ndim)
-    if not len(boxes):
-        return BasinEntropy(np.nan, np.nan)
-    share = np.stack([np.mean(boxes == one, axis=1) for one in np.unique(boxes)])
+    within = tuple(range(1, cut.ndim, 2))
+    share = np.stack([np.mean(cut == one, axis=within) for one in np.unique(whole)])
     entropy = -np.sum(share * np.log(np.where(share > 0.0, share, 1.0)), axis=0)
-    several = np.count_nonzero(entropy)
-    return BasinEntropy(float(entropy.mean()), float(entropy.sum() / max(several, 1)))
+    return float(entropy.mean()), float(entropy.sum() / max(1, np.count_nonzero(entropy)))
