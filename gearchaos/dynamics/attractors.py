@@ -71,7 +71,6 @@ def find_attractors(
     rows = np.stack([group, motion, period], axis=1)
     kind = np.unique(rows, axis=0, return_inverse=True)[1].ravel()
     found: list[Attractor] = []
-    of_kind: dict[int, list[int]] = {}
     place = np.full(len(state), -1)
     waiting = np.flatnonzero(np.isin(motion, (PERIODIC, QUASI_PERIODIC, CHAOTIC)))
     waiting, tried = waiting[np.argsort(kind[waiting], kind="stable")], 1
@@ -82,15 +81,21 @@ def find_attractors(
         _, first, sizes = np.unique(kind[waiting], return_index=True, return_counts=True)
         rank = np.arange(waiting.size) - np.repeat(first, sizes)
         some = waiting[rank < tried][: max(1, AT_ONCE // length)]
-        for one in _led_to(system.of(some), some, state[some], period[some], plan):
-            mine = of_kind.setdefault(int(kind[one.lane]), [])
-            same = [at for at in mine if _is_same(one, found[at])]
-            place[one.lane] = same[0] if same else len(found)
+        part, n = system.of(some), period[some]
+        last = integrate(part, state[some], plan).end_state
+        orbits = polish(part, last, n, steps_per_period, method)
+        start = np.where(orbits.stable[:, np.newaxis], orbits.points, last)
+        section = integrate(part, start, plan).every(system.repeats_after).section
+        there = np.isfinite(section).all(axis=(1, 2)) & (orbits.stable | (n < 1))
+        for at, lane in zip(np.flatnonzero(there).tolist(), some[there].tolist(), strict=True):
+            one = Attractor(lane, section[at, -n[at] :], orbits.multipliers[at])
+            alike = [other for other in found if kind[other.lane] == kind[lane]]
+            same = [place[other.lane] for other in alike if _is_same(one, other)]
+            place[lane] = same[0] if same else len(found)
             if not same:
-                mine.append(len(found))
                 found.append(one)
-                near = np.flatnonzero((kind == kind[one.lane]) & (place < 0) & (period > 0))
-                place[near[_distances(state[near], one.points) <= REACH]] = place[one.lane]
+                near = np.flatnonzero((kind == kind[lane]) & (place < 0) & (period > 0))
+                place[near[_distances(state[near], one.points) <= REACH]] = place[lane]
         waiting = waiting[(place[waiting] < 0) & ~np.isin(waiting, some)]
         tried *= 4
     return found, place
@@ -134,18 +139,3 @@ def _is_same(one: Attractor, other: Attractor) -> bool:
         return bool(_distances(one.points[:1], other.points)[0] <= REACH)
     off = np.abs(one.averages - other.averages)
     return bool(np.all(off <= ALIKE * other.averages[1]))
-
-
-def _led_to(
-    system: System, lanes: Lanes, state: Floats, period: NDArray[np.int32], plan: Plan
-) -> list[Attractor]:
-    """Let lanes go on, and return the attractors of those that have one."""
-    last = integrate(system, state, plan).end_state
-    orbits = polish(system, last, period, plan.steps_per_period, plan.method)
-    start = np.where(orbits.stable[:, np.newaxis], orbits.points, last)
-    section = integrate(system, start, plan).every(system.repeats_after).section
-    there = np.isfinite(section).all(axis=(1, 2)) & (orbits.stable | (period < 1))
-    return [
-        Attractor(int(lanes[at]), section[at, -period[at] :], orbits.multipliers[at])
-        for at in np.flatnonzero(there).tolist()
-    ]

@@ -63,10 +63,8 @@ def find_basins(result: Result, name: str = "the result", threads: int | None = 
     numbers[place >= 0] = numbers_along(value, sizes, averages)[place[place >= 0]]
     parameter = swept[0] if swept else axis_name(config.sweep.parameter)
     values = np.atleast_1d(result[parameter] if swept else result.fixed[parameter])
-    of_lanes = [
-        v for v in result.variables.values() if (v.dims, v.dtype) == (result.axes, "float64")
-    ]
-    told = [v.name for v in of_lanes if v.name not in NO_MEANS]
+    numeric = [v for v in result.variables.values() if v.dtype == "float64"]
+    told = [v.name for v in numeric if v.dims == result.axes and v.name not in NO_MEANS]
     basins: list[Basin] = []
     for here in every.reshape(-1, starts):
         # Those without an attractor come last.
