@@ -58,7 +58,11 @@ def _basins(options: argparse.Namespace) -> int:
     where = slice_facts(whole, part)
     if options.json:
         facts = {"parameter": found.parameter, "slice": where, "starts": found.numbers.shape[1]}
-        basins = [one._asdict() | {"section": one.section.tolist()} for one in found.basins]
+        basins = [one._asdict() for one in found.basins]
+        for one in basins:
+            # That of a motion without a period would be a thousand points.
+            one["section"] = one["section"].tolist() if one["period"] else None
+            one["number"] = one["number"] if one["number"] > 0 else None
         facts |= {"basins": basins, "entropy": found.entropy}
         print(json.dumps(finite(facts), indent=1, allow_nan=False))
     else:

@@ -4,13 +4,13 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
 from matplotlib.colors import ListedColormap
-from matplotlib.image import AxesImage
 from matplotlib.patches import Patch
 
 from gearchaos.errors import FigureError
 from gearchaos.figures.labels import axis_label, in_words, legend_title
-from gearchaos.figures.lanes import diagram_lanes
+from gearchaos.figures.lanes import cell_edges, diagram_lanes
 from gearchaos.figures.page import Page, few_ticks, page
 from gearchaos.figures.shares import Drawn, layer
 from gearchaos.figures.stages import look_of
@@ -26,7 +26,7 @@ MOST_POINTS = 500
 """Section points that are drawn of an attractor."""
 
 
-def basins(axes: Axes, found: Basins, value: int = 0) -> AxesImage:
+def basins(axes: Axes, found: Basins, value: int = 0) -> ScalarMappable:
     """Draw the basins over the two states of a grid of starts, with the attractors on top.
 
     Every start is a cell in the colour of its attractor, circles are the points of a periodic one
@@ -41,24 +41,16 @@ def basins(axes: Axes, found: Basins, value: int = 0) -> AxesImage:
     here = {one.number: one for one in found.basins if one.value == found.values[value]}
     numbers, cells = np.unique(found.numbers[value], return_inverse=True)
     (x, along), (y, up) = found.grid.items()
-    steps = [np.ptp(v) / max(1, v.size - 1) / 2.0 for v in (along, up)]
-    ends = [(v[0] - step, v[-1] + step) for v, step in zip((along, up), steps, strict=True)]
-    image = axes.imshow(
-        cells.reshape(along.size, up.size).T,
-        cmap=ListedColormap([_look(here[number])["facecolor"] for number in numbers.tolist()]),
-        vmin=-0.5,
-        vmax=len(numbers) - 0.5,
-        extent=(*ends[0], *ends[1]),
-        origin="lower",
-        aspect="auto",
-        interpolation="nearest",
-    )
+    ends = cell_edges(along), cell_edges(up)
+    colours = ListedColormap([_look(here[number])["facecolor"] for number in numbers.tolist()])
+    cells = cells.reshape(along.size, up.size).T
+    image = axes.pcolorfast(*ends, cells, cmap=colours, vmin=-0.5, vmax=len(numbers) - 0.5)
     columns = [found.result.variables["state"].flags.index(state) for state in (x, y)]
     for one in here.values():
         face, size, edge = (_look(one)["facecolor"], 5.0, 0.6) if one.period else (BLACK, 1.0, 0.0)
         points = one.section[:MOST_POINTS, columns].T
         axes.plot(*points, "o", ms=size, mfc=face, mec=BLACK, mew=edge)
-    axes.set(xlim=ends[0], ylim=ends[1], xlabel=_label(x), ylabel=_label(y))
+    axes.set(xlim=ends[0][[0, -1]], ylim=ends[1][[0, -1]], xlabel=_label(x), ylabel=_label(y))
     return image
 
 
