@@ -1,8 +1,8 @@
 """Find the attractors of a sweep from many starts, and which share of the starts leads to each.
 
-A periodic attractor is a polished orbit, any other the section of a long record; they keep their
-numbers along the sweep. The table goes to stdout, everything else to stderr. Exit codes: 0 done, 2
-the command line asks for what cannot be, 4 a file cannot be read or written or holds no labels.
+Attractors keep their numbers along the sweep. The table goes to stdout, everything else to stderr.
+Exit codes: 0 done, 2 the command line asks for what cannot be, 4 a file cannot be read or written
+or holds no labels.
 """
 
 import argparse
@@ -12,15 +12,12 @@ import sys
 import textwrap
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from gearchaos.command_line import OK, Command, coordinates, place
 
 if TYPE_CHECKING:
     from gearchaos.results.basins import Basins
-
-WIDTH = 80
-"""Columns of a terminal."""
 
 
 def _arguments(parser: argparse.ArgumentParser) -> None:
@@ -60,8 +57,13 @@ def _basins(options: argparse.Namespace) -> int:
         found = find_basins(part, options.result, options.threads)
     where = slice_facts(whole, part)
     if options.json:
-        values = [_facts(found, at) for at in range(found.values.size)]
-        facts = {"parameter": found.parameter, "slice": where, "values": values}
+        facts = {"parameter": found.parameter, "slice": where, "starts": found.numbers.shape[1]}
+        basins = [one._asdict() for one in found.basins]
+        for one in basins:
+            # That of a motion without a period would be a thousand points.
+            one["section"] = one["section"].tolist() if one["period"] else None
+            one["number"] = one["number"] if one["number"] > 0 else None
+        facts |= {"basins": basins, "entropy": found.entropy}
         print(json.dumps(finite(facts), indent=1, allow_nan=False))
     else:
         print("\n".join([*table(found, slice_lines(where))]))
@@ -79,32 +81,17 @@ def table(found: "Basins", where: list[str]) -> Iterator[str]:
     yield f"{head}  {'share':>7}  95 % confidence"
     for one in found.basins:
         number = str(one.number) if one.number > 0 else "-"
-        multiplier = "" if math.isnan(one.multiplier) else f"{one.multiplier:.4f}"
-        exponent = "" if math.isnan(one.exponent) else f"{one.exponent:.4f}"
-        words = f"{one.value:10.6g}  {number:>3}  {one.motion:15}{multiplier:>10}  {exponent:>9}"
-        low, high = one.starts.intervals
-        yield f"{words}  {one.starts.shares:7.4f}  {low:.4f} to {high:.4f}"
+        known = ["" if math.isnan(x) else f"{x:.4f}" for x in (one.multiplier, one.exponent)]
+        words = f"{one.value:10.6g}  {number:>3}  {one.motion:15}{known[0]:>10}  {known[1]:>9}"
+        low, high = one.share_95_percent
+        yield f"{words}  {one.share:7.4f}  {low:.4f} to {high:.4f}"
     for value, (basin, boundary) in zip(found.values, found.entropy, strict=False):
         yield f"{value:10.6g}  basin entropy {basin:.4f}, of the boundary alone {boundary:.4f}"
     for one in found.basins if found.values.size == 1 else ():
         means = [f"{name} {mean:.4g}" for name, mean in one.means.items() if not math.isnan(mean)]
         if one.number > 0 and means:
             text = f"{one.number}: {', '.join(means)}"
-            yield from textwrap.wrap(text, WIDTH, subsequent_indent="   ")
-
-
-def _facts(found: "Basins", at: int) -> dict[str, Any]:
-    value = float(found.values[at])
-    entropy = found.entropy[at]._asdict() if found.entropy else None
-    basins = []
-    for one in (one for one in found.basins if one.value == value):
-        facts = one._asdict() | {"number": one.number if one.number > 0 else None}
-        facts |= {"starts": int(one.starts.counts), "share": float(one.starts.shares)}
-        facts |= {"share_95_percent": one.starts.intervals.tolist()}
-        # That of a motion without a period would be thousands of points.
-        basins.append(facts | {"section": one.section.tolist() if one.period else None})
-    starts = found.numbers.shape[1]
-    return {"value": value, "starts": starts, "entropy": entropy, "basins": basins}
+            yield from textwrap.wrap(text, 80, subsequent_indent="   ")
 
 
 main = Command("basins", __doc__, _arguments, _basins, common=("overwrite", "threads"))

@@ -66,12 +66,7 @@ def _stages(options: argparse.Namespace) -> int:
     from gearchaos.results.jumps import apart, crises, jumps
     from gearchaos.results.overview import finite, slice_lines
     from gearchaos.results.result import open_result
-    from gearchaos.results.stage_table import (
-        lanes_of_all_repeats,
-        one_axis,
-        slice_facts,
-        stage_table,
-    )
+    from gearchaos.results.stage_table import labelled_lanes, one_axis, slice_facts, stage_table
     from gearchaos.results.variables import DIRECTION, RECORD, REPEATS, UNSWEPT
 
     whole = open_result(options.result)
@@ -83,7 +78,8 @@ def _stages(options: argparse.Namespace) -> int:
     part = one_axis(whole, (*kept, DIRECTION), **places)
     result, both = one_axis(part, kept), DIRECTION in part.axes
     where = slice_facts(whole, result)
-    stages = stage_table(lanes_of_all_repeats(result, name=options.result), options.narrowest)
+    lanes = labelled_lanes(result, name=options.result, repeats=True)
+    stages = stage_table(lanes, options.narrowest)
     stretches, boundaries = apart(part, options.narrowest), None
     if options.refine is not None:
         boundaries = _refined(part, stretches if both else stages, options)

@@ -1,6 +1,6 @@
-"""Attractors found from where lanes have come to: polished orbits, and long records of the rest."""
+"""Attractors found from where lanes have come to, and the numbers that they keep along a sweep."""
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from gearchaos_kernels import Plan, System, integrate
@@ -8,36 +8,44 @@ from numpy.typing import NDArray
 
 from gearchaos.dynamics.orbits import polish
 from gearchaos.interrupts import check
-from gearchaos.records.attractor_sets import ENOUGH, distances
 from gearchaos.records.label import CHAOTIC, PERIODIC, QUASI_PERIODIC
-from gearchaos.records.period import POINTS_NEEDED
+from gearchaos.records.period import POINTS_NEEDED, coordinate_scale
 
 Floats = NDArray[np.float64]
 Lanes = NDArray[np.intp]
 
 REACH = 1e-3
-"""Distance from a periodic orbit, relative to its size, within which a lane has come to it."""
+"""Distance from a periodic orbit within which a lane has come to it, in the scale of each state."""
 
-LONG, SETTLING = 2000, 500
-"""Mesh periods by which an attractor that is not periodic is known, and after which a motion has
-come to the attractor to which it leads; whole excitation periods, see `_whole`."""
+ALIKE = 0.5
+"""Difference up to which averages are those of one attractor, in parts of the extent of a state."""
 
-AT_ONCE = 1024
-"""Lanes whose attractor is looked for at once: their long records have to be held."""
+GOES_ON = 0.3
+"""Change up to which an attractor is the same at another value, in parts of all its averages."""
+
+LONG = 1000
+"""Mesh periods in which a lane settles, and then those over which its section is taken."""
+
+AT_ONCE = 1 << 20
+"""Section points that are held at once."""
 
 
 class Attractor(NamedTuple):
     """An attractor, found from ``lane``.
 
     ``points`` (points, states): its section once an excitation period, of a periodic one all of it;
-    ``reach``: how near, as `distances` has it, lanes on it come to these; ``multipliers``
-    (states,): Floquet multipliers, largest modulus first, not a number where it is not periodic.
+    ``multipliers`` (states,): Floquet multipliers, largest modulus first, not a number where it is
+    not periodic.
     """
 
     lane: int
     points: Floats
-    reach: float
     multipliers: NDArray[np.complex128]
+
+    @property
+    def averages(self) -> Floats:
+        """Mean and extent (standard deviation) of each state on the section, (2, states)."""
+        return np.stack([self.points.mean(axis=0), self.points.std(axis=0)])
 
 
 def find_attractors(
@@ -51,90 +59,83 @@ def find_attractors(
 ) -> tuple[list[Attractor], Lanes]:
     """Find the attractors of lanes, and to which of them each has come: its place in the list.
 
-    A lane whose ``state`` (lanes, states) at tau = 0 lies within reach of a known attractor of its
-    group, motion and period has come to that, whatever its phase; from others the attractor is
-    found anew, first one of each kind, then ever more. A periodic one is a polished stable orbit;
-    any other is the section of `LONG` mesh periods, and its reach the largest distance of the
-    later half from the earlier one. Two are the same where at least half of the points of one lie
-    within reach of the other. -1 where a lane has no such motion or no orbit is found.
+    Lanes go on for twice `LONG` mesh periods, first one of each group, motion and period, then ever
+    more. A periodic attractor is the stable orbit polished on the way; every lane whose ``state``
+    (lanes, states) at tau = 0 lies within `REACH` of it, whatever its phase, has come to it and
+    need not go on. Any other attractor is known by mean and extent of its section, to `ALIKE`. -1
+    where a lane has no such motion or no orbit is found.
 
     ``group`` (lanes,): lanes of the same parameters share a number; ``motion``, ``period``: labels;
     ``steps_per_period`` and ``method`` as for `polish`.
     """
     rows = np.stack([group, motion, period], axis=1)
     kind = np.unique(rows, axis=0, return_inverse=True)[1].ravel()
-    known: list[Attractor] = []
-    of_kind: dict[int, list[int]] = {}
-    number = np.full(len(state), -1)
+    found: list[Attractor] = []
+    place = np.full(len(state), -1)
     waiting = np.flatnonzero(np.isin(motion, (PERIODIC, QUASI_PERIODIC, CHAOTIC)))
-    waiting = waiting[np.argsort(kind[waiting], kind="stable")]
-    tried, how = 1, (steps_per_period, method)
+    waiting, tried = waiting[np.argsort(kind[waiting], kind="stable")], 1
+    length = system.repeats_after * max(POINTS_NEEDED, LONG // system.repeats_after)
+    plan = Plan(steps_per_period, 0, length, length, tangent=True, method=method)
     while waiting.size:
         check()
         _, first, sizes = np.unique(kind[waiting], return_index=True, return_counts=True)
         rank = np.arange(waiting.size) - np.repeat(first, sizes)
-        some = waiting[rank < tried][:AT_ONCE]
-        for one in _from(system.of(some), some, state[some], period[some], *how):
-            if number[one.lane] >= 0:
-                continue
-            mine = of_kind.setdefault(int(kind[one.lane]), [])
-            same = [at for at in mine if _is_same(one, known[at])]
+        some = waiting[rank < tried][: max(1, AT_ONCE // length)]
+        part, n = system.of(some), period[some]
+        last = integrate(part, state[some], plan).end_state
+        orbits = polish(part, last, n, steps_per_period, method)
+        start = np.where(orbits.stable[:, np.newaxis], orbits.points, last)
+        section = integrate(part, start, plan).every(system.repeats_after).section
+        there = np.isfinite(section).all(axis=(1, 2)) & (orbits.stable | (n < 1))
+        for at, lane in zip(np.flatnonzero(there).tolist(), some[there].tolist(), strict=True):
+            one = Attractor(lane, section[at, -n[at] :], orbits.multipliers[at])
+            alike = [other for other in found if kind[other.lane] == kind[lane]]
+            same = [place[other.lane] for other in alike if _is_same(one, other)]
+            place[lane] = same[0] if same else len(found)
             if not same:
-                mine.append(len(known))
-                known.append(one)
-            number[one.lane] = place = (same or mine)[-1]
-            alike = np.flatnonzero((kind == kind[one.lane]) & (number < 0))
-            near = distances(state[alike], one.points) <= one.reach
-            number[alike[near]] = place
-        waiting = waiting[(number[waiting] < 0) & ~np.isin(waiting, some)]
+                found.append(one)
+                near = np.flatnonzero((kind == kind[lane]) & (place < 0) & (period > 0))
+                place[near[_distances(state[near], one.points) <= REACH]] = place[lane]
+        waiting = waiting[(place[waiting] < 0) & ~np.isin(waiting, some)]
         tried *= 4
-    return known, number
+    return found, place
 
 
-def led_to(
-    system: System, start: Floats, steps_per_period: int, method: str = "rk4"
-) -> NDArray[np.float64]:
-    """Return the section (lanes, points, states) on which lanes move after `SETTLING`.
+def numbers_along(value: Lanes, sizes: Lanes, averages: Floats) -> Lanes:
+    """Number attractors such that what goes on along a sweep keeps its number, (attractors,).
 
-    Once an excitation period; ``start`` (lanes, states) at tau = 0, the others as for `polish`.
+    Of those at one value and those seen last under each number, the two whose ``averages``
+    (attractors, 2, states) are nearest go together first, to `GOES_ON`; so one that is missing at
+    some values returns with its number. What is left is new, the largest first. ``value``
+    (attractors,): the place of its value in the sweep; ``sizes`` (attractors,) of its basin.
     """
-    length = _whole(ENOUGH, system)
-    before = _whole(SETTLING, system)
-    plan = Plan(steps_per_period, before, length, length, tangent=True, method=method)
-    return integrate(system, start, plan).every(system.repeats_after).section
+    size = np.linalg.norm(averages, axis=(1, 2))
+    numbers = np.zeros(len(value), dtype=np.intp)
+    latest: dict[int, int] = {}
+    for at in np.unique(value):
+        here = np.flatnonzero(value == at)
+        here = here[np.argsort(-sizes[here], kind="stable")]
+        pairs = [(i, number) for i in here.tolist() for number in latest]
+        changes = [float(np.linalg.norm(averages[i] - averages[latest[k]])) for i, k in pairs]
+        for change, (i, number) in sorted(zip(changes, pairs, strict=True)):
+            near = change <= GOES_ON * max(size[i], size[latest[number]])
+            if near and not numbers[i] and number not in numbers[here]:
+                numbers[i] = number
+        for i in here.tolist():
+            numbers[i] = numbers[i] or len(latest) + 1
+            latest[int(numbers[i])] = i
+    return numbers
 
 
-def _whole(periods: int, system: System) -> int:
-    """Round mesh periods down to whole excitation periods, enough of them to tell a period."""
-    return system.repeats_after * max(POINTS_NEEDED, periods // system.repeats_after)
+def _distances(points: Floats, orbit: Floats) -> Floats:
+    """Return how far points (points, states) lie from the nearest one of an orbit."""
+    apart = (points[:, np.newaxis] - orbit) / coordinate_scale(orbit[np.newaxis])
+    nearest: Floats = np.abs(apart).max(axis=2).min(axis=1)
+    return nearest
 
 
 def _is_same(one: Attractor, other: Attractor) -> bool:
-    return bool(np.mean(distances(one.points, other.points) <= other.reach) >= 0.5)
-
-
-def _from(
-    system: System, lanes: Lanes, state: Floats, period: NDArray[np.int32], *how: Any
-) -> list[Attractor]:
-    """Return the attractors of lanes, where there are some."""
-    steps, method = how
-    repeats, found = system.repeats_after, []
-    orbits = polish(system, state, period, *how)
-    late = np.flatnonzero((period > 0) & ~orbits.stable)
-    if late.size:
-        # Where a longer look told the orbit, the lane may be far from it yet.
-        further = Plan(steps, _whole(LONG, system), 0, 0, tangent=True, method=method)
-        state[late] = integrate(system.of(late), state[late], further).end_state
-        orbits = polish(system, state, period, *how)
-    start = np.where(period[:, np.newaxis] > 0, orbits.points, state)
-    for n in np.unique(period).tolist():
-        some = np.flatnonzero((period == n) & (orbits.stable | (n == 0)))
-        length = n * repeats or _whole(LONG, system)
-        plan = Plan(steps, 0, length, length, tangent=True, method=method)
-        sections = integrate(system.of(some), start[some], plan).every(repeats).section
-        for at, points in zip(some.tolist(), sections, strict=True):
-            if np.isfinite(points).all():
-                half = len(points) // 2
-                reach = REACH if n else float(distances(points[half:], points[:half]).max())
-                found.append(Attractor(int(lanes[at]), points, reach, orbits.multipliers[at]))
-    return sorted(found, key=lambda one: one.lane)
+    if np.isfinite(one.multipliers[0]):
+        return bool(_distances(one.points[:1], other.points)[0] <= REACH)
+    off = np.abs(one.averages - other.averages)
+    return bool(np.all(off <= ALIKE * other.averages[1]))

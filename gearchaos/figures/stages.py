@@ -13,12 +13,7 @@ from gearchaos.figures.labels import legend_title
 from gearchaos.figures.lanes import swept_axes
 from gearchaos.figures.style import LEGEND, SMALL_FONT_PT
 from gearchaos.results.result import Result
-from gearchaos.results.stage_table import (
-    LabelledLanes,
-    Stage,
-    lanes_of_all_repeats,
-    stage_table,
-)
+from gearchaos.results.stage_table import LabelledLanes, Stage, labelled_lanes, stage_table
 
 # Blues that darken with the period, but for period 3, the window in chaos that is looked for. Those
 # without hatching differ in lightness, and all are light enough for black points to stand out.
@@ -98,7 +93,7 @@ def shade_stages(
             f"stages are those of one axis, but the result has {', '.join(result.axes)}; fix the "
             "others with result.sel"
         )
-    lanes = lanes_of_all_repeats(result) if lanes is None else lanes
+    lanes = labelled_lanes(result, repeats=True) if lanes is None else lanes
     low, high = sorted(axes.get_xlim())
     stages = stage_table(lanes, NARROWEST_SHARE * (high - low) if narrowest is None else narrowest)
     # Neighbours meet halfway between their lanes, and the outermost reach to the ends of the axis.

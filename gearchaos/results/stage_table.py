@@ -61,43 +61,39 @@ class _Stretch(NamedTuple):
     narrower: int
 
 
-def labelled_lanes(result: Result, *, name: str = "the result") -> LabelledLanes:
+def labelled_lanes(
+    result: Result, *, name: str = "the result", repeats: bool = False
+) -> LabelledLanes:
     """Take the labels out of a result with one axis, which messages call by a name.
 
-    Raises FileError if the result has no labels, ConfigurationError if it has not one axis.
+    With ``repeats`` it may have several pairs and starts too; where their labels differ, the motion
+    is "several motions", without a period, an exponent or bands. Raises FileError if the result has
+    no labels, ConfigurationError if it has not one axis.
     """
     if not all(variable in result for variable in LABELS):
         raise FileError(
             f"{name}: holds no labels of the motion; run the sweep again with outputs.motion = true"
         )
-    if len(result.axes) != 1:
+    one = result.sel(**{axis: result[axis][0] for axis in REPEATS if repeats and axis in result})
+    if len(one.axes) != 1:
         raise ConfigurationError(
-            f"{name}: has {len(result.axes)} axes ({', '.join(result.axes)}), stages lie along "
+            f"{name}: has {len(one.axes)} axes ({', '.join(one.axes)}), stages lie along "
             "one; fix the others with sel (--at)"
         )
-    motion, period = result["motion"].tolist(), result["period"]
+    motion, period = one["motion"].tolist(), one["period"]
     meanings = result.variables["motion"].flags
     labels = [label_text(meanings[m], n) for m, n in zip(motion, period.tolist(), strict=True)]
     known = LARGEST_EXPONENT in result
-    exponent = result[LARGEST_EXPONENT] if known else np.full(period.shape, np.nan)
-    bands = result[BANDS] if BANDS in result else np.zeros_like(period)
-    return LabelledLanes(result[result.axis], np.array(labels), period, exponent, bands)
-
-
-def lanes_of_all_repeats(result: Result, *, name: str = "the result") -> LabelledLanes:
-    """Take the labels of all pairs and starts, as `labelled_lanes` does those of one of each.
-
-    Where they differ, the motion is "several motions", without a period or an exponent.
-    """
-    first = {axis: result[axis][0] for axis in REPEATS if axis in result.axes}
-    lanes = labelled_lanes(result.sel(**first), name=name)
-    every = [result[label].reshape(lanes.values.size, -1) for label in LABELS]
-    differ = np.any([labels != labels[:, :1] for labels in every], axis=(0, 2))
-    return lanes._replace(
-        labels=np.where(differ, "several motions", lanes.labels),
-        period=np.where(differ, 0, lanes.period),
-        exponent=np.where(differ, np.nan, lanes.exponent),
-        bands=np.where(differ, 0, lanes.bands),
+    exponent = one[LARGEST_EXPONENT] if known else np.full(period.shape, np.nan)
+    bands = one[BANDS] if BANDS in result else np.zeros_like(period)
+    every = np.stack([result[label].reshape(period.size, -1) for label in LABELS])
+    alike = (every == every[:, :, :1]).all(axis=(0, 2))
+    return LabelledLanes(
+        values=one[one.axis],
+        labels=np.where(alike, labels, "several motions"),
+        period=np.where(alike, period, 0),
+        exponent=np.where(alike, exponent, np.nan),
+        bands=np.where(alike, bands, 0),
     )
 
 

@@ -64,10 +64,8 @@ def test_two_motions_share_the_starts_as_a_plain_count_does(grid):
     high = grid["end_state"][0, :, 0] > BETWEEN_THEM
     one, other = found.basins
     assert 0.2 < high.mean() < 0.8
-    assert sorted((int(one.starts.counts), int(other.starts.counts))) == sorted(
-        (high.sum(), (~high).sum())
-    )
-    assert one.starts.counts >= other.starts.counts
+    assert sorted((one.starts, other.starts)) == sorted((high.sum(), (~high).sum()))
+    assert one.starts >= other.starts
     assert (found.numbers[0] == 1).tolist() == (high == (one.section[0, 0] > BETWEEN_THEM)).tolist()
     for basin in found.basins:
         assert (basin.motion, basin.period, basin.section.shape) == ("period 1", 1, (1, 6))
@@ -104,9 +102,7 @@ def test_one_value_of_several_is_looked_at_by_itself(several):
     whole, part = find_basins(several), find_basins(several.sel(pitch_error=1.2))
     assert part.parameter == "pitch_error"
     assert part.values.tolist() == [1.2]
-    counts = [
-        sorted(int(b.starts.counts) for b in f.basins if b.value == 1.2) for f in (whole, part)
-    ]
+    counts = [sorted(b.starts for b in f.basins if b.value == 1.2) for f in (whole, part)]
     assert counts[0] == counts[1]
 
 
@@ -114,7 +110,7 @@ def test_what_diverged_or_is_unresolved_is_a_class_of_its_own(grid):
     motion, period = grid["motion"].copy(), grid["period"].copy()
     motion[0, :3], motion[0, 3:5], period[0, :5] = UNRESOLVED, DIVERGED, 0
     found = find_basins(changed(grid, {"motion": motion, "period": period}))
-    told = {one.number: (one.motion, int(one.starts.counts)) for one in found.basins}
+    told = {one.number: (one.motion, one.starts) for one in found.basins}
     assert told[-UNRESOLVED] == ("unresolved", 3)
     assert told[-DIVERGED] == ("diverged", 2)
     assert [one.number > 0 for one in found.basins] == [True, True, False, False]
@@ -173,14 +169,13 @@ def test_one_value_is_told_with_entropy_and_the_means_of_its_basins(folder):
 
 
 def test_json_tells_all_of_it(folder, grid):
-    (value,) = json.loads(run(folder, "grid.h5", "--json").out)["values"]
+    told = json.loads(run(folder, "grid.h5", "--json").out)
     found = find_basins(grid)
-    assert (value["value"], value["starts"]) == (1.04, 121)
-    assert value["entropy"] == pytest.approx(found.entropy[0]._asdict())
-    for facts, one in zip(value["basins"], found.basins, strict=True):
-        assert facts["number"] == one.number
-        assert facts["starts"] == one.starts.counts
-        assert facts["share_95_percent"] == pytest.approx(one.starts.intervals)
+    assert (told["parameter"], told["starts"]) == ("pitch_error", 121)
+    assert told["entropy"] == [pytest.approx(found.entropy[0])]
+    for facts, one in zip(told["basins"], found.basins, strict=True):
+        assert (facts["value"], facts["number"], facts["starts"]) == (1.04, one.number, one.starts)
+        assert facts["share_95_percent"] == pytest.approx(one.share_95_percent)
         assert facts["section"] == one.section.tolist()
         assert facts["means"]["crossings_per_period"] == one.means["crossings_per_period"]
 
@@ -207,7 +202,7 @@ def test_a_map_shows_the_basin_of_every_start_and_the_attractors_on_top(grid):
     for line, one in zip(axes.lines, found.basins, strict=True):
         assert line.get_xydata().tolist() == one.section[:, :2].tolist()
     (legend,) = basins_page(found).legends
-    share = 100.0 * found.basins[0].starts.shares
+    share = 100.0 * found.basins[0].share
     assert legend.get_texts()[0].get_text().startswith(f"1: period 1, {share:.3g} %")
 
 
