@@ -191,9 +191,8 @@ def start_states(config: Configuration, system: System, numbers: Numbers) -> Flo
     elif kind == "random":
         runs = np.split(numbers, np.flatnonzero(np.diff(numbers) != 1) + 1)
         draws = np.concatenate([_draws(config.start.seed, run) for run in runs])
-        for name, (low, high) in (
-            box or dict.fromkeys(config.scene.states, (-spread, spread))
-        ).items():
+        box = box or dict.fromkeys(config.scene.states, (-spread, spread))
+        for name, (low, high) in box.items():
             place = draws[:, config.scene.states.index(name)]
             values[name] = (low + high) / 2.0 + (high - low) / 2.0 * place
     # What starts in a state that nothing kept depends on is not computed.
