@@ -6,6 +6,7 @@ from gearchaos_kernels import Effects, Status
 
 from .reference import (
     BASE_HELIX_ANGLE,
+    CLEARANCE,
     FLOW_MAP,
     FULL,
     NO_BACKLASH,
@@ -18,8 +19,6 @@ from .reference import (
 from .test_order import measured_order
 
 COS = np.cos(BASE_HELIX_ANGLE)
-CLEARANCE = Effects(False, False, True, False, False)
-"""Torsion with constant stiffness: nothing acts but load, mesh and clearance."""
 
 BOTH = pytest.mark.parametrize(
     "resolved",
