@@ -141,7 +141,9 @@ def _server() -> subprocess.Popen:
 
 
 def _environment() -> dict[str, str]:
-    return {name: os.environ[name] for name in os.environ if name != "PYTEST_CURRENT_TEST"}
+    """Return what tests may set: not what pytest does, or netCDF4 where it is imported."""
+    others = "PYTEST_CURRENT_TEST", "HDF5_PLUGIN_PATH"
+    return {name: value for name, value in os.environ.items() if name not in others}
 
 
 _ENVIRONMENT = _environment()

@@ -75,7 +75,7 @@ def test_png_and_pdf_appear_beside_the_result_and_their_paths_on_stdout(result_f
     }
 
 
-@pytest.mark.parametrize("backend", ["nonsense", "tkagg", ""])
+@pytest.mark.parametrize("backend", ["nonsense", "tkagg"])
 def test_no_display_is_needed_whatever_the_backend(result_file, backend):
     done = run(result_file, "--quiet", "--format", "png", MPLBACKEND=backend, DISPLAY="")
     assert (done.returncode, done.stderr) == (0, "")
@@ -156,11 +156,9 @@ def test_several_sweeps_are_drawn_over_each_other(result_file, capsys):
     assert "without stages" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize(
-    "name", [b"pair $ 50 %.h5", b"gr\xc3\xb6\xc3\x9fe.h5", b"not unicode \xff.h5"]
-)
-def test_odd_names_come_out_as_they_went_in(result_file, name):
-    path = os.fsencode(result_file.parent) + b"/" + name
+def test_an_odd_name_comes_out_as_it_went_in(result_file):
+    # Signs of formulas and formats, letters beyond ASCII, and what is no Unicode.
+    path = os.fsencode(result_file.parent) + b"/pair $ 50 % gr\xc3\xb6\xc3\x9fe \xff.h5"
     with h5py.File(result_file, "r+") as file:
         file.attrs["title"] = ""
     result_file.rename(os.fsdecode(path))

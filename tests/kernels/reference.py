@@ -36,6 +36,9 @@ NO_AXIAL = Effects(axial=False)
 TORSION_ONLY = Effects(transverse=False, axial=False)
 NO_BACKLASH = Effects(backlash=False)
 LINEAR = Effects(stiffness_variation=False, backlash=False)
+TORSION = Effects(*[False] * len(Effects._fields))
+CLEARANCE = TORSION._replace(backlash=True)
+"""Nothing acts but load, mesh and clearance."""
 
 
 def from_python(formula: Any) -> Callable[..., Any]:

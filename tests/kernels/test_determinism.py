@@ -12,14 +12,15 @@ from .reference import FLOW_MAP, FULL, assert_same_bits, lanes_of, lanes_out_of,
 TOTAL = 3 * LANES + 4
 MODEL = pan2021(
     np.linspace(0.0, 15.0, TOTAL),
-    mesh_frequency=np.linspace(0.7, 1.4, TOTAL),
+    # Lanes that share their maps are integrated together, wherever they stand.
+    mesh_frequency=np.resize([0.7, 0.9, 1.0, 1.3, 1.4], TOTAL),
     load=np.linspace(0.2, 0.3, TOTAL),
 )
 START = np.random.default_rng(7).uniform(-1.5, 1.5, (TOTAL, 10))
 # Two lanes that diverge: one in its first period, one later.
 START[40] = state(delta_5=np.nan)
-MODEL.transverse_damping_g[77] = -0.9
-HOW = {"steps": 72, "transient": 20, "periods": 40, "points": 30}
+MODEL.transverse_damping_g[77] = -1.8
+HOW = {"steps": 72, "transient": 10, "periods": 20, "points": 15}
 
 
 WAYS = [False, True, FLOW_MAP]
@@ -70,7 +71,7 @@ def test_one_thread_and_two_give_the_same_bits(integrate, whole):
         numba.set_num_threads(threads)
 
 
-@pytest.mark.parametrize("size", [1, LANES - 1, LANES, LANES + 1, TOTAL])
+@pytest.mark.parametrize("size", [1, LANES - 1, LANES, LANES + 1])
 def test_any_split_into_batches_gives_the_same_bits(integrate, whole, size):
     parts = [
         integrate(np.arange(first, min(first + size, TOTAL))) for first in range(0, TOTAL, size)
@@ -78,9 +79,8 @@ def test_any_split_into_batches_gives_the_same_bits(integrate, whole, size):
     assert_same_bits(joined(parts), whole)
 
 
-@pytest.mark.parametrize("seed", range(3))
-def test_any_order_of_lanes_gives_the_same_bits(integrate, whole, seed):
-    order = np.random.default_rng(seed).permutation(TOTAL)
+def test_any_order_of_lanes_gives_the_same_bits(integrate, whole):
+    order = np.random.default_rng(0).permutation(TOTAL)
     assert_same_bits(integrate(order), lanes_out_of(whole, order))
 
 
@@ -101,7 +101,7 @@ def test_integration_leaves_its_arguments_alone(whole):
 @pytest.mark.parametrize("resolved", WAYS)
 def test_a_longer_transient_is_the_same_motion_recorded_later(resolved):
     how = {**HOW, "resolved": resolved}
-    longer = run(MODEL, FULL, START, **{**how, "transient": 25, "periods": 35})
+    longer = run(MODEL, FULL, START, **{**how, "transient": 15, "periods": 15})
     shorter = run(MODEL, FULL, START, **how)
     assert np.array_equal(longer.section, shorter.section, equal_nan=True)
     assert np.array_equal(longer.growth, shorter.growth[:, 5:], equal_nan=True)

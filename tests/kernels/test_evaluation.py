@@ -19,7 +19,6 @@ SCENES = [
     Effects(pitch_error=False, backlash=False),
     Effects(stiffness_variation=False),
 ]
-NO_ERROR = Effects(pitch_error=False, stiffness_variation=False)
 APART, DRIVING_FLANK, BACK_FLANK = 0, 1, 2
 
 
@@ -99,10 +98,10 @@ def with_delta_5(values) -> np.ndarray:
 
 def test_the_statically_loaded_mesh_rests():
     """Clearance taken up, and the spring compressed until cos(beta_b) N_y carries the load."""
-    groups = pan2021(0.0)
+    groups = pan2021(0.0, stiffness_variation_scale=0.0)
     cosine = np.cos(groups.base_helix_angle)
     y_1 = groups.half_backlash * cosine + groups.load / cosine
-    motion = mesh_motion(system_of(groups, NO_ERROR), with_delta_5(y_1), STEPS)
+    motion = mesh_motion(system_of(groups), with_delta_5(y_1), STEPS)
     assert motion.force_tangential[0] == pytest.approx(groups.load / cosine)
     assert abs(motion.accelerations[0, 0, 0]) < 1e-15
 
@@ -129,10 +128,10 @@ def test_the_axial_force_is_that_of_eq_13():
 
 
 def test_the_clearance_tells_the_contact():
-    groups = pan2021(0.0)
+    groups = pan2021(0.0, stiffness_variation_scale=0.0)
     edge = float(groups.half_backlash[0] * np.cos(groups.base_helix_angle[0]))
     places = np.array([-2.0, -1.0 - 1e-9, -1.0 + 1e-9, 0.0, 1.0 - 1e-9, 1.0 + 1e-9, 2.0]) * edge
-    motion = mesh_motion(system_of(groups, NO_ERROR), with_delta_5(places), STEPS)
+    motion = mesh_motion(system_of(groups), with_delta_5(places), STEPS)
     contacts = [BACK_FLANK] * 2 + [APART] * 3 + [DRIVING_FLANK] * 2
     assert motion.contact_tangential[0].tolist() == contacts
     # The driving flank in one direction is the back flank in the other: y_2 = -tan(beta_b) y_1.
@@ -143,8 +142,9 @@ def test_the_clearance_tells_the_contact():
 
 
 def test_without_clearance_the_teeth_never_part():
-    scene = NO_ERROR._replace(backlash=False)
-    motion = mesh_motion(system_of(pan2021(0.0), scene), with_delta_5([-0.5, 0.5]), STEPS)
+    scene = Effects(pitch_error=False, backlash=False)
+    groups = pan2021(0.0, stiffness_variation_scale=0.0)
+    motion = mesh_motion(system_of(groups, scene), with_delta_5([-0.5, 0.5]), STEPS)
     assert motion.contact_tangential[0].tolist() == [BACK_FLANK, DRIVING_FLANK]
     np.testing.assert_allclose(motion.force_tangential[0], [-0.5, 0.5])
 

@@ -52,7 +52,7 @@ def test_every_stored_solution_is_met_with_all_its_crossings(solution):
 @pytest.mark.parametrize("steps", [1, 7, STEPS])
 @pytest.mark.parametrize("physical", [False, True])
 def test_a_linear_scene_is_the_matrix_exponential_at_any_number_of_steps(steps, physical):
-    model = pan2021(5.86, error_mean=0.1, error_phase=0.4)
+    model = pan2021(5.86, error_mean=0.1)
     start = state(delta_5=1.0, delta_1_rate=-0.4, delta_2=0.3, delta_3_rate=0.7, delta_4=-0.2)
     how = {"steps": steps, "periods": 1000, "physical": physical, "resolved": FLOW_MAP}
     outcome = run(model, LINEAR, start, **how)

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from gearchaos_kernels import Effects, Status
+from gearchaos_kernels import Status
 
 from .reference import (
     BASE_HELIX_ANGLE,
@@ -18,14 +18,17 @@ from .reference import (
 from .test_order import measured_order
 
 COS = np.cos(BASE_HELIX_ANGLE)
-CLEARANCE = Effects(False, False, True, False, False)
-"""Torsion with constant stiffness: nothing acts but load, mesh and clearance."""
 
 BOTH = pytest.mark.parametrize(
     "resolved",
     [False, True, pytest.param(FLOW_MAP, marks=pytest.mark.slow)],
     ids=["plain", "resolved", "flow-map"],
 )
+
+
+def constant(**groups):
+    """Return a pair on which nothing acts but load, mesh and clearance."""
+    return pan2021(0.0, stiffness_variation_scale=0.0, **groups)
 
 
 def assert_sound(outcome) -> None:
@@ -55,8 +58,8 @@ def test_a_tiny_clearance_is_a_perturbation_of_its_own_size(resolved):
 @BOTH
 def test_a_clearance_that_is_never_crossed_leaves_a_free_gap_with_its_damping(resolved):
     # N_y is 2 xi y' alone: under the load the gears run away to the speed that damping allows.
-    model = pan2021(0.0, half_backlash=1e9, load=0.3)
-    outcome = run(model, CLEARANCE, steps=100, periods=200, resolved=resolved)
+    model = constant(half_backlash=1e9, load=0.3)
+    outcome = run(model, TORSION_ONLY, steps=100, periods=200, resolved=resolved)
     assert_sound(outcome)
     assert outcome.crossings.tolist() == [0]
     rate = 2.0 * model.damping_ratio[0] * COS
@@ -68,9 +71,9 @@ def test_a_clearance_that_is_never_crossed_leaves_a_free_gap_with_its_damping(re
 
 @BOTH
 def test_a_huge_clearance_that_is_met_is_met_once_and_held(resolved):
-    model = pan2021(0.0, half_backlash=1e9, load=1e3, damping_ratio=2.0)
+    model = constant(half_backlash=1e9, load=1e3, damping_ratio=2.0)
     start = state(delta_5=1e9 * COS - 1e3)
-    outcome = run(model, CLEARANCE, start, steps=400, periods=40, resolved=resolved)
+    outcome = run(model, TORSION_ONLY, start, steps=400, periods=40, resolved=resolved)
     assert_sound(outcome)
     if resolved:
         assert outcome.crossings.tolist() == [1]
@@ -86,13 +89,13 @@ def test_a_huge_clearance_that_is_met_is_met_once_and_held(resolved):
 def test_a_grazing_motion_is_the_motion_in_contact_as_near_as_it_grazes(resolved, excess):
     load, half_backlash = 0.3, 0.5
     deflection = load / COS
-    model = pan2021(0.0, load=load, half_backlash=half_backlash, damping_ratio=0.0)
+    model = constant(load=load, half_backlash=half_backlash, damping_ratio=0.0)
     amplitude = (1.0 + excess) * deflection
     middle = half_backlash * COS + deflection
     periods = 10
     outcome = run(
         model,
-        CLEARANCE,
+        TORSION_ONLY,
         state(delta_5=middle + amplitude),
         steps=400,
         periods=periods,
@@ -151,16 +154,15 @@ def test_a_pair_at_rest_with_nothing_acting_on_it_stays_at_rest(resolved):
 
 @BOTH
 def test_a_load_that_turns_around_takes_the_teeth_to_the_other_flank(resolved):
-    scene = Effects(pitch_error=False)
     how = {"steps": 100, "transient": 600, "periods": 1, "points": 1, "resolved": resolved}
     model = pan2021(0.0)
-    forward = run(model, scene, **how)
+    forward = run(model, FULL, **how)
     turned = model._replace(load=-model.load)
-    backward = run(turned, scene, forward.end_state, **how)
+    backward = run(turned, FULL, forward.end_state, **how)
     assert_sound(backward)
     assert forward.section[0, 0, 0] > 0.5
     assert backward.section == pytest.approx(-forward.section, rel=0, abs=1e-7)
-    again = run(model, scene, backward.end_state, **how)
+    again = run(model, FULL, backward.end_state, **how)
     assert again.section == pytest.approx(forward.section, rel=0, abs=1e-7)
 
 

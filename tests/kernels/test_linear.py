@@ -2,14 +2,11 @@
 
 import numpy as np
 import pytest
-from gearchaos_kernels import Effects, Groups
+from gearchaos_kernels import Groups
 
 from gearchaos.records.lyapunov import largest_exponent
 
-from .reference import BASE_HELIX_ANGLE, LINEAR, PERIOD, pan2021, run, state
-
-TORSION = Effects(*[False] * len(Effects._fields))
-CLEARANCE = TORSION._replace(backlash=True)
+from .reference import BASE_HELIX_ANGLE, CLEARANCE, LINEAR, PERIOD, TORSION, pan2021, run, state
 
 MODEL = pan2021(5.86, error_mean=0.1, error_phase=0.4)
 TORQUE = state(delta_5_rate=1.0)

@@ -4,13 +4,12 @@ import numpy as np
 import pytest
 from gearchaos_kernels import Effects, Status
 
-from .reference import BASE_HELIX_ANGLE, FULL, TORSION_ONLY, pan2021, run, state
+from .reference import BASE_HELIX_ANGLE, CLEARANCE, FULL, TORSION_ONLY, pan2021, run, state
 from .test_linear import system
 
 COS = np.cos(BASE_HELIX_ANGLE)
 LINEAR = Effects(pitch_error=False, stiffness_variation=False, backlash=False)
 WITH_BACKLASH = LINEAR._replace(backlash=True)
-CLEARANCE = Effects(False, False, True, False, False)
 UNDAMPED = {
     "load": 0.0,
     "damping_ratio": 0.0,

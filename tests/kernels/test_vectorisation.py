@@ -15,7 +15,7 @@ from gearchaos_kernels.block_memory import Present
 from gearchaos_kernels.compilation import evaluator
 from numba.core.caching import NullCache
 
-from .reference import FULL, pan2021, system_of
+from .reference import FULL, TORSION, pan2021, system_of
 
 pytestmark = pytest.mark.skipif(
     platform.machine().lower() not in ("x86_64", "amd64")
@@ -32,7 +32,6 @@ STORE = re.compile(r"%[yz]mm\d+, -?\d*\((?!%r[sb]p\))%r\w+")
 unrolled as a whole has no index."""
 
 WIDE = ("ymm", "zmm")
-TORSION = Effects(*[False] * len(Effects._fields))
 
 
 @evaluator

@@ -24,12 +24,13 @@ class Motion(NamedTuple):
     growth: np.ndarray
 
 
-def spline(x: float, degree: int = 5) -> float:
+def spline(x: np.ndarray, degree: int = 5) -> np.ndarray:
     """The B-spline with knots 0, 1, ... from powers that begin at each of them."""
     knots = np.arange(degree + 2)
-    weights = [(-1) ** k * math.comb(degree + 1, k) for k in knots]
-    powers = np.where(x > knots, np.maximum(x - knots, 0.0) ** degree, 0.0)
-    return float(np.sum(weights * powers)) / math.factorial(degree) if 0 < x < degree + 1 else 0.0
+    weights = np.array([(-1) ** k * math.comb(degree + 1, k) for k in knots])
+    powers = np.maximum(x[..., np.newaxis] - knots, 0.0) ** degree
+    inside = (x > 0.0) & (x < degree + 1.0)
+    return np.where(inside, powers @ weights / math.factorial(degree), 0.0)
 
 
 def shared_error(teeth: Teeth, profile: int, phase: float) -> np.ndarray:
@@ -39,15 +40,15 @@ def shared_error(teeth: Teeth, profile: int, phase: float) -> np.ndarray:
     """
     driving, driven = teeth.driving[profile], teeth.driven[profile]
     begin = (teeth.entry - 2.5 / teeth.cells_per_period) % 1.0
-    total = np.zeros(3)
-    for pair in range(math.floor(phase) - 10, math.floor(phase) + 2):
-        error = driven[pair % driven.size] - driving[pair % driving.size]
-        place = teeth.cells_per_period * (phase - pair - begin)
-        for cell in range(max(0, math.floor(place) - 5), min(teeth.share.size, math.ceil(place))):
-            x, share = place - cell, teeth.share[cell]
-            first = spline(x, 4) - spline(x - 1, 4)
-            second = spline(x, 3) - 2.0 * spline(x - 1, 3) + spline(x - 2, 3)
-            total += error * share * np.array([spline(x), first, second])
+    pairs = np.arange(math.floor(phase) - 10, math.floor(phase) + 2)
+    places = teeth.cells_per_period * (phase - pairs - begin)
+    in_mesh = (places > 0.0) & (places < teeth.share.size + 5)
+    pairs, places = pairs[in_mesh], places[in_mesh]
+    errors = driven[pairs % driven.size] - driving[pairs % driving.size]
+    x = places[:, np.newaxis] - np.arange(teeth.share.size)
+    first = spline(x, 4) - spline(x - 1, 4)
+    second = spline(x, 3) - 2.0 * spline(x - 1, 3) + spline(x - 2, 3)
+    total = np.stack([spline(x), first, second]) @ teeth.share @ errors
     return total * (teeth.cells_per_period / (2.0 * np.pi)) ** np.arange(3)
 
 
