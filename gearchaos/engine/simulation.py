@@ -1,6 +1,5 @@
 """A configured sweep: what it yields, and the means to compute any block of its lanes."""
 
-import math
 from collections.abc import Mapping
 from typing import Any
 
@@ -25,6 +24,7 @@ from gearchaos.dynamics.largest_exponents import largest_exponents
 from gearchaos.dynamics.stability import sufficient_steps
 from gearchaos.dynamics.systems import plan_of
 from gearchaos.engine.error_check import MEANINGS, check_arrays, checked_lanes
+from gearchaos.engine.excitation import remarks, whole_lengths
 from gearchaos.engine.lanes import Lanes
 from gearchaos.engine.steps import (
     MOST_STEPS,
@@ -36,26 +36,18 @@ from gearchaos.engine.steps import (
     solution_of,
     stable_steps,
 )
-from gearchaos.errors import ConfigurationError
-from gearchaos.gear.mesh_stiffness import series_table
 from gearchaos.interrupts import check
 from gearchaos.records.contact import contact_told
 from gearchaos.records.difference import difference
 from gearchaos.records.label import MEANINGS as MOTION_MEANINGS
 from gearchaos.records.label import MOST_POINTS
 from gearchaos.records.loads import loads_told
-from gearchaos.records.period import LONGEST_PERIOD, POINTS_NEEDED, RETURNS
+from gearchaos.records.period import POINTS_NEEDED
 from gearchaos.results.variables import DIRECTIONS, Variable, step_choice_variables, sweep_variables
 
 Arrays = Mapping[str, NDArray[Any]]
 Bounds = tuple[int, int]
 Floats = NDArray[np.float64]
-
-LONGEST_EXCITATION = 50_000
-"""Mesh periods after which pitch errors repeat, at most: a record holds some of them."""
-
-PHASES = 1001
-"""Mesh phases at which the sign of the mesh stiffness is looked at."""
 
 
 class Simulation:
@@ -71,7 +63,7 @@ class Simulation:
         self.lanes = Lanes(config)
         integration, outputs = config.integration, config.outputs
         steps, note = stable_steps(self.lanes, integration.steps_per_period)
-        repeats, lengths = self.lanes.repeats_after, self._whole_lengths()
+        lengths = whole_lengths(self.lanes)
         self.plan = plan_of(
             config,
             steps_per_period=steps,
@@ -83,8 +75,7 @@ class Simulation:
         )
         judged = outputs.lyapunov and integration.tolerance is None
         coarse = coarse_steps(self.lanes, steps) if judged else ""
-        teeth = [self._longer(lengths), self._parting_pairs()] if repeats > 1 else []
-        notes = [note, coarse, *teeth, self._negative_stiffness()]
+        notes = [note, coarse, *remarks(self.lanes, lengths)]
         self.notes = [text for text in notes if text]
         self._choice: list[Variable] = []
 
@@ -318,70 +309,6 @@ class Simulation:
         some = told and Told(told.labels.of(checked), told.state[checked])
         coarse = solution_of(system, outcome_of(outcome, checked), plan, kept, some)
         return check_arrays(lanes, checked, difference(coarse, fine))
-
-    def _whole_lengths(self) -> dict[str, int]:
-        """Transient and record in whole excitation periods, enough of them to tell a period."""
-        integration, repeats = self.config.integration, self.lanes.repeats_after
-        if repeats > LONGEST_EXCITATION:
-            raise ConfigurationError(
-                f"{self.config.source}: the pitch errors repeat after {repeats} mesh periods only, "
-                f"more than {LONGEST_EXCITATION}; give one gear deviations, or other teeth"
-            )
-        least = {"transient_periods": 0, "recorded_periods": 1 if repeats == 1 else RETURNS}
-        return {
-            name: repeats * max(math.ceil(getattr(integration, name) / repeats), count)
-            for name, count in least.items()
-        }
-
-    def _longer(self, lengths: Mapping[str, int]) -> str:
-        """Tell by how much the teeth make transient and record longer than they are configured."""
-        repeats = self.lanes.repeats_after
-        changed = [
-            f"integration.{name} raised from {asked} to {length}"
-            for name, length in lengths.items()
-            if length != (asked := getattr(self.config.integration, name))
-        ]
-        told = min(lengths["recorded_periods"] // (RETURNS * repeats), LONGEST_PERIOD)
-        text = (
-            f"the pitch errors repeat after {repeats} mesh periods, the excitation period; the "
-            f"record is long enough to tell period {told}{' and shorter ones' if told > 1 else ''}"
-        )
-        return f"{text}; {', '.join(changed)}, whole ones of it" if changed else text
-
-    def _parting_pairs(self) -> str:
-        """Tell where neighbouring tooth pairs differ by more than the load bends them."""
-        system = self.lanes.system_of(self.lanes.spread(PILOT_LANES))
-        if system.teeth is None:
-            return ""
-        gears = system.teeth.driving, system.teeth.driven
-        step = sum(np.abs(gear - np.roll(gear, 1, axis=1)).max(axis=1) for gear in gears)
-        groups = system.groups
-        apart = np.abs(groups.error_amplitude) * step[system.teeth.profile]
-        parting = np.mean(apart > np.abs(groups.load))
-        if parting == 0.0:
-            return ""
-        return (
-            f"in {parting:.0%} of the lanes neighbouring tooth pairs differ by up to "
-            f"{apart.max():.2g}, more than the static deflection there; single pairs may then part "
-            "while their neighbours carry, which the model leaves out"
-        )
-
-    def _negative_stiffness(self) -> str:
-        """Tell where the variation of the mesh stiffness exceeds its mean."""
-        if "stiffness_variation" not in self.lanes.effects:
-            return ""
-        parameters = self.lanes.parameters
-        waves = (parameters[f"stiffness_{part}"].value for part in ("cosine", "sine"))
-        cosine, sine = map(np.atleast_1d, waves)
-        variation = series_table(cosine - 1j * sine, PHASES) - 1.0
-        scale = np.asarray(parameters["stiffness_variation_scale"].value)
-        lowest = 1.0 + np.min(np.outer([scale.min(), scale.max()], variation))
-        if lowest >= 0.0:
-            return ""
-        return (
-            f"the mesh stiffness falls to {lowest:.2g} of its mean within a mesh period, below "
-            "zero; groups.stiffness_variation_scale is too large for these harmonics"
-        )
 
 
 def joined(outcomes: list[Outcome]) -> Outcome:

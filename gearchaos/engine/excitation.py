@@ -1,0 +1,96 @@
+"""What the excitation of a sweep asks for: whole periods of it, and remarks before it begins."""
+
+import math
+from collections.abc import Mapping
+
+import numpy as np
+
+from gearchaos.engine.lanes import Lanes
+from gearchaos.engine.steps import PILOT_LANES
+from gearchaos.errors import ConfigurationError
+from gearchaos.gear.mesh_stiffness import series_table
+from gearchaos.records.period import LONGEST_PERIOD, RETURNS
+
+LONGEST_EXCITATION = 50_000
+"""Mesh periods after which pitch errors repeat, at most: a record holds some of them."""
+
+PHASES = 1001
+"""Mesh phases at which the sign of the mesh stiffness is looked at."""
+
+
+def whole_lengths(lanes: Lanes) -> dict[str, int]:
+    """Return transient and record in whole excitation periods, enough of them to tell a period.
+
+    In mesh periods, by the names of their keys. Raises ConfigurationError if the excitation repeats
+    too late.
+    """
+    integration, repeats = lanes.config.integration, lanes.repeats_after
+    if repeats > LONGEST_EXCITATION:
+        raise ConfigurationError(
+            f"{lanes.config.source}: the pitch errors repeat after {repeats} mesh periods only, "
+            f"more than {LONGEST_EXCITATION}; give one gear deviations, or other teeth"
+        )
+    least = {"transient_periods": 0, "recorded_periods": 1 if repeats == 1 else RETURNS}
+    return {
+        name: repeats * max(math.ceil(getattr(integration, name) / repeats), count)
+        for name, count in least.items()
+    }
+
+
+def remarks(lanes: Lanes, lengths: Mapping[str, int]) -> list[str]:
+    """Return what a user should know of teeth and stiffness; ``lengths`` from `whole_lengths`."""
+    teeth = [_longer(lanes, lengths), _parting_pairs(lanes)] if lanes.repeats_after > 1 else []
+    return [*teeth, _negative_stiffness(lanes)]
+
+
+def _longer(lanes: Lanes, lengths: Mapping[str, int]) -> str:
+    """Tell by how much the teeth make transient and record longer than they are configured."""
+    repeats = lanes.repeats_after
+    changed = [
+        f"integration.{name} raised from {asked} to {length}"
+        for name, length in lengths.items()
+        if length != (asked := getattr(lanes.config.integration, name))
+    ]
+    told = min(lengths["recorded_periods"] // (RETURNS * repeats), LONGEST_PERIOD)
+    text = (
+        f"the pitch errors repeat after {repeats} mesh periods, the excitation period; the "
+        f"record is long enough to tell period {told}{' and shorter ones' if told > 1 else ''}"
+    )
+    return f"{text}; {', '.join(changed)}, whole ones of it" if changed else text
+
+
+def _parting_pairs(lanes: Lanes) -> str:
+    """Tell where neighbouring tooth pairs differ by more than the load bends them."""
+    system = lanes.system_of(lanes.spread(PILOT_LANES))
+    if system.teeth is None:
+        return ""
+    gears = system.teeth.driving, system.teeth.driven
+    step = sum(np.abs(gear - np.roll(gear, 1, axis=1)).max(axis=1) for gear in gears)
+    groups = system.groups
+    apart = np.abs(groups.error_amplitude) * step[system.teeth.profile]
+    parting = np.mean(apart > np.abs(groups.load))
+    if parting == 0.0:
+        return ""
+    return (
+        f"in {parting:.0%} of the lanes neighbouring tooth pairs differ by up to "
+        f"{apart.max():.2g}, more than the static deflection there; single pairs may then part "
+        "while their neighbours carry, which the model leaves out"
+    )
+
+
+def _negative_stiffness(lanes: Lanes) -> str:
+    """Tell where the variation of the mesh stiffness exceeds its mean."""
+    if "stiffness_variation" not in lanes.effects:
+        return ""
+    parameters = lanes.parameters
+    waves = (parameters[f"stiffness_{part}"].value for part in ("cosine", "sine"))
+    cosine, sine = map(np.atleast_1d, waves)
+    variation = series_table(cosine - 1j * sine, PHASES) - 1.0
+    scale = np.asarray(parameters["stiffness_variation_scale"].value)
+    lowest = 1.0 + np.min(np.outer([scale.min(), scale.max()], variation))
+    if lowest >= 0.0:
+        return ""
+    return (
+        f"the mesh stiffness falls to {lowest:.2g} of its mean within a mesh period, below "
+        "zero; groups.stiffness_variation_scale is too large for these harmonics"
+    )
