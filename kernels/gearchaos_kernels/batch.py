@@ -108,11 +108,7 @@ def integrate(
 
 
 def _shares(system: System, plan: Plan, present: Present) -> Iterator[tuple[Any, Any, Any, Any]]:
-    """Cut lanes into blocks; lanes of a block share their maps, if the method has any.
-
-    As many at a time as have maps that fit into memory: order of the lanes, blocks as `Batch` has
-    them, maps, and the steps per period of every lane.
-    """
+    """Yield order, blocks, maps and steps of lanes, as many as have maps that fit into memory."""
     lanes, steps = system.lanes, plan.steps_per_period
     if plan.method == "rk4":
         blocks = _blocks(np.array([lanes]), np.array([steps]), np.array([0]))

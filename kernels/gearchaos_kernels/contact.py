@@ -127,11 +127,9 @@ def may_leave(begin, end, branch, margin=0.0):
 
 @scalar
 def leaving_fraction(begin, end, length, branch, half_backlash):
-    """Return the fraction of a piece at which the gap leaves its branch, or `NEVER`.
-
-    The gap over the piece, so many steps long, is the cubic through its values and rates at both
-    ends. The field is continuous, so an error of the moment moves the state by its square only.
-    """
+    """Return the fraction of a piece, so many steps long, at which a gap leaves its branch."""
+    # The gap is the cubic through its values and rates at both ends. The field is continuous, so
+    # that an error of the moment moves the state by its square only.
     if half_backlash == 0.0:
         return NEVER
     # One formula for a motion and its mirror image: the compiler then rounds both alike.

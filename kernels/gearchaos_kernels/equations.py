@@ -87,10 +87,7 @@ def branch_force(gap, stiffness, damping, branch):
 
 @scalar
 def mesh_forces(gaps, lane, stiffness, branches, present):
-    """Return N_y and N_z of eq. 13, and their slopes d(force)/d(gap).
-
-    Without ``branches`` the clearance function itself is evaluated.
-    """
+    """Return N_y and N_z of eq. 13 and their slopes d(force)/d(gap), on branches if given."""
     damping = lane.mesh_damping
     stiffness_z = lane.axial_share * stiffness
     damping_z = lane.axial_share * damping

@@ -241,28 +241,31 @@ def leaving(way, work, done, lane, branches, table, at, present):
     bend = 0.0
     for term in range(TERMS - 1, 3, -1):
         bend += term * (term - 1.0) * (term - 2.0) * (term - 3.0) * abs(work[gap + term])
+    begin = vectors.value_and_slope(work, gap, done)
+    end = vectors.value_and_slope(work, gap, 1.0)
     if branch.engaged != 0.0:
         side = math.copysign(1.0, branch.offset)
-        return first_below((work, gap, side, -half_backlash), done, bend)
+        return first_below((work, gap, side, -half_backlash), done, begin, end, bend)
     return min(
-        first_below((work, gap, -1.0, half_backlash), done, bend),
-        first_below((work, gap, 1.0, half_backlash), done, bend),
+        first_below((work, gap, -1.0, half_backlash), done, begin, end, bend),
+        first_below((work, gap, 1.0, half_backlash), done, begin, end, bend),
     )
 
 
 @scalar
-def first_below(given, left, bend):
-    """Return where a gap, as it is given to `gap_seen`, first falls below zero after a moment.
+def first_below(given, left, begin, end, bend):
+    """Return where a gap, as it is given to `gap_at`, first falls below zero after a moment.
 
-    ``bend``: more than its fourth derivative. Piece by piece: one whose Bezier points with their
-    margins are not below zero has no such place, in one that only falls it is found by Newton's
-    method, others are halved.
+    ``begin``, ``end``: value and slope at that moment and at the end of the step; ``bend``: more
+    than its fourth derivative. Piece by piece: one whose Bezier points with their margins are not
+    below zero has no such place, in one that only falls it is found by Newton's method, others are
+    halved.
     """
-    value_left, slope_left = gap_seen(given, left)
+    value_left, slope_left = seen(given, begin)
     # A step that begins where the last one ended at the boundary begins on the right side of it.
     value_left = max(value_left, 0.0)
     right = 1.0
-    value_right, slope_right = gap_seen(given, right)
+    value_right, slope_right = seen(given, end)
     for _ in range(_LOOKS):
         width = right - left
         # The polynomial and the cubic differ by bend (width^4 / 24) t^2 (1 - t)^2 at most.
@@ -277,7 +280,7 @@ def first_below(given, left, bend):
                 slopes = width * slope_left, width * slope_right
                 fall = contact.first_fall(value_left, slopes[0], value_right, slopes[1])
                 guess = left + width * fall
-                return contact.falling_root(gap_seen, given, left, right, guess, _LAST_CORRECTION)
+                return contact.falling_root(gap_at, given, left, right, guess, _LAST_CORRECTION)
             clear = steepest < -stray * 0.2
             if not clear and width < _NARROW:
                 if value_right < 0.0:
@@ -292,13 +295,18 @@ def first_below(given, left, bend):
             right = min(1.0, left + 2.0 * width)
         else:
             right = left + 0.5 * width
-        value_right, slope_right = gap_seen(given, right)
+        value_right, slope_right = gap_at(given, right)
     return contact.NEVER
 
 
 @scalar
-def gap_seen(given, at):
+def gap_at(given, at):
     """Return a gap, seen from one side and raised by a distance, and its slope."""
-    work, gap, side, distance = given
-    value, slope = vectors.value_and_slope(work, gap, at)
-    return side * value + distance, side * slope
+    return seen(given, vectors.value_and_slope(given[0], given[1], at))
+
+
+@scalar
+def seen(given, motion):
+    """Return value and slope of a gap from one side and raised by a distance."""
+    _, _, side, distance = given
+    return side * motion[0] + distance, side * motion[1]

@@ -30,11 +30,7 @@ MOST_SPLITS = 16
 
 @scalar
 def split_step(memory, slot, table, shares, number, recorded, present):
-    """Repeat one step of one lane in pieces that each stay on their contact branches.
-
-    The state before the step is in the rows from `BEFORE` on, the one after it, which ignored the
-    crossing, in the ordinary rows. These are replaced where there is a crossing.
-    """
+    """Repeat a step of a lane that ignored a crossing in pieces that stay on their branches."""
     lane = read_lane(memory, slot)
     state = read_state(memory, rows.STATE_BEFORE, slot, present)
     after = read_state(memory, rows.STATE, slot, present)
@@ -109,10 +105,7 @@ def forcing_within(memory, slot, lane, table, shares, number, fraction, present)
 
 @scalar
 def first_crossing(begin, end, length, branches, lane, present):
-    """Return the fraction of a piece at which a gap leaves its branch, and if it is the axial one.
-
-    ``length`` is that of the piece in steps: the rates of the gaps are per step.
-    """
+    """Return where in a piece of so many steps a gap leaves its branch, and if the axial one."""
     b = lane.half_backlash
     fraction = leaving_fraction(begin.tangential, end.tangential, length, branches.tangential, b)
     fraction_z = NEVER

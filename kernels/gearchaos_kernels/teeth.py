@@ -156,11 +156,8 @@ def weigh(memory, slot, first, shares):
 
 @scalar
 def between(begin, end, t, width, point):
-    """Return a mesh phase with the error between two half steps so far apart.
-
-    At a fraction of the way it is the polynomial of order 5 through value, slope and curvature at
-    both.
-    """
+    """Return a mesh phase with the error at a fraction of the width between two half steps."""
+    # The polynomial of order 5 through value, slope and curvature at both.
     c1 = width * begin.slope
     c2 = 0.5 * width * width * begin.curvature
     # What the parabola at the beginning leaves of value, slope and curvature at the end.
