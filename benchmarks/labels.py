@@ -346,7 +346,7 @@ def told(simulation: Simulation, start: np.ndarray) -> tuple[np.ndarray, np.ndar
     stable = np.zeros(numbers.size, dtype=np.bool_)
     for distance in RECURRING:
         nearly = np.where(stable, 0, _recurrence(outcome.section, distance))
-        found = polish(system, outcome.end_state, nearly, plan.steps_per_period).stable
+        found = polish(system, outcome.end_state, nearly, plan).stable
         period, stable = np.where(found, nearly, period), stable | found
     growth, error = _growth(outcome.growth[:, -plan.recorded_periods // 2 :])
     arrived = _distance(start, outcome.section[:, -LONGEST:]) < ARRIVED

@@ -191,13 +191,8 @@ class System:
             repeats = self.repeats_after
             transient = repeats * max(-(-self.config.integration.transient_periods // repeats), 1)
             guess = self.integrate(1, transient=transient - 1).states[-1]
-        found = polish(
-            self._record,
-            np.atleast_2d(guess),
-            np.array([period], np.int32),
-            self._steps,
-            self.config.integration.method,
-        )
+        periods = np.array([period], np.int32)
+        found = polish(self._record, np.atleast_2d(guess), periods, self._plan)
         if not found.converged[0]:
             raise ConfigurationError(
                 f"{self.config.source}: no orbit of {period * self.repeats_after} mesh periods "
@@ -223,8 +218,7 @@ class System:
             np.array([float(first)]),
             np.array([float(last)]),
             width,
-            self._steps,
-            self.config.integration.method,
+            self._plan,
         )
         losses = loss_of_stability(followed.stable.multipliers, followed.beyond.multipliers)
         loss = StabilityLoss(int(losses.kind[0]))

@@ -54,8 +54,7 @@ def find_attractors(
     state: Floats,
     motion: NDArray[np.uint8],
     period: NDArray[np.int32],
-    steps_per_period: int,
-    method: str = "rk4",
+    plan: Plan,
 ) -> tuple[list[Attractor], Lanes]:
     """Find the attractors of lanes, and to which of them each has come: its place in the list.
 
@@ -66,7 +65,7 @@ def find_attractors(
     where a lane has no such motion or no orbit is found.
 
     ``group`` (lanes,): lanes of the same parameters share a number; ``motion``, ``period``: labels;
-    ``steps_per_period`` and ``method`` as for `polish`.
+    ``plan`` as for `polish`.
     """
     rows = np.stack([group, motion, period], axis=1)
     kind = np.unique(rows, axis=0, return_inverse=True)[1].ravel()
@@ -75,17 +74,17 @@ def find_attractors(
     waiting = np.flatnonzero(np.isin(motion, (PERIODIC, QUASI_PERIODIC, CHAOTIC)))
     waiting, tried = waiting[np.argsort(kind[waiting], kind="stable")], 1
     length = system.repeats_after * max(POINTS_NEEDED, LONG // system.repeats_after)
-    plan = Plan(steps_per_period, 0, length, length, tangent=True, method=method)
+    long = Plan(plan.steps_per_period, 0, length, length, tangent=True, method=plan.method)
     while waiting.size:
         check()
         _, first, sizes = np.unique(kind[waiting], return_index=True, return_counts=True)
         rank = np.arange(waiting.size) - np.repeat(first, sizes)
         some = waiting[rank < tried][: max(1, AT_ONCE // length)]
         part, n = system.of(some), period[some]
-        last = integrate(part, state[some], plan).end_state
-        orbits = polish(part, last, n, steps_per_period, method)
+        last = integrate(part, state[some], long).end_state
+        orbits = polish(part, last, n, plan)
         start = np.where(orbits.stable[:, np.newaxis], orbits.points, last)
-        section = integrate(part, start, plan).every(system.repeats_after).section
+        section = integrate(part, start, long).every(system.repeats_after).section
         there = np.isfinite(section).all(axis=(1, 2)) & (orbits.stable | (n < 1))
         for at, lane in zip(np.flatnonzero(there).tolist(), some[there].tolist(), strict=True):
             one = Attractor(lane, section[at, -n[at] :], orbits.multipliers[at])

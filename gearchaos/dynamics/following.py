@@ -10,7 +10,7 @@ from enum import IntEnum
 from typing import NamedTuple
 
 import numpy as np
-from gearchaos_kernels import System
+from gearchaos_kernels import Plan, System
 from numpy.typing import NDArray
 
 from gearchaos.dynamics.orbits import Orbits, polish
@@ -155,8 +155,7 @@ def follow(
     first: Floats,
     last: Floats,
     width: float,
-    steps_per_period: int,
-    method: str = "rk4",
+    plan: Plan,
 ) -> Followed:
     """Follow the orbit of every lane along a parameter to where it loses stability.
 
@@ -166,15 +165,15 @@ def follow(
 
     ``system_at`` gives the system of all lanes for a value of the parameter in each, (lanes,);
     ``first``, ``last`` (lanes,): the values at both ends of the way, in either order; ``guess``,
-    ``period``, ``steps_per_period`` and ``method`` as for `polish` at the first values; ``width``:
-    wanted distance of the stable value and the one beyond. Towards a fold a multiplier nears +1
-    like the root of the distance: with too large a width it is not yet `NEAR_FOLD`.
+    ``period`` and ``plan`` as for `polish` at the first values; ``width``: wanted distance of the
+    stable value and the one beyond. Towards a fold a multiplier nears +1 like the root of the
+    distance: with too large a width it is not yet `NEAR_FOLD`.
     """
 
     def orbits(share: Floats, guess: Floats, followed: NDArray[np.bool_]) -> Orbits:
         system = system_at(first + share * (last - first))
         sought = np.where(followed, period, np.int32(0))
-        return polish(system, guess, sought, steps_per_period, method)
+        return polish(system, guess, sought, plan)
 
     share = np.zeros_like(first)
     step = np.full_like(first, LONGEST_STEP)

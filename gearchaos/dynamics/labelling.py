@@ -155,7 +155,7 @@ def _settle(
             continue
         end = outcome.end_state[tried]
         periods = np.full(tried.size, n, dtype=np.int32)
-        orbits = polish(system.of(tried), end, periods, plan.steps_per_period, plan.method)
+        orbits = polish(system.of(tried), end, periods, plan)
         apart = np.abs(orbits.points - end) / coordinate_scale(outcome.section[tried])
         settled = tried[(np.max(apart, axis=1) <= SETTLING) & orbits.stable]
         searched[settled] = False

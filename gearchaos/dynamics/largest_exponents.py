@@ -53,9 +53,7 @@ def largest_exponents(
     lanes = np.flatnonzero((period > 0) & np.isfinite(values))
     if not plan.resolved or not lanes.size:
         return found
-    orbits = polish(
-        system.of(lanes), state[lanes], period[lanes], plan.steps_per_period, plan.method
-    )
+    orbits = polish(system.of(lanes), state[lanes], period[lanes], plan)
     # A multiplier that is 0 but for underflow tells no exponent.
     told = orbits.stable & (np.abs(orbits.multipliers[:, 0]) > 0.0)
     lanes, size = lanes[told], np.abs(orbits.multipliers[told])

@@ -43,13 +43,7 @@ class Orbits(NamedTuple):
         return inside
 
 
-def polish(
-    system: System,
-    guess: Floats,
-    period: NDArray[np.int32],
-    steps_per_period: int,
-    method: str = "rk4",
-) -> Orbits:
+def polish(system: System, guess: Floats, period: NDArray[np.int32], plan: Plan) -> Orbits:
     """Find the periodic orbit next to the guess of every lane.
 
     Newton's method on the map over ``period`` excitation periods, with its Jacobian from the
@@ -58,10 +52,10 @@ def polish(
     thousandth of that of the largest coordinate where this is more.
 
     ``guess`` (lanes, states): states of eq. 13 at tau = 0; ``period`` (lanes,) in excitation
-    periods, see `System.repeats_after`, 0 where there is no orbit to look for;
-    ``steps_per_period``: resolved ones a mesh period, of this ``method``. Not converged is a lane
-    in which Newton's method does not close the orbit or leads out of the neighbourhood of the
-    guess, in which the orbit found repeats after a divisor of the period, or whose period is 0.
+    periods, see `System.repeats_after`, 0 where there is no orbit to look for; of the ``plan`` only
+    method and steps per period count, which are resolved. Not converged is a lane in which Newton's
+    method does not close the orbit or leads out of the neighbourhood of the guess, in which the
+    orbit found repeats after a divisor of the period, or whose period is 0.
     """
     found = Orbits(
         points=np.full(guess.shape, np.nan),
@@ -73,10 +67,9 @@ def polish(
         chosen = np.flatnonzero(period == n)
         # With a tangent, so that map and Jacobian are compiled once and agree bit for bit.
         whole = n * system.repeats_after
-        plan = Plan(steps_per_period, 0, whole, whole, tangent=True, method=method)
-        for all_lanes, some in zip(
-            found, _polish(system.of(chosen), guess[chosen], plan), strict=True
-        ):
+        once = Plan(plan.steps_per_period, 0, whole, whole, tangent=True, method=plan.method)
+        polished = _polish(system.of(chosen), guess[chosen], once)
+        for all_lanes, some in zip(found, polished, strict=True):
             all_lanes[chosen] = some
     return found
 

@@ -3,6 +3,7 @@
 import numpy as np
 
 from gearchaos.dynamics.attractors import find_attractors, numbers_along
+from gearchaos.dynamics.systems import plan_of
 from gearchaos.engine.lanes import Lanes
 from gearchaos.engine.refinement import computable
 from gearchaos.engine.running import choose_threads
@@ -52,9 +53,8 @@ def find_basins(result: Result, name: str = "the result", threads: int | None = 
         raise FileError(f"{name}: holds the configuration of other lanes; run the sweep again")
     every = np.arange(len(lanes))
     system, at_value = lanes.system_of(every), every // starts
-    how = config.integration.steps_per_period, config.integration.method
     state = result.lanes("end_state")
-    found, place = find_attractors(system, at_value, state, motion, period, *how)
+    found, place = find_attractors(system, at_value, state, motion, period, plan_of(config))
     sizes = np.bincount(place[place >= 0], minlength=len(found))
     averages = np.array([one.averages for one in found]).reshape(-1, 2, len(system.states))
     value = np.array([at_value[one.lane] for one in found], dtype=np.intp)

@@ -267,7 +267,6 @@ def _followed(
         first,
         np.clip(last, lowest, highest),
         min(width, float(np.min(np.abs(last - first))) * FOLLOWED_WIDTH),
-        config.integration.steps_per_period,
-        config.integration.method,
+        plan_of(config),
     )
     return followed, loss_of_stability(followed.stable.multipliers, followed.beyond.multipliers)

@@ -8,11 +8,12 @@ from numba import prange
 from numpy.typing import NDArray
 
 from gearchaos_kernels.block import Batch, integrate_block
-from gearchaos_kernels.block_memory import CONTACT_ROWS, LANES, SIGNAL_ROWS, SIGNALS, Present, flags
+from gearchaos_kernels.block_memory import Present, flags
 from gearchaos_kernels.coefficients import lane_coefficients, state_scales, steps_between_scalings
 from gearchaos_kernels.compilation import driver
 from gearchaos_kernels.flow_map import maps_of, sharing
 from gearchaos_kernels.forcing import phase_table
+from gearchaos_kernels.rows import CONTACT_ROWS, LANES, SIGNAL_ROWS, SIGNALS
 from gearchaos_kernels.status import Status
 from gearchaos_kernels.system import Floats, Outcome, Plan, Schedule, System
 from gearchaos_kernels.teeth import tables_of
@@ -21,41 +22,8 @@ Integers = NDArray[np.intp]
 
 
 @driver
-def _integrate_blocks(
-    batch,
-    plan,
-    outcome,
-    pitch_error,
-    phase,
-    teeth,
-    wide,
-    stiffness_variation,
-    backlash,
-    transverse,
-    axial,
-    resolved,
-    contact,
-    loads,
-    tangent,
-    flow_map,
-):
+def _integrate_blocks(batch, plan, outcome, present):
     for number in prange(batch.blocks.shape[0]):
-        # Packed here: as a record it would not pass into the parallel loop.
-        present = Present(
-            pitch_error,
-            phase,
-            teeth,
-            wide,
-            stiffness_variation,
-            backlash,
-            transverse,
-            axial,
-            resolved,
-            contact,
-            loads,
-            tangent,
-            flow_map,
-        )
         # One type of number inside and outside of the parallel loop: else two are compiled.
         integrate_block(np.int64(number), batch, plan, outcome, present)
 
@@ -124,7 +92,7 @@ def integrate(
             maps,
             *tables_of(system, present, steps),
         )
-        _integrate_blocks(batch, schedule, outcome, *present)
+        _integrate_blocks(batch, schedule, outcome, present)
         if maps.size:
             unmapped = np.repeat(np.isnan(maps[blocks[:, 3]]), blocks[:, 1])
             outcome.status[order[unmapped]] = Status.TOO_FAST
@@ -140,11 +108,7 @@ def integrate(
 
 
 def _shares(system: System, plan: Plan, present: Present) -> Iterator[tuple[Any, Any, Any, Any]]:
-    """Cut lanes into blocks; lanes of a block share their maps, if the method has any.
-
-    As many at a time as have maps that fit into memory: order of the lanes, blocks as `Batch` has
-    them, maps, and the steps per period of every lane.
-    """
+    """Yield order, blocks, maps and steps of lanes, as many as have maps that fit into memory."""
     lanes, steps = system.lanes, plan.steps_per_period
     if plan.method == "rk4":
         blocks = _blocks(np.array([lanes]), np.array([steps]), np.array([0]))

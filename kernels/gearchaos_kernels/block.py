@@ -13,31 +13,15 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from gearchaos_kernels import rows
 from gearchaos_kernels.block_memory import (
-    BEFORE,
-    CARRIED,
-    COEFFICIENTS,
-    CONTACT,
-    CONTACT_ROWS,
-    CROSSINGS,
-    GROWTH,
-    LANES,
-    LOADS,
-    SIGNAL_ROWS,
-    SIGNALS,
-    SPEEDS,
-    STATE,
-    STRIDE,
-    SUSPECT,
-    TANGENT,
     Block,
-    Crossings,
-    Lane,
     aligned_memory,
     fill,
     fill_lane,
     load,
     read_branches,
+    read_lane,
     read_state,
     store,
     take,
@@ -50,19 +34,13 @@ from gearchaos_kernels.equations import gaps_at
 from gearchaos_kernels.flow_layout import layout
 from gearchaos_kernels.flow_steps import begin_forces, cross, move_block
 from gearchaos_kernels.flow_vectors import VECTOR, WORK
-from gearchaos_kernels.forcing import During, forcing_at, phase_on_grid
+from gearchaos_kernels.forcing import During, Phase, forcing_at
 from gearchaos_kernels.loads import begin_loads, tell_loads
 from gearchaos_kernels.rk4 import step, tangent_step
+from gearchaos_kernels.rows import LANES, STRIDE
 from gearchaos_kernels.splitting import split_step
 from gearchaos_kernels.status import Status
-from gearchaos_kernels.teeth import (
-    engage,
-    keep_shared,
-    point_on_grid,
-    shares_at,
-    with_kept,
-    with_teeth,
-)
+from gearchaos_kernels.teeth import engage, on_grid, point_on_grid, with_teeth
 
 LARGEST_STATE = 1e100
 """A state beyond this has left every length scale: the lane is stopped as diverged."""
@@ -128,13 +106,11 @@ def integrate_block(number_of_block, batch, plan, outcome, present):
             if present.flow_map is None:
                 # Not in the loop over slots: nobody tells the compiler that its stores spare it.
                 phases = During(
-                    phase_on_grid(table, 2 * number),
-                    phase_on_grid(table, 2 * number + 1),
-                    phase_on_grid(table, 2 * number + 2),
+                    on_grid(table, shares, 2 * number, present),
+                    on_grid(table, shares, 2 * number + 1, present),
+                    on_grid(table, shares, 2 * number + 2, present),
                 )
-                middle_shares = shares_at(shares, 2 * number + 1, present)
-                end_shares = shares_at(shares, 2 * number + 2, present)
-                suspects = step_block(memory, phases, middle_shares, end_shares, present)
+                suspects = step_block(memory, phases, present)
             else:
                 suspects = move_block(memory, maps, row, slots, work, present)
             if present.resolved is not None:
@@ -143,8 +119,7 @@ def integrate_block(number_of_block, batch, plan, outcome, present):
                     split(memory, table, shares, maps, row, work, lanes, number, recorded, present)
             if present.loads is not None:
                 if period >= plan.transient_periods:
-                    middle, end_phase = phases.middle, phases.end
-                    tell_loads(memory, middle, middle_shares, end_phase, end_shares, present)
+                    tell_loads(memory, phases, present)
             if present.tangent is not None:
                 last = number == steps - 1
                 if (number + 1) % interval == 0 or last:
@@ -174,39 +149,42 @@ def begin(block, batch, present):
         # A block that is not full repeats the last lane, and nothing of that is stored.
         index = batch.order[first + min(slot, lanes - 1)]
         interval = min(interval, batch.steps_between_scalings[index])
-        fill_lane(memory, slot, batch.coefficients[index])
-        fill(memory, STATE, slot, batch.scales[index], batch.start[index])
-        fill(memory, TANGENT, slot, batch.scales[index], batch.tangent_start[index])
-        memory[GROWTH * STRIDE + slot] = 0.0
-        store(memory, CROSSINGS, slot, Crossings(0.0, math.inf, 0.0))
-        for row in range(CONTACT, CARRIED):
+        lane = fill_lane(memory, slot, batch.coefficients[index])
+        fill(memory, rows.STATE, slot, batch.scales[index], batch.start[index])
+        fill(memory, rows.TANGENT, slot, batch.scales[index], batch.tangent_start[index])
+        memory[rows.GROWTH * STRIDE + slot] = 0.0
+        store(memory, rows.CROSSINGS, slot, (0.0, math.inf, 0.0))
+        for row in range(rows.CONTACT, rows.CARRIED):
             memory[row * STRIDE + slot] = 0.0
         point = point_on_grid(memory, slot, batch.table, batch.shares, 0, present)
-        keep_shared(memory, slot, point, present)
+        if present.teeth is not None:
+            store(memory, rows.SHARED, slot, point)
         if present.resolved is not None:
-            lane = load(memory, COEFFICIENTS, slot, Lane)
             forcing = forcing_at(lane, point, present)
-            state = read_state(memory, STATE, slot, present)
+            state = read_state(memory, rows.STATE, slot, present)
             gaps = gaps_at(state, lane, forcing, present)
             write_branches(memory, slot, branches_at(gaps, lane.half_backlash, present))
         if present.flow_map is not None:
-            begin_forces(memory, slot, load(memory, COEFFICIENTS, slot, Lane), present)
+            begin_forces(memory, slot, lane, present)
     return interval
 
 
 @scalar
-def step_block(memory, phases, middle_shares, end_shares, present):
+def step_block(memory, phases, present):
     """Take one step in every slot; return how many may have left a contact branch."""
     # A sum of integers, which the compiler knows how to vectorise; it does not know a flag.
     suspects = 0
     for slot in range(LANES):
-        lane = load(memory, COEFFICIENTS, slot, Lane)
-        state = read_state(memory, STATE, slot, present)
-        # What ended the last step begins this one.
-        begin = with_kept(memory, slot, phases.begin, present)
-        middle = with_teeth(memory, slot, middle_shares, phases.middle, present)
-        end = with_teeth(memory, slot, end_shares, phases.end, present)
-        keep_shared(memory, slot, end, present)
+        lane = read_lane(memory, slot)
+        state = read_state(memory, rows.STATE, slot, present)
+        begin, _ = phases.begin
+        if present.teeth is not None:
+            # What ended the last step begins this one.
+            begin = load(memory, rows.SHARED, slot, Phase)
+        middle = with_teeth(memory, slot, phases.middle, present)
+        end = with_teeth(memory, slot, phases.end, present)
+        if present.teeth is not None:
+            store(memory, rows.SHARED, slot, end)
         during = During(
             forcing_at(lane, begin, present),
             forcing_at(lane, middle, present),
@@ -215,24 +193,22 @@ def step_block(memory, phases, middle_shares, end_shares, present):
         if present.resolved is None:
             after, slopes = step(state, 1.0, lane, during, None, present)
         else:
-            branches = read_branches(memory, slot, present)
+            branches = read_branches(memory, slot)
             after, slopes = step(state, 1.0, lane, during, branches, present)
             gaps = gaps_at(state, lane, during.begin, present)
             gaps_after = gaps_at(after, lane, during.end, present)
-            suspect = step_may_leave(gaps, gaps_after, branches, present)
+            suspect = step_may_leave(gaps, gaps_after, branches, (0.0, 0.0), present)
             suspects += 1 if suspect else 0
-            memory[SUSPECT * STRIDE + slot] = 1.0 if suspect else 0.0
-            write_state(memory, BEFORE + STATE, slot, state, present)
-        if present.resolved is None:
-            if present.loads is not None:
-                write_state(memory, BEFORE + STATE, slot, state, present)
-        write_state(memory, STATE, slot, after, present)
+            memory[rows.SUSPECT * STRIDE + slot] = 1.0 if suspect else 0.0
+        if present.resolved is not None or present.loads is not None:
+            write_state(memory, rows.STATE_BEFORE, slot, state, present)
+        write_state(memory, rows.STATE, slot, after, present)
         if present.tangent is not None:
-            tangent = read_state(memory, TANGENT, slot, present)
+            tangent = read_state(memory, rows.TANGENT, slot, present)
             if present.resolved is not None:
-                write_state(memory, BEFORE + TANGENT, slot, tangent, present)
+                write_state(memory, rows.TANGENT_BEFORE, slot, tangent, present)
             tangent = tangent_step(tangent, 1.0, lane, slopes, present)
-            write_state(memory, TANGENT, slot, tangent, present)
+            write_state(memory, rows.TANGENT, slot, tangent, present)
     return suspects
 
 
@@ -241,24 +217,12 @@ def split(memory, table, shares, maps, row, work, lanes, number, recorded, prese
     """Split the step of every lane that may have left a contact branch."""
     # No array of the outcome here: passing one means counting references to it at every step.
     for slot in range(lanes):
-        if memory[SUSPECT * STRIDE + slot] == 0.0:
+        if memory[rows.SUSPECT * STRIDE + slot] == 0.0:
             continue
-        before = load(memory, CROSSINGS, slot, Crossings)
         if present.flow_map is None:
-            count, slowest, overflow = split_step(
-                memory, slot, table, shares, number, recorded, present
-            )
+            split_step(memory, slot, table, shares, number, recorded, present)
         else:
-            count, slowest, overflow = cross(
-                memory, slot, maps, row, work, number, recorded, present
-            )
-        if not recorded:
-            count = 0
-            slowest = math.inf
-        after = Crossings(
-            before.crossed + count, min(before.slowest, slowest), before.overflows + overflow
-        )
-        store(memory, CROSSINGS, slot, after)
+            cross(memory, slot, maps, row, work, number, recorded, present)
 
 
 @scalar
@@ -273,13 +237,13 @@ def scale_tangents(block, batch, steps_done, last):
         scale = batch.scales[index]
         square = 0.0
         for column in range(scale.shape[0]):
-            square += (memory[(TANGENT + column) * STRIDE + slot] * scale[column]) ** 2
+            square += (memory[(rows.TANGENT + column) * STRIDE + slot] * scale[column]) ** 2
         length = math.sqrt(square)
         for column in range(scale.shape[0]):
-            part = memory[(TANGENT + column) * STRIDE + slot] / length
+            part = memory[(rows.TANGENT + column) * STRIDE + slot] / length
             # So would in time what decays faster than the rest.
-            memory[(TANGENT + column) * STRIDE + slot] = part if abs(part) > LOST else 0.0
-        memory[GROWTH * STRIDE + slot] += math.log(length)
+            memory[(rows.TANGENT + column) * STRIDE + slot] = part if abs(part) > LOST else 0.0
+        memory[rows.GROWTH * STRIDE + slot] += math.log(length)
 
 
 @scalar
@@ -294,24 +258,24 @@ def end_period(block, batch, period, steps, plan, outcome, present):
             continue
         sound = within_range(memory, slot, batch.scales[index])
         if present.tangent is not None:
-            sound = sound and math.isfinite(memory[GROWTH * STRIDE + slot])
+            sound = sound and math.isfinite(memory[rows.GROWTH * STRIDE + slot])
         if not sound:
             outcome.status[index] = _DIVERGED
             outcome.diverged_period[index] = period
-            for row in range(COEFFICIENTS):
+            for row in range(rows.COEFFICIENTS):
                 memory[row * STRIDE + slot] = math.nan
             continue
         if present.contact is not None:
             if recorded >= 0:
-                branches = read_branches(memory, slot, present)
+                branches = read_branches(memory, slot)
                 end_contact(memory, slot, 0, branches.tangential, steps)
                 end_contact(memory, slot, 1, branches.axial, steps)
         if point >= 0:
-            take(memory, STATE, slot, batch.scales[index], outcome.section[index, point])
+            take(memory, rows.STATE, slot, batch.scales[index], outcome.section[index, point])
         if present.tangent is not None:
             if recorded >= 0:
-                outcome.growth[index, recorded] = memory[GROWTH * STRIDE + slot]
-            memory[GROWTH * STRIDE + slot] = 0.0
+                outcome.growth[index, recorded] = memory[rows.GROWTH * STRIDE + slot]
+            memory[rows.GROWTH * STRIDE + slot] = 0.0
 
 
 @scalar
@@ -321,20 +285,19 @@ def end(block, batch, steps, plan, outcome, present):
     for slot in range(lanes):
         index = batch.order[first + slot]
         scale = batch.scales[index]
-        take(memory, STATE, slot, scale, outcome.end_state[index])
-        take(memory, TANGENT, slot, scale, outcome.end_tangent[index])
-        crossings = load(memory, CROSSINGS, slot, Crossings)
-        outcome.crossings[index] = int(crossings.crossed)
-        outcome.slowest_crossing[index] = crossings.slowest
-        outcome.overflows[index] = int(crossings.overflows)
+        take(memory, rows.STATE, slot, scale, outcome.end_state[index])
+        take(memory, rows.TANGENT, slot, scale, outcome.end_tangent[index])
+        outcome.crossings[index] = int(memory[rows.CROSSINGS * STRIDE + slot])
+        outcome.slowest_crossing[index] = memory[rows.SLOWEST * STRIDE + slot]
+        outcome.overflows[index] = int(memory[rows.OVERFLOWS * STRIDE + slot])
         if present.contact is not None:
-            for row in range(2 * CONTACT_ROWS):
-                unit = steps if row % CONTACT_ROWS in (0, SPEEDS // 2) else 1
-                outcome.contact[index, row] = memory[(CONTACT + row) * STRIDE + slot] / unit
+            for row in range(2 * rows.CONTACT_ROWS):
+                unit = steps if row % rows.CONTACT_ROWS in (0, rows.SPEEDS // 2) else 1
+                outcome.contact[index, row] = memory[(rows.CONTACT + row) * STRIDE + slot] / unit
         if present.loads is not None:
-            for row in range(SIGNALS * SIGNAL_ROWS):
-                value = memory[(LOADS + row) * STRIDE + slot]
-                outcome.loads[index, row // SIGNAL_ROWS, row % SIGNAL_ROWS] = value
+            for row in range(rows.SIGNALS * rows.SIGNAL_ROWS):
+                value = memory[(rows.LOADS + row) * STRIDE + slot]
+                outcome.loads[index, row // rows.SIGNAL_ROWS, row % rows.SIGNAL_ROWS] = value
     if plan.history_periods > 0:
         keep_state(block, batch, outcome.history, plan.history_periods * plan.steps_per_period)
 
@@ -345,13 +308,13 @@ def keep_state(block, batch, history, sample):
     memory, first, lanes = block
     for slot in range(lanes):
         index = batch.order[first + slot]
-        take(memory, STATE, slot, batch.scales[index], history[index, sample])
+        take(memory, rows.STATE, slot, batch.scales[index], history[index, sample])
 
 
 @scalar
 def within_range(memory, slot, scale):
     """Tell whether every state of a lane is a number of sensible size."""
     for column in range(scale.shape[0]):
-        if not abs(memory[(STATE + column) * STRIDE + slot] * scale[column]) < LARGEST_STATE:
+        if not abs(memory[(rows.STATE + column) * STRIDE + slot] * scale[column]) < LARGEST_STATE:
             return False
     return True

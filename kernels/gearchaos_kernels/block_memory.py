@@ -1,19 +1,4 @@
-"""A block of lanes in memory: which row holds which number, and how the inner loop reads it.
-
-A lane is one point of the batch. A block holds ``LANES`` of them, each in a *slot*, as a structure
-of arrays: one flat array in which row r of a slot is element ``r * STRIDE + slot``. With one base
-pointer and constant distances the compiler can prove that the loop over slots vectorises.
-
-Coordinates are *scaled* so that the mesh force enters every equation with coefficient -1 (beta_b:
-base helix angle, mu: mass ratio)::
-
-    torsion = delta_5 / cos(beta_b)
-    transverse_p = delta_1 / (mu_p cos(beta_b))    transverse_g = -delta_2 / (mu_g cos(beta_b))
-    axial_p = delta_3 / (mu_p sin(beta_b))         axial_g = -delta_4 / (mu_g sin(beta_b))
-
-and rates are displacements per step (h times d/d tau). Row r of a state is the r-th of the system's
-states; the last rows of a system with fewer than ten are unused.
-"""
+"""A block of lanes in memory, and how compiled code reads and writes it; see `rows`."""
 
 from collections import namedtuple
 from typing import Any, NamedTuple
@@ -25,21 +10,17 @@ from numba.core import cgutils
 from numba.extending import intrinsic
 from numpy.typing import NDArray
 
+from gearchaos_kernels import rows
 from gearchaos_kernels.compilation import CACHE_LINE, part, scalar
-from gearchaos_kernels.system import STATES, Plan, System
-
-LANES = 32
-"""Lanes of one block: a few vectors wide, small enough for the first-level cache."""
-
-STRIDE = LANES + 8
-"""Distance between rows: no two rows fall on the same cache set at a distance of 4096 bytes."""
+from gearchaos_kernels.rows import STRIDE, Branch, Branches, Coordinates, Lane, State
+from gearchaos_kernels.system import Plan, System
 
 Present = namedtuple(
     "Present",
     "pitch_error phase teeth wide stiffness_variation backlash transverse axial "
     "resolved contact loads tangent flow_map",
 )
-"""What a compiled loop has: ``()`` where it is there, None where the compiler removes it."""
+"""What a compiled loop has: True where it is there, None where the compiler removes it."""
 
 
 def flags(system: System, plan: Plan) -> Present:
@@ -51,112 +32,15 @@ def flags(system: System, plan: Plan) -> Present:
         **effects._asdict(),
         "phase": effects.pitch_error and teeth is None and bool(np.any(system.groups.error_phase)),
         "teeth": teeth is not None,
-        "wide": teeth is not None and teeth.pairs_in_mesh > NARROW,
+        "wide": teeth is not None and teeth.pairs_in_mesh > rows.NARROW,
         "resolved": resolved,
         "contact": resolved and plan.contact,
         "loads": plan.loads and plan.method == "rk4",
         "tangent": plan.tangent,
         "flow_map": plan.method == "flow_map",
     }
-    return Present(**{name: () if present else None for name, present in values.items()})
+    return Present(**{name: present or None for name, present in values.items()})
 
-
-class Coordinates(NamedTuple):
-    """One number for each of the five scaled coordinates; 0 for those a scene leaves out."""
-
-    torsion: float
-    transverse_p: float
-    transverse_g: float
-    axial_p: float
-    axial_g: float
-
-
-class State(NamedTuple):
-    """Scaled displacements and rates of one lane, or those of its tangent vector."""
-
-    position: Coordinates
-    rate: Coordinates
-
-
-Lane = namedtuple(
-    "Lane",
-    "mass_ratio_p mass_ratio_g "
-    "transverse_damping_p transverse_damping_g transverse_stiffness_p transverse_stiffness_g "
-    "axial_damping_p axial_damping_g axial_stiffness_p axial_stiffness_g "
-    "mean_stiffness stiffness_variation mesh_damping axial_share half_backlash load "
-    "error_inertia error_mean error_amplitude error_rate "
-    "axial_error_mean axial_error_amplitude axial_error_rate "
-    "cos_phase sin_phase cosine tangential_speed axial_speed",
-)
-"""Coefficients of one lane (numbers) or of many (arrays), per step; see `coefficients`."""
-
-
-class Branch(NamedTuple):
-    """One linear piece of the clearance function, and the gaps between which it holds."""
-
-    engaged: float
-    offset: float
-    floor: float
-    ceiling: float
-
-
-class Branches(NamedTuple):
-    """The active pieces of the tangential and of the axial clearance."""
-
-    tangential: Branch
-    axial: Branch
-
-
-class Carried(NamedTuple):
-    """Mesh forces and transmission error at one instant, and the slopes of the forces."""
-
-    tangential: float
-    axial: float
-    error: float
-    tangential_slope: float
-    axial_slope: float
-
-
-class Crossings(NamedTuple):
-    """Clearance boundaries that a lane crossed: how many, the slowest one, steps with too many."""
-
-    crossed: float
-    slowest: float
-    overflows: float
-
-
-STATE = 0
-TANGENT = STATE + len(STATES)
-BEFORE = TANGENT + len(STATES)
-"""First row of a copy of state and tangent vector, as they were before the step."""
-COEFFICIENTS = 2 * BEFORE
-TANGENTIAL_BRANCH = COEFFICIENTS + len(Lane._fields)
-AXIAL_BRANCH = TANGENTIAL_BRANCH + len(Branch._fields)
-SUSPECT = AXIAL_BRANCH + len(Branch._fields)
-"""Row that marks the lanes whose step may have left a contact branch."""
-GROWTH = SUSPECT + 1
-"""Row of the logarithm of the tangent vector's growth since the period began."""
-CROSSINGS = GROWTH + 1
-FORCES = CROSSINGS + len(Crossings._fields)
-"""First row of what forces a lane where a step is a map; see `flow_map`."""
-MARGINS = FORCES + 5
-"""Rows of how far either gap may stray from its cubic in a step that is a map."""
-NARROW, MOST_PAIRS = 4, 7
-"""Tooth pairs in mesh at once: with more than the first the loop is another one."""
-PAIRS = MARGINS + 2
-"""First row of their errors; see `teeth`."""
-SHARED = PAIRS + MOST_PAIRS
-"""Rows of the error that they share where the last step ended: value, slope and curvature."""
-CONTACT = SHARED + 3
-"""First row of what is told of the contact: tangential, then axial."""
-CONTACT_ROWS, SPEEDS = 6, 4
-"""Rows of one direction: time in steps and impacts on either flank, sum and largest of speeds."""
-LOADS = CONTACT + 2 * CONTACT_ROWS
-SIGNALS, SIGNAL_ROWS = 3, 4
-"""What is told of tangential force, axial force and transmission error: largest and smallest value,
-sums over the steps of six times the mean of itself and of its square; see `loads`."""
-CARRIED = LOADS + SIGNALS * SIGNAL_ROWS
-ROWS = CARRIED + len(Carried._fields)
 
 _ITEM = np.dtype(np.float64).itemsize
 
@@ -172,9 +56,9 @@ class Block(NamedTuple):
 @part
 def aligned_memory():
     """Return memory for one block that starts on a cache line."""
-    memory = np.empty(ROWS * STRIDE + CACHE_LINE // _ITEM)
+    memory = np.empty(rows.ROWS * STRIDE + CACHE_LINE // _ITEM)
     misfit = (CACHE_LINE - memory.ctypes.data % CACHE_LINE) % CACHE_LINE // _ITEM
-    return memory[misfit : misfit + ROWS * STRIDE]
+    return memory[misfit : misfit + rows.ROWS * STRIDE]
 
 
 def _pointer(context: Any, builder: Any, signature: Any, arguments: Any, number: int) -> Any:
@@ -213,9 +97,16 @@ def store(_typing_context: Any, memory: Any, row: Any, slot: Any, record: Any) -
 
 @scalar
 def fill_lane(memory, slot, coefficients):
-    """Store the coefficients of a lane, shape (fields of `Lane`,)."""
+    """Store the coefficients of a lane, shape (fields of `Lane`,), and return them."""
     for column in range(coefficients.shape[0]):
-        memory[(COEFFICIENTS + column) * STRIDE + slot] = coefficients[column]
+        memory[(rows.COEFFICIENTS + column) * STRIDE + slot] = coefficients[column]
+    return read_lane(memory, slot)
+
+
+@scalar
+def read_lane(memory, slot):
+    """Return the coefficients of a lane."""
+    return load(memory, rows.COEFFICIENTS, slot, Lane)
 
 
 @scalar
@@ -282,16 +173,16 @@ def write_coordinates(memory, first, slot, values, present):
 
 
 @scalar
-def read_branches(memory, slot, present):
+def read_branches(memory, slot):
     """Return the active pieces of a lane; without axial pair the second one repeats the first."""
-    tangential = load(memory, TANGENTIAL_BRANCH, slot, Branch)
-    if present.axial is None:
-        return Branches(tangential, tangential)
-    return Branches(tangential, load(memory, AXIAL_BRANCH, slot, Branch))
+    return Branches(
+        load(memory, rows.TANGENTIAL_BRANCH, slot, Branch),
+        load(memory, rows.AXIAL_BRANCH, slot, Branch),
+    )
 
 
 @scalar
 def write_branches(memory, slot, branches):
     """Store the active pieces of a lane."""
-    store(memory, TANGENTIAL_BRANCH, slot, branches.tangential)
-    store(memory, AXIAL_BRANCH, slot, branches.axial)
+    store(memory, rows.TANGENTIAL_BRANCH, slot, branches.tangential)
+    store(memory, rows.AXIAL_BRANCH, slot, branches.axial)

@@ -1,14 +1,14 @@
 """From the dimensionless groups to the numbers the inner loop reads.
 
 This is the only place that knows both the notation of Pan 2021 and the scaled coordinates of
-`block_memory`: the groups come in as they are printed in eqs 8-13, and leave as coefficients per
+`rows`: the groups come in as they are printed in eqs 8-13, and leave as coefficients per
 step. With a step of 1 they are those per unit of tau.
 """
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gearchaos_kernels.block_memory import Lane
+from gearchaos_kernels.rows import Lane
 from gearchaos_kernels.system import Floats, Groups, System
 
 BEARING_DAMPING = [name for name in Groups._fields if "_damping_" in name]

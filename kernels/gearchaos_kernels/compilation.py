@@ -67,7 +67,7 @@ class KnownFlags(FunctionPass):  # type: ignore[misc]
         """Keep nothing between functions."""
 
     def run_pass(self, state: Any) -> bool:
-        """Replace ``record.flag`` by None or ``()``."""
+        """Replace ``record.flag`` by None or True; what is there is never False."""
         changed = False
         for part in state.func_ir.blocks.values():
             for assignment in part.find_insts(numba_ir.Assign):
@@ -78,8 +78,8 @@ class KnownFlags(FunctionPass):  # type: ignore[misc]
                 kind = state.args[record.index] if isinstance(record, numba_ir.Arg) else None
                 if isinstance(kind, types.NamedTuple) and value.attr in kind.fields:
                     field = kind.types[kind.fields.index(value.attr)]
-                    if field in (types.none, types.Tuple(())):
-                        constant = None if field is types.none else ()
+                    if field in (types.none, types.boolean):
+                        constant = None if field is types.none else True
                         assignment.value = numba_ir.Const(constant, value.loc)
                         state.func_ir._definitions[assignment.target.name] = [assignment.value]
                         changed = True

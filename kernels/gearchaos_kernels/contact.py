@@ -7,8 +7,9 @@ smooth field, so that the method keeps its order; one that leaves it has to be s
 
 import math
 
-from gearchaos_kernels.block_memory import CONTACT, CONTACT_ROWS, SPEEDS, STRIDE, Branch, Branches
+from gearchaos_kernels import rows
 from gearchaos_kernels.compilation import scalar
+from gearchaos_kernels.rows import STRIDE, Branch, Branches
 
 NEVER = 2.0
 """Fraction of a step returned where the step does not leave its branch: beyond its end."""
@@ -57,41 +58,55 @@ def next_branch(branch, gap, half_backlash):
 
 
 @scalar
-def tell_crossing(memory, slot, axially, branch, following, moment, speed):
-    """Enter a crossing into what is told of the contact, a moment in steps of the mesh period.
+def leave(memory, slot, axially, gap, branches, lane, moment, recorded, present):
+    """Return branches, the one that a gap leaves and the one that follows; tell of the crossing.
 
-    Time on a flank is the sum of all moments at which it is left less those at which it is met.
+    The moment is in steps of the mesh period.
     """
-    first = CONTACT + (CONTACT_ROWS if axially else 0)
-    meets = following.engaged
-    # One of the two offsets is that of the flank, the other one 0.
-    at = (first + row_of_flank(branch.offset + following.offset)) * STRIDE + slot
-    memory[at] += moment * (1.0 - 2.0 * meets)
-    memory[at + STRIDE] += meets
-    at = (first + SPEEDS) * STRIDE + slot
-    memory[at] += meets * speed
-    memory[at + STRIDE] = max(memory[at + STRIDE], meets * speed)
+    branch = branches.axial if axially else branches.tangential
+    following = next_branch(branch, gap.value, lane.half_backlash)
+    if axially:
+        branches = Branches(branches.tangential, following)
+    else:
+        branches = Branches(following, branches.axial)
+    if recorded:
+        speed = (lane.axial_speed if axially else lane.tangential_speed) * abs(gap.rate)
+        at = rows.CROSSINGS * STRIDE + slot
+        memory[at] += 1.0
+        memory[at + STRIDE] = min(memory[at + STRIDE], speed)
+        if present.contact is not None:
+            first = rows.CONTACT + (rows.CONTACT_ROWS if axially else 0)
+            meets = following.engaged
+            # One of the two offsets is that of the flank, the other one 0.
+            at = (first + row_of_flank(branch.offset + following.offset)) * STRIDE + slot
+            # Time on a flank is the sum of all moments of leaving it less those of meeting it.
+            memory[at] += moment * (1.0 - 2.0 * meets)
+            memory[at + STRIDE] += meets
+            at = (first + rows.SPEEDS) * STRIDE + slot
+            memory[at] += meets * speed
+            memory[at + STRIDE] = max(memory[at + STRIDE], meets * speed)
+    return branches, branch, following
 
 
 @scalar
 def end_contact(memory, slot, way, branch, steps):
     """Count the flank on which a mesh period of so many steps ends until its end."""
-    row = CONTACT + way * CONTACT_ROWS + row_of_flank(branch.offset)
+    row = rows.CONTACT + way * rows.CONTACT_ROWS + row_of_flank(branch.offset)
     memory[row * STRIDE + slot] += steps * branch.engaged
 
 
 @scalar
 def row_of_flank(offset):
     """Return the row of the driving flank, and where there is no clearance, or the back flank."""
-    return 0 if offset >= 0.0 else SPEEDS // 2
+    return 0 if offset >= 0.0 else rows.SPEEDS // 2
 
 
 @scalar
-def step_may_leave(begin, end, branches, present):
+def step_may_leave(begin, end, branches, margins, present):
     """Tell whether a step from one pair of gaps to another may leave a branch of either."""
-    suspect = may_leave(begin.tangential, end.tangential, branches.tangential)
+    suspect = may_leave(begin.tangential, end.tangential, branches.tangential, margins[0])
     if present.axial is not None:
-        suspect |= may_leave(begin.axial, end.axial, branches.axial)
+        suspect |= may_leave(begin.axial, end.axial, branches.axial, margins[1])
     return suspect
 
 
@@ -112,11 +127,9 @@ def may_leave(begin, end, branch, margin=0.0):
 
 @scalar
 def leaving_fraction(begin, end, length, branch, half_backlash):
-    """Return the fraction of a piece at which the gap leaves its branch, or `NEVER`.
-
-    The gap over the piece, so many steps long, is the cubic through its values and rates at both
-    ends. The field is continuous, so an error of the moment moves the state by its square only.
-    """
+    """Return the fraction of a piece, so many steps long, at which a gap leaves its branch."""
+    # The gap is the cubic through its values and rates at both ends. The field is continuous, so
+    # that an error of the moment moves the state by its square only.
     if half_backlash == 0.0:
         return NEVER
     # One formula for a motion and its mirror image: the compiler then rounds both alike.
@@ -172,11 +185,24 @@ def first_fall(d0, r0, d1, r1):
             return NEVER
     if d0 == 0.0 and low == 0.0:
         return 0.0
-    value_low = d0 + low * (r0 + low * (c2 + low * c3))
-    at = low - (high - low) * value_low / (value_high - value_low)
+    coefficients = d0, r0, c2, c3
+    value_low, _ = cubic(coefficients, low)
+    guess = low - (high - low) * value_low / (value_high - value_low)
+    return falling_root(cubic, coefficients, low, high, guess, _LAST_CORRECTION)
+
+
+@scalar
+def cubic(coefficients, at):
+    """Return a cubic and its slope."""
+    d0, r0, c2, c3 = coefficients
+    return d0 + at * (r0 + at * (c2 + at * c3)), r0 + at * (2.0 * c2 + at * 3.0 * c3)
+
+
+@scalar
+def falling_root(polynomial, given, low, high, at, last_correction):
+    """Return where a polynomial that falls between two places passes zero, from a guess."""
     for _ in range(_ITERATIONS):
-        value = d0 + at * (r0 + at * (c2 + at * c3))
-        slope = r0 + at * (2.0 * c2 + at * 3.0 * c3)
+        value, slope = polynomial(given, at)
         if value > 0.0:
             low = at
         else:
@@ -184,7 +210,7 @@ def first_fall(d0, r0, d1, r1):
         following = at - value / slope
         if not low <= following <= high:
             following = 0.5 * (low + high)
-        elif abs(following - at) < _LAST_CORRECTION:
+        elif abs(following - at) < last_correction:
             return following
         at = following
     return at

@@ -1,6 +1,6 @@
 """Equations of motion of one lane (Pan 2021, eq. 13) and their linearisation, as plain formulas.
 
-Everything is in the scaled coordinates of `block_memory`, displacements dimensionless and rates,
+Everything is in the scaled coordinates of `rows`, displacements dimensionless and rates,
 accelerations and forces per step and per step squared. There (with q = approach of the two gears)::
 
     gap_y = q - e,            y_1 = cos(beta_b) gap_y
@@ -12,8 +12,8 @@ leaves the second line as it is. The clearance of both directions is then the sa
 
 from typing import NamedTuple
 
-from gearchaos_kernels.block_memory import Coordinates
 from gearchaos_kernels.compilation import scalar
+from gearchaos_kernels.rows import Coordinates
 
 
 class Gap(NamedTuple):
@@ -87,10 +87,7 @@ def branch_force(gap, stiffness, damping, branch):
 
 @scalar
 def mesh_forces(gaps, lane, stiffness, branches, present):
-    """Return N_y and N_z of eq. 13, and their slopes d(force)/d(gap).
-
-    Without ``branches`` the clearance function itself is evaluated.
-    """
+    """Return N_y and N_z of eq. 13 and their slopes d(force)/d(gap), on branches if given."""
     damping = lane.mesh_damping
     stiffness_z = lane.axial_share * stiffness
     damping_z = lane.axial_share * damping

@@ -5,16 +5,12 @@ Both call the formulas that the Runge-Kutta steps call.
 
 import numpy as np
 
+from gearchaos_kernels import rows
 from gearchaos_kernels.block_memory import (
-    COEFFICIENTS,
-    STATE,
-    Lane,
-    State,
     aligned_memory,
     fill,
     fill_lane,
     flags,
-    load,
     read_state,
     take,
     write_state,
@@ -29,7 +25,8 @@ from gearchaos_kernels.equations import (
     mesh_forces,
     tangent_forces,
 )
-from gearchaos_kernels.forcing import forcing_at, phase_table, shifted
+from gearchaos_kernels.forcing import forcing_at, phase_table, pitch_error_at
+from gearchaos_kernels.rows import State
 from gearchaos_kernels.system import Effects, Floats, MeshMotion, Plan, System
 from gearchaos_kernels.teeth import engage, point_on_grid, tables_of
 
@@ -62,8 +59,7 @@ def _differentiate(coefficients, scales, slopes, result, present):
     memory = aligned_memory()
     for index in range(scales.shape[0]):
         scale = scales[index]
-        fill_lane(memory, 0, coefficients[index])
-        lane = load(memory, COEFFICIENTS, 0, Lane)
+        lane = fill_lane(memory, 0, coefficients[index])
         stiffness = Directions(
             lane.mean_stiffness * slopes[index, 0],
             lane.axial_share * lane.mean_stiffness * slopes[index, 1],
@@ -71,12 +67,12 @@ def _differentiate(coefficients, scales, slopes, result, present):
         for column in range(scale.shape[0]):
             unit = np.zeros(scale.shape[0])
             unit[column] = 1.0
-            fill(memory, STATE, 0, scale, unit)
-            tangent = read_state(memory, STATE, 0, present)
+            fill(memory, rows.STATE, 0, scale, unit)
+            tangent = read_state(memory, rows.STATE, 0, present)
             forces = tangent_forces(tangent, lane, stiffness, present)
             change = State(tangent.rate, accelerations(tangent, forces, 0.0, lane, present))
-            write_state(memory, STATE, 0, change, present)
-            take(memory, STATE, 0, scale, result[index, :, column])
+            write_state(memory, rows.STATE, 0, change, present)
+            take(memory, rows.STATE, 0, scale, result[index, :, column])
 
 
 def mesh_motion(
@@ -121,12 +117,11 @@ def _follow(coefficients, scales, steps, table, teeth, first, states, motion, pr
     shares, driving, driven, profile = teeth
     for index in range(states.shape[0]):
         step = steps[index]
-        fill_lane(memory, 0, coefficients[index])
-        lane = load(memory, COEFFICIENTS, 0, Lane)
+        lane = fill_lane(memory, 0, coefficients[index])
         half_backlash = 0.0 if present.backlash is None else lane.half_backlash
         for sample in range(states.shape[1]):
-            fill(memory, STATE, 0, scales[index], states[index, sample])
-            state = read_state(memory, STATE, 0, present)
+            fill(memory, rows.STATE, 0, scales[index], states[index, sample])
+            state = read_state(memory, rows.STATE, 0, present)
             row = 2 * sample % (table.shape[0] - 1)
             if present.teeth is not None:
                 if row == 0:
@@ -135,9 +130,7 @@ def _follow(coefficients, scales, steps, table, teeth, first, states, motion, pr
             point = point_on_grid(memory, 0, table, shares, row, present)
             forcing = forcing_at(lane, point, present)
             if present.pitch_error is not None:
-                # Half of what twice the error is made of, whatever the form of the gaps.
-                value = lane.axial_error_amplitude * shifted(lane, point, present).value
-                motion.pitch_error[index, sample] = 0.5 * (lane.axial_error_mean + value)
+                motion.pitch_error[index, sample] = pitch_error_at(lane, point, present)
             gaps = gaps_at(state, lane, forcing, present)
             forces, _ = mesh_forces(gaps, lane, forcing.stiffness, None, present)
             # Scaled, N_y and N_z enter eq. 13 with coefficient -1, and per step squared.
@@ -148,6 +141,6 @@ def _follow(coefficients, scales, steps, table, teeth, first, states, motion, pr
                 motion.force_axial[index, sample] = forces.axial / step**2
                 motion.contact_axial[index, sample] = flank_at(gaps.axial.value, half_backlash)
             acceleration = accelerations(state, forces, forcing.drive, lane, present)
-            write_state(memory, STATE, 0, State(state.rate, acceleration), present)
-            take(memory, STATE, 0, scales[index], change)
+            write_state(memory, rows.STATE, 0, State(state.rate, acceleration), present)
+            take(memory, rows.STATE, 0, scales[index], change)
             motion.accelerations[index, sample] = change[1::2] / step

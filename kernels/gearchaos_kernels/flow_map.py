@@ -28,10 +28,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gearchaos_kernels.block_memory import Lane, Present, flags
+from gearchaos_kernels.block_memory import Present, flags
 from gearchaos_kernels.coefficients import lane_coefficients
 from gearchaos_kernels.flow_layout import Layout, layout
 from gearchaos_kernels.flow_series import RightSide, differentiate, fill_maps, series_of_forcing
+from gearchaos_kernels.rows import Lane
 from gearchaos_kernels.system import Floats, Groups, Plan, System
 
 TAIL = 2e-15
@@ -83,8 +84,9 @@ def maps_memory(system: System, plan: Plan, stable: NDArray[np.int64]) -> int:
     two for every harmonic of the stiffness; fewer are divided, see `_make`.
     """
     place: Layout = layout.py_func(flags(system, plan))
+    harmonics = system.stiffness_cosine.size if system.effects.stiffness_variation else 0
     _, first = np.unique(sharing(system), return_index=True)
-    needed = stable[first] + 2.0 * system.stiffness_cosine.size * place.varies
+    needed = stable[first] + 2.0 * harmonics
     steps = plan.steps_per_period
     divided = steps * 2.0 ** np.ceil(np.log2(np.maximum(needed / steps, 1.0)))
     sizes = 8 * place.step_size * np.minimum(divided, max(steps, MOST_STEPS))
@@ -149,7 +151,7 @@ def _make(system: System, steps: int, present: Present) -> Floats:
         shapes = (states, states + 3), (2, states + 3), (states, 2)
         right_side = RightSide(*map(np.zeros, shapes))
         differentiate(coefficients, right_side, present)
-        forcing = series_of_forcing(system, Lane(*coefficients), count, place.varies)
+        forcing = series_of_forcing(system, Lane(*coefficients), count)
         table = np.zeros((count, place.step_size))
         edges = 2.0 * np.pi / count * np.arange(count + 1)
         for column, values in enumerate((np.sin(edges), np.cos(edges))):

@@ -9,23 +9,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.polynomial import chebyshev
 
-from gearchaos_kernels.block_memory import (
-    COEFFICIENTS,
-    STATE,
-    STRIDE,
-    Coordinates,
-    Lane,
-    State,
-    aligned_memory,
-    fill_lane,
-    load,
-    read_state,
-    write_state,
-)
-from gearchaos_kernels.compilation import evaluator, part, scalar
+from gearchaos_kernels import rows
+from gearchaos_kernels.block_memory import aligned_memory, fill_lane, read_state, write_state
+from gearchaos_kernels.compilation import evaluator, part
 from gearchaos_kernels.equations import Directions, accelerations, gaps_at
-from gearchaos_kernels.flow_layout import BOUND_Y, BOUND_Z, HEADER, TERMS
+from gearchaos_kernels.flow_layout import BOUNDS, HEADER, TERMS
 from gearchaos_kernels.forcing import Phase, forcing_at
+from gearchaos_kernels.rows import STRIDE, Coordinates, Lane, State
 from gearchaos_kernels.system import Floats, System
 
 ORDER = 26
@@ -82,17 +72,16 @@ def differentiate(coefficients, right_side, present):
     """Apply the formulas of eq. 13 to one unit after the other."""
     states = right_side.rates.shape[0]
     memory = aligned_memory()
-    fill_lane(memory, 0, coefficients)
-    lane = load(memory, COEFFICIENTS, 0, Lane)
+    lane = fill_lane(memory, 0, coefficients)
     zero = Coordinates(0.0, 0.0, 0.0, 0.0, 0.0)
     rest = State(zero, zero)
     for column in range(states + 3):
         for line in range(states):
-            memory[(STATE + line) * STRIDE] = 1.0 if line == column else 0.0
+            memory[(rows.STATE + line) * STRIDE] = 1.0 if line == column else 0.0
         drive = 1.0 if column == states else 0.0
         sine = 1.0 if column == states + 1 else 0.0
         cosine = 1.0 if column == states + 2 else 0.0
-        state = read_state(memory, STATE, 0, present)
+        state = read_state(memory, rows.STATE, 0, present)
         acting = forcing_at(lane, Phase(0.0, sine, cosine, -sine), present)
         both = gaps_at(state, lane, acting, present)
         right_side.gaps[0, column] = both.tangential.value
@@ -104,18 +93,18 @@ def differentiate(coefficients, right_side, present):
         result = State(
             state.rate, accelerations(state, forces, drive + acting.drive, lane, present)
         )
-        write_state(memory, STATE, 0, result, present)
+        write_state(memory, rows.STATE, 0, result, present)
         for line in range(states):
-            right_side.rates[line, column] = memory[(STATE + line) * STRIDE]
+            right_side.rates[line, column] = memory[(rows.STATE + line) * STRIDE]
     for way in range(2):
         forces = Directions(1.0 - way, lane.axial_share * way)
         result = State(zero, accelerations(rest, forces, 0.0, lane, present))
-        write_state(memory, STATE, 0, result, present)
+        write_state(memory, rows.STATE, 0, result, present)
         for line in range(states):
-            right_side.mobility[line, way] = memory[(STATE + line) * STRIDE]
+            right_side.mobility[line, way] = memory[(rows.STATE + line) * STRIDE]
 
 
-def series_of_forcing(system: System, lane: Lane, steps: int, varies: bool) -> Floats:
+def series_of_forcing(system: System, lane: Lane, steps: int) -> Floats:
     """Taylor coefficients about the middle of every step, shape (steps, 3, `ORDER`).
 
     Of the mesh stiffness (eq. 19), and of sine and cosine of the mesh phase.
@@ -126,7 +115,7 @@ def series_of_forcing(system: System, lane: Lane, steps: int, varies: bool) -> F
     factor = half**term / np.cumprod(np.maximum(term, 1.0))
     turn = np.exp(1j * middle) * 1j**term * factor
     stiffness = lane.mean_stiffness * (term == 0) * np.ones((steps, 1))
-    if varies:
+    if system.effects.stiffness_variation:
         for number, amplitude in enumerate(system.stiffness_cosine - 1j * system.stiffness_sine, 1):
             waves = amplitude * np.exp(1j * number * middle) * (1j * number) ** term * factor
             stiffness = stiffness + lane.stiffness_variation * waves.real
@@ -140,7 +129,7 @@ def fill_maps(right_side, forcing, table, place):
     for number in range(table.shape[0]):
         for pair in range(place.pairs):
             left = fill_pair(pair, table[number], right_side, forcing[number], place)
-            tail = larger(tail, left)
+            tail = np.maximum(tail, left)
     return tail
 
 
@@ -214,8 +203,8 @@ def fill_pair(pair, row, right_side, forcing, place):
         add_product(sign, inverse[0], inverse[k], back)
     for line in range(states):
         for column in range(states):
-            tail = larger(tail, abs(psi[ORDER, line, column]))
-            tail = larger(tail, abs(inverse[ORDER, line, column]))
+            tail = np.maximum(tail, abs(psi[ORDER, line, column]))
+            tail = np.maximum(tail, abs(inverse[ORDER, line, column]))
 
     # From the middle of the step to its beginning; a step is 2 long in s.
     end = over_beginning(last, first, back)
@@ -224,15 +213,15 @@ def fill_pair(pair, row, right_side, forcing, place):
             piece[column * place.width + line] = end[line, column]
     along = over_beginning(gap.reshape((ways * ORDER, columns)), first, back)
     cut, left = economised(along.reshape((ORDER, ways * columns)))
-    tail = larger(tail, left)
+    tail = np.maximum(tail, left)
     traced = np.zeros((ORDER, states, ways))
     for k in range(ORDER):
         add_product(0.5, first, switch[k], traced[k])
     thrown, left = economised(traced.reshape((ORDER, ways * states)))
-    tail = larger(tail, left)
+    tail = np.maximum(tail, left)
     for way in range(ways):
-        at = place.gap_y if way == 0 else place.gap_z
-        bound = BOUND_Y if way == 0 else BOUND_Z
+        at = place.gaps[way]
+        bound = BOUNDS[way]
         for column in range(columns):
             terms = piece[at + column * TERMS : at + (column + 1) * TERMS]
             bend = 0.0
@@ -240,17 +229,11 @@ def fill_pair(pair, row, right_side, forcing, place):
                 terms[term] = cut[term, way * columns + column]
                 bend += _BENDS[term] * abs(terms[term])
             row[bound + column] = max(row[bound + column], bend)
-        at = place.switch_y if way == 0 else place.switch_z
+        at = place.switches[way]
         for term in range(TERMS):
             for line in range(states):
                 piece[at + term * place.width + line] = thrown[term, ways * line + way]
     return tail
-
-
-@scalar
-def larger(a, b):
-    """Return the larger of two numbers, or not a number where one is not."""
-    return a if a > b or a != a else b
 
 
 @part
@@ -297,7 +280,7 @@ def economised(series):
         left = 0.0
         for term in range(lost.shape[0]):
             left += abs(lost[term, column])
-        most = larger(most, left)
+        most = np.maximum(most, left)
         for term in range(TERMS):
-            largest = larger(largest, abs(target[term, column]))
+            largest = np.maximum(largest, abs(target[term, column]))
     return target, most / largest

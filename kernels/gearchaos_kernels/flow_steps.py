@@ -12,53 +12,15 @@ those of the motion: the field is continuous, so that no other term comes from t
 
 import math
 
-from gearchaos_kernels.block_memory import (
-    BEFORE,
-    COEFFICIENTS,
-    FORCES,
-    LANES,
-    MARGINS,
-    STATE,
-    STRIDE,
-    SUSPECT,
-    TANGENT,
-    Branch,
-    Branches,
-    Lane,
-    load,
-    read_branches,
-    read_state,
-    write_branches,
-)
+from gearchaos_kernels import contact, rows
+from gearchaos_kernels import flow_vectors as vectors
+from gearchaos_kernels.block_memory import read_branches, read_lane, read_state, write_branches
 from gearchaos_kernels.compilation import scalar
-from gearchaos_kernels.contact import (
-    NEVER,
-    branches_at,
-    first_fall,
-    may_leave,
-    next_branch,
-    tell_crossing,
-)
-from gearchaos_kernels.equations import gaps_at
-from gearchaos_kernels.flow_layout import BOUND_Y, BOUND_Z, HEADER, TERMS, layout
-from gearchaos_kernels.flow_vectors import (
-    GAP_Y,
-    GAP_Z,
-    INPUTS,
-    RESULT,
-    TANGENT_GAP,
-    TANGENT_INPUTS,
-    VECTOR,
-    add_switch,
-    end_of,
-    gap_along,
-    keep_before,
-    move,
-    tangent_end_of,
-    tangent_gap_along,
-    value_and_slope,
-)
+from gearchaos_kernels.equations import Gap, gaps_at
+from gearchaos_kernels.flow_layout import BOUNDS, HEADER, TERMS, layout
+from gearchaos_kernels.flow_vectors import GAPS, INPUTS, RESULT, TANGENT_GAP, TANGENT_INPUTS, VECTOR
 from gearchaos_kernels.forcing import Phase, forcing_at
+from gearchaos_kernels.rows import LANES, STRIDE, Branch, Branches
 from gearchaos_kernels.splitting import MOST_SPLITS
 
 ALWAYS = Branch(1.0, 0.0, -math.inf, math.inf)
@@ -69,7 +31,6 @@ _LOOKS = 300
 _NARROW = 1e-9
 """In so short a piece of a step a gap that turns around goes as far as rounding does."""
 _LAST_CORRECTION = 1e-8
-_ITERATIONS = 60
 
 
 @scalar
@@ -83,31 +44,29 @@ def phases_of(table, row):
 def begin_forces(memory, slot, lane, present):
     """Store what forces a lane, in the order of columns; without clearance no flank has offsets."""
     amplitude = 0.5 * lane.axial_error_amplitude
-    error = FORCES + 1 + layout(present).ways
-    memory[FORCES * STRIDE + slot] = lane.load
+    error = rows.FORCES + 1 + layout(present).ways
+    memory[rows.FORCES * STRIDE + slot] = lane.load
     memory[error * STRIDE + slot] = amplitude * lane.cos_phase
     memory[(error + 1) * STRIDE + slot] = amplitude * lane.sin_phase
     branches = Branches(ALWAYS, ALWAYS)
     if present.resolved is not None:
-        branches = read_branches(memory, slot, present)
+        branches = read_branches(memory, slot)
     store_offsets(memory, slot, lane, branches, present)
 
 
 @scalar
 def store_offsets(memory, slot, lane, branches, present):
     """Store by how much each gap exceeds the deflection on its branch."""
-    y, z = offsets_of(lane, branches, present)
-    memory[(FORCES + 1) * STRIDE + slot] = y
-    if present.axial is not None:
-        memory[(FORCES + 2) * STRIDE + slot] = z
+    for way in range(layout(present).ways):
+        offset = offset_of(way, lane, branches, present)
+        memory[(rows.FORCES + 1 + way) * STRIDE + slot] = offset
 
 
 @scalar
-def offsets_of(lane, branches, present):
-    """Return the offsets of both branches, with the mean error, which no column of a map has."""
-    y, z = branches
-    error_y, error_z = mean_errors(lane, present)
-    return y.offset + y.engaged * error_y, z.offset + z.engaged * error_z
+def offset_of(way, lane, branches, present):
+    """Return the offset of a branch, with the mean error, which no column of a map has."""
+    branch = branches[way]
+    return branch.offset + branch.engaged * mean_errors(lane, present)[way]
 
 
 @scalar
@@ -134,11 +93,11 @@ def move_block(memory, table, row, slots, work, present):
     if slots == 1:
         return move_lane(memory, table, row, work, present)
     for slot in range(0, slots, VECTOR):
-        keep_before(memory, slot, table, row, present)
+        vectors.keep_before(memory, slot, table, row, present)
     for pair in range(place.pairs):
         at = row + HEADER + pair * place.size
         for slot in range(0, slots, VECTOR):
-            move(memory, slot, table, at, 1.0 - pair % 2, 1.0 - pair // 2, present)
+            vectors.move(memory, slot, table, at, 1.0 - pair % 2, 1.0 - pair // 2, present)
     # A known number of slots is what the compiler makes vector instructions of.
     if slots == VECTOR:
         return count_suspects(memory, VECTOR, table, row, present)
@@ -151,20 +110,18 @@ def move_lane(memory, table, row, work, present):
     place = layout(present)
     # Number by number: a vector would have to wait for the single numbers stored before it.
     for line in range(place.states):
-        memory[(BEFORE + STATE + line) * STRIDE] = memory[(STATE + line) * STRIDE]
+        memory[(rows.STATE_BEFORE + line) * STRIDE] = memory[(rows.STATE + line) * STRIDE]
         if present.tangent is not None:
-            memory[(BEFORE + TANGENT + line) * STRIDE] = memory[(TANGENT + line) * STRIDE]
+            memory[(rows.TANGENT_BEFORE + line) * STRIDE] = memory[(rows.TANGENT + line) * STRIDE]
     gather(memory, 0, work, present)
-    margin_y = 0.0
-    margin_z = 0.0
-    for column in range(place.columns):
-        margin_y += table[row + BOUND_Y + column] * abs(work[INPUTS + column])
-        margin_z += table[row + BOUND_Z + column] * abs(work[INPUTS + column])
-    memory[MARGINS * STRIDE] = margin_y
-    memory[(MARGINS + 1) * STRIDE] = margin_z
+    for way in range(place.ways):
+        margin = 0.0
+        for column in range(place.columns):
+            margin += table[row + BOUNDS[way] + column] * abs(work[INPUTS + column])
+        memory[(rows.MARGINS + way) * STRIDE] = margin
     at = row + HEADER
     if present.resolved is not None:
-        at += pair_of(read_branches(memory, 0, present), present) * place.size
+        at += pair_of(read_branches(memory, 0), present) * place.size
     scatter(memory, 0, table, at, work, present)
     return count_suspects(memory, 1, table, row, present)
 
@@ -174,24 +131,24 @@ def gather(memory, slot, work, present):
     """Read what is to be multiplied with a map: state before the step, forces, tangent vector."""
     place = layout(present)
     for line in range(place.states):
-        work[INPUTS + line] = memory[(BEFORE + STATE + line) * STRIDE + slot]
+        work[INPUTS + line] = memory[(rows.STATE_BEFORE + line) * STRIDE + slot]
         if present.tangent is not None:
-            work[TANGENT_INPUTS + line] = memory[(BEFORE + TANGENT + line) * STRIDE + slot]
+            work[TANGENT_INPUTS + line] = memory[(rows.TANGENT_BEFORE + line) * STRIDE + slot]
     for number in range(place.columns - place.states):
-        work[INPUTS + place.states + number] = memory[(FORCES + number) * STRIDE + slot]
+        work[INPUTS + place.states + number] = memory[(rows.FORCES + number) * STRIDE + slot]
 
 
 @scalar
 def scatter(memory, slot, table, at, work, present):
     """Write where a map leads what was read, state and tangent vector."""
     place = layout(present)
-    end_of(work, RESULT, INPUTS, table, at, present)
+    vectors.end_of(work, RESULT, INPUTS, table, at, present)
     for line in range(place.states):
-        memory[(STATE + line) * STRIDE + slot] = work[RESULT + line]
+        memory[(rows.STATE + line) * STRIDE + slot] = work[RESULT + line]
     if present.tangent is not None:
-        tangent_end_of(work, RESULT, TANGENT_INPUTS, table, at, present)
+        vectors.tangent_end_of(work, RESULT, TANGENT_INPUTS, table, at, present)
         for line in range(place.states):
-            memory[(TANGENT + line) * STRIDE + slot] = work[RESULT + line]
+            memory[(rows.TANGENT + line) * STRIDE + slot] = work[RESULT + line]
 
 
 @scalar
@@ -202,47 +159,35 @@ def count_suspects(memory, slots, table, row, present):
     begin, end = phases_of(table, row)
     suspects = 0
     for slot in range(slots):
-        lane = load(memory, COEFFICIENTS, slot, Lane)
-        branches = read_branches(memory, slot, present)
-        before = read_state(memory, BEFORE + STATE, slot, present)
-        after = read_state(memory, STATE, slot, present)
+        lane = read_lane(memory, slot)
+        branches = read_branches(memory, slot)
+        before = read_state(memory, rows.STATE_BEFORE, slot, present)
+        after = read_state(memory, rows.STATE, slot, present)
         gaps = gaps_at(before, lane, forcing_at(lane, begin, present), present)
         gaps_after = gaps_at(after, lane, forcing_at(lane, end, present), present)
-        margin = memory[MARGINS * STRIDE + slot]
-        suspect = may_leave(gaps.tangential, gaps_after.tangential, branches.tangential, margin)
-        if present.axial is not None:
-            margin = memory[(MARGINS + 1) * STRIDE + slot]
-            suspect |= may_leave(gaps.axial, gaps_after.axial, branches.axial, margin)
+        at = rows.MARGINS * STRIDE + slot
+        margins = memory[at], memory[at + STRIDE]
+        suspect = contact.step_may_leave(gaps, gaps_after, branches, margins, present)
         suspects += 1 if suspect else 0
-        memory[SUSPECT * STRIDE + slot] = 1.0 if suspect else 0.0
+        memory[rows.SUSPECT * STRIDE + slot] = 1.0 if suspect else 0.0
     return suspects
 
 
 @scalar
 def cross(memory, slot, table, row, work, number, recorded, present):
-    """Take the step of one lane from crossing to crossing; see `split_step` for what it returns."""
+    """Take the step of one lane from crossing to crossing."""
     place = layout(present)
-    lane = load(memory, COEFFICIENTS, slot, Lane)
-    b = lane.half_backlash
-    branches = read_branches(memory, slot, present)
+    lane = read_lane(memory, slot)
+    branches = read_branches(memory, slot)
     gather(memory, slot, work, present)
-    error_y, error_z = mean_errors(lane, present)
     done = -1.0
     crossings = 0
-    slowest = math.inf
     while True:
         at = row + HEADER + pair_of(branches, present) * place.size
-        offset_y, offset_z = offsets_of(lane, branches, present)
-        work[INPUTS + place.states + 1] = offset_y
-        gap_along(work, GAP_Y, INPUTS, table, at + place.gap_y, present)
-        work[GAP_Y] -= error_y
-        moment = leaving(work, GAP_Y, done, branches.tangential, b)
+        moment = leaving(0, work, done, lane, branches, table, at, present)
         axially = False
         if present.axial is not None:
-            work[INPUTS + place.states + 2] = offset_z
-            gap_along(work, GAP_Z, INPUTS, table, at + place.gap_z, present)
-            work[GAP_Z] -= error_z
-            moment_z = leaving(work, GAP_Z, done, branches.axial, b)
+            moment_z = leaving(1, work, done, lane, branches, table, at, present)
             axially = not moment <= moment_z
             moment = min(moment, moment_z)
         # Also where the lane has left the range of numbers.
@@ -251,80 +196,76 @@ def cross(memory, slot, table, row, work, number, recorded, present):
 
         crossings += 1
         done = moment
-        gap = GAP_Z if axially else GAP_Y
-        columns = place.gap_z if axially else place.gap_y
-        switch = place.switch_z if axially else place.switch_y
-        speed = lane.axial_speed if axially else lane.tangential_speed
-        branch = branches.axial if axially else branches.tangential
-        value, slope = value_and_slope(work, gap, moment)
+        way = 1 if axially else 0
+        gap = GAPS[way]
+        value, slope = vectors.value_and_slope(work, gap, moment)
         # The step is 2 long in s.
-        speed *= 2.0 * abs(slope)
-        slowest = min(slowest, speed)
-        following = next_branch(branch, value, b)
-        if present.contact is not None:
-            if recorded:
-                at_step = number + 0.5 * (1.0 + moment)
-                tell_crossing(memory, slot, axially, branch, following, at_step, speed)
+        crossed = Gap(value, 2.0 * slope)
+        at_step = number + 0.5 * (1.0 + moment)
+        branches, branch, following = contact.leave(
+            memory, slot, axially, crossed, branches, lane, at_step, recorded, present
+        )
         if present.tangent is not None:
-            tangent_gap_along(work, TANGENT_GAP, TANGENT_INPUTS, table, at + columns, present)
-        if axially:
-            branches = Branches(branches.tangential, following)
-        else:
-            branches = Branches(following, branches.axial)
+            columns = at + place.gaps[way]
+            vectors.tangent_gap_along(work, TANGENT_GAP, TANGENT_INPUTS, table, columns, present)
         # One of the two offsets is that of the flank, the other one 0.
         work[gap] -= branch.offset + following.offset
         sign = branch.engaged - following.engaged
         at = row + HEADER + pair_of(branches, present) * place.size
-        add_switch(work, gap, moment, sign, table, at + switch, present)
+        vectors.add_switch(work, gap, moment, sign, table, at + place.switches[way], present)
 
-    overflow = 1 if moment <= 1.0 else 0
     if crossings > 0:
         scatter(memory, slot, table, at, work, present)
-        if overflow > 0:
+        if moment <= 1.0:
+            memory[rows.OVERFLOWS * STRIDE + slot] += 1.0
             _, end = phases_of(table, row)
-            state = read_state(memory, STATE, slot, present)
+            state = read_state(memory, rows.STATE, slot, present)
             gaps = gaps_at(state, lane, forcing_at(lane, end, present), present)
-            branches = branches_at(gaps, b, present)
+            branches = contact.branches_at(gaps, lane.half_backlash, present)
         write_branches(memory, slot, branches)
         store_offsets(memory, slot, lane, branches, present)
-    return crossings, slowest, overflow
 
 
 @scalar
-def leaving(work, gap, done, branch, half_backlash):
+def leaving(way, work, done, lane, branches, table, at, present):
     """Return the moment after ``done`` at which a gap leaves its branch, or `NEVER`."""
+    place = layout(present)
+    gap = GAPS[way]
+    branch = branches[way]
+    half_backlash = lane.half_backlash
+    work[INPUTS + place.states + 1 + way] = offset_of(way, lane, branches, present)
+    vectors.gap_along(work, gap, INPUTS, table, at + place.gaps[way], present)
+    work[gap] -= mean_errors(lane, present)[way]
     if half_backlash == 0.0:
-        return NEVER
+        return contact.NEVER
     bend = 0.0
     for term in range(TERMS - 1, 3, -1):
         bend += term * (term - 1.0) * (term - 2.0) * (term - 3.0) * abs(work[gap + term])
-    begin = value_and_slope(work, gap, done)
-    end = value_and_slope(work, gap, 1.0)
+    begin = vectors.value_and_slope(work, gap, done)
+    end = vectors.value_and_slope(work, gap, 1.0)
     if branch.engaged != 0.0:
         side = math.copysign(1.0, branch.offset)
-        return first_below(work, gap, done, begin, end, bend, side, -half_backlash)
+        return first_below((work, gap, side, -half_backlash), done, begin, end, bend)
     return min(
-        first_below(work, gap, done, begin, end, bend, -1.0, half_backlash),
-        first_below(work, gap, done, begin, end, bend, 1.0, half_backlash),
+        first_below((work, gap, -1.0, half_backlash), done, begin, end, bend),
+        first_below((work, gap, 1.0, half_backlash), done, begin, end, bend),
     )
 
 
 @scalar
-def first_below(work, gap, done, begin, end, bend, side, distance):
-    """Return where a gap, seen from one side and raised by a distance, first falls below zero.
+def first_below(given, left, begin, end, bend):
+    """Return where a gap, as it is given to `gap_at`, first falls below zero after a moment.
 
-    ``begin``, ``end``: value and slope at ``done`` and at the end of the step; ``bend``: more than
-    its fourth derivative. Piece by piece: one whose Bezier points with their margins are not below
-    zero has no such place, in one that only falls it is found by Newton's method, others are
+    ``begin``, ``end``: value and slope at that moment and at the end of the step; ``bend``: more
+    than its fourth derivative. Piece by piece: one whose Bezier points with their margins are not
+    below zero has no such place, in one that only falls it is found by Newton's method, others are
     halved.
     """
-    left = done
+    value_left, slope_left = seen(given, begin)
     # A step that begins where the last one ended at the boundary begins on the right side of it.
-    value_left = max(side * begin[0] + distance, 0.0)
-    slope_left = side * begin[1]
+    value_left = max(value_left, 0.0)
     right = 1.0
-    value_right = side * end[0] + distance
-    slope_right = side * end[1]
+    value_right, slope_right = seen(given, end)
     for _ in range(_LOOKS):
         width = right - left
         # The polynomial and the cubic differ by bend (width^4 / 24) t^2 (1 - t)^2 at most.
@@ -337,8 +278,9 @@ def first_below(work, gap, done, begin, end, bend, side, distance):
             steepest = max(width * slope_left, 3.0 * (point2 - point1), width * slope_right)
             if steepest < -stray * 0.2 and value_right < 0.0:
                 slopes = width * slope_left, width * slope_right
-                guess = first_fall(value_left, slopes[0], value_right, slopes[1])
-                return falling_root(work, gap, side, distance, left, right, guess)
+                fall = contact.first_fall(value_left, slopes[0], value_right, slopes[1])
+                guess = left + width * fall
+                return contact.falling_root(gap_at, given, left, right, guess, _LAST_CORRECTION)
             clear = steepest < -stray * 0.2
             if not clear and width < _NARROW:
                 if value_right < 0.0:
@@ -346,34 +288,25 @@ def first_below(work, gap, done, begin, end, bend, side, distance):
                 clear = True
         if clear:
             if right >= 1.0:
-                return NEVER
+                return contact.NEVER
             left = right
             value_left = max(value_right, 0.0)
             slope_left = slope_right
             right = min(1.0, left + 2.0 * width)
         else:
             right = left + 0.5 * width
-        value, slope = value_and_slope(work, gap, right)
-        value_right = side * value + distance
-        slope_right = side * slope
-    return NEVER
+        value_right, slope_right = gap_at(given, right)
+    return contact.NEVER
 
 
 @scalar
-def falling_root(work, gap, side, distance, left, right, guess):
-    """Return where a gap that falls from one end of a piece to the other passes zero."""
-    at = left + (right - left) * guess
-    for _ in range(_ITERATIONS):
-        value, slope = value_and_slope(work, gap, at)
-        value = side * value + distance
-        if value > 0.0:
-            left = at
-        else:
-            right = at
-        following = at - value / (side * slope)
-        if not left <= following <= right:
-            following = 0.5 * (left + right)
-        elif abs(following - at) < _LAST_CORRECTION:
-            return following
-        at = following
-    return at
+def gap_at(given, at):
+    """Return a gap, seen from one side and raised by a distance, and its slope."""
+    return seen(given, vectors.value_and_slope(given[0], given[1], at))
+
+
+@scalar
+def seen(given, motion):
+    """Return value and slope of a gap from one side and raised by a distance."""
+    _, _, side, distance = given
+    return side * motion[0] + distance, side * motion[1]

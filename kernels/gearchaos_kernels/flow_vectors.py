@@ -14,23 +14,15 @@ from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic
 
-from gearchaos_kernels.block_memory import (
-    AXIAL_BRANCH,
-    BEFORE,
-    FORCES,
-    MARGINS,
-    STATE,
-    STRIDE,
-    TANGENT,
-    TANGENTIAL_BRANCH,
-)
+from gearchaos_kernels import rows
 from gearchaos_kernels.compilation import FASTMATH
-from gearchaos_kernels.flow_layout import BOUND_Y, BOUND_Z, TERMS, Layout, layout
+from gearchaos_kernels.flow_layout import BOUNDS, TERMS, Layout, layout
+from gearchaos_kernels.rows import STRIDE
 
 VECTOR = 8
 """Lanes of a vector."""
 
-INPUTS, TANGENT_INPUTS, GAP_Y, GAP_Z, TANGENT_GAP, RESULT, WORK = 0, 16, 32, 48, 64, 80, 96
+INPUTS, TANGENT_INPUTS, GAPS, TANGENT_GAP, RESULT, WORK = 0, 16, (32, 48), 64, 80, 96
 """Where the numbers of a lane that crosses stand: state and forces, tangent vector, the gaps along
 the step as polynomials, what the tangent vector adds to one of them, the state or tangent vector at
 the end of the step; and how many numbers that are."""
@@ -42,14 +34,14 @@ _FLAGS = tuple(sorted(FASTMATH))
 
 def _scene(kind: Any) -> tuple[Any, Layout]:
     """Read effects and layout of a scene off the type of its flags."""
-    present = kind.instance_class(*(None if flag is types.none else () for flag in kind.types))
+    present = kind.instance_class(*(None if flag is types.none else True for flag in kind.types))
     return present, layout.py_func(present)
 
 
 def _inputs(first: int, place: Layout) -> list[int]:
     """Return the rows of what is multiplied with a map: a state, and what forces a lane."""
     return [first + n for n in range(place.states)] + [
-        FORCES + n for n in range(place.columns - place.states)
+        rows.FORCES + n for n in range(place.columns - place.states)
     ]
 
 
@@ -132,15 +124,15 @@ def keep_before(_typing, memory, slot, table, row, present):
         kind = ir.VectorType(_DOUBLE, VECTOR)
         name = f"llvm.fabs.v{VECTOR}f64"
         fabs = cgutils.get_or_insert_function(builder.module, ir.FunctionType(kind, [kind]), name)
-        for first in (STATE,) if there.tangent is None else (STATE, TANGENT):
+        for first in (rows.STATE,) if there.tangent is None else (rows.STATE, rows.TANGENT):
             for line in range(first, first + place.states):
-                w.store(w.load(lanes, line * STRIDE), lanes, (BEFORE + line) * STRIDE)
+                w.store(w.load(lanes, line * STRIDE), lanes, (rows.BEFORE + line) * STRIDE)
         if there.resolved is not None:
-            rows = _inputs(STATE, place)
-            sizes = [builder.call(fabs, [w.load(lanes, row * STRIDE)]) for row in rows]
-            for number, bound in enumerate((BOUND_Y, BOUND_Z)[: place.ways]):
+            inputs = _inputs(rows.STATE, place)
+            sizes = [builder.call(fabs, [w.load(lanes, row * STRIDE)]) for row in inputs]
+            for number, bound in enumerate(BOUNDS[: place.ways]):
                 bends = [w.spread(numbers, bound + column) for column in range(len(sizes))]
-                w.store(w.sum(enumerate(bends), sizes), lanes, (MARGINS + number) * STRIDE)
+                w.store(w.sum(enumerate(bends), sizes), lanes, (rows.MARGINS + number) * STRIDE)
         return context.get_dummy_value()
 
     return types.void(memory, types.intp, table, types.intp, present), generate
@@ -156,12 +148,12 @@ def move(_typing, memory, slot, table, at, engaged_y, engaged_z, present):
         lanes, numbers = w.element(0, arguments[1]), w.element(2, arguments[3])
 
         def apply(mask):
-            rows = {STATE: _inputs(BEFORE + STATE, place)}
+            read = {rows.STATE: _inputs(rows.STATE_BEFORE, place)}
             if there.tangent is not None:
-                rows[TANGENT] = [BEFORE + TANGENT + line for line in range(place.states)]
+                read[rows.TANGENT] = [rows.TANGENT_BEFORE + line for line in range(place.states)]
             given = {
                 target: [w.load(lanes, row * STRIDE) for row in sources]
-                for target, sources in rows.items()
+                for target, sources in read.items()
             }
             # The axial pair and the offset of its flank act on nothing else.
             axial = place.states - 4 * (place.ways - 1)
@@ -181,7 +173,7 @@ def move(_typing, memory, slot, table, at, engaged_y, engaged_z, present):
         if place.pairs == 1:
             apply(None)
         else:
-            engaged = {TANGENTIAL_BRANCH: arguments[4], AXIAL_BRANCH: arguments[5]}
+            engaged = {rows.TANGENTIAL_BRANCH: arguments[4], rows.AXIAL_BRANCH: arguments[5]}
             same = [
                 builder.fcmp_ordered("==", w.load(lanes, row * STRIDE), w.splat(number))
                 for row, number in engaged.items()
@@ -262,10 +254,10 @@ def add_switch(_typing, work, gap, moment, factor, table, at, present):
                     weighted[target].append(builder.extract_element(value, ir.IntType(32)(number)))
         for first, size in _pieces(scene.width):
             wide = [w.splat(node, size) for node in nodes]
-            *rows, last = (w.load(columns, n * scene.width + first, size) for n in range(TERMS))
+            *others, last = (w.load(columns, n * scene.width + first, size) for n in range(TERMS))
             sums = [last] * len(wide)
             # Term by term: a register holds the sum of each node, and a row is needed once.
-            for row in reversed(rows):
+            for row in reversed(others):
                 sums = [w.multiply_add(*pair, row) for pair in zip(sums, wide, strict=True)]
             for target, factors in weighted.items():
                 pointer = w.element(0, _INTEGER(target + first))

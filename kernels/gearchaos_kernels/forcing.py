@@ -140,6 +140,13 @@ def forcing_at(lane, point, present):
 
 
 @scalar
+def pitch_error_at(lane, point, present):
+    """Return e at a mesh phase: half of what the axial gap has, whatever the form of the gaps."""
+    value = lane.axial_error_amplitude * shifted(lane, point, present).value
+    return 0.5 * (lane.axial_error_mean + value)
+
+
+@scalar
 def shifted(lane, point, present):
     """Return a mesh phase with the sine of the error shifted by the phase that a lane gives it."""
     if present.phase is None:

@@ -8,26 +8,13 @@ force has a kink; what it is there, damping alone, counts as a fourth value and 
 
 import numpy as np
 
-from gearchaos_kernels.block_memory import (
-    BEFORE,
-    CARRIED,
-    COEFFICIENTS,
-    LANES,
-    LOADS,
-    SIGNAL_ROWS,
-    STATE,
-    STRIDE,
-    Carried,
-    Lane,
-    State,
-    load,
-    read_state,
-    store,
-)
+from gearchaos_kernels import rows
+from gearchaos_kernels.block_memory import load, read_lane, read_state, store
 from gearchaos_kernels.compilation import scalar
 from gearchaos_kernels.equations import gaps_at, mesh_forces
-from gearchaos_kernels.forcing import forcing_at, shifted
+from gearchaos_kernels.forcing import forcing_at, pitch_error_at
 from gearchaos_kernels.rk4 import along, plus
+from gearchaos_kernels.rows import LANES, STRIDE, Carried, State
 from gearchaos_kernels.teeth import point_on_grid, with_teeth
 
 
@@ -39,9 +26,8 @@ def carried_at(state, lane, point, present):
     forces, slopes = mesh_forces(gaps, lane, forcing.stiffness, None, present)
     error = lane.cosine * state.position.torsion
     if present.pitch_error is not None:
-        # delta_5 is measured from e, twice of which the axial gap has.
-        value = lane.axial_error_amplitude * shifted(lane, point, present).value
-        error += 0.5 * (lane.axial_error_mean + value)
+        # delta_5 is measured from e.
+        error += pitch_error_at(lane, point, present)
     return Carried(forces.tangential, forces.axial, error, slopes.tangential, slopes.axial)
 
 
@@ -49,35 +35,30 @@ def carried_at(state, lane, point, present):
 def begin_loads(memory, table, shares, present):
     """Begin the record of every slot with what it carries at the beginning of a mesh period."""
     for slot in range(LANES):
-        lane = load(memory, COEFFICIENTS, slot, Lane)
-        state = read_state(memory, STATE, slot, present)
+        lane = read_lane(memory, slot)
+        state = read_state(memory, rows.STATE, slot, present)
         point = point_on_grid(memory, slot, table, shares, 0, present)
         carried = carried_at(state, lane, point, present)
-        store(memory, CARRIED, slot, carried)
-        begin_signal(memory, slot, 0, carried.tangential)
-        begin_signal(memory, slot, 1, carried.axial)
-        begin_signal(memory, slot, 2, carried.error)
+        store(memory, rows.CARRIED, slot, carried)
+        signals = carried.tangential, carried.axial, carried.error
+        for number, value in enumerate(signals):
+            row = rows.LOADS + number * rows.SIGNAL_ROWS
+            store(memory, row, slot, (value, value, 0.0, 0.0))
 
 
 @scalar
-def begin_signal(memory, slot, signal, value):
-    """Begin the record of one signal."""
-    store(memory, LOADS + signal * SIGNAL_ROWS, slot, (value, value, 0.0, 0.0))
-
-
-@scalar
-def tell_loads(memory, middle, middle_shares, end, end_shares, present):
-    """Add a step to the record of every slot; given are the mesh phases of its second half."""
+def tell_loads(memory, phases, present):
+    """Add a step to the record of every slot."""
     for slot in range(LANES):
-        lane = load(memory, COEFFICIENTS, slot, Lane)
-        before = read_state(memory, BEFORE + STATE, slot, present)
-        after = read_state(memory, STATE, slot, present)
-        point = with_teeth(memory, slot, middle_shares, middle, present)
+        lane = read_lane(memory, slot)
+        before = read_state(memory, rows.STATE_BEFORE, slot, present)
+        after = read_state(memory, rows.STATE, slot, present)
+        point = with_teeth(memory, slot, phases.middle, present)
         half = carried_at(halfway(before, after), lane, point, present)
-        point = with_teeth(memory, slot, end_shares, end, present)
+        point = with_teeth(memory, slot, phases.end, present)
         last = carried_at(after, lane, point, present)
-        first = load(memory, CARRIED, slot, Carried)
-        store(memory, CARRIED, slot, last)
+        first = load(memory, rows.CARRIED, slot, Carried)
+        store(memory, rows.CARRIED, slot, last)
         smooth = (first.tangential_slope == 0.0) == (last.tangential_slope == 0.0)
         tell_signal(memory, slot, 0, first.tangential, half.tangential, last.tangential, smooth)
         if present.axial is not None:
@@ -105,7 +86,7 @@ def tell_signal(memory, slot, signal, first, half, last, smooth):
     # Where the parabola turns, or an end; next to there it is as high: single precision is enough.
     at = min(1.0, max(0.0, np.float64(np.float32(slope) / np.float32(-4.0 * bend))))
     turn = first + at * (slope + 2.0 * bend * at) if smooth else half
-    row = (LOADS + signal * SIGNAL_ROWS) * STRIDE + slot
+    row = (rows.LOADS + signal * rows.SIGNAL_ROWS) * STRIDE + slot
     memory[row] = max(memory[row], max(last, turn))
     memory[row + STRIDE] = min(memory[row + STRIDE], min(last, turn))
     memory[row + 2 * STRIDE] += first + 4.0 * half + last
@@ -116,9 +97,9 @@ def tell_signal(memory, slot, signal, first, half, last, smooth):
 def tell_kink(memory, slot, axially, lane, gap):
     """Enter the force of a direction at a crossing, where there is no deflection, only damping."""
     force = lane.mesh_damping * gap.rate
-    row = LOADS * STRIDE + slot
+    row = rows.LOADS * STRIDE + slot
     if axially:
         force *= lane.axial_share
-        row += SIGNAL_ROWS * STRIDE
+        row += rows.SIGNAL_ROWS * STRIDE
     memory[row] = max(memory[row], force)
     memory[row + STRIDE] = min(memory[row + STRIDE], force)

@@ -13,39 +13,43 @@ fraction s of the step become::
 A whole step has the constant s = 1, which the compiler folds away.
 """
 
-from gearchaos_kernels.block_memory import Coordinates, State
 from gearchaos_kernels.compilation import scalar
 from gearchaos_kernels.equations import accelerations, gaps_at, mesh_forces, tangent_forces
+from gearchaos_kernels.rows import Coordinates, State
 
 
 @scalar
 def step(state, s, lane, during, branches, present):
     """Advance a state by a fraction of a step; return it and the mesh slopes of the four stages."""
-    y, w = state
-    a1, slopes1 = stage(state, lane, during.begin, branches, present)
-    second = State(along(y, 0.5 * s, w), along(w, 0.5 * s, a1))
-    a2, slopes2 = stage(second, lane, during.middle, branches, present)
-    third = State(along(second.position, 0.25 * s * s, a1), along(w, 0.5 * s, a2))
-    a3, slopes3 = stage(third, lane, during.middle, branches, present)
-    drifted = along(y, s, w)
-    fourth = State(along(drifted, 0.5 * s * s, a2), along(w, s, a3))
-    a4, slopes4 = stage(fourth, lane, during.end, branches, present)
-    return combine(drifted, w, s, a1, a2, a3, a4), (slopes1, slopes2, slopes3, slopes4)
+    begin, middle, end = during
+    return advance(stage, state, s, lane, (begin, middle, middle, end), branches, present)
 
 
 @scalar
 def tangent_step(tangent, s, lane, slopes, present):
     """Advance a tangent vector by the derivative of `step` at the same stages."""
-    y, w = tangent
-    a1 = tangent_stage(tangent, lane, slopes[0], present)
+    after, _ = advance(tangent_stage, tangent, s, lane, slopes, None, present)
+    return after
+
+
+@scalar
+def advance(stage, state, s, lane, given, branches, present):
+    """Return the end of a fraction of a step, and the slopes of its four stages."""
+    y, w = state
+    a1, slopes1 = stage(state, lane, given[0], branches, present)
     second = State(along(y, 0.5 * s, w), along(w, 0.5 * s, a1))
-    a2 = tangent_stage(second, lane, slopes[1], present)
+    a2, slopes2 = stage(second, lane, given[1], branches, present)
     third = State(along(second.position, 0.25 * s * s, a1), along(w, 0.5 * s, a2))
-    a3 = tangent_stage(third, lane, slopes[2], present)
+    a3, slopes3 = stage(third, lane, given[2], branches, present)
     drifted = along(y, s, w)
     fourth = State(along(drifted, 0.5 * s * s, a2), along(w, s, a3))
-    a4 = tangent_stage(fourth, lane, slopes[3], present)
-    return combine(drifted, w, s, a1, a2, a3, a4)
+    a4, slopes4 = stage(fourth, lane, given[3], branches, present)
+    middle = plus(a2, a3)
+    after = State(
+        along(drifted, s * s / 6.0, plus(a1, middle)),
+        along(w, s / 6.0, along(plus(a1, a4), 2.0, middle)),
+    )
+    return after, (slopes1, slopes2, slopes3, slopes4)
 
 
 @scalar
@@ -57,32 +61,16 @@ def stage(state, lane, forcing, branches, present):
 
 
 @scalar
-def tangent_stage(tangent, lane, slopes, present):
-    """Return the accelerations of a tangent vector, per step squared."""
+def tangent_stage(tangent, lane, slopes, _branches, present):
+    """Return the accelerations of a tangent vector, per step squared, and the slopes."""
     forces = tangent_forces(tangent, lane, slopes, present)
-    return accelerations(tangent, forces, 0.0, lane, present)
-
-
-@scalar
-def combine(drifted, w, s, a1, a2, a3, a4):
-    """Return the state at the end of the step from the four stages."""
-    middle = plus(a2, a3)
-    return State(
-        along(drifted, s * s / 6.0, plus(a1, middle)),
-        along(w, s / 6.0, along(plus(a1, a4), 2.0, middle)),
-    )
+    return accelerations(tangent, forces, 0.0, lane, present), slopes
 
 
 @scalar
 def plus(a, b):
     """Return a + b, coordinate by coordinate."""
-    return Coordinates(
-        a.torsion + b.torsion,
-        a.transverse_p + b.transverse_p,
-        a.transverse_g + b.transverse_g,
-        a.axial_p + b.axial_p,
-        a.axial_g + b.axial_g,
-    )
+    return along(a, 1.0, b)
 
 
 @scalar

@@ -7,32 +7,22 @@ is repeated up to the crossing, then on the next branch, as often as it crosses.
 
 import math
 
+from gearchaos_kernels import rows
 from gearchaos_kernels.block_memory import (
-    BEFORE,
-    COEFFICIENTS,
-    STATE,
-    TANGENT,
-    Branches,
-    Lane,
-    load,
     read_branches,
+    read_lane,
     read_state,
     write_branches,
     write_state,
 )
 from gearchaos_kernels.compilation import scalar
-from gearchaos_kernels.contact import (
-    NEVER,
-    branches_at,
-    leaving_fraction,
-    next_branch,
-    tell_crossing,
-)
+from gearchaos_kernels.contact import NEVER, branches_at, leave, leaving_fraction
 from gearchaos_kernels.equations import gaps_at
 from gearchaos_kernels.forcing import During, forcing_at, phase_within
 from gearchaos_kernels.loads import tell_kink
 from gearchaos_kernels.rk4 import step, tangent_step
-from gearchaos_kernels.teeth import between, point_on_grid, shares_at, with_teeth
+from gearchaos_kernels.rows import STRIDE
+from gearchaos_kernels.teeth import between, point_on_grid
 
 MOST_SPLITS = 16
 """Crossings of one step; a step with more goes on with its last branches and is counted."""
@@ -40,28 +30,21 @@ MOST_SPLITS = 16
 
 @scalar
 def split_step(memory, slot, table, shares, number, recorded, present):
-    """Repeat one step of one lane in pieces that each stay on their contact branches.
-
-    The state before the step is in the rows from `BEFORE` on, the one after it, which ignored the
-    crossing, in the ordinary rows. These are replaced where there is a crossing. Returned are the
-    number of crossings, the smallest speed of y_1 or y_2 at one of them, infinity without any, and
-    1 if the step needed more than `MOST_SPLITS` splits.
-    """
-    lane = load(memory, COEFFICIENTS, slot, Lane)
-    state = read_state(memory, BEFORE + STATE, slot, present)
-    after = read_state(memory, STATE, slot, present)
+    """Repeat a step of a lane that ignored a crossing in pieces that stay on their branches."""
+    lane = read_lane(memory, slot)
+    state = read_state(memory, rows.STATE_BEFORE, slot, present)
+    after = read_state(memory, rows.STATE, slot, present)
     tangent = state
     if present.tangent is not None:
-        tangent = read_state(memory, BEFORE + TANGENT, slot, present)
+        tangent = read_state(memory, rows.TANGENT_BEFORE, slot, present)
     point = point_on_grid(memory, slot, table, shares, 2 * number, present)
     begin = forcing_at(lane, point, present)
     point = point_on_grid(memory, slot, table, shares, 2 * number + 2, present)
     end = forcing_at(lane, point, present)
     gaps = gaps_at(state, lane, begin, present)
-    branches = read_branches(memory, slot, present)
+    branches = read_branches(memory, slot)
     done = 0.0
     crossings = 0
-    slowest = math.inf
     while True:
         left = 1.0 - done
         gaps_after = gaps_at(after, lane, end, present)
@@ -84,17 +67,9 @@ def split_step(memory, slot, table, shares, number, recorded, present):
         crossings += 1
         gaps = gaps_at(state, lane, begin, present)
         gap = gaps.axial if axially else gaps.tangential
-        branch = branches.axial if axially else branches.tangential
-        speed = (lane.axial_speed if axially else lane.tangential_speed) * abs(gap.rate)
-        slowest = min(slowest, speed)
-        following = next_branch(branch, gap.value, lane.half_backlash)
-        if axially:
-            branches = Branches(branches.tangential, following)
-        else:
-            branches = Branches(following, branches.axial)
-        if present.contact is not None:
-            if recorded:
-                tell_crossing(memory, slot, axially, branch, following, number + done, speed)
+        branches, _, _ = leave(
+            memory, slot, axially, gap, branches, lane, number + done, recorded, present
+        )
         if present.loads is not None:
             if recorded:
                 tell_kink(memory, slot, axially, lane, gap)
@@ -104,13 +79,14 @@ def split_step(memory, slot, table, shares, number, recorded, present):
             memory, slot, lane, table, shares, number, done + 0.5 * left, present
         )
         after, slopes = step(state, left, lane, During(begin, middle, end), branches, present)
-        write_state(memory, STATE, slot, after, present)
+        write_state(memory, rows.STATE, slot, after, present)
         if present.tangent is not None:
             tangent_after = tangent_step(tangent, left, lane, slopes, present)
-            write_state(memory, TANGENT, slot, tangent_after, present)
+            write_state(memory, rows.TANGENT, slot, tangent_after, present)
     if crossings > 0:
         write_branches(memory, slot, branches_at(gaps_after, lane.half_backlash, present))
-    return crossings, slowest, 1 if fraction <= 1.0 else 0
+    if fraction <= 1.0:
+        memory[rows.OVERFLOWS * STRIDE + slot] += 1.0
 
 
 @scalar
@@ -120,8 +96,8 @@ def forcing_within(memory, slot, lane, table, shares, number, fraction, present)
     if present.teeth is not None:
         half = 0 if fraction < 0.5 else 1
         row = 2 * number + half
-        begin = with_teeth(memory, slot, shares_at(shares, row, present), point, present)
-        end = with_teeth(memory, slot, shares_at(shares, row + 1, present), point, present)
+        begin = point_on_grid(memory, slot, table, shares, row, present)
+        end = point_on_grid(memory, slot, table, shares, row + 1, present)
         width = 2.0 * math.pi / (table.shape[0] - 1)
         point = between(begin, end, 2.0 * fraction - half, width, point)
     return forcing_at(lane, point, present)
@@ -129,10 +105,7 @@ def forcing_within(memory, slot, lane, table, shares, number, fraction, present)
 
 @scalar
 def first_crossing(begin, end, length, branches, lane, present):
-    """Return the fraction of a piece at which a gap leaves its branch, and if it is the axial one.
-
-    ``length`` is that of the piece in steps: the rates of the gaps are per step.
-    """
+    """Return where in a piece of so many steps a gap leaves its branch, and if the axial one."""
     b = lane.half_backlash
     fraction = leaving_fraction(begin.tangential, end.tangential, length, branches.tangential, b)
     fraction_z = NEVER

@@ -15,9 +15,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gearchaos_kernels.block_memory import MOST_PAIRS, NARROW, PAIRS, SHARED, STRIDE, Present, store
+from gearchaos_kernels.block_memory import Present
 from gearchaos_kernels.compilation import scalar
 from gearchaos_kernels.forcing import Phase, phase_on_grid
+from gearchaos_kernels.rows import MOST_PAIRS, NARROW, PAIRS, STRIDE
 from gearchaos_kernels.system import SPLINE_DEGREE, Floats, System, Teeth
 
 NO_TEETH = Teeth(np.zeros((1, 1)), np.zeros((1, 1)), np.zeros(1, np.intp), np.zeros(1), 1, 0.0)
@@ -112,8 +113,15 @@ def three(shares, first):
 
 
 @scalar
-def with_teeth(memory, slot, shares, point, present):
+def on_grid(table, shares, row, present):
+    """Return the mesh phase at a row of both tables, and the shares of the teeth there."""
+    return phase_on_grid(table, row), shares_at(shares, row, present)
+
+
+@scalar
+def with_teeth(memory, slot, grid, present):
     """Return a mesh phase with the error that the teeth share, if they have their own."""
+    point, shares = grid
     if present.teeth is None:
         return point
     near, far = shares
@@ -128,9 +136,8 @@ def with_teeth(memory, slot, shares, point, present):
 
 @scalar
 def point_on_grid(memory, slot, table, shares, row, present):
-    """Return the mesh phase at a row of both tables."""
-    weights = shares_at(shares, row, present)
-    return with_teeth(memory, slot, weights, phase_on_grid(table, row), present)
+    """Return the mesh phase of a lane at a row of both tables."""
+    return with_teeth(memory, slot, on_grid(table, shares, row, present), present)
 
 
 @scalar
@@ -148,28 +155,9 @@ def weigh(memory, slot, first, shares):
 
 
 @scalar
-def keep_shared(memory, slot, point, present):
-    """Keep the error that the teeth share at the end of a step."""
-    if present.teeth is not None:
-        store(memory, SHARED, slot, (point.value, point.slope, point.curvature))
-
-
-@scalar
-def with_kept(memory, slot, point, present):
-    """Return a mesh phase with the error that the teeth shared where the last step ended."""
-    if present.teeth is None:
-        return point
-    at = SHARED * STRIDE + slot
-    return Phase(point.variation, memory[at], memory[at + STRIDE], memory[at + 2 * STRIDE])
-
-
-@scalar
 def between(begin, end, t, width, point):
-    """Return a mesh phase with the error between two half steps so far apart.
-
-    At a fraction of the way it is the polynomial of order 5 through value, slope and curvature at
-    both.
-    """
+    """Return a mesh phase with the error at a fraction of the width between two half steps."""
+    # The polynomial of order 5 through value, slope and curvature at both.
     c1 = width * begin.slope
     c2 = 0.5 * width * width * begin.curvature
     # What the parabola at the beginning leaves of value, slope and curvature at the end.

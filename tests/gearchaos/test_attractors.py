@@ -16,7 +16,9 @@ def found_from(multiples, states, motion, period, group=0):
     system = system_of(pan2021(np.resize(multiples, len(states))), NO_AXIAL)
     labels = np.full(len(states), motion, np.uint8), np.full(len(states), period, np.int32)
     groups = np.broadcast_to(group, len(states)).astype(np.intp)
-    return find_attractors(system, groups, np.array(states, dtype=float), *labels, 200)
+    return find_attractors(
+        system, groups, np.array(states, dtype=float), *labels, Plan(200, 0, 0, 0)
+    )
 
 
 def ends(multiple, count, periods):

@@ -45,7 +45,7 @@ def system_at(multiples):
 def followed_from(start, period, first, last, width=WIDTH) -> Followed:
     period = np.asarray(period, dtype=np.int32)
     first, last = np.asarray(first), np.asarray(last)
-    return follow(system_at, start, period, first, last, width, STEPS)
+    return follow(system_at, start, period, first, last, width, Plan(STEPS, 0, 0, 0))
 
 
 @pytest.fixture(scope="module")

@@ -129,7 +129,7 @@ def test_the_exponent_of_a_periodic_lane_is_that_of_its_orbit():
     sweep = lanes_at(5.86, 10.75, 12.97)
     arrays = computed(sweep, 3)
     multipliers = polish(
-        sweep.lanes.system_of(np.arange(3)), arrays["end_state"], arrays["period"], 200
+        sweep.lanes.system_of(np.arange(3)), arrays["end_state"], arrays["period"], sweep.plan
     ).multipliers
     exact = np.log(np.abs(multipliers[:, 0])) / (arrays["period"] * PERIOD)
     assert arrays["lyapunov_exponent"] == pytest.approx(exact, abs=1e-9)

@@ -35,7 +35,9 @@ def first_points(orbits: list[dict]) -> np.ndarray:
 
 def found_orbits(scene, multiples, guess, period, steps=200) -> Orbits:
     period = np.asarray(period, dtype=np.int32)
-    return polish(system_of(pan2021(multiples), scene), np.asarray(guess), period, steps)
+    return polish(
+        system_of(pan2021(multiples), scene), np.asarray(guess), period, Plan(steps, 0, 0, 0)
+    )
 
 
 def polished(name: str, steps: int) -> Orbits:
@@ -162,7 +164,7 @@ def test_a_lane_is_polished_by_itself_whatever_its_neighbours_are():
     assert np.array_equal(together.converged, [False, True, True, True])
     order = [3, 1, 2]
     system = system_of(pan2021(multiples), NO_AXIAL).of(order)
-    others = polish(system, guess[order], period[order], 200)
+    others = polish(system, guess[order], period[order], Plan(200, 0, 0, 0))
     for one, other in zip(together, others, strict=True):
         assert np.array_equal(one[order], other)
 

@@ -6,9 +6,9 @@ import math
 import numpy as np
 import pytest
 from gearchaos_kernels import contact
-from gearchaos_kernels.block_memory import Branch
 from gearchaos_kernels.contact import NEVER
 from gearchaos_kernels.equations import Gap
+from gearchaos_kernels.rows import Branch
 from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 

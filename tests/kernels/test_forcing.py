@@ -5,8 +5,9 @@ import math
 import numpy as np
 import pytest
 from gearchaos_kernels import forcing
-from gearchaos_kernels.block_memory import Lane, Present
+from gearchaos_kernels.block_memory import Present
 from gearchaos_kernels.forcing import phase_table
+from gearchaos_kernels.rows import Lane
 
 from .reference import from_python
 
@@ -92,7 +93,7 @@ def test_the_table_is_no_wider_than_its_series_needs():
     assert widths == sorted(widths, reverse=True)
 
 
-EVERYTHING, NOTHING = (Present(*[flag] * len(Present._fields)) for flag in ((), None))
+EVERYTHING, NOTHING = (Present(*[flag] * len(Present._fields)) for flag in (True, None))
 
 
 def lane(**values: float) -> Lane:

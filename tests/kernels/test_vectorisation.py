@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 from gearchaos_kernels import Effects, Plan, batch, integrate
 from gearchaos_kernels.block import integrate_block
-from gearchaos_kernels.block_memory import Present
 from gearchaos_kernels.compilation import evaluator
 from numba.core.caching import NullCache
 
@@ -35,9 +34,9 @@ WIDE = ("ymm", "zmm")
 
 
 @evaluator
-def loop(batch, plan, outcome, *flags):
-    """Stand in for the driver: the flags are packed in compiled code."""
-    integrate_block(0, batch, plan, outcome, Present(*flags))
+def loop(batch, plan, outcome, present):
+    """Stand in for the driver."""
+    integrate_block(0, batch, plan, outcome, present)
 
 
 # What comes from the cache has no assembly to look at.
