@@ -2,14 +2,16 @@
 
 import numpy as np
 import pytest
-from gearchaos_kernels import Effects, Status, batch
+from gearchaos_kernels import Status, batch
 from gearchaos_kernels.coefficients import steps_between_scalings
 
 from .reference import (
     FULL,
+    LINEAR,
     NO_AXIAL,
     NO_BACKLASH,
     SOLUTIONS,
+    TORSION,
     TORSION_ONLY,
     assert_same_bits,
     lanes_of,
@@ -86,9 +88,8 @@ def test_bearings_soft_as_none_give_the_motion_of_a_free_pair(resolved):
 )
 def test_the_analytic_response_repeats_at_every_mesh_frequency(frequency, steps):
     model = pan2021(5.86, mesh_frequency=frequency)
-    linear = Effects(stiffness_variation=False, backlash=False)
     wanted = steady_state(model, False)
-    outcome = run(model, linear, wanted, steps=steps, periods=3)
+    outcome = run(model, LINEAR, wanted, steps=steps, periods=3)
     size = 1.0 + np.abs(wanted).max()
     assert outcome.section[0] == pytest.approx(np.tile(wanted, (3, 1)), rel=0, abs=2e-8 * size)
 
@@ -118,10 +119,9 @@ def test_every_damping_ratio_gives_a_finite_motion_that_settles_if_it_is_damped(
 @pytest.mark.parametrize("frequency", [0.01, 1.0])
 def test_a_tangent_vector_stays_in_range_over_long_periods_and_gives_the_exponent(frequency, ratio):
     model = pan2021(0.0, load=0.0, damping_ratio=ratio, mesh_frequency=frequency)
-    linear = Effects(False, False, False, True, True)
     steps = int(np.ceil(15.0 * 2.0 * np.pi / frequency))
     periods = int(np.ceil(3000.0 * frequency / (2.0 * np.pi)))
-    outcome = run(model, linear, steps=steps, transient=periods, periods=periods, points=1)
+    outcome = run(model, LINEAR, steps=steps, transient=periods, periods=periods, points=1)
     assert outcome.status.tolist() == [Status.OK]
     found = outcome.growth.sum() * frequency / (2.0 * np.pi * periods)
     largest = np.max(np.linalg.eigvals(system(model)[0]).real)
@@ -159,12 +159,11 @@ def test_the_growth_does_not_depend_on_how_often_the_tangent_vector_is_scaled(
 def test_a_tangent_vector_that_leaves_the_range_of_numbers_is_reported(ratio, scaled_every):
     # One period is far too long for it, and the kernels know: they scale it more often.
     model = pan2021(0.0, load=0.0, mesh_frequency=0.001, damping_ratio=ratio)
-    scene = Effects(False, False, False, False, False)
     how = {"steps": 20_000, "periods": 2}
-    assert steps_between_scalings(system_of(model, scene), 20_000)[0] < 5000
-    assert_sound(run(model, scene, **how))
+    assert steps_between_scalings(system_of(model, TORSION), 20_000)[0] < 5000
+    assert_sound(run(model, TORSION, **how))
     scaled_every(20_000)
-    lost = run(model, scene, **how)
+    lost = run(model, TORSION, **how)
     assert lost.status.tolist() == [Status.DIVERGED]
     assert np.isnan(lost.growth).all()
 
