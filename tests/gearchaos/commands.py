@@ -104,7 +104,7 @@ def small_config(folder: Path) -> Path:
 
 def run_module(module: str, *arguments: str, cwd: Path, **options) -> Ended:
     """Run ``python -m module`` in a folder."""
-    if not options and _environment() == _ENVIRONMENT:
+    if not options:
         return _begin(module, arguments, cwd)[1]()
     command = [sys.executable, "-m", module, *arguments]
     done = subprocess.run(command, cwd=cwd, capture_output=True, text=True, timeout=300, **options)
@@ -138,15 +138,6 @@ def _server() -> subprocess.Popen:
     server = subprocess.Popen([sys.executable, str(script)], stdin=pipe, stdout=pipe, text=True)
     atexit.register(server.communicate)
     return server
-
-
-def _environment() -> dict[str, str]:
-    """Return what tests may set: not what pytest does, or netCDF4 where it is imported."""
-    others = "PYTEST_CURRENT_TEST", "HDF5_PLUGIN_PATH"
-    return {name: value for name, value in os.environ.items() if name not in others}
-
-
-_ENVIRONMENT = _environment()
 
 
 def sweep(folder: Path, *arguments: str, **options) -> Ended:

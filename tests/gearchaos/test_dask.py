@@ -56,7 +56,7 @@ def scheduler(folder):
     file = folder / "scheduler.json"
     flags = ("--scheduler-file", str(file), "--host", "127.0.0.1", "--port", "0", "--no-dashboard")
     with python(SCHEDULER, *flags, cwd=folder) as process:
-        while process.poll() is None and not file.exists():
+        while process.poll() is None and not (file.exists() and file.read_text()):
             time.sleep(0.05)
         yield json.loads(file.read_text())["address"]
 
