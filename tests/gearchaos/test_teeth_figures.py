@@ -262,7 +262,7 @@ GRADES = (
     "pair.teeth=[6, 9]",
     'pitch_error={kind="grade",grade=7,realisations=3}',
     'sweep={parameter="pitch_error.grade",values=[5,7]}',
-    'scene.effects=["pitch_error","backlash"]',
+    'scene.effects=["pitch_error","stiffness_variation","backlash"]',
     'outputs.section=["delta_5"]',
     "integration.steps_per_period=120",
 )

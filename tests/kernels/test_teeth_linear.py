@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from gearchaos_kernels import Teeth
 
-from .reference import LINEAR, OMEGA, drawn_teeth, pan2021, run
+from .reference import NO_BACKLASH, OMEGA, drawn_teeth, pan2021, run
 from .test_linear import response, resting_state
 from .test_order import measured_order
 
@@ -13,6 +13,7 @@ MODEL = pan2021(
     5.86,
     error_mean=0.1,
     damping_ratio=0.1,
+    stiffness_variation_scale=0.0,
     transverse_damping_p=0.5,
     transverse_damping_g=0.5,
     axial_damping_p=0.5,
@@ -49,7 +50,7 @@ def measured_lines(teeth: Teeth, repeats: int, steps: int, physical: bool = Fals
     """Return the Fourier coefficients of the states over the mesh periods of a whole turn."""
     outcome = run(
         MODEL,
-        LINEAR,
+        NO_BACKLASH,
         steps=steps,
         transient=TRANSIENT + -TRANSIENT % repeats,
         periods=repeats,
