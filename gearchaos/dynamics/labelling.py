@@ -63,6 +63,8 @@ def labels_of(system: System, outcome: Outcome, plan: Plan) -> Told:
             recorded_periods=longer * plan.recorded_periods,
             section_points=longer * min(MOST_POINTS * repeats, plan.recorded_periods),
             history_periods=0,
+            contact=False,
+            loads=False,
         )
         # In portions whose longer records take no more memory than those of all lanes.
         size = max(1, system.lanes // longer)
