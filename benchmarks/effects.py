@@ -18,7 +18,7 @@ from machine import machine_facts, print_machine
 from matplotlib.figure import Figure
 from throughput import engine, nanoseconds_per_step
 
-from gearchaos.figures.style import BLUE, ORANGE, STYLE
+from gearchaos.figures.style import BLUE, ORANGE, style
 
 SCENES = {
     "linear torsion": Effects(False, False, False, False, False),
@@ -86,7 +86,7 @@ def _print(table: dict[str, dict[str, float]]) -> None:
 
 
 def _draw(table: dict[str, dict[str, float]], path: Path) -> None:
-    with matplotlib.rc_context(STYLE):
+    with matplotlib.rc_context(style()):
         figure = Figure(figsize=(3.35, 2.6), layout="constrained")
         axes = figure.add_subplot()
         rows = range(len(SCENES))

@@ -22,7 +22,7 @@ from matplotlib.ticker import NullLocator
 
 import gearchaos
 from gearchaos.accuracy import MODES
-from gearchaos.figures.style import STYLE
+from gearchaos.figures.style import style
 from gearchaos.figures.work_precision import LOOKS
 from gearchaos.records.period import motion_period
 from gearchaos.results.result import Result
@@ -121,7 +121,7 @@ def _print(rows: list[tuple[str, int, dict[str, float], float]]) -> None:
 
 def _draw(rows: list[tuple[str, int, dict[str, float], float]], path: Path) -> None:
     finest = rows[-1][2]
-    with matplotlib.rc_context(STYLE):
+    with matplotlib.rc_context(style()):
         figure = Figure(figsize=(3.35, 3.2), layout="constrained")
         shifts, times = figure.subplots(2, sharex=True)
         for mode, look in LOOKS.items():
@@ -131,9 +131,9 @@ def _draw(rows: list[tuple[str, int, dict[str, float], float]], path: Path) -> N
                 max(abs(found[name] - finest[name]) for name in BOUNDARIES)
                 for _, _, found, _ in mine
             ]
-            style = {**look, "markersize": 3, "linewidth": 0.8}
-            shifts.plot(steps, worst, label=mode, **style)
-            times.plot(steps, [row[3] for row in mine], **style)
+            marks = {**look, "markersize": 3, "linewidth": 0.8}
+            shifts.plot(steps, worst, label=mode, **marks)
+            times.plot(steps, [row[3] for row in mine], **marks)
         every = sorted({row[1] for row in rows})[::2]
         for axes in (shifts, times):
             axes.set_xscale("log")

@@ -10,7 +10,7 @@ import matplotlib as mpl
 from matplotlib.figure import Figure
 
 from gearchaos.errors import FigureError
-from gearchaos.figures.style import STYLE
+from gearchaos.figures.style import style
 from gearchaos.interrupts import check
 from gearchaos.results.atomic_file import replacing
 from gearchaos.version import software_version
@@ -69,7 +69,7 @@ def save_figure(
     dpi *= FINENESS.get(kind, 1)
     drawn, before = BytesIO(), [axes.get_rasterization_zorder() for axes in figure.axes]
     check()
-    with replacing(path, overwrite=overwrite) as partial, mpl.rc_context(STYLE):
+    with replacing(path, overwrite=overwrite) as partial, mpl.rc_context(style()):
         for axes in figure.axes if kind == "eps" else ():
             axes.set_rasterization_zorder(BELOW_AXIS)
         figure.savefig(drawn, format=kind, dpi=dpi, **facts.get(kind, {"pil_kwargs": tags}))

@@ -11,7 +11,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.ticker import AutoMinorLocator, MaxNLocator
 
-from gearchaos.figures.style import MM_PER_INCH, SINGLE_COLUMN_MM, SMALL_FONT_PT, STYLE
+from gearchaos.figures.style import MM_PER_INCH, SINGLE_COLUMN_MM, SMALL_FONT_PT, style
 
 NOTEBOOK_DPI = 200
 
@@ -21,7 +21,7 @@ class Page(Figure):
 
     def _repr_png_(self) -> bytes:
         picture = BytesIO()
-        with mpl.rc_context(STYLE):
+        with mpl.rc_context(style()):
             self.savefig(picture, format="png", dpi=NOTEBOOK_DPI)
         return picture.getvalue()
 
@@ -29,7 +29,7 @@ class Page(Figure):
 @contextmanager
 def page(width_mm: float, height_mm: float) -> Iterator[Page]:
     """Make a page of this size; what is drawn on it meanwhile has the project's style."""
-    with mpl.rc_context(STYLE):
+    with mpl.rc_context(style()):
         size = (width_mm / MM_PER_INCH, height_mm / MM_PER_INCH)
         figure = Page(figsize=size, layout="constrained")
         FigureCanvasAgg(figure)

@@ -2,6 +2,8 @@
 
 from typing import Any
 
+import matplotlib as mpl
+
 SINGLE_COLUMN_MM = 85.0
 DOUBLE_COLUMN_MM = 180.0
 MM_PER_INCH = 25.4
@@ -43,7 +45,7 @@ TICKS = {
 """Settings for the ticks of either axis."""
 
 # The STIX fonts come with matplotlib, so that a figure is the same on every machine.
-STYLE: dict[Any, Any] = {
+_STYLE: dict[Any, Any] = {
     "font.family": "STIXGeneral",
     "mathtext.fontset": "stix",
     "font.size": FONT_PT,
@@ -64,10 +66,6 @@ STYLE: dict[Any, Any] = {
     "figure.constrained_layout.hspace": 0.02,
     "figure.facecolor": "white",
     "savefig.facecolor": "white",
-    # Whatever a user's matplotlibrc says: the page is as large as the figure, and laid out once.
-    "savefig.bbox": None,
-    "figure.autolayout": False,
-    "figure.constrained_layout.use": False,
     # Journals ask for TrueType; matplotlib's default, Type 3, cannot be edited.
     "pdf.fonttype": 42,
     "ps.fonttype": 42,
@@ -75,4 +73,19 @@ STYLE: dict[Any, Any] = {
     # Ticks in front of what is drawn, so that EPS can make one picture of the latter.
     "axes.axisbelow": False,
 }
-"""Settings for `matplotlib.rc_context`; nothing is ever set globally."""
+
+# Whatever a user's settings say: the page is as large as the figure, and laid out once.
+_LAYOUT: dict[Any, Any] = {
+    "savefig.bbox": None,
+    "figure.autolayout": False,
+    "figure.constrained_layout.use": False,
+}
+
+
+def style() -> dict[Any, Any]:
+    """Return settings for `matplotlib.rc_context`; what a user has set otherwise stays."""
+    now, default = mpl.rcParams, mpl.rcParamsDefault
+    return {
+        **{key: now[key] if now[key] != default[key] else _STYLE[key] for key in _STYLE},
+        **_LAYOUT,
+    }

@@ -329,6 +329,16 @@ def test_drawing_leaves_the_users_settings_alone(result, tmp_path):
     assert dict(mpl.rcParams) == before
 
 
+def test_a_page_has_the_font_and_the_background_that_the_user_has_set(result):
+    own = {"font.family": ["DejaVu Sans"], "figure.facecolor": "0.9", "savefig.bbox": "tight"}
+    with mpl.rc_context(own):
+        page = bifurcation_page(result)
+    axes = page.axes[0]
+    assert axes.xaxis.get_label().get_fontname() == "DejaVu Sans"
+    assert page.get_facecolor() == pytest.approx((0.9, 0.9, 0.9, 1.0))
+    assert bifurcation_page(result).axes[0].xaxis.get_label().get_fontname() == "STIXGeneral"
+
+
 @pytest.mark.parametrize("kind", ["png", "pdf"])
 def test_the_same_result_gives_the_same_bits(result, kind, tmp_path):
     names = [tmp_path / f"{n}.{kind}" for n in range(2)]
