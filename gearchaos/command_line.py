@@ -24,6 +24,23 @@ INTERRUPTED = 130
 CLOSED_PIPE = 141
 TERMINATED = 143
 
+COMMANDS = {
+    "sweep": "compute a sweep from a configuration file",
+    "plot": "draw a result file",
+    "stages": "list the stages of a sweep, and refine their boundaries",
+    "basins": "find the attractors of a sweep from many starts, and their basins",
+    "response": "compute a motion at every step of some mesh periods",
+    "reproduce": "compute, draw and compare everything that a paper shows",
+    "info": "tell what a result file holds, and verify it",
+    "identify": "fit parameters of a pair to what was observed of its diagram",
+    "accuracy": "measure what accuracy costs on some lanes of a sweep",
+    "merge": "join what several jobs have computed of one sweep",
+    "export": "write a result as CSV, Parquet or for MATLAB",
+    "example": "list the ready configurations, or copy one",
+    "configuration": "print the JSON Schema of a configuration file",
+    "completion": "print a script with which bash or zsh completes these commands",
+}
+
 COMMON_OPTIONS: dict[str, dict[str, Any]] = {
     "output": {
         "metavar": "PATH",
@@ -97,7 +114,7 @@ class Command(NamedTuple):
         try:
             # Of negative numbers, argparse takes those with an exponent for options.
             given = [re.sub(r"^-(?=[\d.]+[eE][-+]?\d+$)", " -", text) for text in arguments]
-            options = self._parser().parse_args(given, Namespace(arguments=arguments))
+            options = self.parser().parse_args(given, Namespace(arguments=arguments))
             # Matplotlib would refuse to be imported where the environment names an unknown backend.
             os.environ["MPLBACKEND"] = "agg"
             with speaking(quiet=options.quiet):
@@ -105,7 +122,8 @@ class Command(NamedTuple):
         except SystemExit as leaving:
             return leaving.code if isinstance(leaving.code, int) else OK
 
-    def _parser(self) -> ArgumentParser:
+    def parser(self) -> ArgumentParser:
+        """Return what reads the command's arguments."""
         description, _, epilog = self.text.partition("\n\n")
         parser = ArgumentParser(
             prog=f"gearchaos {self.name}",
@@ -173,6 +191,11 @@ def coordinates(
             )
         found[axis] = value
     return found
+
+
+def module_of(command: str) -> str:
+    """Return the module of a command; the package ``gearchaos.configuration`` is not one."""
+    return f"gearchaos.{'configure' if command == 'configuration' else command}"
 
 
 def version_text() -> str:
