@@ -1,5 +1,6 @@
 """Everything that the gallery shows, computed from two configurations."""
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -9,10 +10,14 @@ from gearchaos.configuration import Configuration
 from gearchaos.engine.response import respond
 from gearchaos.engine.running import run
 from gearchaos.errors import ConfigurationError
+from gearchaos.figures.response_lane import coordinates_of, samples_per_period
+from gearchaos.gear.derivation import Quantities
+from gearchaos.gear.geometry import HelicalPair
 from gearchaos.paper.hop import HIGH, LOW, STARTS, STEP, Hop, exponents_beside, find_hop
-from gearchaos.paper.published import published
+from gearchaos.paper.published import contact_line_stiffness, printed_coefficients, published
 from gearchaos.paper.stages import Crisis, crisis_of, lanes_as_printed
 from gearchaos.progress import say
+from gearchaos.records.amplitude_spectrum import spectral_lines
 from gearchaos.results.result import Result
 from gearchaos.results.stage_table import LabelledLanes
 
@@ -55,6 +60,43 @@ class Reproduction:
     def group(self, name: str) -> float:
         """Return a group that all lanes of the sweep share."""
         return float(self.sweep.parameters[name].value)
+
+    @cached_property
+    def pair(self) -> HelicalPair:
+        """The gear pair of the configuration (Table 1)."""
+        return Quantities(self.config.physical()).pair
+
+    @cached_property
+    def numbers(self) -> dict[str, float]:
+        """Our counterpart of each of the `published` numbers, by its key."""
+        speed, response, pair = published().driving_speed_rpm, self.response, self.pair
+        printed = published().numbers["mean_stiffness"].value * printed_coefficients()
+        lines = contact_line_stiffness().coefficients(printed.size)
+        driven = Quantities(self.config.replace("operation", {"speed_rpm": speed}).physical())
+        stiffness, xi = driven.mean_stiffness, self.group("damping_ratio")
+        period = response["mesh_period"][0]
+        torsion = response["delta_5_acceleration"][lane_of(response, 1.0), :-1]
+        order, amplitude = spectral_lines(torsion, samples_per_period(response))
+        numbers = {
+            "driven_speed": speed * pair.teeth[0] / pair.teeth[1],
+            "mesh_frequency_hz": speed / 60.0 * pair.teeth[0],
+            "total_contact_ratio": pair.total_contact_ratio,
+            # The mean about which Table 2's variation is that of the contact lines, in N/(um mm).
+            "mean_stiffness": np.vdot(lines, printed).real / np.vdot(lines, lines).real,
+            "damping_ratio": xi,
+            # With the stiffness of the whole face width, in N s/m (eq. 20).
+            "mesh_damping": 2.0 * xi * math.sqrt(stiffness * pair.equivalent_mass),
+            "frequency": driven.mesh_frequency(),
+            "mesh_period": period,
+            "spectral_peak": order[1:][np.argmax(amplitude[1:])] / period,
+            "hop": self.hop.changes["rest"][1],
+            "hop_exponent_before": self.exponents[0][0],
+            "hop_exponent_after": self.exponents[0][1],
+        }
+        for name in coordinates_of(response):
+            without, once = (largest_acceleration(response, p, name) for p in (0.0, 1.0))
+            numbers[f"added_{name}"] = once - without
+        return {key: float(number) for key, number in numbers.items()}
 
 
 def compute(

@@ -36,7 +36,7 @@ STARTS = {"rest": "at rest", "contact": "contact flank"}
 """Kinds of start states whose change from one motion to the other is looked for, worded."""
 
 APART = 1e-3
-"""Distance of the section points, relative to the larger one, from which on motions differ."""
+"""Distance of the states from which on motions differ."""
 
 
 class Hop(NamedTuple):
@@ -59,7 +59,7 @@ class Hop(NamedTuple):
 
 
 def find_hop(config: Configuration, step: float = STEP, threads: int | None = None) -> Hop | None:
-    """Follow both motions, bisect the ends of their interval, and find where starts change over.
+    """Follow both motions, to the ends of their interval too, and find where starts change over.
 
     ``config`` sweeps the pitch error; ``step``: of the carried sweeps. None where the sweeps
     upwards and downwards agree everywhere.
@@ -68,25 +68,39 @@ def find_hop(config: Configuration, step: float = STEP, threads: int | None = No
     carried = _over(config, LOW, HIGH, step)
     carried = carried.replace("integration.transient_periods", FOLLOWING_PERIODS)
     upwards, downwards = directions_of(run(carried.replace("start.carry", "both"), threads))
-    one, other = upwards["end_state"], downwards["end_state"]
-    size = np.maximum(np.abs(one), np.abs(other)).max(axis=1)
-    both = np.flatnonzero(np.abs(one - other).max(axis=1) > APART * size)
+    values = upwards[upwards.axis]
+    both = values[_apart(upwards["end_state"], downwards["end_state"]) > APART]
     if not both.size:
         return None
-    # Next to an end a lane may still be on its way: the orbit is followed from the lane before.
-    first = _end(downwards, both[min(1, both.size - 1)], -2.0 * step)
-    last = _end(upwards, both[max(-2, -both.size)], 2.0 * step)
+    inside = float(both[both.size // 2])
+    first, last = _end(downwards, inside, LOW), _end(upwards, inside, HIGH)
     fine = step / FINENESS
     low, high = math.ceil(first.value / fine) * fine, math.floor(last.value / fine) * fine
     within = _over(config, low, high, fine)
     changes = {}
     for kind in STARTS:
         found = run(within.replace("start", {"kind": kind}), threads)
-        on_first = _distance(found, upwards) < _distance(found, downwards)
+        starts, ends = found[found.axis], found["end_state"]
+        # The motions of the carried sweeps, interpolated between their values.
+        one, other = (
+            np.stack([np.interp(starts, values, column) for column in sweep["end_state"].T], axis=1)
+            for sweep in (upwards, downwards)
+        )
+        on_first = _apart(ends, one) < _apart(ends, other)
         places = np.flatnonzero(on_first[:-1] & ~on_first[1:])
         if places.size:
-            changes[kind] = tuple(found[found.axis][places[0] : places[0] + 2].tolist())
+            changes[kind] = tuple(starts[places[0] : places[0] + 2].tolist())
     return Hop(upwards, downwards, first, last, changes)
+
+
+def _end(sweep: Result, value: float, last: float) -> Branch:
+    """Follow the period-1 orbit of a carried sweep from a value to where it ends."""
+    system = System.of_lane(sweep, pitch_error=value)
+    return system.follow(system.orbit(guess=system.state), "pitch_error", value, last)
+
+
+def _apart(one: Floats, other: Floats) -> Floats:
+    return np.asarray(np.abs(one - other).max(axis=1))
 
 
 def exponents_beside(
@@ -114,18 +128,3 @@ def _over(config: Configuration, low: float, high: float, step: float) -> Config
     count = round((high - low) / step) + 1
     sweep = {"parameter": "pitch_error", "from": low, "to": high, "count": count}
     return config.replace("sweep", sweep)
-
-
-def _end(sweep: Result, lane: int, step: float) -> Branch:
-    """Follow the period-1 orbit of a carried sweep beyond its last value, to where it ends."""
-    value = float(sweep[sweep.axis][lane])
-    system = System.of_lane(sweep, pitch_error=value)
-    orbit = system.orbit(guess=system.state)
-    return system.follow(orbit, "pitch_error", value, value + step)
-
-
-def _distance(found: Result, sweep: Result) -> Floats:
-    """Distance of each lane from the motion of a carried sweep, interpolated between its values."""
-    values, known = found[found.axis], sweep["end_state"]
-    there = [np.interp(values, sweep[sweep.axis], column) for column in known.T]
-    return np.asarray(np.abs(found["end_state"] - np.column_stack(there)).max(axis=1))

@@ -11,12 +11,10 @@ import numpy as np
 
 from gearchaos.figures.labels import short
 from gearchaos.figures.response_lane import coordinates_of
-from gearchaos.paper.comparison import NONE, Row, compare, signed
+from gearchaos.paper.comparison import NONE, RULES, WINDOW, Row, Verdict, compare, signed
 from gearchaos.paper.computation import Reproduction, lane_of, largest_acceleration
-from gearchaos.paper.our_numbers import our_numbers, pair_of
 from gearchaos.paper.published import published
-from gearchaos.paper.stages import OUT_OF_TURN, TWO_BANDS, WINDOW, motions_between, out_of_turn
-from gearchaos.paper.verdict import RULES, Verdict
+from gearchaos.paper.stages import OUT_OF_TURN, TWO_BANDS, motions_between, out_of_turn
 from gearchaos.results.response_variables import acceleration_of
 from gearchaos.results.result import Result
 from gearchaos.version import software_version
@@ -49,9 +47,7 @@ def report(found: Reproduction, names: dict[str, str]) -> str:
         out_of_turn=OUT_OF_TURN,
         tables={name: _table(table) for name, table in tables.items()},
         printed={key: number.value for key, number in published().numbers.items()},
-        ours=our_numbers(found),
         found=found,
-        pair=pair_of(found),
         length_scale=length_scale,
         backlash=length_scale * found.group("half_backlash"),
         table_3=_table_3(found.response),
