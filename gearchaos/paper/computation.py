@@ -13,13 +13,14 @@ from gearchaos.errors import ConfigurationError
 from gearchaos.figures.response_lane import coordinates_of, samples_per_period
 from gearchaos.gear.derivation import Quantities
 from gearchaos.gear.geometry import HelicalPair
-from gearchaos.paper.hop import HIGH, LOW, STARTS, STEP, Hop, exponents_beside, find_hop
+from gearchaos.paper.hop import HIGH, LOW, STARTS, STEP, Hop, find_hop
 from gearchaos.paper.published import contact_line_stiffness, printed_coefficients, published
 from gearchaos.paper.stages import Crisis, crisis_of, lanes_as_printed
 from gearchaos.progress import say
 from gearchaos.records.amplitude_spectrum import spectral_lines
 from gearchaos.results.result import Result
 from gearchaos.results.stage_table import LabelledLanes
+from gearchaos.system import System
 
 KEPT_PERIODS = 64
 """Mesh periods of a response: lines of a spectrum 1/64 of the mesh frequency apart."""
@@ -124,7 +125,11 @@ def compute(
             f"{config.source}: there is no hop as in figure 7 between {LOW:g} and {HIGH:g} e(tau), "
             "or no crisis after it; take back what was changed in it"
         )
-    ten, six = (exponents_beside(scene, hop.changes["rest"], threads) for scene in (full, config))
+    # Soft axial bearings take long to come to rest: the exponents are those of the orbits.
+    ten, six = (
+        [System(scene, pitch_error=p).orbit().exponent for p in hop.changes["rest"]]
+        for scene in (full, config)
+    )
     say("figures 5, 6, 14 and 15: accelerations of all coordinates")
     response = respond(_at(full, [0.0, *published().increments.pitch_errors]), periods, threads)
     say("figures 8 to 13: motions at six pitch errors")

@@ -136,7 +136,7 @@ def _of_the_hop(found: Reproduction) -> dict[str, Any]:
         **hop.changes,
         "losses": [end.loss.name.lower().replace("_", " ") for end in (hop.first, hop.last)],
         "crossings": [sweep["crossings_per_period"][lane_of(sweep, place)] for sweep in carried],
-        "hop_share": hop.share(place),
+        "hop_share": (place - hop.first.value) / (hop.last.value - hop.first.value),
         "exponents": [signed(exponent, 5) for exponent in chain(*found.exponents)],
         "printed_exponent": signed(paper["hop_exponent_before"].value, 4),
         "exponent_spread": np.ptp(found.sweep["lyapunov_exponent"][before]),
