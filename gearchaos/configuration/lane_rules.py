@@ -16,8 +16,7 @@ from gearchaos.configuration.sweep_values import (
 from gearchaos.configuration.tables import PHYSICAL_KEYS, Tables
 from gearchaos.errors import ConfigurationError
 from gearchaos.gear.derivation import asked_for, derive_groups
-from gearchaos.gear.group_table import GROUPS_BY_NAME, GroupRow
-from gearchaos.gear.groups import HARMONICS, Groups
+from gearchaos.gear.groups import GROUPS_BY_NAME, HARMONICS, GroupRow, Groups
 
 
 def lane_faults(config: Tables) -> Iterator[Fault]:

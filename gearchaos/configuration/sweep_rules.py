@@ -10,7 +10,7 @@ from gearchaos.configuration.rules import reads
 from gearchaos.configuration.run_tables import MOST_LANES
 from gearchaos.configuration.sweep_values import SWEEPABLE_GROUPS, SWEEPABLE_KEYS
 from gearchaos.configuration.tables import Tables
-from gearchaos.gear.group_table import GROUPS_BY_NAME, LARGEST_VALUE
+from gearchaos.gear.groups import GROUPS_BY_NAME, LARGEST_VALUE
 
 
 def unknown_parameter(key: str, parameter: str) -> Iterator[Fault]:

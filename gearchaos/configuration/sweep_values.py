@@ -8,8 +8,7 @@ import numpy.typing as npt
 
 from gearchaos.configuration.run_tables import Sweep
 from gearchaos.configuration.tables import PHYSICAL_KEYS, Tables
-from gearchaos.gear.group_table import GROUPS_BY_NAME
-from gearchaos.gear.groups import Groups, resolve_groups
+from gearchaos.gear.groups import GROUPS_BY_NAME, Groups, resolve_groups
 from gearchaos.gear.tooth_deviations import REALISATION
 
 FloatArray: TypeAlias = npt.NDArray[np.float64]

@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 from numpy.typing import NDArray
 
-from gearchaos.gear.mesh_stiffness import TrapezoidalStiffness
+from gearchaos.gear.contact_lines import TrapezoidalStiffness
 
 
 class Printed(SimpleNamespace):

@@ -24,7 +24,7 @@ from gearchaos.configuration.models import configuration_keys
 from gearchaos.configuration.schema import json_schema, key_tables
 from gearchaos.configuration.sweep_values import SWEEPABLE_GROUPS
 from gearchaos.errors import ConfigurationError
-from gearchaos.gear.group_table import GROUP_TABLE
+from gearchaos.gear.groups import GROUP_TABLE
 from gearchaos.results.variables import STATE_WORDING
 
 
