@@ -5,7 +5,7 @@ from typing import Any
 from gearchaos.configuration.keys import Key
 from gearchaos.configuration.messages import shown
 from gearchaos.configuration.models import Configuration, configuration_keys
-from gearchaos.configuration.sweep_values import SWEEPABLE_GROUPS, SWEEPABLE_KEYS
+from gearchaos.configuration.tables import SWEEPABLE_GROUPS, SWEEPABLE_KEYS
 from gearchaos.gear.groups import GROUPS_BY_NAME
 
 

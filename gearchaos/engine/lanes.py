@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from gearchaos.configuration import Configuration, axis_values, swept_values
 from gearchaos.configuration.run_tables import states_of
-from gearchaos.configuration.sweep_values import (
+from gearchaos.configuration.tables import (
     SWEEPABLE_GROUPS,
     SWEEPABLE_KEYS,
     groups_at,

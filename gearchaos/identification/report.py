@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gearchaos.configuration.sweep_values import SWEEPABLE_GROUPS
+from gearchaos.configuration.tables import SWEEPABLE_GROUPS
 from gearchaos.identification.search import RUNGS, STEPS_ALONE, Judge, distinct
 from gearchaos.identification.tried import Tried
 

@@ -16,8 +16,14 @@ from gearchaos.figures.response import phase_portrait, poincare_section, time_hi
 from gearchaos.figures.response_lane import COORDINATE, coordinates_of, samples_per_period
 from gearchaos.figures.style import BLACK, BLUE, FONT_PT, GREY, LEGEND, ORANGE, VERMILION
 from gearchaos.gear.contact_lines import series_table
-from gearchaos.paper.computation import Reproduction, lane_of, largest_acceleration
-from gearchaos.paper.hop import HIGH, LOW, STARTS
+from gearchaos.paper.computation import (
+    HIGH,
+    LOW,
+    STARTS,
+    Reproduction,
+    lane_of,
+    largest_acceleration,
+)
 from gearchaos.paper.published import (
     Printed,
     contact_line_stiffness,

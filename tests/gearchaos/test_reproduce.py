@@ -21,9 +21,8 @@ from gearchaos.paper.comparison import (
     motion_verdict,
     overlap_verdict,
 )
-from gearchaos.paper.computation import compute, lane_of, largest_acceleration
+from gearchaos.paper.computation import compute, find_hop, lane_of, largest_acceleration
 from gearchaos.paper.gallery import check_folder, pictures, write_gallery
-from gearchaos.paper.hop import find_hop
 from gearchaos.paper.published import contact_line_stiffness, printed_coefficients, published
 from gearchaos.paper.report import KINDS
 from gearchaos.paper.stages import OUT_OF_TURN, out_of_turn
