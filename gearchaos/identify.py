@@ -21,8 +21,6 @@ from gearchaos.finishing import output_of
 from gearchaos.progress import Progress, say
 
 if TYPE_CHECKING:
-    from gearchaos.identification.loading import Problem
-    from gearchaos.identification.search import Judge
     from gearchaos.identification.tried import Tried
 
 
@@ -30,58 +28,30 @@ def _arguments(parser: ArgumentParser) -> None:
     add = parser.add_argument
     add("config", metavar="TARGETS.toml", help="what was observed, and what is free")
     add("--resume", action="store_true", help="go on with a search that was stopped")
-    text = "search nothing, but judge the parameters of this configuration by the targets"
-    add("--score", metavar="config.toml", help=text)
     replaced = "replace one key of the targets file, such as search.seed=2"
     add("--set", **{**COMMON_OPTIONS["set"], "help": replaced})
 
 
 def _identify(options: Namespace) -> int:
-    from gearchaos.engine.running import choose_threads, compiling
+    from gearchaos.engine.provenance import provenance
+    from gearchaos.engine.running import choose_threads
+    from gearchaos.identification.evaluation import require_stable
     from gearchaos.identification.loading import load_targets
     from gearchaos.identification.report import report
-    from gearchaos.identification.search import Judge
-
-    problem = load_targets(options.config, options.set)
-    choose_threads(options.threads)
-    judge = Judge(problem)
-    if options.score is None:
-        tried = _searched(problem, judge, options)
-    else:
-        with compiling():
-            tried = _scored(problem, judge, options.score)
-    print("\n".join(report(judge, tried)), flush=True)
-    return OK
-
-
-def _scored(problem: "Problem", judge: "Judge", path: str) -> "Tried":
-    import numpy as np
-
-    from gearchaos.configuration import groups_at
-    from gearchaos.identification.evaluation import require_stable
-    from gearchaos.identification.loading import observed_configuration
-
-    config = observed_configuration(judge.targets, path)
-    everything, known = {**config.physical(), **groups_at(config, {}).values}, {}
-    for one in judge.targets.parameter:
-        value = everything.get(one.name)
-        if value is None:
-            raise ConfigurationError(
-                f"--score {path}: has no {one.name}, which the targets leave free"
-            )
-        known[one.name] = np.array([value])
-    require_stable(problem.config, judge.values, known)
-    return judge.judge(0, known)
-
-
-def _searched(problem: "Problem", judge: "Judge", options: Namespace) -> "Tried":
-    from gearchaos.engine.provenance import provenance
-    from gearchaos.identification.evaluation import require_stable
-    from gearchaos.identification.search import MOST_CENTRES, RUNGS, decisive_facts, search
+    from gearchaos.identification.search import (
+        MOST_CENTRES,
+        RUNGS,
+        Judge,
+        decisive_facts,
+        search,
+    )
     from gearchaos.identification.tried import read_tried, write_tried
     from gearchaos.results.atomic_file import check_output
     from gearchaos.results.manifest import require_same
 
+    problem = load_targets(options.config, options.set)
+    choose_threads(options.threads)
+    judge = Judge(problem)
     if find_spec("cma") is None:
         raise ConfigurationError(
             "the package cma, which searches, is not installed; pip install gearchaos[identify]"
@@ -94,7 +64,8 @@ def _searched(problem: "Problem", judge: "Judge", options: Namespace) -> "Tried"
         require_same(f"{output}: is the result", earlier, facts, "replace it with --overwrite")
         if earlier.get("complete"):
             say(f"complete already: {output}, {len(known)} candidates")
-            return known
+            print("\n".join(report(judge, known)), flush=True)
+            return OK
     else:
         check_output(output, options.overwrite)
     began, texts = time.monotonic(), {"title": problem.targets.title, "targets": problem.text}
@@ -116,7 +87,8 @@ def _searched(problem: "Problem", judge: "Judge", options: Namespace) -> "Tried"
         raise
     keep(tried, complete=True)
     say(f"{output}: {len(tried)} candidates, {time.monotonic() - began:.1f} s")
-    return tried
+    print("\n".join(report(judge, tried)), flush=True)
+    return OK
 
 
 main = Command("identify", __doc__, _arguments, _identify, ("output", "overwrite", "threads"))

@@ -2,7 +2,7 @@
 
 from gearchaos.configuration.models import Configuration, Given, configuration_of, load_config
 from gearchaos.configuration.run_tables import EFFECTS, STATES
-from gearchaos.configuration.sweep_values import axis_values, groups_at, swept_values
+from gearchaos.configuration.tables import axis_values, groups_at, swept_values
 
 __all__ = [
     "EFFECTS",

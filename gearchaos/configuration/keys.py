@@ -10,7 +10,7 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 from pydantic.fields import FieldInfo
 
 from gearchaos.configuration.toml_text import toml_literal
-from gearchaos.gear.group_table import Range
+from gearchaos.gear.groups import Range
 
 
 class Table(BaseModel):

@@ -9,13 +9,11 @@ from pydantic import PrivateAttr, TypeAdapter, ValidationError, ValidationInfo, 
 
 from gearchaos.configuration.files import text_of_file, with_deviation_files
 from gearchaos.configuration.keys import Key, keys_of
-from gearchaos.configuration.lane_rules import lane_faults
 from gearchaos.configuration.messages import MOST_SHOWN, Fault, fault_of, texts
 from gearchaos.configuration.physical_tables import GradeError
 from gearchaos.configuration.rules import RULES
-from gearchaos.configuration.sweep_rules import unknown_parameter
-from gearchaos.configuration.sweep_values import SWEEPABLE_GROUPS
-from gearchaos.configuration.tables import PHYSICAL_TABLES, Tables
+from gearchaos.configuration.sweep_rules import lane_faults, unknown_parameter
+from gearchaos.configuration.tables import PHYSICAL_TABLES, SWEEPABLE_GROUPS, Tables
 from gearchaos.configuration.toml_text import (
     tables_from_toml,
     toml_text,

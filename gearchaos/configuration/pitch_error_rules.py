@@ -13,8 +13,7 @@ from gearchaos.configuration.physical_tables import (
     TeethError,
 )
 from gearchaos.configuration.rules import reads
-from gearchaos.configuration.sweep_values import SWEEPABLE_KEYS, FloatArray, swept_values
-from gearchaos.configuration.tables import Tables
+from gearchaos.configuration.tables import SWEEPABLE_KEYS, FloatArray, Tables, swept_values
 from gearchaos.gear.tooth_deviations import counted_deviations, tooth_deviations
 
 OF_DRAWN_GEARS = ("pitch_error.grade", "pitch_error.eccentricity")

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias, get_args
 from pydantic import Field, create_model, model_validator
 
 from gearchaos.configuration.keys import Harmonics, Numbers, Table, key
-from gearchaos.gear.group_table import GROUP_TABLE, GroupRow
+from gearchaos.gear.groups import GROUP_TABLE, GroupRow
 
 MOST_LANES = 100_000_000
 """Lanes of one run: what a file and a machine can still hold."""

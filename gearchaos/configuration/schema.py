@@ -5,8 +5,8 @@ from typing import Any
 from gearchaos.configuration.keys import Key
 from gearchaos.configuration.messages import shown
 from gearchaos.configuration.models import Configuration, configuration_keys
-from gearchaos.configuration.sweep_values import SWEEPABLE_GROUPS, SWEEPABLE_KEYS
-from gearchaos.gear.group_table import GROUPS_BY_NAME
+from gearchaos.configuration.tables import SWEEPABLE_GROUPS, SWEEPABLE_KEYS
+from gearchaos.gear.groups import GROUPS_BY_NAME
 
 
 def json_schema() -> dict[str, Any]:

@@ -1,16 +1,26 @@
-"""Rules of each sweep: its parameter and its values."""
+"""Rules of the sweeps: parameter, values, and that groups of the lanes are known and moved."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator, Mapping
 
 import numpy as np
 
 from gearchaos.configuration.messages import Fault, suggestion
+from gearchaos.configuration.pitch_error_rules import OF_DRAWN_GEARS, grade_faults
 from gearchaos.configuration.rules import reads
-from gearchaos.configuration.run_tables import MOST_LANES
-from gearchaos.configuration.sweep_values import SWEEPABLE_GROUPS, SWEEPABLE_KEYS
-from gearchaos.configuration.tables import Tables
-from gearchaos.gear.group_table import GROUPS_BY_NAME, LARGEST_VALUE
+from gearchaos.configuration.run_tables import MOST_LANES, Sweep
+from gearchaos.configuration.tables import (
+    PHYSICAL_KEYS,
+    SWEEPABLE_GROUPS,
+    SWEEPABLE_KEYS,
+    FloatArray,
+    Tables,
+    groups_at,
+    swept_values,
+)
+from gearchaos.errors import ConfigurationError
+from gearchaos.gear.derivation import asked_for, derive_groups
+from gearchaos.gear.groups import GROUPS_BY_NAME, HARMONICS, LARGEST_VALUE, GroupRow, Groups
 
 
 def unknown_parameter(key: str, parameter: str) -> Iterator[Fault]:
@@ -105,3 +115,125 @@ def _lanes_are_not_too_many(config: Tables) -> Iterator[Fault]:
         product = " x ".join(f"{count} {name}" for name, count in counts.items() if count > 1)
         rule = f"{product} make {lanes} lanes, must be at most {MOST_LANES}"
         yield Fault(list(config.sweeps)[-1], rule, "lower a count, or split it into several runs")
+
+
+def lane_faults(config: Tables) -> Iterator[Fault]:
+    """Yield what is wrong with the groups of the lanes, where every table by itself is sound."""
+    sweeps = config.sweeps
+    # The groups are smooth in every parameter: both ends of a sweep and a value between them
+    # stand for millions of lanes. The axes are in the order of `axis_values`.
+    by_parameter = {one.parameter: _some_values(one) for one in reversed(sweeps.values())}
+    some = dict(zip(by_parameter, np.ix_(*by_parameter.values()), strict=True))
+    try:
+        groups = groups_at(config, some)
+    except ConfigurationError:
+        yield from _refused(config, some)
+        return
+    except (ArithmeticError, ValueError) as error:
+        remedy = "check the magnitudes in [pair], [mesh], [operation], [pitch_error], [bearings]"
+        yield Fault("groups", f"cannot be derived from the physical tables ({error})", remedy)
+        return
+    missing = groups.missing(config.scene.effects)
+    yield from grade_faults(config, by_parameter)
+    yield from (_missing(config, row) for row in missing)
+    yield from _out_of_range(config, groups)
+    yield from _decoupled(config, groups)
+    for axis, (table, sweep) in enumerate(reversed(sweeps.items())):
+        drawn = sweep.parameter in OF_DRAWN_GEARS and "pitch_error" in config.scene.effects
+        known = sweep.parameter in SWEEPABLE_GROUPS or not missing
+        if known and not drawn and not _moved(config, groups, axis, sweep.size):
+            yield _without_effect(config, table, some[sweep.parameter])
+
+
+def _some_values(sweep: Sweep) -> FloatArray:
+    """Return the ends of a sweep and a value between them; a value that is alone comes twice."""
+    values = swept_values(sweep)
+    some = values[[0, values.size // 2, -1]]
+    return np.unique(some) if values.size > 1 else some[:2]
+
+
+def _refused(config: Tables, some: Mapping[str, FloatArray]) -> Iterator[Fault]:
+    """Yield the sweeps that make the stiffness differ between lanes; each does so alone."""
+    for table, sweep in config.sweeps.items():
+        try:
+            groups_at(config, {sweep.parameter: some[sweep.parameter]})
+        except ConfigurationError as error:
+            yield Fault(f"{table}.parameter", str(error), "", sweep.parameter)
+
+
+def _moved(config: Tables, groups: Groups, axis: int, count: int) -> bool:
+    """Whether a sweep, along this axis, changes a group on which what is kept depends."""
+    for name, value in groups.values.items():
+        row = GROUPS_BY_NAME[name]
+        if not row.is_list and np.ndim(value) > 0 and row.needed_by(config.needed_effects):
+            along = np.moveaxis(np.asarray(value), axis, 0)
+            if len(along) > 1 and (count == 1 or not np.allclose(along, along[:1], 1e-12, 0.0)):
+                return True
+    return False
+
+
+def _without_effect(config: Tables, table: str, values: FloatArray) -> Fault:
+    parameter, swept = config.sweeps[table].parameter, config.swept
+    derived = derive_groups({**config.physical(), parameter: values}, without=HARMONICS)
+    names = [name for name, value in derived.items() if np.ndim(value) > 0]
+    winners = [name for name in names if name in swept]
+    given = [name for name in names if name in config.groups.given()]
+    rows = [GROUPS_BY_NAME[name] for name in names or [parameter] if name in GROUPS_BY_NAME]
+    off = [row for row in rows if not row.needed_by(config.scene.effects)]
+    rule = "changes nothing in this scene"
+    if winners:
+        rule += f": {swept[winners[0]]} sweeps {winners[0]}, and a group wins over a derived one"
+        remedy = f"sweep one of the two, {parameter} or {winners[0]}, beside another parameter"
+    elif given:
+        remedy = f"remove {', '.join(given)} from [groups], where a group wins over a derived one"
+    elif off:
+        effects = [f'"{name}"' for name in sorted(set().union(*(row.effects for row in off)))]
+        rule += ", for it acts on an effect that is off"
+        remedy = f"add {' or '.join(effects)} to scene.effects"
+    elif rows and not any(row.needed_by(config.needed_effects) for row in rows):
+        rule = "acts on the axial pair only, and nothing that is kept depends on that"
+        remedy = "keep delta_3 or the like in outputs.section, or set outputs.lyapunov = true"
+    else:
+        remedy = "no group follows from it with the tables given; sweep a group instead"
+    return Fault(f"{table}.parameter", rule, remedy, parameter)
+
+
+def _missing(config: Tables, row: GroupRow) -> Fault:
+    effects = [f'"{name}"' for name in config.scene.effects if name in row.effects]
+    because = f" for {' and '.join(effects)}" if effects else ""
+    lacking = [path for path in _asked_for(config, row.name) if _is_unknown(config, path)]
+    otherwise = f", or derive it by giving {', '.join(lacking)} as well" if lacking else ""
+    name = f"the {row.long_name} ({row.symbol})"
+    rule = f"{name} is needed{because} and neither given nor derivable"
+    return Fault(f"groups.{row.name}", rule, f"give {row.name} in [groups]{otherwise}")
+
+
+def _asked_for(config: Tables, name: str) -> Collection[str]:
+    declared = {path: key.field for path, key in PHYSICAL_KEYS.items()}
+    examples = {path: field.examples[0] for path, field in declared.items() if field.examples}
+    return asked_for(name, config.physical(), examples)
+
+
+def _is_unknown(config: Tables, path: str) -> bool:
+    """Whether a physical key is neither given nor swept, and has no default either."""
+    field, value = PHYSICAL_KEYS[path].field, config.physical()[path]
+    has_default = not field.is_required() and field.default is not None
+    return value is None and path not in config.swept and not has_default
+
+
+def _out_of_range(config: Tables, groups: Groups) -> Iterator[Fault]:
+    for name, value in groups.values.items():
+        row = GROUPS_BY_NAME[name]
+        if groups.origin[name] == "derived" and not row.valid.admits(value):
+            worst = next(entry for entry in np.ravel(value) if not row.valid.admits(entry))
+            rule = f"derived from {', '.join(_asked_for(config, name))}, must be {row.valid.rule}"
+            remedy = "check the magnitudes of those keys"
+            yield Fault(f"groups.{name}", rule, remedy, float(worst))
+
+
+def _decoupled(config: Tables, groups: Groups) -> Iterator[Fault]:
+    effects, angle = config.scene.effects, groups.base_helix_angle_deg
+    if "axial" in effects and angle is not None and np.all(np.equal(angle, 0.0)):
+        rule = '"axial" needs a helix angle: in a spur pair nothing drives the axial motion'
+        remedy = 'drop "axial", or give pair.helix_angle_deg or groups.base_helix_angle_deg'
+        yield Fault("scene.effects", rule, remedy, effects)

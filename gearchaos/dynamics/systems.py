@@ -8,9 +8,9 @@ from gearchaos_kernels import Effects, Groups, Plan, System, Teeth
 from numpy.typing import NDArray
 
 from gearchaos.configuration import Configuration
-from gearchaos.configuration.sweep_values import groups_at, physical_at
+from gearchaos.configuration.tables import groups_at, physical_at
 from gearchaos.errors import ConfigurationError
-from gearchaos.gear.contact_shares import contact_shares
+from gearchaos.gear.contact_lines import contact_shares
 from gearchaos.gear.derivation import Quantities
 from gearchaos.gear.tooth_deviations import tooth_deviations
 

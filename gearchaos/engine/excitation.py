@@ -8,7 +8,7 @@ import numpy as np
 from gearchaos.engine.lanes import Lanes
 from gearchaos.engine.steps import PILOT_LANES
 from gearchaos.errors import ConfigurationError
-from gearchaos.gear.mesh_stiffness import series_table
+from gearchaos.gear.contact_lines import series_table
 from gearchaos.records.period import LONGEST_PERIOD, RETURNS
 
 LONGEST_EXCITATION = 50_000

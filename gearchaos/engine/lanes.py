@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from gearchaos.configuration import Configuration, axis_values, swept_values
 from gearchaos.configuration.run_tables import states_of
-from gearchaos.configuration.sweep_values import (
+from gearchaos.configuration.tables import (
     SWEEPABLE_GROUPS,
     SWEEPABLE_KEYS,
     groups_at,
@@ -18,7 +18,7 @@ from gearchaos.configuration.sweep_values import (
 )
 from gearchaos.dynamics.systems import system_of
 from gearchaos.gear.derivation import SCALES, derive_scales
-from gearchaos.gear.group_table import GROUP_TABLE
+from gearchaos.gear.groups import GROUP_TABLE
 from gearchaos.gear.tooth_deviations import REALISATION
 from gearchaos.results.result_file import Parameter
 from gearchaos.results.variables import (

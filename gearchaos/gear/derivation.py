@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 
 from gearchaos.errors import ConfigurationError
+from gearchaos.gear.contact_lines import TrapezoidalStiffness
 from gearchaos.gear.geometry import HelicalPair, Value
-from gearchaos.gear.mesh_stiffness import TrapezoidalStiffness
 
 _MICROMETRE = 1e-6
 _MILLIMETRE = 1e-3

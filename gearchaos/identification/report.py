@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gearchaos.configuration.sweep_values import SWEEPABLE_GROUPS
+from gearchaos.configuration.tables import SWEEPABLE_GROUPS
 from gearchaos.identification.search import RUNGS, STEPS_ALONE, Judge, distinct
 from gearchaos.identification.tried import Tried
 
@@ -76,15 +76,14 @@ def report(judge: Judge, tried: Tried, most: int = 4) -> Iterator[str]:
     yield _row("observed", ["wanted", "width", *titles])
     for one, row in zip(judge.observations, tried["computed"][sets].T, strict=True):
         yield _row(one.name, [one.wanted, one.width, *row])
-    if len(tried) > 1:
-        yield ""
-        found = reach(tried)
-        yield "how far each can move before the misfit grows by one, alone and with the others:"
-        yield _row("", ["alone from", "to", "all from", "to"])
-        for key, *ends in zip(keys, found.alone, found.among, strict=True):
-            yield _row(key, np.ravel(ends))
-        beside = "a thousandth of the bounds beside where the last steps began"
-        yield f"({beside}: misfit {found.surroundings:.4g})"
+    yield ""
+    found = reach(tried)
+    yield "how far each can move before the misfit grows by one, alone and with the others:"
+    yield _row("", ["alone from", "to", "all from", "to"])
+    for key, *ends in zip(keys, found.alone, found.among, strict=True):
+        yield _row(key, np.ravel(ends))
+    beside = "a thousandth of the bounds beside where the last steps began"
+    yield f"({beside}: misfit {found.surroundings:.4g})"
     yield ""
     yield "set 1 in full, for a configuration:"
     for key, value in zip(keys, tried["values"][sets[0]].tolist(), strict=True):

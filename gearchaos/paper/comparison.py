@@ -1,8 +1,10 @@
-"""Every number that the paper prints beside ours: the rows, worded, and their verdicts."""
+"""Every number that the paper prints beside ours, and by which rule the two agree."""
 
 import math
 from collections import defaultdict
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from enum import StrEnum
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -10,13 +12,70 @@ import numpy as np
 
 from gearchaos.figures.labels import short
 from gearchaos.paper.computation import Reproduction, largest_acceleration
-from gearchaos.paper.our_numbers import contact_line_stiffness, our_numbers
-from gearchaos.paper.published import Printed, published
-from gearchaos.paper.stages import counterparts, motions_between
-from gearchaos.paper.verdict import RULES, Verdict, motion_verdict, overlap_verdict
-from gearchaos.results.stage_table import Stage
+from gearchaos.paper.published import Printed, contact_line_stiffness, published
+from gearchaos.paper.stages import motions_between
+from gearchaos.results.stage_table import LabelledLanes, Stage, stage_table
+
+WINDOW = 0.1
+"""Narrowest stage, in multiples of e(tau): narrower ones are windows in what surrounds them."""
 
 NONE = "–"
+
+
+class Verdict(StrEnum):
+    """What a comparison comes to."""
+
+    AGREES = "agrees"
+    IN_KIND = "agrees in kind"
+    DOES_NOT = "does not agree"
+
+
+@dataclass(frozen=True)
+class Rule:
+    """How far a computed number may lie from a printed one.
+
+    ``measure``: what the distance is measured by, in words; ``agrees``, ``in_kind``: the largest
+    distances with these verdicts; ``relative``: whether these are shares, shown in percent.
+    """
+
+    measure: str
+    agrees: float
+    in_kind: float
+    relative: bool = True
+
+    def verdict(self, published: float, ours: float, size: float | None = None) -> Verdict:
+        """Judge a number, not a number where there is no such thing.
+
+        Where the rule is relative the distance is divided by ``size``, by default the printed one.
+        """
+        distance = abs(ours - published)
+        if self.relative:
+            distance /= abs(published if size is None else size)
+        if not math.isfinite(distance):
+            return Verdict.DOES_NOT
+        # A distance that is the limit but for rounding is within it.
+        within = distance * (1.0 - 1e-9)
+        if within <= self.agrees:
+            return Verdict.AGREES
+        return Verdict.IN_KIND if within <= self.in_kind else Verdict.DOES_NOT
+
+    def __str__(self) -> str:
+        agrees, in_kind = (
+            f"{100 * limit:g} %" if self.relative else f"{limit:g} e(τ)"
+            for limit in (self.agrees, self.in_kind)
+        )
+        return f"agrees within {agrees} {self.measure}, in kind within {in_kind}"
+
+
+RULES = {
+    "derived": Rule("of the printed number", 0.001, 0.1),
+    "coefficient": Rule("of the first harmonic", 0.001, 0.01),
+    "boundary": Rule("of the printed place", 0.1, 0.5, relative=False),
+    "amplitude": Rule("of the printed number", 0.05, 0.25),
+    "exponent": Rule("of the printed number", 0.1, 0.5),
+    "stage": Rule("of both spans together that is not common to them", 0.1, 0.5),
+}
+"""The rules by the names that `published.toml` uses."""
 
 
 class Row(NamedTuple):
@@ -33,7 +92,7 @@ class Row(NamedTuple):
 
 def compare(found: Reproduction) -> dict[str, list[Row]]:
     """Compare a reproduction with all that the paper prints: the tables of the report, by name."""
-    printed, ours = published(), our_numbers(found)
+    printed, ours = published(), found.numbers
     numbers = defaultdict(list)
     for key, number in printed.numbers.items():
         row = _row(number.quantity, number, number.value, ours[key], unit=number.unit)
@@ -103,6 +162,39 @@ def _motions(found: Reproduction) -> Iterator[Row]:
         verdict = motion_verdict(shown.motion, mine, (other, *near))
         place = f"motion at {p:g} e(τ)", f"figure {shown.figure}", published().kinds["motions"]
         yield Row(*place, shown.printed, ours, NONE, verdict)
+
+
+def counterparts(printed: Sequence[Printed], lanes: LabelledLanes) -> list[Stage | None]:
+    """Find the stage of a sweep that answers each printed one.
+
+    Of the stages with the printed motion, the one that has most in common with the printed one; if
+    there is none that overlaps, the nearest one within reach of the rule for boundaries, or None.
+    """
+    stages, found = stage_table(lanes, WINDOW), []
+    for one in printed:
+        alike = [stage for stage in stages if stage.label == one.motion]
+        common = [min(s.end, one.last) - max(s.start, one.first) for s in alike]
+        most = max(common, default=-np.inf)
+        near = most >= -RULES["boundary"].in_kind
+        found.append(alike[common.index(most)] if near else None)
+    return found
+
+
+def overlap_verdict(published: tuple[float, float], ours: tuple[float, float]) -> Verdict:
+    """Judge a span, its first and last value, by how much of both together is common to them."""
+    common = min(published[1], ours[1]) - max(published[0], ours[0])
+    together = max(published[1], ours[1]) - min(published[0], ours[0])
+    return RULES["stage"].verdict(1.0, max(common, 0.0) / together)
+
+
+def motion_verdict(published: str, ours: str, also: tuple[str, ...]) -> Verdict:
+    """Judge the label of the motion at one pitch error.
+
+    ``also`` are those found from another start or within the boundary rule's widest distance.
+    """
+    if ours == published:
+        return Verdict.AGREES
+    return Verdict.IN_KIND if published in also else Verdict.DOES_NOT
 
 
 def signed(value: float, digits: int = 2) -> str:

@@ -1,23 +1,69 @@
-"""Everything that the gallery shows, computed from two configurations."""
+"""Everything that the gallery shows, computed from two configurations.
 
+A pair that settles on one of two coexisting motions hops where its start passes from the basin of
+one into that of the other. The ends of the interval in which both exist belong to the pair; the
+place of a hop between them belongs to the start state as much as to the pair.
+"""
+
+import math
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
 from gearchaos.configuration import Configuration
+from gearchaos.dynamics.following import Branch
 from gearchaos.engine.response import respond
 from gearchaos.engine.running import run
 from gearchaos.errors import ConfigurationError
-from gearchaos.paper.hop import HIGH, LOW, STARTS, STEP, Hop, exponents_beside, find_hop
-from gearchaos.paper.published import published
+from gearchaos.figures.response_lane import coordinates_of, samples_per_period
+from gearchaos.gear.derivation import Quantities
+from gearchaos.gear.geometry import HelicalPair
+from gearchaos.paper.published import contact_line_stiffness, printed_coefficients, published
 from gearchaos.paper.stages import Crisis, crisis_of, lanes_as_printed
 from gearchaos.progress import say
+from gearchaos.records.amplitude_spectrum import spectral_lines
+from gearchaos.results.jumps import directions_of
 from gearchaos.results.result import Result
 from gearchaos.results.stage_table import LabelledLanes
+from gearchaos.system import System
+
+LOW, HIGH = 0.5, 2.0
+"""Pitch errors between which both motions are followed, in multiples of e(tau)."""
+
+STEP = 0.01
+"""Step of the carried sweeps."""
+
+FINENESS = 10
+"""Parts of a step between which the place of a hop is told."""
+
+FOLLOWING_PERIODS = 100
+"""Mesh periods of a carried sweep per value: its motion changes little from one to the next."""
+
+STARTS = {"rest": "at rest", "contact": "contact flank"}
+"""Kinds of start states whose change from one motion to the other is looked for, worded."""
+
+CROSSINGS = "crossings_per_period"
 
 KEPT_PERIODS = 64
 """Mesh periods of a response: lines of a spectrum 1/64 of the mesh frequency apart."""
+
+
+class Hop(NamedTuple):
+    """Two coexisting motions, and where they take over from each other.
+
+    ``upwards``, ``downwards``: carried sweeps, on different motions between ``first`` and ``last``,
+    to which the orbit of the downward and of the upward sweep can be followed; ``changes``: by the
+    kind of the start, the last pitch error at which the teeth never part, as on the motion of the
+    upward sweep, and the next one.
+    """
+
+    upwards: Result
+    downwards: Result
+    first: Branch
+    last: Branch
+    changes: dict[str, tuple[float, float]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,6 +102,43 @@ class Reproduction:
         """Return a group that all lanes of the sweep share."""
         return float(self.sweep.parameters[name].value)
 
+    @cached_property
+    def pair(self) -> HelicalPair:
+        """The gear pair of the configuration (Table 1)."""
+        return Quantities(self.config.physical()).pair
+
+    @cached_property
+    def numbers(self) -> dict[str, float]:
+        """Our counterpart of each of the `published` numbers, by its key."""
+        speed, response, pair = published().driving_speed_rpm, self.response, self.pair
+        printed = published().numbers["mean_stiffness"].value * printed_coefficients()
+        lines = contact_line_stiffness().coefficients(printed.size)
+        driven = Quantities(self.config.replace("operation", {"speed_rpm": speed}).physical())
+        stiffness, xi = driven.mean_stiffness, self.group("damping_ratio")
+        period = response["mesh_period"][0]
+        torsion = response["delta_5_acceleration"][lane_of(response, 1.0), :-1]
+        order, amplitude = spectral_lines(torsion, samples_per_period(response))
+        numbers = {
+            "driven_speed": speed * pair.teeth[0] / pair.teeth[1],
+            "mesh_frequency_hz": speed / 60.0 * pair.teeth[0],
+            "total_contact_ratio": pair.total_contact_ratio,
+            # The mean about which Table 2's variation is that of the contact lines, in N/(um mm).
+            "mean_stiffness": np.vdot(lines, printed).real / np.vdot(lines, lines).real,
+            "damping_ratio": xi,
+            # With the stiffness of the whole face width, in N s/m (eq. 20).
+            "mesh_damping": 2.0 * xi * math.sqrt(stiffness * pair.equivalent_mass),
+            "frequency": driven.mesh_frequency(),
+            "mesh_period": period,
+            "spectral_peak": order[1:][np.argmax(amplitude[1:])] / period,
+            "hop": self.hop.changes["rest"][1],
+            "hop_exponent_before": self.exponents[0][0],
+            "hop_exponent_after": self.exponents[0][1],
+        }
+        for name in coordinates_of(response):
+            without, once = (largest_acceleration(response, p, name) for p in (0.0, 1.0))
+            numbers[f"added_{name}"] = once - without
+        return {key: float(number) for key, number in numbers.items()}
+
 
 def compute(
     config: Configuration,
@@ -82,7 +165,11 @@ def compute(
             f"{config.source}: there is no hop as in figure 7 between {LOW:g} and {HIGH:g} e(tau), "
             "or no crisis after it; take back what was changed in it"
         )
-    ten, six = (exponents_beside(scene, hop.changes["rest"], threads) for scene in (full, config))
+    # Soft axial bearings take long to come to rest: the exponents are those of the orbits.
+    ten, six = (
+        [System(scene, pitch_error=p).orbit().exponent for p in hop.changes["rest"]]
+        for scene in (full, config)
+    )
     say("figures 5, 6, 14 and 15: accelerations of all coordinates")
     response = respond(_at(full, [0.0, *published().increments.pitch_errors]), periods, threads)
     say("figures 8 to 13: motions at six pitch errors")
@@ -92,6 +179,46 @@ def compute(
         for kind in ("rest", "contact")
     )
     return Reproduction(config, sweep, hop, (ten, six), response, motions, from_contact, crisis)
+
+
+def find_hop(config: Configuration, step: float = STEP, threads: int | None = None) -> Hop | None:
+    """Follow both motions, to the ends of their interval too, and find where starts change over.
+
+    ``config`` sweeps the pitch error; ``step``: of the carried sweeps. None where teeth part alike
+    in the sweeps upwards and downwards.
+    """
+    outputs = {"section": ["delta_5"], "section_points": 1, "lyapunov": False, "motion": False}
+    config = config.replace("outputs", outputs).replace("integration.recorded_periods", 1)
+    carried = _over(config, LOW, HIGH, step).replace("start.carry", "both")
+    carried = carried.replace("integration.transient_periods", FOLLOWING_PERIODS)
+    upwards, downwards = directions_of(run(carried, threads))
+    both = upwards[upwards.axis][upwards[CROSSINGS] != downwards[CROSSINGS]]
+    if not both.size:
+        return None
+    inside = float(both[both.size // 2])
+    ends = []
+    for sweep, end in (downwards, LOW), (upwards, HIGH):
+        system = System.of_lane(sweep, pitch_error=inside)
+        orbit = system.orbit(guess=system.state)
+        ends.append(system.follow(orbit, "pitch_error", inside, end))
+    first, last = ends
+    fine = step / FINENESS
+    low, high = math.ceil(first.value / fine) * fine, math.floor(last.value / fine) * fine
+    within = _over(config, low, high, fine)
+    changes = {}
+    for kind in STARTS:
+        found = run(within.replace("start", {"kind": kind}), threads)
+        held = found[CROSSINGS] == 0.0
+        places = np.flatnonzero(held[:-1] & ~held[1:])
+        if places.size:
+            changes[kind] = tuple(found[found.axis][places[0] : places[0] + 2].tolist())
+    return Hop(upwards, downwards, first, last, changes)
+
+
+def _over(config: Configuration, low: float, high: float, step: float) -> Configuration:
+    count = round((high - low) / step) + 1
+    sweep = {"parameter": "pitch_error", "from": low, "to": high, "count": count}
+    return config.replace("sweep", sweep)
 
 
 def _at(config: Configuration, pitch_errors: list[float]) -> Configuration:

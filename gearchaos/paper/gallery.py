@@ -7,7 +7,7 @@ from pathlib import Path
 from gearchaos.errors import FileError
 from gearchaos.figures.files import FORMATS, save_figure
 from gearchaos.figures.page import Page
-from gearchaos.paper import diagram_figures, mesh_figures, motion_figures
+from gearchaos.paper import figures
 from gearchaos.paper.computation import Reproduction
 from gearchaos.paper.published import published
 from gearchaos.paper.report import report
@@ -30,19 +30,19 @@ def pictures() -> list[tuple[str, str, Callable[[Reproduction], Page]]]:
 
     In the paper's order; `report_text.md` holds their captions.
     """
-    draw = motion_figures.motion_page
+    draw = figures.motion_page
     numbered: dict[int, Callable[[Reproduction], Page]] = {
-        3: mesh_figures.pitch_error_page,
-        4: mesh_figures.mesh_stiffness_page,
-        5: motion_figures.accelerations_page,
-        6: motion_figures.spectra_page,
-        7: diagram_figures.diagram_page,
+        3: figures.pitch_error_page,
+        4: figures.mesh_stiffness_page,
+        5: figures.accelerations_page,
+        6: figures.spectra_page,
+        7: figures.diagram_page,
         **{motion.figure: partial(draw, shown=motion) for motion in published().motions},
-        14: partial(motion_figures.accelerations_page, growing=True),
-        15: partial(motion_figures.spectra_page, growing=True),
+        14: partial(figures.accelerations_page, growing=True),
+        15: partial(figures.spectra_page, growing=True),
     }
     shown = [(f"figure_{n:02d}", f"Figure {n}", page) for n, page in numbered.items()]
-    return sorted([*shown, ("figure_07_hop", "The hop of figure 7", diagram_figures.hop_page)])
+    return sorted([*shown, ("figure_07_hop", "The hop of figure 7", figures.hop_page)])
 
 
 def check_folder(folder: Path, overwrite: bool) -> None:
@@ -53,8 +53,8 @@ def check_folder(folder: Path, overwrite: bool) -> None:
     """
     if folder.exists() and not folder.is_dir():
         raise FileError(f"{folder}: is a file; give the name of a folder as --output")
-    figures = [f"{name}.{kind}" for name, *_ in pictures() for kind in FORMATS]
-    targets = [folder / name for name in (REPORT, *figures, *RESULTS)]
+    images = [f"{name}.{kind}" for name, *_ in pictures() for kind in FORMATS]
+    targets = [folder / name for name in (REPORT, *images, *RESULTS)]
     present = [target.name for target in targets if target.exists()]
     if present and not overwrite:
         raise FileError(

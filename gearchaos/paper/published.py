@@ -5,6 +5,11 @@ from functools import cache
 from importlib.resources import files
 from types import SimpleNamespace
 
+import numpy as np
+from numpy.typing import NDArray
+
+from gearchaos.gear.contact_lines import TrapezoidalStiffness
+
 
 class Printed(SimpleNamespace):
     """A table of `published.toml`, with its keys as attributes."""
@@ -23,3 +28,19 @@ def published() -> Printed:
         rows = ({"printed": row["motion"], **row} for row in tables[name])
         tables[name] = [Printed(**row) for row in rows]
     return Printed(**tables)
+
+
+def contact_line_stiffness() -> TrapezoidalStiffness:
+    """Return the mesh stiffness of the contact lines as the paper counts them (eqs 15 to 18)."""
+    lines = published().contact_lines
+    # Half of the variation relative to its mean, with equal rise and fall.
+    half_height = (lines.longest - lines.shortest) / (lines.longest + lines.shortest)
+    return TrapezoidalStiffness(**lines.parts, half_height=half_height)
+
+
+def printed_coefficients() -> NDArray[np.complex128]:
+    """Return the coefficients of Table 2 relative to the mean stiffness, as `series_table` does."""
+    mean, harmonics = published().numbers["mean_stiffness"].value, published().harmonics
+    cosine, sine = (np.divide(wave, mean) for wave in (harmonics.cosine, harmonics.sine))
+    series: NDArray[np.complex128] = cosine - 1j * sine
+    return series

@@ -11,12 +11,10 @@ import numpy as np
 
 from gearchaos.figures.labels import short
 from gearchaos.figures.response_lane import coordinates_of
-from gearchaos.paper.comparison import NONE, Row, compare, signed
+from gearchaos.paper.comparison import NONE, RULES, WINDOW, Row, Verdict, compare, signed
 from gearchaos.paper.computation import Reproduction, lane_of, largest_acceleration
-from gearchaos.paper.our_numbers import our_numbers, pair_of
 from gearchaos.paper.published import published
-from gearchaos.paper.stages import OUT_OF_TURN, TWO_BANDS, WINDOW, motions_between, out_of_turn
-from gearchaos.paper.verdict import RULES, Verdict
+from gearchaos.paper.stages import OUT_OF_TURN, TWO_BANDS, motions_between, out_of_turn
 from gearchaos.results.response_variables import acceleration_of
 from gearchaos.results.result import Result
 from gearchaos.version import software_version
@@ -49,9 +47,7 @@ def report(found: Reproduction, names: dict[str, str]) -> str:
         out_of_turn=OUT_OF_TURN,
         tables={name: _table(table) for name, table in tables.items()},
         printed={key: number.value for key, number in published().numbers.items()},
-        ours=our_numbers(found),
         found=found,
-        pair=pair_of(found),
         length_scale=length_scale,
         backlash=length_scale * found.group("half_backlash"),
         table_3=_table_3(found.response),
@@ -140,7 +136,7 @@ def _of_the_hop(found: Reproduction) -> dict[str, Any]:
         **hop.changes,
         "losses": [end.loss.name.lower().replace("_", " ") for end in (hop.first, hop.last)],
         "crossings": [sweep["crossings_per_period"][lane_of(sweep, place)] for sweep in carried],
-        "hop_share": hop.share(place),
+        "hop_share": (place - hop.first.value) / (hop.last.value - hop.first.value),
         "exponents": [signed(exponent, 5) for exponent in chain(*found.exponents)],
         "printed_exponent": signed(paper["hop_exponent_before"].value, 4),
         "exponent_spread": np.ptp(found.sweep["lyapunov_exponent"][before]),

@@ -6,16 +6,13 @@ longer periods, then chaos on bands that are visited in turn, and that grow unti
 interior crisis ends it: the attractor takes in at once what was beside it.
 """
 
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gearchaos.paper.published import Printed
-from gearchaos.paper.verdict import RULES
 from gearchaos.results.result import Result
-from gearchaos.results.stage_table import LabelledLanes, Stage, labelled_lanes, stage_table
+from gearchaos.results.stage_table import LabelledLanes, labelled_lanes
 
 Floats = NDArray[np.float64]
 
@@ -24,9 +21,6 @@ TOUCHING = "two bands that touch"
 
 OUT_OF_TURN = 0.25
 """Largest share of points out of turn: half of that of a coin, below the third of a period 3."""
-
-WINDOW = 0.1
-"""Narrowest stage, in multiples of e(tau): narrower ones are windows in what surrounds them."""
 
 
 class Crisis(NamedTuple):
@@ -78,22 +72,6 @@ def out_of_turn(section: Floats) -> Floats:
     """
     above = section > np.median(section, axis=1, keepdims=True)
     return np.asarray(np.mean(above[:, 1:] == above[:, :-1], axis=1))
-
-
-def counterparts(printed: Sequence[Printed], lanes: LabelledLanes) -> list[Stage | None]:
-    """Find the stage of a sweep that answers each printed one.
-
-    Of the stages with the printed motion, the one that has most in common with the printed one; if
-    there is none that overlaps, the nearest one within reach of the rule for boundaries, or None.
-    """
-    stages, found = stage_table(lanes, WINDOW), []
-    for one in printed:
-        alike = [stage for stage in stages if stage.label == one.motion]
-        common = [min(s.end, one.last) - max(s.start, one.first) for s in alike]
-        most = max(common, default=-np.inf)
-        near = most >= -RULES["boundary"].in_kind
-        found.append(alike[common.index(most)] if near else None)
-    return found
 
 
 def motions_between(lanes: LabelledLanes, first: float, last: float) -> list[str]:

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gearchaos.errors import FileError
-from gearchaos.gear.group_table import LARGEST_VALUE
+from gearchaos.gear.groups import LARGEST_VALUE
 from gearchaos.results import stored_dataset as stored
 from gearchaos.results import variables as known
 from gearchaos.results.atomic_file import reason

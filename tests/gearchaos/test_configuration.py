@@ -22,9 +22,9 @@ from gearchaos.configuration import (
 )
 from gearchaos.configuration.models import configuration_keys
 from gearchaos.configuration.schema import json_schema, key_tables
-from gearchaos.configuration.sweep_values import SWEEPABLE_GROUPS
+from gearchaos.configuration.tables import SWEEPABLE_GROUPS
 from gearchaos.errors import ConfigurationError
-from gearchaos.gear.group_table import GROUP_TABLE
+from gearchaos.gear.groups import GROUP_TABLE
 from gearchaos.results.variables import STATE_WORDING
 
 

@@ -21,7 +21,7 @@ from gearchaos.identification.tried import read_tried, write_tried
 from gearchaos.identify import main
 from gearchaos.results.result import open_result
 
-from .commands import Ended, run_module
+from .commands import Ended
 
 DAMPING, AMPLITUDE, FREQUENCY, LOAD = 0.05, 0.02, 0.5, 0.1
 
@@ -191,18 +191,6 @@ class TestALinearPair:
         assert found.alone[0, 1] - best[0] < 2.0 * most
         for word in ("damping_ratio", "set 1", "exponent at 1", "groups.pitch_error_amplitude = "):
             assert word in identified.out
-
-    def test_a_configuration_is_scored_by_the_targets(self, identified):
-        given = PAIR.replace("damping_ratio = 0.3", f"damping_ratio = {DAMPING}").replace(
-            "amplitude = 1.0", f"amplitude = {AMPLITUDE}"
-        )
-        (identified.folder / "known.toml").write_text(given)
-        ended = run_module(
-            *("gearchaos.identify", "targets.toml", "--score", "known.toml"), cwd=identified.folder
-        )
-        assert ended.code == 0
-        misfit = next(line for line in ended.out.splitlines() if line.startswith("misfit"))
-        assert float(misfit.split()[1]) < 1.0
 
 
 class TestASearchThatWasStopped:

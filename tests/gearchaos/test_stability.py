@@ -16,7 +16,7 @@ from gearchaos.dynamics.stability import (
     sufficient_steps,
 )
 from gearchaos.dynamics.stable_region import steps_per_time
-from gearchaos.gear.mesh_stiffness import series_table
+from gearchaos.gear.contact_lines import series_table
 
 from ..kernels.reference import (
     COSINE,

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import gearchaos
-from gearchaos.configuration.sweep_values import SWEEPABLE_GROUPS, SWEEPABLE_KEYS
+from gearchaos.configuration.tables import SWEEPABLE_GROUPS, SWEEPABLE_KEYS
 
 from .commands import SMALL
 

@@ -8,7 +8,7 @@ import pint
 import pytest
 
 from gearchaos.configuration.models import configuration_keys
-from gearchaos.gear.group_table import GROUP_TABLE
+from gearchaos.gear.groups import GROUP_TABLE
 
 UNITS = {one.units for one in (*configuration_keys().values(), *GROUP_TABLE)} - {""}
 REGISTRY = pint.UnitRegistry()
