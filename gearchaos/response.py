@@ -69,7 +69,7 @@ def _respond(options: Namespace) -> int:
 
 def _lane(options: Namespace) -> "Asked":
     """Go on from where one lane of a result ended."""
-    from gearchaos.engine.response import continued
+    from gearchaos.engine.recomputing import continued
     from gearchaos.results.result import open_result
 
     if options.set or options.at is None:

@@ -9,7 +9,7 @@ import json
 import math
 import sys
 import textwrap
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -17,8 +17,8 @@ from gearchaos.command_line import OK, Command, coordinates, number, place, whol
 from gearchaos.errors import ConfigurationError
 
 if TYPE_CHECKING:
+    from gearchaos.engine.recomputing import Survival
     from gearchaos.engine.refinement import Boundary
-    from gearchaos.engine.survival import Survival
     from gearchaos.results.jumps import Apart, Crisis, Jump
     from gearchaos.results.result import Result
     from gearchaos.results.stage_table import Stage
@@ -80,13 +80,11 @@ def _stages(options: argparse.Namespace) -> int:
     where = slice_facts(whole, result)
     lanes = labelled_lanes(result, name=options.result, repeats=True)
     stages = stage_table(lanes, options.narrowest)
-    stretches, boundaries = apart(part, options.narrowest), None
-    if options.refine is not None:
-        boundaries = _refined(part, stretches if both else stages, options)
+    stretches = apart(part, options.narrowest)
+    boundaries, outlasting = _computed_again(part, result, stages, stretches, options)
     for at, boundary in enumerate([] if both else boundaries or []):
         stages[at] = stages[at]._replace(end=boundary.below)
         stages[at + 1] = stages[at + 1]._replace(start=boundary.above)
-    outlasting = _survival(result, options) if options.survival is not None else None
     several = [axis for axis in result.axes if axis in REPEATS]
     jumping, bursting = ([], []) if several else (jumps(result), crises(result))
     if options.json:
@@ -119,8 +117,8 @@ def _stages(options: argparse.Namespace) -> int:
 
 def _map_boundaries(result: "Result", options: argparse.Namespace) -> int:
     """Bisect the boundaries in all rows of a map, and tell what that saves."""
-    from gearchaos.engine.map_refinement import refined_map
-    from gearchaos.engine.refinement import refinable
+    from gearchaos.engine.recomputing import refinable
+    from gearchaos.engine.refinement import refined_map
     from gearchaos.engine.running import compiling
     from gearchaos.results.overview import finite
 
@@ -150,31 +148,32 @@ def _map_boundaries(result: "Result", options: argparse.Namespace) -> int:
     return OK
 
 
-def _refined(
-    result: "Result", found: "list[Stage] | list[Apart]", options: argparse.Namespace
-) -> "list[Boundary]":
-    # Only here: reading a file needs no compiler.
-    from gearchaos.engine import refinement
+def _computed_again(
+    part: "Result",
+    result: "Result",
+    stages: "list[Stage]",
+    stretches: "list[Apart]",
+    options: argparse.Namespace,
+) -> "tuple[list[Boundary] | None, Survival | None]":
+    """Compute what --refine and --survival ask for, None where they do not."""
+    if options.refine is None and options.survival is None:
+        # Reading a file needs no compiler.
+        return None, None
+    from gearchaos.engine.recomputing import computable, refinable, survival
+    from gearchaos.engine.refinement import refined_boundaries, refined_jumps
     from gearchaos.engine.running import compiling
     from gearchaos.results.variables import DIRECTION
 
-    refine: Callable[..., list[Boundary]] = refinement.refined_boundaries
-    config = refinement.refinable
-    if DIRECTION in result.axes:
-        refine, config = refinement.refined_jumps, refinement.computable
+    boundaries = outlasting = None
+    name, width, threads = options.result, options.refine, options.threads
     with compiling():
-        asked = config(result, options.result)
-        return refine(asked, result, found, options.refine, options.threads)
-
-
-def _survival(result: "Result", options: argparse.Namespace) -> "Survival":
-    from gearchaos.engine.refinement import computable
-    from gearchaos.engine.running import compiling
-    from gearchaos.engine.survival import survival
-
-    config = computable(result, options.result)
-    with compiling():
-        return survival(config, result, options.survival, options.threads)
+        if width is not None and DIRECTION in part.axes:
+            boundaries = refined_jumps(computable(part, name), part, stretches, width, threads)
+        elif width is not None:
+            boundaries = refined_boundaries(refinable(part, name), part, stages, width, threads)
+        if options.survival is not None:
+            outlasting = survival(computable(result, name), result, options.survival, threads)
+    return boundaries, outlasting
 
 
 def table(axis: str, stages: "Sequence[Stage]", where: Sequence[str]) -> Iterator[str]:

@@ -27,7 +27,7 @@ from gearchaos.dynamics.orbits import Orbits, polish
 from gearchaos.dynamics.stability import fewest_stable_steps
 from gearchaos.dynamics.systems import plan_of, system_of
 from gearchaos.engine.lanes import Lanes, start_states
-from gearchaos.engine.refinement import computable
+from gearchaos.engine.recomputing import computable
 from gearchaos.engine.response import respond
 from gearchaos.engine.steps import stable_steps
 from gearchaos.errors import ConfigurationError

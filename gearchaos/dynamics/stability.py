@@ -2,7 +2,11 @@
 
 On a contact branch with its mesh stiffness held, eq. 13 is linear with the eigenvalues of its
 Jacobian. None of them may lie outside the stable region of the Runge-Kutta method of order 4, or
-the computed motion grows where the true one decays.
+the computed motion grows where the true one decays. A step of length h multiplies the mode of an
+eigenvalue lambda by R(h lambda), R(z) = 1 + z + z^2/2 + z^3/6 + z^4/24 (Hairer, Wanner 1996, sec.
+IV.2). The size of R need not rise steadily along a ray from 0: on the negative real axis it first
+falls. But on every ray of the left half plane it passes 1 only once, so that all steps shorter than
+the longest stable one are stable.
 """
 
 from collections.abc import Iterator
@@ -11,8 +15,6 @@ from typing import NamedTuple
 import numpy as np
 from gearchaos_kernels import Groups, System, jacobian
 from numpy.typing import NDArray
-
-from gearchaos.dynamics.stable_region import ROUNDING, SHORTEST_RAY, amplification, steps_per_time
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -29,8 +31,12 @@ OWNERS = {
 }
 """What moves in each coordinate."""
 
+ROUNDING = 1e-9
+"""Relative error granted to eigenvalues: an undamped mode lies on the imaginary axis up to that."""
+
 _BEYOND_MEASURE = 1e150
 _POINTS_PER_WAVE = 64
+_RAYS = 2**14
 
 
 class StabilityLimit(NamedTuple):
@@ -53,20 +59,13 @@ class StabilityLimit(NamedTuple):
 
 
 def stability_limit(system: System, steps: int) -> StabilityLimit | None:
-    """Find the lanes in which so many steps per period are unstable; None if there are none.
-
-    Eigenvalues are computed only where `sufficient_steps` leaves a doubt.
-    """
-    doubtful = np.flatnonzero(sufficient_steps(system) > steps)
-    if doubtful.size == 0:
-        return None
-    some = system.of(doubtful)
-    fewest = fewest_stable_steps(some)
+    """Find the lanes in which so many steps per period are unstable; None if there are none."""
+    fewest = fewest_stable_steps(system)
     unstable = np.flatnonzero(fewest > steps)
     if unstable.size == 0:
         return None
-    eigenvalue, owner = _strictest_mode(some.of(unstable[[np.argmax(fewest[unstable])]]))
-    return StabilityLimit(doubtful[unstable], fewest[unstable], eigenvalue, owner)
+    eigenvalue, owner = _strictest_mode(system.of(unstable[[np.argmax(fewest[unstable])]]))
+    return StabilityLimit(unstable, fewest[unstable], eigenvalue, owner)
 
 
 def fewest_stable_steps(system: System) -> Integers:
@@ -78,37 +77,10 @@ def fewest_stable_steps(system: System) -> Integers:
     themselves and set no limit. Every larger number of steps, shape (lanes,), is stable too.
     """
     system = _measurable(system)
-    demands = [_demand(block) for _, block in _diagonal_blocks(system)]
-    return _per_period(np.max(demands, axis=0), system)
-
-
-def sufficient_steps(system: System) -> Integers:
-    """Return a number of steps per period that is surely stable, without any eigenvalue.
-
-    In coordinates weighted by the square roots of the masses, stiffness K and damping C of the
-    tangential and of the axial motion are symmetric. A mode u of unit length then satisfies
-    lambda^2 + lambda u*Cu + u*Ku = 0, hence abs(lambda) <= c/2 + sqrt(c^2/4 + k) with the norms c
-    and k of C and K, themselves at most the largest bearing plus the mesh. The step reaches as
-    far as the shortest of all rays. Shape (lanes,).
-    """
-    system = _measurable(system)
-    effects, groups = system.effects, system.groups
-    masses = groups.mass_ratio_p + groups.mass_ratio_g
-    directions = [(np.cos(groups.base_helix_angle), 1.0 + effects.transverse * masses)]
-    k = c = np.zeros(system.lanes)
-    if effects.transverse:
-        k = np.maximum(groups.transverse_stiffness_p, groups.transverse_stiffness_g)
-        c = 2.0 * np.maximum(groups.transverse_damping_p, groups.transverse_damping_g)
-    if effects.axial:
-        directions.append((np.sin(groups.base_helix_angle), masses))
-        k = np.maximum.reduce([k, groups.axial_stiffness_p, groups.axial_stiffness_g])
-        c = np.maximum.reduce([c, 2.0 * groups.axial_damping_p, 2.0 * groups.axial_damping_g])
-    # By so much the mesh accelerates the approach of the teeth, per unit of its force.
-    share = np.max([np.abs(projection) * moved for projection, moved in directions], axis=0)
-    k = k + np.max(np.abs(_stiffnesses(system)), axis=0) * share
-    half = 0.5 * c + groups.damping_ratio * share
-    largest = half + np.hypot(half, np.sqrt(k))
-    return _per_period(largest / SHORTEST_RAY, system)
+    demand = np.max([_demand(block) for _, block in _diagonal_blocks(system)], axis=0)
+    with np.errstate(over="ignore"):
+        steps: Floats = np.ceil(demand * (1.0 - ROUNDING) * system.mesh_period)
+    return np.clip(steps, 1.0, MOST_STEPS).astype(np.int64)
 
 
 def exponent_bias(system: System, steps: int) -> tuple[Floats, Floats]:
@@ -124,6 +96,36 @@ def exponent_bias(system: System, steps: int) -> tuple[Floats, Floats]:
     true = np.max(eigenvalues.real, axis=1)
     computed = np.max(np.log(amplification(step * eigenvalues)) / step, axis=1)
     return computed - true, true
+
+
+def amplification(z: NDArray[np.complex128]) -> Floats:
+    """Return abs(R(z)), by which one step multiplies a mode, for z = h lambda."""
+    return np.abs(1.0 + z * (1.0 + z / 2.0 * (1.0 + z / 3.0 * (1.0 + z / 4.0))))
+
+
+def _reach(angles: Floats) -> Floats:
+    """Return where rays at these angles leave the stable region; all of them between 2.5 and 3."""
+    inside, outside = np.full_like(angles, 2.5), np.full_like(angles, 3.0)
+    for _ in range(52):
+        middle = 0.5 * (inside + outside)
+        stable = amplification(middle * np.exp(1j * angles)) <= 1.0
+        inside, outside = np.where(stable, middle, inside), np.where(stable, outside, middle)
+    return inside
+
+
+_ANGLES = np.linspace(0.5 * np.pi, np.pi, _RAYS)
+_LENGTHS = _reach(_ANGLES)
+
+
+def steps_per_time(eigenvalues: NDArray[np.complex128]) -> Floats:
+    """Return the fewest stable steps per unit of time for every eigenvalue.
+
+    It is abs(lambda) over the length of the ray through lambda, and 0 where the real part is
+    positive: what grows by itself may grow in the steps.
+    """
+    size = np.abs(eigenvalues)
+    ray = np.interp(np.abs(np.angle(eigenvalues)), _ANGLES, _LENGTHS)
+    return np.where(eigenvalues.real <= ROUNDING * size, size / ray, 0.0)
 
 
 def _measurable(system: System) -> System:
@@ -169,12 +171,6 @@ def _demand(block: Floats) -> Floats:
     eigenvalues = np.linalg.eigvals(block[distinct]).astype(np.complex128)
     demand: Floats = np.max(steps_per_time(eigenvalues), axis=1)
     return demand[kind]
-
-
-def _per_period(demand: Floats, system: System) -> Integers:
-    with np.errstate(over="ignore"):
-        steps = np.ceil(demand * (1.0 - ROUNDING) * system.mesh_period)
-    return np.clip(steps, 1.0, MOST_STEPS).astype(np.int64)
 
 
 def _strictest_mode(system: System) -> tuple[complex, str]:

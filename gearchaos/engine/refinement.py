@@ -1,8 +1,10 @@
 """The boundaries between the stages of a sweep, found more exactly than its lanes lie."""
 
-from collections.abc import Callable
+from collections.abc import Mapping, Sequence
+from itertools import pairwise
 from typing import Any, NamedTuple
 
+import numba
 import numpy as np
 from gearchaos_kernels import System, integrate
 from numpy.typing import NDArray
@@ -16,21 +18,18 @@ from gearchaos.dynamics.following import (
     follow,
     loss_of_stability,
 )
-from gearchaos.dynamics.labelling import LOOKS
+from gearchaos.dynamics.labelling import LOOKS, labels_of
 from gearchaos.dynamics.systems import plan_of, system_of
-from gearchaos.engine.running import choose_threads, run
-from gearchaos.errors import ConfigurationError, FileError
-from gearchaos.gear.tooth_deviations import REALISATION
+from gearchaos.engine.lanes import Floats, start_states
+from gearchaos.engine.running import choose_threads
+from gearchaos.engine.simulation import Simulation
+from gearchaos.interrupts import check
+from gearchaos.records.label import MEANINGS
 from gearchaos.records.period import TOLERANCE
 from gearchaos.results.jumps import Apart, directions_of
 from gearchaos.results.result import Result
-from gearchaos.results.stage_table import Stage, labelled_lanes
-from gearchaos.results.variables import WAYS, axis_name
-
-Floats = NDArray[np.float64]
-
-MOST_ROUNDS = 60
-"""Bisections after which two different numbers are neighbours."""
+from gearchaos.results.stage_table import Stage, label_text
+from gearchaos.results.variables import LABELS, WAYS
 
 FOLLOWED_WIDTH = 1.0 / 1024.0
 """Share of its way to which the end of an orbit is located: next to a fold a multiplier nears +1
@@ -59,63 +58,9 @@ class Boundary(NamedTuple):
     above: float
     label_below: str
     label_above: str
-    loss: str
-    multiplier: complex
+    loss: str = ""
+    multiplier: complex = complex("nan")
     direction: str = ""
-
-
-def computable(result: Result, name: str) -> Configuration:
-    """Return the configuration with which lanes of a result can be computed again, or go on.
-
-    Messages call the result ``name``. Raises FileError if it does not hold its configuration.
-    """
-    text = str(result.metadata.get("configuration_resolved", ""))
-    if not text:
-        raise FileError(f"{name}: holds no configuration; run the sweep again")
-    config = Configuration.from_toml(text, f"{name} (configuration_resolved)")
-    parameters = [REALISATION, *(sweep.parameter for sweep in config.sweeps.values())]
-    fixed = {p: result.fixed[axis_name(p)] for p in parameters if axis_name(p) in result.fixed}
-    if fixed:
-        config = config.at(fixed)
-    # The steps and periods that were taken, not those from which they were chosen or raised.
-    for name in ("steps_per_period", "transient_periods", "recorded_periods"):
-        taken = int(result.metadata.get(name, getattr(config.integration, name)))
-        config = config.replace(f"integration.{name}", taken)
-    for key, value in {
-        "integration.tolerance": None,
-        "integration.error_check": 0.0,
-        "outputs.exponents": False,
-        "outputs.motion": True,
-    }.items():
-        config = config.replace(key, value)
-    return config
-
-
-def refinable(result: Result, name: str) -> Configuration:
-    """Return the configuration with which lanes between those of a result can be computed.
-
-    As `computable`, and raises ConfigurationError if its lanes do not stand for themselves.
-    """
-    config = computable(result, name)
-    if config.sweep.parameter == "pitch_error.grade":
-        raise ConfigurationError(
-            f"{name}: pitch_error.grade: nothing lies between two grades; refine a sweep of "
-            "another parameter, such as pitch_error"
-        )
-    unfit = remedy = ""
-    if config.start.carry != "none":
-        unfit, remedy = f'carry = "{config.start.carry}"', 'with start.carry = "none"'
-    elif config.start.kind == "random":
-        unfit, remedy = 'kind = "random"', "that starts otherwise"
-    elif config.start.kind == "grid":
-        state = zip(result.variables["state"].flags, result["start_state"][0].tolist(), strict=True)
-        config = config.replace("start", {"kind": "given", "state": dict(state)})
-    if unfit:
-        raise ConfigurationError(
-            f"{name}: start.{unfit}: a lane between two others has no start of its own; refine a "
-            f"sweep {remedy}"
-        )
-    return config
 
 
 def refined_boundaries(
@@ -134,16 +79,20 @@ def refined_boundaries(
     """
     if len(stages) < 2:
         return []
-    every = _edges(result)
+    choose_threads(threads)
+    simulation, every = Simulation(config), _edges_of(result)
     below = every[[stage.last for stage in stages[:-1]]]
     above = every[[stage.first for stage in stages[1:]]]
     spacing = above["value"] - below["value"]
-
-    def between(middle: Floats, _: NDArray[np.intp]) -> NDArray[Any]:
-        values = {"parameter": config.sweep.parameter, "values": middle.tolist()}
-        return _edges(run(config.replace("sweep", values), threads))
-
-    bisect(below, above, width, between)
+    while True:
+        middle = (below["value"] + above["value"]) / 2.0
+        wide = (below["value"] < middle) & (middle < above["value"])
+        wide = np.flatnonzero(wide & (above["value"] - below["value"] > width))
+        if not wide.size:
+            break
+        tried = _computed(simulation, {config.sweep.parameter: middle[wide]})
+        same = tried["label"] == below["label"][wide]
+        below[wide[same]], above[wide[~same]] = tried[same], tried[~same]
     losses = _losses(config, below, above, spacing)
     return [
         Boundary(float(one["value"]), float(other["value"]), one["label"], other["label"], *loss)
@@ -151,27 +100,47 @@ def refined_boundaries(
     ]
 
 
-def bisect(
-    below: NDArray[Any],
-    above: NDArray[Any],
-    width: float,
-    between: Callable[[Floats, NDArray[np.intp]], NDArray[Any]],
-) -> None:
-    """Move the ends of boundaries towards each other, in place, until none is wider than that.
+def refined_map(
+    config: Configuration, result: Result, width: float, threads: int | None = None
+) -> tuple[dict[float, list[Boundary]], int]:
+    """Find the boundaries in all rows of a map to this width, without a look at orbits.
 
-    ``below``, ``above``: arrays with fields ``value`` and ``label``; ``between`` gives the same
-    at values in the middle of boundaries, and of these numbers.
+    Halved, round by round, are the stretches of a row between two lanes that move differently, and
+    those beside which, in the row above or below, a lane moves differently: so islands and windows
+    are found that no lane of their own row shows. Returns the boundaries of each value of the
+    second parameter that has any, and the number of lanes that this takes. ``config`` is from
+    `refinable`, the axes of the result are its two sweeps.
     """
-    for _ in range(MOST_ROUNDS):
-        middle = (below["value"] + above["value"]) / 2.0
-        wide = above["value"] - below["value"] > width
-        wide &= (below["value"] < middle) & (middle < above["value"])
-        if not wide.any():
+    choose_threads(threads)
+    simulation = Simulation(config)
+    first, second = (sweep.parameter for sweep in config.sweeps.values())
+    values, rows = result[result.axis].tolist(), result[result.axes[0]]
+    labels = _edges_of(result)["label"].reshape(rows.size, -1).tolist()
+    ends = [list(zip(values, row, strict=True)) for row in labels]
+    stretches = {(r, n): pair for r, row in enumerate(ends) for n, pair in enumerate(pairwise(row))}
+    found: dict[float, list[Boundary]] = {}
+    computed = 0
+    while stretches:
+        halved = {}
+        for (row, n), (low, high) in stretches.items():
+            beside = (stretches.get((row + step, n), ()) for step in (-1, 0, 1))
+            middle = (low[0] + high[0]) / 2.0
+            if high[0] - low[0] <= width or not low[0] < middle < high[0]:
+                if low[1] != high[1]:
+                    boundary = Boundary(low[0], high[0], low[1], high[1])
+                    found.setdefault(float(rows[row]), []).append(boundary)
+            elif len({label for pair in beside for _, label in pair}) > 1:
+                halved[row, n] = middle
+        if not halved:
             break
-        numbers = np.flatnonzero(wide)
-        tried = between(middle[wide], numbers)
-        same = tried["label"] == below["label"][wide]
-        below[numbers[same]], above[numbers[~same]] = tried[same], tried[~same]
+        middle = np.array([*halved.values()])
+        tried = _computed(simulation, {first: middle, second: rows[[row for row, _ in halved]]})
+        computed += middle.size
+        last, stretches = stretches, {}
+        for (row, n), half in zip(halved, tried[["value", "label"]].tolist(), strict=True):
+            low, high = last[row, n]
+            stretches |= {(row, 2 * n): (low, half), (row, 2 * n + 1): (half, high)}
+    return {row: sorted(found[row]) for row in sorted(found)}, computed
 
 
 def refined_jumps(
@@ -192,7 +161,7 @@ def refined_jumps(
     outermost = np.array([(one.first, one.last) for one in stretches]).reshape(-1, 2).T
     ways = zip(WAYS, directions_of(result), outermost[::-1], (1, -1), strict=True)
     for way, one_way, end, step in ways:
-        edges = _edges(one_way)
+        edges = _edges_of(one_way)
         # Next to its end a lane may still be on its way: the orbit is that of the lane before.
         inner = np.clip(end - step, *outermost)
         there = (end + step >= 0) & (end + step < edges.size)
@@ -213,16 +182,41 @@ def refined_jumps(
     return sorted(found, key=lambda boundary: boundary.below)
 
 
-def _edges(result: Result) -> NDArray[Any]:
-    """Return of each lane value, label, period, end state, and if that is far from its orbit."""
-    lanes, states = labelled_lanes(result), result["end_state"]
-    fields = [("value", "f8"), ("label", object), ("period", "i4"), ("far", "?")]
-    edges = np.empty(lanes.values.size, [*fields, ("state", "f8", states.shape[1:])])
-    edges["value"], edges["label"], edges["period"] = lanes.values, lanes.labels, lanes.period
-    edges["state"], edges["far"] = states, False
+def _edges_of(result: Result) -> NDArray[Any]:
+    """Return the edges that the lanes of a result with labels are, in their order."""
+    told = [result.lanes(name) for name in (*LABELS, "end_state")]
+    edges = _edges(result.along(result.axis), result.variables["motion"].flags, *told)
     if "return_distance" in result:
-        edges["far"] = (lanes.period > 0) & ~(result["return_distance"] <= TOLERANCE)
+        distance = result.lanes("return_distance")
+        edges["far"] = (edges["period"] > 0) & ~(distance <= TOLERANCE)
     return edges
+
+
+def _edges(
+    values: Floats, flags: Sequence[str], motion: NDArray[Any], period: NDArray[Any], state: Floats
+) -> NDArray[Any]:
+    """Return of each lane value, label, period, state, and whether that is far from its orbit."""
+    fields = [("value", "f8"), ("label", object), ("period", "i4"), ("far", "?")]
+    edges = np.zeros(values.size, [*fields, ("state", "f8", state.shape[1:])])
+    edges["value"], edges["period"], edges["state"] = values, period, state
+    kinds = zip(motion.tolist(), period.tolist(), strict=True)
+    edges["label"] = [label_text(flags[m], n) for m, n in kinds]
+    return edges
+
+
+def _computed(simulation: Simulation, values: Mapping[str, Floats]) -> NDArray[Any]:
+    """Compute lanes at values of the swept parameters, the first one first, as the sweep would."""
+    config, plan = simulation.config, simulation.recording
+    (axis, *_), found = values.values(), []
+    size = simulation.block_lanes(numba.get_num_threads())
+    for first in range(0, axis.size, size):
+        check()
+        some = {name: value[first : first + size] for name, value in values.items()}
+        system = system_of(config, some, simulation.lanes.effects)
+        start = start_states(config, system, np.zeros(system.lanes, dtype=np.intp))
+        labels, state = labels_of(system, integrate(system, start, plan), plan)
+        found.append((labels.motion, labels.period, state))
+    return _edges(axis, MEANINGS, *map(np.concatenate, zip(*found, strict=True)))
 
 
 def _losses(

@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 from tqdm import tqdm
 
 from gearchaos.configuration import Configuration, Given, configuration_of
-from gearchaos.engine.refinement import computable
 from gearchaos.engine.running import choose_threads, metadata, result_of
 from gearchaos.engine.simulation import Simulation
 from gearchaos.errors import ConfigurationError
@@ -57,28 +56,6 @@ def respond(config: Given, periods: int = DEFAULT_PERIODS, threads: int | None =
     simulation = prepared(config, periods)
     simulation.choose_steps()
     return compute_response(simulation, periods, config.text)
-
-
-def continued(lane: Result, name: str) -> Configuration:
-    """Return the configuration of the motion that goes on from the end of a lane of a result.
-
-    All axes of the result, which messages call by a name, are fixed; no transient is left out.
-    Raises FileError if it holds no configuration, ConfigurationError if the lane diverged.
-    """
-    config, ended = computable(lane, name), lane["end_state"].tolist()
-    if not np.isfinite(ended).all():
-        raise ConfigurationError(
-            f"{name}: {lane.where}: this lane diverged, choose another with --at"
-        )
-    state = dict(zip(lane.variables["state"].flags, ended, strict=True))
-    for key, value in {
-        "start": {"kind": "given", "state": state},
-        # States that the file lacks would begin far from where they settle.
-        "scene.effects": config.needed_effects,
-        "integration.transient_periods": 0,
-    }.items():
-        config = config.replace(key, value)
-    return config
 
 
 def prepared(config: Configuration, periods: int) -> Simulation:

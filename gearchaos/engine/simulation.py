@@ -21,7 +21,7 @@ from gearchaos.dynamics.exponents import exponents, sum_of_exponents
 from gearchaos.dynamics.labelling import LOOKS, Told, labels_of
 from gearchaos.dynamics.largest_exponents import MEANINGS as RECORD_MEANINGS
 from gearchaos.dynamics.largest_exponents import largest_exponents
-from gearchaos.dynamics.stability import sufficient_steps
+from gearchaos.dynamics.stability import fewest_stable_steps
 from gearchaos.dynamics.systems import plan_of
 from gearchaos.engine.error_check import MEANINGS, check_arrays, checked_lanes
 from gearchaos.engine.excitation import remarks, whole_lengths
@@ -174,7 +174,7 @@ class Simulation:
         if self.plan.method == "flow_map":
             for block in np.arange(lanes), np.arange(len(self.lanes) - lanes, len(self.lanes)):
                 system = self.lanes.system_of(block)
-                maps = max(maps, maps_memory(system, self.plan, sufficient_steps(system)))
+                maps = max(maps, maps_memory(system, self.plan, fewest_stable_steps(system)))
         return 8 * records * numbers + maps
 
     def block_lanes(self, threads: int) -> int:

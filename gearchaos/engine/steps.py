@@ -15,8 +15,8 @@ from gearchaos.dynamics.largest_exponents import largest_exponents
 from gearchaos.dynamics.stability import (
     StabilityLimit,
     exponent_bias,
+    fewest_stable_steps,
     stability_limit,
-    sufficient_steps,
 )
 from gearchaos.engine.lanes import Lanes
 from gearchaos.errors import ConfigurationError
@@ -36,7 +36,7 @@ MOST_BIAS = 0.05
 """Largest shift of an exponent by the step alone that is passed over, in parts of the exponent."""
 
 SURELY_FINE = 8
-"""So many times the steps that are surely stable shift no exponent that matters."""
+"""So many times the fewest stable steps shift no exponent that matters."""
 
 PILOT_PERIODS = 150
 """Mesh periods in which a lane settles on its grid, and as many that are compared."""
@@ -98,7 +98,7 @@ def coarse_steps(lanes: Lanes, steps: int) -> str:
     system = lanes.system_of(lanes.spread(PILOT_LANES))
     if lanes.config.integration.method != "rk4":
         return ""
-    if steps >= SURELY_FINE * np.max(sufficient_steps(system)):
+    if steps >= SURELY_FINE * np.max(fewest_stable_steps(system)):
         return ""
     bias, true = exponent_bias(system, steps)
     worst = int(np.argmax(np.abs(bias) - MOST_BIAS * np.abs(true)))

@@ -5,7 +5,7 @@ import pytest
 from gearchaos_kernels import Effects, Groups, Plan, integrate, jacobian
 
 from gearchaos.dynamics.exponents import exponents, period_jacobian, sum_of_exponents
-from gearchaos.dynamics.stable_region import amplification
+from gearchaos.dynamics.stability import amplification
 from gearchaos.records.lyapunov import largest_exponent
 
 from ..kernels.reference import (

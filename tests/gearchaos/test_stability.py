@@ -13,9 +13,8 @@ from gearchaos.dynamics.stability import (
     exponent_bias,
     fewest_stable_steps,
     stability_limit,
-    sufficient_steps,
+    steps_per_time,
 )
-from gearchaos.dynamics.stable_region import steps_per_time
 from gearchaos.gear.contact_lines import series_table
 
 from ..kernels.reference import (
@@ -88,7 +87,7 @@ def test_a_mode_that_grows_by_itself_sets_no_limit():
 
 
 @pytest.mark.parametrize("scene", EVERY_SCENE, ids=name_of)
-def test_limit_of_every_scene_is_that_of_its_whole_jacobian_and_no_more_than_the_bound(scene):
+def test_limit_of_every_scene_is_that_of_its_whole_jacobian(scene):
     model = random_pairs(40, 7)
     stiffness = series_table((COSINE - 1j * SINE) * 2.0 / 3.0, 4096)
     extremes = [np.min(stiffness), np.max(stiffness)] if scene.stiffness_variation else [1.0]
@@ -103,7 +102,6 @@ def test_limit_of_every_scene_is_that_of_its_whole_jacobian_and_no_more_than_the
     # Stiffness sampled on another grid, and rounding up to whole steps.
     assert np.all(found >= wanted * (1.0 - 1e-3))
     assert np.all(found <= wanted * (1.0 + 1e-3) + 1.0)
-    assert np.all(sufficient_steps(system_of(model, scene)) >= found)
 
 
 def largest_state(model: Groups, steps: int) -> float:

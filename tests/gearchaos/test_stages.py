@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import gearchaos
-from gearchaos.engine.refinement import refinable
+from gearchaos.engine.recomputing import refinable
 from gearchaos.results.result import Result
 
 from .commands import run_module

@@ -5,7 +5,7 @@ import json
 import pytest
 
 import gearchaos
-from gearchaos.engine.survival import Survival
+from gearchaos.engine.recomputing import Survival
 from gearchaos.records.label import CHAOTIC
 
 from .commands import run_module

@@ -7,7 +7,7 @@ from gearchaos_kernels import integrate
 import gearchaos
 from gearchaos.configuration import Configuration
 from gearchaos.dynamics.systems import plan_of, system_of
-from gearchaos.engine.refinement import computable
+from gearchaos.engine.recomputing import computable
 
 DEVIATIONS = np.round(12.0 * np.sin(2.0 * np.pi * np.arange(21) / 21), 2) + [0, 5, -4] * 7
 

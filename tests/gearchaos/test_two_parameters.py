@@ -2,6 +2,7 @@
 
 import json
 import signal
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -244,8 +245,8 @@ def test_a_row_of_a_map_is_the_sweep_of_that_row_bit_for_bit(tmp_path):
         assert same_data(row, sole)
 
 
-def test_the_boundaries_of_a_map_are_those_of_its_rows(tmp_path):
-    """Every row is bisected to where its own slice is; the lanes that this takes are told."""
+def test_the_boundaries_of_a_map_are_those_of_its_rows_and_what_rows_beside_show(tmp_path):
+    """What bisection of a row meets on its way is found too; the lanes that this takes are told."""
     text = BOTH[: BOTH.index("[start]")] + BOTH[BOTH.index("[integration]") :]
     (tmp_path / "both.toml").write_text(text, encoding="utf-8")
     overrides = [f"groups.{way}_damping_{g}=0.05" for way in ("transverse", "axial") for g in "pg"]
@@ -257,21 +258,31 @@ def test_the_boundaries_of_a_map_are_those_of_its_rows(tmp_path):
     whole = json.loads(of_the_file("stages", path, *width, "--json"))
     assert (whole["parameter"], whole["second_parameter"]) == ("pitch_error", "load")
     loads = gearchaos.open_result(path)["load"].tolist()
-    rows, count = [], 0
+    edges = ("below", "above", "motion_below", "motion_above")
+    found = {
+        row["value"]: [[one[key] for key in edges] for one in row["boundaries"]]
+        for row in whole["rows"]
+    }
+    alone = 0
     for load in loads:
         sliced = json.loads(of_the_file("stages", path, "--at", f"{load}", *width, "--json"))
-        edges = ("below", "above", "motion_below", "motion_above")
         ends = [[one[key] for key in edges] for one in sliced["boundaries"]]
-        count += len(ends)
-        rows += [(load, ends)] if ends else []
-    assert count > 1
-    found = [(row["value"], row["boundaries"]) for row in whole["rows"]]
-    assert [(value, [[one[key] for key in edges] for one in row]) for value, row in found] == rows
+        # Where bisection of a slice meets a third motion, it has one boundary; here begin two.
+        rest = [[*one[:3]] for one in found.get(load, [])]
+        assert all([*one[:3]] in rest for one in ends)
+        for one, other in pairwise(found.get(load, [])):
+            assert one[1] <= other[0] and one[3] == other[2]
+        alone += len(ends)
+    count = sum(map(len, found.values()))
+    assert count > alone > 1
+    assert all(0.0 < one[1] - one[0] <= 0.1 for row in found.values() for one in row)
     # Four halvings of 1.25 are no wider than 0.1, and each takes one lane.
-    assert whole["lanes"] == 4 * count
-    assert whole["lanes_of_a_map_as_fine"] == 3 * 51
+    assert 4 * alone < whole["lanes"] < 3 * 51 == whole["lanes_of_a_map_as_fine"]
     told = of_the_file("stages", path, *width)
-    assert len(told.splitlines()) == count + len(rows) + 1
-    assert told.splitlines()[0] == f"load = {rows[0][0]:.6g}"
+    assert len(told.splitlines()) == count + len(found) + 1
+    assert told.splitlines()[0] == f"load = {min(found):.6g}"
+    across = json.loads(of_the_file("stages", path, "--at", "pitch_error=11.5", *width, "--json"))
+    assert across["parameter"] == "load"
+    assert [0.1 <= one["below"] < one["above"] <= 0.5 for one in across["boundaries"]] == [True]
     refused = run_module("gearchaos.stages", path.name, *width, "--survival", "3", cwd=tmp_path)
     assert refused.code == 2 and "choose a slice with --at NAME=VALUE" in refused.err

@@ -8,7 +8,7 @@ from gearchaos_kernels.flow_map import maps_of
 from scipy.linalg import expm
 
 from gearchaos.dynamics.exponents import exponents, period_jacobian, sum_of_exponents
-from gearchaos.dynamics.stability import sufficient_steps
+from gearchaos.dynamics.stability import fewest_stable_steps
 
 from .reference import (
     BASE_HELIX_ANGLE,
@@ -123,7 +123,7 @@ def test_the_memory_of_maps_is_foretold_within_a_factor_of_two(scene, steps):
         plan = Plan(steps, 0, 1, 0, method=FLOW_MAP)
         made = maps_of(pair, steps, flags(pair, plan)).table.nbytes
         # Those kept and those used.
-        told = maps_memory(pair, plan, sufficient_steps(pair))
+        told = maps_memory(pair, plan, fewest_stable_steps(pair))
         assert 1 <= told / (2 * made) <= 2
 
 

@@ -1,0 +1,150 @@
+"""The lanes of a result computed again, or others between them, or going on from their ends."""
+
+from typing import NamedTuple
+
+import numpy as np
+from gearchaos_kernels import Status, integrate
+
+from gearchaos.configuration import Configuration
+from gearchaos.dynamics.systems import plan_of, system_of
+from gearchaos.engine.running import choose_threads
+from gearchaos.errors import ConfigurationError, FileError
+from gearchaos.gear.tooth_deviations import REALISATION
+from gearchaos.interrupts import check
+from gearchaos.records.label import CHAOTIC_GROWTH
+from gearchaos.records.lyapunov import largest_exponent
+from gearchaos.results.result import Result
+from gearchaos.results.stage_table import labelled_lanes
+from gearchaos.results.variables import axis_name
+
+MOST_LANES = 25
+"""Chaotic lanes that are tried, spread evenly over the sweep: they bound the cost."""
+
+
+def computable(result: Result, name: str) -> Configuration:
+    """Return the configuration with which lanes of a result can be computed again, or go on.
+
+    Messages call the result ``name``. Raises FileError if it does not hold its configuration.
+    """
+    text = str(result.metadata.get("configuration_resolved", ""))
+    if not text:
+        raise FileError(f"{name}: holds no configuration; run the sweep again")
+    config = Configuration.from_toml(text, f"{name} (configuration_resolved)")
+    parameters = [REALISATION, *(sweep.parameter for sweep in config.sweeps.values())]
+    fixed = {p: result.fixed[axis_name(p)] for p in parameters if axis_name(p) in result.fixed}
+    if fixed:
+        config = config.at(fixed)
+    if config.second_sweep is not None and config.sweep.parameter in fixed:
+        # What is left runs along the second parameter alone.
+        tables = config.tables()
+        tables["sweep"] = tables.pop("second_sweep")
+        config = Configuration.from_tables(tables, config.source)
+    # The steps and periods that were taken, not those from which they were chosen or raised.
+    for name in ("steps_per_period", "transient_periods", "recorded_periods"):
+        taken = int(result.metadata.get(name, getattr(config.integration, name)))
+        config = config.replace(f"integration.{name}", taken)
+    for key, value in {
+        "integration.tolerance": None,
+        "integration.error_check": 0.0,
+        "outputs.exponents": False,
+        "outputs.motion": True,
+    }.items():
+        config = config.replace(key, value)
+    return config
+
+
+def refinable(result: Result, name: str) -> Configuration:
+    """Return the configuration with which lanes between those of a result can be computed.
+
+    As `computable`, and raises ConfigurationError if its lanes do not stand for themselves.
+    """
+    config = computable(result, name)
+    if config.sweep.parameter == "pitch_error.grade":
+        raise ConfigurationError(
+            f"{name}: pitch_error.grade: nothing lies between two grades; refine a sweep of "
+            "another parameter, such as pitch_error"
+        )
+    unfit = remedy = ""
+    if config.start.carry != "none":
+        unfit, remedy = f'carry = "{config.start.carry}"', 'with start.carry = "none"'
+    elif config.start.kind == "random":
+        unfit, remedy = 'kind = "random"', "that starts otherwise"
+    elif config.start.kind == "grid":
+        state = zip(result.variables["state"].flags, result["start_state"][0].tolist(), strict=True)
+        config = config.replace("start", {"kind": "given", "state": dict(state)})
+    if unfit:
+        raise ConfigurationError(
+            f"{name}: start.{unfit}: a lane between two others has no start of its own; refine a "
+            f"sweep {remedy}"
+        )
+    return config
+
+
+def continued(lane: Result, name: str) -> Configuration:
+    """Return the configuration of the motion that goes on from the end of a lane of a result.
+
+    All axes of the result, which messages call by a name, are fixed; no transient is left out.
+    Raises FileError if it holds no configuration, ConfigurationError if the lane diverged.
+    """
+    config, ended = computable(lane, name), lane["end_state"].tolist()
+    if not np.isfinite(ended).all():
+        raise ConfigurationError(
+            f"{name}: {lane.where}: this lane diverged, choose another with --at"
+        )
+    state = dict(zip(lane.variables["state"].flags, ended, strict=True))
+    for key, value in {
+        "start": {"kind": "given", "state": state},
+        # States that the file lacks would begin far from where they settle.
+        "scene.effects": config.needed_effects,
+        "integration.transient_periods": 0,
+    }.items():
+        config = config.replace(key, value)
+    return config
+
+
+class Survival(NamedTuple):
+    """Of so many chaotic lanes tried, how many are still chaotic after so many more records."""
+
+    records: int
+    lanes: int
+    outlasting: int
+
+    @property
+    def text(self) -> str:
+        """One line for a person."""
+        if not self.lanes:
+            return "chaotic: no lane, so that there is nothing to outlast"
+        share = 100.0 * self.outlasting / self.lanes
+        return (
+            f"chaotic: {share:.0f} % of lanes outlast {self.records} records ({self.lanes} tried)"
+        )
+
+
+def survival(
+    config: Configuration, result: Result, records: int, threads: int | None = None
+) -> Survival:
+    """Try how many chaotic lanes outlast so many records of their own length.
+
+    A lane outlasts them if a disturbance still grows over the later half of the last one, at the
+    pace of `CHAOTIC_GROWTH` over a record. ``config`` is from `computable`; the result, which it
+    computed, has one axis.
+    """
+    chaotic = np.flatnonzero(labelled_lanes(result).labels == "chaotic")
+    if not chaotic.size:
+        return Survival(records, 0, 0)
+    chosen = np.linspace(0, chaotic.size - 1, min(MOST_LANES, chaotic.size))
+    lanes = chaotic[chosen.round().astype(np.intp)]
+    values = {config.sweep.parameter: result[result.axis][lanes]}
+    choose_threads(threads)
+    system = system_of(config, values, config.needed_effects)
+    plan = plan_of(config, transient_periods=0, tangent=True)
+    state, tangent = result["end_state"][lanes], None
+    for _ in range(records):
+        check()
+        outcome = integrate(system, state, plan, tangent_start=tangent)
+        state, tangent = outcome.end_state, outcome.end_tangent
+    assert outcome.growth is not None
+    later = outcome.growth[:, plan.recorded_periods // 2 :]
+    exponent, _ = largest_exponent(later, np.ones(lanes.size))
+    growing = exponent * plan.recorded_periods > CHAOTIC_GROWTH
+    return Survival(records, lanes.size, int(np.sum(growing & (outcome.status == Status.OK))))
