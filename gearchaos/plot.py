@@ -207,7 +207,7 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
 def _targets(options: argparse.Namespace, name: str, alone: bool) -> list[Path]:
     from matplotlib.backend_bases import FigureCanvasBase
 
-    from gearchaos.figures.files import ENDINGS, FORMATS
+    from gearchaos.figures.page import ENDINGS, FORMATS
 
     formats = FORMATS
     if options.format is not None:
@@ -241,7 +241,7 @@ def _targets(options: argparse.Namespace, name: str, alone: bool) -> list[Path]:
 
 
 def _check_targets(targets: Sequence[Path], options: argparse.Namespace) -> None:
-    from gearchaos.figures.files import is_own_figure
+    from gearchaos.figures.page import is_own_figure
     from gearchaos.results.atomic_file import check_output
 
     problems: list[str] = []

@@ -11,7 +11,7 @@ from matplotlib.patches import Patch, Rectangle
 from gearchaos.errors import FigureError
 from gearchaos.figures.labels import legend_title
 from gearchaos.figures.lanes import swept_axes
-from gearchaos.figures.style import LEGEND, SMALL_FONT_PT
+from gearchaos.figures.page import legend_below
 from gearchaos.results.result import Result
 from gearchaos.results.stage_table import LabelledLanes, Stage, labelled_lanes, stage_table
 
@@ -110,12 +110,12 @@ def shade_stages(
         return StageArtists(stages, shades, None)
     named = [kind for kind in dict.fromkeys([*SHADES, *kinds]) if kind in drawn]
     handles = [Patch(linewidth=0.3, label=kind, **look_of(kind)) for kind in named]
-    assert axes.figure is not None
     # Above the axes are the panel's letter and the marks of lanes that cannot be shown; and a line
     # at the foot of the page would lie on the legend.
-    look = {"loc": "outside lower center", "ncols": min(len(handles), 5), **LEGEND}
-    look |= {"title": legend_title(result), "title_fontsize": SMALL_FONT_PT}
-    return StageArtists(stages, shades, axes.figure.legend(handles=handles, **look))
+    figure: Any = axes.figure
+    return StageArtists(
+        stages, shades, legend_below(figure, handles, legend_title(result), columns=5)
+    )
 
 
 def look_of(kind: str) -> dict[str, Any]:

@@ -29,6 +29,7 @@ _SPEED = Unit(r"unit $b\prime\omega_h$", "m s-1", 1e-6, (LENGTH, FREQUENCY))
 _ACCELERATION = Unit(r"unit $b\prime\omega_h^2$", "m s-2", 1e-6, (LENGTH, FREQUENCY, FREQUENCY))
 _FORCE = Unit(r"unit $k_mb\prime$", "N", 1e-6, (STIFFNESS, LENGTH))
 _GROWTH = Unit(r"per unit of $\tau$", "s-1", 1.0, (FREQUENCY,))
+_PURE = Unit("", "1", 1.0, ())
 _UNITS = {
     r"(section_)?delta_\d|mesh_error|transmission_error_\w+": _LENGTH,
     r"(section_)?delta_\d_rate|approach_\w+|slowest_crossing": _SPEED,
@@ -40,9 +41,9 @@ _UNITS = {
 """By a pattern of the names of variables: docs/model.md."""
 
 
-def unit_of(name: str) -> Unit | None:
-    """Return what the numbers of a dimensionless variable are multiples of, None of pure ones."""
-    return next((unit for names, unit in _UNITS.items() if re.fullmatch(names, name)), None)
+def unit_of(name: str) -> Unit:
+    """Return what the numbers of a dimensionless variable are multiples of, nothing if pure."""
+    return next((unit for names, unit in _UNITS.items() if re.fullmatch(names, name)), _PURE)
 
 
 def in_physical_units(
@@ -54,7 +55,7 @@ def in_physical_units(
     the variable does not have.
     """
     unit = unit_of(variable.name)
-    if unit is None or variable.units != "1":
+    if unit is _PURE or variable.units != "1":
         return variable, values
     for name in unit.scales:
         if name not in parameters:

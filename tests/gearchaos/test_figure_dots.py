@@ -11,7 +11,7 @@ from gearchaos.figures import bifurcation, lyapunov
 from gearchaos.figures.dots import MOST_DOTS, DenseDots, counts, dots
 from gearchaos.figures.lanes import COLUMNS, Lanes
 from gearchaos.results.result import Result
-from gearchaos.results.variables import Axis, sweep_variables
+from gearchaos.results.variables import coordinate, sweep_variables
 
 RANDOM = np.random.default_rng(7)
 
@@ -42,7 +42,7 @@ def wide_sweep(count: int, points: int, *, exponent=None) -> Result:
     section = np.where(load < 0.5, 0.5 * load, 1.0)[:, np.newaxis] * RANDOM.random((count, points))
     section[load < 0.5] = load[load < 0.5, np.newaxis]
     variables = sweep_variables(
-        [Axis("load", "1", "static load", "", load)],
+        [coordinate("load", "1", "static load", "", load)],
         states=["delta_5"],
         section=["delta_5"],
         section_points=points,
