@@ -80,7 +80,7 @@ def _searched(problem: "Problem", judge: "Judge", options: Namespace) -> "Tried"
     from gearchaos.identification.search import MOST_CENTRES, RUNGS, decisive_facts, search
     from gearchaos.identification.tried import read_tried, write_tried
     from gearchaos.results.atomic_file import check_output
-    from gearchaos.results.manifest import require_same
+    from gearchaos.results.block_folder import require_same
 
     if find_spec("cma") is None:
         raise ConfigurationError(

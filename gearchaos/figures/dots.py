@@ -59,7 +59,6 @@ class DenseDots(Line2D):
     def __init__(self, lanes: Lanes, rows: Floats, **look: Any) -> None:
         super().__init__([], [], **look | {"rasterized": True})
         self._points = lanes, rows
-        self._counted: tuple[Any, NDArray[np.uint32]] = (None, np.zeros((0, 0), np.uint32))
 
     @allow_rasterization  # type: ignore[untyped-decorator]
     def draw(self, renderer: Any) -> None:
@@ -70,11 +69,7 @@ class DenseDots(Line2D):
         dot = self._dot(renderer)
         ends = dot.shape[0] - 1
         left, bottom = (floor(edge) for edge in self.axes.bbox.min)
-        # A figure is drawn twice at each resolution, first to lay it out.
-        drawn = (ends, *self.axes.bbox.bounds, *self.axes.viewLim.bounds)
-        if self._counted[0] != drawn:
-            self._counted = drawn, counts(self.axes, *self._points, ends // 2)
-        counted = self._counted[1]
+        counted = counts(self.axes, *self._points, ends // 2)
         height, width = (size - ends for size in counted.shape)
         clear = np.zeros((height, width), np.float32)
         for row, column in np.argwhere(dot > 0.0):

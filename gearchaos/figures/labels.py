@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from matplotlib.mathtext import MathTextParser
 
 from gearchaos.results import units
-from gearchaos.results.excitation import excitation_of
 from gearchaos.results.result import Result
+from gearchaos.results.units import excitation_of
 from gearchaos.results.variables import DIRECTION, START, coordinate_text
 
 DIMENSIONLESS = ("", "1")

@@ -7,10 +7,10 @@ from typing import Any, TypeAlias
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
+from gearchaos.figures import phase_portrait, poincare_section, time_history
 from gearchaos.figures.page import Page, column, few_ticks, letter, remark
 from gearchaos.figures.panel import legend_above
-from gearchaos.figures.response import phase_portrait, poincare_section, time_history
-from gearchaos.figures.response_lane import COORDINATE, coordinates_of, samples_per_period
+from gearchaos.figures.response import COORDINATE, coordinates_of, samples_per_period
 from gearchaos.figures.style import BLACK, BLUE, FONT_PT, SMALL_FONT_PT, VERMILION
 from gearchaos.paper.computation import Reproduction, lane_of, largest_acceleration
 from gearchaos.paper.published import Printed, published

@@ -5,7 +5,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from gearchaos.figures.response_lane import coordinates_of, samples_per_period
+from gearchaos.figures.response import coordinates_of, samples_per_period
 from gearchaos.gear.derivation import Quantities, derive_groups
 from gearchaos.gear.geometry import HelicalPair
 from gearchaos.gear.mesh_stiffness import TrapezoidalStiffness

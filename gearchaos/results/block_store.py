@@ -15,10 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gearchaos.errors import FileError
-from gearchaos.results import manifest
 from gearchaos.results.atomic_file import PARTIAL, reason, replacing, unlinked_content
+from gearchaos.results.block_folder import LOCK, MANIFEST, StoreLock, folder_of, settle_manifest
 from gearchaos.results.result_file import Metadata, Parameter, write_result
-from gearchaos.results.store_lock import LOCK, StoreLock
 from gearchaos.results.variables import Variable, lane_axes
 from gearchaos.version import Software
 
@@ -69,7 +68,7 @@ class BlockStore(AbstractContextManager["BlockStore"]):
         blocks: Sequence[Bounds] | None = None,
         shards: int | None = None,
     ) -> None:
-        self.output, self.folder = Path(output), manifest.folder_of(output)
+        self.output, self.folder = Path(output), folder_of(output)
         self.lanes, self._record = lanes_and_record(variables)
         facts = {**SCHEMA, **software._asdict(), "configuration": configuration}
         facts |= {"lanes": self.lanes, "variables": self._record.descr}
@@ -84,7 +83,7 @@ class BlockStore(AbstractContextManager["BlockStore"]):
             beside = {"text": text, "shards": shards}
             # Of several shards, whoever comes first writes it.
             how = {"write": shared or not own, "overwrite": not shared}
-            manifest.settle_manifest(self.folder, decisive, beside, **how)
+            settle_manifest(self.folder, decisive, beside, **how)
             if own and not resume:
                 raise FileError(
                     f"{self.folder}: holds {len(own)} finished blocks of an earlier run; continue "
@@ -111,7 +110,7 @@ class BlockStore(AbstractContextManager["BlockStore"]):
     def remove(self) -> None:
         """Remove the blocks, the folder if nothing else is in it, and let go of the lock."""
         # Only what the store has made: the folder may hold files of the user.
-        self._remove([*self._names(), manifest.MANIFEST, LOCK])
+        self._remove([*self._names(), MANIFEST, LOCK])
         # What comes to be there from now on is another sweep's.
         self._lock.release()
 

@@ -15,8 +15,7 @@ from gearchaos.errors import FileError
 from gearchaos.gear.group_table import LARGEST_VALUE
 from gearchaos.results import stored_dataset as stored
 from gearchaos.results import variables as known
-from gearchaos.results.atomic_file import reason
-from gearchaos.results.checksum_line import checksum_fits
+from gearchaos.results.atomic_file import checksum_fits, reason
 from gearchaos.results.result_file import ORIGINS, PARAMETERS, SCHEMA, SCHEMA_VERSION, Parameter
 from gearchaos.results.stored_dataset import UnfitError
 from gearchaos.results.variables import HARMONIC, STATE, Variable, coordinate

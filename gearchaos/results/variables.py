@@ -269,7 +269,6 @@ def step_choice_variables(
     text = "steps per period that were tried before the sweep; the last number was taken"
     variables = [coordinate(name, "1", text, "$N$", np.asarray(steps, dtype=np.int32))]
     for key, row in measured.items():
-        values = np.asarray(row, dtype=np.float64)
-        key, text = f"candidate_{key}", wording[key]
-        variables.append(Variable(key, (name,), "float64", "1", text, values=values))
+        told = f"candidate_{key}", (name,), "float64", "1", wording[key]
+        variables.append(Variable(*told, values=np.asarray(row, dtype=np.float64)))
     return variables

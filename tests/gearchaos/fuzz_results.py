@@ -10,7 +10,7 @@ from typing import Any
 import h5py
 import numpy as np
 
-from gearchaos.results.checksum_line import append_checksum
+from gearchaos.results.atomic_file import append_checksum
 from gearchaos.results.result import Parameter, Result
 from gearchaos.results.variables import (
     STATE_WORDING,

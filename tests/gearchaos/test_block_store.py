@@ -15,10 +15,9 @@ import numpy as np
 import pytest
 
 from gearchaos.errors import FileError
+from gearchaos.results.block_folder import StoreLock, read_manifest, require_same
 from gearchaos.results.block_store import BlockStore
-from gearchaos.results.manifest import read_manifest, require_same
 from gearchaos.results.result import Parameter, Result, open_result
-from gearchaos.results.store_lock import StoreLock
 from gearchaos.results.variables import Variable, coordinate, start_axis, sweep_variables
 from gearchaos.version import Software
 

@@ -8,7 +8,7 @@ import h5py
 import numpy as np
 import pytest
 
-from gearchaos.results.checksum_line import append_checksum
+from gearchaos.results.atomic_file import append_checksum
 from gearchaos.results.overview import overview
 from gearchaos.results.result import Result, open_result
 from gearchaos.results.variables import coordinate

@@ -9,7 +9,7 @@ import pytest
 
 from gearchaos import FileError, load_config, open_result
 from gearchaos.command_line import sweep_file
-from gearchaos.figures.response_lane import coordinates_of
+from gearchaos.figures.response import coordinates_of
 from gearchaos.gear.mesh_stiffness import series_table
 from gearchaos.paper.comparison import compare
 from gearchaos.paper.computation import compute, lane_of, largest_acceleration

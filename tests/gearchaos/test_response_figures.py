@@ -17,7 +17,7 @@ from gearchaos.figures import (
     response_page,
     time_history,
 )
-from gearchaos.figures.response_lane import coordinates_of, is_response, repeats_after
+from gearchaos.figures.response import coordinates_of, is_response, repeats_after
 from gearchaos.plot import main
 from gearchaos.results.response_variables import response_variables
 from gearchaos.results.result import Result

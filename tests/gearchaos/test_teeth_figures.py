@@ -9,13 +9,13 @@ from matplotlib.text import Text
 
 import gearchaos
 from gearchaos.figures import response_page, shares_page
-from gearchaos.figures.response_lane import repeats_after
+from gearchaos.figures.response import repeats_after
 from gearchaos.figures.style import BLACK, BLUE, VERMILION
 from gearchaos.info import main as info
 from gearchaos.plot import main as plot
-from gearchaos.results.excitation import Excitation, excitation_of
 from gearchaos.results.response_variables import response_variables
 from gearchaos.results.result import Parameter, Result
+from gearchaos.results.units import Excitation, excitation_of
 from gearchaos.results.variables import coordinate, sweep_variables
 from gearchaos.stages import main as stages
 
