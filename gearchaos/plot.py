@@ -257,7 +257,7 @@ def _lanes_in_words(result: "Result") -> str:
     lanes = result.along(result.axis).size
     words = f"{lanes} lane{'s' if lanes != 1 else ''} over {' and '.join(swept_axes(result))}"
     words += f" at {result.where}" if result.fixed else ""
-    diverged = int((result["status"] != 0).sum()) if "status" in result else 0
+    diverged = int((result["status"] != 0).sum())
     return f"{words}, {diverged} of them diverged" if diverged else words
 
 

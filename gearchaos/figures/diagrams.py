@@ -141,10 +141,8 @@ def lyapunov(
     stored: Floats = result.lanes(LARGEST_EXPONENT)
     whole = stored[lanes.numbers]
     whole[lanes.diverged | np.isinf(whole)] = np.nan
-    spread = np.full(whole.shape, np.nan)
-    if LARGEST_EXPONENT + STANDARD_ERROR in result:
-        error = result.lanes(LARGEST_EXPONENT + STANDARD_ERROR)[lanes.numbers]
-        spread = BAND_STANDARD_ERRORS * error
+    error = result.lanes(LARGEST_EXPONENT + STANDARD_ERROR)[lanes.numbers]
+    spread = BAND_STANDARD_ERRORS * error
     several_starts = bool(np.any(np.diff(lanes.parameter) == 0.0))
     # Several starts may lie on different motions, which no line should join.
     lonely = np.isfinite(whole)

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from gearchaos.errors import FigureError
 from gearchaos.results.result import Result
-from gearchaos.results.variables import UNSWEPT
+from gearchaos.results.variables import STATUS, UNSWEPT
 
 Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -76,17 +76,15 @@ def select_lanes(result: Result, between: Between = (None, None)) -> Lanes:
     parameter = np.asarray(result.along(result.axis), dtype=np.float64)
     low, high = between
     least, most = -np.inf if low is None else low, np.inf if high is None else high
-    chosen = np.isfinite(parameter) & (parameter >= least) & (parameter <= most)
+    chosen = (parameter >= least) & (parameter <= most)
     if not chosen.any():
         wanted = " to ".join("..." if end is None else f"{end}" for end in between)
-        there = f"{parameter.min():g} to {parameter.max():g}" if parameter.size else "no lane"
+        there = f"{parameter.min():g} to {parameter.max():g}"
         raise FigureError(f"no lane with {result.axis} from {wanted}; the result has {there}")
     numbers = np.flatnonzero(chosen)
     numbers = numbers[np.argsort(parameter[numbers], kind="stable")]
     parameter = parameter[numbers]
-    diverged = np.zeros(numbers.shape, dtype=bool)
-    if "status" in result:
-        diverged = result.lanes("status")[numbers] != 0
+    diverged = result.lanes(STATUS)[numbers] != 0
     # Half a lane beyond the outermost ones, which would lie under the frame.
     half = float(parameter[-1] - parameter[0]) / (2 * max(1, np.unique(parameter).size - 1))
     left = float(parameter[0]) - half if low is None else low

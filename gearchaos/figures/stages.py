@@ -8,9 +8,8 @@ from matplotlib.axes import Axes
 from matplotlib.legend import Legend
 from matplotlib.patches import Patch, Rectangle
 
-from gearchaos.errors import FigureError
 from gearchaos.figures.labels import legend_title
-from gearchaos.figures.lanes import swept_axes
+from gearchaos.figures.lanes import diagram_lanes
 from gearchaos.figures.page import legend_below
 from gearchaos.results.result import Result
 from gearchaos.results.stage_table import LabelledLanes, Stage, labelled_lanes, stage_table
@@ -88,11 +87,7 @@ def shade_stages(
     FigureError
         If it has several swept parameters.
     """
-    if swept_axes(result) != [result.axis]:
-        raise FigureError(
-            f"stages are those of one axis, but the result has {', '.join(result.axes)}; fix the "
-            "others with result.sel"
-        )
+    diagram_lanes(result)  # Refuses two swept parameters.
     lanes = labelled_lanes(result, repeats=True) if lanes is None else lanes
     low, high = sorted(axes.get_xlim())
     stages = stage_table(lanes, NARROWEST_SHARE * (high - low) if narrowest is None else narrowest)

@@ -99,10 +99,6 @@ class BlockStore(AbstractContextManager["BlockStore"]):
             self._remove([partial.name for partial in self.folder.glob(f".*{PARTIAL}")])
 
     def __exit__(self, *_: object) -> None:
-        self.close()
-
-    def close(self) -> None:
-        """Let go of the lock; finished blocks stay."""
         if not self._names() and self._lock.alone():
             self.remove()
         self._lock.release()
@@ -208,11 +204,11 @@ class BlockStore(AbstractContextManager["BlockStore"]):
         self.remove()
         return self.output
 
-    def require_all(self, found: Finished, remedy: str, most: int = 3) -> None:
+    def require_all(self, found: Finished, remedy: str) -> None:
         """Raise a FileError that names the lanes which `finished` has not found, with a remedy."""
         if gaps := self.missing(found.bounds, self.lanes):
-            names = ", ".join(f"{first} to {last - 1}" for first, last in gaps[:most])
-            more = f" and {len(gaps) - most} more ranges" if len(gaps) > most else ""
+            names = ", ".join(f"{first} to {last - 1}" for first, last in gaps[:3])
+            more = f" and {len(gaps) - 3} more ranges" if len(gaps) > 3 else ""
             missing = f"{self.folder}: lanes {names}{more} are missing; {remedy}"
             raise FileError([*found.problems, missing])
 

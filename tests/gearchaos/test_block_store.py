@@ -584,11 +584,11 @@ def test_what_was_merged_leaves_the_next_sweep_alone(output: Path) -> None:
         fill(store)
         store.merge(VARIABLES, PARAMETERS, {})
         following = open_store(output)
-    assert following.folder.is_dir()
-    with pytest.raises(FileError, match="another sweep is writing to it"):
-        open_store(output)
-    fill(following)
-    following.close()
+    with following:
+        assert following.folder.is_dir()
+        with pytest.raises(FileError, match="another sweep is writing to it"):
+            open_store(output)
+        fill(following)
     with open_store(output, resume=True) as store:
         assert store.finished().bounds == BLOCKS
 
