@@ -11,9 +11,8 @@ from matplotlib.legend import Legend
 from matplotlib.lines import Line2D
 
 from gearchaos.errors import FigureError
-from gearchaos.figures.dots import MOST_DOTS, dots, portions
 from gearchaos.figures.labels import axis_label
-from gearchaos.figures.lanes import Between, Floats, diagram_lanes, outermost
+from gearchaos.figures.lanes import MOST_DOTS, Between, diagram_lanes, dots, outermost, portions
 from gearchaos.figures.panel import Diagram, close_panel
 from gearchaos.figures.style import BLACK, GREY, VERMILION
 from gearchaos.results.result import Result, section_variables
@@ -57,7 +56,7 @@ def bifurcation(
 
     Every section point is a small translucent dot: a periodic motion, whose points coincide,
     shows as a crisp black line, and chaos as grey whose depth is the density of visits. The
-    dots are rasterised, so that a PDF stays small. Above `figures.dots.MOST_DOTS` they are counted
+    dots are rasterised, so that a PDF stays small. Above `figures.lanes.MOST_DOTS` they are counted
     by pixel, and fainter the more there are, so that chaos stays grey.
     Diverged lanes get a red tick at the bottom, lanes beyond robust limits a triangle at the edge,
     and a legend above says so.
@@ -138,7 +137,7 @@ def lyapunov(
     if LARGEST_EXPONENT not in result:
         raise FigureError("the result has no Lyapunov exponents: the sweep left them out")
     lanes = diagram_lanes(result, between)
-    stored: Floats = result.lanes(LARGEST_EXPONENT)
+    stored = result.lanes(LARGEST_EXPONENT)
     whole = stored[lanes.numbers]
     whole[lanes.diverged | np.isinf(whole)] = np.nan
     error = result.lanes(LARGEST_EXPONENT + STANDARD_ERROR)[lanes.numbers]

@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.legend import Legend
 from matplotlib.lines import Line2D
 
-from gearchaos.figures.labels import axis_label, plain, short
+from gearchaos.figures.labels import axis_label, short
 from gearchaos.figures.lanes import Floats, Lanes, columns
 from gearchaos.figures.style import BLACK, GREY, LEGEND, VERMILION
 from gearchaos.results.result import Result
@@ -63,7 +63,9 @@ def close_panel(axes: Axes, result: Result, own: Diagram, *, hold_zero: bool = F
         look: dict[str, Any] = {"marker": "s", "ms": 3.5, "ls": "none"}
         own.named.insert(0, Line2D([], [], color=color, label=label, **look))
     if own.lanes.diverged.any():
-        own.diverged = _mark_diverged(axes, result, own.lanes.parameter[own.lanes.diverged])
+        look = {"marker": "|", "ms": 8.0, "mew": 0.8, "color": VERMILION}
+        parameter = own.lanes.parameter[own.lanes.diverged]
+        own.diverged = _marks(axes, parameter, 0.0, "diverged", **look)
         own.named.append(own.diverged)
     least = np.concatenate([one.low - one.spread for one in drawn])
     most = np.concatenate([one.high + one.spread for one in drawn])
@@ -106,13 +108,6 @@ def robust_limits(
         top = max(inner_top, float(high[high <= inner_top + inner / 2.0].max()))
     pad = MARGIN * (top - bottom) or abs(top) * MARGIN or 0.5
     return bottom - pad, top + pad
-
-
-def _mark_diverged(axes: Axes, result: Result, parameter: Floats) -> Line2D:
-    """Draw a rug of red ticks at the bottom of the axes where lanes diverged."""
-    meanings = str(result.attributes("status").get("flag_meanings", "")).split()
-    label = plain(meanings[1].replace("_", " ")) if len(meanings) == 2 else "diverged"
-    return _marks(axes, parameter, 0.0, label, marker="|", ms=8.0, mew=0.8, color=VERMILION)
 
 
 def _mark_off_scale(axes: Axes, drawn: Diagram) -> list[Line2D]:

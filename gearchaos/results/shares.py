@@ -1,7 +1,7 @@
 """What gear pairs and starts of each swept value come to: shares of motions, and basins."""
 
 from collections.abc import Iterable
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -78,17 +78,13 @@ def motion_shares(result: Result) -> Shares:
             "result.sel), or set pitch_error.realisations or start.count"
         )
     values = np.asarray(result[result.axis], dtype=np.float64)
-
-    def rows(name: str) -> NDArray[Any]:
-        return result[name].reshape(values.size, -1)
-
     kinds = kinds.reshape(values.size, -1)
     found = {name: np.sum(kinds == number, axis=1) for number, name in enumerate(names)}
     seen = {name: counts for name, counts in found.items() if counts.any()}
     lanes = np.full(values.size, kinds.shape[1])
     other, apart = Counted(lanes - found[names[0]], lanes), None
     if CROSSINGS in result:
-        crossings = rows(CROSSINGS)
+        crossings = result[CROSSINGS].reshape(kinds.shape)
         apart = Counted(np.sum(crossings > 0.0, axis=1), np.sum(np.isfinite(crossings), axis=1))
     return Shares(values, tuple(seen), np.stack([*seen.values()], axis=1), other, apart)
 

@@ -90,7 +90,6 @@ def labelled_lanes(
     labels = [label_text(meanings[m], n) for m, n in zip(motion, period.tolist(), strict=True)]
     known = LARGEST_EXPONENT in result
     exponent = one[LARGEST_EXPONENT] if known else np.full(period.shape, np.nan)
-    bands = one[BANDS] if BANDS in result else np.zeros_like(period)
     every = np.stack([result[label].reshape(period.size, -1) for label in LABELS])
     alike = (every == every[:, :, :1]).all(axis=(0, 2))
     return LabelledLanes(
@@ -98,7 +97,7 @@ def labelled_lanes(
         labels=np.where(alike, labels, "several motions"),
         period=np.where(alike, period, 0),
         exponent=np.where(alike, exponent, np.nan),
-        bands=np.where(alike, bands, 0),
+        bands=np.where(alike, one[BANDS], 0),
     )
 
 
