@@ -62,7 +62,7 @@ def _accuracy(options: Namespace) -> int:
     from gearchaos.configuration import load_config
     from gearchaos.engine.running import choose_threads
     from gearchaos.engine.simulation import Simulation
-    from gearchaos.figures.files import FORMATS
+    from gearchaos.figures.page import FORMATS
     from gearchaos.results.atomic_file import check_output
 
     steps = options.steps
@@ -105,7 +105,7 @@ def _numbers_of_steps(text: str) -> list[int]:
 
 def _write(settings: Sequence[Setting], title: str, targets: list[str], overwrite: bool) -> None:
     from gearchaos.engine.provenance import provenance
-    from gearchaos.figures.files import save_figure
+    from gearchaos.figures.page import save_figure
     from gearchaos.figures.work_precision import work_precision_page
     from gearchaos.results.atomic_file import replacing
 

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 from gearchaos.command_line import OK, Command, coordinates, place
 
 if TYPE_CHECKING:
-    from gearchaos.results.basins import Basins
+    from gearchaos.results.shares import Basins
 
 
 def _arguments(parser: argparse.ArgumentParser) -> None:
@@ -40,7 +40,7 @@ def _basins(options: argparse.Namespace) -> int:
     from gearchaos.engine.basins import find_basins
     from gearchaos.engine.running import compiling
     from gearchaos.figures import basins_page, save_figure
-    from gearchaos.figures.files import is_own_figure
+    from gearchaos.figures.page import is_own_figure
     from gearchaos.results.atomic_file import check_output
     from gearchaos.results.overview import finite, slice_lines
     from gearchaos.results.result import open_result

@@ -8,6 +8,7 @@ that dimension or no such format, 4 a file cannot be read or written, or a packa
 import os
 import sys
 from argparse import ArgumentParser, Namespace
+from typing import Any
 
 from gearchaos.command_line import OK, Command
 from gearchaos.errors import ConfigurationError, FileError
@@ -24,10 +25,13 @@ def _arguments(parser: ArgumentParser) -> None:
 
 
 def _export(options: Namespace) -> int:
+    import numpy as np
+
     from gearchaos.results.atomic_file import check_output, replacing
     from gearchaos.results.result import open_result
-    from gearchaos.results.tables import write
+    from gearchaos.results.tables import needed
 
+    kind = options.output.lower().rpartition(".")[2]
     if not options.output.lower().endswith(ENDINGS):
         raise ConfigurationError(f"{options.output}: must end in {', '.join(ENDINGS)}")
     result = open_result(options.result)
@@ -35,7 +39,17 @@ def _export(options: Namespace) -> int:
         raise FileError(f"{options.output}: is the result file itself; choose another name")
     check_output(options.output, options.overwrite)
     with replacing(options.output, overwrite=options.overwrite) as partial:
-        write(result, partial, options.output.lower().rpartition(".")[2], options.along)
+        if kind == "mat":
+            flags = {v.name: v.flags for v in result.variables.values() if v.flags}
+            words = {f"{name}_meanings": np.array(flags[name], dtype=object) for name in flags}
+            arrays: dict[str, Any] = {name: result[name] for name in result}
+            arrays |= {**words, "metadata": result.metadata}
+            needed("scipy.io").savemat(partial, arrays, appendmat=False)
+        elif kind == "csv":
+            result.to_dataframe(*options.along).to_csv(partial)
+        else:
+            needed("pyarrow")
+            result.to_dataframe(*options.along).to_parquet(partial, engine="pyarrow")
     print(options.output, flush=True)
     return OK
 

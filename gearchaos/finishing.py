@@ -58,7 +58,7 @@ def complete_already(simulation: "Simulation", output: str) -> int | None:
     """
     from gearchaos.engine.provenance import SOFTWARE
     from gearchaos.engine.store_filling import open_store
-    from gearchaos.results.manifest import folder_of, require_same
+    from gearchaos.results.block_folder import folder_of, require_same
     from gearchaos.results.result import completed
 
     found = completed(output)

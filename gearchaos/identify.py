@@ -47,7 +47,7 @@ def _identify(options: Namespace) -> int:
     )
     from gearchaos.identification.tried import read_tried, write_tried
     from gearchaos.results.atomic_file import check_output
-    from gearchaos.results.manifest import require_same
+    from gearchaos.results.block_folder import require_same
 
     problem = load_targets(options.config, options.set)
     choose_threads(options.threads)

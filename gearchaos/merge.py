@@ -28,7 +28,7 @@ def _arguments(parser: ArgumentParser) -> None:
 def _merge(options: Namespace) -> int:
     output: str = options.output
     from gearchaos.results.atomic_file import check_output
-    from gearchaos.results.manifest import folder_of, read_manifest, require_same
+    from gearchaos.results.block_folder import folder_of, read_manifest, require_same
     from gearchaos.results.result import completed
 
     folder = folder_of(output)

@@ -31,7 +31,7 @@ RESULT_ENDINGS = (".h5", ".hdf5", ".nc")
 
 def _plot(options: argparse.Namespace) -> int:
     from gearchaos.figures import save_figure
-    from gearchaos.figures.response_lane import is_response
+    from gearchaos.figures.response import is_response
     from gearchaos.gear.tooth_deviations import REALISATION
 
     results = [_opened(path, options.at) for path in options.result]
@@ -101,9 +101,8 @@ def _sweep_sheets(results: "Sequence[Result]", options: argparse.Namespace) -> "
                 f"{options.result[0]}: runs over {' and '.join(swept)}: a map is drawn alone and "
                 f"without --stages; --at {swept[0]}={results[0][swept[0]][0]:g} draws a diagram"
             )
-        return [
-            (name, partial(map_page, results[0], options.variable, marked=marked, **shown, **size))
-        ]
+        draw = partial(map_page, results[0], options.variable, marked=marked, **shown, **size)
+        return [(name, draw)]
     name += "_stages" if options.stages else ""
     shown |= {"stages": options.stages, "labels": _titles(results, options.result)}
     if marked:
@@ -115,7 +114,7 @@ def _response_sheets(results: "Sequence[Result]", options: argparse.Namespace) -
     from gearchaos.figures import response_page
     from gearchaos.figures.labels import in_a_name, place_of
     from gearchaos.figures.lanes import select_lanes
-    from gearchaos.figures.response_lane import COORDINATE
+    from gearchaos.figures.response import COORDINATE
     from gearchaos.figures.style import DOUBLE_COLUMN_MM
 
     for option in ("full_range", "stages", "shares", "mark"):
@@ -138,27 +137,23 @@ def _response_sheets(results: "Sequence[Result]", options: argparse.Namespace) -
 
 
 def _opened(path: Path, at: Sequence[tuple[str, float]]) -> "Result":
+    """Read a result, its sections too unless it is a map, with the axes fixed that --at names."""
     from gearchaos.figures.lanes import swept_axes
     from gearchaos.results.result import open_result
 
-    # Sections are most of a file, and a map has none.
-    of_lanes = _slice(open_result(path, rows=False), at)
-    return of_lanes if len(swept_axes(of_lanes)) > 1 else _slice(open_result(path), at)
-
-
-def _slice(result: "Result", at: Sequence[tuple[str, float]]) -> "Result":
-    """Fix the axes that --at names at the values next to those it gives."""
-    from gearchaos.figures.lanes import swept_axes
-
-    if not at:
-        return result
-    fixed = coordinates(at, result.axes, result.axis)
-    if not {*swept_axes(result)} - {*fixed}:
-        raise FigureError(
-            f"--at {' and '.join(fixed)}: nothing is left to draw against; choose values of "
-            f"{result.axis} with --from and --to"
-        )
-    return result.sel(method="nearest", **fixed)
+    for rows in (False, True):  # Sections are most of a file.
+        result = open_result(path, rows=rows)
+        fixed = coordinates(at, result.axes, result.axis)
+        left = {*swept_axes(result)} - {*fixed}
+        if fixed and not left:
+            raise FigureError(
+                f"--at {' and '.join(fixed)}: nothing is left to draw against; choose values of "
+                f"{result.axis} with --from and --to"
+            )
+        result = result.sel(method="nearest", **fixed)
+        if len(left) > 1:
+            break
+    return result
 
 
 def _arguments(parser: argparse.ArgumentParser) -> None:
@@ -207,7 +202,7 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
 def _targets(options: argparse.Namespace, name: str, alone: bool) -> list[Path]:
     from matplotlib.backend_bases import FigureCanvasBase
 
-    from gearchaos.figures.files import ENDINGS, FORMATS
+    from gearchaos.figures.page import ENDINGS, FORMATS
 
     formats = FORMATS
     if options.format is not None:
@@ -241,7 +236,7 @@ def _targets(options: argparse.Namespace, name: str, alone: bool) -> list[Path]:
 
 
 def _check_targets(targets: Sequence[Path], options: argparse.Namespace) -> None:
-    from gearchaos.figures.files import is_own_figure
+    from gearchaos.figures.page import is_own_figure
     from gearchaos.results.atomic_file import check_output
 
     problems: list[str] = []
@@ -262,7 +257,7 @@ def _lanes_in_words(result: "Result") -> str:
     lanes = result.along(result.axis).size
     words = f"{lanes} lane{'s' if lanes != 1 else ''} over {' and '.join(swept_axes(result))}"
     words += f" at {result.where}" if result.fixed else ""
-    diverged = int((result["status"] != 0).sum()) if "status" in result else 0
+    diverged = int((result["status"] != 0).sum())
     return f"{words}, {diverged} of them diverged" if diverged else words
 
 

@@ -10,9 +10,9 @@ from gearchaos.engine.running import choose_threads
 from gearchaos.errors import ConfigurationError, FileError
 from gearchaos.records.label import UNRESOLVED
 from gearchaos.records.wilson import wilson_interval
-from gearchaos.results.basins import Basin, Basins, basin_entropy
 from gearchaos.results.result import Result
-from gearchaos.results.stage_table import label_text
+from gearchaos.results.shares import Basin, Basins, basin_entropy, in_order
+from gearchaos.results.stage_table import label_text, require_labels
 from gearchaos.results.variables import (
     LABELS,
     LARGEST_EXPONENT,
@@ -37,8 +37,7 @@ def find_basins(result: Result, name: str = "the result", threads: int | None = 
     it, with several starts; messages call it ``name``. Raises ConfigurationError if it has other
     axes, FileError if it holds no labels or not its configuration.
     """
-    if not all(label in result for label in LABELS):
-        raise FileError(f"{name}: holds no labels; run the sweep again with outputs.motion = true")
+    require_labels(result, name)
     config = computable(result, name).replace("start.carry", "none")
     swept = [axis for axis in result.axes if axis not in REPEATS]
     if {*result.axes} != {*swept, START} or len(swept) > 1:
@@ -67,8 +66,7 @@ def find_basins(result: Result, name: str = "the result", threads: int | None = 
     told = [v.name for v in numeric if v.dims == result.axes and v.name not in NO_MEANS]
     basins: list[Basin] = []
     for here in every.reshape(-1, starts):
-        # Those without an attractor come last.
-        for number in sorted({*numbers[here].tolist()}, key=lambda n: (n < 0, abs(n))):
+        for number in in_order(numbers[here].tolist()):
             mine = here[numbers[here] == number]
             first, orbit = mine[0], found[place[mine[0]]] if number > 0 else None
             code, repeats = (motion[first], int(period[first])) if orbit else (-number, 0)

@@ -23,8 +23,9 @@ from gearchaos.gear.tooth_deviations import REALISATION
 from gearchaos.results.result_file import Parameter
 from gearchaos.results.variables import (
     HARMONIC,
-    Axis,
+    Variable,
     axis_name,
+    coordinate,
     direction_axis,
     pair_axis,
     start_axis,
@@ -43,7 +44,7 @@ _PHILOX_WIDTH = 4
 class Lanes:
     """The product of all axes as a flat list, the last axis running fastest.
 
-    A lane's result depends on its number in this list and nothing else. ``axes``: one `Axis` for
+    A lane's result depends on its number in this list and nothing else. ``axes``: a coordinate for
     each dimension, the second swept parameter, the first one, the drawn gear pair, the start, the
     direction, those that there are; ``effects``: those that act on what is kept, and ``states``:
     those that they leave; ``starts``: of one value, or pair of values, with one gear pair;
@@ -161,14 +162,14 @@ class Lanes:
         return parameters
 
 
-def axis_of(parameter: str, values: Floats) -> Axis:
+def axis_of(parameter: str, values: Floats) -> Variable:
     """Return the axis of a swept parameter with values (values,), as files name and word it."""
     name = axis_name(parameter)
     if parameter in SWEEPABLE_GROUPS:
         row = SWEEPABLE_GROUPS[parameter]
-        return Axis(name, row.units, row.long_name, row.mathtext, values)
+        return coordinate(name, row.units, row.long_name, row.mathtext, values)
     key = SWEEPABLE_KEYS[parameter]
-    return Axis(name, key.units or "1", key.wording, "", values)
+    return coordinate(name, key.units or "1", key.wording, "", values)
 
 
 def start_states(config: Configuration, system: System, numbers: Numbers) -> Floats:

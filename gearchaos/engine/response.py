@@ -96,7 +96,6 @@ def compute_response(simulation: Simulation, periods: int, text: str) -> Result:
         states=system.states,
         periods=periods,
         steps_per_period=plan.steps_per_period,
-        axial=system.effects.axial,
     )
     facts = {
         **metadata(simulation, time.monotonic() - began),

@@ -1,9 +1,8 @@
 """Figures drawn from result files alone: no kernel, no simulation, no pyplot."""
 
-from gearchaos.figures.basins import basins, basins_page, fractions
 from gearchaos.figures.diagrams import bifurcation, lyapunov
-from gearchaos.figures.files import save_figure
 from gearchaos.figures.maps import map_page, parameter_map
+from gearchaos.figures.page import save_figure
 from gearchaos.figures.response import (
     amplitude_spectrum,
     phase_portrait,
@@ -11,7 +10,7 @@ from gearchaos.figures.response import (
     time_history,
 )
 from gearchaos.figures.response_page import response_page
-from gearchaos.figures.shares import shares, shares_page
+from gearchaos.figures.shares import basins, basins_page, fractions, shares, shares_page
 from gearchaos.figures.stages import shade_stages
 from gearchaos.figures.sweep_page import bifurcation_page
 

@@ -11,10 +11,9 @@ from matplotlib.legend import Legend
 from matplotlib.lines import Line2D
 
 from gearchaos.errors import FigureError
-from gearchaos.figures.dots import MOST_DOTS, dots, portions
 from gearchaos.figures.labels import axis_label
-from gearchaos.figures.lanes import Between, Floats, diagram_lanes, outermost
-from gearchaos.figures.panel import DiagramArtists, Drawn, close_panel
+from gearchaos.figures.lanes import MOST_DOTS, Between, diagram_lanes, dots, outermost, portions
+from gearchaos.figures.panel import Diagram, close_panel
 from gearchaos.figures.style import BLACK, GREY, VERMILION
 from gearchaos.results.result import Result, section_variables
 from gearchaos.results.variables import LARGEST_EXPONENT, RECORD, STANDARD_ERROR, STATUS
@@ -23,7 +22,7 @@ BAND_STANDARD_ERRORS = 2.0
 
 
 class LyapunovArtists(NamedTuple):
-    """What `lyapunov` has drawn, beside what a `DiagramArtists` has.
+    """What `lyapunov` has drawn, beside what a `Diagram` has.
 
     ``line``: the exponents drawn, by the parameter, not a number where a lane diverged;
     ``points``: exponents without a neighbour to draw a line to, between diverged lanes, or all of
@@ -52,12 +51,12 @@ def bifurcation(
     color: str = BLACK,
     label: str | None = None,
     marker: str = ".",
-) -> DiagramArtists:
+) -> Diagram:
     """Draw the bifurcation diagram of one section variable into axes.
 
     Every section point is a small translucent dot: a periodic motion, whose points coincide,
     shows as a crisp black line, and chaos as grey whose depth is the density of visits. The
-    dots are rasterised, so that a PDF stays small. Above `figures.dots.MOST_DOTS` they are counted
+    dots are rasterised, so that a PDF stays small. Above `figures.lanes.MOST_DOTS` they are counted
     by pixel, and fainter the more there are, so that chaos stays grey.
     Diverged lanes get a red tick at the bottom, lanes beyond robust limits a triangle at the edge,
     and a legend above says so.
@@ -104,7 +103,8 @@ def bifurcation(
     for part, values in portions(lanes, rows):
         np.fmin.reduce(values, axis=1, out=low[part])
         np.fmax.reduce(values, axis=1, out=high[part])
-    return close_panel(axes, result, Drawn(points, lanes, low, high, 0.0, full_range, [], []))
+    drawn = Diagram(points, lanes, low, high, full_range=full_range)
+    return close_panel(axes, result, drawn)
 
 
 def lyapunov(
@@ -137,13 +137,11 @@ def lyapunov(
     if LARGEST_EXPONENT not in result:
         raise FigureError("the result has no Lyapunov exponents: the sweep left them out")
     lanes = diagram_lanes(result, between)
-    stored: Floats = result.lanes(LARGEST_EXPONENT)
+    stored = result.lanes(LARGEST_EXPONENT)
     whole = stored[lanes.numbers]
     whole[lanes.diverged | np.isinf(whole)] = np.nan
-    spread = np.full(whole.shape, np.nan)
-    if LARGEST_EXPONENT + STANDARD_ERROR in result:
-        error = result.lanes(LARGEST_EXPONENT + STANDARD_ERROR)[lanes.numbers]
-        spread = BAND_STANDARD_ERRORS * error
+    error = result.lanes(LARGEST_EXPONENT + STANDARD_ERROR)[lanes.numbers]
+    spread = BAND_STANDARD_ERRORS * error
     several_starts = bool(np.any(np.diff(lanes.parameter) == 0.0))
     # Several starts may lie on different motions, which no line should join.
     lonely = np.isfinite(whole)
@@ -173,6 +171,7 @@ def lyapunov(
         look = {"ms": 3.0, "mfc": "none", "mew": 0.5, "color": VERMILION}
         named += axes.plot(x[mixed], exponent[mixed], "o", label="came from another motion", **look)
     axes.set_ylabel(axis_label(result, LARGEST_EXPONENT, line_length=20))
-    own = Drawn(line, lanes, whole, whole, np.nan_to_num(spread), full_range, named, [])
-    marks = close_panel(axes, result, own, hold_zero=True)[1:]
+    own = Diagram(line, lanes, whole, whole, np.nan_to_num(spread), full_range, named)
+    close_panel(axes, result, own, hold_zero=True)
+    marks = own.diverged, own.off_scale, own.legend
     return LyapunovArtists(line, points, band, bars, positive, zero, *marks)

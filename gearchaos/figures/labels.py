@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from matplotlib.mathtext import MathTextParser
 
 from gearchaos.results import units
-from gearchaos.results.excitation import excitation_of
 from gearchaos.results.result import Result
+from gearchaos.results.units import excitation_of
 from gearchaos.results.variables import DIRECTION, START, coordinate_text
 
 DIMENSIONLESS = ("", "1")
@@ -37,8 +37,7 @@ def unit_of(result: Result, name: str) -> str:
     """Word the unit of a variable, or what its numbers are multiples of; "" of a pure number."""
     written = str(result.attributes(name).get("units", ""))
     if written in DIMENSIONLESS:
-        unit = units.unit_of(name)
-        return unit.stands_for if unit else ""
+        return units.unit_of(name).stands_for
     words = plain(re.sub(r"\bum\b", "\N{MICRO SIGN}m", written))
     return re.sub(r"\b([a-z]+)-(\d)", r"\1$^{-\2}$", words)
 

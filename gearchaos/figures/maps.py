@@ -192,7 +192,7 @@ def map_page(
             _title(axes, head + title, most - title.count("\n") if beside else _rows(axes))
         footnote(figure, legend_title(result) or "")
         if result.fixed:
-            figure.suptitle(in_words(result, result.fixed), fontsize=SMALL_FONT_PT)
+            figure.suptitle(in_words(result, result.fixed))
     return figure
 
 

@@ -1,7 +1,8 @@
 """How far the axes of a diagram reach, and how it marks what it cannot show."""
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from dataclasses import dataclass, field
+from typing import Any
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -10,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.legend import Legend
 from matplotlib.lines import Line2D
 
-from gearchaos.figures.labels import axis_label, plain, short
+from gearchaos.figures.labels import axis_label, short
 from gearchaos.figures.lanes import Floats, Lanes, columns
 from gearchaos.figures.style import BLACK, GREY, LEGEND, VERMILION
 from gearchaos.results.result import Result
@@ -19,61 +20,53 @@ OUTLYING_SHARE = 0.03
 MARGIN = 0.05
 
 
-class DiagramArtists(NamedTuple):
-    """What a diagram has drawn.
+@dataclass(eq=False)
+class Diagram:
+    """What one call has drawn into axes, and how far it reaches.
 
-    ``points``: what shows the lanes, lane after lane; ``diverged``: the rug of diverged lanes;
-    ``off_scale``: triangles for lanes beyond bottom and top; ``legend``: of these.
+    ``points``: what shows the lanes, lane after lane; ``low``, ``high`` (lanes,): lowest and
+    highest value of each lane, not a number where there is none; ``spread``, (lanes,) or one for
+    all: what the limits leave room for beyond these; ``full_range``: as for `robust_limits`;
+    ``named``: what the legend names beside the points; ``diverged``: the rug of diverged lanes;
+    ``off_scale``: triangles for lanes beyond bottom and top; ``legend``: of all these.
     """
 
     points: Line2D
-    diverged: Line2D | None
-    off_scale: list[Line2D]
-    legend: Legend | None
-
-
-class Drawn(NamedTuple):
-    """What one call has drawn into axes, and how far it reaches.
-
-    ``artist``: what shows the lanes; the legend names its label, if it has one, and what is
-    ``named``; ``low``, ``high`` (lanes,): lowest and highest value of each lane, not a number where
-    there is none; ``spread``, (lanes,) or one for all: what the limits leave room for beyond these;
-    ``full_range``: as for `robust_limits`; ``off_scale``: triangles for lanes beyond the limits.
-    """
-
-    artist: Line2D
     lanes: Lanes
     low: Floats
     high: Floats
-    spread: Floats | float
-    full_range: bool
-    named: list[Artist]
-    off_scale: list[Line2D]
+    spread: Floats | float = 0.0
+    full_range: bool = False
+    named: list[Artist] = field(default_factory=list)
+    diverged: Line2D | None = None
+    off_scale: list[Line2D] = field(default_factory=list)
+    legend: Legend | None = None
 
 
-_DRAWN: WeakKeyDictionary[Axes, list[Drawn]] = WeakKeyDictionary()
+_DRAWN: WeakKeyDictionary[Axes, list[Diagram]] = WeakKeyDictionary()
 
 
-def close_panel(
-    axes: Axes, result: Result, own: Drawn, *, hold_zero: bool = False
-) -> DiagramArtists:
+def close_panel(axes: Axes, result: Result, own: Diagram, *, hold_zero: bool = False) -> Diagram:
     """Set limits and the label of the parameter, and mark the lanes that cannot be shown.
 
     Limits and marks are those of everything that was drawn into the axes in this way; ``hold_zero``
     is as for `robust_limits`.
     """
     # Of axes that were cleared, nothing is left.
-    earlier = [one for one in _DRAWN.get(axes, []) if one.artist.axes is axes]
+    earlier = [one for one in _DRAWN.get(axes, []) if one.points.axes is axes]
     drawn = _DRAWN[axes] = [*earlier, own]
     left, right = zip(*(one.lanes.limits for one in drawn), strict=True)
     axes.set_xlim(min(left), max(right))
     axes.set_xlabel(axis_label(result, result.axis))
-    color, label = own.artist.get_color(), str(own.artist.get_label())
+    color, label = own.points.get_color(), str(own.points.get_label())
     if not label.startswith("_"):
         look: dict[str, Any] = {"marker": "s", "ms": 3.5, "ls": "none"}
         own.named.insert(0, Line2D([], [], color=color, label=label, **look))
-    rug = _mark_diverged(axes, result, own.lanes.parameter[own.lanes.diverged])
-    own.named.extend([rug] if rug else [])
+    if own.lanes.diverged.any():
+        look = {"marker": "|", "ms": 8.0, "mew": 0.8, "color": VERMILION}
+        parameter = own.lanes.parameter[own.lanes.diverged]
+        own.diverged = _marks(axes, parameter, 0.0, "diverged", **look)
+        own.named.append(own.diverged)
     least = np.concatenate([one.low - one.spread for one in drawn])
     most = np.concatenate([one.high + one.spread for one in drawn])
     there = np.isfinite(least)
@@ -89,8 +82,8 @@ def close_panel(
         one.off_scale[:] = _mark_off_scale(axes, one)
     # Entries that several results have in common appear once.
     named = {str(mark.get_label()): mark for one in drawn for mark in one.named + one.off_scale}
-    legend = legend_above(axes, list(named.values()))
-    return DiagramArtists(own.artist, rug, own.off_scale, legend)
+    own.legend = legend_above(axes, list(named.values()))
+    return own
 
 
 def robust_limits(
@@ -117,19 +110,11 @@ def robust_limits(
     return bottom - pad, top + pad
 
 
-def _mark_diverged(axes: Axes, result: Result, parameter: Floats) -> Line2D | None:
-    """Draw a rug of red ticks at the bottom of the axes where lanes diverged."""
-    if parameter.size == 0:
-        return None
-    meanings = str(result.attributes("status").get("flag_meanings", "")).split()
-    label = plain(meanings[1].replace("_", " ")) if len(meanings) == 2 else "diverged"
-    return _marks(axes, parameter, 0.0, label, marker="|", ms=8.0, mew=0.8, color=VERMILION)
-
-
-def _mark_off_scale(axes: Axes, drawn: Drawn) -> list[Line2D]:
+def _mark_off_scale(axes: Axes, drawn: Diagram) -> list[Line2D]:
     """Draw a triangle at the edge of the axes for every lane that reaches beyond it."""
     low, high, (bottom, top) = drawn.low, drawn.high, axes.get_ylim()
-    color = GREY if drawn.artist.get_color() == BLACK else drawn.artist.get_color()
+    color = drawn.points.get_color()
+    color = GREY if color == BLACK else color
     marks = []
     ends = (low < bottom, low, np.min, 0.02, "v"), (high > top, high, np.max, 0.98, "^")
     for beyond, values, extreme, height, marker in ends:

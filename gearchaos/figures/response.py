@@ -7,21 +7,18 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 
 from gearchaos.errors import FigureError
-from gearchaos.figures.labels import axis_label, plain, unit_of
+from gearchaos.figures.labels import axis_label, place_of, plain, unit_of
 from gearchaos.figures.lanes import Between, Floats
 from gearchaos.figures.page import remark
-from gearchaos.figures.response_lane import (
-    COORDINATE,
-    motion_of,
-    once_an_excitation,
-    repeats_after,
-    samples_per_period,
-)
 from gearchaos.figures.style import BLACK, BLUE, VERMILION
 from gearchaos.records.amplitude_spectrum import spectral_lines
-from gearchaos.results.excitation import excitation_of
+from gearchaos.records.period import motion_period
 from gearchaos.results.response_variables import TIME, acceleration_of
-from gearchaos.results.result import Result
+from gearchaos.results.result import Result, section_variables
+from gearchaos.results.units import excitation_of
+
+COORDINATE = "delta_5"
+"""The coordinate that is drawn unless another is asked for: the torsion."""
 
 HIGHEST_ORDER = 8.0
 DECADES = 5
@@ -124,7 +121,7 @@ def amplitude_spectrum(
     variable: str | None = None,
     *,
     highest: float = HIGHEST_ORDER,
-    window: str = "rectangular",
+    window: str | None = None,
     logarithmic: bool = False,
 ) -> LineCollection:
     """Draw the single-sided amplitude spectrum; a sine of amplitude A is a line of height A.
@@ -142,15 +139,18 @@ def amplitude_spectrum(
         A variable over time; default ``"delta_5_acceleration"``.
     highest : float
         Multiple of the mesh frequency up to which lines are shown.
-    window : str
-        ``"rectangular"``, exact for a motion that repeats, or ``"hann"``.
+    window : str, optional
+        ``"rectangular"``, exact for a motion that repeats, or ``"hann"``; default by whether it
+        repeats within the record.
     logarithmic : bool
         Show five decades up to that of the highest line, instead of a linear scale.
     """
     variable = variable or acceleration_of(COORDINATE)
     values, steps = motion_of(result, lane, variable), samples_per_period(result)
     held, excitation = values.size // steps, excitation_of(result.metadata).excitation_period
-    period = next((n for n in (repeats_after(result, lane), excitation) if 0 < n <= held), 1)
+    repeats = repeats_after(result, lane)
+    period = next((n for n in (repeats, excitation) if 0 < n <= held), 1)
+    window = window or ("rectangular" if 0 < repeats <= held else "hann")
     periods = held // period * period
     record = values[-1 - periods * steps : -1]
     order, amplitude = spectral_lines(record, steps, window)
@@ -174,6 +174,75 @@ def amplitude_spectrum(
     plural = "s" if periods > 1 else ""
     remark(axes, f"{window.capitalize()} window, {periods} mesh period{plural}")
     return lines
+
+
+def is_response(result: Result) -> bool:
+    """Whether a result holds the motion of its lanes in time."""
+    return bool(response_variables_of(result))
+
+
+def response_variables_of(result: Result) -> tuple[str, ...]:
+    """Return the variables that run over time as numbers: all but the contact states."""
+    return tuple(
+        name
+        for name in result
+        if TIME in result.dims(name)[1:] and not result.variables[name].flags
+    )
+
+
+def coordinates_of(result: Result) -> tuple[str, ...]:
+    """Return the coordinates whose motion a response holds, `delta_5` first."""
+    names = response_variables_of(result)
+    return tuple(name for name in names if acceleration_of(name) in names)
+
+
+def repeats_after(result: Result, lane: int) -> int:
+    """Return after how many mesh periods the motion of a lane repeats.
+
+    0 for none up to 16 periods of the excitation, or a section with too few points to tell.
+    """
+    section = np.stack([result.lanes(name)[lane] for name in section_variables(result)], axis=1)
+    once = once_an_excitation(result, section.shape[0])
+    return int(once.step * motion_period(section[np.newaxis, once])[0])
+
+
+def once_an_excitation(result: Result, points: int) -> slice:
+    """Return which of so many points, a mesh period apart, are one period of the excitation apart.
+
+    The last of them ends the lane, as it does a whole number of excitation periods.
+    """
+    period = excitation_of(result.metadata).excitation_period
+    return slice((points - 1) % period, None, period)
+
+
+def samples_per_period(result: Result) -> int:
+    """Return how many samples of a response make a mesh period."""
+    return int(np.searchsorted(result[TIME], 1.0))
+
+
+def motion_of(result: Result, lane: int, variable: str) -> Floats:
+    """Return a variable of one lane over time, shape (samples,).
+
+    Raises FigureError if the result is no response, has no such lane or variable, or the lane
+    diverged.
+    """
+    names = response_variables_of(result)
+    if not names:
+        raise FigureError(
+            "the result holds no motion in time; compute one with python -m gearchaos.response"
+        )
+    if variable not in names:
+        raise FigureError(
+            f"no variable {variable!r} over time in the result; it has {', '.join(names)}"
+        )
+    lanes = result.along(result.axis).size
+    if not 0 <= lane < lanes:
+        raise FigureError(f"no lane {lane} in the result; it has 0 to {lanes - 1}")
+    values = np.asarray(result.lanes(variable)[lane], dtype=np.float64)
+    if not np.isfinite(values).all():
+        place = ", ".join(f"{axis} = {value:g}" for axis, value in place_of(result, lane).items())
+        raise FigureError(f"{place}: the lane diverged, it has no motion")
+    return values
 
 
 def _plane(coordinate: str) -> tuple[str, str]:

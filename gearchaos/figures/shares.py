@@ -1,23 +1,35 @@
-"""Which share of the gear pairs moves in which way: how much pitch error a pair may have."""
+"""Which share of gear pairs and starts moves in which way, and which start comes to what."""
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import ListedColormap
 from matplotlib.container import Container
+from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator, NullLocator
 
+from gearchaos.errors import FigureError
 from gearchaos.figures.labels import axis_label, in_words, legend_title
 from gearchaos.figures.lanes import Between, Floats, cell_edges, diagram_lanes
-from gearchaos.figures.page import Page, few_ticks, letter, page, remark
+from gearchaos.figures.page import Page, few_ticks, legend_below, letter, page, remark
 from gearchaos.figures.stages import SHADES, look_of
-from gearchaos.figures.style import BLACK, LEGEND, SINGLE_COLUMN_MM, SMALL_FONT_PT
+from gearchaos.figures.style import BLACK, SINGLE_COLUMN_MM
 from gearchaos.results.result import Result
-from gearchaos.results.shares import Counted, motion_shares
-from gearchaos.results.variables import REPEATS
+from gearchaos.results.shares import Basin, Basins, Counted, in_order, motion_shares
+from gearchaos.results.units import unit_of
+from gearchaos.results.variables import REPEATS, STATE_WORDING
 
 Drawn = Artist | Container
+
+COLORS = ("#D6E6F3", "#EDBE62", "#5DB898", "#C284AD", "#B4602F", "#4C6E8E")
+"""Of attractors by their numbers, over and over again; lightness tells them apart in grey."""
+
+MOST_POINTS = 500
+"""Section points that are drawn of an attractor."""
 
 MOST_BARS = 24
 """More values than these are steps side by side, with a band instead of bars of confidence."""
@@ -53,11 +65,10 @@ def shares(
     """
     limits, counted = diagram_lanes(result, between).limits, motion_shares(result)
     values, known = counted.values, list(dict.fromkeys([*SHADES, *counted.motions]))
-    base, layers = np.zeros(values.size), []
-    for motion in sorted(counted.motions, key=known.index, reverse=True):
-        top = base + counted.counts[:, counted.motions.index(motion)] / counted.other.lanes
-        layers.append(layer(axes, values, base, top, label=motion, **look_of(motion)))
-        base = top
+    each = dict(zip(counted.motions, (counted.counts.T / counted.other.lanes), strict=True))
+    lowest_first = sorted(each, key=known.index, reverse=True)
+    looks = [{"label": motion, **look_of(motion)} for motion in lowest_first]
+    layers = _stacked(axes, values, [each[motion] for motion in lowest_first], looks)
     layers.insert(0, _confidence(axes, values, counted.other, "none"))
     axes.set_ylabel("Share of motions")
     if contact and counted.apart:
@@ -96,19 +107,26 @@ def shares_page(
         sizes = [f"{result[axis].size} {name}" for axis, name in names if axis in result.axes]
         remark(stack[0], f"{' with '.join(sizes)} each")
         if result.fixed:
-            figure.suptitle(in_words(result, result.fixed), fontsize=SMALL_FONT_PT)
-        look = {"title_fontsize": SMALL_FONT_PT, "loc": "outside lower center", **LEGEND}
-        figure.legend(handles=drawn, title=legend_title(result), ncols=3, **look)
+            figure.suptitle(in_words(result, result.fixed))
+        legend_below(figure, drawn, legend_title(result), columns=3)
         figure.align_ylabels(stack)
     return figure
 
 
-def layer(axes: Axes, values: Floats, base: Floats, top: Floats, **look: Any) -> Drawn:
-    """Draw one of several shares on top of each other, from base to top, both (values,)."""
-    if values.size <= MOST_BARS:
-        width = 0.8 * (np.diff(values).min() if values.size > 1 else 1.0)
-        return axes.bar(values, top - base, width, base, linewidth=0.3, **look)
-    return axes.stairs(top, cell_edges(values), baseline=base, fill=True, linewidth=0.0, **look)
+def _stacked(
+    axes: Axes, values: Floats, shares: Sequence[Floats], looks: Sequence[dict[str, Any]]
+) -> list[Drawn]:
+    """Draw shares, each (values,), on top of each other, the first one lowest."""
+    drawn: list[Drawn] = []
+    width = 0.8 * (np.diff(values).min() if values.size > 1 else 1.0)
+    edges, tops = cell_edges(values), np.cumsum(shares, axis=0)
+    for base, top, look in zip([np.zeros(values.size), *tops], tops, looks, strict=False):
+        if values.size <= MOST_BARS:
+            drawn.append(axes.bar(values, top - base, width, base, linewidth=0.3, **look))
+        else:
+            look = {"baseline": base, "fill": True, "linewidth": 0.0, **look}
+            drawn.append(axes.stairs(top, edges, **look))
+    return drawn
 
 
 def _confidence(axes: Axes, values: Floats, counted: Counted, marker: str) -> Drawn:
@@ -116,15 +134,94 @@ def _confidence(axes: Axes, values: Floats, counted: Counted, marker: str) -> Dr
     label = "not period 1, 95 % confidence"
     share, (low, high) = counted.shares, counted.intervals.T
     if values.size <= MOST_BARS:
-        look: dict[str, Any] = {
-            "fmt": marker,
-            "ms": 2.5,
-            "lw": 0.7,
-            "capsize": 1.5,
-            "capthick": 0.7,
-        }
+        look: dict[str, Any] = {"ms": 2.5, "lw": 0.7, "capsize": 1.5, "capthick": 0.7}
         reach = (share - low, high - share)
-        return axes.errorbar(values, share, reach, color=BLACK, label=label, **look)
+        return axes.errorbar(values, share, reach, fmt=marker, color=BLACK, label=label, **look)
     axes.plot(values, share, color=BLACK, linewidth=0.6, drawstyle="steps-mid")
     band: dict[str, Any] = {"step": "mid", "color": BLACK, "alpha": 0.25, "linewidth": 0.0}
     return axes.fill_between(values, low, high, label=label, **band)
+
+
+def basins(axes: Axes, found: Basins, value: int = 0) -> ScalarMappable:
+    """Draw the basins over the two states of a grid of starts, with the attractors on top.
+
+    Every start is a cell in the colour of its attractor, circles are the points of a periodic one
+    that lie within the axes, dots those of any other. ``found``: from `find_basins`, ``value``:
+    which of its values. Raises FigureError if the starts are not on a grid over two states.
+    """
+    if len(found.grid) != 2:
+        raise FigureError(
+            'basins are drawn over two states: set start.kind = "grid" and name two states in '
+            "start.box; of other starts, their shares are drawn over several values of a parameter"
+        )
+    here = {one.number: one for one in found.basins if one.value == found.values[value]}
+    numbers, cells = np.unique(found.numbers[value], return_inverse=True)
+    (x, along), (y, up) = found.grid.items()
+    ends = cell_edges(along), cell_edges(up)
+    colours = ListedColormap([_look(here[number])["facecolor"] for number in numbers.tolist()])
+    cells = cells.reshape(along.size, up.size).T
+    image = axes.pcolorfast(*ends, cells, cmap=colours, vmin=-0.5, vmax=len(numbers) - 0.5)
+    columns = [found.result.variables["state"].flags.index(state) for state in (x, y)]
+    for one in here.values():
+        face, size, edge = (_look(one)["facecolor"], 5.0, 0.6) if one.period else (BLACK, 1.0, 0.0)
+        points = one.section[:MOST_POINTS, columns].T
+        axes.plot(*points, "o", ms=size, mfc=face, mec=BLACK, mew=edge)
+    axes.set(xlim=ends[0][[0, -1]], ylim=ends[1][[0, -1]], xlabel=_label(x), ylabel=_label(y))
+    return image
+
+
+def fractions(axes: Axes, found: Basins) -> list[Drawn]:
+    """Draw the shares of all basins over the parameter on top of each other, number 1 lowest.
+
+    ``found``: from `find_basins`, of several values. Returns what is drawn, with labels, in the
+    order of the numbers.
+    """
+    numbers, looks = in_order(one.number for one in found.basins), []
+    for number in numbers:
+        mine = [one for one in found.basins if one.number == number]
+        motions = [*dict.fromkeys(one.motion for one in mine)]
+        words = ", ".join(motions[:3]) + (", ..." if len(motions) > 3 else "")
+        looks.append(_look(mine[0]) | {"label": f"{number}: {words}" if number > 0 else words})
+    axes.set(ylim=(0.0, 1.0), xlabel=axis_label(found.result, found.parameter))
+    axes.set(xlim=diagram_lanes(found.result).limits, ylabel="Share of starts")
+    shares = [np.mean(found.numbers == number, axis=1) for number in numbers]
+    return _stacked(axes, found.values, shares, looks)
+
+
+def basins_page(
+    found: Basins, width_mm: float = SINGLE_COLUMN_MM, height_mm: float | None = None
+) -> Page:
+    """Draw the basins of one value as `basins` does, those of several as `fractions`.
+
+    Width and height are those of the page; raises FigureError as `basins`.
+    """
+    several, fixed = found.values.size > 1, found.result.fixed
+    with page(width_mm, height_mm or 20.0 + (0.55 if several else 0.85) * width_mm) as figure:
+        axes = figure.subplots()
+        if several:
+            drawn: list[Any] = fractions(axes, found)
+        else:
+            basins(axes, found)
+            drawn = [Patch(**_look(b), lw=0.3, label=_in_words(b)) for b in found.basins]
+            fixed = fixed | {found.parameter: float(found.values[0])}
+        few_ticks(axes, 8, 6)
+        figure.suptitle(in_words(found.result, fixed))
+        legend_below(figure, drawn, legend_title(found.result), columns=2)
+    return figure
+
+
+def _look(one: Basin) -> dict[str, Any]:
+    if one.number < 0:
+        return look_of(one.motion)
+    return {"facecolor": COLORS[(one.number - 1) % len(COLORS)], "edgecolor": "0.55"}
+
+
+def _label(state: str) -> str:
+    wording, symbol = STATE_WORDING[state]
+    return f"{wording.capitalize()}, {symbol} ({unit_of(state).stands_for})"
+
+
+def _in_words(one: Basin) -> str:
+    share, low, high = (100.0 * part for part in (one.share, *one.share_95_percent))
+    number = f"{one.number}: " if one.number > 0 else ""
+    return f"{number}{one.motion}, {share:.3g} % ({low:.3g} to {high:.3g})"

@@ -8,10 +8,9 @@ from matplotlib.axes import Axes
 from matplotlib.legend import Legend
 from matplotlib.patches import Patch, Rectangle
 
-from gearchaos.errors import FigureError
 from gearchaos.figures.labels import legend_title
-from gearchaos.figures.lanes import swept_axes
-from gearchaos.figures.style import LEGEND, SMALL_FONT_PT
+from gearchaos.figures.lanes import diagram_lanes
+from gearchaos.figures.page import legend_below
 from gearchaos.results.result import Result
 from gearchaos.results.stage_table import LabelledLanes, Stage, labelled_lanes, stage_table
 
@@ -88,11 +87,7 @@ def shade_stages(
     FigureError
         If it has several swept parameters.
     """
-    if swept_axes(result) != [result.axis]:
-        raise FigureError(
-            f"stages are those of one axis, but the result has {', '.join(result.axes)}; fix the "
-            "others with result.sel"
-        )
+    diagram_lanes(result)  # Refuses two swept parameters.
     lanes = labelled_lanes(result, repeats=True) if lanes is None else lanes
     low, high = sorted(axes.get_xlim())
     stages = stage_table(lanes, NARROWEST_SHARE * (high - low) if narrowest is None else narrowest)
@@ -110,12 +105,12 @@ def shade_stages(
         return StageArtists(stages, shades, None)
     named = [kind for kind in dict.fromkeys([*SHADES, *kinds]) if kind in drawn]
     handles = [Patch(linewidth=0.3, label=kind, **look_of(kind)) for kind in named]
-    assert axes.figure is not None
     # Above the axes are the panel's letter and the marks of lanes that cannot be shown; and a line
     # at the foot of the page would lie on the legend.
-    look = {"loc": "outside lower center", "ncols": min(len(handles), 5), **LEGEND}
-    look |= {"title": legend_title(result), "title_fontsize": SMALL_FONT_PT}
-    return StageArtists(stages, shades, axes.figure.legend(handles=handles, **look))
+    figure: Any = axes.figure
+    return StageArtists(
+        stages, shades, legend_below(figure, handles, legend_title(result), columns=5)
+    )
 
 
 def look_of(kind: str) -> dict[str, Any]:

@@ -26,6 +26,7 @@ FONT_PT = 8.0
 LEGEND: dict[str, Any] = {
     "frameon": False,
     "fontsize": SMALL_FONT_PT,
+    "title_fontsize": SMALL_FONT_PT,
     "borderpad": 0.0,
     "handlelength": 1.0,
     "handletextpad": 0.4,
@@ -57,6 +58,7 @@ _STYLE: dict[Any, Any] = {
     "axes.linewidth": 0.6,
     "axes.formatter.use_mathtext": True,
     "legend.fontsize": SMALL_FONT_PT,
+    "figure.titlesize": SMALL_FONT_PT,
     **{f"{axis}tick.{name}": value for axis in "xy" for name, value in TICKS.items()},
     "xtick.top": True,
     "ytick.right": True,
@@ -64,8 +66,6 @@ _STYLE: dict[Any, Any] = {
     "figure.constrained_layout.h_pad": 0.02,
     "figure.constrained_layout.w_pad": 0.02,
     "figure.constrained_layout.hspace": 0.02,
-    "figure.facecolor": "white",
-    "savefig.facecolor": "white",
     # Journals ask for TrueType; matplotlib's default, Type 3, cannot be edited.
     "pdf.fonttype": 42,
     "ps.fonttype": 42,

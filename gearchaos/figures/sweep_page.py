@@ -14,7 +14,7 @@ from gearchaos.figures.lanes import Between
 from gearchaos.figures.page import Page, few_ticks, footnote, letter, page
 from gearchaos.figures.panel import legend_above, mark_values
 from gearchaos.figures.stages import NARROWEST_SHARE, shade_stages
-from gearchaos.figures.style import OVERLAID, SINGLE_COLUMN_MM, SMALL_FONT_PT
+from gearchaos.figures.style import OVERLAID, SINGLE_COLUMN_MM
 from gearchaos.results.jumps import apart, directions_of
 from gearchaos.results.result import Result, section_variables
 from gearchaos.results.stage_table import LabelledLanes
@@ -130,7 +130,7 @@ def bifurcation_page(
             footnote(figure, whose + max(forms))
         places = dict.fromkeys(in_words(one, one.fixed) for one in files if one.fixed)
         if places:
-            figure.suptitle("; ".join(places), fontsize=SMALL_FONT_PT)
+            figure.suptitle("; ".join(places))
         figure.align_ylabels(stack)
     return figure
 

@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 from gearchaos.engine.lanes import axis_of
 from gearchaos.errors import FileError
 from gearchaos.identification.observations import Observation
-from gearchaos.results.atomic_file import reason
-from gearchaos.results.checksum_line import checksum_fits
+from gearchaos.results.atomic_file import checksum_fits, reason
 from gearchaos.results.result_file import write_result
 from gearchaos.results.result_reader import SEARCH
 from gearchaos.results.stored_dataset import UnfitError, datasets_of, scalars_of, text_of, values_of

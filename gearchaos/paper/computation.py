@@ -17,7 +17,7 @@ from gearchaos.dynamics.following import Branch
 from gearchaos.engine.response import respond
 from gearchaos.engine.running import run
 from gearchaos.errors import ConfigurationError
-from gearchaos.figures.response_lane import coordinates_of, samples_per_period
+from gearchaos.figures.response import coordinates_of, samples_per_period
 from gearchaos.gear.derivation import Quantities
 from gearchaos.gear.geometry import HelicalPair
 from gearchaos.paper.published import contact_line_stiffness, printed_coefficients, published

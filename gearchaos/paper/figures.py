@@ -12,8 +12,14 @@ from gearchaos.figures import bifurcation_page
 from gearchaos.figures.lanes import Floats
 from gearchaos.figures.page import Page, column, few_ticks, letter, remark
 from gearchaos.figures.panel import legend_above
-from gearchaos.figures.response import phase_portrait, poincare_section, time_history
-from gearchaos.figures.response_lane import COORDINATE, coordinates_of, samples_per_period
+from gearchaos.figures.response import (
+    COORDINATE,
+    coordinates_of,
+    phase_portrait,
+    poincare_section,
+    samples_per_period,
+    time_history,
+)
 from gearchaos.figures.style import BLACK, BLUE, FONT_PT, GREY, LEGEND, ORANGE, VERMILION
 from gearchaos.gear.contact_lines import series_table
 from gearchaos.paper.computation import (

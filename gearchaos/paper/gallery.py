@@ -5,8 +5,7 @@ from functools import partial
 from pathlib import Path
 
 from gearchaos.errors import FileError
-from gearchaos.figures.files import FORMATS, save_figure
-from gearchaos.figures.page import Page
+from gearchaos.figures.page import FORMATS, Page, save_figure
 from gearchaos.paper import figures
 from gearchaos.paper.computation import Reproduction
 from gearchaos.paper.published import published

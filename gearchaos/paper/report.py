@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from gearchaos.figures.labels import short
-from gearchaos.figures.response_lane import coordinates_of
+from gearchaos.figures.response import coordinates_of
 from gearchaos.paper.comparison import NONE, RULES, WINDOW, Row, Verdict, compare, signed
 from gearchaos.paper.computation import Reproduction, lane_of, largest_acceleration
 from gearchaos.paper.published import published

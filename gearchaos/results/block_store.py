@@ -15,10 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gearchaos.errors import FileError
-from gearchaos.results import manifest
 from gearchaos.results.atomic_file import PARTIAL, reason, replacing, unlinked_content
+from gearchaos.results.block_folder import LOCK, MANIFEST, StoreLock, folder_of, settle_manifest
 from gearchaos.results.result_file import Metadata, Parameter, write_result
-from gearchaos.results.store_lock import LOCK, StoreLock
 from gearchaos.results.variables import Variable, lane_axes
 from gearchaos.version import Software
 
@@ -69,7 +68,7 @@ class BlockStore(AbstractContextManager["BlockStore"]):
         blocks: Sequence[Bounds] | None = None,
         shards: int | None = None,
     ) -> None:
-        self.output, self.folder = Path(output), manifest.folder_of(output)
+        self.output, self.folder = Path(output), folder_of(output)
         self.lanes, self._record = lanes_and_record(variables)
         facts = {**SCHEMA, **software._asdict(), "configuration": configuration}
         facts |= {"lanes": self.lanes, "variables": self._record.descr}
@@ -84,7 +83,7 @@ class BlockStore(AbstractContextManager["BlockStore"]):
             beside = {"text": text, "shards": shards}
             # Of several shards, whoever comes first writes it.
             how = {"write": shared or not own, "overwrite": not shared}
-            manifest.settle_manifest(self.folder, decisive, beside, **how)
+            settle_manifest(self.folder, decisive, beside, **how)
             if own and not resume:
                 raise FileError(
                     f"{self.folder}: holds {len(own)} finished blocks of an earlier run; continue "
@@ -100,10 +99,6 @@ class BlockStore(AbstractContextManager["BlockStore"]):
             self._remove([partial.name for partial in self.folder.glob(f".*{PARTIAL}")])
 
     def __exit__(self, *_: object) -> None:
-        self.close()
-
-    def close(self) -> None:
-        """Let go of the lock; finished blocks stay."""
         if not self._names() and self._lock.alone():
             self.remove()
         self._lock.release()
@@ -111,7 +106,7 @@ class BlockStore(AbstractContextManager["BlockStore"]):
     def remove(self) -> None:
         """Remove the blocks, the folder if nothing else is in it, and let go of the lock."""
         # Only what the store has made: the folder may hold files of the user.
-        self._remove([*self._names(), manifest.MANIFEST, LOCK])
+        self._remove([*self._names(), MANIFEST, LOCK])
         # What comes to be there from now on is another sweep's.
         self._lock.release()
 
@@ -209,11 +204,11 @@ class BlockStore(AbstractContextManager["BlockStore"]):
         self.remove()
         return self.output
 
-    def require_all(self, found: Finished, remedy: str, most: int = 3) -> None:
+    def require_all(self, found: Finished, remedy: str) -> None:
         """Raise a FileError that names the lanes which `finished` has not found, with a remedy."""
         if gaps := self.missing(found.bounds, self.lanes):
-            names = ", ".join(f"{first} to {last - 1}" for first, last in gaps[:most])
-            more = f" and {len(gaps) - most} more ranges" if len(gaps) > most else ""
+            names = ", ".join(f"{first} to {last - 1}" for first, last in gaps[:3])
+            more = f" and {len(gaps) - 3} more ranges" if len(gaps) > 3 else ""
             missing = f"{self.folder}: lanes {names}{more} are missing; {remedy}"
             raise FileError([*found.problems, missing])
 

@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gearchaos.records.period import TOLERANCE, section_distance
-from gearchaos.results.excitation import excitation_of
 from gearchaos.results.result import Result, section_variables
 from gearchaos.results.stage_table import labelled_lanes
+from gearchaos.results.units import excitation_of
 from gearchaos.results.variables import DIRECTION, WAYS
 
 Floats = NDArray[np.float64]
@@ -85,10 +85,8 @@ def jumps(result: Result) -> list[Jump]:
     has one axis and labels; without a section nothing is found.
     """
     lanes = labelled_lanes(result)
-    if lanes.values.size < 3:
-        return []
     # A lane still on its way to its orbit lies anywhere.
-    arrived = ~(result["return_distance"] > TOLERANCE) if "return_distance" in result else True
+    arrived = ~(result["return_distance"] > TOLERANCE)
     sections = sections_of(result)
     period = np.where(arrived, lanes.period, 0)
     found = np.flatnonzero(jump_sizes(period, sections / size_of(sections)))
@@ -118,10 +116,7 @@ def size_of(sections: Floats) -> Floats:
 
 
 def jump_sizes(
-    period: NDArray[np.int32],
-    section: Floats,
-    cells: Floats | float = 1.0,
-    alone: float = np.nan,
+    period: NDArray[np.int32], section: Floats, cells: Floats | float = 1.0, alone: float = np.nan
 ) -> Floats:
     """Return how far neighbouring lanes move apart where they jump, else 0, shape (lanes - 1,).
 

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from gearchaos.results.variables import STATE_WORDING, Axis, Variable
+from gearchaos.results.variables import DIRECTIONS, STATE_WORDING, Variable, coordinate
 
 TIME = "time"
 MESH_PERIOD = "mesh_period"
@@ -20,11 +20,11 @@ NO_CONTACT_STATE = 255
 
 
 def response_variables(
-    axes: Sequence[Axis], *, states: Sequence[str], periods: int, steps_per_period: int, axial: bool
+    axes: Sequence[Variable], *, states: Sequence[str], periods: int, steps_per_period: int
 ) -> list[Variable]:
     """List the variables that a response adds to those of a sweep, in the order of the file.
 
-    Axes and states are those of the sweep; ``axial`` tells whether there is an axial mesh force.
+    Axes and states are those of the sweep.
     """
     lane = tuple(axis.name for axis in axes)
     instants = np.arange(periods * steps_per_period + 1) / steps_per_period
@@ -35,7 +35,7 @@ def response_variables(
     text, symbol = "time in mesh periods", r"$\Omega\tau/2\pi$"
     period = "mesh period in units of dimensionless time"
     variables = [
-        Variable(TIME, (TIME,), "float64", "1", text, symbol, values=instants),
+        coordinate(TIME, "1", text, symbol, instants),
         Variable(MESH_PERIOD, lane, "float64", "1", period, r"$2\pi/\Omega$"),
     ]
     for state in states:
@@ -45,7 +45,8 @@ def response_variables(
             text, symbol = text.replace("velocity", "acceleration"), symbol.replace("'", "''")
             variables.append(motion(acceleration_of(state.removesuffix("_rate")), text, symbol))
     variables.append(motion(MESH_ERROR, "pitch error of the mesh", "$e$"))
-    for direction, symbol in (("tangential", "$N_y$"), ("axial", "$N_z$"))[: 2 if axial else 1]:
+    acting = DIRECTIONS if "delta_3" in states else DIRECTIONS[:1]
+    for direction, symbol in zip(acting, ("$N_y$", "$N_z$"), strict=False):
         name, text = f"contact_{direction}", f"contact in the {direction} direction"
         dims = (*lane, TIME)
         variables += [

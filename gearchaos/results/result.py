@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from gearchaos.errors import ConfigurationError, FileError
 from gearchaos.results import tables
-from gearchaos.results.checksum_line import checksum_fits
+from gearchaos.results.atomic_file import checksum_fits
 from gearchaos.results.result_file import Parameter, own_metadata, write_result
 from gearchaos.results.result_reader import fixed_coordinates, is_coordinate, read_result
 from gearchaos.results.units import in_physical_units

@@ -15,8 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gearchaos.interrupts import check
-from gearchaos.results.atomic_file import replacing
-from gearchaos.results.checksum_line import append_checksum
+from gearchaos.results.atomic_file import append_checksum, replacing
 from gearchaos.results.variables import HARMONIC, Variable, diagram_axis, lane_axes
 
 SCHEMA = "gearchaos-sweep"

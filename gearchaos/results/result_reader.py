@@ -15,11 +15,10 @@ from gearchaos.errors import FileError
 from gearchaos.gear.groups import LARGEST_VALUE
 from gearchaos.results import stored_dataset as stored
 from gearchaos.results import variables as known
-from gearchaos.results.atomic_file import reason
-from gearchaos.results.checksum_line import checksum_fits
+from gearchaos.results.atomic_file import checksum_fits, reason
 from gearchaos.results.result_file import ORIGINS, PARAMETERS, SCHEMA, SCHEMA_VERSION, Parameter
 from gearchaos.results.stored_dataset import UnfitError
-from gearchaos.results.variables import HARMONIC, STATE, Axis, Variable
+from gearchaos.results.variables import HARMONIC, STATE, Variable, coordinate
 
 Contents = tuple[
     list[Variable], dict[str, NDArray[Any]], dict[str, Parameter], dict[str, str | int | float]
@@ -213,7 +212,7 @@ def _check_variables(
         raise UnfitError(f"lacks the variable {STATE}")
     expected = known.sweep_variables(
         [
-            Axis(name, "", "", "", np.zeros(1, "i4" if name in known.UNSWEPT else "f8"))
+            coordinate(name, "", "", "", np.zeros(1, "i4" if name in known.UNSWEPT else "f8"))
             for name in axes
         ],
         states=found[STATE].flags,

@@ -61,6 +61,14 @@ class _Stretch(NamedTuple):
     narrower: int
 
 
+def require_labels(result: Result, name: str = "the result") -> None:
+    """Raise a FileError that calls a result by a name if it has no labels of the motion."""
+    if not all(label in result for label in LABELS):
+        raise FileError(
+            f"{name}: holds no labels of the motion; run the sweep again with outputs.motion = true"
+        )
+
+
 def labelled_lanes(
     result: Result, *, name: str = "the result", repeats: bool = False
 ) -> LabelledLanes:
@@ -70,10 +78,7 @@ def labelled_lanes(
     is "several motions", without a period, an exponent or bands. Raises FileError if the result has
     no labels, ConfigurationError if it has not one axis.
     """
-    if not all(variable in result for variable in LABELS):
-        raise FileError(
-            f"{name}: holds no labels of the motion; run the sweep again with outputs.motion = true"
-        )
+    require_labels(result, name)
     one = result.sel(**{axis: result[axis][0] for axis in REPEATS if repeats and axis in result})
     if len(one.axes) != 1:
         raise ConfigurationError(
@@ -85,7 +90,6 @@ def labelled_lanes(
     labels = [label_text(meanings[m], n) for m, n in zip(motion, period.tolist(), strict=True)]
     known = LARGEST_EXPONENT in result
     exponent = one[LARGEST_EXPONENT] if known else np.full(period.shape, np.nan)
-    bands = one[BANDS] if BANDS in result else np.zeros_like(period)
     every = np.stack([result[label].reshape(period.size, -1) for label in LABELS])
     alike = (every == every[:, :, :1]).all(axis=(0, 2))
     return LabelledLanes(
@@ -93,7 +97,7 @@ def labelled_lanes(
         labels=np.where(alike, labels, "several motions"),
         period=np.where(alike, period, 0),
         exponent=np.where(alike, exponent, np.nan),
-        bands=np.where(alike, bands, 0),
+        bands=np.where(alike, one[BANDS], 0),
     )
 
 

@@ -1,8 +1,6 @@
-"""Results for other libraries: an xarray Dataset, a pandas DataFrame, arrays for MATLAB."""
+"""Results for other libraries: an xarray Dataset, a pandas DataFrame."""
 
-from collections.abc import Sequence
 from importlib import import_module
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -58,17 +56,3 @@ def to_dataframe(result: "Result", *along: str) -> Any:
     levels = [words[dim][result[dim]] if words[dim].size else result[dim] for dim in dims]
     index = pandas.MultiIndex.from_product(levels, names=dims)
     return pandas.DataFrame(columns, index.get_level_values(0) if len(dims) == 1 else index)
-
-
-def write(result: "Result", path: Path, kind: str, along: Sequence[str] = ()) -> None:
-    """Write a table as "csv" or "parquet", or every array and the words of flags as "mat"."""
-    if kind == "mat":
-        known = [v for v in result.variables.values() if v.flags]
-        words = {f"{v.name}_meanings": np.array(v.flags, dtype=object) for v in known}
-        arrays = {**{name: result[name] for name in result}, **words, "metadata": result.metadata}
-        needed("scipy.io").savemat(path, arrays, appendmat=False)
-    elif kind == "csv":
-        to_dataframe(result, *along).to_csv(path)
-    else:
-        needed("pyarrow")
-        to_dataframe(result, *along).to_parquet(path, engine="pyarrow")

@@ -1,4 +1,4 @@
-"""What dimensionless variables are multiples of, and what they are in physical units."""
+"""What the numbers of a result are multiples of: scales of the pair, periods of its excitation."""
 
 import re
 from collections.abc import Mapping
@@ -29,6 +29,7 @@ _SPEED = Unit(r"unit $b\prime\omega_h$", "m s-1", 1e-6, (LENGTH, FREQUENCY))
 _ACCELERATION = Unit(r"unit $b\prime\omega_h^2$", "m s-2", 1e-6, (LENGTH, FREQUENCY, FREQUENCY))
 _FORCE = Unit(r"unit $k_mb\prime$", "N", 1e-6, (STIFFNESS, LENGTH))
 _GROWTH = Unit(r"per unit of $\tau$", "s-1", 1.0, (FREQUENCY,))
+_PURE = Unit("", "1", 1.0, ())
 _UNITS = {
     r"(section_)?delta_\d|mesh_error|transmission_error_\w+": _LENGTH,
     r"(section_)?delta_\d_rate|approach_\w+|slowest_crossing": _SPEED,
@@ -40,9 +41,9 @@ _UNITS = {
 """By a pattern of the names of variables: docs/model.md."""
 
 
-def unit_of(name: str) -> Unit | None:
-    """Return what the numbers of a dimensionless variable are multiples of, None of pure ones."""
-    return next((unit for names, unit in _UNITS.items() if re.fullmatch(names, name)), None)
+def unit_of(name: str) -> Unit:
+    """Return what the numbers of a dimensionless variable are multiples of, nothing if pure."""
+    return next((unit for names, unit in _UNITS.items() if re.fullmatch(names, name)), _PURE)
 
 
 def in_physical_units(
@@ -54,7 +55,7 @@ def in_physical_units(
     the variable does not have.
     """
     unit = unit_of(variable.name)
-    if unit is None or variable.units != "1":
+    if unit is _PURE or variable.units != "1":
         return variable, values
     for name in unit.scales:
         if name not in parameters:
@@ -70,3 +71,37 @@ def in_physical_units(
         sizes = zip(variable.dims, values.shape, strict=True)
         values = values * np.reshape(scale.value, [n if d in scale.dims else 1 for d, n in sizes])
     return replace(variable, units=unit.units), unit.factor * values
+
+
+class Excitation(NamedTuple):
+    """The excitation of all lanes, by the attributes of these names.
+
+    ``excitation_period``: mesh periods after which it repeats, 1 for a sine; the others, 0 where
+    not known, are numbers of teeth that have errors of their own.
+    """
+
+    excitation_period: int = 1
+    driving_teeth: int = 0
+    driven_teeth: int = 0
+
+    @property
+    def of_teeth(self) -> bool:
+        """Whether teeth have errors of their own, whose numbers are known."""
+        return self.driving_teeth > 0 and self.driven_teeth > 0
+
+    @property
+    def in_words(self) -> str:
+        """What the periods of motions are, where they are not mesh periods."""
+        n = self.excitation_period
+        return f"periods are those of the excitation, {n} mesh periods each" if n > 1 else ""
+
+
+def excitation_of(metadata: Mapping[str, Any]) -> Excitation:
+    """Read the excitation from the metadata of a result; what makes no sense is not known."""
+    # Beyond that is no number of teeth.
+    sound = {
+        name: value
+        for name, default in Excitation._field_defaults.items()
+        if isinstance(value := metadata.get(name), type(default)) and 0 < value < 1e9
+    }
+    return Excitation(**sound)

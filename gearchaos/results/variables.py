@@ -78,7 +78,7 @@ class Variable:
     fill_value: float | int | None = None
     flags: tuple[str, ...] = ()
     errors: tuple[str, ...] = ()
-    values: NDArray[Any] | None = None
+    values: Any = None
 
     @property
     def attributes(self) -> dict[str, Any]:
@@ -94,19 +94,17 @@ class Variable:
         return attributes
 
 
-@dataclass(frozen=True, eq=False)
-class Axis:
-    """One dimension of the lanes of a sweep; values of shape (values,) ascend, none of them twice.
-
-    For the name see `axis_name`; the other texts, and flags, are as of a variable.
-    """
-
-    name: str
-    units: str
-    long_name: str
-    symbol: str
-    values: NDArray[Any]
-    flags: tuple[str, ...] = ()
+def coordinate(
+    name: str,
+    units: str,
+    long_name: str,
+    symbol: str,
+    values: NDArray[Any],
+    flags: tuple[str, ...] = (),
+) -> Variable:
+    """Give a variable that is a dimension of its own, such as an axis: its values ascend."""
+    dtype = {"i": "int32", "f": "float64"}[values.dtype.kind]
+    return Variable(name, (name,), dtype, units, long_name, symbol, flags=flags, values=values)
 
 
 def axis_name(parameter: str) -> str:
@@ -114,21 +112,21 @@ def axis_name(parameter: str) -> str:
     return parameter.replace(".", "_")
 
 
-def start_axis(count: int) -> Axis:
+def start_axis(count: int) -> Variable:
     """Give the axis of several starts of each parameter value."""
     text = "number of the start among those of one parameter value"
-    return Axis(START, "1", text, "", np.arange(count))
+    return coordinate(START, "1", text, "", np.arange(count))
 
 
-def pair_axis(numbers: NDArray[Any]) -> Axis:
+def pair_axis(numbers: NDArray[Any]) -> Variable:
     """Give the axis of several drawn gear pairs, of these numbers."""
-    return Axis(REALISATION, "1", "drawn gear pair", "", numbers)
+    return coordinate(REALISATION, "1", "drawn gear pair", "", numbers)
 
 
-def direction_axis() -> Axis:
+def direction_axis() -> Variable:
     """Give the axis of both directions in which a sweep carries its states."""
     text = "direction in which each value starts from the end state of its neighbour"
-    return Axis(DIRECTION, "1", text, "", np.arange(len(WAYS)), WAYS)
+    return coordinate(DIRECTION, "1", text, "", np.arange(len(WAYS)), WAYS)
 
 
 def coordinate_text(axis: str, value: float, digits: int = 12) -> str:
@@ -148,7 +146,7 @@ def lane_axes(variables: Sequence[Variable]) -> tuple[str, ...]:
 
 
 def sweep_variables(
-    axes: Sequence[Axis],
+    axes: Sequence[Variable],
     *,
     states: Sequence[str],
     section: Sequence[str],
@@ -174,10 +172,7 @@ def sweep_variables(
     whole excitation periods, of so many mesh periods each.
     """
     names = tuple(axis.name for axis in axes)
-    variables = [
-        replace(_coordinate(a.name, a.values, a.long_name, a.symbol, a.units), flags=a.flags)
-        for a in axes
-    ]
+    variables = list(axes)
 
     def add(dtype: str, name: str, text: str, symbol: str = "", *dims: str, **more: Any) -> None:
         variables.append(Variable(name, (*names, *dims), dtype, "1", text, symbol, **more))
@@ -190,7 +185,7 @@ def sweep_variables(
 
     if section and section_points > 0:
         text = "number of the section point, one mesh period apart; the last one ends the lane"
-        variables.append(_coordinate(SECTION_POINT, np.arange(section_points), text))
+        variables.append(coordinate(SECTION_POINT, "1", text, "", np.arange(section_points)))
         for state in section:
             text, symbol = STATE_WORDING[state]
             real(SECTION + state, f"{text} at the stroboscopic section", symbol, SECTION_POINT)
@@ -215,7 +210,7 @@ def sweep_variables(
     if exponents:
         text = "number of the Lyapunov exponent, the largest first"
         numbers = np.arange(1, len(states) + 1)
-        variables.append(_coordinate(EXPONENT_NUMBER, numbers, text, "$i$"))
+        variables.append(coordinate(EXPONENT_NUMBER, "1", text, "$i$", numbers))
         real(ALL_EXPONENTS, "all Lyapunov exponents", r"$\lambda_i$", EXPONENT_NUMBER)
         text = "standard error of each Lyapunov exponent"
         real(ALL_EXPONENTS + STANDARD_ERROR, text, "", EXPONENT_NUMBER)
@@ -244,8 +239,7 @@ def sweep_variables(
     text = "mesh period in which the lane diverged, -1 where it did not"
     add("int32", "diverged_period", text, fill_value=-1)
     text = "number of the state variable, which its meaning names"
-    numbered = _coordinate(STATE, np.arange(len(states)), text)
-    variables.append(replace(numbered, flags=tuple(states)))
+    variables.append(coordinate(STATE, "1", text, "", np.arange(len(states)), tuple(states)))
     for end in ("start", "end"):
         real(f"{end}_state", f"state at the {end} of the lane", "", STATE)
     errors = {
@@ -273,16 +267,8 @@ def step_choice_variables(
         "periodic_share": "share of lanes that move periodically: errors are measured on these",
     }
     text = "steps per period that were tried before the sweep; the last number was taken"
-    variables = [_coordinate(name, np.asarray(steps, dtype=np.int32), text, "$N$")]
+    variables = [coordinate(name, "1", text, "$N$", np.asarray(steps, dtype=np.int32))]
     for key, row in measured.items():
-        values = np.asarray(row, dtype=np.float64)
-        key, text = f"candidate_{key}", wording[key]
-        variables.append(Variable(key, (name,), "float64", "1", text, values=values))
+        told = f"candidate_{key}", (name,), "float64", "1", wording[key]
+        variables.append(Variable(*told, values=np.asarray(row, dtype=np.float64)))
     return variables
-
-
-def _coordinate(
-    name: str, values: NDArray[Any], long_name: str, symbol: str = "", units: str = "1"
-) -> Variable:
-    dtype = {"i": "int32", "f": "float64"}[values.dtype.kind]
-    return Variable(name, (name,), dtype, units, long_name, symbol, values=values)

@@ -10,11 +10,12 @@ from typing import Any
 import h5py
 import numpy as np
 
-from gearchaos.results.checksum_line import append_checksum
+from gearchaos.results.atomic_file import append_checksum
 from gearchaos.results.result import Parameter, Result
 from gearchaos.results.variables import (
     STATE_WORDING,
-    Axis,
+    Variable,
+    coordinate,
     start_axis,
     step_choice_variables,
     sweep_variables,
@@ -26,12 +27,12 @@ Random = random.Random
 
 CHECKSUM_LINE = 82
 LANES, POINTS = 20, 5
-LOAD = Axis("load", "1", "static load", "$f_n$", np.linspace(0.0, 1.0, LANES))
-ERRORS = Axis("pitch_error", "1", "pitch error", "$P$", np.linspace(0.0, 3.0, 4))
+LOAD = coordinate("load", "1", "static load", "$f_n$", np.linspace(0.0, 1.0, LANES))
+ERRORS = coordinate("pitch_error", "1", "pitch error", "$P$", np.linspace(0.0, 3.0, 4))
 GOOD_AXES = ((LOAD,), (ERRORS, LOAD, start_axis(2)), (ERRORS, LOAD), (LOAD, start_axis(3)))
 
 
-def good_result(path: Path, axes: tuple[Axis, ...] = GOOD_AXES[0]) -> None:
+def good_result(path: Path, axes: tuple[Variable, ...] = GOOD_AXES[0]) -> None:
     """Write a sound result file with every kind of variable that a sweep has."""
     states = list(STATE_WORDING)[:2]
     choice = dict.fromkeys(("section_error", "exponent_error", "changed_share"), (1e-3, 1e-7))

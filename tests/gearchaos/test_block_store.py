@@ -15,11 +15,10 @@ import numpy as np
 import pytest
 
 from gearchaos.errors import FileError
+from gearchaos.results.block_folder import StoreLock, read_manifest, require_same
 from gearchaos.results.block_store import BlockStore
-from gearchaos.results.manifest import read_manifest, require_same
 from gearchaos.results.result import Parameter, Result, open_result
-from gearchaos.results.store_lock import StoreLock
-from gearchaos.results.variables import Axis, Variable, start_axis, sweep_variables
+from gearchaos.results.variables import Variable, coordinate, start_axis, sweep_variables
 from gearchaos.version import Software
 
 LANES = 100
@@ -35,7 +34,7 @@ values = [1.0, 2.0]
 
 def variables(lanes: int = LANES) -> list[Variable]:
     return sweep_variables(
-        [Axis("load", "1", "static load", "$f_n$", np.arange(float(lanes)))],
+        [coordinate("load", "1", "static load", "$f_n$", np.arange(float(lanes)))],
         states=["delta_5", "delta_5_rate"],
         section=["delta_5"],
         section_points=POINTS,
@@ -401,10 +400,11 @@ def test_merging_takes_the_memory_of_a_block(output: Path) -> None:
 import numpy as np
 from test_block_store import CONFIGURATION, POINTS, SOFTWARE
 from gearchaos.results.block_store import BlockStore
-from gearchaos.results.variables import Axis, sweep_variables
+from gearchaos.results.variables import coordinate, sweep_variables
 points, size, count = 500, 250, 80
 variables = sweep_variables(
-    [Axis("load", "1", "load", "", np.arange(float(size * count)))], states=["delta_5"],
+    [coordinate("load", "1", "load", "", np.arange(float(size * count)))],
+        states=["delta_5"],
     section=["delta_5"], section_points=points, lyapunov=False, status_meanings=["ok"],
 )
 random = np.random.default_rng(0)
@@ -561,8 +561,8 @@ def test_what_is_no_file_in_the_place_of_a_block_is_not_waited_for(output: Path)
 
 def test_several_axes_become_one_file_from_blocks_that_cut_them(output: Path) -> None:
     axes = [
-        Axis("load", "1", "load", "", np.arange(4.0)),
-        Axis("pitch_error", "1", "pitch error", "", np.arange(5.0)),
+        coordinate("load", "1", "load", "", np.arange(4.0)),
+        coordinate("pitch_error", "1", "pitch error", "", np.arange(5.0)),
         start_axis(5),
     ]
     several = sweep_variables(
@@ -584,11 +584,11 @@ def test_what_was_merged_leaves_the_next_sweep_alone(output: Path) -> None:
         fill(store)
         store.merge(VARIABLES, PARAMETERS, {})
         following = open_store(output)
-    assert following.folder.is_dir()
-    with pytest.raises(FileError, match="another sweep is writing to it"):
-        open_store(output)
-    fill(following)
-    following.close()
+    with following:
+        assert following.folder.is_dir()
+        with pytest.raises(FileError, match="another sweep is writing to it"):
+            open_store(output)
+        fill(following)
     with open_store(output, resume=True) as store:
         assert store.finished().bounds == BLOCKS
 

@@ -6,7 +6,7 @@ import pytest
 from gearchaos.records.label import CHAOTIC, MEANINGS, PERIODIC
 from gearchaos.results.jumps import crises, grows_at
 from gearchaos.results.result import Result
-from gearchaos.results.variables import Axis, sweep_variables
+from gearchaos.results.variables import coordinate, sweep_variables
 
 MERGING = 1.5 * np.sqrt(3.0)
 """Where the two chaotic sets of the cubic map meet: its maximum comes to its zero."""
@@ -63,7 +63,7 @@ def result(backwards: bool) -> Result:
     section, chaotic = cubic(100)
     if backwards:
         section, chaotic = section[::-1], chaotic[::-1]
-    axes = [Axis("growth", "1", "growth", "", GROWTH)]
+    axes = [coordinate("growth", "1", "growth", "", GROWTH)]
     variables = sweep_variables(
         axes,
         states=["delta_5"],

@@ -48,7 +48,7 @@ def test_the_diagram_shows_all_starts_and_the_stages_say_where_they_differ():
 
 def test_stages_are_those_of_one_axis():
     for axes in ("two parameters", "two parameters, several starts"):
-        with pytest.raises(FigureError, match=r"load, pitch_error.*result\.sel"):
+        with pytest.raises(FigureError, match=r"load and pitch_error.*result\.sel"):
             shade_stages(Figure().subplots(), result_over(AXES[axes]))
 
 

@@ -8,10 +8,9 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from gearchaos.figures import bifurcation, lyapunov
-from gearchaos.figures.dots import MOST_DOTS, DenseDots, counts, dots
-from gearchaos.figures.lanes import COLUMNS, Lanes
+from gearchaos.figures.lanes import COLUMNS, MOST_DOTS, DenseDots, Lanes, counts, dots
 from gearchaos.results.result import Result
-from gearchaos.results.variables import Axis, sweep_variables
+from gearchaos.results.variables import coordinate, sweep_variables
 
 RANDOM = np.random.default_rng(7)
 
@@ -42,7 +41,7 @@ def wide_sweep(count: int, points: int, *, exponent=None) -> Result:
     section = np.where(load < 0.5, 0.5 * load, 1.0)[:, np.newaxis] * RANDOM.random((count, points))
     section[load < 0.5] = load[load < 0.5, np.newaxis]
     variables = sweep_variables(
-        [Axis("load", "1", "static load", "", load)],
+        [coordinate("load", "1", "static load", "", load)],
         states=["delta_5"],
         section=["delta_5"],
         section_points=points,
@@ -66,7 +65,7 @@ def test_counted_dots_are_the_picture_of_the_dots(dpi, look, monkeypatch):
     rows[3, :9], rows[5, :3], rows[7] = np.nan, np.inf, 1e300
     pictures = []
     for most in (rows.size, 1000):
-        monkeypatch.setattr("gearchaos.figures.dots.MOST_DOTS", most)
+        monkeypatch.setattr("gearchaos.figures.lanes.MOST_DOTS", most)
         axes = panel(dpi)
         drawn = dots(axes, lanes_of(300, (50, 51)), rows, color="#0072B2", rasterized=True, **look)
         assert isinstance(drawn, DenseDots) == (most < rows.size)

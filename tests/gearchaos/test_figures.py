@@ -17,7 +17,7 @@ from gearchaos.errors import FigureError
 from gearchaos.figures import bifurcation, bifurcation_page, lyapunov, save_figure
 from gearchaos.figures.panel import robust_limits
 from gearchaos.results.result import Result, open_result
-from gearchaos.results.variables import Axis, start_axis, sweep_variables
+from gearchaos.results.variables import coordinate, start_axis, sweep_variables
 
 POINTS = 60
 LANES = 121
@@ -34,7 +34,7 @@ def logistic_sweep(
     units: str = "1",
 ) -> Result:
     """Make a result of the logistic map, whose bifurcations and exponents are well known."""
-    axes = [Axis("growth", units, "growth rate", symbol, np.asarray(values, dtype=float))]
+    axes = [coordinate("growth", units, "growth rate", symbol, np.asarray(values, dtype=float))]
     axes += [start_axis(starts)] if starts > 1 else []
     r = np.repeat(axes[0].values, starts)
     x = np.full(r.shape, 0.4)

@@ -8,10 +8,10 @@ import h5py
 import numpy as np
 import pytest
 
-from gearchaos.results.checksum_line import append_checksum
+from gearchaos.results.atomic_file import append_checksum
 from gearchaos.results.overview import overview
 from gearchaos.results.result import Result, open_result
-from gearchaos.results.variables import Axis
+from gearchaos.results.variables import coordinate
 
 from .commands import run_module
 from .fuzz_results import CHECKSUM_LINE, LANES, good_result
@@ -156,7 +156,7 @@ def test_several_axes_are_listed_and_the_stages_are_those_of_a_named_slice(tmp_p
 
 @pytest.mark.parametrize("lanes", [20, 31])
 def test_of_many_stages_the_first_and_the_last_are_shown(lanes, tmp_path):
-    result = result_over((Axis("load", "1", "static load", "", np.arange(float(lanes))),))
+    result = result_over((coordinate("load", "1", "static load", "", np.arange(float(lanes))),))
     data = {name: result[name] for name in result}
     data["period"], data["motion"] = np.arange(lanes) + 1, np.zeros(lanes)
     variables = list(result.variables.values())

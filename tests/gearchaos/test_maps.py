@@ -13,10 +13,12 @@ from gearchaos.plot import main
 from gearchaos.records.contact import MEANINGS as CONTACT
 from gearchaos.records.label import MEANINGS
 from gearchaos.results.result import Result
-from gearchaos.results.variables import Axis, start_axis, sweep_variables
+from gearchaos.results.variables import Variable, coordinate, start_axis, sweep_variables
 
-SPEEDS = Axis("operation_speed_rpm", "rpm", "speed", "", np.array([900.0, 1000.0, 1300.0, 1500.0]))
-ERRORS = Axis("pitch_error", "1", "pitch error", "$P$", np.array([0.0, 1.0, 4.0]))
+SPEEDS = coordinate(
+    "operation_speed_rpm", "rpm", "speed", "", np.array([900.0, 1000.0, 1300.0, 1500.0])
+)
+ERRORS = coordinate("pitch_error", "1", "pitch error", "$P$", np.array([0.0, 1.0, 4.0]))
 MOTION = np.array([[0, 0, 0, 3], [0, 0, 1, 2], [4, 4, 2, 2]])
 PERIOD = np.array([[1, 2, 3, 0], [4, 7, 0, 0], [0, 0, 0, 0]])
 KINDS = [
@@ -27,7 +29,7 @@ KINDS = [
 EXPONENT = np.array([[-0.3, -0.1, -0.2, 0.01], [-0.1, -0.4, 0.0, 0.2], [np.nan, np.nan, 0.5, 0.4]])
 
 
-def result_over(*axes: Axis, labelled: bool = True) -> Result:
+def result_over(*axes: Variable, labelled: bool = True) -> Result:
     """Three pitch errors by four speeds, unevenly spaced; two lanes diverged at the lowest."""
     variables = sweep_variables(
         axes,

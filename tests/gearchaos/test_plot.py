@@ -12,7 +12,7 @@ import pytest
 
 from gearchaos.plot import main
 from gearchaos.results.result import Result
-from gearchaos.results.variables import Axis, sweep_variables
+from gearchaos.results.variables import coordinate, sweep_variables
 
 PICTURES = {"png": b"\x89PNG", "pdf": b"%PDF", "svg": b"<?xml", "eps": b"%!PS", "tiff": b"II*\0"}
 
@@ -26,7 +26,7 @@ def result_file(tmp_path) -> Path:
     status[20] = 1
     points[20] = np.nan
     variables = sweep_variables(
-        [Axis("load", "1", "load", "$f_n$", load)],
+        [coordinate("load", "1", "load", "$f_n$", load)],
         states=("delta_5",),
         section=("delta_5", "delta_1"),
         section_points=2,

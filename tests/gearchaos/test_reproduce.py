@@ -9,7 +9,7 @@ import pytest
 
 from gearchaos import FileError, load_config, open_result
 from gearchaos.command_line import sweep_file
-from gearchaos.figures.response_lane import coordinates_of
+from gearchaos.figures.response import coordinates_of
 from gearchaos.gear.contact_lines import series_table
 from gearchaos.paper.comparison import (
     RULES,

@@ -17,11 +17,11 @@ from gearchaos.figures import (
     response_page,
     time_history,
 )
-from gearchaos.figures.response_lane import coordinates_of, is_response, repeats_after
+from gearchaos.figures.response import coordinates_of, is_response, repeats_after
 from gearchaos.plot import main
 from gearchaos.results.response_variables import response_variables
 from gearchaos.results.result import Result
-from gearchaos.results.variables import Axis, axis_name, sweep_variables
+from gearchaos.results.variables import axis_name, coordinate, sweep_variables
 
 STEPS, PERIODS, POINTS = 40, 8, 60
 STATES = ("delta_5", "delta_5_rate")
@@ -44,7 +44,7 @@ def known_response(diverged: tuple[int, ...] = (), swept: str = "pitch_error") -
     motion = dict(zip((*STATES, "delta_5_acceleration"), waves, strict=True))
     record = {name: values[:, -PERIODS * STEPS - 1 :] for name, values in motion.items()}
     physical = "." in swept
-    axis = Axis(
+    axis = coordinate(
         axis_name(swept),
         "rpm" if physical else "1",
         "speed of the driving gear" if physical else "multiple of the pitch error",
@@ -64,7 +64,6 @@ def known_response(diverged: tuple[int, ...] = (), swept: str = "pitch_error") -
         states=STATES,
         periods=PERIODS,
         steps_per_period=STEPS,
-        axial=False,
     )
     status = np.isin(np.arange(2), diverged)
     data = {

@@ -15,11 +15,11 @@ from hypothesis import strategies as st
 from gearchaos.errors import ConfigurationError, FileError
 from gearchaos.results.result import Parameter, Result, open_result, section_variables
 from gearchaos.results.result_file import hyperslabs, write_result
-from gearchaos.results.variables import Axis, start_axis, sweep_variables
+from gearchaos.results.variables import Variable, coordinate, start_axis, sweep_variables
 
 POINTS = 6
-LOADS = Axis("load", "1", "static load", "$f_n$", np.linspace(0.1, 0.5, 3))
-ERRORS = Axis("pitch_error", "1", "pitch error", "$P$", np.linspace(0.0, 3.0, 7))
+LOADS = coordinate("load", "1", "static load", "$f_n$", np.linspace(0.1, 0.5, 3))
+ERRORS = coordinate("pitch_error", "1", "pitch error", "$P$", np.linspace(0.0, 3.0, 7))
 AXES = {
     "one start": (ERRORS,),
     "several starts": (ERRORS, start_axis(4)),
@@ -28,7 +28,7 @@ AXES = {
 }
 
 
-def flat_arrays(variables: list, axes: tuple[Axis, ...]) -> dict[str, np.ndarray]:
+def flat_arrays(variables: list, axes: tuple[Variable, ...]) -> dict[str, np.ndarray]:
     sizes = {v.name: len(v.values) for v in variables if v.values is not None}
     lanes = math.prod(axis.values.size for axis in axes)
     random = np.random.default_rng(3)
@@ -42,7 +42,7 @@ def flat_arrays(variables: list, axes: tuple[Axis, ...]) -> dict[str, np.ndarray
     return arrays
 
 
-def variables_over(axes: tuple[Axis, ...]) -> list:
+def variables_over(axes: tuple[Variable, ...]) -> list:
     return sweep_variables(
         axes,
         states=["delta_5", "delta_5_rate"],
@@ -54,7 +54,7 @@ def variables_over(axes: tuple[Axis, ...]) -> list:
     )
 
 
-def result_over(axes: tuple[Axis, ...]) -> Result:
+def result_over(axes: tuple[Variable, ...]) -> Result:
     variables = variables_over(axes)
     cosine = Parameter(np.array([0.3, 0.2]), "given", dims=("harmonic",))
     parameters = {"damping_ratio": Parameter(0.1, "given"), "stiffness_cosine": cosine}
@@ -70,12 +70,12 @@ def result_over(axes: tuple[Axis, ...]) -> Result:
 
 
 @pytest.fixture(params=AXES)
-def axes(request: Any) -> tuple[Axis, ...]:
+def axes(request: Any) -> tuple[Variable, ...]:
     return AXES[request.param]
 
 
 @pytest.fixture
-def result(axes: tuple[Axis, ...]) -> Result:
+def result(axes: tuple[Variable, ...]) -> Result:
     return result_over(axes)
 
 
@@ -202,8 +202,8 @@ def test_flat_blocks_of_any_size_become_the_same_file(axes, size: int, tmp_path:
 
 
 def test_chunks_follow_the_order_of_the_lanes(tmp_path: Path) -> None:
-    many = Axis("load", "1", "load", "", np.arange(700.0))
-    more = Axis("pitch_error", "1", "pitch error", "", np.arange(300.0))
+    many = coordinate("load", "1", "load", "", np.arange(700.0))
+    more = coordinate("pitch_error", "1", "pitch error", "", np.arange(300.0))
     variables = [v for v in variables_over((many, more)) if not v.name.startswith("section")]
     write_result(tmp_path / "r.h5", variables, [], {}, {})
     with h5py.File(tmp_path / "r.h5") as file:

@@ -13,7 +13,7 @@ import pytest
 
 from gearchaos.errors import FileError
 from gearchaos.results.result import Parameter, Result, open_result
-from gearchaos.results.variables import Axis, sweep_variables
+from gearchaos.results.variables import coordinate, sweep_variables
 
 CHECKSUM_LINE = 82
 
@@ -21,7 +21,7 @@ CHECKSUM_LINE = 82
 @pytest.fixture(scope="module")
 def good(tmp_path_factory: pytest.TempPathFactory) -> Path:
     variables = sweep_variables(
-        [Axis("load", "1", "static load", "$f_n$", np.linspace(0.0, 1.0, 20))],
+        [coordinate("load", "1", "static load", "$f_n$", np.linspace(0.0, 1.0, 20))],
         states=["delta_5", "delta_5_rate"],
         section=["delta_5"],
         section_points=5,

@@ -17,8 +17,9 @@ import xarray as xr
 from gearchaos.results.result import Parameter, Result, open_result
 from gearchaos.results.variables import (
     STATE_WORDING,
-    Axis,
+    Variable,
     axis_name,
+    coordinate,
     direction_axis,
     pair_axis,
     start_axis,
@@ -31,12 +32,12 @@ STATES = ("delta_5", "delta_5_rate")
 SIZES = {"section_point": POINTS, "state": len(STATES), "exponent": len(STATES)}
 
 
-def swept(parameter: str = "pitch_error", count: int = LANES) -> Axis:
+def swept(parameter: str = "pitch_error", count: int = LANES) -> Variable:
     values = np.linspace(-1.0, 4.0, count)
-    return Axis(axis_name(parameter), "1", "pitch error", "$P$", values)
+    return coordinate(axis_name(parameter), "1", "pitch error", "$P$", values)
 
 
-def make_result(*axes: Axis, **metadata: Any) -> Result:
+def make_result(*axes: Variable, **metadata: Any) -> Result:
     axes = axes or (swept(),)
     variables = sweep_variables(
         axes,

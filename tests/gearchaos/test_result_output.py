@@ -15,18 +15,19 @@ import pytest
 from gearchaos.errors import FileError
 from gearchaos.results.atomic_file import check_output, replacing
 from gearchaos.results.result import Result, open_result
-from gearchaos.results.variables import Axis, sweep_variables
+from gearchaos.results.variables import coordinate, sweep_variables
 
 PROGRAM = """
 import sys
 import numpy as np
 from gearchaos.errors import FileError
 from gearchaos.results.result import Result
-from gearchaos.results.variables import Axis, sweep_variables
+from gearchaos.results.variables import coordinate, sweep_variables
 
 def result(lanes):
     variables = sweep_variables(
-        [Axis("load", "1", "static load", "$f_n$", np.arange(float(lanes)))], states=["delta_5"],
+        [coordinate("load", "1", "static load", "$f_n$", np.arange(float(lanes)))],
+        states=["delta_5"],
         section=["delta_5"], section_points=100, lyapunov=False, status_meanings=["ok", "diverged"],
     )
     sizes = {"section_point": 100, "state": 1}
@@ -56,7 +57,7 @@ def run(program: str, *arguments: str | Path, limit: int | None = None) -> str:
 @pytest.fixture
 def result() -> Result:
     variables = sweep_variables(
-        [Axis("load", "1", "static load", "$f_n$", np.arange(3.0))],
+        [coordinate("load", "1", "static load", "$f_n$", np.arange(3.0))],
         states=["delta_5"],
         section=[],
         section_points=0,

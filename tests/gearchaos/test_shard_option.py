@@ -6,8 +6,7 @@ import pytest
 import gearchaos
 from gearchaos.engine.sharding import Shard, shared_blocks
 from gearchaos.errors import ConfigurationError
-from gearchaos.results.manifest import folder_of
-from gearchaos.results.store_lock import StoreLock
+from gearchaos.results.block_folder import StoreLock, folder_of
 
 from .commands import LINEAR, names_in, run_module, same_data, sweep
 from .short_sweeps import METHODS

@@ -17,7 +17,7 @@ from gearchaos.records.label import MEANINGS
 from gearchaos.records.wilson import wilson_interval
 from gearchaos.results.result import Result
 from gearchaos.results.shares import motion_shares
-from gearchaos.results.variables import Axis, pair_axis, start_axis, sweep_variables
+from gearchaos.results.variables import coordinate, pair_axis, start_axis, sweep_variables
 
 INTERVAL = "not period 1, 95 % confidence"
 PAIRS, STARTS, TEETH_MEET = 10, 2, 798
@@ -39,9 +39,9 @@ def known_motions(
     from the second value on, and one diverges at the last; twice n lose contact.
     """
     values = np.asarray(grades)
-    axes = [Axis("pitch_error_grade", "1", "accuracy grade of both gears", "", values)]
+    axes = [coordinate("pitch_error_grade", "1", "accuracy grade of both gears", "", values)]
     if second > 1:
-        axes.insert(0, Axis("load", "1", "load", "$f_n$", np.arange(1.0, 1.0 + second)))
+        axes.insert(0, coordinate("load", "1", "load", "$f_n$", np.arange(1.0, 1.0 + second)))
     axes += [pair_axis(np.arange(pairs))] if pairs > 1 else []
     axes += [start_axis(starts)] if starts > 1 else []
     variables = sweep_variables(

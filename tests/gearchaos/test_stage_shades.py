@@ -13,7 +13,7 @@ from gearchaos.figures.stages import HATCHES, SHADES, shade_stages
 from gearchaos.records.label import MEANINGS
 from gearchaos.results.result import Result
 from gearchaos.results.stage_table import labelled_lanes
-from gearchaos.results.variables import Axis, sweep_variables
+from gearchaos.results.variables import coordinate, sweep_variables
 
 KINDS = {str(n): (0, n) for n in (1, 2, 3, 5)}
 KINDS |= {letter: (kind, 0) for kind, letter in enumerate("qcudg", 1)}
@@ -22,7 +22,7 @@ KINDS |= {letter: (kind, 0) for kind, letter in enumerate("qcudg", 1)}
 def result_of(labels: str, *, labelled: bool = True) -> Result:
     """A sweep over 0, 1, 2, ... whose lanes have labels of one letter."""
     variables = sweep_variables(
-        [Axis("load", "1", "static load", "", np.arange(float(len(labels))))],
+        [coordinate("load", "1", "static load", "", np.arange(float(len(labels))))],
         states=["delta_5", "delta_5_rate"],
         section=[],
         section_points=0,

@@ -17,8 +17,7 @@ import pytest
 from gearchaos_kernels import source_hash
 
 import gearchaos
-from gearchaos.results.manifest import folder_of
-from gearchaos.results.store_lock import LOCK
+from gearchaos.results.block_folder import LOCK, folder_of
 from gearchaos.sweep import main
 
 from .commands import (

@@ -9,14 +9,14 @@ from matplotlib.text import Text
 
 import gearchaos
 from gearchaos.figures import response_page, shares_page
-from gearchaos.figures.response_lane import repeats_after
+from gearchaos.figures.response import repeats_after
 from gearchaos.figures.style import BLACK, BLUE, VERMILION
 from gearchaos.info import main as info
 from gearchaos.plot import main as plot
-from gearchaos.results.excitation import Excitation, excitation_of
 from gearchaos.results.response_variables import response_variables
 from gearchaos.results.result import Parameter, Result
-from gearchaos.results.variables import Axis, sweep_variables
+from gearchaos.results.units import Excitation, excitation_of
+from gearchaos.results.variables import coordinate, sweep_variables
 from gearchaos.stages import main as stages
 
 from .commands import small_config
@@ -52,7 +52,7 @@ def known_teeth(
     )
     motion = dict(zip((*STATES, "delta_5_acceleration"), (wave, rate, acceleration), strict=True))
     record = {name: values[np.newaxis, -kept * STEPS - 1 :] for name, values in motion.items()}
-    axis = Axis("pitch_error", "1", "multiple of the pitch error", "$P$", np.array([2.0]))
+    axis = coordinate("pitch_error", "1", "multiple of the pitch error", "$P$", np.array([2.0]))
     known = {
         "excitation_period": MEET,
         "driving_teeth": DRIVING,
@@ -69,9 +69,7 @@ def known_teeth(
         motion_meanings=meanings,
         excitation_period=MEET,
     )
-    variables += response_variables(
-        [axis], states=STATES, periods=kept, steps_per_period=STEPS, axial=False
-    )
+    variables += response_variables([axis], states=STATES, periods=kept, steps_per_period=STEPS)
     data = {
         **{f"section_{name}": motion[name][np.newaxis, STEPS::STEPS] for name in STATES},
         **dict.fromkeys(("motion", "bands", "status", "return_distance"), np.zeros(1)),
