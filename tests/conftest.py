@@ -1,5 +1,6 @@
 """Settings of all tests."""
 
+import gc
 import os
 
 import pytest
@@ -24,3 +25,8 @@ def pytest_cmdline_main(config):
         option.numprocesses = "logical"
         # A file in one process: what its tests compile is compiled once.
         option.dist = "loadfile"
+
+
+def pytest_collection_finish():
+    """Take what is imported out of the garbage collector's sight: it stays to the end."""
+    gc.freeze()
