@@ -1,5 +1,6 @@
 """Settings of all tests."""
 
+import gc
 import os
 
 import pytest
@@ -11,6 +12,12 @@ os.environ.setdefault("OMP_WAIT_POLICY", "passive")
 # The same examples on every run: a failure is a failure of the change that was made.
 settings.register_profile("repeatable", derandomize=True, deadline=None)
 settings.load_profile("repeatable")
+
+FIRST = ("vectorisation", "plot", "oracle", "dask", "sweep_interrupted", "hard_groups", "loads")
+"""Files of which none shall be the last that runs, while other processes have nothing left to do.
+
+The first one compiles scenes whatever is in the cache: so early, others find them there.
+"""
 
 
 @pytest.hookimpl(tryfirst=True)
@@ -24,3 +31,15 @@ def pytest_cmdline_main(config):
         option.numprocesses = "logical"
         # A file in one process: what its tests compile is compiled once.
         option.dist = "loadfile"
+        option.loadscopereorder = False
+
+
+def pytest_collection_modifyitems(items):
+    """Begin with the files that are told to be first, in their order."""
+    places = {f"test_{name}": place for place, name in enumerate(FIRST)}
+    items.sort(key=lambda item: places.get(item.path.stem, len(FIRST)))
+
+
+def pytest_collection_finish():
+    """Take what is imported out of the garbage collector's sight: it stays to the end."""
+    gc.freeze()

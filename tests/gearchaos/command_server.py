@@ -6,6 +6,7 @@ the imports happens as in a process of its own.
 """
 
 import atexit
+import gc
 import json
 import os
 import runpy
@@ -30,6 +31,8 @@ def main() -> None:
     # What Numba would import in every process before it loads the first kernel.
     cpu_target.typing_context.refresh()
     cpu_target.target_context.refresh()
+    # A collection would write to every object of this process, and so copy its memory.
+    gc.freeze()
     for line in sys.stdin:
         process = os.fork()
         if process == 0:

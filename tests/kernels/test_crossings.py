@@ -14,6 +14,7 @@ from .reference import (
     NO_BACKLASH,
     PERIOD,
     SOLUTIONS,
+    TORSION,
     assert_same_bits,
     pan2021,
     run,
@@ -23,7 +24,7 @@ from .reference import (
 )
 from .test_oracle import name_of
 from .test_order import measured_order
-from .test_twin import MODEL, SCENES, START, named
+from .test_twin import IN_PHASE, MODEL, SCENES, START, named
 
 STEPS = np.array([100, 141, 200, 283, 400, 566, 800])
 ORBITS = [orbit for orbit in SOLUTIONS["periodic_orbits"] if orbit["crossings"] > 0]
@@ -157,13 +158,11 @@ def test_a_step_that_crosses_too_often_is_counted_and_never_silent():
     assert ((outcome.overflows > 0) | (outcome.status != 0)).all()
 
 
-@pytest.mark.parametrize(
-    "scene", [NO_BACKLASH, Effects(False, True, False, False, False)], ids=named
-)
+@pytest.mark.parametrize("scene", [NO_BACKLASH, TORSION], ids=named)
 def test_without_backlash_resolved_steps_are_the_plain_ones(scene):
     how = {"steps": 60, "periods": 3}
-    resolved = run(MODEL, scene, START, **how, resolved=True)
-    assert_same_bits(resolved, run(MODEL, scene, START, **how))
+    resolved = run(IN_PHASE, scene, START, **how, resolved=True)
+    assert_same_bits(resolved, run(IN_PHASE, scene, START, **how))
     assert not resolved.crossings.any()
 
 
@@ -178,11 +177,12 @@ FAST = START + np.stack(
 
 @pytest.mark.parametrize("scene", [scene for scene in SCENES if scene.backlash], ids=named)
 def test_resolved_steps_agree_with_plain_ones_so_fine_that_crossings_do_not_matter(scene):
+    model = MODEL if scene == FULL else IN_PHASE
     for physical in (False, True):
         how = {"periods": 3, "physical": physical}
-        fine = run(MODEL, scene, FAST, steps=25_600, **how)
+        fine = run(model, scene, FAST, steps=25_600, **how)
         for steps, tolerance in ((400, 2e-5), (800, 1.5e-6)):
-            resolved = run(MODEL, scene, FAST, steps=steps, **how, resolved=True)
+            resolved = run(model, scene, FAST, steps=steps, **how, resolved=True)
             assert resolved.section == pytest.approx(fine.section, rel=0, abs=tolerance)
             # A plain tangent vector has an error of first order in every step that crosses.
             assert resolved.growth == pytest.approx(fine.growth, rel=0, abs=2e-3)
@@ -191,16 +191,15 @@ def test_resolved_steps_agree_with_plain_ones_so_fine_that_crossings_do_not_matt
 
 def test_resolved_steps_without_tangent_give_the_states_of_those_with_it():
     how = {"steps": 60, "periods": 3, "resolved": True}
-    model = MODEL._replace(error_phase=np.zeros(2))
-    plain = run(model, FULL, START, **how, tangent=False)
-    both = run(model, FULL, START, **how)
+    plain = run(IN_PHASE, FULL, START, **how, tangent=False)
+    both = run(IN_PHASE, FULL, START, **how)
     assert plain.growth is None
     assert plain.section == pytest.approx(both.section, rel=0, abs=2e-11)
     assert plain.crossings.tolist() == both.crossings.tolist()
 
 
 def test_without_clearance_resolved_steps_are_those_of_the_scene_without_backlash():
-    model = MODEL._replace(half_backlash=np.zeros(2))
+    model = IN_PHASE._replace(half_backlash=np.zeros(2))
     how = {"steps": 100, "periods": 5}
     clearance = run(model, FULL, START, **how, resolved=True)
     linear = run(model, NO_BACKLASH, START, **how)
