@@ -106,6 +106,7 @@ reads("outputs")(partial(_named_once, "outputs", "section"))
 reads("scene", "outputs")(partial(_states_exist, "outputs", "section"))
 reads("scene", "start")(partial(_states_exist, "start", "state"))
 reads("scene", "start")(partial(_states_exist, "start", "box"))
+reads("scene", "start")(partial(_states_exist, "start", "drawn"))
 
 
 @reads("start")
@@ -117,26 +118,29 @@ def _start_keys_belong_to_the_kind(config: Tables) -> Iterator[Fault]:
     if not getattr(start, name):
         remedy = f"such as {name} = {{ {example} }}"
         yield Fault(f"start.{name}", f'is missing with kind = "{kind}"', remedy)
-    drawn = kind == "random"
+    drawn, grid = kind == "random", kind == "grid"
     homes = {
         "state": (kind == "given" or boxed, 'kind = "given" or a box'),
-        "box": (kind == "grid" or drawn, 'kind = "grid" or "random"'),
-        "count": (kind == "grid" or drawn, 'kind = "grid" or "random"'),
+        "box": (grid or drawn, 'kind = "grid" or "random"'),
+        "drawn": (grid, 'kind = "grid"'),
+        "count": (grid or drawn, 'kind = "grid" or "random"'),
         "spread": (drawn and not boxed, 'kind = "random" without a box'),
-        "seed": (drawn, 'kind = "random"'),
+        "seed": (drawn or bool(start.drawn), 'kind = "random" or states that are drawn'),
     }
     for name, (at_home, home) in homes.items():
         value = getattr(start, name)
         if not at_home and value != getattr(default, name):
             rule = f'has no meaning with start.kind = "{kind}"{boxed}'
             yield Fault(f"start.{name}", rule, f"it goes with {home}", value)
-    for name, bounds in start.box.items():
-        if not bounds[0] < bounds[1]:
-            rule = "must be the lowest value and the highest one"
-            yield Fault(f"start.box.{name}", rule, "exchange or widen them", bounds)
-        if name in start.state:
-            rule = "start.state has a value of it as well"
-            yield Fault(f"start.box.{name}", rule, "keep one of the two", bounds)
+    for key, box in (("box", start.box), ("drawn", start.drawn)):
+        for name, bounds in box.items():
+            if not bounds[0] < bounds[1]:
+                rule = "must be the lowest value and the highest one"
+                yield Fault(f"start.{key}.{name}", rule, "exchange or widen them", bounds)
+            other = "state" if name in start.state else "box"
+            if name in start.state or (key == "drawn" and name in start.box):
+                rule = f"start.{other} has a value of it as well"
+                yield Fault(f"start.{key}.{name}", rule, "keep one of the two", bounds)
 
 
 @reads("outputs", "integration")

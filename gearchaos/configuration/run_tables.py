@@ -85,6 +85,9 @@ class Scene(Table):
         return states_of(self.effects)
 
 
+_Box = dict[State, Annotated[tuple[float, float], Field(strict=False)]]
+
+
 class Start(Table):
     """The state in which the lanes start."""
 
@@ -96,10 +99,15 @@ class Start(Table):
         example={"delta_5": 1.0},
         default={},
     )
-    box: dict[State, Annotated[tuple[float, float], Field(strict=False)]] = key(
+    box: _Box = key(
         "lowest and highest start value by state: where a grid reaches, both ends included, or "
         "where random starts are uniform; those not named are as in `state`",
         example={"delta_5": [-2.0, 2.0], "delta_5_rate": [-1.5, 1.5]},
+        default={},
+    )
+    drawn: _Box = key(
+        'for kind = "grid": lowest and highest start value of states that are drawn beside it',
+        example={"delta_1": [-0.5, 0.5]},
         default={},
     )
     spread: float = key(
@@ -108,7 +116,7 @@ class Start(Table):
         default=1.0,
         gt=0,
     )
-    seed: int = key('for kind = "random": seed', default=0, ge=0, le=2**32 - 1)
+    seed: int = key("seed of what is drawn", default=0, ge=0, le=2**32 - 1)
     count: int = key(
         "random starts per parameter value, or points of a grid along each state of its box",
         default=1,

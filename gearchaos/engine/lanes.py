@@ -189,10 +189,12 @@ def start_states(config: Configuration, system: System, numbers: Numbers) -> Flo
         places = np.unravel_index(numbers % config.start.size, [count] * len(box))
         for (name, bounds), at in zip(box.items(), places, strict=True):
             values[name] = np.linspace(*bounds, count)[at]
-    elif kind == "random":
+        box = {**config.start.drawn}
+    elif kind == "random" and not box:
+        box = dict.fromkeys(config.scene.states, (-spread, spread))
+    if box:
         runs = np.split(numbers, np.flatnonzero(np.diff(numbers) != 1) + 1)
         draws = np.concatenate([_draws(config.start.seed, run) for run in runs])
-        box = box or dict.fromkeys(config.scene.states, (-spread, spread))
         for name, (low, high) in box.items():
             place = draws[:, config.scene.states.index(name)]
             values[name] = (low + high) / 2.0 + (high - low) / 2.0 * place

@@ -69,6 +69,8 @@ def refinable(result: Result, name: str) -> Configuration:
         unfit, remedy = f'carry = "{config.start.carry}"', 'with start.carry = "none"'
     elif config.start.kind == "random":
         unfit, remedy = 'kind = "random"', "that starts otherwise"
+    elif config.start.drawn:
+        unfit, remedy = "drawn", "whose starts are not drawn"
     elif config.start.kind == "grid":
         state = zip(result.variables["state"].flags, result["start_state"][0].tolist(), strict=True)
         config = config.replace("start", {"kind": "given", "state": dict(state)})

@@ -1,7 +1,11 @@
 """The states in which the lanes of a sweep start."""
 
+import re
+
 import numpy as np
 import pytest
+
+from gearchaos.errors import ConfigurationError
 
 from .short_sweeps import RANDOM, simulation, starts_of
 
@@ -79,6 +83,33 @@ def test_a_grid_holds_every_pair_of_its_values_the_last_state_running_fastest():
 def test_a_lane_of_a_grid_starts_where_it_does_in_any_block():
     sweep = simulation("start.kind=grid", "start.count=4", BOX)
     assert np.array_equal(starts_of(sweep, 21, 40), starts_of(sweep)[21:40])
+
+
+def test_states_beside_a_grid_are_drawn_within_their_bounds_for_every_start_anew():
+    drawn = ("start.count=4", BOX, "start.drawn={delta_1=[0.2, 0.4]}")
+    sweep = simulation("start.kind=grid", *drawn)
+    plain = simulation("start.kind=grid", "start.count=4", BOX)
+    start, at = starts_of(sweep), sweep.lanes.states.index("delta_1")
+    assert np.unique(start[:, at]).size == len(start)
+    assert 0.2 <= start[:, at].min() < 0.21 and 0.39 < start[:, at].max() <= 0.4
+    assert np.array_equal(np.delete(start, at, axis=1), np.delete(starts_of(plain), at, axis=1))
+    assert np.array_equal(starts_of(sweep, 21, 40), start[21:40])
+    other = simulation("start.kind=grid", *drawn, "start.seed=1")
+    assert not np.any(starts_of(other)[:, at] == start[:, at])
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        (["start.drawn={delta_5=[0.0, 1.0]}"], "start.box has a value of it as well"),
+        (["start.drawn={delta_1=[1.0, 0.0]}"], "must be the lowest value and the highest one"),
+        (["start.kind=random", "start.drawn={delta_1=[0.0, 1.0]}"], 'it goes with kind = "grid"'),
+        (["start.seed=1"], "it goes with kind"),
+    ],
+)
+def test_what_is_drawn_beside_a_grid_is_checked(changes, said):
+    with pytest.raises(ConfigurationError, match=re.escape(said)):
+        simulation("start.kind=grid", "start.count=4", BOX, *changes)
 
 
 def test_random_starts_fill_a_box_and_leave_other_states_as_given():
