@@ -88,9 +88,10 @@ def table(found: "Basins", where: list[str]) -> Iterator[str]:
     for value, (basin, boundary) in zip(found.values, found.entropy, strict=False):
         yield f"{value:10.6g}  basin entropy {basin:.4f}, of the boundary alone {boundary:.4f}"
     for one in found.basins if found.values.size == 1 else ():
-        means = [f"{name} {mean:.4g}" for name, mean in one.means.items() if not math.isnan(mean)]
-        if one.number > 0 and means:
-            text = f"{one.number}: {', '.join(means)}"
+        facts = [f"{name} {kind}" for name, kind in one.contact.items()]
+        facts += [f"{name} {mean:.4g}" for name, mean in one.means.items() if not math.isnan(mean)]
+        if one.number > 0 and facts:
+            text = f"{one.number}: {', '.join(facts)}"
             yield from textwrap.wrap(text, 80, subsequent_indent="   ")
 
 

@@ -63,6 +63,7 @@ def find_basins(result: Result, name: str = "the result", threads: int | None = 
     parameter = swept[0] if swept else axis_name(config.sweep.parameter)
     values = np.atleast_1d(result[parameter] if swept else result.fixed[parameter])
     numeric = [v for v in result.variables.values() if v.dtype == "float64"]
+    contact = {n: v.flags for n, v in result.variables.items() if n.startswith("contact_state_")}
     told = [v.name for v in numeric if v.dims == result.axes and v.name not in NO_MEANS]
     basins: list[Basin] = []
     for here in every.reshape(-1, starts):
@@ -88,6 +89,7 @@ def find_basins(result: Result, name: str = "the result", threads: int | None = 
                     starts=mine.size,
                     share=mine.size / starts,
                     share_95_percent=(low, high),
+                    contact={n: flags[result.lanes(n)[first]] for n, flags in contact.items()},
                     means=means,
                     section=orbit.points if orbit else np.zeros((0, len(system.states))),
                 )

@@ -32,7 +32,7 @@ def computed(values: list[float], *start: str) -> Result:
 
 @pytest.fixture(scope="module")
 def grid() -> Result:
-    return computed([1.04], "start.kind=grid", "start.count=11")
+    return computed([1.04], "start.kind=grid", "start.count=11", "outputs.contact=true")
 
 
 @pytest.fixture(scope="module")
@@ -163,7 +163,9 @@ def test_the_table_lists_every_basin_within_80_columns(folder):
 def test_one_value_is_told_with_entropy_and_the_means_of_its_basins(folder):
     out = run(folder, "grid.h5").out
     assert "basin entropy" in out
-    assert "2: crossings_per_period" in out
+    told = " ".join(out.split())
+    assert "2: contact_state_tangential held, crossings_per_period 0" in told
+    assert "1: contact_state_tangential single_sided_impact" in told
     at = run(folder, "several.h5", "--at", "pitch_error=1.1").out.splitlines()
     assert at[1] == "slice pitch_error = 1.2, number 3 of 5; others with --at pitch_error=VALUE"
 
@@ -177,6 +179,7 @@ def test_json_tells_all_of_it(folder, grid):
         assert (facts["value"], facts["number"], facts["starts"]) == (1.04, one.number, one.starts)
         assert facts["share_95_percent"] == pytest.approx(one.share_95_percent)
         assert facts["section"] == one.section.tolist()
+        assert facts["contact"] == one.contact
         assert facts["means"]["crossings_per_period"] == one.means["crossings_per_period"]
 
 
