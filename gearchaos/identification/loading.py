@@ -10,10 +10,14 @@ from typing import Any, NamedTuple
 from pydantic import ValidationError
 
 from gearchaos.configuration import Configuration, load_config
-from gearchaos.configuration.files import text_of_file
 from gearchaos.configuration.keys import keys_of
-from gearchaos.configuration.messages import MOST_SHOWN, Fault, fault_of, texts
-from gearchaos.configuration.toml_text import tables_from_toml, toml_literal, with_overrides
+from gearchaos.configuration.messages import Fault, faults_of, texts
+from gearchaos.configuration.toml_text import (
+    tables_from_toml,
+    text_of_file,
+    toml_literal,
+    with_overrides,
+)
 from gearchaos.errors import ConfigurationError
 from gearchaos.identification.targets import Targets
 from gearchaos.records.period import LONGEST_PERIOD, POINTS_NEEDED
@@ -45,10 +49,8 @@ def load_targets(file: str | os.PathLike[str], overrides: Iterable[str] = ()) ->
     try:
         targets = Targets.model_validate(tables)
     except ValidationError as error:
-        found = error.errors(include_url=False)
-        keys = {one.path: one for one in keys_of(Targets)}
-        worded = [fault_of(one, keys) for one in found[:MOST_SHOWN]]
-        raise ConfigurationError(texts(worded, source, len(found) - len(worded))) from None
+        worded, more = faults_of(error, {one.path: one for one in keys_of(Targets)})
+        raise ConfigurationError(texts(worded, source, more)) from None
     if faults := list(_faults(targets)):
         raise ConfigurationError(texts(faults, source))
     config = observed_configuration(targets, Path(source).parent / targets.configuration)

@@ -27,6 +27,7 @@ from gearchaos.records.amplitude_spectrum import spectral_lines
 from gearchaos.results.jumps import directions_of
 from gearchaos.results.result import Result
 from gearchaos.results.stage_table import LabelledLanes
+from gearchaos.results.variables import CROSSINGS
 from gearchaos.system import System
 
 LOW, HIGH = 0.5, 2.0
@@ -43,8 +44,6 @@ FOLLOWING_PERIODS = 100
 
 STARTS = {"rest": "at rest", "contact": "contact flank"}
 """Kinds of start states whose change from one motion to the other is looked for, worded."""
-
-CROSSINGS = "crossings_per_period"
 
 KEPT_PERIODS = 64
 """Mesh periods of a response: lines of a spectrum 1/64 of the mesh frequency apart."""

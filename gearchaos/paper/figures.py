@@ -39,7 +39,7 @@ CYCLE = np.arange(1001) / 1000
 
 HIGHEST_ORDER = 8
 TIME_LABEL = r"Time in mesh periods, $\Omega\tau/2\pi$"
-PANEL_MM = 24.0
+PANEL_MM = 27.0
 SHOWN_PERIODS = 4.0
 """Mesh periods of the histories of figures 5 and 14."""
 
@@ -138,13 +138,12 @@ def spectra_page(found: Reproduction, *, growing: bool = False) -> Page:
             axes.set(xlim=(0.0, HIGHEST_ORDER + 0.5), yscale="log")
             # Three decades below the highest line.
             axes.set_ylim(3e-4 * min(tops), 4.0 * max(tops))
-        # The paper's frequency is in cycles per unit of tau.
-        period, first = float(response["mesh_period"][0]), figure.axes[0]
-        to_and_fro = (lambda order: order / period, lambda frequency: frequency * period)
-        first.tick_params(axis="x", which="both", top=False)
-        above = first.secondary_xaxis("top", functions=to_and_fro)
-        above.set_xlabel(r"Frequency in cycles per unit of $\tau$")
         axes.set_xlabel("Frequency over mesh frequency")
+        # The paper's frequency is in cycles per unit of tau.
+        period = float(response["mesh_period"][0])
+        to_and_fro = (lambda order: order / period, lambda frequency: frequency * period)
+        below = axes.secondary_xaxis(-0.55, functions=to_and_fro)
+        below.set_xlabel(r"Frequency in cycles per unit of $\tau$")
     return figure
 
 
@@ -160,7 +159,7 @@ def _stack(
     if growing:
         steps = published().increments.pitch_errors
         shown = [(COORDINATE, [(p, BLACK, 0.0)]) for p in steps]
-    with column(PANEL_MM * len(shown) + 12.0) as figure:
+    with column(PANEL_MM * len(shown) + 10.0) as figure:
         panels = figure.subplots(len(shown), 1, sharex=True, sharey=growing)
         yield figure, [(axes, *one) for axes, one in zip(panels, shown, strict=True)]
         for axes, (name, _) in zip(panels, shown, strict=True):

@@ -22,9 +22,8 @@ from gearchaos.paper.comparison import (
     overlap_verdict,
 )
 from gearchaos.paper.computation import compute, find_hop, lane_of, largest_acceleration
-from gearchaos.paper.gallery import check_folder, pictures, write_gallery
+from gearchaos.paper.gallery import KINDS, check_folder, pictures, write_gallery
 from gearchaos.paper.published import contact_line_stiffness, printed_coefficients, published
-from gearchaos.paper.report import KINDS
 from gearchaos.paper.stages import OUT_OF_TURN, out_of_turn
 from gearchaos.results.stage_table import stage_table
 
