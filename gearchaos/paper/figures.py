@@ -14,12 +14,9 @@ from gearchaos.figures.page import Page, column, few_ticks, letter, remark
 from gearchaos.figures.panel import legend_above
 from gearchaos.figures.response import phase_portrait, poincare_section, time_history
 from gearchaos.figures.response_lane import COORDINATE, coordinates_of, samples_per_period
-from gearchaos.figures.style import BLACK, BLUE, FONT_PT, GREY, LEGEND, ORANGE, VERMILION
+from gearchaos.figures.style import BLACK, BLUE, FONT_PT, GREY, ORANGE, VERMILION
 from gearchaos.gear.contact_lines import series_table
 from gearchaos.paper.computation import (
-    HIGH,
-    LOW,
-    STARTS,
     Reproduction,
     lane_of,
     largest_acceleration,
@@ -180,35 +177,13 @@ def diagram_page(found: Reproduction) -> Page:
 
 
 def hop_page(found: Reproduction) -> Page:
-    """Draw the section of the two coexisting motions over the pitch error, and where starts change.
+    """Draw the two coexisting motions of the hop; ticks where starts change from one to the other.
 
     Not a figure of the paper.
     """
-    hop = found.hop
-    with column(66.0) as figure:
-        axes = figure.subplots()
-        for sweep, color, marker, label in (
-            (hop.upwards, BLACK, "^", "swept upwards"),
-            (hop.downwards, BLUE, "v", "swept downwards"),
-        ):
-            points = sweep[sweep.axis], sweep["section_delta_5"][:, -1]
-            axes.plot(*points, marker, color=color, ms=1.8, mew=0.0, label=label)
-        above: dict[str, Any] = {"loc": "lower right", "bbox_to_anchor": (1.0, 1.0), **LEGEND}
-        axes.legend(ncols=2, markerscale=2.0, borderaxespad=0.3, **above)
-        axes.axvspan(hop.first.value, hop.last.value, color=GREY, alpha=0.12, linewidth=0.0)
-        middle = float(np.mean(axes.get_ylim()))
-        places = [(STARTS[kind], place, BLACK) for kind, (_, place) in hop.changes.items()]
-        places.append(("Pan 2021", published().numbers["hop"].value, VERMILION))
-        for text, place, color in places:
-            axes.axvline(place, color=color, lw=0.7, dashes=(4, 2) if color == BLACK else ())
-            side, aside = ("right", -2) if text == STARTS["rest"] else ("left", 2)
-            look: dict[str, Any] = {"textcoords": "offset points", "rotation": 90, "fontsize": 7}
-            look |= {"ha": side, "va": "center", "color": color}
-            axes.annotate(f"{text}: {place:.2f}", (place, middle), (aside, 0), **look)
-        axes.set(xlim=(LOW, HIGH), xlabel="Multiple of the pitch error, $P$")
-        axes.set_ylabel(r"$\delta_5$ at the section (dimensionless)")
-        few_ticks(axes, 8, 6)
-    return figure
+    places = [after for _, after in found.hop.changes.values()]
+    words = f"starts change at {', '.join(f'{place:.2f}' for place in places)}"
+    return bifurcation_page(found.hop.sweeps, marked=(words, places))
 
 
 def motion_page(found: Reproduction, shown: Printed) -> Page:

@@ -25,6 +25,7 @@ from gearchaos.progress import say
 from gearchaos.results.atomic_file import check_output, replacing, writing
 from gearchaos.results.response_variables import acceleration_of
 from gearchaos.results.result import Result
+from gearchaos.results.variables import CROSSINGS
 from gearchaos.version import software_version
 
 REPORT = "report.md"
@@ -211,13 +212,14 @@ def _of_the_bands(found: Reproduction) -> dict[str, Any]:
 
 def _of_the_hop(found: Reproduction) -> dict[str, Any]:
     hop, paper = found.hop, published().numbers
-    place, carried = paper["hop"].value, (hop.upwards, hop.downwards)
+    place = paper["hop"].value
+    there = hop.sweeps.sel(pitch_error=place, method="nearest")
     before = found.sweep[found.sweep.axis] <= hop.changes["rest"][0]
     return {
         **hop.changes,
-        "losses": [end.loss.name.lower().replace("_", " ") for end in (hop.first, hop.last)],
-        "crossings": [sweep["crossings_per_period"][lane_of(sweep, place)] for sweep in carried],
-        "hop_share": (place - hop.first.value) / (hop.last.value - hop.first.value),
+        "losses": [re.split("[,:]", end.loss)[0] for end in (hop.first, hop.last)],
+        "crossings": there[CROSSINGS],
+        "hop_share": (place - hop.first.above) / (hop.last.below - hop.first.above),
         "exponents": [signed(exponent, 5) for exponent in chain(*found.exponents)],
         "printed_exponent": signed(paper["hop_exponent_before"].value, 4),
         "exponent_spread": np.ptp(found.sweep["lyapunov_exponent"][before]),
