@@ -87,8 +87,7 @@ def _lane(options: Namespace) -> "Asked":
 def _configuration(options: Namespace) -> "Asked":
     """Take the place of what a configuration sweeps."""
     from gearchaos.configuration import Configuration
-    from gearchaos.configuration.files import text_of_file
-    from gearchaos.configuration.toml_text import toml_literal
+    from gearchaos.configuration.toml_text import text_of_file, toml_literal
 
     text = text_of_file(options.config)
 

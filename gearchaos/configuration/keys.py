@@ -99,7 +99,9 @@ class Key:
     @property
     def choices(self) -> tuple[str, ...]:
         """What the value, or each entry of it, may be, as TOML writes it; empty: no such list."""
-        return tuple(map(toml_literal, _choices(self.field.annotation)))
+        parts = _parts(self.field.annotation)
+        literals = (part for part in parts if typing.get_origin(part) is typing.Literal)
+        return tuple(toml_literal(one) for part in literals for one in typing.get_args(part))
 
     @property
     def remedy(self) -> str:
@@ -112,21 +114,16 @@ def keys_of(model: type[Table], path: str = "") -> Iterator[Key]:
     """List the keys of a model and of the tables inside it, in the order of declaration."""
     for name, field in model.model_fields.items():
         here = f"{path}.{field.alias or name}".lstrip(".")
-        tables = tuple(_tables(field.annotation))
+        parts = _parts(field.annotation)
+        tables = tuple(part for part in parts if isinstance(part, type) and issubclass(part, Table))
         yield Key(here, field, tables)
         for table in tables:
             yield from keys_of(table, here)
 
 
-def _choices(annotation: Any) -> tuple[Any, ...]:
-    parts = typing.get_args(annotation)
-    if typing.get_origin(annotation) is typing.Literal:
-        return parts
-    return tuple(choice for part in parts for choice in _choices(part))
-
-
-def _tables(annotation: Any) -> Iterator[type[Table]]:
-    if isinstance(annotation, type) and issubclass(annotation, Table):
-        yield annotation
-    for part in typing.get_args(annotation):
-        yield from _tables(part)
+def _parts(annotation: Any) -> Iterator[Any]:
+    """List the types that an annotation is made of, the whole first, choices as one."""
+    yield annotation
+    if typing.get_origin(annotation) is not typing.Literal:
+        for part in typing.get_args(annotation):
+            yield from _parts(part)

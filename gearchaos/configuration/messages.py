@@ -6,6 +6,7 @@ import re
 from collections.abc import Iterable, Mapping
 from typing import NamedTuple
 
+from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
 from gearchaos.configuration.keys import Key
@@ -105,8 +106,15 @@ def suggestion(word: str, words: Iterable[str]) -> str:
     return f"did you mean `{by_lower[close[0]]}`?" if close else ""
 
 
-def fault_of(error: ErrorDetails, keys: Mapping[str, Key]) -> Fault:
-    """Word one error that `ValidationError.errors` lists; ``keys`` are all keys by their paths."""
+def faults_of(error: ValidationError, keys: Mapping[str, Key]) -> tuple[list[Fault], int]:
+    """Word the first hundred faults of tables, and count the others; ``keys`` are all by path."""
+    found = error.errors(include_url=False)
+    # A long list of nonsense can hold a million faults.
+    worded = [_fault_of(one, keys) for one in found[:MOST_SHOWN]]
+    return worded, len(found) - len(worded)
+
+
+def _fault_of(error: ErrorDetails, keys: Mapping[str, Key]) -> Fault:
     kind, value, rule = error["type"], error["input"], _rule(error)
     names = _names(error, keys)
     if kind.startswith("union_tag"):

@@ -7,15 +7,16 @@ from typing import Any, Self, TypeAlias
 
 from pydantic import PrivateAttr, TypeAdapter, ValidationError, ValidationInfo, model_validator
 
-from gearchaos.configuration.files import text_of_file, with_deviation_files
 from gearchaos.configuration.keys import Key, keys_of
-from gearchaos.configuration.messages import MOST_SHOWN, Fault, fault_of, texts
+from gearchaos.configuration.messages import Fault, faults_of, texts
 from gearchaos.configuration.physical_tables import GradeError
+from gearchaos.configuration.pitch_errors import with_deviation_files
 from gearchaos.configuration.rules import RULES
 from gearchaos.configuration.sweep_rules import lane_faults, unknown_parameter
 from gearchaos.configuration.tables import PHYSICAL_TABLES, SWEEPABLE_GROUPS, Tables
 from gearchaos.configuration.toml_text import (
     tables_from_toml,
+    text_of_file,
     toml_text,
     with_overrides,
     with_value,
@@ -73,12 +74,9 @@ class Configuration(Tables):
         try:
             config = cls.model_validate(dict(tables), context={"source": source})
         except ValidationError as error:
-            found = error.errors(include_url=False)
-            # A long list of nonsense can hold a million faults.
-            own = [fault_of(one, configuration_keys()) for one in found[:MOST_SHOWN]]
-            unreadable = {str(one["loc"][0]) for one in found}
+            own, more = faults_of(error, configuration_keys())
+            unreadable = {str(one["loc"][0]) for one in error.errors(include_url=False)}
             shared = _broken_rules(_readable(tables, unreadable), unreadable)
-            more = len(found) - len(own)
             raise ConfigurationError(texts([*own, *shared], source, more)) from None
         config._source = source
         return config

@@ -6,7 +6,7 @@ from collections.abc import Collection, Iterator, Mapping
 import numpy as np
 
 from gearchaos.configuration.messages import Fault, suggestion
-from gearchaos.configuration.pitch_error_rules import OF_DRAWN_GEARS, grade_faults
+from gearchaos.configuration.pitch_errors import OF_DRAWN_GEARS, grade_faults
 from gearchaos.configuration.rules import reads
 from gearchaos.configuration.run_tables import MOST_LANES, Sweep
 from gearchaos.configuration.tables import (

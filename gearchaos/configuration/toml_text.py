@@ -1,4 +1,4 @@
-"""TOML text to tables and back, with `key.path=value` overrides."""
+"""TOML text: read from a file, to tables and back, with `key.path=value` overrides."""
 
 import json
 import re
@@ -6,7 +6,12 @@ import tomllib
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from gearchaos.errors import ConfigurationError
+from gearchaos.errors import ConfigurationError, FileError
+
+LARGEST_FILE = 4 * 1024 * 1024
+"""Bytes: room for several hundred thousand swept values, and read in seconds whatever it holds."""
+
+CONFIGURATION = "configuration"
 
 _DEEPEST = 8
 _BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
@@ -16,6 +21,37 @@ _ENDLESS_KEY = re.compile(rf"(?<![A-Za-z0-9_-])(?:{_PART}\.[ \t]*+){{64}}")
 
 _ENDLESS_INTEGER = re.compile(r"0[xob][0-9A-Fa-f_]{1000}")
 """An integer that Python reads and refuses to print."""
+
+
+def text_of_file(source: str, what: str = CONFIGURATION) -> str:
+    """Read the text of a file at a path, a configuration or what else the messages call it.
+
+    Raises FileError or ConfigurationError if it cannot be read.
+    """
+    if not source:
+        raise FileError("no configuration file: the path is empty; name a TOML file")
+    try:
+        with open(0 if source == "-" else source, "rb", closefd=source != "-") as file:
+            content = file.read(LARGEST_FILE + 1)
+    except (OSError, ValueError) as error:
+        reason = error.strerror if isinstance(error, OSError) else str(error)
+        rule = f"cannot be read: {reason}"
+        raise FileError(f"{source}: {rule}; check the path of the {what}") from None
+    if content.startswith(b"\x89HDF") and what == CONFIGURATION:
+        remedy = f"`gearchaos info {source}` shows that of a result"
+        raise ConfigurationError(f"{source}: is HDF5, and a configuration is TOML; {remedy}")
+    if len(content) > LARGEST_FILE:
+        size = f"larger than {LARGEST_FILE // 1024**2} MB, so hardly a {what}"
+        remedy = "give many swept values as sweep.from, sweep.to and sweep.count"
+        raise ConfigurationError(f"{source}: {size}; name another file, or {remedy}")
+    try:
+        # utf-8-sig: some editors begin a file with a byte order mark.
+        return content.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = content[: error.start].count(b"\n") + 1
+        raise ConfigurationError(
+            f"{source}: line {line} is not UTF-8 text; save the {what} as UTF-8"
+        ) from None
 
 
 def quoted_key(name: str) -> str:

@@ -64,15 +64,8 @@ class TrapezoidalStiffness:
         top for abs(u - v) and at its bottom for abs(1 - u - v); the mean of the full sum is
         eps_alpha eps_beta.
 
-        Parameters
-        ----------
-        transverse, overlap : float
-            eps_alpha > 0 and eps_beta >= 0; zero is a spur pair, whose contact length jumps.
-
-        Raises
-        ------
-        ValueError
-            If a contact ratio is outside its range.
+        ``transverse``, ``overlap``: eps_alpha > 0 and eps_beta >= 0; zero is a spur pair, whose
+        contact length jumps. Raises ValueError if one is outside its range.
         """
         if not (0.0 < transverse < math.inf and 0.0 <= overlap < math.inf):
             raise ValueError(

@@ -17,18 +17,10 @@ class HelicalPair:
     A spur pair has a helix angle of zero. Every quantity may be a float or an array; arrays
     broadcast against each other. Pairs of values are in the order (driving p, driven g).
 
-    Parameters
-    ----------
-    teeth : pair of values
-        Numbers of teeth z.
-    normal_module, face_width : float or ndarray
-        m_n and B, in m.
-    normal_pressure_angle, helix_angle : float or ndarray
-        alpha_n, and beta on the reference circle, in rad.
-    density : float or ndarray
-        Density of the solid discs on the reference circles, in kg/m^3.
-    given_masses, given_inertias : pair of values, optional
-        In kg and kg m^2; they replace those of the solid discs.
+    ``teeth``: numbers of teeth z; ``normal_module``, ``face_width``: m_n and B, in m;
+    ``normal_pressure_angle``, ``helix_angle``: alpha_n, and beta on the reference circle, in rad;
+    ``density``: of the solid discs on the reference circles, in kg/m^3; ``given_masses``,
+    ``given_inertias``: in kg and kg m^2, they replace those of the solid discs.
     """
 
     teeth: PairOfValues

@@ -10,10 +10,14 @@ from typing import Any, NamedTuple
 from pydantic import ValidationError
 
 from gearchaos.configuration import Configuration, load_config
-from gearchaos.configuration.files import text_of_file
 from gearchaos.configuration.keys import keys_of
-from gearchaos.configuration.messages import MOST_SHOWN, Fault, fault_of, texts
-from gearchaos.configuration.toml_text import tables_from_toml, toml_literal, with_overrides
+from gearchaos.configuration.messages import Fault, faults_of, texts
+from gearchaos.configuration.toml_text import (
+    tables_from_toml,
+    text_of_file,
+    toml_literal,
+    with_overrides,
+)
 from gearchaos.errors import ConfigurationError
 from gearchaos.identification.targets import Targets
 from gearchaos.records.period import LONGEST_PERIOD, POINTS_NEEDED
@@ -45,13 +49,16 @@ def load_targets(file: str | os.PathLike[str], overrides: Iterable[str] = ()) ->
     try:
         targets = Targets.model_validate(tables)
     except ValidationError as error:
-        found = error.errors(include_url=False)
-        keys = {one.path: one for one in keys_of(Targets)}
-        worded = [fault_of(one, keys) for one in found[:MOST_SHOWN]]
-        raise ConfigurationError(texts(worded, source, len(found) - len(worded))) from None
+        worded, more = faults_of(error, {one.path: one for one in keys_of(Targets)})
+        raise ConfigurationError(texts(worded, source, more)) from None
     if faults := list(_faults(targets)):
         raise ConfigurationError(texts(faults, source))
-    config = observed_configuration(targets, Path(source).parent / targets.configuration)
+    # What is observed is kept, and no more: the axial pair, which is driven one way, is computed
+    # only where somebody looks at it.
+    section = [*dict.fromkeys(("delta_5", *(one.coordinate for one in targets.increment)))]
+    outputs = {"section": section, "section_points": 1, "lyapunov": bool(targets.exponent)}
+    replaced = [*targets.set, f"outputs={toml_literal(outputs)}"]
+    config = load_config(Path(source).parent / targets.configuration, replaced)
     if problems := list(_unfit(config, targets, source)):
         raise ConfigurationError(problems)
     return Problem(targets, config, text)
@@ -91,18 +98,6 @@ def _faults(targets: Targets) -> Iterator[Fault]:
             f"search.candidates = {search.candidates}"
         )
         yield Fault("search.drawn", rule, "it is a part of the candidates", search.drawn)
-
-
-def observed_configuration(targets: Targets, path: str | os.PathLike[str]) -> Configuration:
-    """Read a configuration, to be integrated as the targets say.
-
-    It keeps what is observed, and no more: the axial pair, which is driven one way, is computed
-    only where somebody looks at it.
-    """
-    coordinates = dict.fromkeys(("delta_5", *(one.coordinate for one in targets.increment)))
-    exponent = bool(targets.exponent)
-    outputs = {"section": list(coordinates), "section_points": 1, "lyapunov": exponent}
-    return load_config(path, [*targets.set, f"outputs={toml_literal(outputs)}"])
 
 
 def _unfit(config: Configuration, targets: Targets, source: str) -> Iterator[str]:

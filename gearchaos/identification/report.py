@@ -4,6 +4,7 @@ from collections.abc import Iterable, Iterator
 from typing import NamedTuple
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from gearchaos.configuration.tables import SWEEPABLE_GROUPS
@@ -45,18 +46,16 @@ def reach(tried: Tried) -> Reach:
     alike = tried["values"][tried["misfit"] <= np.min(tried["misfit"]) + ONE_UNIT]
     among = np.stack([alike.min(axis=0), alike.max(axis=0)], axis=1)
     steps = np.flatnonzero(tried["run"] == STEPS_ALONE)[-1 - 2 * RUNGS * parameters :]
-    centre, others = tried["values"][steps[0]], tried["values"][steps[1:]]
     misfit = tried["misfit"][steps[1:]].reshape(parameters, 2, RUNGS)
     surroundings = float(np.median(misfit[..., :NEAREST]))
     padded = np.pad(misfit, ((0, 0), (0, 0), (1, 1)), mode="edge")
-    median = np.median(np.stack([padded[..., :-2], misfit, padded[..., 2:]]), axis=0)
+    median = np.median(sliding_window_view(padded, 3, axis=2), axis=3)
     too_far = median > max(surroundings, tried["misfit"][steps[0]]) + ONE_UNIT
     # The last step before the first one that is too far; 0 is the centre.
     last = np.where(too_far.any(axis=2), np.argmax(too_far, axis=2), RUNGS)
-    number = np.arange(parameters)
-    moved = others.reshape(parameters, 2, RUNGS, parameters)[number, :, :, number]
-    moved = np.concatenate([np.broadcast_to(centre[:, None, None], (parameters, 2, 1)), moved], 2)
-    alone = moved[number[:, np.newaxis], [0, 1], last]
+    number = np.arange(parameters)[:, np.newaxis]
+    row = np.where(last > 0, RUNGS * (2 * number + [0, 1]) + last, 0)
+    alone = tried["values"][steps[row], number]
     return Reach(alone, among, surroundings)
 
 

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from gearchaos.configuration import Configuration
-from gearchaos.dynamics.following import Branch
+from gearchaos.engine.refinement import Boundary, refined_jumps
 from gearchaos.engine.response import respond
 from gearchaos.engine.running import run
 from gearchaos.errors import ConfigurationError
@@ -24,9 +24,11 @@ from gearchaos.paper.published import contact_line_stiffness, printed_coefficien
 from gearchaos.paper.stages import Crisis, crisis_of, lanes_as_printed
 from gearchaos.progress import say
 from gearchaos.records.amplitude_spectrum import spectral_lines
-from gearchaos.results.jumps import directions_of
+from gearchaos.records.period import POINTS_NEEDED
+from gearchaos.results.jumps import apart
 from gearchaos.results.result import Result
 from gearchaos.results.stage_table import LabelledLanes
+from gearchaos.results.variables import CROSSINGS
 from gearchaos.system import System
 
 LOW, HIGH = 0.5, 2.0
@@ -38,13 +40,14 @@ STEP = 0.01
 FINENESS = 10
 """Parts of a step between which the place of a hop is told."""
 
-FOLLOWING_PERIODS = 100
+FOLLOWING = {"transient_periods": 100, "recorded_periods": POINTS_NEEDED}
 """Mesh periods of a carried sweep per value: its motion changes little from one to the next."""
 
-STARTS = {"rest": "at rest", "contact": "contact flank"}
-"""Kinds of start states whose change from one motion to the other is looked for, worded."""
+ACCURACY = 1e-5
+"""To which the ends of the interval are located, in multiples of e(tau)."""
 
-CROSSINGS = "crossings_per_period"
+STARTS = ("rest", "contact")
+"""Kinds of start states whose change from one motion to the other is looked for."""
 
 KEPT_PERIODS = 64
 """Mesh periods of a response: lines of a spectrum 1/64 of the mesh frequency apart."""
@@ -53,16 +56,15 @@ KEPT_PERIODS = 64
 class Hop(NamedTuple):
     """Two coexisting motions, and where they take over from each other.
 
-    ``upwards``, ``downwards``: carried sweeps, on different motions between ``first`` and ``last``,
-    to which the orbit of the downward and of the upward sweep can be followed; ``changes``: by the
-    kind of the start, the last pitch error at which the teeth never part, as on the motion of the
-    upward sweep, and the next one.
+    ``sweeps``: carried upwards and downwards; ``first``, ``last``: between which they are on
+    different motions, as far as their orbits can be followed; ``changes``: by the kind of the
+    start, the last pitch error at which the teeth never part, as on the motion of the upward sweep,
+    and the next one.
     """
 
-    upwards: Result
-    downwards: Result
-    first: Branch
-    last: Branch
+    sweeps: Result
+    first: Boundary
+    last: Boundary
     changes: dict[str, tuple[float, float]]
 
 
@@ -160,7 +162,7 @@ def compute(
     say("the hop of figure 7: both motions, upwards and downwards")
     hop = find_hop(config, step=hop_step, threads=threads)
     crisis = crisis_of(sweep)
-    if crisis is None or hop is None or hop.changes.keys() != STARTS.keys():
+    if crisis is None or hop is None or hop.changes.keys() != {*STARTS}:
         raise ConfigurationError(
             f"{config.source}: there is no hop as in figure 7 between {LOW:g} and {HIGH:g} e(tau), "
             "or no crisis after it; take back what was changed in it"
@@ -184,35 +186,29 @@ def compute(
 def find_hop(config: Configuration, step: float = STEP, threads: int | None = None) -> Hop | None:
     """Follow both motions, to the ends of their interval too, and find where starts change over.
 
-    ``config`` sweeps the pitch error; ``step``: of the carried sweeps. None where teeth part alike
-    in the sweeps upwards and downwards.
+    ``config`` sweeps the pitch error; ``step``: of the carried sweeps. None where the sweeps
+    upwards and downwards agree everywhere.
     """
-    outputs = {"section": ["delta_5"], "section_points": 1, "lyapunov": False, "motion": False}
-    config = config.replace("outputs", outputs).replace("integration.recorded_periods", 1)
+    config = config.replace("outputs", {"section_points": 1, "lyapunov": False})
     carried = _over(config, LOW, HIGH, step).replace("start.carry", "both")
-    carried = carried.replace("integration.transient_periods", FOLLOWING_PERIODS)
-    upwards, downwards = directions_of(run(carried, threads))
-    both = upwards[upwards.axis][upwards[CROSSINGS] != downwards[CROSSINGS]]
-    if not both.size:
+    for key, periods in FOLLOWING.items():
+        carried = carried.replace(f"integration.{key}", periods)
+    sweeps = run(carried, threads)
+    stretches = apart(sweeps)
+    jumps = refined_jumps(carried, sweeps, stretches, ACCURACY, threads) if stretches else []
+    if len(jumps) < 2:
         return None
-    inside = float(both[both.size // 2])
-    ends = []
-    for sweep, end in (downwards, LOW), (upwards, HIGH):
-        system = System.of_lane(sweep, pitch_error=inside)
-        orbit = system.orbit(guess=system.state)
-        ends.append(system.follow(orbit, "pitch_error", inside, end))
-    first, last = ends
-    fine = step / FINENESS
-    low, high = math.ceil(first.value / fine) * fine, math.floor(last.value / fine) * fine
-    within = _over(config, low, high, fine)
-    changes = {}
+    first, *_, last = jumps
+    fine, changes = step / FINENESS, {}
+    low, high = math.ceil(first.above / fine) * fine, math.floor(last.below / fine) * fine
+    within = _over(config, low, high, fine).replace("outputs.motion", False)
     for kind in STARTS:
         found = run(within.replace("start", {"kind": kind}), threads)
         held = found[CROSSINGS] == 0.0
         places = np.flatnonzero(held[:-1] & ~held[1:])
         if places.size:
             changes[kind] = tuple(found[found.axis][places[0] : places[0] + 2].tolist())
-    return Hop(upwards, downwards, first, last, changes)
+    return Hop(sweeps, first, last, changes)
 
 
 def _over(config: Configuration, low: float, high: float, step: float) -> Configuration:

@@ -20,12 +20,9 @@ from gearchaos.figures.response import (
     samples_per_period,
     time_history,
 )
-from gearchaos.figures.style import BLACK, BLUE, FONT_PT, GREY, LEGEND, ORANGE, VERMILION
+from gearchaos.figures.style import BLACK, BLUE, FONT_PT, GREY, ORANGE, VERMILION
 from gearchaos.gear.contact_lines import series_table
 from gearchaos.paper.computation import (
-    HIGH,
-    LOW,
-    STARTS,
     Reproduction,
     lane_of,
     largest_acceleration,
@@ -45,7 +42,7 @@ CYCLE = np.arange(1001) / 1000
 
 HIGHEST_ORDER = 8
 TIME_LABEL = r"Time in mesh periods, $\Omega\tau/2\pi$"
-PANEL_MM = 24.0
+PANEL_MM = 27.0
 SHOWN_PERIODS = 4.0
 """Mesh periods of the histories of figures 5 and 14."""
 
@@ -144,13 +141,12 @@ def spectra_page(found: Reproduction, *, growing: bool = False) -> Page:
             axes.set(xlim=(0.0, HIGHEST_ORDER + 0.5), yscale="log")
             # Three decades below the highest line.
             axes.set_ylim(3e-4 * min(tops), 4.0 * max(tops))
-        # The paper's frequency is in cycles per unit of tau.
-        period, first = float(response["mesh_period"][0]), figure.axes[0]
-        to_and_fro = (lambda order: order / period, lambda frequency: frequency * period)
-        first.tick_params(axis="x", which="both", top=False)
-        above = first.secondary_xaxis("top", functions=to_and_fro)
-        above.set_xlabel(r"Frequency in cycles per unit of $\tau$")
         axes.set_xlabel("Frequency over mesh frequency")
+        # The paper's frequency is in cycles per unit of tau.
+        period = float(response["mesh_period"][0])
+        to_and_fro = (lambda order: order / period, lambda frequency: frequency * period)
+        below = axes.secondary_xaxis(-0.55, functions=to_and_fro)
+        below.set_xlabel(r"Frequency in cycles per unit of $\tau$")
     return figure
 
 
@@ -166,7 +162,7 @@ def _stack(
     if growing:
         steps = published().increments.pitch_errors
         shown = [(COORDINATE, [(p, BLACK, 0.0)]) for p in steps]
-    with column(PANEL_MM * len(shown) + 12.0) as figure:
+    with column(PANEL_MM * len(shown) + 10.0) as figure:
         panels = figure.subplots(len(shown), 1, sharex=True, sharey=growing)
         yield figure, [(axes, *one) for axes, one in zip(panels, shown, strict=True)]
         for axes, (name, _) in zip(panels, shown, strict=True):
@@ -187,35 +183,13 @@ def diagram_page(found: Reproduction) -> Page:
 
 
 def hop_page(found: Reproduction) -> Page:
-    """Draw the section of the two coexisting motions over the pitch error, and where starts change.
+    """Draw the two coexisting motions of the hop; ticks where starts change from one to the other.
 
     Not a figure of the paper.
     """
-    hop = found.hop
-    with column(66.0) as figure:
-        axes = figure.subplots()
-        for sweep, color, marker, label in (
-            (hop.upwards, BLACK, "^", "swept upwards"),
-            (hop.downwards, BLUE, "v", "swept downwards"),
-        ):
-            points = sweep[sweep.axis], sweep["section_delta_5"][:, -1]
-            axes.plot(*points, marker, color=color, ms=1.8, mew=0.0, label=label)
-        above: dict[str, Any] = {"loc": "lower right", "bbox_to_anchor": (1.0, 1.0), **LEGEND}
-        axes.legend(ncols=2, markerscale=2.0, borderaxespad=0.3, **above)
-        axes.axvspan(hop.first.value, hop.last.value, color=GREY, alpha=0.12, linewidth=0.0)
-        middle = float(np.mean(axes.get_ylim()))
-        places = [(STARTS[kind], place, BLACK) for kind, (_, place) in hop.changes.items()]
-        places.append(("Pan 2021", published().numbers["hop"].value, VERMILION))
-        for text, place, color in places:
-            axes.axvline(place, color=color, lw=0.7, dashes=(4, 2) if color == BLACK else ())
-            side, aside = ("right", -2) if text == STARTS["rest"] else ("left", 2)
-            look: dict[str, Any] = {"textcoords": "offset points", "rotation": 90, "fontsize": 7}
-            look |= {"ha": side, "va": "center", "color": color}
-            axes.annotate(f"{text}: {place:.2f}", (place, middle), (aside, 0), **look)
-        axes.set(xlim=(LOW, HIGH), xlabel="Multiple of the pitch error, $P$")
-        axes.set_ylabel(r"$\delta_5$ at the section (dimensionless)")
-        few_ticks(axes, 8, 6)
-    return figure
+    places = [after for _, after in found.hop.changes.values()]
+    words = f"starts change at {', '.join(f'{place:.2f}' for place in places)}"
+    return bifurcation_page(found.hop.sweeps, marked=(words, places))
 
 
 def motion_page(found: Reproduction, shown: Printed) -> Page:

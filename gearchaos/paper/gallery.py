@@ -1,17 +1,31 @@
-"""The folder of a gallery: figures, results and report, written once they are computed."""
+"""The folder of a gallery: figures, results, and a report, `report_text.md` with its numbers."""
 
-from collections.abc import Callable, Sequence
+import re
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import partial
+from importlib.resources import files
+from itertools import chain
 from pathlib import Path
+from typing import Any
+
+import numpy as np
 
 from gearchaos.errors import FileError
+from gearchaos.figures.labels import short
 from gearchaos.figures.page import FORMATS, Page, save_figure
+from gearchaos.figures.response import coordinates_of
 from gearchaos.paper import figures
-from gearchaos.paper.computation import Reproduction
+from gearchaos.paper.comparison import NONE, RULES, WINDOW, Row, Verdict, compare, signed
+from gearchaos.paper.computation import Reproduction, lane_of, largest_acceleration
 from gearchaos.paper.published import published
-from gearchaos.paper.report import report
+from gearchaos.paper.stages import OUT_OF_TURN, TWO_BANDS, motions_between, out_of_turn
 from gearchaos.progress import say
 from gearchaos.results.atomic_file import check_output, replacing, writing
+from gearchaos.results.response_variables import acceleration_of
+from gearchaos.results.result import Result
+from gearchaos.results.variables import CROSSINGS
+from gearchaos.version import software_version
 
 REPORT = "report.md"
 DPI = 200
@@ -22,6 +36,16 @@ RESULTS = {
     "motions_from_contact.h5": ("motions_from_contact", "the same, starting on the contact flank"),
 }
 """Result files by name: the attribute of `Reproduction`, and what they hold."""
+
+TOLERANCE_MM = 0.011
+"""Single pitch deviation of the driving gear in grade 7 (ISO 1328-1)."""
+
+KINDS = ("derived", "fitted", "predicted")
+"""What it is worth if a printed number agrees: `published.toml` says which is which."""
+
+TABLE_HEAD = (
+    "| | where | kind | Pan 2021 | here | difference | verdict |\n|---|---|---|---|---|---|---|\n"
+)
 
 
 def pictures() -> list[tuple[str, str, Callable[[Reproduction], Page]]]:
@@ -83,7 +107,129 @@ def write_gallery(
         for kind in formats:
             target = folder / f"{name}.{kind}"
             save_figure(page, target, title=title, dpi=DPI, overwrite=overwrite)
-    text = report(found, {name: words for name, (_, words) in RESULTS.items()})
     with replacing(folder / REPORT, overwrite=overwrite) as partly_written:
-        partly_written.write_text(text, encoding="utf-8")
+        partly_written.write_text(_report(found), encoding="utf-8")
     return folder / REPORT
+
+
+def _report(found: Reproduction) -> str:
+    tables = compare(found)
+    rows = [row for table in tables.values() for row in table]
+    length_scale = TOLERANCE_MM / found.group("pitch_error_amplitude")
+    template = files("gearchaos.paper").joinpath("report_text.md").read_text(encoding="utf-8")
+    text = template.format(
+        version=software_version(),
+        rows=len(rows),
+        counts=Counter(row.verdict for row in rows),
+        kinds={kind: _counts(row for row in rows if row.kind == kind) for kind in KINDS},
+        disagreements=_disagreements(rows),
+        rules=RULES,
+        window=WINDOW,
+        out_of_turn=OUT_OF_TURN,
+        tables={name: _table(table) for name, table in tables.items()},
+        printed={key: number.value for key, number in published().numbers.items()},
+        found=found,
+        length_scale=length_scale,
+        backlash=length_scale * found.group("half_backlash"),
+        table_3=_table_3(found.response),
+        stages=" ".join(_chaotic_stages(found)),
+        shown={motion.figure: motion for motion in published().motions},
+        **_of_the_bands(found),
+        **_of_the_hop(found),
+        **_of_the_increments(found),
+        files="\n".join(f"- `{name}`: {words}" for name, (_, words) in RESULTS.items()),
+    )
+    # Who cannot see a picture is told how its caption begins.
+    without_words = r"!\[\](?=\(\S+\)\n\n([^:;\n]+))"
+    return re.sub(without_words, lambda picture: f"![{picture[1].replace('*', '')}]", text)
+
+
+def _counts(rows: Iterable[Row]) -> str:
+    counts = Counter(row.verdict for row in rows)
+    return " | ".join(map(str, (counts.total(), *(counts[verdict] for verdict in Verdict))))
+
+
+def _disagreements(rows: Iterable[Row]) -> str:
+    lines = [
+        f"- **{row.quantity}** ({row.where}): {row.published} in the paper, "
+        f"{row.ours if row.ours != NONE else 'not found'} here."
+        for row in rows
+        if row.verdict is Verdict.DOES_NOT
+    ]
+    if not lines:
+        return "Everything agrees at least in kind."
+    return "\n".join(["Does not agree:\n", *lines])
+
+
+def _table(rows: Iterable[Row]) -> str:
+    lines = []
+    for row in rows:
+        verdict = f"**{row.verdict}**" if row.verdict is Verdict.DOES_NOT else row.verdict
+        lines.append(_line(*row[:-1], verdict))
+    return TABLE_HEAD + "\n".join(lines)
+
+
+def _table_3(response: Result) -> str:
+    lines = []
+    for name in coordinates_of(response):
+        before, after = (largest_acceleration(response, p, name) for p in (0.0, 1.0))
+        theirs = short(published().numbers[f"added_{name}"].value)
+        wording = response.attributes(acceleration_of(name))["long_name"]
+        added = short(after - before, sign="+")
+        lines.append(_line(wording, short(before), short(after), added, theirs))
+    return "\n".join(lines)
+
+
+def _line(*cells: object) -> str:
+    return f"| {' | '.join(map(str, cells))} |"
+
+
+def _chaotic_stages(found: Reproduction) -> Iterator[str]:
+    """Tell what lies in the stages that the paper calls chaotic or by a name of its own."""
+    for stage in published().stages:
+        if stage.printed != stage.motion or stage.motion == "chaotic":
+            motions = motions_between(found.lanes, stage.first, stage.last)
+            counts = Counter(motions).most_common(6)
+            worded = ", ".join(f"{count} {label}" for label, count in counts)
+            yield (
+                f'In the paper\'s stage "{stage.printed}", {stage.first:g} to {stage.last:g} e(τ), '
+                f"the {len(motions)} lanes of the sweep are: {worded}."
+            )
+
+
+def _of_the_bands(found: Reproduction) -> dict[str, Any]:
+    on_two = found.lanes.labels == TWO_BANDS
+    values, exponents = found.lanes.values[on_two], found.lanes.exponent[on_two]
+    shares = out_of_turn(found.sweep["section_delta_5"])[on_two]
+    return {
+        "bands_apart": values[shares == 0.0].max(),
+        "last_on_bands": values.max(),
+        "most_out_of_turn": shares.max(),
+        "band_exponents": [signed(end, 3) for end in (exponents.min(), exponents.max())],
+    }
+
+
+def _of_the_hop(found: Reproduction) -> dict[str, Any]:
+    hop, paper = found.hop, published().numbers
+    place = paper["hop"].value
+    there = hop.sweeps.sel(pitch_error=place, method="nearest")
+    before = found.sweep[found.sweep.axis] <= hop.changes["rest"][0]
+    return {
+        **hop.changes,
+        "losses": [re.split("[,:]", end.loss)[0] for end in (hop.first, hop.last)],
+        "crossings": there[CROSSINGS],
+        "hop_share": (place - hop.first.above) / (hop.last.below - hop.first.above),
+        "exponents": [signed(exponent, 5) for exponent in chain(*found.exponents)],
+        "printed_exponent": signed(paper["hop_exponent_before"].value, 4),
+        "exponent_spread": np.ptp(found.sweep["lyapunov_exponent"][before]),
+    }
+
+
+def _of_the_increments(found: Reproduction) -> dict[str, Any]:
+    lanes = [lane_of(found.response, p) for p in published().increments.pitch_errors]
+    largest = np.max(np.abs(found.response["delta_5_acceleration"][lanes]), axis=1)
+    forcing = 2.0 * found.group("mesh_frequency") ** 2 * found.group("pitch_error_amplitude")
+    return {
+        "forcing": short(forcing),
+        "magnitudes": ", ".join(map(short, np.diff(largest))),
+    }

@@ -22,9 +22,8 @@ from gearchaos.paper.comparison import (
     overlap_verdict,
 )
 from gearchaos.paper.computation import compute, find_hop, lane_of, largest_acceleration
-from gearchaos.paper.gallery import check_folder, pictures, write_gallery
+from gearchaos.paper.gallery import KINDS, check_folder, pictures, write_gallery
 from gearchaos.paper.published import contact_line_stiffness, printed_coefficients, published
-from gearchaos.paper.report import KINDS
 from gearchaos.paper.stages import OUT_OF_TURN, out_of_turn
 from gearchaos.results.stage_table import stage_table
 
@@ -281,13 +280,9 @@ def test_both_motions_exist_between_the_folds_and_only_one_parts_the_teeth(found
     hop = found.hop
     assert hop is not None
     before, after = hop.changes["rest"]
-    assert hop.first.value < before < after < hop.last.value
-    assert hop.first.value < published().numbers["hop"].value < hop.last.value
-    lanes = [lane_of(sweep, after) for sweep in (hop.upwards, hop.downwards)]
-    crossings = [
-        sweep["crossings_per_period"][lane]
-        for sweep, lane in zip((hop.upwards, hop.downwards), lanes, strict=True)
-    ]
+    assert hop.first.above < before < after < hop.last.below
+    assert hop.first.above < published().numbers["hop"].value < hop.last.below
+    crossings = hop.sweeps.sel(pitch_error=after, method="nearest")["crossings_per_period"]
     assert crossings[0] == 0.0 < crossings[1]
 
 
@@ -435,7 +430,7 @@ def test_the_hop_in_the_report_is_where_the_carried_sweeps_part(report, found):
     )
     ends = re.search(r"coexist from \*P\* = (\S+), .*? to \*P\* = (\S+), where", report)
     assert [float(end) for end in ends.groups()] == pytest.approx(
-        [found.hop.first.value, found.hop.last.value], abs=1e-4
+        [found.hop.first.above, found.hop.last.below], abs=1e-4
     )
 
 

@@ -1,11 +1,15 @@
-"""Rules of pitch errors tooth by tooth, measured or drawn by a grade."""
+"""Pitch errors tooth by tooth, measured or drawn by a grade: their files and their rules."""
 
+import csv
+import os
+import re
 from collections.abc import Iterator, Mapping
+from math import isfinite
+from typing import Any
 
 import numpy as np
 
-from gearchaos.configuration.files import LISTS
-from gearchaos.configuration.messages import Fault
+from gearchaos.configuration.messages import NUMBER, Fault, shown
 from gearchaos.configuration.physical_tables import (
     GearDeviations,
     GradeError,
@@ -14,13 +18,77 @@ from gearchaos.configuration.physical_tables import (
 )
 from gearchaos.configuration.rules import reads
 from gearchaos.configuration.tables import SWEEPABLE_KEYS, FloatArray, Tables, swept_values
+from gearchaos.configuration.toml_text import text_of_file
+from gearchaos.errors import GearchaosError
 from gearchaos.gear.tooth_deviations import counted_deviations, tooth_deviations
+
+LISTS = {"cumulative": "cumulative_um", "single": "single_um"}
+"""Keys of the lists of deviations by what a column holds."""
 
 OF_DRAWN_GEARS = ("pitch_error.grade", "pitch_error.eccentricity")
 """Keys of which no group depends, but the gears that are drawn."""
 
 _LARGEST_SUM_UM, _LARGEST_SUM_SHARE = 0.1, 0.01
 """What rounding in a list leaves of the sum of all single deviations, at most."""
+
+
+def with_deviation_files(
+    tables: Mapping[str, Any], source: str
+) -> tuple[Mapping[str, Any], list[Fault]]:
+    """Return the tables of a configuration with the deviations in the files they name, and faults.
+
+    The numbers go into the table of the gear, where none are listed, and the text into ``files``,
+    from which it is taken when it is needed again.
+    """
+    faults = []
+    for gear in ("driving", "driven"):
+        error, files = _table(tables, "pitch_error"), _table(tables, "files")
+        table = _table(error, gear)
+        name = table.get("file")
+        if not isinstance(name, str) or not table.keys().isdisjoint(LISTS.values()):
+            continue
+        path = os.path.join(os.path.dirname(source) or ".", name)
+        read = LISTS.get(str(table.get("holds")), LISTS["cumulative"])
+        try:
+            if not isinstance(files.get(name), str):
+                files[name] = text_of_file(path, "file of pitch deviations")
+            table[read] = _column(files[name], table.get("column"))
+            tables = {**tables, "pitch_error": {**error, gear: table}, "files": files}
+        except (GearchaosError, ValueError, csv.Error) as fault:
+            rule, remedy = [*map(str, fault.args), ""][:2]
+            # The fault names the file.
+            rule = rule.removeprefix(f"{path}: ")
+            faults.append(Fault(f"pitch_error.{gear}.file", rule, remedy, name))
+    return tables, faults
+
+
+def _table(tables: Mapping[str, Any], name: str) -> dict[str, Any]:
+    found = tables.get(name)
+    return dict(found) if isinstance(found, Mapping) else {}
+
+
+def _column(text: str, column: object) -> list[float]:
+    """Return the numbers of a column; ValueError with rule and remedy where they are none."""
+    # Notes become empty lines, of which there are no rows.
+    lines = [re.sub(r"^\s*(#.*)?$", "", line) for line in text.splitlines()]
+    headline = next(filter(None, lines), "")
+    delimiter = next((mark for mark in ";\t," if mark in headline), ",")
+    reader = csv.reader(lines, delimiter=delimiter)
+    rows = [(reader.line_num, [*map(str.strip, row)]) for row in reader if row]
+    headings = rows.pop(0)[1] if rows else []
+    if column not in headings:
+        asked = "column is missing" if column is None else f"has no column {shown(column)}"
+        raise ValueError(asked, f"its first line has the headings {shown(headings)}")
+    place = headings.index(column)
+    cells = [(line, "".join(row[place : place + 1])) for line, row in rows]
+    # Beside a gear with more teeth a column ends in empty cells.
+    while cells and not cells[-1][1]:
+        cells.pop()
+    for line, cell in cells:
+        if not (NUMBER.fullmatch(cell) and isfinite(float(cell))):
+            rule = f"line {line}, column {column}: must be a finite number, not {shown(cell)}"
+            raise ValueError(rule, "give one for every tooth, decimals with a point")
+    return [float(cell) for _, cell in cells]
 
 
 def _kind(config: Tables) -> str:
