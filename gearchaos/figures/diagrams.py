@@ -83,9 +83,8 @@ def bifurcation(
         If the result has no such variable, no lane in the range, or two swept parameters.
     """
     names = section_variables(result)
-    numbers = (tuple(result.axes), "float64")
-    of_lanes = [v.name for v in result.variables.values() if (v.dims, v.dtype) == numbers]
-    of_lanes = [name for name in of_lanes if name not in result.axes]
+    numbers = [v for v in result.variables.values() if v.dtype == "float64"]
+    of_lanes = [v.name for v in numbers if v.dims == result.axes and v.name not in result.axes]
     if not names and variable is None:
         raise FigureError("the result has no section points: the sweep did not record any")
     variable = names[0] if variable is None else variable
@@ -94,8 +93,8 @@ def bifurcation(
         raise FigureError(f"no variable {variable!r} of the diagram in the result; it has {there}")
     lanes = diagram_lanes(result, between)
     rows = result.lanes(variable).reshape(result.lanes(STATUS).size, -1)
-    total, of_a_lane = max(1, lanes.numbers.size * rows.shape[1]), max(1, rows.shape[1])
-    alpha = min(1.0, 4.0 / of_a_lane**0.5) * min(1.0, MOST_DOTS / total)
+    of_a_lane = max(1, rows.shape[1])
+    alpha = min(1.0, 4.0 / of_a_lane**0.5) * min(1.0, MOST_DOTS / (lanes.numbers.size * of_a_lane))
     look = {"markersize": lanes.dot_size(0.8), "marker": marker, "color": color, "label": label}
     points = dots(axes, lanes, rows, rasterized=True, alpha=alpha, **look)
     axes.set_ylabel(axis_label(result, variable, line_length=34))
@@ -103,8 +102,8 @@ def bifurcation(
     for part, values in portions(lanes, rows):
         np.fmin.reduce(values, axis=1, out=low[part])
         np.fmax.reduce(values, axis=1, out=high[part])
-    drawn = Diagram(points, lanes, low, high, full_range=full_range)
-    return close_panel(axes, result, drawn)
+    own = Diagram(points, lanes, low, high, full_range=full_range)
+    return close_panel(axes, result, own)
 
 
 def lyapunov(

@@ -10,8 +10,6 @@ from gearchaos.results.result import Result
 from gearchaos.results.units import excitation_of
 from gearchaos.results.variables import DIRECTION, START, coordinate_text
 
-DIMENSIONLESS = ("", "1")
-
 
 def axis_label(result: Result, name: str, line_length: int = 60) -> str:
     """Compose the label of a variable: its long name, symbol and unit, broken into lines.
@@ -19,9 +17,9 @@ def axis_label(result: Result, name: str, line_length: int = 60) -> str:
     For example ``Largest Lyapunov exponent, $\\lambda_1$ (per unit of $\\tau$)``; of a pure number
     there is no unit. Lines are broken after ``line_length`` characters.
     """
-    attributes = result.attributes(name)
-    wording = " ".join(str(attributes.get("long_name", "") or name).split())
-    symbol, unit = _formula(attributes.get("symbol", "")), unit_of(result, name)
+    variable = result.variables[name]
+    wording = " ".join((variable.long_name or name).split())
+    symbol, unit = _formula(variable.symbol), unit_of(result, name)
     words = [plain(word) for word in (wording[:1].upper() + wording[1:]).split(" ")]
     # The symbol stays on the line of the last word.
     if symbol:
@@ -35,8 +33,8 @@ def axis_label(result: Result, name: str, line_length: int = 60) -> str:
 
 def unit_of(result: Result, name: str) -> str:
     """Word the unit of a variable, or what its numbers are multiples of; "" of a pure number."""
-    written = str(result.attributes(name).get("units", ""))
-    if written in DIMENSIONLESS:
+    written = result.variables[name].units
+    if written in ("", "1"):
         return units.unit_of(name).stands_for
     words = plain(re.sub(r"\bum\b", "\N{MICRO SIGN}m", written))
     return re.sub(r"\b([a-z]+)-(\d)", r"\1$^{-\2}$", words)
@@ -99,9 +97,8 @@ def _broken(words: list[str], line_length: int) -> list[str]:
     return lines
 
 
-def _formula(symbol: object) -> str:
+def _formula(text: str) -> str:
     """Return a symbol that is no formula as plain text."""
-    text = str(symbol)
     # A file may come from anywhere; a formula that matplotlib cannot read would fail at drawing.
     try:
         MathTextParser("path").parse(text)

@@ -157,11 +157,6 @@ def legend_above(axes: Axes, handles: Sequence[Artist]) -> Legend | None:
     """Place a legend above the right end of the axes, where it hides nothing."""
     if not handles:
         return None
-    return axes.legend(
-        handles=handles,
-        loc="lower right",
-        bbox_to_anchor=(1.0, 1.0),
-        ncols=-(-len(handles) // -(-len(handles) // 3)),
-        borderaxespad=0.3,
-        **LEGEND,
-    )
+    columns = -(-len(handles) // -(-len(handles) // 3))
+    place: Any = {"loc": "lower right", "bbox_to_anchor": (1.0, 1.0), "borderaxespad": 0.3}
+    return axes.legend(handles=handles, ncols=columns, **place, **LEGEND)

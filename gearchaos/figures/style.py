@@ -65,7 +65,6 @@ _STYLE: dict[Any, Any] = {
     "hatch.linewidth": 0.3,
     "figure.constrained_layout.h_pad": 0.02,
     "figure.constrained_layout.w_pad": 0.02,
-    "figure.constrained_layout.hspace": 0.02,
     # Journals ask for TrueType; matplotlib's default, Type 3, cannot be edited.
     "pdf.fonttype": 42,
     "ps.fonttype": 42,

@@ -206,9 +206,8 @@ def _metadata(overview: Mapping[str, Any], names: str) -> Iterator[str]:
     for name in names.split():
         value = overview["metadata"].get(name)
         if value not in (None, ""):
-            yield _entry(
-                name.replace("_", " "), value if isinstance(value, str) else _number(value)
-            )
+            text = value if isinstance(value, str) else _number(value)
+            yield _entry(name.replace("_", " "), text)
 
 
 def _groups(parameters: Mapping[str, Any]) -> Iterator[str]:
@@ -237,7 +236,5 @@ def _entry(label: str, text: str) -> str:
 
 
 def _wrapped(text: str, first: str, further: str = "    ") -> str:
-    text = printable(text)
-    return textwrap.fill(
-        text, WIDTH, initial_indent=first, subsequent_indent=further, break_on_hyphens=False
-    )
+    indents: Any = {"initial_indent": first, "subsequent_indent": further}
+    return textwrap.fill(printable(text), WIDTH, break_on_hyphens=False, **indents)

@@ -16,17 +16,12 @@ from numpy.typing import NDArray
 
 from gearchaos.errors import ConfigurationError, FileError
 from gearchaos.results import tables
+from gearchaos.results import variables as known
 from gearchaos.results.atomic_file import checksum_fits
 from gearchaos.results.result_file import Parameter, own_metadata, write_result
 from gearchaos.results.result_reader import fixed_coordinates, is_coordinate, read_result
 from gearchaos.results.units import in_physical_units
-from gearchaos.results.variables import (
-    SECTION,
-    SECTION_POINT,
-    Variable,
-    coordinate_text,
-    diagram_axis,
-)
+from gearchaos.results.variables import Variable, coordinate_text, diagram_axis
 
 __all__ = ["Parameter", "Result", "open_result", "section_variables"]
 
@@ -245,8 +240,10 @@ class Result:
 
 def section_variables(result: Result) -> tuple[str, ...]:
     """Return the section variables of a result, `section_delta_5` first where there is one."""
-    dims = (*result.axes, SECTION_POINT)
-    names = [name for name in result if name.startswith(SECTION) and result.dims(name) == dims]
+    dims = (*result.axes, known.SECTION_POINT)
+    names = [
+        name for name in result if name.startswith(known.SECTION) and result.dims(name) == dims
+    ]
     return tuple(sorted(names, key=lambda name: name != DEFAULT_VARIABLE))
 
 
