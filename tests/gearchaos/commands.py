@@ -105,14 +105,14 @@ def small_config(folder: Path) -> Path:
 def run_module(module: str, *arguments: str, cwd: Path, **options) -> Ended:
     """Run ``python -m module`` in a folder."""
     if not options:
-        return _begin(module, arguments, cwd)[1]()
+        return begin(module, arguments, cwd)[1]()
     command = [sys.executable, "-m", module, *arguments]
     done = subprocess.run(command, cwd=cwd, capture_output=True, text=True, timeout=300, **options)
     assert "Traceback" not in done.stderr, done.stderr
     return Ended(done.returncode, done.stdout, done.stderr)
 
 
-def _begin(module: str, arguments: Sequence[str], cwd: Path) -> tuple[int, Callable[[], Ended]]:
+def begin(module: str, arguments: Sequence[str], cwd: Path) -> tuple[int, Callable[[], Ended]]:
     """Begin a command that need not import what it needs; return its process, and how to wait."""
     server, folder = _server(), TemporaryDirectory()
     out, err = Path(folder.name, "out"), Path(folder.name, "err")
@@ -165,7 +165,7 @@ def same_data(one: gearchaos.Result, other: gearchaos.Result) -> bool:
 
 def signalled(folder: Path, blocks: str, number: int, *arguments: str) -> Ended:
     """Run a sweep, send it a signal once a block is finished; return exit code, stdout, stderr."""
-    process, ended = _begin("gearchaos.sweep", arguments, folder)
+    process, ended = begin("gearchaos.sweep", arguments, folder)
     late = time.monotonic() + 60.0
     while not list((folder / blocks).glob("*.block")) and time.monotonic() < late:
         time.sleep(0.005)

@@ -21,8 +21,8 @@ from .commands import LINEAR, names_in, same_data, small_config, sweep
 pytest.importorskip("distributed")
 
 BLOCKS = "gears.h5.blocks"
-# Eight blocks of lanes that take a quarter of a second or so each.
-LONG = ("--set", "sweep.count=2000", "--set", "integration.transient_periods=200")
+# Eight blocks of lanes that take a tenth of a second or more each.
+LONG = ("--set", "sweep.count=2000", "--set", "integration.transient_periods=100")
 SCHEDULER = "from distributed.cli.dask_scheduler import main; main()"
 WORKER = "from distributed.cli.dask_worker import main; main()"
 

@@ -8,7 +8,8 @@ from gearchaos import load_config
 from gearchaos.records.loads import FORCES, WORDING, loads_told
 
 from .commands import run_module
-from .short_sweeps import PAN2021, SHORT
+from .short_sweeps import PAN2021, SHORT, simulation
+from .test_contact_told import AXIAL, WAYS
 
 
 def test_factors_are_those_of_the_static_force_in_the_direction_of_the_load():
@@ -24,10 +25,12 @@ def test_factors_are_those_of_the_static_force_in_the_direction_of_the_load():
 
 
 def test_a_sweep_tells_them_and_its_file_keeps_them(tmp_path):
-    asked = (*SHORT, "outputs.loads=true", "integration.transient_periods=60", "sweep.count=6")
+    lengths = ("integration.transient_periods=60", "sweep.count=6")
+    asked = (*SHORT, "outputs.loads=true", *lengths, *AXIAL)
     result = gearchaos.run(load_config(PAN2021, asked))
-    names = [f"{name}_tangential" for name in FORCES] + list(WORDING)
-    assert not any(name.endswith("_axial") for name in result.variables)
+    names = [f"{name}_{way}" for name in FORCES for way in WAYS] + list(WORDING)
+    without = [variable.name for variable in simulation("outputs.loads=true").variables]
+    assert {*without} == {name for name in result.variables if not name.endswith("_axial")}
     # Over a record the mean force balances the load, but for what the mass still gains.
     assert result["mesh_force_mean_tangential"] == pytest.approx(
         result["mesh_force_largest_tangential"] / result["load_factor_largest"], rel=0.1

@@ -10,7 +10,11 @@ from gearchaos.plot import main as plot
 from .commands import small_config
 from .short_sweeps import PAN2021, SHORT
 
-ASKED = ("outputs.loads=true", "outputs.section=['delta_5', 'delta_5_rate']")
+ASKED = (
+    "outputs.loads=true",
+    "outputs.section=['delta_5', 'delta_5_rate']",
+    "pitch_error.phase_deg=0.0",
+)
 
 
 @pytest.fixture(scope="module")

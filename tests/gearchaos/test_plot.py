@@ -81,19 +81,11 @@ def test_no_display_is_needed_whatever_the_backend(result_file, backend):
     assert (done.returncode, done.stderr) == (0, "")
 
 
-def test_running_twice_draws_the_same_bits_twice(result_file):
-    def draw() -> list[bytes]:
-        assert main([str(result_file)]) == 0
-        return [result_file.with_suffix(ending).read_bytes() for ending in (".png", ".pdf")]
-
-    assert draw() == draw()
-
-
 @pytest.mark.parametrize(("ending", "begins"), PICTURES.items())
 def test_every_format_says_whose_it_is_and_gives_the_same_bits(result_file, ending, begins):
     drawn = []
     for _ in range(2):
-        assert main([str(result_file), "--format", ending, "--dpi", "100"]) == 0
+        assert main([str(result_file), "--format", ending, "--dpi", "60"]) == 0
         drawn.append(result_file.with_suffix(f".{ending}").read_bytes())
     assert drawn[0] == drawn[1] and drawn[0].startswith(begins)
     assert b"gearchaos " in drawn[0] and b"Date" not in drawn[0]

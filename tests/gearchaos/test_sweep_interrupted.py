@@ -1,6 +1,5 @@
 """A sweep that is stopped half-way: what is kept, what is said, and how it goes on."""
 
-import multiprocessing
 import os
 import random
 import re
@@ -18,10 +17,10 @@ from gearchaos_kernels import source_hash
 
 import gearchaos
 from gearchaos.results.block_folder import LOCK, folder_of
-from gearchaos.sweep import main
 
 from .commands import (
     LINEAR,
+    begin,
     names_in,
     run_module,
     same_data,
@@ -177,27 +176,24 @@ def test_twenty_kills_at_random_moments_cost_no_bit(tmp_path):
     (tmp_path / "undisturbed").mkdir()
     assert sweep(tmp_path / "undisturbed", *wide).code == 0
     output, moments = tmp_path / "gears.h5", random.Random(20)
-    command = [str(small_config(tmp_path)), *wide, "--resume", "--output", str(output)]
-    # Not the import of packages, but what a sweep does, is to be met.
-    processes = multiprocessing.get_context("forkserver")
-    processes.set_forkserver_preload(["gearchaos.sweep", "gearchaos.engine.store_filling"])
+    small_config(tmp_path)
     finished = []
     for _ in range(20):
-        process = processes.Process(target=main, args=(command,))
-        process.start()
-        while process.is_alive() and not is_locked(output):
+        process, ended = begin("gearchaos.sweep", ("gears.toml", *wide, "--resume"), tmp_path)
+        while not is_locked(output) and is_running(process):
             time.sleep(0.005)
         before = blocks_in(tmp_path)
         enough = min(before + moments.randint(1, 7), 63)
-        while process.is_alive() and blocks_in(tmp_path) < enough:
+        while is_running(process) and blocks_in(tmp_path) < enough:
             time.sleep(0.001)
         # The result to be is begun beside the blocks.
-        while process.is_alive() and enough == 63 and not list((tmp_path / BLOCKS).glob(".gears*")):
+        while (
+            is_running(process) and enough == 63 and not list((tmp_path / BLOCKS).glob(".gears*"))
+        ):
             time.sleep(0.001)
         time.sleep(moments.uniform(0.0, 0.03))
-        process.kill()
-        process.join()
-        assert process.exitcode == -signal.SIGKILL
+        os.kill(process, signal.SIGKILL)
+        assert ended().code == -signal.SIGKILL
         finished.append(blocks_in(tmp_path))
         # What was there before is there still.
         assert finished[-1] >= before
@@ -208,6 +204,10 @@ def test_twenty_kills_at_random_moments_cost_no_bit(tmp_path):
     assert names_in(tmp_path) == ["gears.h5", "gears.toml", "undisturbed"]
     undisturbed = gearchaos.open_result(tmp_path / "undisturbed" / "gears.h5")
     assert same_data(gearchaos.open_result(tmp_path / "gears.h5"), undisturbed)
+
+
+def is_running(process):
+    return Path(f"/proc/{process}").exists()
 
 
 def blocks_in(folder):

@@ -46,7 +46,8 @@ def test_a_tiny_clearance_is_a_perturbation_of_its_own_size(resolved):
     model = pan2021([0.5, 5.86, 12.0])
     how = {"steps": 100, "periods": 200}
     tiny = run(model._replace(half_backlash=np.full(3, 1e-9)), FULL, **how, resolved=resolved)
-    none = run(model, NO_BACKLASH, **how, resolved=resolved)
+    # Flow maps are exact, as short steps nearly are.
+    none = run(model, NO_BACKLASH, **how | ({"steps": 800} if resolved == FLOW_MAP else {}))
     assert_sound(tiny)
     # A split step is two shorter ones: what differs is the error of the method, not the clearance.
     assert tiny.section == pytest.approx(none.section, rel=0, abs=2e-6)
