@@ -39,17 +39,16 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
 def _basins(options: argparse.Namespace) -> int:
     from gearchaos.engine.basins import find_basins
     from gearchaos.engine.running import compiling
-    from gearchaos.figures import basins_page, save_figure
-    from gearchaos.figures.page import is_own_figure
-    from gearchaos.results.atomic_file import check_output
+    from gearchaos.figures import basins_page
+    from gearchaos.figures.page import check_figures, save_figure
     from gearchaos.results.overview import finite, slice_lines
     from gearchaos.results.result import open_result
     from gearchaos.results.stage_table import slice_facts
     from gearchaos.results.variables import REPEATS, START
 
-    if options.output:
-        check_output(options.output, overwrite=options.overwrite or is_own_figure(options.output))
     whole = open_result(options.result)
+    if options.output:
+        check_figures([options.output], [options.result], options.overwrite)
     part = whole.sel("nearest", **coordinates(options.at, whole.axes, whole.axis))
     kept = {START} | ({part.axis} - {*REPEATS})
     part = part.sel(**{axis: part[axis][0] for axis in part.axes if axis not in kept})

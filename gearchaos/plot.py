@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from gearchaos.command_line import OK, Command, coordinates, number, place, whole_number
-from gearchaos.errors import FigureError, FileError
+from gearchaos.errors import FigureError
 from gearchaos.progress import Progress, say
 
 if TYPE_CHECKING:
@@ -30,7 +30,7 @@ RESULT_ENDINGS = (".h5", ".hdf5", ".nc")
 
 
 def _plot(options: argparse.Namespace) -> int:
-    from gearchaos.figures import save_figure
+    from gearchaos.figures.page import check_figures, save_figure
     from gearchaos.figures.response import is_response
     from gearchaos.gear.tooth_deviations import REALISATION
 
@@ -45,7 +45,7 @@ def _plot(options: argparse.Namespace) -> int:
     if options.units == "physical":
         sheets = [(f"{name}_physical", draw) for name, draw in sheets]
     targets = [_targets(options, name, len(sheets) == 1) for name, _ in sheets]
-    _check_targets([path for paths in targets for path in paths], options)
+    check_figures([path for paths in targets for path in paths], options.result, options.overwrite)
     title = ", ".join(_titles(results, options.result))
     with Progress(len(sheets), unit="page") as bar:
         for (_, draw), paths in zip(sheets, targets, strict=True):
@@ -233,22 +233,6 @@ def _targets(options: argparse.Namespace, name: str, alone: bool) -> list[Path]:
     elif not alone:
         output = output.with_name(f"{output.name}{name}")
     return [output.with_name(f"{output.name}.{kind}") for kind in formats]
-
-
-def _check_targets(targets: Sequence[Path], options: argparse.Namespace) -> None:
-    from gearchaos.figures.page import is_own_figure
-    from gearchaos.results.atomic_file import check_output
-
-    problems: list[str] = []
-    for target in targets:
-        try:
-            if target.exists() and any(target.samefile(result) for result in options.result):
-                raise FileError(f"{target}: is a result file itself; choose another --output")
-            check_output(target, overwrite=options.overwrite or is_own_figure(target))
-        except FileError as error:
-            problems += error.problems
-    if problems:
-        raise FileError(problems)
 
 
 def _lanes_in_words(result: "Result") -> str:

@@ -15,10 +15,10 @@ from matplotlib.figure import Figure
 from matplotlib.legend import Legend
 from matplotlib.ticker import AutoMinorLocator, MaxNLocator
 
-from gearchaos.errors import FigureError
+from gearchaos.errors import FigureError, FileError
 from gearchaos.figures.style import LEGEND, MM_PER_INCH, SINGLE_COLUMN_MM, SMALL_FONT_PT, style
 from gearchaos.interrupts import check
-from gearchaos.results.atomic_file import replacing
+from gearchaos.results.atomic_file import check_output, replacing
 from gearchaos.version import software_version
 
 FORMATS: tuple[str, ...] = ("png", "pdf")
@@ -149,7 +149,24 @@ def save_figure(
         partial.write_bytes(content)
 
 
-def is_own_figure(path: Path) -> bool:
+def check_figures(paths: Sequence[Path], results: Sequence[str | Path], overwrite: bool) -> None:
+    """Make sure that figures of results can be written, before anything is computed for them.
+
+    What `save_figure` wrote is replaced. Raises FileError with all that stands in the way.
+    """
+    problems: list[str] = []
+    for path in paths:
+        try:
+            if path.exists() and any(path.samefile(result) for result in results):
+                raise FileError(f"{path}: is a result file itself; choose another --output")
+            check_output(path, overwrite or _is_own(path))
+        except FileError as error:
+            problems += error.problems
+    if problems:
+        raise FileError(problems)
+
+
+def _is_own(path: Path) -> bool:
     """Whether a file says in its metadata that `save_figure` wrote it."""
     with suppress(OSError):
         return re.search(OWN, path.read_bytes()) is not None

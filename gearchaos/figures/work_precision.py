@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
 
-from gearchaos.figures.page import Page, letter, page
-from gearchaos.figures.style import BLACK, BLUE, LEGEND, ORANGE, SINGLE_COLUMN_MM
+from gearchaos.figures.page import Page, column, letter
+from gearchaos.figures.style import BLACK, BLUE, LEGEND, ORANGE
 
 LOOKS: dict[str, dict[str, Any]] = {
     "plain": {"color": ORANGE, "marker": "o"},
@@ -17,14 +17,12 @@ LOOKS: dict[str, dict[str, Any]] = {
 HEIGHT_MM = 65.0
 
 
-def work_precision_page(
-    modes: Mapping[str, Sequence[tuple[int, float, float]]], width_mm: float = SINGLE_COLUMN_MM
-) -> Page:
+def work_precision_page(modes: Mapping[str, Sequence[tuple[int, float, float]]]) -> Page:
     """Draw the error against the steps per period and against the time, all logarithmic.
 
     ``modes``: points (steps, seconds, error) by mode; those without an error are left out.
     """
-    with page(width_mm, HEIGHT_MM) as figure:
+    with column(HEIGHT_MM) as figure:
         panels = figure.subplots(1, 2, sharey=True)
         for cost, label in enumerate(("Steps per mesh period", "Time (s)")):
             axes, lines = panels[cost], []
