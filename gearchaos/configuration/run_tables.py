@@ -161,14 +161,6 @@ class Sweep(Table):
     )
 
     @property
-    def span(self) -> tuple[float, float, int]:
-        """First value, last value and count of a sweep without a list of values."""
-        if self.from_ is None or self.count is None:
-            raise ValueError("the sweep lists its values")
-        last = self.from_ if self.to is None or self.count == 1 else self.to
-        return self.from_, last, self.count
-
-    @property
     def size(self) -> int:
         """Number of values."""
         return (self.count or 0) if self.values is None else len(self.values)

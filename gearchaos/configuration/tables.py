@@ -106,7 +106,9 @@ def swept_values(sweep: Sweep) -> FloatArray:
     """Return the values of a sweep, shape (values,), in the unit of its parameter, ascending."""
     if sweep.values is not None:
         return np.sort(np.asarray(sweep.values, dtype=np.float64))
-    first, last, count = sweep.span
+    first, count = sweep.from_, sweep.count
+    assert first is not None and count is not None
+    last = first if sweep.to is None or count == 1 else sweep.to
     # One rounding per value: 586 * 15 / 1500 is 5.86, 586 * 0.01 is not always.
     steps = np.arange(count, dtype=np.float64)
     values = first + steps * (last - first) / max(count - 1, 1)

@@ -125,8 +125,8 @@ def test_the_configuration_and_the_printed_numbers_say_the_same():
         assert config.mesh.stiffness.sine_N_per_um_mm == (*printed.harmonics.sine,)
         groups = config.groups.given()
         assert groups["mesh_frequency"] == pytest.approx(2.0 * np.pi * numbers["frequency"])
-        first, last, _ = config.sweep.span
-        assert (first, last) == (printed.stages[0].first, printed.stages[-1].last)
+        ends = config.sweep.from_, config.sweep.to
+        assert ends == (printed.stages[0].first, printed.stages[-1].last)
     # Only the first set took the printed damping for that of the whole face width.
     assert groups["damping_ratio"] == pytest.approx(numbers["damping_ratio"] / np.sqrt(15.0))
 
