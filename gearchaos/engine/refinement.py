@@ -21,7 +21,6 @@ from gearchaos.dynamics.following import (
 from gearchaos.dynamics.labelling import LOOKS, labels_of
 from gearchaos.dynamics.systems import plan_of, system_of
 from gearchaos.engine.lanes import Floats, start_states
-from gearchaos.engine.running import choose_threads
 from gearchaos.engine.simulation import Simulation
 from gearchaos.interrupts import check
 from gearchaos.records.label import MEANINGS
@@ -64,11 +63,7 @@ class Boundary(NamedTuple):
 
 
 def refined_boundaries(
-    config: Configuration,
-    result: Result,
-    stages: list[Stage],
-    width: float,
-    threads: int | None = None,
+    config: Configuration, result: Result, stages: list[Stage], width: float
 ) -> list[Boundary]:
     """Bisect every boundary between two stages, and tell what the orbits beside it do.
 
@@ -79,7 +74,6 @@ def refined_boundaries(
     """
     if len(stages) < 2:
         return []
-    choose_threads(threads)
     simulation, every = Simulation(config), _edges_of(result)
     below = every[[stage.last for stage in stages[:-1]]]
     above = every[[stage.first for stage in stages[1:]]]
@@ -101,7 +95,7 @@ def refined_boundaries(
 
 
 def refined_map(
-    config: Configuration, result: Result, width: float, threads: int | None = None
+    config: Configuration, result: Result, width: float
 ) -> tuple[dict[float, list[Boundary]], int]:
     """Find the boundaries in all rows of a map to this width, without a look at orbits.
 
@@ -111,7 +105,6 @@ def refined_map(
     second parameter that has any, and the number of lanes that this takes. ``config`` is from
     `refinable`, the axes of the result are its two sweeps.
     """
-    choose_threads(threads)
     simulation = Simulation(config)
     first, second = (sweep.parameter for sweep in config.sweeps.values())
     values, rows = result[result.axis].tolist(), result[result.axes[0]]
@@ -144,11 +137,7 @@ def refined_map(
 
 
 def refined_jumps(
-    config: Configuration,
-    result: Result,
-    stretches: list[Apart],
-    width: float,
-    threads: int | None = None,
+    config: Configuration, result: Result, stretches: list[Apart], width: float
 ) -> list[Boundary]:
     """Follow the motions of both directions to where they end and the sweep jumps.
 
@@ -156,7 +145,6 @@ def refined_jumps(
     result. Where a motion has no orbit, or it goes on, a jump lies between two lanes; elsewhere its
     place is known to the width.
     """
-    choose_threads(threads)
     found: list[Boundary] = []
     outermost = np.array([(one.first, one.last) for one in stretches]).reshape(-1, 2).T
     ways = zip(WAYS, directions_of(result), outermost[::-1], (1, -1), strict=True)

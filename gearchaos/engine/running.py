@@ -13,13 +13,12 @@ import numpy as np
 from numba.core import event
 
 from gearchaos.configuration import Given, configuration_of
-from gearchaos.engine.error_check import Tally
 from gearchaos.engine.executors import LocalExecutor, compute_blocks
 from gearchaos.engine.provenance import provenance
 from gearchaos.engine.simulation import Arrays, Bounds, Simulation
 from gearchaos.errors import ConfigurationError
 from gearchaos.interrupts import check
-from gearchaos.progress import Progress, say, speaking
+from gearchaos.progress import say, speaking
 from gearchaos.results.result import Result
 from gearchaos.results.variables import Variable
 
@@ -82,15 +81,8 @@ def run(config: Given, threads: int | None = None, progress: bool = False) -> Re
         began = time.monotonic()
         blocks: dict[Bounds, Arrays] = {}
         every = simulation.blocks(simulation.block_lanes(numba.get_num_threads()))
-        tally = Tally()
-        with LocalExecutor(simulation) as executor, Progress(len(simulation.lanes)) as bar:
-
-            def keep(block: Bounds, arrays: Arrays) -> None:
-                blocks[block] = arrays
-                tally.add(arrays)
-                bar.advance(block[1] - block[0])
-
-            compute_blocks(executor, every, keep)
+        with LocalExecutor(simulation) as executor:
+            tally = compute_blocks(executor, every, blocks.__setitem__)
         if tally.errors:
             say(tally.errors)
         in_order = [blocks[block] for block in sorted(blocks)]
