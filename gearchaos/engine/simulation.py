@@ -37,12 +37,11 @@ from gearchaos.engine.steps import (
     stable_steps,
 )
 from gearchaos.interrupts import check
-from gearchaos.records.contact import contact_told
 from gearchaos.records.difference import difference
 from gearchaos.records.label import MEANINGS as MOTION_MEANINGS
 from gearchaos.records.label import MOST_POINTS
-from gearchaos.records.loads import loads_told
 from gearchaos.records.period import POINTS_NEEDED
+from gearchaos.records.teeth import contact_told, loads_told
 from gearchaos.results.variables import DIRECTIONS, Variable, step_choice_variables, sweep_variables
 
 Arrays = Mapping[str, NDArray[Any]]
