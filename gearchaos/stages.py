@@ -70,8 +70,6 @@ def _stages(options: argparse.Namespace) -> int:
     from gearchaos.results.variables import DIRECTION, RECORD, REPEATS, UNSWEPT
 
     whole = open_result(options.result)
-    if options.refine is not None and not options.at and {*whole.axes} - {whole.axis, *UNSWEPT}:
-        return _map_boundaries(whole, options)
     # What is computed again is that of one pair and one start.
     kept = REPEATS if options.refine is None and options.survival is None else ()
     places = coordinates(options.at, whole.axes, whole.axis)
@@ -79,6 +77,8 @@ def _stages(options: argparse.Namespace) -> int:
     result, both = one_axis(part, kept), DIRECTION in part.axes
     where = slice_facts(whole, result)
     lanes = labelled_lanes(result, name=options.result, repeats=True)
+    if options.refine is not None and not options.at and {*whole.axes} - {whole.axis, *UNSWEPT}:
+        return _map_boundaries(whole, options)
     stages = stage_table(lanes, options.narrowest)
     stretches = apart(part, options.narrowest)
     boundaries, outlasting = _computed_again(part, result, stages, stretches, options)

@@ -39,10 +39,12 @@ def computable(result: Result, name: str) -> Configuration:
         tables["sweep"] = tables.pop("second_sweep")
         config = Configuration.from_tables(tables, config.source)
     # The steps and periods that were taken, not those from which they were chosen or raised.
-    for name in ("steps_per_period", "transient_periods", "recorded_periods"):
-        taken = int(result.metadata.get(name, getattr(config.integration, name)))
-        config = config.replace(f"integration.{name}", taken)
+    taken = {
+        f"integration.{name}": int(result.metadata.get(name, getattr(config.integration, name)))
+        for name in ("steps_per_period", "transient_periods", "recorded_periods")
+    }
     for key, value in {
+        **taken,
         "integration.tolerance": None,
         "integration.error_check": 0.0,
         "outputs.exponents": False,

@@ -109,30 +109,32 @@ def refined_map(
     first, second = (sweep.parameter for sweep in config.sweeps.values())
     values, rows = result[result.axis].tolist(), result[result.axes[0]]
     labels = _edges_of(result)["label"].reshape(rows.size, -1).tolist()
-    ends = [list(zip(values, row, strict=True)) for row in labels]
-    stretches = {(r, n): pair for r, row in enumerate(ends) for n, pair in enumerate(pairwise(row))}
+    lanes = [zip(values, row, strict=True) for row in labels]
+    stretches = {
+        (r, n): ends for r, row in enumerate(lanes) for n, ends in enumerate(pairwise(row))
+    }
     found: dict[float, list[Boundary]] = {}
     computed = 0
     while stretches:
         halved = {}
-        for (row, n), (low, high) in stretches.items():
+        for (row, n), ((low, below), (high, above)) in stretches.items():
             beside = (stretches.get((row + step, n), ()) for step in (-1, 0, 1))
-            middle = (low[0] + high[0]) / 2.0
-            if high[0] - low[0] <= width or not low[0] < middle < high[0]:
-                if low[1] != high[1]:
-                    boundary = Boundary(low[0], high[0], low[1], high[1])
+            middle = (low + high) / 2.0
+            if high - low <= width or not low < middle < high:
+                if below != above:
+                    boundary = Boundary(low, high, below, above)
                     found.setdefault(float(rows[row]), []).append(boundary)
-            elif len({label for pair in beside for _, label in pair}) > 1:
+            elif len({label for ends in beside for _, label in ends}) > 1:
                 halved[row, n] = middle
         if not halved:
             break
-        middle = np.array([*halved.values()])
-        tried = _computed(simulation, {first: middle, second: rows[[row for row, _ in halved]]})
-        computed += middle.size
+        places = {first: np.array([*halved.values()]), second: rows[[row for row, _ in halved]]}
+        tried = _computed(simulation, places)[["value", "label"]].tolist()
+        computed += len(tried)
         last, stretches = stretches, {}
-        for (row, n), half in zip(halved, tried[["value", "label"]].tolist(), strict=True):
-            low, high = last[row, n]
-            stretches |= {(row, 2 * n): (low, half), (row, 2 * n + 1): (half, high)}
+        for (row, n), half in zip(halved, tried, strict=True):
+            lower, upper = last[row, n]
+            stretches |= {(row, 2 * n): (lower, half), (row, 2 * n + 1): (half, upper)}
     return {row: sorted(found[row]) for row in sorted(found)}, computed
 
 
