@@ -15,8 +15,8 @@ from gearchaos_kernels import LANES
 from tqdm import tqdm
 
 from gearchaos.configuration import Configuration, swept_values
-from gearchaos.engine.sharding import Shard
 from gearchaos.engine.simulation import Simulation
+from gearchaos.engine.store_filling import Shard
 from gearchaos.progress import notice
 from gearchaos.results.block_store import PIECE_BYTES, lanes_and_record
 from gearchaos.results.result_file import CACHE_BYTES

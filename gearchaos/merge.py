@@ -67,7 +67,7 @@ def _merge(options: Namespace) -> int:
 
 def _require_all(store: "BlockStore", found: "Finished", shards: object) -> None:
     """Name the shards of which blocks are missing, as far as it is known how many there are."""
-    from gearchaos.engine.sharding import shared_blocks
+    from gearchaos.engine.store_filling import shared_blocks
     from gearchaos.results.block_store import uncovered
 
     remedy = "go on with the sweep and --resume"

@@ -70,8 +70,6 @@ def _stages(options: argparse.Namespace) -> int:
     from gearchaos.results.variables import DIRECTION, RECORD, REPEATS, UNSWEPT
 
     whole = open_result(options.result)
-    if options.refine is not None and not options.at and {*whole.axes} - {whole.axis, *UNSWEPT}:
-        return _map_boundaries(whole, options)
     # What is computed again is that of one pair and one start.
     kept = REPEATS if options.refine is None and options.survival is None else ()
     places = coordinates(options.at, whole.axes, whole.axis)
@@ -79,6 +77,8 @@ def _stages(options: argparse.Namespace) -> int:
     result, both = one_axis(part, kept), DIRECTION in part.axes
     where = slice_facts(whole, result)
     lanes = labelled_lanes(result, name=options.result, repeats=True)
+    if options.refine is not None and not options.at and {*whole.axes} - {whole.axis, *UNSWEPT}:
+        return _map_boundaries(whole, options)
     stages = stage_table(lanes, options.narrowest)
     stretches = apart(part, options.narrowest)
     boundaries, outlasting = _computed_again(part, result, stages, stretches, options)
@@ -119,9 +119,10 @@ def _map_boundaries(result: "Result", options: argparse.Namespace) -> int:
     """Bisect the boundaries in all rows of a map, and tell what that saves."""
     from gearchaos.engine.recomputing import refinable
     from gearchaos.engine.refinement import refined_map
-    from gearchaos.engine.running import compiling
+    from gearchaos.engine.running import choose_threads, compiling
     from gearchaos.results.overview import finite
 
+    choose_threads(options.threads)
     config = refinable(result, options.result)
     if len(result.axes) > 2 or options.narrowest or options.survival is not None:
         raise ConfigurationError(
@@ -130,16 +131,18 @@ def _map_boundaries(result: "Result", options: argparse.Namespace) -> int:
             "with --at NAME=VALUE"
         )
     with compiling():
-        rows, lanes = refined_map(config, result, options.refine, options.threads)
+        rows, lanes = refined_map(config, result, options.refine)
     second, first = result.axes
     reach = float(result[first][-1] - result[first][0])
     fine = result[second].size * (math.ceil(reach / options.refine) + 1)
     if options.json:
-        listed = [
-            {"value": value, "boundaries": [*map(_named, found)]} for value, found in rows.items()
-        ]
-        facts: dict[str, Any] = {"parameter": first, "second_parameter": second, "rows": listed}
-        facts |= {"lanes": lanes, "lanes_of_a_map_as_fine": fine}
+        facts = {
+            "parameter": first,
+            "second_parameter": second,
+            "rows": [{"value": at, "boundaries": [*map(_named, rows[at])]} for at in rows],
+            "lanes": lanes,
+            "lanes_of_a_map_as_fine": fine,
+        }
         print(json.dumps(finite(facts), indent=1, allow_nan=False))
         return OK
     for value, found in rows.items():
@@ -161,18 +164,19 @@ def _computed_again(
         return None, None
     from gearchaos.engine.recomputing import computable, refinable, survival
     from gearchaos.engine.refinement import refined_boundaries, refined_jumps
-    from gearchaos.engine.running import compiling
+    from gearchaos.engine.running import choose_threads, compiling
     from gearchaos.results.variables import DIRECTION
 
+    choose_threads(options.threads)
     boundaries = outlasting = None
-    name, width, threads = options.result, options.refine, options.threads
+    name, width = options.result, options.refine
     with compiling():
         if width is not None and DIRECTION in part.axes:
-            boundaries = refined_jumps(computable(part, name), part, stretches, width, threads)
+            boundaries = refined_jumps(computable(part, name), part, stretches, width)
         elif width is not None:
-            boundaries = refined_boundaries(refinable(part, name), part, stages, width, threads)
+            boundaries = refined_boundaries(refinable(part, name), part, stages, width)
         if options.survival is not None:
-            outlasting = survival(computable(result, name), result, options.survival, threads)
+            outlasting = survival(computable(result, name), result, options.survival)
     return boundaries, outlasting
 
 

@@ -20,8 +20,8 @@ from gearchaos.progress import say
 
 if TYPE_CHECKING:
     from gearchaos.configuration import Configuration
-    from gearchaos.engine.sharding import Shard
     from gearchaos.engine.simulation import Simulation
+    from gearchaos.engine.store_filling import Shard
 
 
 def _arguments(parser: ArgumentParser) -> None:
@@ -48,8 +48,8 @@ def _sweep(options: Namespace) -> int:
 
     config = load_config(options.config, options.set)
     from gearchaos.engine.running import choose_threads, prepare
-    from gearchaos.engine.sharding import Shard
     from gearchaos.engine.simulation import Simulation
+    from gearchaos.engine.store_filling import Shard
 
     shard = None if options.shard is None else Shard.from_text(options.shard)
     _check_sharing(options, config)

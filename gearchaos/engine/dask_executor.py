@@ -54,29 +54,37 @@ class DaskExecutor(ExitStack):
             logging.getLogger(name).setLevel(logging.CRITICAL)
         with ExitStack() as stack:
             self._client: Any = stack.enter_context(_connected(stack, address))
-            self._wait_for_workers()
+            workers = self.workers
             self._require_software()
             self._executor = self._client.get_executor(pure=False)
             self.callback(stack.pop_all().close)
-        say(f"{self.workers} dask worker{'s' if self.workers > 1 else ''} at {address}")
+        say(f"{workers} dask worker{'s' if workers > 1 else ''} at {address}")
 
     @property
     def workers(self) -> int:
-        """How many workers there are now."""
+        """How many workers there are; waits for one where none is left."""
+        began = None
         try:
-            return len(_answer(self._client.nthreads, _patience()))
-        except OSError as error:
-            raise self._worded(error) from None
-
-    @property
-    def width(self) -> int:
-        """How many blocks to hand out at a time; waits where no worker is left."""
-        try:
-            return BLOCKS_PER_WORKER * self._wait_for_workers()
+            while not (workers := len(_answer(self._client.nthreads, _patience()))):
+                if began is None:
+                    began, hours = time.monotonic(), _HOURS_WITHOUT_WORKERS
+                    say(f"{self._address}: waits up to {hours:g} h for a worker to join")
+                if time.monotonic() - began > 3600 * hours:
+                    raise ExecutionError(f"{self._address}: no worker has joined; start some")
+                check()
+                time.sleep(_SECONDS_BETWEEN_LOOKS)
         except KeyboardInterrupt:
             # Nobody computes what has been handed out.
             self.close()
             raise
+        except OSError as error:
+            raise self._worded(error) from None
+        return workers
+
+    @property
+    def width(self) -> int:
+        """How many blocks to hand out at a time."""
+        return BLOCKS_PER_WORKER * self.workers
 
     def submit(self, block: Bounds) -> Future[Arrays]:
         """Hand a block to the cluster and return the future of its arrays."""
@@ -86,18 +94,6 @@ class DaskExecutor(ExitStack):
         inner = self._executor.submit(compute_block, SOFTWARE, *self._recipe, block)
         inner.add_done_callback(lambda done: _settle(future, done.result, self._worded))
         return future
-
-    def _wait_for_workers(self) -> int:
-        workers, began = self.workers, time.monotonic()
-        if not workers:
-            say(f"{self._address}: waits up to {_HOURS_WITHOUT_WORKERS:g} h for a worker to join")
-        while not workers:
-            if time.monotonic() - began > 3600 * _HOURS_WITHOUT_WORKERS:
-                raise ExecutionError(f"{self._address}: no worker has joined; start some")
-            check()
-            time.sleep(_SECONDS_BETWEEN_LOOKS)
-            workers = self.workers
-        return workers
 
     def _require_software(self) -> None:
         # Blocks cannot even be sent to a worker without it; versions are compared with the blocks.

@@ -8,7 +8,6 @@ from gearchaos_kernels import Status
 from numpy.typing import NDArray
 
 from gearchaos.dynamics.largest_exponents import MIXED, UNIFORM
-from gearchaos.records.difference import Difference
 
 NOT_CHECKED, SAME, CHANGED = 0, 1, 2
 MEANINGS = ("not_checked", "same", "changed")
@@ -26,22 +25,6 @@ def checked_lanes(numbers: NDArray[np.intp], share: float) -> NDArray[np.intp]:
     The share is spread evenly over the whole sweep and depends on the number of a lane alone.
     """
     return np.flatnonzero(np.floor((numbers + 1) * share) > np.floor(numbers * share))
-
-
-def check_arrays(
-    lanes: int, checked: NDArray[np.intp], difference: Difference | None
-) -> dict[str, NDArray[Any]]:
-    """Return what the check says of so many lanes of a block, by the name of the variable.
-
-    The difference is that of the checked lanes, see `checked_lanes`, and None where there are none.
-    """
-    section, exponent = np.full((2, lanes), np.nan)
-    motion = np.full(lanes, NOT_CHECKED, dtype=np.uint8)
-    if difference is not None:
-        section[checked] = difference.section_error
-        exponent[checked] = difference.exponent_error
-        motion[checked] = np.where(difference.changed, CHANGED, SAME)
-    return dict(zip(CHECKED, (section, exponent, motion), strict=True))
 
 
 class Tally:

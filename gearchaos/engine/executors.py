@@ -14,9 +14,11 @@ from typing import TYPE_CHECKING, TypeAlias
 import numba
 import numpy as np
 
+from gearchaos.engine.error_check import Tally
 from gearchaos.engine.simulation import Arrays, Bounds, Floats, Simulation
 from gearchaos.errors import FileError, GearchaosError
 from gearchaos.interrupts import check
+from gearchaos.progress import Progress
 
 if TYPE_CHECKING:
     from gearchaos.engine.dask_executor import DaskExecutor
@@ -83,32 +85,47 @@ class LocalExecutor(ExitStack):
 
 
 def compute_blocks(
-    executor: BlockExecutor, blocks: Sequence[Bounds], keep: Callable[[Bounds, Arrays], None]
-) -> None:
+    executor: BlockExecutor,
+    blocks: Sequence[Bounds],
+    keep: Callable[[Bounds, Arrays], None],
+    tally: Tally | None = None,
+    done: int = 0,
+) -> Tally:
     """Have blocks computed, handed out in this order, and keep each as soon as it is there.
 
-    ``keep(block, arrays)`` is called in this thread. An interrupt lets the blocks that are running
+    ``keep(block, arrays)`` is called in this thread. Returns what the blocks add up to with those
+    of a tally, where so many lanes are done already. An interrupt lets the blocks that are running
     end and keeps them.
     """
-    waiting = list(reversed(blocks))
+    tally, waiting = tally or Tally(), list(reversed(blocks))
+    lanes = done + sum(last - first for first, last in blocks)
     futures: dict[Future[Arrays], Bounds] = {}
-    try:
-        while waiting or futures:
-            while waiting and len(futures) < executor.width:
-                block = waiting.pop()
-                futures[executor.submit(block)] = block
-            for future in _ended(executor, futures):
-                keep(futures[future], future.result())
-                del futures[future]
-            check()
-    except KeyboardInterrupt:
-        running = {future: block for future, block in futures.items() if not future.cancel()}
-        while running:
-            for future in _ended(executor, running):
-                # What cannot be computed or kept is missing afterwards, and counted as such.
-                with suppress(GearchaosError):
-                    keep(running.pop(future), future.result())
-        raise
+    with Progress(lanes, done) as progress:
+
+        def collect(future: Future[Arrays], block: Bounds) -> None:
+            arrays = future.result()
+            keep(block, arrays)
+            tally.add(arrays)
+            progress.advance(block[1] - block[0])
+
+        try:
+            while waiting or futures:
+                while waiting and len(futures) < executor.width:
+                    block = waiting.pop()
+                    futures[executor.submit(block)] = block
+                for future in _ended(executor, futures):
+                    collect(future, futures[future])
+                    del futures[future]
+                check()
+        except KeyboardInterrupt:
+            running = {future: block for future, block in futures.items() if not future.cancel()}
+            while running:
+                for future in _ended(executor, running):
+                    # What cannot be computed or kept is missing afterwards, and counted as such.
+                    with suppress(GearchaosError):
+                        collect(future, running.pop(future))
+            raise
+    return tally
 
 
 def _ended(

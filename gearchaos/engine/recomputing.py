@@ -7,7 +7,6 @@ from gearchaos_kernels import Status, integrate
 
 from gearchaos.configuration import Configuration
 from gearchaos.dynamics.systems import plan_of, system_of
-from gearchaos.engine.running import choose_threads
 from gearchaos.errors import ConfigurationError, FileError
 from gearchaos.gear.tooth_deviations import REALISATION
 from gearchaos.interrupts import check
@@ -40,10 +39,12 @@ def computable(result: Result, name: str) -> Configuration:
         tables["sweep"] = tables.pop("second_sweep")
         config = Configuration.from_tables(tables, config.source)
     # The steps and periods that were taken, not those from which they were chosen or raised.
-    for name in ("steps_per_period", "transient_periods", "recorded_periods"):
-        taken = int(result.metadata.get(name, getattr(config.integration, name)))
-        config = config.replace(f"integration.{name}", taken)
+    taken = {
+        f"integration.{name}": int(result.metadata.get(name, getattr(config.integration, name)))
+        for name in ("steps_per_period", "transient_periods", "recorded_periods")
+    }
     for key, value in {
+        **taken,
         "integration.tolerance": None,
         "integration.error_check": 0.0,
         "outputs.exponents": False,
@@ -122,9 +123,7 @@ class Survival(NamedTuple):
         )
 
 
-def survival(
-    config: Configuration, result: Result, records: int, threads: int | None = None
-) -> Survival:
+def survival(config: Configuration, result: Result, records: int) -> Survival:
     """Try how many chaotic lanes outlast so many records of their own length.
 
     A lane outlasts them if a disturbance still grows over the later half of the last one, at the
@@ -137,7 +136,6 @@ def survival(
     chosen = np.linspace(0, chaotic.size - 1, min(MOST_LANES, chaotic.size))
     lanes = chaotic[chosen.round().astype(np.intp)]
     values = {config.sweep.parameter: result[result.axis][lanes]}
-    choose_threads(threads)
     system = system_of(config, values, config.needed_effects)
     plan = plan_of(config, transient_periods=0, tangent=True)
     state, tangent = result["end_state"][lanes], None

@@ -21,7 +21,6 @@ from gearchaos.dynamics.following import (
 from gearchaos.dynamics.labelling import LOOKS, labels_of
 from gearchaos.dynamics.systems import plan_of, system_of
 from gearchaos.engine.lanes import Floats, start_states
-from gearchaos.engine.running import choose_threads
 from gearchaos.engine.simulation import Simulation
 from gearchaos.interrupts import check
 from gearchaos.records.label import MEANINGS
@@ -64,11 +63,7 @@ class Boundary(NamedTuple):
 
 
 def refined_boundaries(
-    config: Configuration,
-    result: Result,
-    stages: list[Stage],
-    width: float,
-    threads: int | None = None,
+    config: Configuration, result: Result, stages: list[Stage], width: float
 ) -> list[Boundary]:
     """Bisect every boundary between two stages, and tell what the orbits beside it do.
 
@@ -79,7 +74,6 @@ def refined_boundaries(
     """
     if len(stages) < 2:
         return []
-    choose_threads(threads)
     simulation, every = Simulation(config), _edges_of(result)
     below = every[[stage.last for stage in stages[:-1]]]
     above = every[[stage.first for stage in stages[1:]]]
@@ -101,7 +95,7 @@ def refined_boundaries(
 
 
 def refined_map(
-    config: Configuration, result: Result, width: float, threads: int | None = None
+    config: Configuration, result: Result, width: float
 ) -> tuple[dict[float, list[Boundary]], int]:
     """Find the boundaries in all rows of a map to this width, without a look at orbits.
 
@@ -111,44 +105,41 @@ def refined_map(
     second parameter that has any, and the number of lanes that this takes. ``config`` is from
     `refinable`, the axes of the result are its two sweeps.
     """
-    choose_threads(threads)
     simulation = Simulation(config)
     first, second = (sweep.parameter for sweep in config.sweeps.values())
     values, rows = result[result.axis].tolist(), result[result.axes[0]]
     labels = _edges_of(result)["label"].reshape(rows.size, -1).tolist()
-    ends = [list(zip(values, row, strict=True)) for row in labels]
-    stretches = {(r, n): pair for r, row in enumerate(ends) for n, pair in enumerate(pairwise(row))}
+    lanes = [zip(values, row, strict=True) for row in labels]
+    stretches = {
+        (r, n): ends for r, row in enumerate(lanes) for n, ends in enumerate(pairwise(row))
+    }
     found: dict[float, list[Boundary]] = {}
     computed = 0
     while stretches:
         halved = {}
-        for (row, n), (low, high) in stretches.items():
+        for (row, n), ((low, below), (high, above)) in stretches.items():
             beside = (stretches.get((row + step, n), ()) for step in (-1, 0, 1))
-            middle = (low[0] + high[0]) / 2.0
-            if high[0] - low[0] <= width or not low[0] < middle < high[0]:
-                if low[1] != high[1]:
-                    boundary = Boundary(low[0], high[0], low[1], high[1])
+            middle = (low + high) / 2.0
+            if high - low <= width or not low < middle < high:
+                if below != above:
+                    boundary = Boundary(low, high, below, above)
                     found.setdefault(float(rows[row]), []).append(boundary)
-            elif len({label for pair in beside for _, label in pair}) > 1:
+            elif len({label for ends in beside for _, label in ends}) > 1:
                 halved[row, n] = middle
         if not halved:
             break
-        middle = np.array([*halved.values()])
-        tried = _computed(simulation, {first: middle, second: rows[[row for row, _ in halved]]})
-        computed += middle.size
+        places = {first: np.array([*halved.values()]), second: rows[[row for row, _ in halved]]}
+        tried = _computed(simulation, places)[["value", "label"]].tolist()
+        computed += len(tried)
         last, stretches = stretches, {}
-        for (row, n), half in zip(halved, tried[["value", "label"]].tolist(), strict=True):
-            low, high = last[row, n]
-            stretches |= {(row, 2 * n): (low, half), (row, 2 * n + 1): (half, high)}
+        for (row, n), half in zip(halved, tried, strict=True):
+            lower, upper = last[row, n]
+            stretches |= {(row, 2 * n): (lower, half), (row, 2 * n + 1): (half, upper)}
     return {row: sorted(found[row]) for row in sorted(found)}, computed
 
 
 def refined_jumps(
-    config: Configuration,
-    result: Result,
-    stretches: list[Apart],
-    width: float,
-    threads: int | None = None,
+    config: Configuration, result: Result, stretches: list[Apart], width: float
 ) -> list[Boundary]:
     """Follow the motions of both directions to where they end and the sweep jumps.
 
@@ -156,7 +147,6 @@ def refined_jumps(
     result. Where a motion has no orbit, or it goes on, a jump lies between two lanes; elsewhere its
     place is known to the width.
     """
-    choose_threads(threads)
     found: list[Boundary] = []
     outermost = np.array([(one.first, one.last) for one in stretches]).reshape(-1, 2).T
     ways = zip(WAYS, directions_of(result), outermost[::-1], (1, -1), strict=True)

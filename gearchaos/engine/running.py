@@ -13,13 +13,12 @@ import numpy as np
 from numba.core import event
 
 from gearchaos.configuration import Given, configuration_of
-from gearchaos.engine.error_check import Tally
 from gearchaos.engine.executors import LocalExecutor, compute_blocks
 from gearchaos.engine.provenance import provenance
 from gearchaos.engine.simulation import Arrays, Bounds, Simulation
 from gearchaos.errors import ConfigurationError
 from gearchaos.interrupts import check
-from gearchaos.progress import Progress, say, speaking
+from gearchaos.progress import say, speaking
 from gearchaos.results.result import Result
 from gearchaos.results.variables import Variable
 
@@ -82,15 +81,8 @@ def run(config: Given, threads: int | None = None, progress: bool = False) -> Re
         began = time.monotonic()
         blocks: dict[Bounds, Arrays] = {}
         every = simulation.blocks(simulation.block_lanes(numba.get_num_threads()))
-        tally = Tally()
-        with LocalExecutor(simulation) as executor, Progress(len(simulation.lanes)) as bar:
-
-            def keep(block: Bounds, arrays: Arrays) -> None:
-                blocks[block] = arrays
-                tally.add(arrays)
-                bar.advance(block[1] - block[0])
-
-            compute_blocks(executor, every, keep)
+        with LocalExecutor(simulation) as executor:
+            tally = compute_blocks(executor, every, blocks.__setitem__)
         if tally.errors:
             say(tally.errors)
         in_order = [blocks[block] for block in sorted(blocks)]
@@ -159,7 +151,10 @@ def choose_threads(threads: int | None) -> None:
 
 def metadata(simulation: Simulation, seconds: float) -> Mapping[str, Any]:
     """Return what a result says of itself beside its arrays, after so many seconds of wall time."""
-    config = simulation.config
+    config, repeats = simulation.config, simulation.lanes.repeats_after
+    # What figures of teeth need, see `Excitation`.
+    pair = config.pair if repeats > 1 else None
+    teeth = zip(("driving_teeth", "driven_teeth"), pair.teeth, strict=True) if pair else ()
     return {
         "axes": " ".join(axis.name for axis in simulation.lanes.axes),
         "title": config.title,
@@ -172,18 +167,10 @@ def metadata(simulation: Simulation, seconds: float) -> Mapping[str, Any]:
         "steps_per_period": simulation.plan.steps_per_period,
         "transient_periods": simulation.plan.transient_periods,
         "recorded_periods": simulation.plan.recorded_periods,
-        **_excitation(simulation),
+        "excitation_period": repeats,
+        **dict(teeth),
         "notes": "\n".join(simulation.notes),
         **provenance(seconds),
         "configuration": config.text,
         "configuration_resolved": config.resolved_toml(),
     }
-
-
-def _excitation(simulation: Simulation) -> dict[str, float]:
-    """Tell when the excitation repeats, and of teeth what their figures need, see `Excitation`."""
-    config = simulation.config
-    facts: dict[str, float] = {"excitation_period": simulation.lanes.repeats_after}
-    if facts["excitation_period"] == 1 or config.pair is None:
-        return facts
-    return facts | dict(zip(("driving_teeth", "driven_teeth"), config.pair.teeth, strict=True))

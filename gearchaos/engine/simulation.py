@@ -23,7 +23,14 @@ from gearchaos.dynamics.largest_exponents import MEANINGS as RECORD_MEANINGS
 from gearchaos.dynamics.largest_exponents import largest_exponents
 from gearchaos.dynamics.stability import fewest_stable_steps
 from gearchaos.dynamics.systems import plan_of
-from gearchaos.engine.error_check import MEANINGS, check_arrays, checked_lanes
+from gearchaos.engine.error_check import (
+    CHANGED,
+    CHECKED,
+    MEANINGS,
+    NOT_CHECKED,
+    SAME,
+    checked_lanes,
+)
 from gearchaos.engine.excitation import remarks, whole_lengths
 from gearchaos.engine.lanes import Lanes
 from gearchaos.engine.steps import (
@@ -37,12 +44,11 @@ from gearchaos.engine.steps import (
     stable_steps,
 )
 from gearchaos.interrupts import check
-from gearchaos.records.contact import contact_told
 from gearchaos.records.difference import difference
 from gearchaos.records.label import MEANINGS as MOTION_MEANINGS
 from gearchaos.records.label import MOST_POINTS
-from gearchaos.records.loads import loads_told
 from gearchaos.records.period import POINTS_NEEDED
+from gearchaos.records.teeth import contact_told, loads_told
 from gearchaos.results.variables import DIRECTIONS, Variable, step_choice_variables, sweep_variables
 
 Arrays = Mapping[str, NDArray[Any]]
@@ -262,10 +268,8 @@ class Simulation:
             arrays["lyapunov_exponents"] = spectrum.values
             arrays["lyapunov_exponents_standard_error"] = spectrum.standard_errors
             arrays["lyapunov_sum"] = sum_of_exponents(system)
-        share = self.config.integration.error_check
-        if share > 0.0:
-            checked = checked_lanes(lanes // self.lanes.directions, share)
-            arrays |= self._check(system, start, outcome, told, checked)
+        if self.config.integration.error_check > 0.0:
+            arrays |= self._check(lanes, start, outcome, told)
         return arrays
 
     def _told_of_teeth(self, system: System, outcome: Outcome) -> dict[str, NDArray[Any]]:
@@ -287,28 +291,29 @@ class Simulation:
         }
 
     def _check(
-        self,
-        system: System,
-        start: Floats,
-        outcome: Outcome,
-        told: Told | None,
-        checked: NDArray[np.intp],
+        self, lanes: NDArray[np.intp], start: Floats, outcome: Outcome, told: Told | None
     ) -> dict[str, NDArray[Any]]:
         """Integrate and label the checked lanes of a block again with half the step, and compare.
 
         Compared is what the labels know: the file may keep fewer section points.
         """
-        lanes, kept = start.shape[0], self.config.outputs.section
-        if not checked.size:
-            return check_arrays(lanes, checked, None)
-        plan = self.recording
-        half = plan._replace(steps_per_period=2 * plan.steps_per_period)
-        system, finer = system.of(checked), integrate(system.of(checked), start[checked], half)
-        some = told and labels_of(system, finer, half)
-        fine = solution_of(system, finer, half, kept, some)
-        some = told and Told(told.labels.of(checked), told.state[checked])
-        coarse = solution_of(system, outcome_of(outcome, checked), plan, kept, some)
-        return check_arrays(lanes, checked, difference(coarse, fine))
+        plan, kept = self.recording, self.config.outputs.section
+        share = self.config.integration.error_check
+        checked = checked_lanes(lanes // self.lanes.directions, share)
+        section, exponent = np.full((2, lanes.size), np.nan)
+        motion = np.full(lanes.size, NOT_CHECKED, dtype=np.uint8)
+        if checked.size:
+            half = plan._replace(steps_per_period=2 * plan.steps_per_period)
+            system = self.lanes.system_of(lanes[checked])
+            finer = integrate(system, start[checked], half)
+            some = told and labels_of(system, finer, half)
+            fine = solution_of(system, finer, half, kept, some)
+            some = told and Told(told.labels.of(checked), told.state[checked])
+            coarse = solution_of(system, outcome_of(outcome, checked), plan, kept, some)
+            found = difference(coarse, fine)
+            section[checked], exponent[checked] = found.section_error, found.exponent_error
+            motion[checked] = np.where(found.changed, CHANGED, SAME)
+        return dict(zip(CHECKED, (section, exponent, motion), strict=True))
 
 
 def joined(outcomes: list[Outcome]) -> Outcome:

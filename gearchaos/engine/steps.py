@@ -213,13 +213,14 @@ def choose_steps(
 
     ``solution`` integrates the pilot lanes with so many steps per period, from one common state;
     ``tolerance``: of section and exponent; ``source``: what a message calls the configuration;
-    ``finest``: steps per period with which nothing is compared any more. Raises ConfigurationError
-    if the tolerance is not reached, with what was reached, or if no lane moves periodically.
+    ``finest``: steps per period beyond which only the first number is compared. Raises
+    ConfigurationError if the tolerance is not reached, with what was reached, or if no lane moves
+    periodically.
     """
     found: dict[int, Solution] = {}
     candidates: list[Candidate] = []
     steps = coarsest
-    while 4 * steps <= finest:
+    while not candidates or 4 * steps <= finest:
         for grid in (steps, 2 * steps, 4 * steps):
             if grid not in found:
                 found[grid] = solution(grid)
@@ -233,14 +234,9 @@ def choose_steps(
         if candidates[-1].error <= tolerance:
             return candidates
         steps *= 2
-    reached = (
-        f"{candidates[-1].error:.1e} with {candidates[-1].steps} steps per period"
-        if candidates
-        else "nothing, integration.steps_per_period is too large to begin with"
-    )
     raise ConfigurationError(
-        f"{source}: integration.tolerance = {tolerance:g}: is not reached, but {reached}; ask for "
-        "less" + ("" if candidates else " steps")
+        f"{source}: integration.tolerance = {tolerance:g}: is not reached, but "
+        f"{candidates[-1].error:.1e} with {candidates[-1].steps} steps per period; ask for less"
     )
 
 

@@ -1,16 +1,60 @@
-"""The blocks that a store lacks, computed into it."""
+"""The blocks of a sweep in its store: which of them are whose, and the missing ones computed."""
 
+import re
 from functools import partial
+from typing import NamedTuple, Self
 
 import numba
+from gearchaos_kernels import LANES
 
 from gearchaos.engine.error_check import Tally
 from gearchaos.engine.executors import BlockExecutor, LocalExecutor, compute_blocks
 from gearchaos.engine.provenance import SOFTWARE
-from gearchaos.engine.sharding import Shard, shared_block_lanes
-from gearchaos.engine.simulation import Arrays, Bounds, Simulation
-from gearchaos.progress import Progress, complain
+from gearchaos.engine.simulation import Bounds, Simulation
+from gearchaos.errors import ConfigurationError
+from gearchaos.progress import complain
 from gearchaos.results.block_store import BlockStore
+
+BLOCKS_PER_SHARD = 4
+"""At least so many blocks for everyone, as far as there are enough lanes: shards end together."""
+
+FEWEST_LANES, MOST_LANES = 8 * LANES, 128 * LANES
+"""Lanes of a block: a few threads are kept busy by the fewest, a whole node by the most."""
+
+
+class Shard(NamedTuple):
+    """The ``number``-th, from 1, ``of`` several portions of a sweep, each the work of one job."""
+
+    number: int
+    of: int
+
+    @classmethod
+    def from_text(cls, text: str) -> Self:
+        """Read ``2/8``; ConfigurationError if it is no shard."""
+        found = re.fullmatch(r"(\d{1,9})/(\d{1,9})", text, re.ASCII)
+        shard = cls(*map(int, found.groups())) if found else cls(0, 0)
+        if not 1 <= shard.number <= shard.of:
+            raise ConfigurationError(
+                f"--shard {text}: must be i/N with i from 1 to N, such as 2/8 for the second of "
+                "eight jobs"
+            )
+        return shard
+
+    def blocks(self, lanes: int) -> list[Bounds]:
+        """Return the bounds of this shard's blocks of a sweep of so many lanes."""
+        return shared_blocks(lanes, self.of)[self.number - 1 :: self.of]
+
+
+def shared_blocks(lanes: int, shards: int) -> list[Bounds]:
+    """Cut a sweep into blocks, whatever the machine, that so many jobs or workers share."""
+    size = shared_block_lanes(lanes, shards)
+    return [(first, min(first + size, lanes)) for first in range(0, lanes, size)]
+
+
+def shared_block_lanes(lanes: int, shards: int) -> int:
+    """Return how many lanes such a block has."""
+    share = -(-lanes // (BLOCKS_PER_SHARD * shards))
+    return min(max(LANES * -(-share // LANES), FEWEST_LANES), MOST_LANES)
 
 
 def open_store(
@@ -55,12 +99,6 @@ def fill(
         size = shared_block_lanes(len(simulation.lanes), executor.workers)
         performed_by = {"threads": 1, "workers": executor.workers}
     missing = store.missing(finished, size)
-    with executor, Progress(store.own_lanes, done) as progress:
-
-        def keep(block: Bounds, arrays: Arrays) -> None:
-            store.write(*block, arrays)
-            tally.add(arrays)
-            progress.advance(block[1] - block[0])
-
-        compute_blocks(executor, missing, keep)
+    with executor:
+        compute_blocks(executor, missing, lambda at, arrays: store.write(*at, arrays), tally, done)
     return tally, performed_by

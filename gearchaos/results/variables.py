@@ -8,10 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gearchaos.gear.tooth_deviations import REALISATION
-from gearchaos.records.contact import MEANINGS as CONTACT_STATES
-from gearchaos.records.contact import WORDING
-from gearchaos.records.loads import FORCES
-from gearchaos.records.loads import WORDING as LOADS
+from gearchaos.records.teeth import CONTACT, CONTACT_STATES, FORCES, LOADS
 
 START = "start"
 DIRECTION = "direction"
@@ -222,7 +219,7 @@ def sweep_variables(
         real("slowest_crossing", "smallest speed of a gap at a crossing of its clearance boundary")
         add("int32", "unsplit_steps", "steps with more crossings than they were split at")
     for way in contact:
-        for name, text in WORDING.items():
+        for name, text in CONTACT.items():
             real(f"{name}_{way}", f"{text}, {way}")
         kind(f"contact_state_{way}", f"kind of {way} contact", CONTACT_STATES)
     for way in loads:

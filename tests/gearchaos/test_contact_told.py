@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 import gearchaos
 from gearchaos import load_config
 from gearchaos.figures import bifurcation
-from gearchaos.records.contact import MEANINGS, contact_told
+from gearchaos.records.teeth import CONTACT_STATES, contact_told
 
 from .commands import run_module
 from .short_sweeps import PAN2021, SHORT, simulation
@@ -35,7 +35,7 @@ def test_the_four_states_of_contact():
     speeds = 0.5 * (on_driving + on_back)
     contact = np.stack([driving, on_driving, back, on_back, speeds, 0.7 * speeds], axis=1)
     found = contact_told(contact, 10)
-    assert [MEANINGS[state] for state in found["contact_state"]] == [
+    assert [CONTACT_STATES[state] for state in found["contact_state"]] == [
         "held",
         "held",
         "single_sided_impact",
@@ -68,7 +68,7 @@ def test_a_sweep_tells_the_contact_of_both_directions_and_its_file_keeps_it(tmp_
     kept = gearchaos.open_result(next(tmp_path.glob("*.h5")))
     for name in names:
         assert np.array_equal(kept[name], result[name], equal_nan=True), name
-    assert kept.variables["contact_state_tangential"].flags == MEANINGS
+    assert kept.variables["contact_state_tangential"].flags == CONTACT_STATES
 
 
 def test_what_is_told_of_each_lane_can_be_drawn_over_the_parameter():

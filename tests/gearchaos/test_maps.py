@@ -10,8 +10,8 @@ from gearchaos.errors import FigureError, FileError
 from gearchaos.figures import map_page, parameter_map
 from gearchaos.figures.stages import SHADES
 from gearchaos.plot import main
-from gearchaos.records.contact import MEANINGS as CONTACT
 from gearchaos.records.label import MEANINGS
+from gearchaos.records.teeth import CONTACT_STATES
 from gearchaos.results.result import Result
 from gearchaos.results.variables import Variable, coordinate, start_axis, sweep_variables
 
@@ -141,7 +141,7 @@ def test_the_page_has_a_panel_for_each_of_motion_exponent_and_contact(width, sha
     assert page.axes[0].get_gridspec().get_geometry() == shape
     titles = [axes.get_title(loc="left").split("$ ", 1)[1] for axes in page.axes]
     assert titles[0] == "Motion and period" and titles[1].startswith("Largest Lyapunov exponent")
-    flags = [flag.replace("_", " ") for flag in CONTACT]
+    flags = [flag.replace("_", " ") for flag in CONTACT_STATES]
     assert legend_of(page.axes[2]) == flags
     for axes in page.axes:
         assert [line.get_xdata() for line in axes.lines] == [[1200.0, 1200.0]] * 2

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import gearchaos
-from gearchaos.engine.sharding import Shard, shared_blocks
+from gearchaos.engine.store_filling import Shard, shared_blocks
 from gearchaos.errors import ConfigurationError
 from gearchaos.results.block_folder import StoreLock, folder_of
 

@@ -286,3 +286,6 @@ def test_the_boundaries_of_a_map_are_those_of_its_rows_and_what_rows_beside_show
     assert [0.1 <= one["below"] < one["above"] <= 0.5 for one in across["boundaries"]] == [True]
     refused = run_module("gearchaos.stages", path.name, *width, "--survival", "3", cwd=tmp_path)
     assert refused.code == 2 and "choose a slice with --at NAME=VALUE" in refused.err
+    assert sweep(tmp_path, *flags, "--set", "outputs.motion=false", "--overwrite").code == 0
+    refused = run_module("gearchaos.stages", path.name, *width, cwd=tmp_path)
+    assert refused.code == 4 and "holds no labels of the motion" in refused.err
