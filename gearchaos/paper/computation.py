@@ -190,7 +190,8 @@ def find_hop(config: Configuration, step: float = STEP, threads: int | None = No
     upwards and downwards agree everywhere.
     """
     config = config.replace("outputs", {"section_points": 1, "lyapunov": False})
-    carried = _over(config, LOW, HIGH, step).replace("start.carry", "both")
+    values = np.linspace(LOW, HIGH, 1 + round((HIGH - LOW) / step))
+    carried = _at(config, values.tolist()).replace("start.carry", "both")
     for key, periods in FOLLOWING.items():
         carried = carried.replace(f"integration.{key}", periods)
     sweeps = run(carried, threads)
@@ -200,8 +201,9 @@ def find_hop(config: Configuration, step: float = STEP, threads: int | None = No
         return None
     first, *_, last = jumps
     fine, changes = step / FINENESS, {}
-    low, high = math.ceil(first.above / fine) * fine, math.floor(last.below / fine) * fine
-    within = _over(config, low, high, fine).replace("outputs.motion", False)
+    inside = fine * np.arange(math.ceil(first.above / fine), math.ceil(last.below / fine))
+    within = _at(config, inside.tolist()).replace("integration.recorded_periods", 1)
+    within = within.replace("outputs.motion", False)
     for kind in STARTS:
         found = run(within.replace("start", {"kind": kind}), threads)
         held = found[CROSSINGS] == 0.0
@@ -209,12 +211,6 @@ def find_hop(config: Configuration, step: float = STEP, threads: int | None = No
         if places.size:
             changes[kind] = tuple(found[found.axis][places[0] : places[0] + 2].tolist())
     return Hop(sweeps, first, last, changes)
-
-
-def _over(config: Configuration, low: float, high: float, step: float) -> Configuration:
-    count = round((high - low) / step) + 1
-    sweep = {"parameter": "pitch_error", "from": low, "to": high, "count": count}
-    return config.replace("sweep", sweep)
 
 
 def _at(config: Configuration, pitch_errors: list[float]) -> Configuration:
