@@ -13,10 +13,12 @@ os.environ.setdefault("OMP_WAIT_POLICY", "passive")
 settings.register_profile("repeatable", derandomize=True, deadline=None)
 settings.load_profile("repeatable")
 
-FIRST = ("vectorisation", "plot", "oracle", "dask", "sweep_interrupted", "hard_groups", "loads")
+FIRST = ("vectorisation", "plot", "oracle", "shard_option", "hard_groups", "loads")
+FIRST += ("swept_parameters", "sweep_interrupted", "dask")
 """Files of which none shall be the last that runs, while other processes have nothing left to do.
 
-The first one compiles scenes whatever is in the cache: so early, others find them there.
+The first one compiles scenes whatever is in the cache: so early, others find them there. In the
+last one several workers would compile the same scene at once, had not a file before done it.
 """
 
 

@@ -15,7 +15,7 @@ from .commands import SMALL, names_in, run_module, same_data, signalled
 LOADS = np.linspace(0.1, 0.5, 9)
 ERRORS = np.linspace(0.0, 5.0, 40)
 STARTS = 3
-SETTLED = "transient_periods = 300\nrecorded_periods = 40"
+SETTLED = "transient_periods = 150\nrecorded_periods = 40"
 # Five blocks of lanes, cut across both axes, that take a second or two together.
 BOTH = SMALL.replace(
     "[integration]",
