@@ -1,4 +1,4 @@
-"""What do the contact and the loads of every lane cost a sweep?
+"""What do contact, loads, extremes and amplitudes of every lane cost a sweep?
 
     python benchmarks/outputs.py [--rounds 9]
 
@@ -10,6 +10,7 @@ other, and every figure is the median of the ratios of processor time within a r
 import argparse
 import statistics
 import time
+from fractions import Fraction
 from pathlib import Path
 
 import numba
@@ -27,6 +28,8 @@ OUTPUTS = {
     "contact": {"contact": True},
     "loads": {"loads": True},
     "both": {"contact": True, "loads": True},
+    "loads, a state": {"loads": True, "states": ("delta_5",)},
+    "loads, 5 orders": {"loads": True, "orders": tuple(Fraction(n, 2) for n in range(1, 6))},
 }
 LANES, SHARE = 128, 10
 """Lanes, and the part of the configured lengths that they run."""
@@ -49,12 +52,12 @@ def main() -> None:
     system = Lanes(config).system_of(np.arange(LANES))
     lengths = f"{plan.transient_periods} periods and a record of {plan.recorded_periods}"
     print(f"in multiples of a sweep without, {lengths}, median of {rounds} rounds\n")
-    print(f"{'scene':40}" + "".join(f"{name:>10}" for name in OUTPUTS))
+    print(f"{'scene':40}" + "".join(f"{name:>17}" for name in OUTPUTS))
     for name, effects in SCENES.items():
         for tangent in (False, True):
             ratios = costs(system._replace(effects=effects), plan._replace(tangent=tangent), rounds)
             row = f"{name}{', tangent' if tangent else ''}"
-            print(f"{row:40}" + "".join(f"{ratio:10.2f}" for ratio in ratios), flush=True)
+            print(f"{row:40}" + "".join(f"{ratio:17.2f}" for ratio in ratios), flush=True)
 
 
 def costs(system: System, plan: Plan, rounds: int) -> list[float]:

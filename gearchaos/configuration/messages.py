@@ -29,6 +29,7 @@ _RULES = {
     "literal_error": "must be one of {expected}",
     "union_tag_invalid": "must be one of {expected_tags}",
     "union_tag_not_found": "is missing",
+    "string_pattern_mismatch": "must be a positive whole number, or a fraction of two",
 }
 _EXPECTED = {
     "float_type": "a number",

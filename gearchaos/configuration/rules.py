@@ -102,8 +102,9 @@ def _states_exist(table: str, key: str, config: Tables) -> Iterator[Fault]:
 
 
 reads("scene")(partial(_named_once, "scene", "effects"))
-reads("outputs")(partial(_named_once, "outputs", "section"))
-reads("scene", "outputs")(partial(_states_exist, "outputs", "section"))
+for _key in ("section", "states"):
+    reads("outputs")(partial(_named_once, "outputs", _key))
+    reads("scene", "outputs")(partial(_states_exist, "outputs", _key))
 reads("scene", "start")(partial(_states_exist, "start", "state"))
 reads("scene", "start")(partial(_states_exist, "start", "box"))
 reads("scene", "start")(partial(_states_exist, "start", "drawn"))
@@ -178,9 +179,11 @@ def _contact_is_told_by_crossings(config: Tables) -> Iterator[Fault]:
 
 @reads("outputs", "integration")
 def _loads_are_told_by_short_steps(config: Tables) -> Iterator[Fault]:
-    if config.outputs.loads and config.integration.method == "flow_map":
-        rule = "needs steps shorter than those of flow maps"
-        yield Fault("outputs.loads", rule, 'set integration.method = "rk4"', True)
+    for name in ("loads", "states", "orders"):
+        value = getattr(config.outputs, name)
+        if value and config.integration.method == "flow_map":
+            rule = "needs steps shorter than those of flow maps"
+            yield Fault(f"outputs.{name}", rule, 'set integration.method = "rk4"', value)
 
 
 @reads("outputs", "integration")

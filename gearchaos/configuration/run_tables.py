@@ -1,9 +1,10 @@
 """The tables that say what is computed: groups given directly, scene, start, sweeps, outputs."""
 
 from collections.abc import Collection
+from fractions import Fraction
 from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias, get_args
 
-from pydantic import Field, create_model, model_validator
+from pydantic import BeforeValidator, Field, create_model, model_validator
 
 from gearchaos.configuration.keys import Harmonics, Numbers, Table, key
 from gearchaos.gear.groups import GROUP_TABLE, GroupRow
@@ -32,6 +33,11 @@ State: TypeAlias = Literal[
     "delta_4_rate",
 ]
 STATES: tuple[str, ...] = get_args(State)
+Order: TypeAlias = Annotated[
+    str,
+    BeforeValidator(str, json_schema_input_type=int | str),
+    Field(pattern="^[1-9][0-9]{0,5}(/[1-9][0-9]{0,5})?$"),
+]
 
 
 def states_of(effects: Collection[str]) -> tuple[str, ...]:
@@ -238,6 +244,17 @@ class Outputs(Table):
     loads: bool = key(
         "whether mesh forces, load factors and the transmission error are told", default=False
     )
+    states: Annotated[tuple[State, ...], Field(strict=False)] = key(
+        "states of which extremes, and amplitudes at the orders, are told",
+        example=["delta_5"],
+        default=(),
+    )
+    orders: Annotated[tuple[Order, ...], Field(strict=False, max_length=1000)] = key(
+        "multiples of the mesh frequency at which amplitudes of the transmission error are told; "
+        "the record has whole cycles of them",
+        example=["1/3", "1/2", 1, 2],
+        default=(),
+    )
     exponents: bool = key(
         "whether all Lyapunov exponents are computed, at about ten times the cost", default=False
     )
@@ -248,3 +265,8 @@ class Outputs(Table):
         ge=0,
         le=1,
     )
+
+    @property
+    def mesh_orders(self) -> tuple[Fraction, ...]:
+        """The orders, ascending, each once."""
+        return tuple(sorted({Fraction(order) for order in self.orders}))

@@ -65,11 +65,12 @@ class Tables(Table):
     def needed_effects(self) -> tuple[str, ...]:
         """The effects of the scene that act on what is kept.
 
-        The axial pair is driven one way: without an axial state in the section and without the
+        The axial pair is driven one way: without an axial state among the outputs and without the
         exponent of the whole system, nothing that is kept depends on it.
         """
         without_axial = states_of({"transverse"})
-        if self.outputs.lyapunov or not set(self.outputs.section).issubset(without_axial):
+        kept = {*self.outputs.section, *self.outputs.states}
+        if self.outputs.lyapunov or not kept.issubset(without_axial):
             return self.scene.effects
         return tuple(effect for effect in self.scene.effects if effect != "axial")
 

@@ -65,6 +65,8 @@ def labels_of(system: System, outcome: Outcome, plan: Plan) -> Told:
             history_periods=0,
             contact=False,
             loads=False,
+            states=(),
+            orders=(),
         )
         # In portions whose longer records take no more memory than those of all lanes.
         size = max(1, system.lanes // longer)

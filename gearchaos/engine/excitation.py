@@ -22,7 +22,7 @@ def whole_lengths(lanes: Lanes) -> dict[str, int]:
     """Return transient and record in whole excitation periods, enough of them to tell a period.
 
     In mesh periods, by the names of their keys. Raises ConfigurationError if the excitation repeats
-    too late.
+    too late, or the record does not suit an order of which amplitudes are told.
     """
     integration, repeats = lanes.config.integration, lanes.repeats_after
     if repeats > LONGEST_EXCITATION:
@@ -31,10 +31,21 @@ def whole_lengths(lanes: Lanes) -> dict[str, int]:
             f"more than {LONGEST_EXCITATION}; give one gear deviations, or other teeth"
         )
     least = {"transient_periods": 0, "recorded_periods": 1 if repeats == 1 else RETURNS}
-    return {
+    lengths = {
         name: repeats * max(math.ceil(getattr(integration, name) / repeats), count)
         for name, count in least.items()
     }
+    orders, record = lanes.config.outputs.mesh_orders, lengths["recorded_periods"]
+    most = integration.steps_per_period / 2
+    if unfit := [str(one) for one in orders if record % one.denominator or one >= most]:
+        whole = math.lcm(repeats, *(order.denominator for order in orders))
+        raise ConfigurationError(
+            f"{lanes.config.source}: outputs.orders: {', '.join(unfit)}: must have whole cycles in "
+            f"the record of {record} mesh periods and more than two steps in each; set "
+            f"integration.recorded_periods to a multiple of {whole}, such as "
+            f"{whole * math.ceil(record / whole)}, and keep to orders below {most:g}"
+        )
+    return lengths
 
 
 def remarks(lanes: Lanes, lengths: Mapping[str, int]) -> list[str]:

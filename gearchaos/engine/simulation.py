@@ -49,7 +49,14 @@ from gearchaos.records.label import MEANINGS as MOTION_MEANINGS
 from gearchaos.records.label import MOST_POINTS
 from gearchaos.records.period import POINTS_NEEDED
 from gearchaos.records.teeth import contact_told, loads_told
-from gearchaos.results.variables import DIRECTIONS, Variable, step_choice_variables, sweep_variables
+from gearchaos.results.variables import (
+    AMPLITUDE,
+    DIRECTIONS,
+    EXTREMES,
+    Variable,
+    step_choice_variables,
+    sweep_variables,
+)
 
 Arrays = Mapping[str, NDArray[Any]]
 Bounds = tuple[int, int]
@@ -78,6 +85,8 @@ class Simulation:
             tangent=outputs.lyapunov,
             contact=outputs.contact,
             loads=outputs.loads,
+            states=outputs.states,
+            orders=outputs.mesh_orders,
         )
         judged = outputs.lyapunov and integration.tolerance is None
         coarse = coarse_steps(self.lanes, steps) if judged else ""
@@ -138,6 +147,8 @@ class Simulation:
             crossings=self._splits_steps,
             contact=self._directions if self.plan.contact and self._splits_steps else (),
             loads=self._directions if self.plan.loads else (),
+            chosen=outputs.states,
+            orders=self.plan.orders,
             exponents=outputs.exponents,
             status_meanings=[status.name.lower() for status in STATUS_TEXTS],
             check_meanings=MEANINGS if checked else (),
@@ -273,7 +284,7 @@ class Simulation:
         return arrays
 
     def _told_of_teeth(self, system: System, outcome: Outcome) -> dict[str, NDArray[Any]]:
-        """Return what is kept of contact and loads, and of lanes that diverged none of it."""
+        """Return what is kept of contact, loads and states; of lanes that diverged none of it."""
         told: dict[str, NDArray[Any]] = {}
         if self.plan.contact and self._splits_steps:
             for way, columns in zip(
@@ -284,11 +295,11 @@ class Simulation:
         if self.plan.loads:
             static = system.groups.load / np.cos(system.groups.base_helix_angle)
             told |= loads_told(outcome.loads, static, self._directions)
-        sound = outcome.status == Status.OK
-        return {
-            name: values if values.dtype == np.uint8 else np.where(sound, values, np.nan)
-            for name, values in told.items()
-        }
+        told |= states_told(outcome, self.plan)
+        for values in told.values():
+            if values.dtype != np.uint8:
+                values[outcome.status != Status.OK] = np.nan
+        return told
 
     def _check(
         self, lanes: NDArray[np.intp], start: Floats, outcome: Outcome, told: Told | None
@@ -314,6 +325,19 @@ class Simulation:
             section[checked], exponent[checked] = found.section_error, found.exponent_error
             motion[checked] = np.where(found.changed, CHANGED, SAME)
         return dict(zip(CHECKED, (section, exponent, motion), strict=True))
+
+
+def states_told(outcome: Outcome, plan: Plan) -> dict[str, Floats]:
+    """Return extremes of the states of a plan, and amplitudes at its orders, by name."""
+    told: dict[str, Floats] = {}
+    for number, state in enumerate(plan.states):
+        smallest, largest = outcome.extremes[:, number].T
+        ends = smallest, largest, largest - smallest
+        told |= {f"{state}_{name}": end for name, end in zip(EXTREMES, ends, strict=True)}
+    if plan.orders:
+        names = (f"{AMPLITUDE}{name}" for name in (*plan.states, "transmission_error"))
+        told |= zip(names, np.moveaxis(outcome.amplitudes, 1, 0), strict=True)
+    return told
 
 
 def joined(outcomes: list[Outcome]) -> Outcome:

@@ -13,6 +13,7 @@ from gearchaos.figures.response_page import response_page
 from gearchaos.figures.shares import basins, basins_page, fractions, shares, shares_page
 from gearchaos.figures.stages import shade_stages
 from gearchaos.figures.sweep_page import bifurcation_page
+from gearchaos.figures.waterfall import waterfall
 
 __all__ = [
     "amplitude_spectrum",
@@ -32,4 +33,5 @@ __all__ = [
     "shares",
     "shares_page",
     "time_history",
+    "waterfall",
 ]

@@ -15,10 +15,11 @@ from gearchaos.figures.page import Page, few_ticks, footnote, letter, page
 from gearchaos.figures.panel import legend_above, mark_values
 from gearchaos.figures.stages import NARROWEST_SHARE, shade_stages
 from gearchaos.figures.style import OVERLAID, SINGLE_COLUMN_MM
+from gearchaos.figures.waterfall import waterfall
 from gearchaos.results.jumps import apart, directions_of
 from gearchaos.results.result import Result, section_variables
 from gearchaos.results.stage_table import LabelledLanes
-from gearchaos.results.variables import LABELS, LARGEST_EXPONENT, WAYS
+from gearchaos.results.variables import LABELS, LARGEST_EXPONENT, ORDER, WAYS
 
 HEIGHT_RATIOS = (1.6, 1.0)
 SHADE = "0.92"
@@ -48,7 +49,7 @@ def bifurcation_page(
     result : Result or sequence of Result
         Over one swept parameter; several are drawn over each other.
     variable, between, full_range
-        As for `bifurcation`.
+        As for `bifurcation`; amplitudes at mesh orders are drawn as by `waterfall`.
     stages : bool or LabelledLanes
         Shade the stages behind both panels. Lanes with other labels than those of the result may be
         given.
@@ -104,7 +105,9 @@ def bifurcation_page(
             shown: dict[str, Any] = {"between": between, "full_range": full_range}
             if len(results) > 1:
                 shown |= {"color": color, "marker": marker, "label": plain(name) or "untitled"}
-            if variable is not None or section_variables(one):
+            if variable in one and one.dims(str(variable))[-1] == ORDER:
+                waterfall(stack[0], one, str(variable), between=between)
+            elif variable is not None or section_variables(one):
                 bifurcation(stack[0], one, variable, **shown)
             if LARGEST_EXPONENT in one:
                 # A legend of the colours is enough.
@@ -113,7 +116,7 @@ def bifurcation_page(
             stack[0].set_xlabel("")
             letter(stack)
         for axes, intervals in zip(reversed(stack), MOST_INTERVALS, strict=False):
-            few_ticks(axes, None, intervals)
+            few_ticks(axes, None, None if axes.images else intervals)
             axes.yaxis.label.set_linespacing(1.0)
         if marked is not None:
             mark_values(stack, *marked)

@@ -4,6 +4,7 @@ import os
 import stat
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
+from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
@@ -225,6 +226,8 @@ def _check_variables(
         crossings=known.CROSSINGS in found,
         contact=[way for way in known.DIRECTIONS if f"contact_state_{way}" in found],
         loads=[way for way in known.DIRECTIONS if f"mesh_force_largest_{way}" in found],
+        chosen=[one for one in known.STATE_WORDING if f"{one}_peak_to_peak" in found],
+        orders=[Fraction(1)] if known.ORDER in found else [],
         exponents=known.ALL_EXPONENTS in found,
         check_meanings=["same"] if "motion_changed" in found else [],
         motion_meanings=["periodic"] if "motion" in found else [],

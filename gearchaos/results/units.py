@@ -30,9 +30,10 @@ _ACCELERATION = Unit(r"unit $b\prime\omega_h^2$", "m s-2", 1e-6, (LENGTH, FREQUE
 _FORCE = Unit(r"unit $k_mb\prime$", "N", 1e-6, (STIFFNESS, LENGTH))
 _GROWTH = Unit(r"per unit of $\tau$", "s-1", 1.0, (FREQUENCY,))
 _PURE = Unit("", "1", 1.0, ())
+_STATE = r"(section_|amplitude_)?delta_\d%s(_largest|_smallest|_peak_to_peak)?"
 _UNITS = {
-    r"(section_)?delta_\d|mesh_error|transmission_error_\w+": _LENGTH,
-    r"(section_)?delta_\d_rate|approach_\w+|slowest_crossing": _SPEED,
+    _STATE % "" + r"|mesh_error|(amplitude_)?transmission_error\w*": _LENGTH,
+    _STATE % "_rate" + r"|approach_\w+|slowest_crossing": _SPEED,
     r"delta_\d_acceleration": _ACCELERATION,
     r"mesh_force_\w+": _FORCE,
     r"lyapunov_(exponent|sum)\w*|exponent_step_error": _GROWTH,

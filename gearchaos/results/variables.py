@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from fractions import Fraction
 from typing import Any
 
 import numpy as np
@@ -21,11 +22,17 @@ WAYS = ("upwards", "downwards")
 SECTION_POINT = "section_point"
 STATE = "state"
 EXPONENT_NUMBER = "exponent"
+ORDER = "order"
 HARMONIC = "harmonic"
 """Dimensions: the start of a lane is one of its axes, the others belong to single variables."""
 
 SECTION = "section_"
 """What the names of section variables begin with."""
+
+AMPLITUDE = "amplitude_"
+"""What the names of amplitudes begin with."""
+EXTREMES = ("smallest", "largest", "peak_to_peak")
+"""What the names of those of a state end with."""
 
 LARGEST_EXPONENT = "lyapunov_exponent"
 ALL_EXPONENTS = "lyapunov_exponents"
@@ -153,6 +160,8 @@ def sweep_variables(
     crossings: bool = False,
     contact: Sequence[str] = (),
     loads: Sequence[str] = (),
+    chosen: Sequence[str] = (),
+    orders: Sequence[Fraction] = (),
     exponents: bool = False,
     check_meanings: Sequence[str] = (),
     motion_meanings: Sequence[str] = (),
@@ -163,7 +172,8 @@ def sweep_variables(
 
     The axes are second swept parameter, first swept parameter, realisation, start, direction, those
     there are; ``states`` those of the scene in its order, ``section`` those recorded at so many
-    section points, ``contact`` and ``loads`` the ways of which they are told. Meanings are those
+    section points, ``contact`` and ``loads`` the ways of which they are told, ``chosen`` the
+    states of which extremes are told, ``orders`` those of their amplitudes. Meanings are those
     of 0, 1, ...: of ``status``, of ``motion_changed`` where lanes are computed twice to measure
     their error, and of ``motion`` and ``record`` where they are labelled. A motion repeats after
     whole excitation periods, of so many mesh periods each.
@@ -227,6 +237,15 @@ def sweep_variables(
             real(f"{name}_{way}", f"{text}, {way}")
     for name, text in LOADS.items() if loads else ():
         real(name, text)
+    for state in chosen:
+        for name in EXTREMES:
+            real(f"{state}_{name}", f"{name.replace('_', ' ')} {STATE_WORDING[state][0]}")
+    if orders:
+        numbers = np.array(orders, dtype=np.float64)
+        variables.append(coordinate(ORDER, "1", "frequency over mesh frequency", "", numbers))
+        for state in (*chosen, "transmission_error"):
+            text, symbol = STATE_WORDING.get(state, ("transmission error", ""))
+            real(AMPLITUDE + state, f"amplitude of the {text}", symbol, ORDER)
     if check_meanings:
         halved = "when the step is halved"
         real("section_error", f"change of the section of a periodic lane {halved}")

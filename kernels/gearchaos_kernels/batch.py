@@ -13,7 +13,7 @@ from gearchaos_kernels.coefficients import lane_coefficients, state_scales, step
 from gearchaos_kernels.compilation import driver
 from gearchaos_kernels.flow_map import maps_of, sharing
 from gearchaos_kernels.forcing import phase_table
-from gearchaos_kernels.rows import CONTACT_ROWS, LANES, SIGNAL_ROWS, SIGNALS
+from gearchaos_kernels.rows import CONTACT_ROWS, ERROR, LANES, SIGNAL_ROWS, SIGNALS
 from gearchaos_kernels.status import Status
 from gearchaos_kernels.system import Floats, Outcome, Plan, Schedule, System
 from gearchaos_kernels.teeth import tables_of
@@ -51,13 +51,14 @@ def integrate(
     Raises
     ------
     ValueError
-        If flow maps are asked for with pitch errors tooth by tooth or with loads, or too many pairs
-        are in mesh.
+        If flow maps are asked for with pitch errors tooth by tooth, or to tell loads, extremes or
+        amplitudes, or too many pairs are in mesh.
     """
     lanes, states = start.shape[0], len(system.states)
     steps = plan.steps_per_period
     if tangent_start is None:
         tangent_start = np.full((lanes, states), 1.0 / np.sqrt(states))
+    present = flags(system, plan)
     outcome = Outcome(
         section=np.full((lanes, plan.section_points, states), np.nan),
         growth=np.full((lanes, plan.recorded_periods if plan.tangent else 0), np.nan),
@@ -69,14 +70,19 @@ def integrate(
         slowest_crossing=np.full(lanes, np.inf),
         overflows=np.zeros(lanes, dtype=np.int64),
         contact=np.zeros((lanes, 2 * CONTACT_ROWS if plan.contact else 0)),
-        loads=np.full((lanes, SIGNALS if plan.loads else 0, SIGNAL_ROWS), np.nan),
+        loads=np.full((lanes, SIGNALS if present.loads else 0, SIGNAL_ROWS), np.nan),
+        extremes=np.full((lanes, len(plan.states), 2), np.nan),
+        amplitudes=np.full((lanes, (len(plan.states) + 1) * len(plan.orders)), np.nan),
         history=np.full((lanes, plan.history_periods * steps + 1, states), np.nan),
     )
-    present = flags(system, plan)
     if present.flow_map is not None and present.teeth is not None:
         raise ValueError("flow maps know pitch errors that are a sine, not those of teeth")
-    if present.flow_map is not None and plan.loads:
+    if present.flow_map is not None and (plan.loads or plan.states or plan.orders):
         raise ValueError("the steps of flow maps are too long to tell loads from")
+    columns = [system.states.index(name) for name in plan.states]
+    phases = [2.0 * np.pi * float(order) / steps for order in plan.orders]
+    turns = np.stack([np.cos(phases), np.sin(phases)], axis=1)
+    chosen: tuple[Any, ...] = np.array([*columns, ERROR], dtype=np.intp), turns
     schedule = Schedule(*(getattr(plan, name) for name in Schedule._fields))
     for order, blocks, maps, steps_of in _shares(system, plan, present):
         step = system.mesh_period / steps_of
@@ -91,17 +97,25 @@ def integrate(
             blocks,
             maps,
             *tables_of(system, present, steps),
+            *chosen,
         )
         _integrate_blocks(batch, schedule, outcome, present)
         if maps.size:
             unmapped = np.repeat(np.isnan(maps[blocks[:, 3]]), blocks[:, 1])
             outcome.status[order[unmapped]] = Status.TOO_FAST
-    if plan.loads:
+    samples, step = steps * max(1, plan.recorded_periods), system.mesh_period / steps
+    if present.loads is not None:
         # Forces come per step squared, and the sums of Simpson's rule.
-        outcome.loads[:, :, 2:] /= 6.0 * steps * max(1, plan.recorded_periods)
-        outcome.loads[:, :2] /= (system.mesh_period / steps)[:, np.newaxis, np.newaxis] ** 2
-        outcome.loads[:, :2, 3] /= (system.mesh_period / steps)[:, np.newaxis] ** 2
+        outcome.loads[:, :, 2:] /= 6.0 * samples
+        outcome.loads[:, :2] /= step[:, np.newaxis, np.newaxis] ** 2
+        outcome.loads[:, :2, 3] /= step[:, np.newaxis] ** 2
+    scales = np.pad(state_scales(system, step)[:, columns], ((0, 0), (0, 1)), constant_values=1.0)
+    scales = scales[..., np.newaxis]
+    sums = outcome.amplitudes.reshape(lanes, len(columns) + 1, len(plan.orders))
     return outcome._replace(
+        # A scaled state may have the other sign.
+        extremes=np.sort(outcome.extremes * scales[:, :-1], axis=2),
+        amplitudes=np.abs(scales) * sums * (2.0 / samples),
         growth=outcome.growth if plan.tangent else None,
         history=outcome.history if plan.history_periods else None,
     )

@@ -28,6 +28,7 @@ from gearchaos_kernels.block_memory import (
     write_branches,
     write_state,
 )
+from gearchaos_kernels.chosen import begin_chosen, end_chosen, half_of, tell_chosen
 from gearchaos_kernels.compilation import align_stack, part, scalar
 from gearchaos_kernels.contact import branches_at, end_contact, step_may_leave
 from gearchaos_kernels.equations import gaps_at
@@ -59,7 +60,9 @@ class Batch(NamedTuple):
     states), ``steps_between_scalings`` (lanes,), ``table`` (rows, columns). ``blocks`` (blocks, 4):
     place of the first lane of each in ``order`` (lanes,), number of lanes, steps per period and
     where its maps begin in ``maps``, which only a method that has maps looks at. ``shares``: see
-    `share_table`; ``driving``, ``driven``, ``profile``: see `Teeth`.
+    `share_table`; ``driving``, ``driven``, ``profile``: see `Teeth`. ``chosen`` (rows,): of states
+    and the transmission error; ``turns`` (orders, 2): cosine and sine of the phase by which an
+    order advances in a step.
     """
 
     coefficients: NDArray[np.float64]
@@ -75,6 +78,8 @@ class Batch(NamedTuple):
     driving: NDArray[np.float64]
     driven: NDArray[np.float64]
     profile: NDArray[np.intp]
+    chosen: NDArray[np.intp]
+    turns: NDArray[np.float64]
 
 
 @part
@@ -82,7 +87,7 @@ def integrate_block(number_of_block, batch, plan, outcome, present):
     """Integrate the lanes of a block, and write what comes of them."""
     align_stack()
     first, lanes, steps, maps_at = batch.blocks[number_of_block]
-    memory = aligned_memory()
+    memory = aligned_memory(2 * half_of(batch))
     table = batch.table
     shares = batch.shares
     maps = batch.maps
@@ -98,6 +103,7 @@ def integrate_block(number_of_block, batch, plan, outcome, present):
         if present.loads is not None:
             if period == plan.transient_periods:
                 begin_loads(memory, table, shares, present)
+                begin_chosen(memory, batch)
         for number in range(steps):
             if period >= periods - plan.history_periods and number % every == 0:
                 sample = (period - periods + plan.history_periods) * plan.steps_per_period
@@ -120,6 +126,7 @@ def integrate_block(number_of_block, batch, plan, outcome, present):
             if present.loads is not None:
                 if period >= plan.transient_periods:
                     tell_loads(memory, phases, present)
+                    tell_chosen(memory, batch)
             if present.tangent is not None:
                 last = number == steps - 1
                 if (number + 1) % interval == 0 or last:
@@ -298,6 +305,7 @@ def end(block, batch, steps, plan, outcome, present):
             for row in range(rows.SIGNALS * rows.SIGNAL_ROWS):
                 value = memory[(rows.LOADS + row) * STRIDE + slot]
                 outcome.loads[index, row // rows.SIGNAL_ROWS, row % rows.SIGNAL_ROWS] = value
+            end_chosen(memory, slot, index, batch, outcome)
     if plan.history_periods > 0:
         keep_state(block, batch, outcome.history, plan.history_periods * plan.steps_per_period)
 

@@ -35,7 +35,7 @@ def flags(system: System, plan: Plan) -> Present:
         "wide": teeth is not None and teeth.pairs_in_mesh > rows.NARROW,
         "resolved": resolved,
         "contact": resolved and plan.contact,
-        "loads": plan.loads and plan.method == "rk4",
+        "loads": bool(plan.loads or plan.states or plan.orders) and plan.method == "rk4",
         "tangent": plan.tangent,
         "flow_map": plan.method == "flow_map",
     }
@@ -54,11 +54,12 @@ class Block(NamedTuple):
 
 
 @part
-def aligned_memory():
-    """Return memory for one block that starts on a cache line."""
-    memory = np.empty(rows.ROWS * STRIDE + CACHE_LINE // _ITEM)
+def aligned_memory(more=0):
+    """Return memory for one block, and so many rows more, that starts on a cache line."""
+    size = (rows.ROWS + more) * STRIDE
+    memory = np.empty(size + CACHE_LINE // _ITEM)
     misfit = (CACHE_LINE - memory.ctypes.data % CACHE_LINE) % CACHE_LINE // _ITEM
-    return memory[misfit : misfit + rows.ROWS * STRIDE]
+    return memory[misfit : misfit + size]
 
 
 def _pointer(context: Any, builder: Any, signature: Any, arguments: Any, number: int) -> Any:

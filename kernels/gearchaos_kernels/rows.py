@@ -116,4 +116,6 @@ SIGNALS, SIGNAL_ROWS = 3, 4
 """What is told of tangential force, axial force and transmission error: largest and smallest value,
 sums over the steps of six times the mean of itself and of its square; see `loads`."""
 CARRIED = LOADS + SIGNALS * SIGNAL_ROWS
+ERROR = CARRIED + Carried._fields.index("error")
 ROWS = CARRIED + len(Carried._fields)
+"""Rows of every block; behind them are those of what is `chosen`."""

@@ -1,6 +1,7 @@
 """What is integrated, how long, and what comes of it: the records that go in and out."""
 
 import math
+from fractions import Fraction
 from typing import NamedTuple, Self
 
 import numpy as np
@@ -156,7 +157,9 @@ class Plan(NamedTuple):
     ``history_periods`` every step is kept. ``method``: "rk4" or "flow_map", which resolves every
     crossing and whose steps are exact. ``first_period``: mesh periods that the teeth have turned
     before tau = 0. ``contact``: whether crossings are told by flank, where they are resolved.
-    ``loads``: whether mesh forces and transmission error are told, by RK4 alone.
+    ``loads``: whether mesh forces and transmission error are told, by RK4 alone; and so are the
+    extremes of these ``states``, and at these mesh ``orders``, of which the record has whole
+    cycles, amplitudes of them and of the transmission error.
     """
 
     steps_per_period: int
@@ -170,6 +173,8 @@ class Plan(NamedTuple):
     first_period: int = 0
     contact: bool = False
     loads: bool = False
+    states: tuple[str, ...] = ()
+    orders: tuple[Fraction, ...] = ()
 
 
 class Schedule(NamedTuple):
@@ -197,8 +202,9 @@ class Outcome(NamedTuple):
     (lanes, 12), or (lanes, 0) where the plan does not ask for it: tangential and then axial, mesh
     periods on and impacts on the driving flank and on the back flank, sum and largest of the speeds
     of approach, in the recorded periods; ``loads`` (lanes, 3, 4), or (lanes, 0, 4): largest and
-    smallest value, mean and mean square of N_y, N_z and delta_5 + e there; ``history`` (lanes,
-    history periods times steps + 1, states): the state at every step, or None.
+    smallest value, mean and mean square of N_y, N_z and delta_5 + e there; ``extremes`` (lanes,
+    states of the plan, 2): smallest and largest value, ``amplitudes`` (lanes, states + 1, orders);
+    ``history`` (lanes, history periods times steps + 1, states): the state at every step, or None.
     """
 
     section: Floats
@@ -212,6 +218,8 @@ class Outcome(NamedTuple):
     overflows: NDArray[np.int64]
     contact: Floats
     loads: Floats
+    extremes: Floats
+    amplitudes: Floats
     history: Floats | None
 
     def every(self, periods: int) -> Self:

@@ -5,6 +5,7 @@ import re
 import shutil
 import subprocess
 from dataclasses import replace
+from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
@@ -29,7 +30,7 @@ from gearchaos.results.variables import (
 LANES = 300
 POINTS = 1000
 STATES = ("delta_5", "delta_5_rate")
-SIZES = {"section_point": POINTS, "state": len(STATES), "exponent": len(STATES)}
+SIZES = {"section_point": POINTS, "state": len(STATES), "exponent": len(STATES), "order": 2}
 
 
 def swept(parameter: str = "pitch_error", count: int = LANES) -> Variable:
@@ -49,6 +50,8 @@ def make_result(*axes: Variable, **metadata: Any) -> Result:
         crossings=True,
         contact=["tangential"],
         loads=["tangential"],
+        chosen=["delta_1"],
+        orders=[Fraction(1, 2), Fraction(1)],
         exponents=True,
         check_meanings=["not_checked", "same", "changed"],
         motion_meanings=["periodic", "chaotic"],
@@ -375,6 +378,8 @@ def test_the_documented_variables_are_those_that_are_written() -> None:
     repeats = pair_axis(np.arange(2)), start_axis(2), direction_axis()
     result = make_result(swept("load", 3), swept(count=4), *repeats)
     short = {"load": "B", "pitch_error": "A", "section_delta_5": "section_STATE"}
+    ends = "delta_1_smallest", "delta_1_largest", "delta_1_peak_to_peak", "amplitude_delta_1"
+    short |= {name: name.replace("delta_1", "STATE") for name in ends}
     for name, variable in result.variables.items():
         dims = ", ".join(variable.dims).replace(", ".join(result.axes), "axes")
         fill = "" if variable.fill_value is None else str(variable.fill_value)
