@@ -164,7 +164,8 @@ def test_a_scheduler_that_goes_away_costs_nothing_that_is_finished(tmp_path):
         out, err = process.communicate(timeout=60)
     assert (process.returncode, out) == (4, ""), err
     assert "Traceback" not in err
-    assert "the connection to the scheduler was lost" in err
+    # Who asks it just then waits for an answer; on a busy machine that comes first.
+    assert re.search("the connection to the scheduler was lost|silent for .* alive[?]", err), err
     assert "lanes are kept" in err
 
 
