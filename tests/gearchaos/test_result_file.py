@@ -177,6 +177,7 @@ def test_xarray_reads_it_as_the_same_labelled_arrays(
             "section_point",
             "state",
             "exponent",
+            "order",
             "harmonic",
         }
         assert dataset.attrs["title"] == "Δ sweep"
@@ -220,6 +221,7 @@ def test_netcdf_finds_real_dimensions_only(path: Path, result: Result) -> None:
             "state": len(STATES),
             "harmonic": 3,
             "exponent": len(STATES),
+            "order": 2,
         }
         assert not file.groups["parameters"].dimensions
         assert [name for name in file.variables if name in result] == list(result)
@@ -236,7 +238,7 @@ def test_every_dataset_follows_the_rules_of_the_format(path: Path) -> None:
         assert (file.attrs["schema"], file.attrs["schema_version"]) == (b"gearchaos-sweep", b"3.2")
         datasets: list[h5py.Dataset] = []
         file.visititems(lambda _, item: datasets.append(item) if hasattr(item, "shape") else None)
-        assert len(datasets) == 47
+        assert len(datasets) == 53
         for dataset in datasets:
             assert {"units", "long_name"} <= set(dataset.attrs)
             assert dataset.dtype.kind == "S" or dataset.dtype.str in {"<f8", "<i4", "|u1"}
