@@ -12,6 +12,7 @@ import matplotlib as mpl
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.layout_engine import ConstrainedLayoutEngine
 from matplotlib.legend import Legend
 from matplotlib.ticker import AutoMinorLocator, MaxNLocator
 
@@ -48,11 +49,12 @@ def page(width_mm: float, height_mm: float) -> Iterator[Page]:
     """Make a page of this size; what is drawn on it meanwhile has the project's style."""
     with mpl.rc_context(style()):
         size = (width_mm / MM_PER_INCH, height_mm / MM_PER_INCH)
-        figure = Page(figsize=size, layout="constrained")
+        layout = ConstrainedLayoutEngine()
+        figure = Page(figsize=size, layout=layout)
         FigureCanvasAgg(figure)
         yield figure
-        # Ticks are made at the first drawing, in the style of that moment.
-        figure.draw_without_rendering()
+        # Ticks are made when they are first measured, in the style of that moment.
+        layout.execute(figure)
         # The layout is found; looking for it again takes longer than the drawing itself. The engine
         # "none" would have every page drawn twice.
         figure.set_layout_engine(None)
