@@ -27,6 +27,7 @@ TERMINATED = 143
 COMMANDS = {
     "sweep": "compute a sweep from a configuration file",
     "plot": "draw a result file",
+    "explore": "open a local page to look into a result",
     "stages": "list the stages of a sweep, and refine their boundaries",
     "basins": "find the attractors of a sweep from many starts, and their basins",
     "response": "compute a motion at every step of some mesh periods",

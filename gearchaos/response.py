@@ -1,6 +1,7 @@
 """Compute the motion of some pitch errors, or of some values of the swept parameter, at every step
 of the last mesh periods: displacements, velocities, accelerations, mesh forces and contact. Of a
-result, the motion goes on from where one of its lanes ended, with no transient.
+result, the motion goes on from where one of its lanes ended, with no transient, or is computed
+again from where the lane started.
 
 The path of the result goes to stdout, everything else to stderr; python -m gearchaos.plot draws
 it. Exit codes: 0 done, 2 the command line or the configuration asks for what cannot be, 3 done, but
@@ -38,6 +39,8 @@ def _arguments(parser: ArgumentParser) -> None:
         "nearest lane, with NAME=VALUE for each axis where there are several"
     )
     values.add_argument("--at", type=place, action="append", metavar="VALUE", help=text)
+    text = "of the lane of a result: go on from its end (default), or repeat it from its start"
+    add("--begin", choices=("end", "start"), default="end", help=text)
     text = "mesh periods kept (default: %(default)s)"
     add("--periods", type=int, default=DEFAULT_PERIODS, metavar="N", help=text)
 
@@ -80,8 +83,9 @@ def _lane(options: Namespace) -> "Asked":
     if lane.axes:
         rest = " and ".join(f"--at {axis}=VALUE" for axis in lane.axes)
         raise ConfigurationError(f"{options.config}: name one lane, with {rest} as well")
-    note = f"goes on from the end of the lane {lane.where} of {options.config}"
-    return continued(lane, options.config), str(lane.metadata["configuration"]), [note]
+    note = f"goes on from the {options.begin} of the lane {lane.where} of {options.config}"
+    config = continued(lane, options.config, options.begin)
+    return config, str(lane.metadata["configuration"]), [note]
 
 
 def _configuration(options: Namespace) -> "Asked":

@@ -83,13 +83,14 @@ def refinable(result: Result, name: str) -> Configuration:
     return config
 
 
-def continued(lane: Result, name: str) -> Configuration:
+def continued(lane: Result, name: str, begin: str = "end") -> Configuration:
     """Return the configuration of the motion that goes on from the end of a lane of a result.
 
-    All axes of the result, which messages call by a name, are fixed; no transient is left out.
-    Raises FileError if it holds no configuration, ConfigurationError if the lane diverged.
+    All axes of the result, which messages call by a name, are fixed; no transient is left out. To
+    ``begin`` at its "start" repeats the lane, transient and all. Raises FileError if it holds no
+    configuration, ConfigurationError if the lane diverged.
     """
-    config, ended = computable(lane, name), lane["end_state"].tolist()
+    config, ended = computable(lane, name), lane[f"{begin}_state"].tolist()
     if not np.isfinite(ended).all():
         raise ConfigurationError(
             f"{name}: {lane.where}: this lane diverged, choose another with --at"
@@ -99,10 +100,9 @@ def continued(lane: Result, name: str) -> Configuration:
         "start": {"kind": "given", "state": state},
         # States that the file lacks would begin far from where they settle.
         "scene.effects": config.needed_effects,
-        "integration.transient_periods": 0,
     }.items():
         config = config.replace(key, value)
-    return config
+    return config.replace("integration.transient_periods", 0) if begin == "end" else config
 
 
 class Survival(NamedTuple):

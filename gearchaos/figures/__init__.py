@@ -5,6 +5,7 @@ from gearchaos.figures.maps import map_page, parameter_map
 from gearchaos.figures.page import save_figure
 from gearchaos.figures.response import (
     amplitude_spectrum,
+    contact_strip,
     phase_portrait,
     poincare_section,
     time_history,
@@ -21,6 +22,7 @@ __all__ = [
     "basins_page",
     "bifurcation",
     "bifurcation_page",
+    "contact_strip",
     "fractions",
     "lyapunov",
     "map_page",

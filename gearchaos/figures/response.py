@@ -1,8 +1,10 @@
 """One lane of a response: time history, phase portrait, Poincare section, amplitude spectrum."""
 
+from typing import Any
+
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.collections import LineCollection
+from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 
@@ -10,10 +12,10 @@ from gearchaos.errors import FigureError
 from gearchaos.figures.labels import axis_label, place_of, plain, unit_of
 from gearchaos.figures.lanes import Between, Floats
 from gearchaos.figures.page import remark
-from gearchaos.figures.style import BLACK, BLUE, VERMILION
+from gearchaos.figures.style import BLACK, BLUE, LEGEND, ORANGE, VERMILION
 from gearchaos.records.amplitude_spectrum import spectral_lines
 from gearchaos.records.period import motion_period
-from gearchaos.results.response_variables import TIME, acceleration_of
+from gearchaos.results.response_variables import MESH_FORCE, TIME, acceleration_of
 from gearchaos.results.result import Result, section_variables
 from gearchaos.results.units import excitation_of
 
@@ -23,6 +25,11 @@ COORDINATE = "delta_5"
 HIGHEST_ORDER = 8.0
 DECADES = 5
 """Decades that a logarithmic spectrum shows, up to that of its highest line."""
+
+CONTACT_COLOURS = (ORANGE, "0.8", BLUE)
+"""Of teeth apart, of driving and of back flanks in contact."""
+STRIP_HEIGHT = 0.05
+"""Of what tells the contact along the foot of a panel, in parts of the panel."""
 
 _LINE_LENGTH = 26
 _MARGIN = 0.06
@@ -71,6 +78,28 @@ def time_history(
     axes.set_xlim(low, high)
     _label(axes, result, TIME, variable)
     return line
+
+
+def contact_strip(axes: Axes, result: Result, lane: int, variable: str) -> list[PolyCollection]:
+    """Tell along the foot of a time history of a mesh force which flanks are in contact.
+
+    Parameters as for `time_history`, for ``"mesh_force_tangential"`` or ``"mesh_force_axial"``.
+    Returns a strip of bars for each state of contact that occurs; a legend above everything in the
+    figure, which needs the constrained layout, names them.
+    """
+    name, time = f"contact_{variable.removeprefix(MESH_FORCE)}", result[TIME]
+    states, strips = result.lanes(name)[lane], []
+    first = np.flatnonzero(np.diff(states, prepend=-1))
+    begin, lengths = time[first], np.diff(time[first], append=time[-1])
+    for number, words in enumerate(result.variables[name].flags):
+        bars = np.column_stack([begin, lengths])[states[first] == number]
+        if bars.size:
+            look: Any = {"color": CONTACT_COLOURS[number], "lw": 0.0}
+            look |= {"label": words.replace("_", " "), "transform": axes.get_xaxis_transform()}
+            strips.append(axes.broken_barh(bars.tolist(), (0.0, STRIP_HEIGHT), **look))
+    assert axes.figure is not None
+    axes.figure.legend(handles=strips, loc="outside upper left", ncols=len(strips), **LEGEND)
+    return strips
 
 
 def phase_portrait(

@@ -16,7 +16,7 @@ from gearchaos.figures import response
 from gearchaos.figures.labels import form_in_words, in_words, place_of
 from gearchaos.figures.page import Page, few_ticks, footnote, letter, page, remark
 from gearchaos.figures.style import BLACK, BLUE, DOUBLE_COLUMN_MM, LEGEND, VERMILION
-from gearchaos.results.response_variables import MESH_ERROR, TIME, acceleration_of
+from gearchaos.results.response_variables import MESH_ERROR, MESH_FORCE, TIME, acceleration_of
 from gearchaos.results.result import Result
 from gearchaos.results.units import Excitation, excitation_of
 
@@ -86,6 +86,8 @@ def response_page(
         last = result[TIME][-1]
         shown = (max(0.0, last - SHOWN_PERIODS), last)
         response.time_history(history, result, lane, coordinate, between=shown)
+        if coordinate.startswith(MESH_FORCE):
+            response.contact_strip(history, result, lane, coordinate)
         texts = [in_words(result, place_of(result, lane))]
         if whole:
             response.phase_portrait(planes[0], result, lane, coordinate)

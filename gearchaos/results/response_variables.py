@@ -9,6 +9,8 @@ from gearchaos.results.variables import DIRECTIONS, STATE_WORDING, Variable, coo
 TIME = "time"
 MESH_PERIOD = "mesh_period"
 MESH_ERROR = "mesh_error"
+MESH_FORCE = "mesh_force_"
+"""What the names of mesh forces begin with."""
 DEFAULT_PERIODS = 32
 """Mesh periods of a response where their number is not given."""
 
@@ -50,7 +52,7 @@ def response_variables(
         name, text = f"contact_{direction}", f"contact in the {direction} direction"
         dims = (*lane, TIME)
         variables += [
-            motion(f"mesh_force_{direction}", f"{direction} mesh force", symbol),
+            motion(f"{MESH_FORCE}{direction}", f"{direction} mesh force", symbol),
             Variable(name, dims, "uint8", "1", text, "", NO_CONTACT_STATE, CONTACTS),
         ]
     return variables

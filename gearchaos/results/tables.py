@@ -12,13 +12,13 @@ if TYPE_CHECKING:
     from gearchaos.results.result import Result
 
 
-def needed(package: str) -> Any:
-    """Import a package that gearchaos does without otherwise; raises FileError if it is missing."""
+def needed(package: str, extra: str = "export") -> Any:
+    """Import a package of an extra of gearchaos; raises FileError if it is missing."""
     try:
         return import_module(package)
     except ImportError as error:
         text = f"the package {package.partition('.')[0]} is not installed"
-        raise FileError(f"{text}; pip install gearchaos[export]") from error
+        raise FileError(f"{text}; pip install gearchaos[{extra}]") from error
 
 
 def to_xarray(result: "Result") -> Any:

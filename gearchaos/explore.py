@@ -1,0 +1,92 @@
+"""Open a local page on a result: its diagram to zoom into, and the motion of any lane at a click.
+
+The page is served to this machine alone, at the address that goes to stdout, until Ctrl-C; the
+address in the browser is a link to what the page shows. Needs pip install gearchaos[explore]. Exit
+codes: 0 ended, 2 the port is taken or the file is a response, 4 the file cannot be read, or a
+package is missing.
+"""
+
+import sys
+from argparse import ArgumentParser, Namespace
+from collections.abc import Sequence
+from contextlib import redirect_stderr, redirect_stdout
+from functools import partial
+from io import StringIO
+
+from gearchaos import plot
+from gearchaos.command_line import OK, Command, whole_number
+from gearchaos.errors import ConfigurationError, FigureError
+from gearchaos.progress import say
+
+HOST = "127.0.0.1"
+PACKAGES = ("panel", "holoviews", "datashader")
+
+
+def _arguments(parser: ArgumentParser) -> None:
+    add = parser.add_argument
+    add("result", metavar="RESULT.h5", help="result file of a sweep")
+    port = partial(whole_number, low=0, high=65535)
+    text = "port of the page (default: %(default)s; 0: any that is free)"
+    add("--port", type=port, default=5006, metavar="N", help=text)
+    add("--no-browser", action="store_true", help="only say the address")
+
+
+def _explore(options: Namespace) -> int:
+    import webbrowser
+    from socket import create_server
+
+    from gearchaos.figures.response import is_response
+    from gearchaos.results.atomic_file import reason
+    from gearchaos.results.result import open_result
+    from gearchaos.results.tables import needed
+
+    result = open_result(options.result)
+    if is_response(result):
+        raise ConfigurationError(
+            f"{options.result}: is a response; python -m gearchaos.plot draws it"
+        )
+    try:
+        with create_server((HOST, options.port)) as free:
+            port = free.getsockname()[1]
+    except OSError as error:
+        rule = f"{reason(error)}; choose another port, or 0 for any that is free"
+        raise ConfigurationError(f"--port {options.port}: {rule}") from error
+    panel, *_ = (needed(package, "explore") for package in PACKAGES)
+    from tornado.web import ErrorHandler
+
+    from gearchaos.explorer.page import Page
+
+    panel.extension()
+    server = panel.io.server.get_server(
+        lambda: Page(result, options.result, _draw).view(),
+        port=port,
+        address=HOST,
+        websocket_origin=[f"{HOST}:{port}", f"localhost:{port}"],
+        title=f"gearchaos: {options.result}",
+        warm=True,
+    )
+    # A page of another site can give its own name to this address, and would be taken for ours.
+    refused = (".*", ErrorHandler, {"status_code": 403})
+    server._tornado.add_handlers(rf"(?!({HOST}|localhost)$).*", [refused])
+    server.start()
+    address = f"http://{HOST}:{port}/"
+    print(address, flush=True)
+    say("Ctrl-C ends it")
+    if not options.no_browser:
+        webbrowser.open(address)
+    server.io_loop.start()
+    return OK
+
+
+def _draw(arguments: Sequence[str]) -> None:
+    said = StringIO()
+    with redirect_stdout(StringIO()), redirect_stderr(said):
+        code = plot.main([*arguments, "--quiet"])
+    if code:
+        raise FigureError(said.getvalue())
+
+
+main = Command("explore", __doc__, _arguments, _explore, writes=False)
+
+if __name__ == "__main__":
+    sys.exit(main())

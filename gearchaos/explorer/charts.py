@@ -1,0 +1,99 @@
+"""Diagram, exponent chart and map of a sweep, which are drawn anew at every zoom."""
+
+import re
+from typing import Any
+from unicodedata import lookup
+
+import holoviews as hv
+import numpy as np
+from datashader.reductions import max as highest
+from holoviews.operation.datashader import dynspread, rasterize
+from matplotlib.colors import ListedColormap, to_hex
+from matplotlib.figure import Figure
+
+from gearchaos.figures.labels import axis_label
+from gearchaos.figures.lanes import diagram_lanes, map_axes
+from gearchaos.figures.maps import parameter_map
+from gearchaos.figures.panel import robust_limits
+from gearchaos.figures.style import BLACK
+from gearchaos.results.result import Result
+from gearchaos.results.variables import LARGEST_EXPONENT
+
+Charts = tuple[list[Any], dict[str, str]]
+"""Panels, of which the first is zoomed into, and the colours of kinds by their names."""
+
+GREYS = [f"#{3 * f'{shade:02x}'}" for shade in range(176, -1, -1)]
+"""From pixels that are visited rarely to those where all points of a motion lie."""
+
+COLOURS = 256
+
+_RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+_LOWERED = str.maketrans("0123456789aehikmnprstx", "₀₁₂₃₄₅₆₇₈₉ₐₑₕᵢₖₘₙₚᵣₛₜₓ")
+
+
+def diagram(result: Result, variable: str) -> Charts:
+    """Draw the points of a variable over one swept parameter, and the largest exponent if known."""
+    lanes, drawn = diagram_lanes(result), [variable]
+    if LARGEST_EXPONENT in result:
+        drawn.append(LARGEST_EXPONENT)
+    charts: list[Any] = []
+    for name in drawn:
+        rows = result.lanes(name)[lanes.numbers].reshape(lanes.numbers.size, -1)
+        rows = np.where(lanes.diverged[:, np.newaxis], np.nan, rows)
+        there, dimensions = (
+            rows[np.isfinite(rows).any(axis=1)],
+            _dimensions(result, result.axis, name),
+        )
+        points = np.repeat(lanes.parameter, rows.shape[1]), rows.ravel()
+        if charts:
+            drawn_line = rasterize(hv.Curve(points, *dimensions), aggregator="any")
+            chart = dynspread(drawn_line, max_px=1, threshold=0.9)
+            look = {"cmap": [BLACK], "height": 240, "show_grid": True}
+        else:
+            counted = rasterize(hv.Points(points, dimensions), aggregator="count")
+            chart = dynspread(counted, max_px=3, threshold=0.9)
+            look = {"cmap": GREYS, "cnorm": "eq_hist", "height": 340}
+        if there.size:
+            ends = np.nanmin(there, axis=1), np.nanmax(there, axis=1)
+            look["ylim"] = robust_limits(*ends, hold_zero=bool(charts))
+        charts.append(chart.opts(xlim=lanes.limits, responsive=True, **look))
+    return charts, {}
+
+
+def two_parameter_map(result: Result, variable: str) -> Charts:
+    """Draw a variable of the lanes over two swept parameters, as `figures.parameter_map` does."""
+    axes, names = Figure().subplots(), map_axes(result)
+    image: Any = parameter_map(axes, result, variable)
+    legend, colours = axes.get_legend(), image.cmap
+    patches: list[Any] = legend.legend_handles if legend else []
+    numbers = np.ma.filled(image.get_array().astype(float), np.nan)
+    mesh = hv.QuadMesh((*map(result.__getitem__, names), numbers), _dimensions(result, *names))
+    shades = colours(np.linspace(0.0, 1.0, min(colours.N, COLOURS)))
+    look: Any = {"cmap": [to_hex(shade) for shade in shades], "clim": image.get_clim()}
+    look |= {"colorbar": not isinstance(colours, ListedColormap), "height": 580}
+    chart = rasterize(mesh, aggregator=highest()).opts(responsive=True, **look)
+    return [chart], {str(one.get_label()): to_hex(one.get_facecolor()) for one in patches}
+
+
+def plain_text(label: str) -> str:
+    """Word a label in Unicode, as δ₅' for ``$\\delta_5'$``: nothing then takes it for a formula."""
+    text = re.sub(r"\\([A-Za-z]+)", lambda found: _letter(found[1]), label)
+    text = re.sub(r"\^\{?(-?\d+)\}?", lambda found: found[1].translate(_RAISED), text)
+    text = re.sub(r"_\{?([\daehikmnprstx]+)\}?", lambda found: found[1].translate(_LOWERED), text)
+    return re.sub(r"[${}\\]", "", text)
+
+
+def _letter(name: str) -> str:
+    case = "CAPITAL" if name[0].isupper() else "SMALL"
+    try:
+        return lookup(f"GREEK {case} LETTER {name.replace('lambda', 'lamda')}")
+    except KeyError:
+        return "\N{PRIME}" if name == "prime" else name
+
+
+def _dimensions(result: Result, *names: str) -> list[Any]:
+    # Of the axis upwards there is less room.
+    labels = [
+        axis_label(result, name, length) for name, length in zip(names, (60, 26), strict=True)
+    ]
+    return [hv.Dimension(n, label=plain_text(one)) for n, one in zip(names, labels, strict=True)]

@@ -1,0 +1,287 @@
+"""The page of one result: what it shows, and what switches, clicks and links change."""
+
+import shlex
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
+from html import escape
+from io import BytesIO
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import holoviews as hv
+import numpy as np
+import panel as pn
+from bokeh.models import CrosshairTool, Span
+
+from gearchaos.engine.recomputing import continued
+from gearchaos.engine.response import compute_response, prepared
+from gearchaos.engine.running import compiling
+from gearchaos.errors import FigureError
+from gearchaos.explorer.charts import diagram, plain_text, two_parameter_map
+from gearchaos.explorer.motion import FORCE, panels
+from gearchaos.figures.labels import in_words, unit_of
+from gearchaos.figures.lanes import diagram_lanes, swept_axes
+from gearchaos.figures.page import FORMATS
+from gearchaos.figures.response import COORDINATE
+from gearchaos.figures.style import GREY, VERMILION
+from gearchaos.results.response_variables import DEFAULT_PERIODS
+from gearchaos.results.result import Result, section_variables
+from gearchaos.results.stage_table import label_text
+from gearchaos.results.variables import LABELS, LARGEST_EXPONENT, SECTION, STATUS, coordinate_text
+
+WIDE = {"sizing_mode": "stretch_width"}
+HALF = {"flex": "1 1 560px", "min-width": "0"}
+"""Side by side where the window is wide enough."""
+
+
+class Page:
+    """What a visitor sees of a result, whose file is ``path``.
+
+    ``draw`` runs the command `plot` with its arguments, and raises FigureError if that fails.
+    """
+
+    def __init__(self, result: Result, path: str, draw: Callable[[Sequence[str]], None]) -> None:
+        self._result, self._path, self._draw, self._shown = result, path, draw, result
+        self._swept = swept_axes(result)[::-1]
+        self._others = [axis for axis in result.axes if axis not in self._swept]
+        self._periods = min(DEFAULT_PERIODS, int(result.metadata["recorded_periods"]))
+        choices: dict[str, Any] = {"variable": self._variables()}
+        for axis in self._others:
+            choices[axis] = {coordinate_text(axis, at): at for at in result[axis].tolist()}
+        choices |= {"units": ["dimensionless", "physical"], "motion_from": ["end", "start"]}
+        self._switches = {name: pn.widgets.Select(options=choices[name]) for name in choices}
+        for axis in self._swept:
+            middle = float(result[axis][result[axis].size // 2])
+            self._switches[axis] = pn.widgets.FloatInput(value=middle, format="0.[000000]")
+        for name, switch in self._switches.items():
+            switch.name, switch.width = name.replace("_", " ").capitalize(), 170
+        self._window = pn.widgets.LiteralInput(value=[], visible=False)
+        texts = (pn.pane.HTML("", **WIDE) for _ in range(5))
+        self._pointed, self._lane, self._fault, self._kinds, self._commands = texts
+        self._charts, self._panels = pn.Column(**WIDE), pn.GridBox(ncols=2, **WIDE)
+        self._place, self._steady = hv.streams.Pipe(data=()), True
+        self._fixed: Mapping[str, float] = {}
+        self._motion: Result | None = None
+        self._refused: dict[str, str] = {}
+
+    def view(self) -> Any:
+        """Compose what the link asks for; from then on the link follows what is changed."""
+        for name, switch in (*self._switches.items(), ("window", self._window)):
+            wrong = partial(self._refuse, name)
+            pn.state.location.sync(switch, {"value": name}, lambda _, wrong=wrong: wrong())
+        for name, switch in self._switches.items():
+            moves = name in ("motion_from", *self._swept)
+            changed = partial(self._change, name, self._move if moves else self._redraw)
+            switch.param.watch(changed, "value")
+        self._redraw()
+        for name in (*self._switches, *self._refused):
+            self._allowed(name)
+        files = [(name, kind) for name in ("sweep", "motion", "mesh_force") for kind in FORMATS]
+        saves = [
+            pn.widgets.FileDownload(
+                callback=partial(self._saved, name, kind),
+                filename=f"{Path(self._path).stem}_{name}.{kind}",
+                label=f"{name.replace('_', ' ').capitalize()} as {kind.upper()}",
+                width=170,
+            )
+            for name, kind in files
+        ]
+        title = escape(str(self._result.metadata.get("title", "")))
+        return pn.Column(
+            pn.pane.HTML(f"<b>{title}</b> {escape(self._path)}", **WIDE),
+            pn.FlexBox(*self._switches.values()),
+            self._fault,
+            pn.FlexBox(
+                pn.Column(self._pointed, self._charts, self._kinds, styles=HALF),
+                pn.Column(self._lane, self._panels, styles=HALF),
+                **WIDE,
+            ),
+            pn.FlexBox(*saves),
+            self._commands,
+            **WIDE,
+        )
+
+    def _variables(self) -> list[str]:
+        """Name what can be drawn of the sweep, first what is drawn unless another is chosen."""
+        of_lanes = [one for one in self._result.variables.values() if one.dims == self._result.axes]
+        if len(self._swept) > 1:
+            return sorted((one.name for one in of_lanes), key=lambda name: name != LABELS[0])
+        numbers = [one.name for one in of_lanes if one.dtype == "float64"]
+        return [*section_variables(self._result), *numbers]
+
+    @property
+    def _ends(self) -> list[float]:
+        """The ends of both axes of the first chart, empty where all of it is seen."""
+        ends = self._window.value
+        given = isinstance(ends, list) and len(ends) == 4
+        return ends if given and all(isinstance(end, float | int) for end in ends) else []
+
+    def _value(self, name: str) -> Any:
+        return self._switches[name].value
+
+    def _in_units(self, result: Result) -> Result:
+        return result.physical() if self._value("units") == "physical" else result
+
+    def _change(self, name: str, show: Callable[[], None], _event: Any) -> None:
+        """Show what another value of a switch asks for."""
+        if self._steady and self._allowed(name):
+            if show == self._redraw:
+                self._window.value = []
+            show()
+
+    def _allowed(self, name: str) -> bool:
+        """Tell whether a switch has one of its values; if a link gave another, take the first."""
+        choices = getattr(self._switches[name], "values", [self._value(name)])
+        if self._value(name) in choices:
+            return True
+        self._switches[name].value = choices[0]
+        self._refuse(name)
+        return False
+
+    def _refuse(self, name: str) -> None:
+        self._refused[name] = ""
+        self._say(f"the link asks for what there is not: {', '.join(self._refused)}")
+
+    def _redraw(self) -> None:
+        """Draw the sweep, of which another variable, branch or unit may be wanted, and a motion."""
+        chosen = self._result.sel(None, **{axis: self._value(axis) for axis in self._others})
+        draw = two_parameter_map if len(self._swept) > 1 else diagram
+        try:
+            self._shown = self._in_units(chosen)
+            charts, kinds = draw(self._shown, self._value("variable"))
+        except Exception as error:
+            # Most often there are no physical units.
+            self._switches["units"].value = "dimensionless"
+            self._say(_reason(error))
+            return
+        line = Span(dimension="height", line_color=GREY)
+        if ends := self._ends:
+            charts[0].opts(ylim=tuple(ends[2:]))
+        for chart in charts:
+            chart.opts(**({"xlim": tuple(ends[:2])} if ends else {}))
+            chart.opts(tools=[CrosshairTool(overlay=line)])
+            hv.streams.PointerXY(source=chart).add_subscriber(self._point)
+            hv.streams.Tap(source=chart).add_subscriber(self._click)
+        hv.streams.RangeXY(source=charts[0]).add_subscriber(self._zoom)
+        mark = hv.DynamicMap(self._mark, streams=[self._place])
+        drag = hv.opts.Overlay(active_tools=["box_zoom"])
+        layout = hv.Layout([(chart * mark).opts(drag) for chart in charts]).cols(1)
+        self._charts[:] = [pn.pane.HoloViews(layout, **WIDE)]
+        swatch = "<span style='background:{}; border:1px solid; padding:0 .6em'></span> {} &emsp;"
+        texts = (swatch.format(colour, escape(name)) for name, colour in kinds.items())
+        self._kinds.object = "".join(texts)
+        self._move()
+
+    def _mark(self, data: tuple[float, ...]) -> Any:
+        if len(data) == 2:
+            return hv.Points([data]).opts(color=VERMILION, marker="x", size=12, line_width=3)
+        return hv.VLine(*data).opts(color=VERMILION, line_width=1.5)
+
+    def _nearest(self, x: float | None, y: float | None) -> dict[str, int]:
+        """Return the number of the value next to a place in a chart, for each swept axis."""
+        if x is None or y is None:
+            return {}
+        pairs = zip(self._swept, (x, y), strict=False)
+        return {axis: int(np.abs(self._shown[axis] - value).argmin()) for axis, value in pairs}
+
+    def _point(self, x: float | None, y: float | None) -> None:
+        if at := self._nearest(x, y):
+            self._pointed.object = self._words({axis: self._shown[axis][at[axis]] for axis in at})
+
+    def _click(self, x: float | None, y: float | None) -> None:
+        if at := self._nearest(x, y):
+            self._steady = False
+            for axis, number in at.items():
+                self._switches[axis].value = float(self._result[axis][number])
+            self._steady = True
+            self._move()
+
+    def _zoom(self, x_range: Any, y_range: Any) -> None:
+        if x_range and y_range:
+            whole = len(self._swept) == 1 and np.allclose(
+                x_range, diagram_lanes(self._shown).limits
+            )
+            ends = () if whole else (*x_range, *y_range)
+            self._window.value = [float(f"{end:.6g}") for end in ends]
+            self._say_commands()
+
+    def _move(self) -> None:
+        """Show the motion of the lane next to the values that the switches give."""
+        fault, self._motion, start = "", None, self._value("motion_from")
+        try:
+            lane = self._result.sel("nearest", **{a: self._value(a) for a in self._result.axes})
+            self._fixed = lane.fixed
+            at = {a: self._shown[a][self._result[a] == lane.fixed[a]][0] for a in self._swept}
+            self._place.send(tuple(at.values()))
+            self._lane.object = self._words(at)
+            self._say_commands()
+            config = continued(lane, self._path, start)
+            with compiling():
+                motion = compute_response(prepared(config, self._periods), self._periods, "")
+            self._panels[:] = panels(self._in_units(motion), self._coordinate)
+            self._motion = motion
+        except Exception as error:
+            fault = _reason(error)
+        self._say(fault)
+
+    @property
+    def _coordinate(self) -> str:
+        """The coordinate that is drawn of the sweep, or else the torsion."""
+        name = str(self._value("variable"))
+        of_section = name.startswith(SECTION)
+        return name.removeprefix(SECTION).removesuffix("_rate") if of_section else COORDINATE
+
+    def _words(self, at: Mapping[str, float]) -> str:
+        """Name value, motion, period, exponent and the chosen number of a lane."""
+        lane = self._shown.sel(None, **at)
+        told = ["diverged"] if lane[STATUS] else []
+        if LABELS[0] in lane and not told:
+            motion, period = (int(lane[name]) for name in LABELS)
+            told.append(label_text(lane.variables[LABELS[0]].flags[motion], period))
+        for name in dict.fromkeys([LARGEST_EXPONENT, self._value("variable")]):
+            if name in lane and lane.dims(name) == () and lane[name].dtype == float:
+                symbol = lane.attributes(name).get("symbol") or name.replace("_", " ")
+                told.append(plain_text(f"{symbol} = {lane[name]:.4g} {unit_of(lane, name)}"))
+        return f"<b>{escape(plain_text(in_words(self._shown, at)))}</b> {escape(', '.join(told))}"
+
+    def _say(self, text: str) -> None:
+        self._fault.object = f"<b style='color:{VERMILION}'>{escape(text)}</b>" if text else ""
+
+    def _arguments(self) -> dict[str, list[str]]:
+        """Return the words of the commands that make what is shown, by the name of the figure."""
+        ends, motion = self._ends, f"{Path(self._path).stem}_response.h5"
+        units = ["--units", "physical"] if self._value("units") == "physical" else []
+        at = {a: f"--at={a}={coordinate_text(a, value)}" for a, value in self._fixed.items()}
+        here = [at[axis] for axis in self._others if axis in at]
+        between = ["--from", f"{ends[0]}", "--to", f"{ends[1]}"] if ends else []
+        how = ["--begin", self._value("motion_from"), "--periods", f"{self._periods}"]
+        shown = ["--variable", self._value("variable")]
+        return {
+            "sweep": ["plot", self._path, *here, *between, *shown, *units],
+            "lane": ["response", self._path, *at.values(), *how],
+            "motion": ["plot", motion, "--variable", self._coordinate, *units],
+            "mesh_force": ["plot", motion, "--variable", FORCE, *units],
+        }
+
+    def _say_commands(self) -> None:
+        lines = (f"python -m gearchaos.{shlex.join(w)}\n" for w in self._arguments().values())
+        self._commands.object = f"<pre>{escape(''.join(lines))}</pre>"
+
+    def _saved(self, name: str, kind: str) -> BytesIO:
+        """Draw a figure as the command that is shown does, and return its file."""
+        with TemporaryDirectory() as folder:
+            _, path, *words = self._arguments()[name]
+            target = Path(folder, f"figure.{kind}")
+            if name != "sweep":
+                if self._motion is None:
+                    raise FigureError("there is no motion to draw")
+                path = str(Path(folder, path))
+                self._motion.save(path)
+            self._draw([path, *words, "--output", str(target)])
+            return BytesIO(target.read_bytes())
+
+
+def _reason(error: Exception) -> str:
+    # A file from elsewhere may ask for anything; whatever comes of it, the page stays.
+    return str(error) or type(error).__name__

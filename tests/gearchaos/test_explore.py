@@ -1,0 +1,249 @@
+"""The page of a result in a real browser: what it shows is what the file holds."""
+
+import json
+import re
+import shlex
+import shutil
+import socket
+import subprocess
+import sys
+from http.client import HTTPConnection
+from importlib import import_module
+from pathlib import Path
+from urllib.error import HTTPError
+from urllib.parse import parse_qs, urlsplit
+from urllib.request import Request, urlopen
+
+import numpy as np
+import pytest
+
+import gearchaos
+from gearchaos.engine.recomputing import continued
+from gearchaos.engine.response import compute_response, prepared
+from gearchaos.explore import main
+
+from .commands import small_config
+
+pytest.importorskip("panel")
+pytest.importorskip("datashader")
+playwright = pytest.importorskip("playwright.sync_api")
+CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
+needs_browser = pytest.mark.skipif(CHROMIUM is None, reason="there is no chromium here")
+
+OPTIONS = "--headless --no-sandbox --disable-gpu --no-first-run --disable-background-networking"
+OPTIONS += " --disable-component-update --disable-sync"
+ASKED = ("start.carry='both'", "sweep.count=20", "outputs.section_points=10")
+HOSTILE = '<img src="x" onerror="document.hacked = 1"> $$\\href{javascript:0}{x}$$'
+PERIODS = 10
+FIGURES = """() => [...Bokeh.documents[0]._all_models.values()]
+    .filter(one => one.type == "Figure")"""
+PANELS = (
+    f"""() => ({FIGURES})()"""
+    + """
+    .map(one => [one.left[0].axis_label, one.renderers.map(shown => shown.data_source?.data)
+        .map(data => Object.fromEntries(Object.entries(data instanceof Map ?
+            Object.fromEntries(data) : data ?? {}).map(([name, row]) => [name, Array.from(row)])))
+        .filter(data => !("image" in data))])"""
+)
+
+
+@pytest.fixture(scope="module")
+def path(tmp_path_factory) -> Path:
+    folder = tmp_path_factory.mktemp("explore")
+    config = gearchaos.load_config(small_config(folder), (*ASKED, f"title='{HOSTILE}'"))
+    gearchaos.run(config).save(folder / "pair.h5")
+    return folder / "pair.h5"
+
+
+@pytest.fixture(scope="module")
+def address(path):
+    """Serve the file as a user does, for all tests."""
+    command = [sys.executable, "-m", "gearchaos.explore", "pair.h5", "--no-browser", "--port", "0"]
+    pipe = subprocess.PIPE
+    with subprocess.Popen(command, cwd=path.parent, stdout=pipe, text=True) as server:
+        yield server.stdout.readline().strip()
+        server.terminate()
+
+
+@pytest.fixture(scope="module")
+def browser():
+    with playwright.sync_playwright() as driver:
+        yield driver.chromium.launch(executable_path=CHROMIUM, args=OPTIONS.split())
+
+
+@pytest.fixture
+def page(browser, address):
+    """Open the page, and see that nothing comes from elsewhere and nothing goes wrong."""
+    opened, wrong = browser.new_page(viewport={"width": 1400, "height": 900}), []
+    opened.on("pageerror", lambda error: wrong.append(str(error)))
+    opened.on("console", lambda said: wrong.append(said.text) if said.type == "error" else None)
+    opened.on("request", lambda asked: wrong.append(asked.url) if foreign(asked.url) else None)
+
+    def foreign(url: str) -> bool:
+        return not url.startswith((address, "data:", "blob:"))
+
+    yield opened
+    opened.close()
+    assert wrong == []
+
+
+def look(page, address: str, view: str = "") -> dict[str, list]:
+    """Open a view, wait for the motion, and read its panels."""
+    page.goto(address + view)
+    page.locator(".bk-Figure >> nth=5").wait_for()
+    return panels(page)
+
+
+def panels(page) -> dict[str, list]:
+    """Read what the panels of the motion show, by what stands beside their axis."""
+    return {" ".join(name.split()): shown for name, shown in page.evaluate(PANELS) if shown}
+
+
+def lane_of(path: Path, begin: str = "end", **at):
+    """Give the lane of a file, and compute its motion as the command does."""
+    lane = gearchaos.open_result(path).sel("nearest", **at)
+    config = continued(lane, str(path), begin)
+    return lane, compute_response(prepared(config, PERIODS), PERIODS, "")
+
+
+def texts(page) -> str:
+    """Return all texts of the page."""
+    return "\n".join(page.locator(".bk-panel-models-markup-HTML div").all_inner_texts())
+
+
+def lane_in(link: str) -> str:
+    return parse_qs(urlsplit(link).query).get("pitch_error", [""])[0]
+
+
+def click(page, across: float) -> float:
+    """Click into the diagram, and return the value of the lane that the page then shows."""
+    before, box = page.url, page.locator(".bk-Figure").first.bounding_box()
+    place = box["x"] + across * box["width"], box["y"] + 0.5 * box["height"]
+    page.mouse.move(*place)
+    page.mouse.click(*place)
+    page.wait_for_url(lambda url: lane_in(url) != lane_in(before))
+    value = lane_in(page.url)
+    page.locator(f"pre:has-text('pitch_error={float(value):.12g}')").wait_for()
+    return float(value)
+
+
+def wait_for(page, panel: str, values: np.ndarray) -> list:
+    """Wait until a panel shows these values upwards, and return all that it shows."""
+    for _ in range(100):
+        shown = panels(page).get(panel, [{}])
+        if np.array_equal(shown[0].get("y", ()), values):
+            return shown
+        page.wait_for_timeout(100)
+    raise AssertionError(f"{panel}: {shown[0]}")
+
+
+@needs_browser
+def test_a_click_shows_the_motion_of_the_lane_with_the_values_of_the_file(page, path, address):
+    look(page, address, "?direction=1.0")
+    value = float(click(page, 0.8))
+    assert value in gearchaos.open_result(path)["pitch_error"] and value > 3.0
+    lane, motion = lane_of(path, pitch_error=value, direction="downwards")
+    wait_for(page, "Relative torsional displacement, δ₅ (unit b′)", motion["delta_5"][0])
+    shown = panels(page)
+    curve, strobe, section = shown["Relative torsional velocity, δ₅' (unit b′ωₕ)"]
+    assert curve["y"] == motion["delta_5_rate"][0].tolist()
+    assert strobe["x"] == motion["delta_5"][0, ::40].tolist()
+    assert section["x"] == motion["section_delta_5"][0].tolist()
+    # The motion goes on from the end of the lane: its first point is the last of the file.
+    assert curve["x"][0] == lane["end_state"][0] == lane["section_delta_5"][-1]
+    force, *strips = shown["Tangential mesh force, N_y (unit kₘb′)"]
+    assert force["y"] == motion["mesh_force_tangential"][0].tolist()
+    assert sum(len(strip["left"]) for strip in strips) > 0
+    text = texts(page)
+    exponent = f"λ₁ = {lane['lyapunov_exponent']:.4g} per unit of τ"
+    # Both above the diagram, of the lane under the pointer, and above the panels.
+    assert text.count(f"P = {value:.6g} period {lane['period']}, {exponent}") == 2
+    assert "python -m gearchaos.plot pair.h5 --at=direction=downwards" in text
+    command = f"response pair.h5 --at=pitch_error={value:.12g} --at=direction=downwards --begin end"
+    assert f"python -m gearchaos.{command} --periods 10" in text
+
+
+@needs_browser
+def test_a_link_brings_back_the_view_and_a_command_its_figure(
+    page, path, address, monkeypatch, capsys
+):
+    look(page, address)
+    page.locator("select").nth(2).select_option("physical")
+    page.locator("select").nth(3).select_option("start")
+    page.wait_for_url(re.compile("units=physical.*motion_from=start"))
+    value = float(click(page, 0.4))
+    before, box = page.url, page.locator(".bk-Figure").first.bounding_box()
+    page.mouse.move(box["x"] + 0.3 * box["width"], box["y"] + 0.4 * box["height"])
+    page.mouse.down()
+    page.mouse.move(box["x"] + 0.6 * box["width"], box["y"] + 0.6 * box["height"], steps=4)
+    page.mouse.up()
+    page.wait_for_url(lambda url: url != before)
+    link = page.url
+    left, right, *_ = json.loads(parse_qs(urlsplit(link).query)["window"][0])
+    assert 0.0 < left < value < right < 5.0
+    page.goto("about:blank")
+    shown = look(page, link)
+    _, motion = lane_of(path, "start", pitch_error=value, direction="upwards")
+    history = shown["Relative torsional displacement, δ₅ (µm)"][0]
+    # The length scale of the pair is 25 um.
+    np.testing.assert_allclose(history["y"], 25.0 * motion["delta_5"][0], rtol=1e-14)
+    assert page.url == link
+    for end, wanted in (("start", left), ("end", right)):
+        seen = page.evaluate(f"({FIGURES})().slice(0, 2).map(one => one.x_range.{end})")
+        np.testing.assert_allclose(seen, wanted, rtol=1e-5)
+    with page.expect_download() as saved:
+        page.get_by_text("Mesh force as PNG").click()
+    assert saved.value.suggested_filename == "pair_mesh_force.png"
+    sweep, response, _, figure = page.locator("pre").inner_text().splitlines()
+    assert f"--from {left} --to {right} --variable section_delta_5 --units physical" in sweep
+    monkeypatch.chdir(path.parent)
+    for line in (response, figure):
+        module, *arguments = shlex.split(line.removeprefix("python -m "))
+        assert import_module(module).main(arguments) == 0
+    _, drawn, _ = capsys.readouterr().out.splitlines()
+    assert Path(saved.value.path()).read_bytes() == Path(drawn).read_bytes()
+
+
+@needs_browser
+def test_what_a_file_or_a_link_says_is_shown_but_not_executed(page, address):
+    look(page, address, "?units=furlongs&pitch_error=x&window=[1]&direction=1.0")
+    page.get_by_text("the link asks for what there is not").wait_for()
+    assert HOSTILE in texts(page) and page.evaluate("document.hacked") is None
+    assert "--at=direction=downwards" in texts(page)
+
+
+@needs_browser
+def test_no_other_origin_is_served(address):
+    port = address.split(":")[-1].strip("/")
+    with urlopen(address) as answer:
+        assert answer.status == 200
+    with pytest.raises(HTTPError, match="403"):
+        urlopen(Request(address, headers={"Host": f"evil.example:{port}"}))
+    upgrade = {"Upgrade": "websocket", "Connection": "Upgrade", "Sec-WebSocket-Version": "13"}
+    upgrade |= {"Sec-WebSocket-Key": 22 * "A" + "==", "Sec-WebSocket-Protocol": "bokeh, x"}
+    for origin in ("http://evil.example", f"http://evil.example:{port}", "null"):
+        asked = HTTPConnection("127.0.0.1", int(port))
+        asked.request("GET", "/ws", headers={**upgrade, "Origin": origin})
+        assert asked.getresponse().status == 403
+        asked.close()
+    # Another address of this machine, as every one but the loopback's own.
+    with socket.socket() as other, pytest.raises(OSError):
+        other.connect(("127.0.0.2", int(port)))
+
+
+def test_what_is_wrong_is_told_in_a_sentence(path, tmp_path, monkeypatch, capsys):
+    def said(*arguments: str) -> tuple[int, str]:
+        return main([*arguments, "--no-browser"]), capsys.readouterr().err
+
+    code, text = said(str(tmp_path / "none.h5"))
+    assert code == 4 and "none.h5: cannot be read" in text
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        port = str(taken.getsockname()[1])
+        code, text = said(str(path), "--port", port)
+    assert code == 2 and f"--port {port}: Address already in use; choose another port" in text
+    lane_of(path, pitch_error=1.0, direction="upwards")[1].save(tmp_path / "response.h5")
+    code, text = said(str(tmp_path / "response.h5"))
+    assert code == 2 and "is a response; python -m gearchaos.plot draws it" in text
+    monkeypatch.setitem(sys.modules, "panel", None)
+    code, text = said(str(path), "--port", "0")
+    assert code == 4 and "panel is not installed; pip install gearchaos[explore]" in text
