@@ -125,6 +125,8 @@ def _teeth_page(
         shown = (max(0.0, time[-1] - SHOWN_REVOLUTIONS * teeth), time[-1])
         response.time_history(top, result, lane, MESH_ERROR, between=shown)
         response.time_history(below, result, lane, coordinate, between=shown)
+        if coordinate.startswith(MESH_FORCE):
+            response.contact_strip(below, result, lane, coordinate)
         top.sharex(below)
         for axes, most in ((top, 4), (below, 6)):
             few_ticks(axes, None, most)
