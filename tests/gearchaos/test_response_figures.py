@@ -12,6 +12,7 @@ from matplotlib.text import Text
 from gearchaos.errors import FigureError
 from gearchaos.figures import (
     amplitude_spectrum,
+    contact_strip,
     phase_portrait,
     poincare_section,
     response_page,
@@ -237,6 +238,20 @@ def test_the_command_draws_a_page_for_each_lane(path, arguments, names, capsys):
     else:
         (line,) = progress
         assert re.fullmatch(r"gearchaos plot: 2 of 2 pages, [\d.]+ pages/s, 0 s left", line)
+
+
+def test_the_strip_below_a_force_covers_the_record_with_the_states_of_contact():
+    result = known_response()
+    states, edges = result["contact_tangential"], result["time"]
+    states[0] = np.where(edges < 2.0, 1, np.where(edges < 3.5, 0, 2))
+    axes = Figure(layout="constrained").subplots()
+    strips = contact_strip(axes, result, 0, "mesh_force_tangential")
+    bars = [[path.get_extents().intervalx.tolist() for path in one.get_paths()] for one in strips]
+    assert dict(zip((one.get_label() for one in strips), bars, strict=True)) == {
+        "apart": [[2.0, 3.5]],
+        "driving flank": [[0.0, 2.0]],
+        "back flank": [[3.5, float(PERIODS)]],
+    }
 
 
 @pytest.mark.parametrize("name", ["mesh_force_tangential", "delta_5_rate"])
