@@ -21,7 +21,6 @@ to unit vectors, and e is 1 on an engaged flank. Polynomials along the step are 
 as Chebyshev series are. Where the series do not converge to rounding, the step is divided.
 """
 
-from collections import OrderedDict
 from collections.abc import Hashable
 from typing import NamedTuple
 
@@ -31,18 +30,15 @@ from numpy.typing import NDArray
 from gearchaos_kernels.block_memory import Present, flags
 from gearchaos_kernels.coefficients import lane_coefficients
 from gearchaos_kernels.flow_layout import Layout, layout
-from gearchaos_kernels.flow_series import RightSide, differentiate, fill_maps, series_of_forcing
-from gearchaos_kernels.rows import Lane
+from gearchaos_kernels.flow_series import TAIL, make_maps, series_of_forcing
+from gearchaos_kernels.rows import LANES
 from gearchaos_kernels.system import Floats, Groups, Plan, System
-
-TAIL = 2e-15
-"""What may be left of the series, relative to their largest term."""
 
 MOST_STEPS = 4096
 """Steps per period beyond which nothing is divided any more."""
 
 MOST_BYTES = 2**27
-"""Maps that are kept in memory."""
+"""Maps that are kept in memory, unless those of one group of lanes are more."""
 
 _UNIT = {
     "load": 0.0,
@@ -90,46 +86,62 @@ def maps_memory(system: System, plan: Plan, stable: NDArray[np.int64]) -> int:
     steps = plan.steps_per_period
     divided = steps * 2.0 ** np.ceil(np.log2(np.maximum(needed / steps, 1.0)))
     sizes = 8 * place.step_size * np.minimum(divided, max(steps, MOST_STEPS))
-    # Those that are kept, and those that are used.
+    # Those that are kept, and those that are being made.
     return 2 * int(min(sizes.sum(), MOST_BYTES + sizes.max()))
 
 
-_kept: OrderedDict[Hashable, Floats] = OrderedDict()
-_joined: dict[Hashable, Maps] = {}
+class _Kept:
+    """Maps that were made, one behind the other, until no more fit.
+
+    ``places``: steps and beginning of the maps of a lane, by its scene and groups.
+    """
+
+    def __init__(self, size: int) -> None:
+        self.table = np.empty(max(size, MOST_BYTES // 8))
+        self.used = 0
+        self.places: dict[Hashable, tuple[int, int]] = {}
+
+    def keep(self, name: Hashable, maps: Floats) -> None:
+        """Keep the maps of a lane, shape (steps, size of a step)."""
+        self.table[self.used : self.used + maps.size] = maps.reshape(-1)
+        self.places[name] = len(maps), self.used
+        self.used += maps.size
+
+
+_kept = _Kept(0)
 
 
 def maps_of(system: System, steps: int, present: Present) -> Maps:
     """Return the maps of the first lanes of a system, as many as fit into memory.
 
-    Those used last are kept: the same lanes may be integrated again and again.
+    They are kept: the same lanes may be integrated again and again.
     """
-    present = present._replace(tangent=None, contact=None)
+    global _kept
+    present = present._replace(tangent=None, contact=None, loads=None)
     waves = system.stiffness_cosine, system.stiffness_sine
     scene = (steps, present, system.physical, *(wave.tobytes() for wave in waves))
-    rows = [row.tobytes() for row in _own_groups(system)]
-    if (scene, *rows) in _joined:
-        return _joined[scene, *rows]
-    tables: list[Floats] = []
-    size = 0
-    for number, row in enumerate(rows):
-        if (scene, row) not in _kept:
-            _kept[scene, row] = _make(system.of([number]), steps, present)
-        _kept.move_to_end((scene, row))
-        tables.append(_kept[scene, row])
-        size += tables[-1].nbytes
-        if size > MOST_BYTES:
-            break
-    while sum(table.nbytes for table in _kept.values()) > MOST_BYTES and len(_kept) > 1:
-        _kept.popitem(last=False)
-    sizes = np.array([table.size for table in tables], dtype=np.intp)
-    joined = Maps(
-        np.concatenate([table.reshape(-1) for table in tables]),
-        np.array([len(table) for table in tables], dtype=np.intp),
-        np.cumsum(sizes) - sizes,
-    )
-    _joined.clear()
-    _joined[scene, *rows] = joined
-    return joined
+    names = [(scene, row.tobytes()) for row in _own_groups(system)]
+    done, together = 0, 1
+    while done < len(names):
+        some = range(done, min(done + together, len(names)))
+        new = [number for number in some if names[number] not in _kept.places]
+        made = _make(system.of(new), steps, present)
+        size = sum(maps.size for maps in made)
+        if _kept.used + size > _kept.table.size:
+            if done:
+                break
+            # A new table: somebody may still be reading the old one.
+            _kept = _Kept(size)
+            continue
+        for number, maps in zip(new, made, strict=True):
+            _kept.keep(names[number], maps)
+        done += len(some)
+        # Lanes side by side need about as many steps.
+        steps_made, _ = _kept.places[names[done - 1]]
+        size = 8 * steps_made * layout.py_func(present).step_size
+        together = max(1, min(LANES, MOST_BYTES // (4 * size)))
+    places = np.array([_kept.places[name] for name in names[:done]], dtype=np.intp)
+    return Maps(_kept.table, places[:, 0], places[:, 1])
 
 
 def _own_groups(system: System) -> Floats:
@@ -137,27 +149,25 @@ def _own_groups(system: System) -> Floats:
     return np.stack([getattr(system.groups, name) for name in OWN], axis=1)
 
 
-def _make(system: System, steps: int, present: Present) -> Floats:
-    """Make the maps of one lane, shape (steps, size of a step), with steps divided if need be.
+def _make(system: System, steps: int, present: Present) -> list[Floats]:
+    """Make the maps of lanes, each (steps, size of a step), with steps divided if need be.
 
     A motion so fast that no steps resolve it has maps that are not a number.
     """
     place: Layout = layout.py_func(present)
-    unit = {name: np.full(1, value) for name, value in _UNIT.items()}
+    unit = {name: np.full(system.lanes, value) for name, value in _UNIT.items()}
     system = system._replace(groups=system.groups._replace(**unit))
-    states, count = place.states, steps
-    while True:
-        coefficients = lane_coefficients(system, system.mesh_period / count)[0]
-        shapes = (states, states + 3), (2, states + 3), (states, 2)
-        right_side = RightSide(*map(np.zeros, shapes))
-        differentiate(coefficients, right_side, present)
-        forcing = series_of_forcing(system, Lane(*coefficients), count)
-        table = np.zeros((count, place.step_size))
+    made = [np.full((steps, place.step_size), np.nan)] * system.lanes
+    left, count = np.arange(system.lanes), steps
+    while left.size and count <= max(steps, MOST_STEPS):
+        coefficients = lane_coefficients(system.of(left), system.mesh_period[left] / count)
+        tables, tails = np.zeros((left.size, count, place.step_size)), np.zeros(left.size)
         edges = 2.0 * np.pi / count * np.arange(count + 1)
         for column, values in enumerate((np.sin(edges), np.cos(edges))):
-            table[:, column], table[:, column + 2] = values[:-1], values[1:]
-        if fill_maps(right_side, forcing, table, place) < TAIL:
-            return table
-        if 2 * count > MOST_STEPS or not np.isfinite(coefficients).all():
-            return np.full((steps, table.shape[1]), np.nan)
+            tables[:, :, column], tables[:, :, column + 2] = values[:-1], values[1:]
+        make_maps(coefficients, series_of_forcing(system, count), tables, tails, present)
+        for number in np.flatnonzero(tails < TAIL):
+            made[left[number]] = tables[number].copy()
+        left = left[~(tails < TAIL) & np.isfinite(coefficients).all(axis=1)]
         count *= 2
+    return made

@@ -7,19 +7,26 @@ mesh phase (eqs 14 and 19). `flow_map` has the equations that are solved here.
 from typing import NamedTuple
 
 import numpy as np
+from numba import prange
 from numpy.polynomial import chebyshev
 
 from gearchaos_kernels import rows
 from gearchaos_kernels.block_memory import aligned_memory, fill_lane, read_state, write_state
-from gearchaos_kernels.compilation import evaluator, part
+from gearchaos_kernels.compilation import driver, part
 from gearchaos_kernels.equations import Directions, accelerations, gaps_at
-from gearchaos_kernels.flow_layout import BOUNDS, HEADER, TERMS
+from gearchaos_kernels.flow_layout import BOUNDS, HEADER, TERMS, layout
 from gearchaos_kernels.forcing import Phase, forcing_at
-from gearchaos_kernels.rows import STRIDE, Coordinates, Lane, State
+from gearchaos_kernels.rows import STRIDE, Coordinates, State
 from gearchaos_kernels.system import Floats, System
 
-ORDER = 26
+ORDER = 22
 """Terms of the Taylor series that they come from."""
+
+TAIL = 2e-15
+"""What may be left of the series, relative to their largest term."""
+
+TOGETHER = 8
+"""Steps whose series are computed side by side: they fill vectors, and the cache holds them."""
 
 
 def _economy() -> tuple[Floats, Floats]:
@@ -53,6 +60,9 @@ def _bends() -> Floats:
 
 _BENDS = _bends()
 
+_ENDS = np.stack([(-1.0) ** np.arange(ORDER + 1), np.ones(ORDER + 1)])
+"""What makes the values at both ends of a step of a series."""
+
 
 class RightSide(NamedTuple):
     """Eq. 13 as matrices: what every state and every forcing adds to rates and gaps.
@@ -67,9 +77,9 @@ class RightSide(NamedTuple):
     mobility: Floats
 
 
-@evaluator
+@part
 def differentiate(coefficients, right_side, present):
-    """Apply the formulas of eq. 13 to one unit after the other."""
+    """Apply the formulas of eq. 13 of a lane to one unit after the other; return the lane."""
     states = right_side.rates.shape[0]
     memory = aligned_memory()
     lane = fill_lane(memory, 0, coefficients)
@@ -102,143 +112,183 @@ def differentiate(coefficients, right_side, present):
         write_state(memory, rows.STATE, 0, result, present)
         for line in range(states):
             right_side.mobility[line, way] = memory[(rows.STATE + line) * STRIDE]
+    return lane
 
 
-def series_of_forcing(system: System, lane: Lane, steps: int) -> Floats:
-    """Taylor coefficients about the middle of every step, shape (steps, 3, `ORDER`).
+def series_of_forcing(system: System, steps: int) -> Floats:
+    """Taylor coefficients about the middle of every step, shape (3, `ORDER`, steps).
 
-    Of the mesh stiffness (eq. 19), and of sine and cosine of the mesh phase.
+    Of the stiffness variation relative to the mean (eq. 19), and of sine and cosine of the phase.
     """
     half = np.pi / steps
-    middle = (2 * np.arange(steps) + 1)[:, np.newaxis] * half
-    term = np.arange(ORDER)
-    factor = half**term / np.cumprod(np.maximum(term, 1.0))
+    middle = (2 * np.arange(steps) + 1) * half
+    term = np.arange(ORDER)[:, np.newaxis]
+    factor = half**term / np.cumprod(np.maximum(term, 1.0))[:, np.newaxis]
     turn = np.exp(1j * middle) * 1j**term * factor
-    stiffness = lane.mean_stiffness * (term == 0) * np.ones((steps, 1))
+    variation = np.zeros(turn.shape)
     if system.effects.stiffness_variation:
         for number, amplitude in enumerate(system.stiffness_cosine - 1j * system.stiffness_sine, 1):
             waves = amplitude * np.exp(1j * number * middle) * (1j * number) ** term * factor
-            stiffness = stiffness + lane.stiffness_variation * waves.real
-    return np.stack([stiffness, turn.imag, turn.real], axis=1)
+            variation += waves.real
+    return np.stack([variation, turn.imag, turn.real])
 
 
-@evaluator
-def fill_maps(right_side, forcing, table, place):
-    """Fill the maps of every step, shape (steps, size of a step); return what series leave."""
+@driver
+def make_maps(coefficients, forcing, tables, tails, present):
+    """Fill the maps of lanes, shape (lanes, steps, size of a step), and tell what series leave."""
+    for number in prange(tables.shape[0]):
+        # One type of number inside and outside of the parallel loop: else two are compiled.
+        lane = np.int64(number)
+        tails[lane] = fill_maps(coefficients[lane], forcing, tables[lane], present)
+
+
+@part
+def fill_maps(coefficients, forcing, table, present):
+    """Fill the maps of a lane, shape (steps, size of a step); return what series leave."""
+    place = layout(present)
+    states = place.states
+    right_side = RightSide(
+        np.zeros((states, states + 3)), np.zeros((2, states + 3)), np.zeros((states, 2))
+    )
+    lane = differentiate(coefficients, right_side, present)
     tail = 0.0
-    for number in range(table.shape[0]):
-        for pair in range(place.pairs):
-            left = fill_pair(pair, table[number], right_side, forcing[number], place)
-            tail = np.maximum(tail, left)
+    for first in range(0, table.shape[0], TOGETHER):
+        some = table[first : first + TOGETHER]
+        near = forcing[:, :, first : first + TOGETHER]
+        width = place.pairs * some.shape[0]
+        engaged = np.empty((2, width))
+        acting = np.empty((3, ORDER, width))
+        for at in range(width):
+            pair, step = divmod(at, some.shape[0])
+            engaged[0, at] = 1.0 - pair % 2
+            engaged[1, at] = 1.0 - pair // 2
+            for term in range(ORDER):
+                acting[0, term, at] = lane.stiffness_variation * near[0, term, step]
+                acting[1, term, at] = near[1, term, step]
+                acting[2, term, at] = near[2, term, step]
+            acting[0, 0, at] += lane.mean_stiffness
+        tail = np.maximum(tail, fill_steps(right_side, engaged, acting, some, place))
+        if not tail < TAIL:
+            break
     return tail
 
 
 @part
-def fill_pair(pair, row, right_side, forcing, place):
-    """Fill the maps of one step on one pair of branches; return what is left of the series."""
-    piece = row[HEADER + pair * place.size : HEADER + (pair + 1) * place.size]
-    engaged = (1.0 - pair % 2, 1.0 - pair // 2)
-    states = place.states
-    columns = place.columns
-    stiffness = forcing[0]
+def fill_steps(right_side, engaged, forcing, table, place):
+    """Fill the maps of some steps on all pairs of branches; return what is left of the series.
+
+    In every array the last numbers are those of these steps, pair by pair.
+    """
+    states, columns, ways = place.states, place.columns, place.ways
     rates, gaps, mobility = right_side
-    engaged_gaps = np.zeros((2, states))
-    for way in range(2):
-        for line in range(states):
-            engaged_gaps[way, line] = engaged[way] * gaps[way, line]
-    ways = place.ways
+    width = engaged.shape[1]
     error = states + 1 + ways
 
     # The motion by column with drive and error below it, the gaps, and the forces times K.
-    psi = np.zeros((ORDER + 1, states + 3, columns))
-    gap = np.zeros((ORDER, ways, columns))
-    force = np.zeros((ways, columns))
+    psi = np.zeros((ORDER + 1, states + 3, columns * width))
+    gap = np.zeros((ORDER, ways, columns * width))
+    force = np.zeros((ORDER, ways, columns * width))
     for column in range(states + 1):
-        psi[0, column, column] = 1.0
+        psi[0, column, column * width : (column + 1) * width] = 1.0
     for k in range(ORDER):
-        scale = 0.5 / (k + 1)
         if columns > error:
-            psi[k, states + 1, error] = forcing[1, k]
-            psi[k, states + 2, error] = forcing[2, k]
+            psi[k, states + 1, error * width : (error + 1) * width] = forcing[1, k]
+            psi[k, states + 2, error * width : (error + 1) * width] = forcing[2, k]
         if columns > error + 1:
-            psi[k, states + 1, error + 1] = forcing[2, k]
-            psi[k, states + 2, error + 1] = -forcing[1, k]
-        add_product(1.0, gaps, psi[k], gap[k])
-        for way in range(ways):
-            for column in range(columns):
-                force[way, column] = 0.0
-            for j in range(k + 1):
-                factor = engaged[way] * stiffness[k - j]
-                for column in range(columns):
-                    force[way, column] += factor * gap[j, way, column]
-            force[way, states + 1 + way] -= stiffness[k]
-        add_product(scale, rates, psi[k], psi[k + 1])
-        add_product(scale, mobility, force, psi[k + 1])
+            psi[k, states + 1, (error + 1) * width :] = forcing[2, k]
+            psi[k, states + 2, (error + 1) * width :] = -forcing[1, k]
+    # An offset is no part of the gap, but less deflection.
+    for way in range(ways):
+        gap[0, way, (states + 1 + way) * width : (states + 2 + way) * width] = -1.0
+    solve(0.5, rates, mobility, gaps, forcing[0], engaged, psi, gap, force)
+    for way in range(ways):
+        gap[0, way, (states + 1 + way) * width : (states + 2 + way) * width] += 1.0
 
-    # The inverse flow, and with K what it makes of the mobilities.
-    inverse = np.zeros((ORDER + 1, states, states))
-    moved = np.zeros((ORDER, states, ways))
-    switch = np.zeros((ORDER, states, ways))
+    # The inverse flow, transposed, and what it makes of the mobilities, with K.
+    inverse = np.zeros((ORDER + 1, states, states * width))
+    moved = np.zeros((ORDER, ways, states * width))
+    switch = np.zeros((ORDER, ways, states * width))
     for line in range(states):
-        inverse[0, line, line] = 1.0
-    for k in range(ORDER):
-        scale = -0.5 / (k + 1)
-        add_product(1.0, inverse[k], mobility, moved[k])
-        for j in range(k + 1):
-            for line in range(states):
-                for way in range(ways):
-                    switch[k, line, way] += stiffness[k - j] * moved[j, line, way]
-        add_product(scale, inverse[k], rates, inverse[k + 1])
-        add_product(scale, switch[k], engaged_gaps, inverse[k + 1])
-
-    first = np.zeros((states, columns))
-    last = np.zeros((states, columns))
-    back = np.zeros((states, states))
-    tail = 0.0
-    for k in range(ORDER, -1, -1):
-        sign = 1.0 - 2.0 * (k % 2)
-        # The first term of the inverse is 1.
-        add_product(sign, inverse[0], psi[k], first)
-        add_product(1.0, inverse[0], psi[k], last)
-        add_product(sign, inverse[0], inverse[k], back)
-    for line in range(states):
-        for column in range(states):
-            tail = np.maximum(tail, abs(psi[ORDER, line, column]))
-            tail = np.maximum(tail, abs(inverse[ORDER, line, column]))
+        inverse[0, line, line * width : (line + 1) * width] = 1.0
+    back_rates = np.ascontiguousarray(rates[:, :states].T)
+    solve(
+        -0.5,
+        back_rates,
+        gaps.T.copy(),
+        mobility.T.copy(),
+        forcing[0],
+        engaged,
+        inverse,
+        moved,
+        switch,
+    )
 
     # From the middle of the step to its beginning; a step is 2 long in s.
-    end = over_beginning(last, first, back)
+    ends = combined(_ENDS, psi).reshape((2, states + 3, columns, width))
+    back = combined(_ENDS, inverse).reshape((2, states, states, width))[0]
+    from_beginning = np.zeros((columns, columns, width))
+    first = np.zeros((states, states, width))
     for line in range(states):
+        for source in range(states):
+            from_beginning[line, source] = back[source, line]
+            first[source, line] = 0.5 * ends[0, line, source]
+    for column in range(states, columns):
+        from_beginning[column, column] = 1.0
+        for line in range(states):
+            for source in range(states):
+                from_beginning[line, column] -= back[source, line] * ends[0, source, column]
+    end = multiplied(ends[1, :states], from_beginning)
+    along, tail = economised(gap)
+    along = multiplied(along.reshape((TERMS * ways, columns, width)), from_beginning)
+    traced, lost = economised(switch)
+    traced = multiplied(traced.reshape((TERMS * ways, states, width)), first)
+    tail = max(tail, lost, np.abs(psi[ORDER, :states]).max(), np.abs(inverse[ORDER]).max())
+
+    for at in range(width):
+        pair, step = divmod(at, table.shape[0])
+        row = table[step]
+        piece = row[HEADER + pair * place.size :]
         for column in range(columns):
-            piece[column * place.width + line] = end[line, column]
-    along = over_beginning(gap.reshape((ways * ORDER, columns)), first, back)
-    cut, left = economised(along.reshape((ORDER, ways * columns)))
-    tail = np.maximum(tail, left)
-    traced = np.zeros((ORDER, states, ways))
-    for k in range(ORDER):
-        add_product(0.5, first, switch[k], traced[k])
-    thrown, left = economised(traced.reshape((ORDER, ways * states)))
-    tail = np.maximum(tail, left)
-    for way in range(ways):
-        at = place.gaps[way]
-        bound = BOUNDS[way]
-        for column in range(columns):
-            terms = piece[at + column * TERMS : at + (column + 1) * TERMS]
-            bend = 0.0
-            for term in range(TERMS):
-                terms[term] = cut[term, way * columns + column]
-                bend += _BENDS[term] * abs(terms[term])
-            row[bound + column] = max(row[bound + column], bend)
-        at = place.switches[way]
-        for term in range(TERMS):
             for line in range(states):
-                piece[at + term * place.width + line] = thrown[term, ways * line + way]
+                piece[column * place.width + line] = end[line, column, at]
+        for way in range(ways):
+            for column in range(columns):
+                bend = 0.0
+                for term in range(TERMS):
+                    value = along[term * ways + way, column, at]
+                    piece[place.gaps[way] + column * TERMS + term] = value
+                    bend += _BENDS[term] * abs(value)
+                row[BOUNDS[way] + column] = max(row[BOUNDS[way] + column], bend)
+            for term in range(TERMS):
+                for line in range(states):
+                    value = traced[term * ways + way, line, at]
+                    piece[place.switches[way] + term * place.width + line] = value
     return tail
+
+
+@part
+def solve(scale, rates, outer, inner, stiffness, engaged, terms, seen, pulled):
+    """Solve terms' = scale (rates + outer K engaged inner) terms; tell inner terms, and K of it."""
+    width = engaged.shape[1]
+    acting = np.zeros(seen.shape[1:])
+    for k in range(ORDER):
+        add_product(1.0, inner, terms[k], seen[k])
+        for way in range(seen.shape[1]):
+            for begin in range(0, seen.shape[2], width):
+                for j in range(k + 1):
+                    for at in range(width):
+                        pulled[k, way, begin + at] += (
+                            stiffness[k - j, at] * seen[j, way, begin + at]
+                        )
+                for at in range(width):
+                    acting[way, begin + at] = engaged[way, at] * pulled[k, way, begin + at]
+        add_product(scale / (k + 1), rates, terms[k], terms[k + 1])
+        add_product(scale / (k + 1), outer, acting, terms[k + 1])
 
 
 @part
 def add_product(scale, a, b, target):
-    """Add the product of two small matrices, many of whose elements are 0, times a number.
+    """Add the product of two matrices, the first of which is small, times a number.
 
     What one of them has more of than the target or the other one does not count: no axial pair.
     """
@@ -251,36 +301,31 @@ def add_product(scale, a, b, target):
 
 
 @part
-def over_beginning(rows, first, back):
-    """Turn rows over the middle state and forcing into ones over the state at the beginning."""
-    states = back.shape[0]
-    target = np.zeros(rows.shape)
-    for line in range(rows.shape[0]):
-        for source in range(states):
-            for column in range(states):
-                target[line, column] += rows[line, source] * back[source, column]
-        for column in range(states, rows.shape[1]):
-            target[line, column] = rows[line, column]
-        for source in range(states):
-            for column in range(states, rows.shape[1]):
-                target[line, column] -= target[line, source] * first[source, column]
+def combined(matrix, series):
+    """Return combinations of the terms of a series."""
+    flat = series.reshape((series.shape[0], -1))
+    target = np.zeros((matrix.shape[0], flat.shape[1]))
+    add_product(1.0, matrix, flat, target)
+    return target
+
+
+@part
+def multiplied(a, b):
+    """Return the product of the matrices of every step."""
+    target = np.zeros((a.shape[0], b.shape[1], b.shape[2]))
+    for line in range(a.shape[0]):
+        for source in range(b.shape[0]):
+            for column in range(b.shape[1]):
+                for at in range(b.shape[2]):
+                    target[line, column, at] += a[line, source, at] * b[source, column, at]
     return target
 
 
 @part
 def economised(series):
     """Cut Taylor series to fewer terms; return them, and the largest share that is lost."""
-    target = np.zeros((TERMS, series.shape[1]))
-    lost = np.zeros((ORDER - TERMS, series.shape[1]))
-    add_product(1.0, _KEPT, series, target)
-    add_product(1.0, _DROPPED, series, lost)
-    largest = 1e-300
+    kept, lost = combined(_KEPT, series), combined(_DROPPED, series)
     most = 0.0
-    for column in range(series.shape[1]):
-        left = 0.0
-        for term in range(lost.shape[0]):
-            left += abs(lost[term, column])
-        most = np.maximum(most, left)
-        for term in range(TERMS):
-            largest = np.maximum(largest, abs(target[term, column]))
-    return target, most / largest
+    for column in range(lost.shape[1]):
+        most = np.maximum(most, np.abs(lost[:, column]).sum())
+    return kept, most / np.maximum(np.abs(kept).max(), 1e-300)
