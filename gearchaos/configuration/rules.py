@@ -178,15 +178,6 @@ def _contact_is_told_by_crossings(config: Tables) -> Iterator[Fault]:
 
 
 @reads("outputs", "integration")
-def _loads_are_told_by_short_steps(config: Tables) -> Iterator[Fault]:
-    for name in ("loads", "states", "orders"):
-        value = getattr(config.outputs, name)
-        if value and config.integration.method == "flow_map":
-            rule = "needs steps shorter than those of flow maps"
-            yield Fault(f"outputs.{name}", rule, 'set integration.method = "rk4"', value)
-
-
-@reads("outputs", "integration")
 def _errors_are_measured_on_a_section(config: Tables) -> Iterator[Fault]:
     if config.outputs.section:
         return

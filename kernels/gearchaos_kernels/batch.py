@@ -11,7 +11,7 @@ from gearchaos_kernels.block import Batch, integrate_block
 from gearchaos_kernels.block_memory import Present, flags
 from gearchaos_kernels.coefficients import lane_coefficients, state_scales, steps_between_scalings
 from gearchaos_kernels.compilation import driver
-from gearchaos_kernels.flow_map import maps_of, sharing
+from gearchaos_kernels.flow_map import fewest_steps, maps_of, sharing
 from gearchaos_kernels.forcing import phase_table
 from gearchaos_kernels.rows import CONTACT_ROWS, ERROR, LANES, SIGNAL_ROWS, SIGNALS
 from gearchaos_kernels.status import Status
@@ -51,8 +51,7 @@ def integrate(
     Raises
     ------
     ValueError
-        If flow maps are asked for with pitch errors tooth by tooth, or to tell loads, extremes or
-        amplitudes, or too many pairs are in mesh.
+        If flow maps are asked for with pitch errors tooth by tooth, or too many pairs are in mesh.
     """
     lanes, states = start.shape[0], len(system.states)
     steps = plan.steps_per_period
@@ -77,15 +76,14 @@ def integrate(
     )
     if present.flow_map is not None and present.teeth is not None:
         raise ValueError("flow maps know pitch errors that are a sine, not those of teeth")
-    if present.flow_map is not None and (plan.loads or plan.states or plan.orders):
-        raise ValueError("the steps of flow maps are too long to tell loads from")
     columns = [system.states.index(name) for name in plan.states]
-    phases = [2.0 * np.pi * float(order) / steps for order in plan.orders]
-    turns = np.stack([np.cos(phases), np.sin(phases)], axis=1)
-    chosen: tuple[Any, ...] = np.array([*columns, ERROR], dtype=np.intp), turns
+    cycles = 2.0 * np.pi * np.array([float(order) for order in plan.orders])
+    steps_taken = np.full(lanes, steps)
     schedule = Schedule(*(getattr(plan, name) for name in Schedule._fields))
     for order, blocks, maps, steps_of in _shares(system, plan, present):
         step = system.mesh_period / steps_of
+        steps_taken[order] = steps_of[order]
+        phases = cycles / steps_of[:, np.newaxis]
         batch = Batch(
             lane_coefficients(system, step),
             state_scales(system, step),
@@ -97,13 +95,15 @@ def integrate(
             blocks,
             maps,
             *tables_of(system, present, steps),
-            *chosen,
+            chosen=np.array([*columns, ERROR], dtype=np.intp),
+            turns=np.stack([np.cos(phases), np.sin(phases)], axis=2),
         )
         _integrate_blocks(batch, schedule, outcome, present)
         if maps.size:
             unmapped = np.repeat(np.isnan(maps[blocks[:, 3]]), blocks[:, 1])
             outcome.status[order[unmapped]] = Status.TOO_FAST
-    samples, step = steps * max(1, plan.recorded_periods), system.mesh_period / steps
+    step = system.mesh_period / steps_taken
+    samples = (steps_taken * max(1, plan.recorded_periods))[:, np.newaxis, np.newaxis]
     if present.loads is not None:
         # Forces come per step squared, and the sums of Simpson's rule.
         outcome.loads[:, :, 2:] /= 6.0 * samples
@@ -128,7 +128,7 @@ def _shares(system: System, plan: Plan, present: Present) -> Iterator[tuple[Any,
         blocks = _blocks(np.array([lanes]), np.array([steps]), np.array([0]))
         yield np.arange(lanes), blocks, np.zeros(0), np.full(lanes, steps)
         return
-    group = sharing(system)
+    steps, group = fewest_steps(plan), sharing(system)
     every = np.argsort(group, kind="stable")
     _, first, counts = np.unique(group[every], return_index=True, return_counts=True)
     done = 0

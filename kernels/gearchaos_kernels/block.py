@@ -35,7 +35,7 @@ from gearchaos_kernels.equations import gaps_at
 from gearchaos_kernels.flow_layout import layout
 from gearchaos_kernels.flow_steps import begin_forces, cross, move_block
 from gearchaos_kernels.flow_vectors import VECTOR, WORK
-from gearchaos_kernels.forcing import During, Phase, forcing_at
+from gearchaos_kernels.forcing import During, Phase, forcing_at, phase_within
 from gearchaos_kernels.loads import begin_loads, tell_loads
 from gearchaos_kernels.rk4 import step, tangent_step
 from gearchaos_kernels.rows import LANES, STRIDE
@@ -61,8 +61,8 @@ class Batch(NamedTuple):
     place of the first lane of each in ``order`` (lanes,), number of lanes, steps per period and
     where its maps begin in ``maps``, which only a method that has maps looks at. ``shares``: see
     `share_table`; ``driving``, ``driven``, ``profile``: see `Teeth`. ``chosen`` (rows,): of states
-    and the transmission error; ``turns`` (orders, 2): cosine and sine of the phase by which an
-    order advances in a step.
+    and the transmission error; ``turns`` (lanes, orders, 2): cosine and sine of the phase by
+    which an order advances in a step.
     """
 
     coefficients: NDArray[np.float64]
@@ -95,6 +95,7 @@ def integrate_block(number_of_block, batch, plan, outcome, present):
     slots = 1 if lanes == 1 else VECTOR if lanes <= VECTOR else LANES
     work = np.zeros(WORK)
     every = steps // plan.steps_per_period
+    turns = batch.turns[batch.order[first]]
     block = Block(memory, first, lanes)
     turn(block, batch, plan.first_period, present)
     interval = begin(block, batch, present)
@@ -125,8 +126,14 @@ def integrate_block(number_of_block, batch, plan, outcome, present):
                     split(memory, table, shares, maps, row, work, lanes, number, recorded, present)
             if present.loads is not None:
                 if period >= plan.transient_periods:
-                    tell_loads(memory, phases, present)
-                    tell_chosen(memory, batch)
+                    if present.flow_map is None:
+                        tell_loads(memory, phases.middle, phases.end, present)
+                    else:
+                        asked, of_it = number // every, number % every
+                        middle = phase_within(table, asked, (of_it + 0.5) / every)
+                        last = phase_within(table, asked, (of_it + 1.0) / every)
+                        tell_loads(memory, (middle, None), (last, None), present)
+                    tell_chosen(memory, batch, turns)
             if present.tangent is not None:
                 last = number == steps - 1
                 if (number + 1) % interval == 0 or last:

@@ -35,7 +35,7 @@ def flags(system: System, plan: Plan) -> Present:
         "wide": teeth is not None and teeth.pairs_in_mesh > rows.NARROW,
         "resolved": resolved,
         "contact": resolved and plan.contact,
-        "loads": bool(plan.loads or plan.states or plan.orders) and plan.method == "rk4",
+        "loads": plan.told_by_steps,
         "tangent": plan.tangent,
         "flow_map": plan.method == "flow_map",
     }

@@ -33,7 +33,7 @@ def one(memory, row, slot):
 @scalar
 def half_of(batch):
     """Return half the number of rows behind those of every block."""
-    return batch.chosen.size - 1 + batch.chosen.size * batch.turns.shape[0]
+    return batch.chosen.size - 1 + batch.chosen.size * batch.turns.shape[1]
 
 
 @scalar
@@ -48,7 +48,7 @@ def begin_chosen(memory, batch):
 
 
 @scalar
-def tell_chosen(memory, batch):
+def tell_chosen(memory, batch, turns):
     """Add a step to the extremes and sums of every slot."""
     half = half_of(batch)
     at = rows.ROWS
@@ -75,8 +75,8 @@ def tell_chosen(memory, batch):
             store(memory, at + half, slot, (min(smallest, min(turn1, turn2)),))
         at += 1
     for row in batch.chosen:
-        for order in range(batch.turns.shape[0]):
-            cosine, sine = batch.turns[order, 0], batch.turns[order, 1]
+        for order in range(turns.shape[0]):
+            cosine, sine = turns[order, 0], turns[order, 1]
             for slot in range(LANES):
                 real = one(memory, at, slot) + one(memory, row, slot)
                 imaginary = one(memory, at + half, slot)

@@ -37,6 +37,9 @@ from gearchaos_kernels.system import Floats, Groups, Plan, System
 MOST_STEPS = 4096
 """Steps per period beyond which nothing is divided any more."""
 
+TOLD_STEPS = 240
+"""Steps per period that loads need, which come from parabolas, and extremes and amplitudes."""
+
 MOST_BYTES = 2**27
 """Maps that are kept in memory, unless those of one group of lanes are more."""
 
@@ -64,6 +67,12 @@ class Maps(NamedTuple):
     starts: NDArray[np.intp]
 
 
+def fewest_steps(plan: Plan) -> int:
+    """Return the steps per period of undivided maps: those asked for, or a multiple of them."""
+    least = TOLD_STEPS if plan.told_by_steps else 1
+    return plan.steps_per_period * -(-least // plan.steps_per_period)
+
+
 def sharing(system: System) -> NDArray[np.intp]:
     """Return the number of the group of lanes with the same maps of every lane, shape (lanes,)."""
     rows = _own_groups(system)
@@ -83,7 +92,7 @@ def maps_memory(system: System, plan: Plan, stable: NDArray[np.int64]) -> int:
     harmonics = system.stiffness_cosine.size if system.effects.stiffness_variation else 0
     _, first = np.unique(sharing(system), return_index=True)
     needed = stable[first] + 2.0 * harmonics
-    steps = plan.steps_per_period
+    steps = fewest_steps(plan)
     divided = steps * 2.0 ** np.ceil(np.log2(np.maximum(needed / steps, 1.0)))
     sizes = 8 * place.step_size * np.minimum(divided, max(steps, MOST_STEPS))
     # Those that are kept, and those that are being made.

@@ -20,6 +20,7 @@ from gearchaos_kernels.equations import Gap, gaps_at
 from gearchaos_kernels.flow_layout import BOUNDS, HEADER, TERMS, layout
 from gearchaos_kernels.flow_vectors import GAPS, INPUTS, RESULT, TANGENT_GAP, TANGENT_INPUTS, VECTOR
 from gearchaos_kernels.forcing import Phase, forcing_at
+from gearchaos_kernels.loads import tell_kink
 from gearchaos_kernels.rows import LANES, STRIDE, Branch, Branches
 from gearchaos_kernels.splitting import MOST_SPLITS
 
@@ -205,6 +206,9 @@ def cross(memory, slot, table, row, work, number, recorded, present):
         branches, branch, following = contact.leave(
             memory, slot, axially, crossed, branches, lane, at_step, recorded, present
         )
+        if present.loads is not None:
+            if recorded:
+                tell_kink(memory, slot, axially, lane, crossed)
         if present.tangent is not None:
             columns = at + place.gaps[way]
             vectors.tangent_gap_along(work, TANGENT_GAP, TANGENT_INPUTS, table, columns, present)

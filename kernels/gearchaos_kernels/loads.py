@@ -47,15 +47,15 @@ def begin_loads(memory, table, shares, present):
 
 
 @scalar
-def tell_loads(memory, phases, present):
-    """Add a step to the record of every slot."""
+def tell_loads(memory, middle, end, present):
+    """Add a step to the record of every slot, from the mesh phases in its middle and at its end."""
     for slot in range(LANES):
         lane = read_lane(memory, slot)
         before = read_state(memory, rows.STATE_BEFORE, slot, present)
         after = read_state(memory, rows.STATE, slot, present)
-        point = with_teeth(memory, slot, phases.middle, present)
+        point = with_teeth(memory, slot, middle, present)
         half = carried_at(halfway(before, after), lane, point, present)
-        point = with_teeth(memory, slot, phases.end, present)
+        point = with_teeth(memory, slot, end, present)
         last = carried_at(after, lane, point, present)
         first = load(memory, rows.CARRIED, slot, Carried)
         store(memory, rows.CARRIED, slot, last)

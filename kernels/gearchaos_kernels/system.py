@@ -157,7 +157,7 @@ class Plan(NamedTuple):
     ``history_periods`` every step is kept. ``method``: "rk4" or "flow_map", which resolves every
     crossing and whose steps are exact. ``first_period``: mesh periods that the teeth have turned
     before tau = 0. ``contact``: whether crossings are told by flank, where they are resolved.
-    ``loads``: whether mesh forces and transmission error are told, by RK4 alone; and so are the
+    ``loads``: whether mesh forces and transmission error are told; and so are the
     extremes of these ``states``, and at these mesh ``orders``, of which the record has whole
     cycles, amplitudes of them and of the transmission error.
     """
@@ -175,6 +175,11 @@ class Plan(NamedTuple):
     loads: bool = False
     states: tuple[str, ...] = ()
     orders: tuple[Fraction, ...] = ()
+
+    @property
+    def told_by_steps(self) -> bool:
+        """Whether something is told to which every step adds; flow maps then take short ones."""
+        return bool(self.loads or self.states or self.orders)
 
 
 class Schedule(NamedTuple):
