@@ -16,7 +16,7 @@ NEVER = 2.0
 
 _THIRD = 1.0 / 3.0
 _ITERATIONS = 60
-_LAST_CORRECTION = 1e-6
+LAST_CORRECTION = 1e-6
 """Newton's method squares the error: after so small a correction it is far below the cubic's."""
 
 
@@ -188,7 +188,7 @@ def first_fall(d0, r0, d1, r1):
     coefficients = d0, r0, c2, c3
     value_low, _ = cubic(coefficients, low)
     guess = low - (high - low) * value_low / (value_high - value_low)
-    return falling_root(cubic, coefficients, low, high, guess, _LAST_CORRECTION)
+    return falling_root(cubic, coefficients, low, high, guess, LAST_CORRECTION)
 
 
 @scalar

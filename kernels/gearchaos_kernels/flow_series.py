@@ -147,9 +147,8 @@ def fill_maps(coefficients, forcing, table, present):
     """Fill the maps of a lane, shape (steps, size of a step); return what series leave."""
     place = layout(present)
     states = place.states
-    right_side = RightSide(
-        np.zeros((states, states + 3)), np.zeros((2, states + 3)), np.zeros((states, 2))
-    )
+    rates, gaps = np.zeros((states, states + 3)), np.zeros((2, states + 3))
+    right_side = RightSide(rates, gaps, np.zeros((states, 2)))
     lane = differentiate(coefficients, right_side, present)
     tail = 0.0
     for first in range(0, table.shape[0], TOGETHER):
@@ -200,7 +199,7 @@ def fill_steps(right_side, engaged, forcing, table, place):
     # An offset is no part of the gap, but less deflection.
     for way in range(ways):
         gap[0, way, (states + 1 + way) * width : (states + 2 + way) * width] = -1.0
-    solve(0.5, rates, mobility, gaps, forcing[0], engaged, psi, gap, force)
+    solve(0.5, (rates, mobility, gaps), forcing[0], engaged, psi, gap, force)
     for way in range(ways):
         gap[0, way, (states + 1 + way) * width : (states + 2 + way) * width] += 1.0
 
@@ -210,18 +209,8 @@ def fill_steps(right_side, engaged, forcing, table, place):
     switch = np.zeros((ORDER, ways, states * width))
     for line in range(states):
         inverse[0, line, line * width : (line + 1) * width] = 1.0
-    back_rates = np.ascontiguousarray(rates[:, :states].T)
-    solve(
-        -0.5,
-        back_rates,
-        gaps.T.copy(),
-        mobility.T.copy(),
-        forcing[0],
-        engaged,
-        inverse,
-        moved,
-        switch,
-    )
+    backward = np.ascontiguousarray(rates[:, :states].T), gaps.T.copy(), mobility.T.copy()
+    solve(-0.5, backward, forcing[0], engaged, inverse, moved, switch)
 
     # From the middle of the step to its beginning; a step is 2 long in s.
     ends = combined(_ENDS, psi).reshape((2, states + 3, columns, width))
@@ -242,7 +231,8 @@ def fill_steps(right_side, engaged, forcing, table, place):
     along = multiplied(along.reshape((TERMS * ways, columns, width)), from_beginning)
     traced, lost = economised(switch)
     traced = multiplied(traced.reshape((TERMS * ways, states, width)), first)
-    tail = max(tail, lost, np.abs(psi[ORDER, :states]).max(), np.abs(inverse[ORDER]).max())
+    for left in (lost, np.abs(psi[ORDER, :states]).max(), np.abs(inverse[ORDER]).max()):
+        tail = np.maximum(tail, left)
 
     for at in range(width):
         pair, step = divmod(at, table.shape[0])
@@ -267,21 +257,21 @@ def fill_steps(right_side, engaged, forcing, table, place):
 
 
 @part
-def solve(scale, rates, outer, inner, stiffness, engaged, terms, seen, pulled):
+def solve(scale, matrices, stiffness, engaged, terms, seen, pulled):
     """Solve terms' = scale (rates + outer K engaged inner) terms; tell inner terms, and K of it."""
+    rates, outer, inner = matrices
     width = engaged.shape[1]
     acting = np.zeros(seen.shape[1:])
     for k in range(ORDER):
         add_product(1.0, inner, terms[k], seen[k])
         for way in range(seen.shape[1]):
             for begin in range(0, seen.shape[2], width):
+                part = pulled[k, way, begin : begin + width]
                 for j in range(k + 1):
                     for at in range(width):
-                        pulled[k, way, begin + at] += (
-                            stiffness[k - j, at] * seen[j, way, begin + at]
-                        )
+                        part[at] += stiffness[k - j, at] * seen[j, way, begin + at]
                 for at in range(width):
-                    acting[way, begin + at] = engaged[way, at] * pulled[k, way, begin + at]
+                    acting[way, begin + at] = engaged[way, at] * part[at]
         add_product(scale / (k + 1), rates, terms[k], terms[k + 1])
         add_product(scale / (k + 1), outer, acting, terms[k + 1])
 

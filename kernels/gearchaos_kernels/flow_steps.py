@@ -17,7 +17,7 @@ from gearchaos_kernels import flow_vectors as vectors
 from gearchaos_kernels.block_memory import read_branches, read_lane, read_state, write_branches
 from gearchaos_kernels.compilation import scalar
 from gearchaos_kernels.equations import Gap, gaps_at
-from gearchaos_kernels.flow_layout import BOUNDS, HEADER, TERMS, layout
+from gearchaos_kernels.flow_layout import BOUNDS, HEADER, layout
 from gearchaos_kernels.flow_vectors import GAPS, INPUTS, RESULT, TANGENT_GAP, TANGENT_INPUTS, VECTOR
 from gearchaos_kernels.forcing import Phase, forcing_at
 from gearchaos_kernels.loads import tell_kink
@@ -31,7 +31,6 @@ _THIRD = 1.0 / 3.0
 _LOOKS = 300
 _NARROW = 1e-9
 """In so short a piece of a step a gap that turns around goes as far as rounding does."""
-_LAST_CORRECTION = 1e-8
 
 
 @scalar
@@ -243,8 +242,10 @@ def leaving(way, work, done, lane, branches, table, at, present):
     if half_backlash == 0.0:
         return contact.NEVER
     bend = 0.0
-    for term in range(TERMS - 1, 3, -1):
-        bend += term * (term - 1.0) * (term - 2.0) * (term - 3.0) * abs(work[gap + term])
+    for term in range(4, 8):
+        # Terms 4 to 15, in sums that do not wait for each other.
+        near = fourth(work, gap, term) + fourth(work, gap, term + 4)
+        bend += near + fourth(work, gap, term + 8)
     begin = vectors.value_and_slope(work, gap, done)
     end = vectors.value_and_slope(work, gap, 1.0)
     if branch.engaged != 0.0:
@@ -254,6 +255,12 @@ def leaving(way, work, done, lane, branches, table, at, present):
         first_below((work, gap, -1.0, half_backlash), done, begin, end, bend),
         first_below((work, gap, 1.0, half_backlash), done, begin, end, bend),
     )
+
+
+@scalar
+def fourth(work, gap, term):
+    """Return how much a term of a polynomial adds to its fourth derivative, at most."""
+    return term * (term - 1.0) * (term - 2.0) * (term - 3.0) * abs(work[gap + term])
 
 
 @scalar
@@ -281,10 +288,16 @@ def first_below(given, left, begin, end, bend):
             # Their slopes differ by less than a fifth of the same number.
             steepest = max(width * slope_left, 3.0 * (point2 - point1), width * slope_right)
             if steepest < -stray * 0.2 and value_right < 0.0:
-                slopes = width * slope_left, width * slope_right
-                fall = contact.first_fall(value_left, slopes[0], value_right, slopes[1])
-                guess = left + width * fall
-                return contact.falling_root(gap_at, given, left, right, guess, _LAST_CORRECTION)
+                # The cubic of the place over the value, as that falls.
+                fallen = value_left - value_right
+                done = value_left / fallen
+                early = (1.0 - done) * (-fallen / slope_left - width)
+                late = done * (-fallen / slope_right - width)
+                guess = left + width * done + done * (1.0 - done) * (early - late)
+                guess = min(max(guess, left), right)
+                return contact.falling_root(
+                    gap_at, given, left, right, guess, contact.LAST_CORRECTION
+                )
             clear = steepest < -stray * 0.2
             if not clear and width < _NARROW:
                 if value_right < 0.0:

@@ -272,18 +272,20 @@ def add_switch(_typing, work, gap, moment, factor, table, at, present):
 
 @intrinsic
 def value_and_slope(_typing, work, at, place):
-    """Evaluate a polynomial in the work of a lane, and its derivative, by its even and odd part."""
+    """Evaluate a polynomial in the work of a lane, and its derivative, by four parts of each."""
 
     def generate(context, builder, signature, arguments):
         w = _Writer(context, builder, signature, arguments)
         numbers, s = w.element(0, arguments[1]), arguments[2]
         square = builder.fmul(s, s)
+        fourth = builder.fmul(square, square)
         terms = [builder.load(builder.gep(numbers, [_INTEGER(term)])) for term in range(TERMS)]
         slopes = [builder.fmul(terms[term], _DOUBLE(float(term))) for term in range(1, TERMS)]
         results = []
         for series in (terms, slopes):
-            even, odd = (w.polynomial(series[first::2], square) for first in (0, 1))
-            results.append(w.multiply_add(odd, s, even))
+            parts = [w.polynomial(series[first::4], fourth) for first in range(4)]
+            low, high = (w.multiply_add(parts[n + 1], s, parts[n]) for n in (0, 2))
+            results.append(w.multiply_add(high, square, low))
         return context.make_tuple(builder, signature.return_type, results)
 
     return types.UniTuple(types.float64, 2)(work, types.intp, types.float64), generate
