@@ -16,8 +16,8 @@ NEVER = 2.0
 
 _THIRD = 1.0 / 3.0
 _ITERATIONS = 60
-LAST_CORRECTION = 1e-6
-"""Newton's method squares the error: after so small a correction it is far below the cubic's."""
+_LAST_CORRECTION = 1e-6
+"""Newton's method squares the error: after so small a correction hardly anything is left of it."""
 
 
 @scalar
@@ -188,7 +188,7 @@ def first_fall(d0, r0, d1, r1):
     coefficients = d0, r0, c2, c3
     value_low, _ = cubic(coefficients, low)
     guess = low - (high - low) * value_low / (value_high - value_low)
-    return falling_root(cubic, coefficients, low, high, guess, LAST_CORRECTION)
+    return falling_root(cubic, coefficients, low, high, guess)
 
 
 @scalar
@@ -199,7 +199,7 @@ def cubic(coefficients, at):
 
 
 @scalar
-def falling_root(polynomial, given, low, high, at, last_correction):
+def falling_root(polynomial, given, low, high, at):
     """Return where a polynomial that falls between two places passes zero, from a guess."""
     for _ in range(_ITERATIONS):
         value, slope = polynomial(given, at)
@@ -210,7 +210,7 @@ def falling_root(polynomial, given, low, high, at, last_correction):
         following = at - value / slope
         if not low <= following <= high:
             following = 0.5 * (low + high)
-        elif abs(following - at) < last_correction:
+        elif abs(following - at) < _LAST_CORRECTION:
             return following
         at = following
     return at

@@ -295,9 +295,7 @@ def first_below(given, left, begin, end, bend):
                 late = done * (-fallen / slope_right - width)
                 guess = left + width * done + done * (1.0 - done) * (early - late)
                 guess = min(max(guess, left), right)
-                return contact.falling_root(
-                    gap_at, given, left, right, guess, contact.LAST_CORRECTION
-                )
+                return contact.falling_root(gap_at, given, left, right, guess)
             clear = steepest < -stray * 0.2
             if not clear and width < _NARROW:
                 if value_right < 0.0:
