@@ -84,6 +84,8 @@ def integrate(
         step = system.mesh_period / steps_of
         steps_taken[order] = steps_of[order]
         phases = cycles / steps_of[:, np.newaxis]
+        turns = np.stack([np.cos(phases), np.sin(phases)], axis=2)
+        chosen: tuple[Any, ...] = np.array([*columns, ERROR], dtype=np.intp), turns
         batch = Batch(
             lane_coefficients(system, step),
             state_scales(system, step),
@@ -95,8 +97,7 @@ def integrate(
             blocks,
             maps,
             *tables_of(system, present, steps),
-            chosen=np.array([*columns, ERROR], dtype=np.intp),
-            turns=np.stack([np.cos(phases), np.sin(phases)], axis=2),
+            *chosen,
         )
         _integrate_blocks(batch, schedule, outcome, present)
         if maps.size:
