@@ -85,8 +85,9 @@ def label(record: Record) -> Labels:
     In this order: *diverged*; *periodic* with the smallest period whose return distance is within
     the tolerance, see `motion_period`; *chaotic* where the largest exponent is positive by three
     standard errors, a disturbance grows by a factor exp(2) over the record, and its later half
-    goes on at this pace; *quasi-periodic* where the scene admits it, the exponent is zero within
-    its error, and the weighted averages of both halves agree, see `halves_differ_by`;
+    goes on at this pace, but *grows* where the motion itself does so; *quasi-periodic* where the
+    scene admits it, the exponent is zero within its error, and the weighted averages of both halves
+    agree, see `halves_differ_by`;
     *unresolved* otherwise.
     """
     distances = return_distances(record.section)
@@ -199,7 +200,13 @@ def _aperiodic(section: Floats, growth: Floats, torus: Mask) -> NDArray[np.uint8
     pace = CHAOTIC_GROWTH / periods
     chaotic = (exponent > STANDARD_ERRORS * error) & (exponent > pace) & (later > pace)
     neutral = np.abs(exponent) <= np.minimum(STANDARD_ERRORS * error, NEUTRAL_GROWTH / periods)
+    # Far beyond the clearances all is linear: the motion grows as a disturbance does.
+    quarter = max(1, section.shape[1] // 4)
+    first, last = section[:, :quarter], section[:, -quarter:]
+    ratio = np.max(np.abs(last), axis=(1, 2)) / np.max(np.abs(first), axis=(1, 2))
+    grows = chaotic & (np.log(ratio) > exponent * (section.shape[1] - quarter) / 2.0)
     enough = section.shape[1] >= 2 * POINTS_NEEDED
     quasi_periodic = enough & torus & neutral & (halves_differ_by(section) <= AGREEMENT)
     motion = np.where(chaotic, CHAOTIC, np.where(quasi_periodic, QUASI_PERIODIC, UNRESOLVED))
+    motion[grows] = GROWS
     return motion.astype(np.uint8)

@@ -10,6 +10,7 @@ from scipy.optimize import brentq
 
 from gearchaos.configuration import load_config
 from gearchaos.engine.simulation import Simulation
+from gearchaos.records.label import GROWS, PERIODIC
 
 from .short_sweeps import computed, values_of
 
@@ -239,3 +240,27 @@ def test_at_twice_the_resonance_the_stiffness_drives_a_motion_of_two_periods():
     assert growth[3] > 0.0 > arrays["lyapunov_exponent"][3]
     points = arrays["section_delta_5"][3]
     assert np.ptp(points[::2]) < APART < 0.05 < abs(points[1] - points[0])
+
+
+def test_a_resonance_that_outgrows_the_clearance_is_told_from_chaos():
+    frequency, stiffness, damping = 1.9, 0.6, 0.02
+
+    def linear(time, flow):
+        spring = 1.0 - stiffness * np.cos(frequency * time)
+        x, rate = flow.reshape(2, 2)
+        return np.concatenate([rate, -2.0 * damping * rate - spring * x])
+
+    period = 2.0 * np.pi / frequency
+    flow = solve_ivp(linear, (0.0, period), np.eye(2).ravel(), rtol=1e-12, atol=1e-13).y[:, -1]
+    multiplier = np.abs(np.linalg.eigvals(flow.reshape(2, 2))).max()
+    changes = (
+        "start.carry=none",
+        f"sweep={{parameter='mesh_frequency', values=[{frequency}, 2.25]}}",
+        f"groups.stiffness_cosine=[{-stiffness}]",
+        f"groups.damping_ratio={damping}",
+        "groups.half_backlash=0.02",
+    )
+    lanes = computed(Simulation(load_config(SPUR_PAIR, changes)))
+    assert lanes["motion"].tolist() == [GROWS, PERIODIC]
+    # Where the clearance is nothing beside the motion, it grows as the linear equation does.
+    assert lanes["lyapunov_exponent"][0] == pytest.approx(np.log(multiplier) / period, rel=1e-6)
