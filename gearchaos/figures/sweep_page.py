@@ -84,12 +84,16 @@ def bifurcation_page(
         results += ways
         of_ways = [title] if len(ways) == 1 else [f"{title}, {way}" for way in WAYS]
         labels += of_ways if len(files) > 1 else WAYS[: len(ways)]
-    if len({one.axis for one in results}) > 1 or (stages and len(results) > 1):
+    if len({one.axis for one in results}) > 1:
         raise FigureError(
-            f"{len(results)} results over {', '.join(one.axis for one in results)}: only results "
-            "over the same parameter are drawn over each other, and without stages"
-            + ("; choose one with --at direction=upwards" if len(results) > len(files) else "")
+            f"results over {', '.join(one.axis for one in results)}: only those over the same "
+            "parameter are drawn over each other"
         )
+    of_orders = any(variable in one and one.dims(str(variable))[-1] == ORDER for one in results)
+    if len(results) > 1 and (stages or of_orders):
+        remedy = "; choose one with --at direction=upwards" if len(results) > len(files) else ""
+        what = "stages are" if stages else f"{variable}: is"
+        raise FigureError(f"{what} drawn of one result, in one direction{remedy}")
     has_section = variable is not None or any(map(section_variables, results))
     panels = has_section + any(LARGEST_EXPONENT in one for one in results)
     if not panels:
@@ -105,7 +109,7 @@ def bifurcation_page(
             shown: dict[str, Any] = {"between": between, "full_range": full_range}
             if len(results) > 1:
                 shown |= {"color": color, "marker": marker, "label": plain(name) or "untitled"}
-            if variable in one and one.dims(str(variable))[-1] == ORDER:
+            if of_orders:
                 waterfall(stack[0], one, str(variable), between=between)
             elif variable is not None or section_variables(one):
                 bifurcation(stack[0], one, variable, **shown)

@@ -229,7 +229,7 @@ def test_results_over_each_other_share_a_page_and_are_named(result):
     assert upper.get_xlim() == lower.get_xlim()
     assert upper.get_xlim()[0] < 2.0
     assert [text.get_text() for text in upper.get_legend().get_texts()] == ["one", r"other \$"]
-    with pytest.raises(FigureError, match="drawn over each other, and without stages"):
+    with pytest.raises(FigureError, match="stages are drawn of one result"):
         bifurcation_page([result, other], stages=True)
 
 

@@ -145,7 +145,7 @@ def test_several_sweeps_are_drawn_over_each_other(result_file, capsys):
     assert err.count("50 lanes over load") == 2
     assert main([str(result_file), str(other), "-o", str(other), "--overwrite"]) == 0
     assert main([str(result_file), str(other), "--stages"]) == 2
-    assert "without stages" in capsys.readouterr().err
+    assert "stages are drawn of one result" in capsys.readouterr().err
 
 
 def test_an_odd_name_comes_out_as_it_went_in(result_file):

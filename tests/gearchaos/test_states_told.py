@@ -116,8 +116,6 @@ def test_the_waterfall_has_a_row_for_each_order(result, path, capsys):
         (["outputs.orders=['1/0']"], r"orders\[0\] = \"1/0\": must be a positive whole number"),
         (["outputs.orders=[0.5]"], r"orders\[0\] = \"0.5\": must be .*such as \[\"1/3\""),
         (["outputs.states=['delta_3']"], r'outputs\.states.*no state `delta_3`; add "axial"'),
-        (["outputs.orders=[1]", "integration.method=flow_map"], r"outputs\.orders.*flow maps"),
-        (["outputs.states=['delta_5']", "integration.method=flow_map"], r"outputs\.states.*flow"),
     ],
 )
 def test_what_cannot_be_told_is_refused(settings, message):
