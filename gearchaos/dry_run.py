@@ -83,7 +83,8 @@ def _seconds_per_lane(simulation: Simulation) -> float:
         for more, length in (1, min(1.0, 8.0 / periods)), (0, min(1.0, SAMPLE_PERIODS / periods)):
             sample = Simulation(_thinned(simulation, lanes / len(simulation.lanes), length))
             plan, every = sample.plan, np.arange(len(sample.lanes))
-            sample.plan = plan._replace(steps_per_period=plan.steps_per_period + more)
+            steps, orders = plan.steps_per_period + more, simulation.plan.orders
+            sample.plan = plan._replace(steps_per_period=steps, orders=orders)
             began = time.perf_counter()
             sample.integrate(every, sample.plan._replace(transient_periods=0, recorded_periods=0))
             made = time.perf_counter()
@@ -121,6 +122,8 @@ def _thinned(simulation: Simulation, share: float, length: float) -> Configurati
     }
     tables["integration"].pop("tolerance", None)
     tables["outputs"]["section_points"] = min(config.outputs.section_points, recorded)
+    # So short a record need not have whole cycles of them.
+    tables["outputs"]["orders"] = ()
     return Configuration.from_tables(tables, config.source)
 
 

@@ -148,7 +148,7 @@ def refined_jumps(
     place is known to the width.
     """
     found: list[Boundary] = []
-    outermost = np.array([(one.first, one.last) for one in stretches]).reshape(-1, 2).T
+    outermost = np.array([(one.first, one.last) for one in stretches], np.intp).reshape(-1, 2).T
     ways = zip(WAYS, directions_of(result), outermost[::-1], (1, -1), strict=True)
     for way, one_way, end, step in ways:
         edges = _edges_of(one_way)

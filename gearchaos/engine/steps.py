@@ -18,6 +18,7 @@ from gearchaos.dynamics.stability import (
     fewest_stable_steps,
     stability_limit,
 )
+from gearchaos.dynamics.systems import plan_of
 from gearchaos.engine.lanes import Lanes
 from gearchaos.errors import ConfigurationError
 from gearchaos.gear.tooth_deviations import REALISATION
@@ -188,13 +189,16 @@ def pilot(
 
     def solution(steps: int, resolved: bool, method: str) -> Solution:
         check()
-        grid = plan._replace(
+        # Loads and states, which no flow map tells, are not compared.
+        grid = plan_of(
+            lanes.config,
             steps_per_period=steps,
             transient_periods=periods,
             recorded_periods=periods,
             section_points=min(POINTS_NEEDED * repeats, periods),
             resolved=resolved,
             method=method,
+            tangent=plan.tangent,
         )
         outcome = integrate(system, common, grid)
         return solution_of(system, outcome, grid, lanes.config.outputs.section)

@@ -195,8 +195,7 @@ def find_hop(config: Configuration, step: float = STEP, threads: int | None = No
     for key, periods in FOLLOWING.items():
         carried = carried.replace(f"integration.{key}", periods)
     sweeps = run(carried, threads)
-    stretches = apart(sweeps)
-    jumps = refined_jumps(carried, sweeps, stretches, ACCURACY) if stretches else []
+    jumps = refined_jumps(carried, sweeps, apart(sweeps), ACCURACY)
     if len(jumps) < 2:
         return None
     first, *_, last = jumps

@@ -8,6 +8,8 @@ import pytest
 
 import gearchaos
 from gearchaos import figures
+from gearchaos.engine.recomputing import computable
+from gearchaos.engine.refinement import refined_jumps
 from gearchaos.errors import ConfigurationError, FigureError
 from gearchaos.results.jumps import apart
 from gearchaos.results.variables import WAYS
@@ -78,6 +80,7 @@ def test_both_directions_differ_between_the_folds_of_the_coexisting_motions(resu
 def test_narrow_stretches_and_those_of_one_direction_are_not_told(result):
     assert apart(result, 0.95) == []
     assert apart(result.sel(direction="upwards")) == []
+    assert refined_jumps(computable(result, "both.h5"), result, [], 1e-3) == []
 
 
 def test_refined_jumps_are_the_folds(folder, folds):

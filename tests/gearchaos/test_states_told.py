@@ -8,6 +8,7 @@ import gearchaos
 from gearchaos import load_config
 from gearchaos.figures import waterfall
 from gearchaos.plot import main as plot
+from gearchaos.results.units import unit_of
 
 from .commands import run_module
 from .short_sweeps import PAN2021, SHORT
@@ -58,6 +59,13 @@ def test_a_file_keeps_what_is_told(result, path):
     assert squares == pytest.approx(result["transmission_error_rms"] ** 2, rel=0.05)
 
 
+def test_a_dry_run_needs_no_whole_cycles(tmp_path):
+    settings = [f"--set={one}" for one in ASKED]
+    ended = run_module("gearchaos.sweep", str(PAN2021), *settings, "--dry-run", cwd=tmp_path)
+    assert (ended.code, ended.out) == (0, "")
+    assert "time:     about" in ended.err
+
+
 def test_half_an_order_rises_where_the_period_doubles(result):
     assert result["period"].tolist() == [1, 1, 1, 2]
     half = result["amplitude_transmission_error"][:, 0]
@@ -82,8 +90,7 @@ def test_they_are_in_physical_units():
         ("amplitude_delta_1_rate", "m s-1"),
         ("amplitude_transmission_error", "um"),
     ):
-        unit = gearchaos.results.units.unit_of(name)
-        assert unit is not None and unit.units == units
+        assert unit_of(name).units == units
 
 
 def test_the_waterfall_has_a_row_for_each_order(result, path, capsys):
