@@ -38,13 +38,7 @@ def _identify(options: Namespace) -> int:
     from gearchaos.identification.evaluation import require_stable
     from gearchaos.identification.loading import load_targets
     from gearchaos.identification.report import report
-    from gearchaos.identification.search import (
-        MOST_CENTRES,
-        RUNGS,
-        Judge,
-        decisive_facts,
-        search,
-    )
+    from gearchaos.identification.search import MOST_CENTRES, RUNGS, Judge, decisive_facts, search
     from gearchaos.identification.tried import read_tried, write_tried
     from gearchaos.results.atomic_file import check_output
     from gearchaos.results.block_folder import require_same

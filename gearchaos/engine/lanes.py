@@ -10,12 +10,7 @@ from numpy.typing import NDArray
 
 from gearchaos.configuration import Configuration, axis_values, swept_values
 from gearchaos.configuration.run_tables import states_of
-from gearchaos.configuration.tables import (
-    SWEEPABLE_GROUPS,
-    SWEEPABLE_KEYS,
-    groups_at,
-    physical_at,
-)
+from gearchaos.configuration.tables import SWEEPABLE_GROUPS, SWEEPABLE_KEYS, groups_at, physical_at
 from gearchaos.dynamics.systems import system_of
 from gearchaos.gear.derivation import SCALES, derive_scales
 from gearchaos.gear.groups import GROUP_TABLE

@@ -22,11 +22,7 @@ from gearchaos.figures.response import (
 )
 from gearchaos.figures.style import BLACK, BLUE, FONT_PT, GREY, ORANGE, VERMILION
 from gearchaos.gear.contact_lines import series_table
-from gearchaos.paper.computation import (
-    Reproduction,
-    lane_of,
-    largest_acceleration,
-)
+from gearchaos.paper.computation import Reproduction, lane_of, largest_acceleration
 from gearchaos.paper.published import (
     Printed,
     contact_line_stiffness,

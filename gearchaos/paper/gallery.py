@@ -229,7 +229,4 @@ def _of_the_increments(found: Reproduction) -> dict[str, Any]:
     lanes = [lane_of(found.response, p) for p in published().increments.pitch_errors]
     largest = np.max(np.abs(found.response["delta_5_acceleration"][lanes]), axis=1)
     forcing = 2.0 * found.group("mesh_frequency") ** 2 * found.group("pitch_error_amplitude")
-    return {
-        "forcing": short(forcing),
-        "magnitudes": ", ".join(map(short, np.diff(largest))),
-    }
+    return {"forcing": short(forcing), "magnitudes": ", ".join(map(short, np.diff(largest)))}
