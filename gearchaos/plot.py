@@ -164,9 +164,10 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
     add("-o", "--output", metavar="PATH", help=text)
     add("--format", metavar="FORMATS", help="some of png, pdf, svg, eps, tiff (default: png,pdf)")
     text = (
-        "section variable of a sweep (default: section_delta_5), coordinate of a response "
-        "(default: delta_5) or another of its variables over time, such as mesh_force_tangential, "
-        "any number of the lanes of a map (default: motion, exponent and contact)"
+        "section variable of a sweep (default: section_delta_5), any number of its lanes, or "
+        "amplitudes such as amplitude_transmission_error; coordinate of a response (default: "
+        "delta_5) or another of its variables over time, such as mesh_force_tangential; any number "
+        "of the lanes of a map (default: motion, exponent and contact)"
     )
     add("--variable", metavar="NAME", help=text)
     add("--from", dest="low", type=number, metavar="VALUE", help="lowest parameter to show")

@@ -36,8 +36,8 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
     text = (
         "bisect every boundary to this width, and tell how the orbit beside it is lost; lanes are "
         "computed again with the configuration in the file. Of a sweep in both directions, follow "
-        "the orbits to where each direction jumps; of two parameters without --at, bisect those "
-        "along the first one in every row"
+        "the orbits to where each direction jumps; of two parameters without --at, find those "
+        "along the first one in every row, also where only a row beside shows them"
     )
     add("--refine", type=_width, metavar="WIDTH", help=text)
     text = (
@@ -116,7 +116,7 @@ def _stages(options: argparse.Namespace) -> int:
 
 
 def _map_boundaries(result: "Result", options: argparse.Namespace) -> int:
-    """Bisect the boundaries in all rows of a map, and tell what that saves."""
+    """Find the boundaries in all rows of a map, and tell what that saves."""
     from gearchaos.engine.recomputing import refinable
     from gearchaos.engine.refinement import refined_map
     from gearchaos.engine.running import choose_threads, compiling
