@@ -89,7 +89,7 @@ def find_basins(result: Result, name: str = "the result", threads: int | None = 
                     starts=mine.size,
                     share=mine.size / starts,
                     share_95_percent=(low, high),
-                    contact={n: flags[result.lanes(n)[first]] for n, flags in contact.items()},
+                    contact={n: f[result.lanes(n)[first]] for n, f in contact.items() if orbit},
                     means=means,
                     section=orbit.points if orbit else np.zeros((0, len(system.states))),
                 )

@@ -34,7 +34,8 @@ def waterfall(axes: Axes, result: Result, variable: str, *, between: Between = (
     lanes = diagram_lanes(result, between)
     values = np.unique(lanes.parameter)
     if axes.images or values.size < lanes.numbers.size:
-        raise FigureError(f"{variable}: is drawn of one result, with one lane for each value")
+        rule = "is drawn of one result, with one lane for each value"
+        raise FigureError(f"{variable}: {rule}; choose them with --at (in Python: result.sel)")
     amplitudes = result.lanes(variable)[lanes.numbers].T
     most = float(np.nanmax(amplitudes, initial=0.0)) or 1.0
     least = most / 10.0**DECADES

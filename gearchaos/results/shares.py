@@ -96,9 +96,9 @@ class Basin(NamedTuple):
     none; ``motion``: such as "period 2", "chaotic" or "diverged"; ``multiplier``: largest modulus
     of the Floquet multipliers, not a number where the motion is not periodic; ``exponent``: largest
     Lyapunov exponent, that of the orbit or a mean over the starts; ``starts``: how many, with their
-    share and its confidence interval; ``contact``: the kind of contact of the first of them, by
-    variable; ``means`` of other variables of the result over all of them; ``section`` (points,
-    states): points of the attractor, once an excitation period.
+    share and its confidence interval; ``contact``: the kind of contact on the attractor, that of
+    the first of them, by variable; ``means`` of other variables of the result over all of them;
+    ``section`` (points, states): points of the attractor, once an excitation period.
     """
 
     value: float

@@ -116,6 +116,7 @@ def test_what_diverged_or_is_unresolved_is_a_class_of_its_own(grid):
     assert [one.number > 0 for one in found.basins] == [True, True, False, False]
     assert sum(count for _, count in told.values()) == 121
     assert all(not one.section.size for one in found.basins if one.number < 0)
+    assert [len(one.contact) for one in found.basins] == [1, 1, 0, 0]
 
 
 def test_a_motion_without_an_orbit_at_its_end_is_unresolved(grid):
