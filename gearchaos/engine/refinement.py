@@ -30,7 +30,7 @@ from gearchaos.results.result import Result
 from gearchaos.results.stage_table import Stage, label_text
 from gearchaos.results.variables import LABELS, WAYS
 
-FOLLOWED_WIDTH = 1.0 / 1024.0
+FOLLOWED_WIDTH = 2.0**-16
 """Share of its way to which the end of an orbit is located: next to a fold a multiplier nears +1
 like the root of the distance, so that a coarse end tells nothing."""
 
