@@ -111,8 +111,7 @@ def test_the_truth_is_that_of_the_stored_orbits():
         if orbit["scene"] == "no_axial" and orbit["pitch_error"] in (5.86, 10.75)
     }
     values = f"sweep={{parameter='pitch_error', values={[*stored]}}}"
-    # Loads, which no flow map tells, are left out of the comparison.
-    sweep = Simulation(gearchaos.load_config(PAN2021, [values, "outputs.loads=true"]))
+    sweep = Simulation(gearchaos.load_config(PAN2021, [values]))
     _, motion = pilot(sweep.lanes, sweep.plan, 2, TRUTH_STEPS)
     truth = motion(TRUTH_STEPS, True, "flow_map")
     for lane, orbit in enumerate(stored.values()):
