@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 from gearchaos.command_line import OK, Command, coordinates, place
 
 if TYPE_CHECKING:
-    from gearchaos.results.shares import Basins
+    from gearchaos.results.ensembles import Basins
 
 
 def _arguments(parser: argparse.ArgumentParser) -> None:

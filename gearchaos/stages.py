@@ -65,8 +65,8 @@ def _stages(options: argparse.Namespace) -> int:
     from gearchaos.results.jumps import apart, crises, jumps
     from gearchaos.results.overview import finite, slice_lines
     from gearchaos.results.result import open_result
+    from gearchaos.results.scales import excitation_of
     from gearchaos.results.stage_table import labelled_lanes, one_axis, slice_facts, stage_table
-    from gearchaos.results.units import excitation_of
     from gearchaos.results.variables import DIRECTION, RECORD, REPEATS, UNSWEPT
 
     whole = open_result(options.result)

@@ -10,8 +10,8 @@ from gearchaos.engine.running import choose_threads
 from gearchaos.errors import ConfigurationError, FileError
 from gearchaos.records.label import UNRESOLVED
 from gearchaos.records.wilson import wilson_interval
+from gearchaos.results.ensembles import Basin, Basins, basin_entropy, in_order
 from gearchaos.results.result import Result
-from gearchaos.results.shares import Basin, Basins, basin_entropy, in_order
 from gearchaos.results.stage_table import label_text, require_labels
 from gearchaos.results.variables import (
     LABELS,

@@ -5,9 +5,9 @@ from collections.abc import Mapping
 
 from matplotlib.mathtext import MathTextParser
 
-from gearchaos.results import units
+from gearchaos.results import scales
 from gearchaos.results.result import Result
-from gearchaos.results.units import excitation_of
+from gearchaos.results.scales import excitation_of
 from gearchaos.results.variables import DIRECTION, START, coordinate_text
 
 
@@ -35,7 +35,7 @@ def unit_of(result: Result, name: str) -> str:
     """Word the unit of a variable, or what its numbers are multiples of; "" of a pure number."""
     written = result.variables[name].units
     if written in ("", "1"):
-        return units.unit_of(name).stands_for
+        return scales.unit_of(name).stands_for
     words = plain(re.sub(r"\bum\b", "\N{MICRO SIGN}m", written))
     return re.sub(r"\b([a-z]+)-(\d)", r"\1$^{-\2}$", words)
 

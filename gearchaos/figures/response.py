@@ -17,7 +17,7 @@ from gearchaos.records.amplitude_spectrum import spectral_lines
 from gearchaos.records.period import motion_period
 from gearchaos.results.response_variables import MESH_FORCE, TIME, acceleration_of
 from gearchaos.results.result import Result, section_variables
-from gearchaos.results.units import excitation_of
+from gearchaos.results.scales import excitation_of
 
 COORDINATE = "delta_5"
 """The coordinate that is drawn unless another is asked for: the torsion."""

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from gearchaos.records.period import TOLERANCE, section_distance
 from gearchaos.results.result import Result, section_variables
+from gearchaos.results.scales import excitation_of
 from gearchaos.results.stage_table import labelled_lanes
-from gearchaos.results.units import excitation_of
 from gearchaos.results.variables import DIRECTION, WAYS
 
 Floats = NDArray[np.float64]

@@ -15,8 +15,8 @@ from gearchaos.results import variables as known
 from gearchaos.results.result import Result
 from gearchaos.results.result_file import Parameter
 from gearchaos.results.result_reader import printable, read_result
+from gearchaos.results.scales import excitation_of
 from gearchaos.results.stage_table import labelled_lanes, one_axis, slice_facts, stage_table
-from gearchaos.results.units import excitation_of
 
 ERRORS = {
     "section_error": ("section error", "when the step is halved"),

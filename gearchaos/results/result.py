@@ -20,7 +20,7 @@ from gearchaos.results import variables as known
 from gearchaos.results.atomic_file import checksum_fits
 from gearchaos.results.result_file import Parameter, own_metadata, write_result
 from gearchaos.results.result_reader import fixed_coordinates, is_coordinate, read_result
-from gearchaos.results.units import in_physical_units
+from gearchaos.results.scales import in_physical_units
 from gearchaos.results.variables import Variable, coordinate_text, diagram_axis
 
 __all__ = ["Parameter", "Result", "open_result", "section_variables"]

@@ -11,7 +11,7 @@ import gearchaos
 from gearchaos.engine.basins import find_basins
 from gearchaos.errors import ConfigurationError, FigureError, FileError
 from gearchaos.figures import basins, basins_page, fractions
-from gearchaos.figures.shares import COLORS
+from gearchaos.figures.ensembles import COLORS
 from gearchaos.records.label import DIVERGED, UNRESOLVED
 from gearchaos.results.result import Result
 

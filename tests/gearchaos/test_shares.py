@@ -15,8 +15,8 @@ from gearchaos.figures import shares, shares_page
 from gearchaos.plot import main
 from gearchaos.records.label import MEANINGS
 from gearchaos.records.wilson import wilson_interval
+from gearchaos.results.ensembles import motion_shares
 from gearchaos.results.result import Result
-from gearchaos.results.shares import motion_shares
 from gearchaos.results.variables import coordinate, pair_axis, start_axis, sweep_variables
 
 INTERVAL = "not period 1, 95 % confidence"

@@ -8,7 +8,7 @@ import gearchaos
 from gearchaos import load_config
 from gearchaos.figures import waterfall
 from gearchaos.plot import main as plot
-from gearchaos.results.units import unit_of
+from gearchaos.results.scales import unit_of
 
 from .commands import run_module
 from .short_sweeps import PAN2021, SHORT

@@ -17,7 +17,7 @@ from gearchaos.info import main as info
 from gearchaos.plot import main as plot
 from gearchaos.results.response_variables import response_variables
 from gearchaos.results.result import Parameter, Result
-from gearchaos.results.units import Excitation, excitation_of
+from gearchaos.results.scales import Excitation, excitation_of
 from gearchaos.results.variables import coordinate, sweep_variables
 from gearchaos.stages import main as stages
 

@@ -1,4 +1,4 @@
-"""What gear pairs and starts of each swept value come to: shares of motions, and basins."""
+"""Ensembles of gear pairs and starts: the shares of their motions, and their basins."""
 
 from collections.abc import Iterable
 from typing import NamedTuple

@@ -1,4 +1,4 @@
-"""Which share of gear pairs and starts moves in which way, and which start comes to what."""
+"""Ensembles: which share of pairs and starts moves in which way, which start comes to what."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -18,9 +18,9 @@ from gearchaos.figures.lanes import Between, Floats, cell_edges, diagram_lanes
 from gearchaos.figures.page import Page, few_ticks, legend_below, letter, page, remark
 from gearchaos.figures.stages import SHADES, look_of
 from gearchaos.figures.style import BLACK, SINGLE_COLUMN_MM
+from gearchaos.results.ensembles import Basin, Basins, Counted, in_order, motion_shares
 from gearchaos.results.result import Result
-from gearchaos.results.shares import Basin, Basins, Counted, in_order, motion_shares
-from gearchaos.results.units import unit_of
+from gearchaos.results.scales import unit_of
 from gearchaos.results.variables import REPEATS, STATE_WORDING
 
 Drawn = Artist | Container
