@@ -2,9 +2,7 @@
 
 from pathlib import Path
 
-import nbformat
 import pytest
-from nbclient import NotebookClient
 
 NOTEBOOK = Path(__file__).parents[2] / "docs" / "own_pair.ipynb"
 
@@ -19,6 +17,10 @@ def printed(notebook):
 
 @pytest.mark.slow
 def test_the_notebook_runs_and_prints_what_it_shows(tmp_path):
+    # Not imported by the processes that only collect this test.
+    import nbformat
+    from nbclient import NotebookClient
+
     notebook = nbformat.read(NOTEBOOK, as_version=4)
     shown = printed(notebook)
     resources = {"metadata": {"path": str(tmp_path)}}
