@@ -53,6 +53,10 @@ def test_lengths_times_and_forces_are_those_of_the_pair(result):
     # 50 Nm at the base radius of the driving gear, 22.5688 mm.
     force = 1e-6 * length * stiffness * result.parameters["load"].value
     assert force == pytest.approx(50.0 / 22.5688e-3, rel=1e-5)
+    assert result.parameters["static_load"].value == pytest.approx(force)
+    mass, period = (result.parameters[name].value for name in ("equivalent_mass", "mesh_period"))
+    assert frequency == pytest.approx(np.sqrt(stiffness / mass))
+    assert period == pytest.approx(60.0 / (8000.0 * 21))
 
 
 def test_one_variable_is_enough_and_twice_is_once(result):
