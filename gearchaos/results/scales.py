@@ -37,7 +37,7 @@ _UNITS = {
     r"delta_\d_acceleration": _ACCELERATION,
     r"mesh_force_\w+": _FORCE,
     r"lyapunov_(exponent|sum)\w*|exponent_step_error": _GROWTH,
-    "mesh_frequency": Unit(r"unit $\omega_h$", "rad s-1", 1.0, (FREQUENCY,)),
+    "mesh_frequency": Unit(r"unit $\omega_h$", "Hz", 0.5 / np.pi, (FREQUENCY,)),
 }
 """By a pattern of the names of variables: docs/model.md."""
 
@@ -71,6 +71,8 @@ def in_physical_units(
             raise ConfigurationError(f"{variable.name}: {varied}: select one value there first")
         sizes = zip(variable.dims, values.shape, strict=True)
         values = values * np.reshape(scale.value, [n if d in scale.dims else 1 for d, n in sizes])
+    if unit.units == "Hz":
+        variable = replace(variable, long_name="mesh frequency", symbol="$f$")
     return replace(variable, units=unit.units), unit.factor * values
 
 

@@ -59,6 +59,15 @@ def test_lengths_times_and_forces_are_those_of_the_pair(result):
     assert period == pytest.approx(60.0 / (8000.0 * 21))
 
 
+def test_a_mesh_frequency_is_in_hertz_and_no_longer_angular(tmp_path):
+    swept = "sweep={parameter='mesh_frequency', values=[0.5, 1.0]}"
+    result = gearchaos.run(gearchaos.load_config(small_config(tmp_path), [*ASKED, swept]))
+    found = result.physical("mesh_frequency")
+    assert found["mesh_frequency"] == pytest.approx(1.0 / result.parameters["mesh_period"].value)
+    told = found.attributes("mesh_frequency")
+    assert (told["units"], told["long_name"]) == ("Hz", "mesh frequency")
+
+
 def test_one_variable_is_enough_and_twice_is_once(result):
     one = result.physical("section_delta_5")
     assert one.attributes("lyapunov_exponent")["units"] == "1"
