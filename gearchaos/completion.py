@@ -2,7 +2,7 @@
 
 For bash: gearchaos completion bash > ~/.local/share/bash-completion/completions/gearchaos; for zsh:
 gearchaos completion zsh > a file named _gearchaos in a folder of $fpath. Needs pip install
-gearchaos[completion]. Exit codes: 0 done, 2 no such shell, or the package shtab is missing.
+gearchaos[completion]. Exit codes: 0 done, 2 no such shell, 4 the package shtab is missing.
 """
 
 import sys
@@ -10,7 +10,6 @@ from argparse import ArgumentParser, Namespace
 from importlib import import_module
 
 from gearchaos.command_line import COMMANDS, OK, Command, module_of
-from gearchaos.errors import ConfigurationError
 
 
 def _arguments(parser: ArgumentParser) -> None:
@@ -18,12 +17,9 @@ def _arguments(parser: ArgumentParser) -> None:
 
 
 def _complete(options: Namespace) -> int:
-    try:
-        import shtab
-    except ImportError as error:
-        raise ConfigurationError(
-            "the package shtab is not installed; pip install gearchaos[completion]"
-        ) from error
+    from gearchaos.results.tables import needed
+
+    shtab = needed("shtab", "completion")
     whole = ArgumentParser(prog="gearchaos")
     parsers = whole.add_subparsers()
     for name, text in COMMANDS.items():

@@ -12,7 +12,7 @@ from gearchaos.configuration import Configuration, axis_values, swept_values
 from gearchaos.configuration.run_tables import states_of
 from gearchaos.configuration.tables import SWEEPABLE_GROUPS, SWEEPABLE_KEYS, groups_at, physical_at
 from gearchaos.dynamics.systems import system_of
-from gearchaos.gear.derivation import IN_UNITS, SCALES, derive_scales
+from gearchaos.gear.derivation import SCALES, derive_scales
 from gearchaos.gear.groups import GROUP_TABLE
 from gearchaos.gear.tooth_deviations import REALISATION
 from gearchaos.results.result_file import Parameter
@@ -153,9 +153,8 @@ class Lanes:
                 origin = groups.origin[row.name]
                 parameters[row.name] = entry(value, origin, texts, row.is_list)
         physical = physical_at(self.config, values)
-        texts_of = IN_UNITS | {name: texts[:3] for name, texts in SCALES.items()}
         for name, value in derive_scales(physical, groups.load, groups.mesh_frequency).items():
-            parameters[name] = entry(value, "derived", texts_of[name])
+            parameters[name] = entry(value, "derived", SCALES[name])
         return parameters
 
 

@@ -22,9 +22,9 @@ _N_PER_UM_MM = 1e9  # stiffness per unit face width: 1 N/(um mm) = 1e9 N/m^2
 def derive_scales(physical: Mapping[str, Any], load: Value, frequency: Value) -> dict[str, Value]:
     """Compute those of the `SCALES` for which the physical data suffice; see `derive_groups`.
 
-    And of them what the groups ``load`` and mesh ``frequency`` are in physical units.
+    ``load``, ``frequency``: the groups of which two of them tell what they are in units.
     """
-    found = _derive(physical, {name: derivation for name, (*_, derivation) in SCALES.items()})
+    found = _derive(physical, _SCALE_DERIVATIONS)
     with suppress(KeyError):
         found["mesh_period"] = 2.0 * np.pi / (frequency * found[FREQUENCY])
         found["static_load"] = load * found[STIFFNESS] * found[LENGTH] * _MICROMETRE
@@ -197,16 +197,22 @@ def _common_to_lanes(value: Any) -> float:
 
 
 LENGTH, FREQUENCY, STIFFNESS = "length_scale", "scaling_frequency", "mean_mesh_stiffness"
-SCALES: dict[str, tuple[str, str, str, Callable[[Quantities], Any]]] = {
-    LENGTH: ("um", "length scale", r"$b\prime$", lambda q: q.length_scale / _MICROMETRE),
-    FREQUENCY: ("s-1", "scaling frequency", r"$\omega_h$", lambda q: q.scaling_frequency),
-    STIFFNESS: ("N m-1", "mean mesh stiffness", "$k_m$", lambda q: q.mean_stiffness),
-    "equivalent_mass": ("kg", "equivalent mass", "$m_e$", lambda q: q.pair.equivalent_mass),
+SCALES = {
+    LENGTH: ("um", "length scale", r"$b\prime$"),
+    FREQUENCY: ("s-1", "scaling frequency", r"$\omega_h$"),
+    STIFFNESS: ("N m-1", "mean mesh stiffness", "$k_m$"),
+    "equivalent_mass": ("kg", "equivalent mass", "$m_e$"),
+    "mesh_period": ("s", "mesh period", ""),
+    "static_load": ("N", "static load", ""),
 }
-"""What makes a model dimensionless: unit, wording, symbol and derivation of each, by name."""
+"""What makes a model dimensionless, and two groups in units: unit, wording and symbol by name."""
 
-IN_UNITS = {"mesh_period": ("s", "mesh period", ""), "static_load": ("N", "static load", "")}
-"""Unit, wording and symbol of what two groups are in physical units."""
+_SCALE_DERIVATIONS: dict[str, Callable[[Quantities], Any]] = {
+    LENGTH: lambda q: q.length_scale / _MICROMETRE,
+    FREQUENCY: lambda q: q.scaling_frequency,
+    STIFFNESS: lambda q: q.mean_stiffness,
+    "equivalent_mass": lambda q: q.pair.equivalent_mass,
+}
 
 _DERIVATIONS: dict[str, Callable[[Quantities], Any]] = {
     "mesh_frequency": Quantities.mesh_frequency,

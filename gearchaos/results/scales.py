@@ -15,12 +15,16 @@ from gearchaos.results.variables import Variable
 
 
 class Unit(NamedTuple):
-    """A product of scales of a pair, worded, and how many physical units it is."""
+    """A product of scales of a pair, worded, and how many physical units it is.
+
+    ``renamed``: what a variable is called in these units where that is another name.
+    """
 
     stands_for: str
     units: str
     factor: float
     scales: tuple[str, ...]
+    renamed: Mapping[str, Any] = {}
 
 
 # The prime is written out, since one in superscript stands apart from its letter.
@@ -29,6 +33,8 @@ _SPEED = Unit(r"unit $b\prime\omega_h$", "m s-1", 1e-6, (LENGTH, FREQUENCY))
 _ACCELERATION = Unit(r"unit $b\prime\omega_h^2$", "m s-2", 1e-6, (LENGTH, FREQUENCY, FREQUENCY))
 _FORCE = Unit(r"unit $k_mb\prime$", "N", 1e-6, (STIFFNESS, LENGTH))
 _GROWTH = Unit(r"per unit of $\tau$", "s-1", 1.0, (FREQUENCY,))
+_ORDINARY = {"long_name": "mesh frequency", "symbol": "$f$"}
+_HERTZ = Unit(r"unit $\omega_h$", "Hz", 0.5 / np.pi, (FREQUENCY,), _ORDINARY)
 _PURE = Unit("", "1", 1.0, ())
 _STATE = r"(section_|amplitude_)?delta_\d%s(_largest|_smallest|_peak_to_peak)?"
 _UNITS = {
@@ -37,7 +43,7 @@ _UNITS = {
     r"delta_\d_acceleration": _ACCELERATION,
     r"mesh_force_\w+": _FORCE,
     r"lyapunov_(exponent|sum)\w*|exponent_step_error": _GROWTH,
-    "mesh_frequency": Unit(r"unit $\omega_h$", "Hz", 0.5 / np.pi, (FREQUENCY,)),
+    "mesh_frequency": _HERTZ,
 }
 """By a pattern of the names of variables: docs/model.md."""
 
@@ -71,9 +77,7 @@ def in_physical_units(
             raise ConfigurationError(f"{variable.name}: {varied}: select one value there first")
         sizes = zip(variable.dims, values.shape, strict=True)
         values = values * np.reshape(scale.value, [n if d in scale.dims else 1 for d, n in sizes])
-    if unit.units == "Hz":
-        variable = replace(variable, long_name="mesh frequency", symbol="$f$")
-    return replace(variable, units=unit.units), unit.factor * values
+    return replace(variable, units=unit.units, **unit.renamed), unit.factor * values
 
 
 class Excitation(NamedTuple):
