@@ -32,9 +32,10 @@ from gearchaos_kernels.chosen import begin_chosen, end_chosen, half_of, tell_cho
 from gearchaos_kernels.compilation import align_stack, part, scalar
 from gearchaos_kernels.contact import branches_at, end_contact, step_may_leave
 from gearchaos_kernels.equations import gaps_at
-from gearchaos_kernels.flow_layout import layout
-from gearchaos_kernels.flow_steps import begin_forces, cross, move_block
-from gearchaos_kernels.flow_vectors import VECTOR, WORK
+from gearchaos_kernels.flow_crossings import cross
+from gearchaos_kernels.flow_layout import KNOWN, OWN, Work, layout
+from gearchaos_kernels.flow_steps import begin_forces, move_block
+from gearchaos_kernels.flow_vectors import VECTOR
 from gearchaos_kernels.forcing import During, Phase, forcing_at, phase_within
 from gearchaos_kernels.loads import begin_loads, tell_loads
 from gearchaos_kernels.rk4 import step, tangent_step
@@ -93,7 +94,9 @@ def integrate_block(number_of_block, batch, plan, outcome, present):
     maps = batch.maps
     # A few lanes need no more than one vector, and one lane with maps of its own not even that.
     slots = 1 if lanes == 1 else VECTOR if lanes <= VECTOR else LANES
-    work = np.zeros(WORK)
+    places = np.zeros(3 * LANES, dtype=np.intp)
+    numbers = np.zeros(OWN * slots)
+    work = Work(numbers, np.zeros(KNOWN * VECTOR), places[:LANES], places[LANES:])
     every = steps // plan.steps_per_period
     turns = batch.turns[batch.order[first]]
     block = Block(memory, first, lanes)
@@ -119,11 +122,14 @@ def integrate_block(number_of_block, batch, plan, outcome, present):
                 )
                 suspects = step_block(memory, phases, present)
             else:
-                suspects = move_block(memory, maps, row, slots, work, present)
+                suspects = move_block(memory, maps, row, slots, numbers, present)
             if present.resolved is not None:
                 if suspects > 0:
                     recorded = period >= plan.transient_periods
-                    split(memory, table, shares, maps, row, work, lanes, number, recorded, present)
+                    if present.flow_map is None:
+                        split(memory, lanes, table, shares, number, recorded, present)
+                    else:
+                        cross(memory, lanes, maps, row, work, number, recorded, present)
             if present.loads is not None:
                 if period >= plan.transient_periods:
                     if present.flow_map is None:
@@ -227,16 +233,12 @@ def step_block(memory, phases, present):
 
 
 @scalar
-def split(memory, table, shares, maps, row, work, lanes, number, recorded, present):
+def split(memory, lanes, table, shares, number, recorded, present):
     """Split the step of every lane that may have left a contact branch."""
     # No array of the outcome here: passing one means counting references to it at every step.
     for slot in range(lanes):
-        if memory[rows.SUSPECT * STRIDE + slot] == 0.0:
-            continue
-        if present.flow_map is None:
+        if memory[rows.SUSPECT * STRIDE + slot] != 0.0:
             split_step(memory, slot, table, shares, number, recorded, present)
-        else:
-            cross(memory, slot, maps, row, work, number, recorded, present)
 
 
 @scalar

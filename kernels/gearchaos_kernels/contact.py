@@ -16,7 +16,7 @@ NEVER = 2.0
 
 _THIRD = 1.0 / 3.0
 _ITERATIONS = 60
-_LAST_CORRECTION = 1e-6
+LAST_CORRECTION = 1e-6
 """Newton's method squares the error: after so small a correction hardly anything is left of it."""
 
 
@@ -210,7 +210,7 @@ def falling_root(polynomial, given, low, high, at):
         following = at - value / slope
         if not low <= following <= high:
             following = 0.5 * (low + high)
-        elif abs(following - at) < _LAST_CORRECTION:
+        elif abs(following - at) < LAST_CORRECTION:
             return following
         at = following
     return at

@@ -1,8 +1,12 @@
-"""Where the numbers of the maps of `flow_map` stand in their tables."""
+"""Where numbers stand: those of the maps of `flow_map` in tables, those of lanes that cross."""
 
 from typing import NamedTuple
 
+import numpy as np
+from numpy.typing import NDArray
+
 from gearchaos_kernels.compilation import scalar
+from gearchaos_kernels.system import Floats
 
 TERMS = 16
 """Terms of the polynomials along a step."""
@@ -10,6 +14,35 @@ TERMS = 16
 BOUNDS, HEADER = (8, 24), 40
 """What stands before the maps of a step: sine and cosine of the mesh phase at its beginning and at
 its end; by how much each column may bend either gap beyond a cubic, on any branch."""
+
+
+INPUTS, TANGENT_INPUTS, GAPS, GAP, TANGENT_GAP, RESULT, DONE, OWN = 0, 16, 32, 32, 96, 112, 128, 136
+"""Where the numbers of a lane that crosses stand: state and forces, tangent vector, both gaps, each
+so long, what the tangent vector adds to one of them, state or tangent vector at the end of the
+step, the moment of the last crossing; and how many numbers that are."""
+
+BEGIN, END, BEND, SIDE, DISTANCE, MOMENT, CROSSED, KNOWN = 16, 18, 20, 21, 22, 23, 24, 26
+"""What is known of a gap, behind its terms along the step: value and slope at the beginning and at
+the end, more than its fourth derivative, the side from which it is seen and by what it is raised,
+the next crossing, value and slope there; and how many numbers that are."""
+
+
+def fourth_derivative(power: Floats) -> Floats:
+    """Return the largest fourth derivative of powers of s from -1 to 1."""
+    return power * (power - 1.0) * (power - 2.0) * (power - 3.0)
+
+
+class Work(NamedTuple):
+    """Memory of the lanes of a block that cross.
+
+    ``numbers``: of one lane after the other; ``columns``: what is known of gaps, side by side;
+    ``slots``: of the lanes; ``gaps``: where in the numbers those begin that are looked at.
+    """
+
+    numbers: Floats
+    columns: Floats
+    slots: NDArray[np.intp]
+    gaps: NDArray[np.intp]
 
 
 class Layout(NamedTuple):

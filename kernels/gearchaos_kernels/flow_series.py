@@ -14,7 +14,7 @@ from gearchaos_kernels import rows
 from gearchaos_kernels.block_memory import aligned_memory, fill_lane, read_state, write_state
 from gearchaos_kernels.compilation import driver, part
 from gearchaos_kernels.equations import Directions, accelerations, gaps_at
-from gearchaos_kernels.flow_layout import BOUNDS, HEADER, TERMS, layout
+from gearchaos_kernels.flow_layout import BOUNDS, HEADER, TERMS, fourth_derivative, layout
 from gearchaos_kernels.forcing import Phase, forcing_at
 from gearchaos_kernels.rows import STRIDE, Coordinates, State
 from gearchaos_kernels.system import Floats, System
@@ -41,24 +41,13 @@ def _economy() -> tuple[Floats, Floats]:
 _KEPT, _DROPPED = _economy()
 
 
-def _bends() -> Floats:
-    """By how much each power of s may lower the middle Bezier points of its Hermite cubic.
+_BENDS = fourth_derivative(np.arange(TERMS, dtype=float)) / 18.0
+"""By how much each power of s may lower the middle Bezier points of its Hermite cubic.
 
-    With t from 0 to 1 along the step, both differ by no more than b t^2 (1 - t)^2, and that is no
-    more than b/4 (t (1 - t)^2 + t^2 (1 - t)): what both middle points add, moved by b/12.
-    """
-    t = np.linspace(0.0, 1.0, 402)[1:-1]
-    power = np.arange(TERMS)[:, np.newaxis]
-    s, sign = 2.0 * t - 1.0, (-1.0) ** power
-    first = (1.0 - t) ** 2 * ((1.0 + 2.0 * t) * sign - 2.0 * t * power * sign)
-    last = t**2 * ((3.0 - 2.0 * t) - 2.0 * (1.0 - t) * power)
-    apart = np.abs(s**power - first - last) / (t * (1.0 - t)) ** 2
-    # Powers up to the third are cubics themselves; between two samples it is hardly larger.
-    bends: Floats = np.where(np.arange(TERMS) > 3, 1.01 * apart.max(axis=1) / 12.0, 0.0)
-    return bends
-
-
-_BENDS = _bends()
+With t from 0 to 1 along the step, which is 2 long, both differ by no more than f t^2 (1 - t)^2 2/3,
+where f is the fourth derivative, and that is no more than f/6 (t (1 - t)^2 + t^2 (1 - t)): what
+both middle points add, moved by f/18. A piece of the step has the fourth power of its share.
+"""
 
 _ENDS = np.stack([(-1.0) ** np.arange(ORDER + 1), np.ones(ORDER + 1)])
 """What makes the values at both ends of a step of a series."""

@@ -2,9 +2,10 @@
 
 A map is applied to eight lanes at once, its numbers the same for all of them (`move`). What a lane
 that crosses needs alone are sums of columns, each a vector along a state or along the terms of a
-polynomial (`combine`, `add_switch`). The compiler finds neither by itself.
+polynomial (`combine`, `look_along`, `add_switch`). The compiler finds neither by itself.
 """
 
+import itertools
 from collections.abc import Iterable, Sequence
 from typing import Any
 
@@ -16,19 +17,23 @@ from numba.extending import intrinsic
 
 from gearchaos_kernels import rows
 from gearchaos_kernels.compilation import FASTMATH
-from gearchaos_kernels.flow_layout import BOUNDS, TERMS, Layout, layout
+from gearchaos_kernels.flow_layout import (
+    BEGIN,
+    BOUNDS,
+    INPUTS,
+    TANGENT_GAP,
+    TANGENT_INPUTS,
+    TERMS,
+    Layout,
+    fourth_derivative,
+    layout,
+)
 from gearchaos_kernels.rows import STRIDE
 
 VECTOR = 8
 """Lanes of a vector."""
 
-INPUTS, TANGENT_INPUTS, GAPS, TANGENT_GAP, RESULT, WORK = 0, 16, (32, 48), 64, 80, 96
-"""Where the numbers of a lane that crosses stand: state and forces, tangent vector, the gaps along
-the step as polynomials, what the tangent vector adds to one of them, the state or tangent vector at
-the end of the step; and how many numbers that are."""
-
-_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(10)
-_DOUBLE, _INTEGER = ir.DoubleType(), ir.IntType(types.intp.bitwidth)
+_DOUBLE, _INTEGER, _INDEX = ir.DoubleType(), ir.IntType(types.intp.bitwidth), ir.IntType(32)
 _FLAGS = tuple(sorted(FASTMATH))
 
 
@@ -76,14 +81,30 @@ class _Writer:
     def splat(self, number: Any, width: int = VECTOR) -> Any:
         """Return a vector of one number."""
         nothing = ir.Constant(ir.VectorType(_DOUBLE, width), ir.Undefined)
-        one = self.builder.insert_element(nothing, number, ir.IntType(32)(0))
-        order = ir.Constant(ir.VectorType(ir.IntType(32), width), [0] * width)
-        return self.builder.shuffle_vector(one, nothing, order)
+        return self.repeat(self.builder.insert_element(nothing, number, _INDEX(0)), 0, width)
+
+    def repeat(self, vector: Any, number: int, width: int) -> Any:
+        """Return a vector of one number of another vector."""
+        return self.pick(vector, vector, [number] * width)
+
+    def pick(self, vector: Any, following: Any, places: Iterable[int]) -> Any:
+        """Return numbers of a vector and the one behind it, by their places."""
+        order = [_INDEX(place) for place in places]
+        chosen = ir.Constant(ir.VectorType(_INDEX, len(order)), order)
+        return self.builder.shuffle_vector(vector, following, chosen)
 
     def constant(self, numbers: Iterable[float]) -> Any:
         """Return a vector of known numbers."""
         values = [float(number) for number in numbers]
         return ir.Constant(ir.VectorType(_DOUBLE, len(values)), values)
+
+    def size(self, vector: Any) -> Any:
+        """Return the sizes of the numbers of a vector."""
+        kind = vector.type
+        name = f"llvm.fabs.v{kind.count}f64"
+        function = ir.FunctionType(kind, [kind])
+        fabs = cgutils.get_or_insert_function(self.builder.module, function, name)
+        return self.builder.call(fabs, [vector])
 
     def multiply_add(self, a: Any, b: Any, c: Any) -> Any:
         """Return a b + c, with c None for nothing."""
@@ -100,13 +121,6 @@ class _Writer:
             parts[number % 2] = self.multiply_add(factor, terms[number], parts[number % 2])
         return self.builder.fadd(*parts, flags=_FLAGS)
 
-    def polynomial(self, terms: Sequence[Any], place: Any) -> Any:
-        """Return the value of a polynomial by Horner's rule."""
-        value = terms[-1]
-        for term in terms[-2::-1]:
-            value = self.multiply_add(value, place, term)
-        return value
-
 
 def _pieces(width: int) -> list[tuple[int, int]]:
     """Cut a width into vectors: where each begins and how wide it is."""
@@ -121,15 +135,12 @@ def keep_before(_typing, memory, slot, table, row, present):
     def generate(context, builder, signature, arguments):
         w = _Writer(context, builder, signature, arguments)
         lanes, numbers = w.element(0, arguments[1]), w.element(2, arguments[3])
-        kind = ir.VectorType(_DOUBLE, VECTOR)
-        name = f"llvm.fabs.v{VECTOR}f64"
-        fabs = cgutils.get_or_insert_function(builder.module, ir.FunctionType(kind, [kind]), name)
         for first in (rows.STATE,) if there.tangent is None else (rows.STATE, rows.TANGENT):
             for line in range(first, first + place.states):
                 w.store(w.load(lanes, line * STRIDE), lanes, (rows.BEFORE + line) * STRIDE)
         if there.resolved is not None:
             inputs = _inputs(rows.STATE, place)
-            sizes = [builder.call(fabs, [w.load(lanes, row * STRIDE)]) for row in inputs]
+            sizes = [w.size(w.load(lanes, row * STRIDE)) for row in inputs]
             for number, bound in enumerate(BOUNDS[: place.ways]):
                 bends = [w.spread(numbers, bound + column) for column in range(len(sizes))]
                 w.store(w.sum(enumerate(bends), sizes), lanes, (rows.MARGINS + number) * STRIDE)
@@ -216,76 +227,134 @@ end_of = _combination(of_state=True, forced=True)
 """State at the end of the step: work, target, inputs, table, at, present."""
 tangent_end_of = _combination(of_state=True, forced=False)
 """The same of a tangent vector."""
-gap_along = _combination(of_state=False, forced=True)
-"""Terms of a gap along the step."""
 tangent_gap_along = _combination(of_state=False, forced=False)
 """Terms of what a tangent vector adds to a gap."""
 
 
+def _integrals(w: _Writer, place: Any) -> list[Any]:
+    """Return the integrals from -1 to a place of s^0 to s^(2 TERMS - 1), in vectors."""
+    order = np.arange(1, VECTOR + 1)
+    ones = w.constant(np.ones(VECTOR))
+    powers, power = ones, w.splat(place)
+    for bit in (1, 2, 4, 8):
+        has = ir.Constant(ir.VectorType(ir.IntType(1), VECTOR), [int(n & bit > 0) for n in order])
+        powers = w.builder.fmul(powers, w.builder.select(has, power, ones))
+        power = w.builder.fmul(power, power)
+    last = w.repeat(powers, VECTOR - 1, VECTOR)
+    results = []
+    for _ in range(2 * TERMS // VECTOR):
+        less = w.builder.fsub(powers, w.constant((-1.0) ** order))
+        results.append(w.builder.fmul(less, w.constant(1.0 / order)))
+        powers = w.builder.fmul(powers, last)
+        order = order + VECTOR
+    return results
+
+
 @intrinsic
-def add_switch(_typing, work, gap, moment, factor, table, at, present):
+def add_switch(_typing, work, own, gap, moment, factor, table, at, present):
     """Carry a lane to another branch: move its state, and tangent vector, at the step's beginning.
 
     To the state is added the factor times the integral from -1 to the moment of the `SWITCH` of the
-    new branch times the polynomial at ``gap`` in the work of the lane, by Gauss's rule.
+    new branch, sum_k s^k p_k, times the gap: p_k times the sum of the terms j of the gap, each
+    times the integral of s^(j + k).
     """
     there, scene = _scene(present)
 
     def generate(context, builder, signature, arguments):
         w = _Writer(context, builder, signature, arguments)
-        columns = w.element(4, arguments[5])
-        half = builder.fmul(builder.fadd(arguments[2], _DOUBLE(1.0)), _DOUBLE(0.5))
-        scale = builder.fmul(half, arguments[3])
-        sources = {INPUTS: arguments[1]}
+        columns = w.element(5, arguments[6])
+        factor = w.splat(arguments[4])
+        integrals = [builder.fmul(some, factor) for some in _integrals(w, arguments[3])]
+        # Eight integrals from every order on.
+        windows = [
+            w.pick(one, following, range(first, first + VECTOR))
+            for one, following in itertools.pairwise(integrals)
+            for first in range(VECTOR)
+        ]
+        sources = {INPUTS: arguments[2]}
         if there.tangent is not None:
-            sources[TANGENT_INPUTS] = _INTEGER(TANGENT_GAP)
-        nodes: list[Any] = []
-        weighted: dict[int, list[Any]] = {target: [] for target in sources}
-        for first, size in _pieces(len(_NODES)):
-            shifted = w.constant(_NODES[first : first + size] + 1.0)
-            place = w.multiply_add(shifted, w.splat(half, size), w.constant([-1.0] * size))
-            nodes += (builder.extract_element(place, ir.IntType(32)(n)) for n in range(size))
-            weights = builder.fmul(w.constant(_WEIGHTS[first : first + size]), w.splat(scale, size))
-            for target, source in sources.items():
-                numbers = w.element(0, source)
-                terms = [w.spread(numbers, term, size) for term in range(TERMS)]
-                value = builder.fmul(w.polynomial(terms, place), weights, flags=_FLAGS)
-                for number in range(size):
-                    weighted[target].append(builder.extract_element(value, ir.IntType(32)(number)))
+            sources[TANGENT_INPUTS] = builder.add(arguments[1], _INTEGER(TANGENT_GAP))
+        sums = {}
+        for target, source in sources.items():
+            numbers = w.element(0, source)
+            factors = [(term, w.spread(numbers, term)) for term in range(TERMS)]
+            sums[target] = [w.sum(factors, windows[k:]) for k in range(0, TERMS, VECTOR)]
         for first, size in _pieces(scene.width):
-            wide = [w.splat(node, size) for node in nodes]
-            *others, last = (w.load(columns, n * scene.width + first, size) for n in range(TERMS))
-            sums = [last] * len(wide)
-            # Term by term: a register holds the sum of each node, and a row is needed once.
-            for row in reversed(others):
-                sums = [w.multiply_add(*pair, row) for pair in zip(sums, wide, strict=True)]
-            for target, factors in weighted.items():
-                pointer = w.element(0, _INTEGER(target + first))
-                change = w.sum(enumerate(w.splat(factor, size) for factor in factors), sums)
+            terms = [w.load(columns, k * scene.width + first, size) for k in range(TERMS)]
+            for target, given in sums.items():
+                pointer = w.element(0, builder.add(arguments[1], _INTEGER(target + first)))
+                factors = [
+                    (k, w.repeat(given[k // VECTOR], k % VECTOR, size)) for k in range(TERMS)
+                ]
+                change = w.sum(factors, terms)
                 moved = builder.fadd(w.load(pointer, 0, size), change, flags=_FLAGS)
                 w.store(moved, pointer, 0)
         return context.get_dummy_value()
 
-    numbers = work, types.intp, types.float64, types.float64, table, types.intp
+    numbers = work, types.intp, types.intp, types.float64, types.float64, table, types.intp
+    return types.void(*numbers, present), generate
+
+
+def _sums(w: _Writer, vectors: list[Any]) -> Any:
+    """Return the sum of the numbers of every vector, as one vector."""
+    vectors = vectors + [w.constant(np.zeros(VECTOR))] * (VECTOR - len(vectors))
+    while len(vectors) > 1:
+        # Numbers that belong to the same sum stay side by side.
+        vectors = [
+            w.builder.fadd(*(w.pick(*pair, range(side, 2 * VECTOR, 2)) for side in (0, 1)))
+            for pair in zip(vectors[::2], vectors[1::2], strict=True)
+        ]
+    return vectors[0]
+
+
+@intrinsic
+def look_along(_typing, work, gap, inputs, mean_error, table, at, present):
+    """Write a gap along the step, and what is known of it at both ends; see `flow_layout`."""
+    place = _scene(present)[1]
+
+    def generate(context, builder, signature, arguments):
+        w = _Writer(context, builder, signature, arguments)
+        result, given = w.element(0, arguments[1]), w.element(0, arguments[2])
+        numbers = w.element(4, arguments[5])
+        factors = [w.spread(given, column) for column in range(place.columns)]
+        parts: list[Any] = [None] * 5
+        for first in range(0, TERMS, VECTOR):
+            columns = [w.load(numbers, column * TERMS + first) for column in range(place.columns)]
+            terms = w.sum(enumerate(factors), columns)
+            if first == 0:
+                none = w.constant(np.zeros(VECTOR))
+                constant = builder.insert_element(none, arguments[3], _INDEX(0))
+                terms = builder.fsub(terms, constant, flags=_FLAGS)
+            w.store(terms, result, first)
+            order = np.arange(first, first + VECTOR, dtype=float)
+            sign, size = (-1.0) ** order, w.size(terms)
+            weights = sign, -sign * order, np.ones(VECTOR), order, fourth_derivative(order)
+            sources = terms, terms, terms, terms, size
+            parts = [
+                w.multiply_add(source, w.constant(weight), part)
+                for source, weight, part in zip(sources, weights, parts, strict=True)
+            ]
+        w.store(_sums(w, parts), result, BEGIN)
+        return context.get_dummy_value()
+
+    numbers = work, types.intp, types.intp, types.float64, table, types.intp
     return types.void(*numbers, present), generate
 
 
 @intrinsic
-def value_and_slope(_typing, work, at, place):
-    """Evaluate a polynomial in the work of a lane, and its derivative, by four parts of each."""
+def margins_of(_typing, work, inputs, table, row):
+    """Bound by how much either gap of a lane bends in a step, as `keep_before` does."""
 
     def generate(context, builder, signature, arguments):
         w = _Writer(context, builder, signature, arguments)
-        numbers, s = w.element(0, arguments[1]), arguments[2]
-        square = builder.fmul(s, s)
-        fourth = builder.fmul(square, square)
-        terms = [builder.load(builder.gep(numbers, [_INTEGER(term)])) for term in range(TERMS)]
-        slopes = [builder.fmul(terms[term], _DOUBLE(float(term))) for term in range(1, TERMS)]
-        results = []
-        for series in (terms, slopes):
-            parts = [w.polynomial(series[first::4], fourth) for first in range(4)]
-            low, high = (w.multiply_add(parts[n + 1], s, parts[n]) for n in (0, 2))
-            results.append(w.multiply_add(high, square, low))
+        given, numbers = w.element(0, arguments[1]), w.element(2, arguments[3])
+        parts: list[Any] = [None] * len(BOUNDS)
+        for first in range(0, TERMS, VECTOR):
+            size = w.size(w.load(given, first))
+            bounds = [w.load(numbers, bound + first) for bound in BOUNDS]
+            parts = [w.multiply_add(size, *pair) for pair in zip(bounds, parts, strict=True)]
+        sums = _sums(w, parts)
+        results = [builder.extract_element(sums, _INDEX(number)) for number in range(len(BOUNDS))]
         return context.make_tuple(builder, signature.return_type, results)
 
-    return types.UniTuple(types.float64, 2)(work, types.intp, types.float64), generate
+    return types.UniTuple(types.float64, 2)(work, types.intp, table, types.intp), generate

@@ -1,0 +1,172 @@
+"""The moment at which a gap leaves its branch in a step that is a map.
+
+The gap is a polynomial along the step, from -1 to 1; seen from one side and raised by a distance it
+falls below zero where it leaves. Nearly every one that may leave falls all the way, and is solved
+side by side with others (`find_side_by_side`), with as many steps of Newton's method for each, so
+that none depends on its neighbours. What is left is searched piece by piece (`find_in_pieces`).
+"""
+
+from gearchaos_kernels import contact
+from gearchaos_kernels.compilation import part, scalar
+from gearchaos_kernels.flow_layout import (
+    BEGIN,
+    BEND,
+    CROSSED,
+    DISTANCE,
+    DONE,
+    END,
+    KNOWN,
+    MOMENT,
+    OWN,
+    SIDE,
+    TERMS,
+)
+from gearchaos_kernels.flow_vectors import VECTOR
+
+_THIRD = 1.0 / 3.0
+UNKNOWN = -2.0
+"""In place of a moment that has to be searched."""
+
+_ITERATIONS = 3
+_LOOKS = 300
+_NARROW = 1e-9
+"""In so short a piece of a step a gap that turns around goes as far as rounding does."""
+
+
+@scalar
+def find_moments(work, looks):
+    """Find the next crossing of so many gaps of a work, or `NEVER`; see `flow_layout`."""
+    numbers, columns, gaps = work.numbers, work.columns, work.gaps
+    for first in range(0, looks, VECTOR):
+        count = min(looks - first, VECTOR)
+        for n in range(count):
+            for row in range(MOMENT + 1):
+                columns[row * VECTOR + n] = numbers[gaps[first + n] + row]
+        find_side_by_side(columns)
+        for n in range(count):
+            gap = gaps[first + n]
+            for row in range(MOMENT, KNOWN):
+                numbers[gap + row] = columns[row * VECTOR + n]
+    for look in range(looks):
+        if numbers[gaps[look] + MOMENT] == UNKNOWN:
+            find_in_pieces(numbers, gaps[look])
+
+
+@scalar
+def find_side_by_side(columns):
+    """Find the crossings of gaps that fall all the way from the beginning of the step."""
+    for n in range(VECTOR):
+        side, distance = columns[SIDE * VECTOR + n], columns[DISTANCE * VECTOR + n]
+        # What begins where the last step ended, at the boundary, begins on the right side of it.
+        value_left = max(side * columns[BEGIN * VECTOR + n] + distance, 0.0)
+        slope_left = side * columns[(BEGIN + 1) * VECTOR + n]
+        value_right = side * columns[END * VECTOR + n] + distance
+        slope_right = side * columns[(END + 1) * VECTOR + n]
+        point1 = value_left + 2.0 * _THIRD * slope_left
+        point2 = value_right - 2.0 * _THIRD * slope_right
+        stray = columns[BEND * VECTOR + n] * 2.0 * _THIRD
+        stays = min(point1, point2) >= stray / 12.0 and value_right >= 0.0
+        # From the other side: a lane between the flanks may meet either.
+        farthest = max(max(point1, point2) + stray / 12.0, value_right)
+        one_way = distance < 0.0 or farthest <= 2.0 * distance
+        steepest = max(max(2.0 * slope_left, 3.0 * (point2 - point1)), 2.0 * slope_right)
+        falls = steepest < -0.2 * stray and value_right < 0.0
+        guess = guess_fall(value_left, slope_left, value_right, slope_right, 2.0)
+        at = min(max(guess - 1.0, -1.0), 1.0)
+        value, slope, correction = 0.0, 0.0, 0.0
+        for _ in range(_ITERATIONS):
+            value, slope = polynomial(columns, n, VECTOR, at)
+            correction = (side * value + distance) / (side * slope)
+            at -= correction
+        found = falls and abs(correction) < contact.LAST_CORRECTION and -1.0 <= at <= 1.0
+        moment = contact.NEVER if stays else at
+        known = one_way and (stays or found) and columns[MOMENT * VECTOR + n] != UNKNOWN
+        columns[MOMENT * VECTOR + n] = moment if known else UNKNOWN
+        columns[CROSSED * VECTOR + n] = value
+        columns[(CROSSED + 1) * VECTOR + n] = slope
+
+
+@scalar
+def guess_fall(value_left, slope_left, value_right, slope_right, width):
+    """Return where in a piece a gap falls below 0, by the cubic of the place over the value."""
+    fallen = value_left - value_right
+    done = value_left / fallen
+    early = (1.0 - done) * (-fallen / slope_left - width)
+    late = done * (-fallen / slope_right - width)
+    return width * done + done * (1.0 - done) * (early - late)
+
+
+@scalar
+def polynomial(numbers, first, stride, at):
+    """Return the value of a polynomial, and its slope; its terms stand so far apart."""
+    value = numbers[first + (TERMS - 1) * stride]
+    slope = 0.0
+    for term in range(TERMS - 2, -1, -1):
+        slope = slope * at + value
+        value = value * at + numbers[first + term * stride]
+    return value, slope
+
+
+@part
+def find_in_pieces(numbers, gap):
+    """Find the crossing of a gap after the last one of its lane, or `NEVER`, whatever it does."""
+    done = numbers[gap - gap % OWN + DONE]
+    side, distance = numbers[gap + SIDE], numbers[gap + DISTANCE]
+    moment = first_below(numbers, gap, side, distance, done)
+    if distance > 0.0:
+        # A lane between the flanks may meet either.
+        moment = min(moment, first_below(numbers, gap, -side, distance, done))
+    numbers[gap + MOMENT] = moment
+    numbers[gap + CROSSED], numbers[gap + CROSSED + 1] = polynomial(numbers, gap, 1, moment)
+
+
+@part
+def first_below(numbers, gap, side, distance, left):
+    """Return where a gap, seen from a side and raised, first falls below zero after a moment.
+
+    Piece by piece: one whose Bezier points with their margins are not below zero has no such place,
+    in one that only falls it is found by Newton's method, others are halved.
+    """
+    given = numbers, gap, side, distance
+    value_left, slope_left = gap_at(given, left)
+    value_left = max(value_left, 0.0)
+    right = 1.0
+    value_right, slope_right = gap_at(given, right)
+    for _ in range(_LOOKS):
+        width = right - left
+        # The polynomial and the cubic differ by bend (width^4 / 24) t^2 (1 - t)^2 at most.
+        stray = numbers[gap + BEND] * width**4 / 24.0
+        point1 = value_left + _THIRD * width * slope_left
+        point2 = value_right - _THIRD * width * slope_right
+        clear = min(point1, point2) >= stray / 12.0 and value_right >= 0.0
+        if not clear:
+            # Their slopes differ by less than a fifth of the same number.
+            steepest = max(width * slope_left, 3.0 * (point2 - point1), width * slope_right)
+            if steepest < -stray * 0.2 and value_right < 0.0:
+                guess = left + guess_fall(value_left, slope_left, value_right, slope_right, width)
+                guess = min(max(guess, left), right)
+                return contact.falling_root(gap_at, given, left, right, guess)
+            clear = steepest < -stray * 0.2
+            if not clear and width < _NARROW:
+                if value_right < 0.0:
+                    return right
+                clear = True
+        if clear:
+            if right >= 1.0:
+                return contact.NEVER
+            left = right
+            value_left = max(value_right, 0.0)
+            slope_left = slope_right
+            right = min(1.0, left + 2.0 * width)
+        else:
+            right = left + 0.5 * width
+        value_right, slope_right = gap_at(given, right)
+    return contact.NEVER
+
+
+@scalar
+def gap_at(given, at):
+    """Return a gap, seen from one side and raised by a distance, and its slope."""
+    numbers, gap, side, distance = given
+    value, slope = polynomial(numbers, gap, 1, at)
+    return side * value + distance, side * slope
