@@ -11,8 +11,8 @@ from typing import NamedTuple, Self
 import gearchaos_kernels as kernels
 import numpy as np
 from gearchaos_kernels import Plan, Status
-from numpy.typing import NDArray
 
+from gearchaos.arrays import Floats
 from gearchaos.configuration import Given, axis_values, configuration_of, swept_values
 from gearchaos.dynamics.exponents import Exponents, exponents, sum_of_exponents
 from gearchaos.dynamics.following import (
@@ -34,8 +34,6 @@ from gearchaos.errors import ConfigurationError
 from gearchaos.records.amplitude_spectrum import SpectralLines, spectral_lines
 from gearchaos.results.response_variables import DEFAULT_PERIODS
 from gearchaos.results.result import Result
-
-Floats = NDArray[np.float64]
 
 
 class Trajectory(NamedTuple):

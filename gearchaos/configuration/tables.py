@@ -1,11 +1,12 @@
 """The tables of a configuration, the swept values and the groups; `models` checks them."""
 
 from collections.abc import Mapping
-from typing import Any, Literal, TypeAlias
+from typing import Any, Literal
 
 import numpy as np
 import numpy.typing as npt
 
+from gearchaos.arrays import Floats
 from gearchaos.configuration.keys import Table, key, keys_of
 from gearchaos.configuration.physical_tables import Bearings, Mesh, Operation, Pair, PitchError
 from gearchaos.configuration.run_tables import (
@@ -20,8 +21,6 @@ from gearchaos.configuration.run_tables import (
 from gearchaos.configuration.toml_text import flat_tables
 from gearchaos.gear.groups import GROUPS_BY_NAME, Groups, resolve_groups
 from gearchaos.gear.tooth_deviations import REALISATION
-
-FloatArray: TypeAlias = npt.NDArray[np.float64]
 
 
 class Tables(Table):
@@ -103,7 +102,7 @@ SWEEPABLE_GROUPS = {name: row for name, row in GROUPS_BY_NAME.items() if not row
 """Groups that a sweep may vary, by name."""
 
 
-def swept_values(sweep: Sweep) -> FloatArray:
+def swept_values(sweep: Sweep) -> Floats:
     """Return the values of a sweep, shape (values,), in the unit of its parameter, ascending."""
     if sweep.values is not None:
         return np.sort(np.asarray(sweep.values, dtype=np.float64))
@@ -117,7 +116,7 @@ def swept_values(sweep: Sweep) -> FloatArray:
     return values
 
 
-def axis_values(config: Tables) -> dict[str, FloatArray]:
+def axis_values(config: Tables) -> dict[str, Floats]:
     """Return the swept values by parameter, in the order of the axes: [second_sweep] first.
 
     Each has the shape (values,); a parameter is in its own unit.

@@ -9,11 +9,9 @@ from typing import NamedTuple, Self
 
 import numpy as np
 from gearchaos_kernels import Plan, System, integrate, jacobian
-from numpy.typing import NDArray
 
+from gearchaos.arrays import Floats
 from gearchaos.records.lyapunov import largest_exponent
-
-Floats = NDArray[np.float64]
 
 SMALLEST_RESOLVED = 1e-8
 """Share of a tangent vector that must be left when those before it are taken out."""

@@ -11,13 +11,9 @@ from typing import NamedTuple
 
 import numpy as np
 from gearchaos_kernels import Plan, System
-from numpy.typing import NDArray
 
+from gearchaos.arrays import Codes, Complex, Counts, Floats, Mask
 from gearchaos.dynamics.orbits import Orbits, polish
-
-Floats = NDArray[np.float64]
-
-Complex = NDArray[np.complex128]
 
 LONGEST_STEP = 1.0 / 16.0
 """Share of the way along which an orbit is followed."""
@@ -60,7 +56,7 @@ class Orbit(NamedTuple):
 
     period: int
     point: Floats
-    multipliers: NDArray[np.complex128]
+    multipliers: Complex
     exponent: float
     residual: float
 
@@ -93,7 +89,7 @@ class Losses(NamedTuple):
     pair that with the positive imaginary part.
     """
 
-    kind: NDArray[np.uint8]
+    kind: Codes
     multiplier: Complex
 
 
@@ -151,7 +147,7 @@ def loss_of_stability(stable: Complex, beyond: Complex) -> Losses:
 def follow(
     system_at: Callable[[Floats], System],
     guess: Floats,
-    period: NDArray[np.int32],
+    period: Counts,
     first: Floats,
     last: Floats,
     width: float,
@@ -170,7 +166,7 @@ def follow(
     distance: with too large a width it is not yet `NEAR_FOLD`.
     """
 
-    def orbits(share: Floats, guess: Floats, followed: NDArray[np.bool_]) -> Orbits:
+    def orbits(share: Floats, guess: Floats, followed: Mask) -> Orbits:
         system = system_at(first + share * (last - first))
         sought = np.where(followed, period, np.int32(0))
         return polish(system, guess, sought, plan)
@@ -210,7 +206,7 @@ def follow(
     )
 
 
-def _chosen(lanes: NDArray[np.bool_], one: Orbits, other: Orbits) -> Orbits:
+def _chosen(lanes: Mask, one: Orbits, other: Orbits) -> Orbits:
     """Take some lanes from one, the rest from the other."""
     return Orbits(
         *(

@@ -4,8 +4,8 @@ from typing import NamedTuple
 
 import numpy as np
 from gearchaos_kernels import Outcome, Plan, Status, System, integrate
-from numpy.typing import NDArray
 
+from gearchaos.arrays import Counts, Floats, Integers, Mask
 from gearchaos.dynamics.exponents import period_jacobian, sum_of_exponents
 from gearchaos.dynamics.orbits import polish
 from gearchaos.records.bands import band_count, subsequence_spread
@@ -41,7 +41,7 @@ class Told(NamedTuple):
     """Labels, and the state (lanes, states) at the end of the look that told each."""
 
     labels: Labels
-    state: NDArray[np.float64]
+    state: Floats
 
 
 def labels_of(system: System, outcome: Outcome, plan: Plan) -> Told:
@@ -131,13 +131,13 @@ def _record(system: System, outcome: Outcome, most_points: int) -> Record:
     )
 
 
-def _measure_return(labels: Labels, section: NDArray[np.float64], lanes: NDArray[np.intp]) -> None:
+def _measure_return(labels: Labels, section: Floats, lanes: Integers) -> None:
     """Keep how near their own period brings the record of some lanes back to itself."""
     distances = return_distances(section[lanes])
     labels.return_distance[lanes] = distances[np.arange(lanes.size), labels.period[lanes] - 1]
 
 
-def _admits_tori(system: System) -> NDArray[np.bool_]:
+def _admits_tori(system: System) -> Mask:
     """Whether quasi-periodic motion can exist at all.
 
     With two states and damping the period map contracts every area by the same factor; a closed
@@ -148,9 +148,7 @@ def _admits_tori(system: System) -> NDArray[np.bool_]:
     return sum_of_exponents(system) >= 0.0
 
 
-def _settle(
-    system: System, outcome: Outcome, plan: Plan, labels: Labels, period: NDArray[np.int32]
-) -> None:
+def _settle(system: System, outcome: Outcome, plan: Plan, labels: Labels, period: Counts) -> None:
     """Give the lanes that have come close to a stable orbit its period, in place."""
     searched = period > 0
     for n in range(1, int(period.max(initial=0)) + 1):

@@ -4,14 +4,12 @@ from typing import NamedTuple
 
 import numpy as np
 from gearchaos_kernels import Outcome, Plan, System
-from numpy.typing import NDArray
 
+from gearchaos.arrays import Codes, Counts, Floats
 from gearchaos.dynamics.exponents import SMALLEST_RESOLVED
 from gearchaos.dynamics.orbits import polish
 from gearchaos.records.label import CHAOTIC_GROWTH
 from gearchaos.records.lyapunov import largest_exponent
-
-Floats = NDArray[np.float64]
 
 UNIFORM, MIXED, NOT_TOLD = 0, 1, 2
 MEANINGS = ("uniform", "mixed", "not_told")
@@ -31,12 +29,12 @@ class LargestExponents(NamedTuple):
 
     values: Floats
     standard_errors: Floats
-    record: NDArray[np.uint8]
+    record: Codes
     of_orbit: Floats
 
 
 def largest_exponents(
-    system: System, outcome: Outcome, plan: Plan, period: NDArray[np.int32], state: Floats
+    system: System, outcome: Outcome, plan: Plan, period: Counts, state: Floats
 ) -> LargestExponents:
     """Tell the exponent of lanes from the multipliers of their orbits, or else from their records.
 

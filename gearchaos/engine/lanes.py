@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 from gearchaos_kernels import System
-from numpy.typing import NDArray
 
+from gearchaos.arrays import Array, Floats, Integers
 from gearchaos.configuration import Configuration, axis_values, swept_values
 from gearchaos.configuration.run_tables import states_of
 from gearchaos.configuration.tables import SWEEPABLE_GROUPS, SWEEPABLE_KEYS, groups_at, physical_at
@@ -26,8 +26,6 @@ from gearchaos.results.variables import (
     start_axis,
 )
 
-Floats = NDArray[np.float64]
-Numbers = NDArray[np.intp]
 Texts = tuple[str, str, str]
 
 _DRAWS_PER_LANE = 12
@@ -52,7 +50,7 @@ class Lanes:
         self._values = axis_values(config)
         self.axes = [axis_of(parameter, values) for parameter, values in self._values.items()]
         # What the system of a lane depends on, in the order of the axes.
-        self._of_systems: dict[str, NDArray[Any]] = dict(self._values)
+        self._of_systems: dict[str, Array] = dict(self._values)
         first = getattr(config.pitch_error, "first_realisation", 0)
         numbers = first + np.arange(getattr(config.pitch_error, "realisations", 1))
         if numbers.size > 1:
@@ -87,7 +85,7 @@ class Lanes:
         carried = self.config.start.carry != "none"
         return len(self) // (swept_values(self.config.sweep).size if carried else 1)
 
-    def computed_at(self, places: Numbers) -> Numbers:
+    def computed_at(self, places: Integers) -> Integers:
         """Return the lanes at some places in the order of computation.
 
         A carried sweep takes a lane of each line along the first swept parameter, then the next one
@@ -105,22 +103,22 @@ class Lanes:
         place = (line, value, repeat, direction)
         return np.ravel_multi_index(place, (lines, values, repeats, directions))
 
-    def values_of(self, lanes: Numbers) -> dict[str, Floats]:
+    def values_of(self, lanes: Integers) -> dict[str, Floats]:
         """Return the value of each swept parameter in some lanes, and the number of the pair."""
         index = np.unravel_index(lanes, self.shape)
         found = zip(self._of_systems.items(), index, strict=False)
         return {parameter: values[at] for (parameter, values), at in found}
 
-    def system_of(self, lanes: Numbers) -> System:
+    def system_of(self, lanes: Integers) -> System:
         """Return the system of some lanes."""
         return system_of(self.config, self.values_of(lanes), self.effects)
 
-    def start_of(self, lanes: Numbers) -> Floats:
+    def start_of(self, lanes: Integers) -> Floats:
         """Return the configured start states of some lanes, shape (lanes, states)."""
         # Both directions of a carried sweep begin alike.
         return start_states(self.config, self.system_of(lanes), lanes // self.directions)
 
-    def spread(self, count: int) -> Numbers:
+    def spread(self, count: int) -> Integers:
         """Return the numbers of at most so many lanes, spread evenly over all."""
         chosen = np.linspace(0, len(self) - 1, min(count, len(self)))
         return np.unique(chosen.round().astype(np.intp))
@@ -168,7 +166,7 @@ def axis_of(parameter: str, values: Floats) -> Variable:
     return coordinate(name, key.units or "1", key.wording, "", values)
 
 
-def start_states(config: Configuration, system: System, numbers: Numbers) -> Floats:
+def start_states(config: Configuration, system: System, numbers: Integers) -> Floats:
     """Return the start states, shape (lanes, states), of lanes with this system.
 
     ``numbers`` (lanes,): those that they have in the whole sweep: the random state of a lane
@@ -199,7 +197,7 @@ def start_states(config: Configuration, system: System, numbers: Numbers) -> Flo
     return np.stack(columns, axis=1).astype(np.float64)
 
 
-def _draws(seed: int, run: Numbers) -> Floats:
+def _draws(seed: int, run: Integers) -> Floats:
     """Draw the random numbers of consecutive lanes, shape (lanes, draws)."""
     generator = np.random.Philox(seed)
     generator.advance(int(run[0]) * (_DRAWS_PER_LANE // _PHILOX_WIDTH))

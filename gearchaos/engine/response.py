@@ -1,13 +1,12 @@
 """The time response: the motion at every step, after the transient."""
 
 import time
-from typing import Any
 
 import numpy as np
 from gearchaos_kernels import Outcome, Plan, Status, System, mesh_motion
-from numpy.typing import NDArray
 from tqdm import tqdm
 
+from gearchaos.arrays import Array
 from gearchaos.configuration import Configuration, Given, configuration_of
 from gearchaos.engine.running import choose_threads, metadata, result_of
 from gearchaos.engine.simulation import Simulation
@@ -119,11 +118,11 @@ def _check_size(simulation: Simulation, periods: int) -> None:
         )
 
 
-def _motion(system: System, outcome: Outcome, plan: Plan) -> dict[str, NDArray[Any]]:
+def _motion(system: System, outcome: Outcome, plan: Plan) -> dict[str, Array]:
     assert outcome.history is not None
     turned = plan.transient_periods + plan.recorded_periods - plan.history_periods
     found = mesh_motion(system, outcome.history, plan.steps_per_period, turned)
-    motion: dict[str, NDArray[Any]] = {
+    motion: dict[str, Array] = {
         name: outcome.history[..., column].copy() for column, name in enumerate(system.states)
     }
     for column, name in enumerate(system.states[::2]):

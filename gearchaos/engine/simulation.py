@@ -14,8 +14,8 @@ from gearchaos_kernels import (
     integrate,
     maps_memory,
 )
-from numpy.typing import NDArray
 
+from gearchaos.arrays import Array, Floats, Integers
 from gearchaos.configuration import Configuration
 from gearchaos.dynamics.exponents import exponents, sum_of_exponents
 from gearchaos.dynamics.labelling import LOOKS, Told, labels_of
@@ -58,9 +58,8 @@ from gearchaos.results.variables import (
     sweep_variables,
 )
 
-Arrays = Mapping[str, NDArray[Any]]
+Arrays = Mapping[str, Array]
 Bounds = tuple[int, int]
-Floats = NDArray[np.float64]
 
 
 class Simulation:
@@ -214,7 +213,7 @@ class Simulation:
         return self.arrays(lanes, *self.integrate(lanes, self.recording, carried))
 
     def integrate(
-        self, lanes: NDArray[np.intp], plan: Plan, carried: Floats | None = None
+        self, lanes: Integers, plan: Plan, carried: Floats | None = None
     ) -> tuple[Floats, Outcome]:
         """Integrate lanes by a plan, and return their start states as well.
 
@@ -239,7 +238,7 @@ class Simulation:
             outcomes.append(integrate(self.lanes.system_of(mine), begin, plan))
         return start, joined(outcomes)
 
-    def arrays(self, lanes: NDArray[np.intp], start: Floats, outcome: Outcome) -> dict[str, Any]:
+    def arrays(self, lanes: Integers, start: Floats, outcome: Outcome) -> dict[str, Any]:
         """Return what is kept of integrated lanes, by the name of the variable."""
         system, plan, outputs = self.lanes.system_of(lanes), self.plan, self.config.outputs
         sound = outcome.status == Status.OK
@@ -283,9 +282,9 @@ class Simulation:
             arrays |= self._check(lanes, start, outcome, told)
         return arrays
 
-    def _told_of_teeth(self, system: System, outcome: Outcome) -> dict[str, NDArray[Any]]:
+    def _told_of_teeth(self, system: System, outcome: Outcome) -> dict[str, Array]:
         """Return what is kept of contact, loads and states; of lanes that diverged none of it."""
-        told: dict[str, NDArray[Any]] = {}
+        told: dict[str, Array] = {}
         if self.plan.contact and self._splits_steps:
             for way, columns in zip(
                 self._directions, np.split(outcome.contact, 2, 1), strict=False
@@ -302,8 +301,8 @@ class Simulation:
         return told
 
     def _check(
-        self, lanes: NDArray[np.intp], start: Floats, outcome: Outcome, told: Told | None
-    ) -> dict[str, NDArray[Any]]:
+        self, lanes: Integers, start: Floats, outcome: Outcome, told: Told | None
+    ) -> dict[str, Array]:
         """Integrate and label the checked lanes of a block again with half the step, and compare.
 
         Compared is what the labels know: the file may keep fewer section points.
@@ -349,7 +348,7 @@ def joined(outcomes: list[Outcome]) -> Outcome:
     return Outcome(*arrays)
 
 
-def outcome_of(outcome: Outcome, lanes: NDArray[np.intp]) -> Outcome:
+def outcome_of(outcome: Outcome, lanes: Integers) -> Outcome:
     """Return the outcome of some lanes."""
     arrays: Any = (None if array is None else array[lanes] for array in outcome)
     return Outcome(*arrays)

@@ -6,8 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 from gearchaos_kernels import Outcome, Plan, Status, System, integrate
-from numpy.typing import NDArray
 
+from gearchaos.arrays import Integers
 from gearchaos.configuration.messages import Fault
 from gearchaos.configuration.run_tables import MOST_STEPS_PER_PERIOD
 from gearchaos.dynamics.labelling import Told
@@ -122,7 +122,7 @@ def _limits(lanes: Lanes, steps: int) -> Iterator[StabilityLimit]:
             yield limit._replace(lanes=some[limit.lanes])
 
 
-def _fault(lanes: Lanes, worst: StabilityLimit, unstable: NDArray[np.intp], steps: int) -> Fault:
+def _fault(lanes: Lanes, worst: StabilityLimit, unstable: Integers, steps: int) -> Fault:
     places = []
     swept = lanes.values_of(unstable)
     swept.pop(REALISATION, None)

@@ -12,9 +12,10 @@ from matplotlib.container import Container
 from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator, NullLocator
 
+from gearchaos.arrays import Floats
 from gearchaos.errors import FigureError
 from gearchaos.figures.labels import axis_label, in_words, legend_title
-from gearchaos.figures.lanes import Between, Floats, cell_edges, diagram_lanes
+from gearchaos.figures.lanes import Between, cell_edges, diagram_lanes
 from gearchaos.figures.page import Page, few_ticks, legend_below, letter, page, remark
 from gearchaos.figures.stages import SHADES, look_of
 from gearchaos.figures.style import BLACK, SINGLE_COLUMN_MM

@@ -13,11 +13,11 @@ from matplotlib.patches import Patch, PathPatch
 from matplotlib.path import Path
 from matplotlib.ticker import MaxNLocator
 from matplotlib.transforms import offset_copy
-from numpy.typing import NDArray
 
+from gearchaos.arrays import Array, Floats, Mask
 from gearchaos.errors import FigureError
 from gearchaos.figures.labels import axis_label, in_words, legend_title
-from gearchaos.figures.lanes import Between, Floats, Mask, cell_edges, map_axes, select_lanes
+from gearchaos.figures.lanes import Between, cell_edges, map_axes, select_lanes
 from gearchaos.figures.page import Page, few_ticks, footnote, page
 from gearchaos.figures.panel import robust_limits
 from gearchaos.figures.stages import look_of
@@ -95,7 +95,7 @@ def parameter_map(
     x = lanes.parameter[:: y.size]
     edges = cell_edges(x), cell_edges(y)
 
-    def cells(values: NDArray[Any]) -> NDArray[Any]:
+    def cells(values: Array) -> Array:
         return values.ravel()[lanes.numbers].reshape(x.size, y.size).T
 
     image: ScalarMappable
@@ -196,7 +196,7 @@ def map_page(
     return figure
 
 
-def _kinds(result: Result, variable: str) -> tuple[NDArray[Any], dict[str, dict[str, Any]]]:
+def _kinds(result: Result, variable: str) -> tuple[Array, dict[str, dict[str, Any]]]:
     """Return the number of each lane's kind, and by the names of 0, 1, ... how it is filled."""
     if variable in LABELS:
         kinds, names = motion_kinds(result)

@@ -11,8 +11,9 @@ from matplotlib.axes import Axes
 from matplotlib.legend import Legend
 from matplotlib.lines import Line2D
 
+from gearchaos.arrays import Floats
 from gearchaos.figures.labels import axis_label, short
-from gearchaos.figures.lanes import Floats, Lanes, columns
+from gearchaos.figures.lanes import Lanes, columns
 from gearchaos.figures.style import BLACK, GREY, LEGEND, VERMILION
 from gearchaos.results.result import Result
 

@@ -8,9 +8,10 @@ from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 
+from gearchaos.arrays import Floats
 from gearchaos.errors import FigureError
 from gearchaos.figures.labels import axis_label, place_of, plain, unit_of
-from gearchaos.figures.lanes import Between, Floats
+from gearchaos.figures.lanes import Between
 from gearchaos.figures.page import remark
 from gearchaos.figures.style import BLACK, BLUE, LEGEND, ORANGE, VERMILION
 from gearchaos.records.amplitude_spectrum import spectral_lines

@@ -4,8 +4,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from gearchaos_kernels import Outcome, Plan, Status, System, integrate, mesh_motion
-from numpy.typing import NDArray
 
+from gearchaos.arrays import Counts, Floats, Integers, Mask
 from gearchaos.configuration import Configuration
 from gearchaos.dynamics.stability import stability_limit
 from gearchaos.dynamics.systems import plan_of, system_of
@@ -13,9 +13,6 @@ from gearchaos.engine.lanes import start_states
 from gearchaos.errors import ConfigurationError
 from gearchaos.records.lyapunov import largest_exponent
 from gearchaos.records.period import period_of, return_distances
-
-Floats = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 RETURN = 1e-3
 """Return distance that counts as periodic: what is compared are short runs on coarse grids."""
@@ -40,12 +37,12 @@ class Records(NamedTuple):
     """
 
     section: Floats
-    period: NDArray[np.int32]
+    period: Counts
     exponent: Floats
     acceleration: Floats
     sound: Mask
 
-    def at(self, values: NDArray[np.intp]) -> "Records":
+    def at(self, values: Integers) -> "Records":
         """Return what there is at some of the swept values, by their numbers."""
         arrays: Any = (array[:, values] for array in self)
         return Records(*arrays)
@@ -106,7 +103,7 @@ def require_stable(config: Configuration, values: Floats, parameters: dict[str, 
         )
 
 
-def _records(system: System, outcome: Outcome, looked_at: NDArray[np.intp], plan: Plan) -> Records:
+def _records(system: System, outcome: Outcome, looked_at: Integers, plan: Plan) -> Records:
     """Return what lanes came to, each array with the lanes first."""
     assert outcome.growth is not None
     sound = outcome.status == Status.OK

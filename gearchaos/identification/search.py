@@ -11,8 +11,8 @@ from importlib.metadata import version
 from typing import Any, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gearchaos.arrays import Floats
 from gearchaos.configuration.run_tables import states_of
 from gearchaos.configuration.toml_text import toml_text
 from gearchaos.engine.provenance import SOFTWARE
@@ -23,8 +23,6 @@ from gearchaos.identification.observations import misfit, observations_of
 from gearchaos.identification.targets import Search
 from gearchaos.identification.tried import Tried, tried_of
 from gearchaos.interrupts import check
-
-Floats = NDArray[np.float64]
 
 DRAWN = 0
 """Number of the run to which drawn candidates belong; those of CMA-ES count from 1."""

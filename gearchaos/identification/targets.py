@@ -5,12 +5,11 @@ from itertools import product
 from typing import Annotated, Literal, TypeAlias, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
+from gearchaos.arrays import Floats
 from gearchaos.configuration.keys import Table, key
 
-Floats = NDArray[np.float64]
 Pair: TypeAlias = Annotated[tuple[float, float], Field(strict=False)]
 Entry = TypeVar("Entry")
 Coordinate: TypeAlias = Literal["delta_5", "delta_1", "delta_2", "delta_3", "delta_4"]

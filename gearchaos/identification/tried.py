@@ -9,6 +9,7 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
+from gearchaos.arrays import Array
 from gearchaos.engine.lanes import axis_of
 from gearchaos.errors import FileError
 from gearchaos.identification.observations import Observation
@@ -31,7 +32,7 @@ was observed of them, NaN where there is no such thing; ``misfit``; ``status`` o
 """
 
 
-def tried_of(**fields: NDArray[Any]) -> Tried:
+def tried_of(**fields: Array) -> Tried:
     """Put the fields of candidates together, the candidates first in each."""
     # One order, whoever gives them: NumPy joins no others.
     types = [(name, fields[name].dtype, fields[name].shape[1:]) for name in sorted(fields)]
@@ -54,7 +55,7 @@ def write_tried(
     """
 
     def column(
-        name: str, values: NDArray[Any], text: str, *dims: str, units: str = "1", **more: Any
+        name: str, values: Array, text: str, *dims: str, units: str = "1", **more: Any
     ) -> Variable:
         return Variable(name, dims, str(values.dtype), units, text, values=values, **more)
 

@@ -8,8 +8,8 @@ from typing import Any, TypeAlias
 import numpy as np
 from matplotlib.axes import Axes
 
+from gearchaos.arrays import Floats
 from gearchaos.figures import bifurcation_page
-from gearchaos.figures.lanes import Floats
 from gearchaos.figures.page import Page, column, few_ticks, letter, remark
 from gearchaos.figures.panel import legend_above
 from gearchaos.figures.response import (

@@ -7,11 +7,9 @@ rotation every n-th point goes everywhere.
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gearchaos.arrays import Counts, Floats, Mask
 from gearchaos.records.period import LONGEST_PERIOD, coordinate_scale
-
-Floats = NDArray[np.float64]
 
 STRIDES = (2, 3, 5, 7)
 """Every so many points of a curve are averaged; what the windows of chaos are made of."""
@@ -57,7 +55,7 @@ def subsequence_spread(section: Floats) -> Floats:
     return smallest
 
 
-def band_count(section: Floats) -> NDArray[np.int32]:
+def band_count(section: Floats) -> Counts:
     """Return on how many bands every section lies, which are visited in turn, shape (lanes,).
 
     The largest n <= 16 such that every n-th point stays away from the other ones: the four nearest
@@ -75,7 +73,7 @@ def band_count(section: Floats) -> NDArray[np.int32]:
     return count
 
 
-def _may_have_bands(section: Floats) -> NDArray[np.bool_]:
+def _may_have_bands(section: Floats) -> Mask:
     """Whether subsequences explain much of a coordinate's variance: looking at pairs is dear."""
     lanes, points, states = section.shape
     found = np.zeros(lanes, dtype=np.bool_)

@@ -3,12 +3,10 @@
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gearchaos.arrays import Codes, Counts, Floats, Mask
 from gearchaos.records.label import UNRESOLVED
 from gearchaos.records.period import section_distance
-
-Floats = NDArray[np.float64]
 
 MOST = 0.95
 """Share of the lanes that `bound` speaks for: the rest lies next to a bifurcation."""
@@ -26,9 +24,9 @@ class Solution(NamedTuple):
 
     section: Floats
     exponent: Floats | None
-    diverged: NDArray[np.bool_]
-    motion: NDArray[np.uint8]
-    period: NDArray[np.int32]
+    diverged: Mask
+    motion: Codes
+    period: Counts
 
 
 class Difference(NamedTuple):
@@ -41,10 +39,10 @@ class Difference(NamedTuple):
     way.
     """
 
-    period: NDArray[np.int32]
+    period: Counts
     section_error: Floats
     exponent_error: Floats
-    changed: NDArray[np.bool_]
+    changed: Mask
 
 
 def difference(one: Solution, other: Solution) -> Difference:

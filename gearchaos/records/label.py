@@ -3,15 +3,11 @@
 from typing import Any, NamedTuple, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gearchaos.arrays import Codes, Counts, Floats, Integers, Mask
 from gearchaos.records.bands import smooth_weights
 from gearchaos.records.lyapunov import largest_exponent
 from gearchaos.records.period import POINTS_NEEDED, period_of, return_distances
-
-Floats = NDArray[np.float64]
-
-Mask = NDArray[np.bool_]
 
 PERIODIC, QUASI_PERIODIC, CHAOTIC, UNRESOLVED, DIVERGED, GROWS = range(6)
 MEANINGS = ("periodic", "quasi_periodic", "chaotic", "unresolved", "diverged", "grows")
@@ -68,12 +64,12 @@ class Labels(NamedTuple):
     where it is neither or has not been looked at.
     """
 
-    motion: NDArray[np.uint8]
-    period: NDArray[np.int32]
+    motion: Codes
+    period: Counts
     return_distance: Floats
-    bands: NDArray[np.int32]
+    bands: Counts
 
-    def of(self, lanes: NDArray[np.intp]) -> Self:
+    def of(self, lanes: Integers) -> Self:
         """Return the labels of some lanes."""
         some: Any = (label[lanes] for label in self)
         return type(self)(*some)
@@ -106,7 +102,7 @@ def label(record: Record) -> Labels:
     return Labels(motion, period, distance, np.zeros_like(period))
 
 
-def settling_periods(record: Record, labels: Labels) -> NDArray[np.int32]:
+def settling_periods(record: Record, labels: Labels) -> Counts:
     """Return the period of the orbit on which a lane may still be settling, 0 for none.
 
     A lane settles where its return distance after some period is small and smaller than in the
@@ -191,7 +187,7 @@ def halves_differ_by(section: Floats) -> Floats:
     return largest
 
 
-def _aperiodic(section: Floats, growth: Floats, torus: Mask) -> NDArray[np.uint8]:
+def _aperiodic(section: Floats, growth: Floats, torus: Mask) -> Codes:
     """Tell chaotic, quasi-periodic and unresolved lanes that do not return."""
     periods = growth.shape[1]
     one = np.ones(growth.shape[0])

@@ -1,12 +1,10 @@
 """What the teeth do over a record: contact and impacts, mesh forces, transmission error."""
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from gearchaos.arrays import Array, Floats
 
 HELD, SINGLE_SIDED, DOUBLE_SIDED, FREE = range(4)
 CONTACT_STATES = ("held", "single_sided_impact", "double_sided_impact", "free")
@@ -42,7 +40,7 @@ LOADS = {
 """What else is told, by name."""
 
 
-def contact_told(contact: Floats, periods: int) -> dict[str, NDArray[Any]]:
+def contact_told(contact: Floats, periods: int) -> dict[str, Array]:
     """Return what is told of one direction, each of shape (lanes,), by the names of `CONTACT`.
 
     With the ``contact_state``. ``contact`` (lanes, 6), one half of that of an `Outcome`, is that of

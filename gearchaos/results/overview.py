@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gearchaos.arrays import Array
 from gearchaos.results import variables as known
 from gearchaos.results.result import Result
 from gearchaos.results.result_file import Parameter
@@ -96,7 +96,7 @@ def finite(value: Any) -> Any:
     return json.loads(json.dumps(value), parse_constant=lambda _: None)
 
 
-def _range(values: NDArray[Any]) -> dict[str, float]:
+def _range(values: Array) -> dict[str, float]:
     return {"least": float(values.min()), "greatest": float(values.max())}
 
 
@@ -112,7 +112,7 @@ def _wording(entry: known.Variable | Parameter) -> dict[str, str]:
     return {"units": entry.units, "long_name": entry.long_name}
 
 
-def _spread(values: NDArray[Any]) -> dict[str, Any]:
+def _spread(values: Array) -> dict[str, Any]:
     sound = values[np.isfinite(values)]
     if sound.size == 0:
         return {"lanes": 0, "median": None, "greatest": None}

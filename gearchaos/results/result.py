@@ -12,8 +12,8 @@ from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gearchaos.arrays import Array
 from gearchaos.errors import ConfigurationError, FileError
 from gearchaos.results import tables
 from gearchaos.results import variables as known
@@ -62,7 +62,7 @@ class Result:
         self.axes = tuple(axes)
         self.parameters = dict(parameters)
         self.metadata = {**metadata, **own_metadata(self.axes)}
-        self._data: dict[str, NDArray[Any]] = {}
+        self._data: dict[str, Array] = {}
         for variable in variables:
             values = data.get(variable.name, variable.values)
             if values is None:
@@ -111,7 +111,7 @@ class Result:
     def __len__(self) -> int:
         return len(self._data)
 
-    def __getitem__(self, name: str) -> NDArray[Any]:
+    def __getitem__(self, name: str) -> Array:
         """Give the values of a variable, of the shape of its dimensions.
 
         Raises KeyError if there is no such variable; the message lists those there are.
@@ -126,13 +126,13 @@ class Result:
         """Give units, long_name, symbol and, for the status, flag_values and flag_meanings."""
         return self.variables[self._known(name)].attributes
 
-    def lanes(self, name: str) -> NDArray[Any]:
+    def lanes(self, name: str) -> Array:
         """Give a variable of the lanes with all axes flattened into the first dimension."""
         values = self[name]
         count = math.prod(values.shape[: len(self.axes)])
         return values.reshape(count, *values.shape[len(self.axes) :])
 
-    def along(self, axis: str) -> NDArray[Any]:
+    def along(self, axis: str) -> Array:
         """Give the value of an axis for every lane in that order, shape (lanes,)."""
         grid = np.meshgrid(*(self[name] for name in self.axes), indexing="ij")
         return np.ravel(grid[self.axes.index(axis)])

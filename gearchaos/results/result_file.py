@@ -12,8 +12,8 @@ from typing import Any, TypeAlias
 
 import h5py
 import numpy as np
-from numpy.typing import NDArray
 
+from gearchaos.arrays import Array, Floats
 from gearchaos.interrupts import check
 from gearchaos.results.atomic_file import append_checksum, replacing
 from gearchaos.results.variables import HARMONIC, Variable, diagram_axis, lane_axes
@@ -26,7 +26,7 @@ DIMS = "dims"
 """Attribute with the names of dimensions: HDF5 keeps its own list of them in the global heap."""
 
 ORIGINS = ("given", "derived", "default", "swept")
-Block: TypeAlias = tuple[int, int, Mapping[str, NDArray[Any]]]
+Block: TypeAlias = tuple[int, int, Mapping[str, Array]]
 Metadata: TypeAlias = Mapping[str, str | int | float]
 
 _CHUNK_BYTES = 1 << 19
@@ -44,7 +44,7 @@ class Parameter:
     variable.
     """
 
-    value: float | NDArray[np.float64]
+    value: float | Floats
     origin: str
     units: str = "1"
     long_name: str = ""

@@ -10,8 +10,8 @@ from typing import Any
 
 import h5py
 import numpy as np
-from numpy.typing import NDArray
 
+from gearchaos.arrays import Array
 from gearchaos.errors import FileError
 from gearchaos.gear.groups import LARGEST_VALUE
 from gearchaos.results import stored_dataset as stored
@@ -22,7 +22,7 @@ from gearchaos.results.stored_dataset import UnfitError
 from gearchaos.results.variables import HARMONIC, STATE, Variable, coordinate
 
 Contents = tuple[
-    list[Variable], dict[str, NDArray[Any]], dict[str, Parameter], dict[str, str | int | float]
+    list[Variable], dict[str, Array], dict[str, Parameter], dict[str, str | int | float]
 ]
 """Variables, data, parameters and metadata, as for `Result`."""
 
@@ -102,7 +102,7 @@ def fixed_coordinates(metadata: Mapping[str, Any]) -> dict[str, float]:
     return {name: float(value) for name, _, value in pairs}
 
 
-def is_coordinate(values: NDArray[Any]) -> bool:
+def is_coordinate(values: Array) -> bool:
     """Tell whether values are those of an axis: numbers that ascend, none twice, none too large."""
     numbers = values.ndim == 1 and values.size > 0 and values.dtype.kind in "if"
     small = numbers and (np.abs(values) <= LARGEST_VALUE).all()
@@ -136,7 +136,7 @@ def _read(file: h5py.File, rows: bool) -> Contents:
     datasets = stored.datasets_of(file)
     grouped = {name: datasets.pop(name) for name in list(datasets) if "/" in name}
     variables: dict[str, Variable] = {}
-    data: dict[str, NDArray[Any]] = {}
+    data: dict[str, Array] = {}
     sizes: dict[str, int] = {}
     for name, dataset in datasets.items():
         text = stored.text_of(dataset)
@@ -204,7 +204,7 @@ def _check_schema(metadata: Mapping[str, Any]) -> None:
 
 
 def _check_variables(
-    axes: tuple[str, ...], found: Mapping[str, Variable], data: Mapping[str, NDArray[Any]]
+    axes: tuple[str, ...], found: Mapping[str, Variable], data: Mapping[str, Array]
 ) -> None:
     """Compare what a sweep must yield with what there is; more than that is welcome."""
     if not axes or len(set(axes)) < len(axes):

@@ -6,8 +6,8 @@ from fractions import Fraction
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gearchaos.arrays import Array
 from gearchaos.gear.tooth_deviations import REALISATION
 from gearchaos.records.teeth import CONTACT, CONTACT_STATES, FORCES, LOADS
 
@@ -103,7 +103,7 @@ def coordinate(
     units: str,
     long_name: str,
     symbol: str,
-    values: NDArray[Any],
+    values: Array,
     flags: tuple[str, ...] = (),
 ) -> Variable:
     """Give a variable that is a dimension of its own, such as an axis: its values ascend."""
@@ -122,7 +122,7 @@ def start_axis(count: int) -> Variable:
     return coordinate(START, "1", text, "", np.arange(count))
 
 
-def pair_axis(numbers: NDArray[Any]) -> Variable:
+def pair_axis(numbers: Array) -> Variable:
     """Give the axis of several drawn gear pairs, of these numbers."""
     return coordinate(REALISATION, "1", "drawn gear pair", "", numbers)
 
