@@ -46,12 +46,7 @@ class Attractor(NamedTuple):
 
 
 def find_attractors(
-    system: System,
-    group: Integers,
-    state: Floats,
-    motion: Codes,
-    period: Counts,
-    plan: Plan,
+    system: System, group: Integers, state: Floats, motion: Codes, period: Counts, plan: Plan
 ) -> tuple[list[Attractor], Integers]:
     """Find the attractors of lanes, and to which of them each has come: its place in the list.
 

@@ -99,12 +99,7 @@ class Variable:
 
 
 def coordinate(
-    name: str,
-    units: str,
-    long_name: str,
-    symbol: str,
-    values: Array,
-    flags: tuple[str, ...] = (),
+    name: str, units: str, long_name: str, symbol: str, values: Array, flags: tuple[str, ...] = ()
 ) -> Variable:
     """Give a variable that is a dimension of its own, such as an axis: its values ascend."""
     dtype = {"i": "int32", "f": "float64"}[values.dtype.kind]
