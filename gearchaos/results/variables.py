@@ -1,15 +1,18 @@
 """What a sweep yields: name, dimensions, type, unit and wording of every variable, in one place."""
 
+import csv
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
+from itertools import product
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from gearchaos.arrays import Array
 from gearchaos.gear.tooth_deviations import REALISATION
-from gearchaos.records.teeth import CONTACT, CONTACT_STATES, FORCES, LOADS
+from gearchaos.records.teeth import CONTACT_STATES
 
 START = "start"
 DIRECTION = "direction"
@@ -59,6 +62,16 @@ STATE_WORDING: dict[str, tuple[str, str]] = {
     "delta_4_rate": ("axial velocity of the driven gear", r"$\delta_4'$"),
 }
 """Long name and mathtext symbol of each state (all dimensionless), in the one order of states."""
+
+
+_ROWS: dict[str, list[dict[str, str]]] = {}
+"""What a sweep yields, by what it is told with, in the order of the file.
+
+In all three columns of texts, @ stands for a state or a direction and its wording.
+"""
+with Path(__file__).with_name("variables.csv").open(encoding="utf-8", newline="") as _file:
+    for _row in csv.DictReader(_file):
+        _ROWS.setdefault(_row["told_with"], []).append(_row)
 
 
 @dataclass(frozen=True, eq=False)
@@ -173,94 +186,63 @@ def sweep_variables(
     their error, and of ``motion`` and ``record`` where they are labelled. A motion repeats after
     whole excitation periods, of so many mesh periods each.
     """
-    names = tuple(axis.name for axis in axes)
-    variables = list(axes)
-
-    def add(dtype: str, name: str, text: str, symbol: str = "", *dims: str, **more: Any) -> None:
-        variables.append(Variable(name, (*names, *dims), dtype, "1", text, symbol, **more))
-
-    def real(name: str, text: str, symbol: str = "", *dims: str) -> None:
-        add("float64", name, text, symbol, *dims, fill_value=float("nan"))
-
-    def kind(name: str, text: str, meanings: Sequence[str]) -> None:
-        add("uint8", name, text, flags=tuple("_".join(meaning.split()) for meaning in meanings))
-
-    if section and section_points > 0:
-        text = "number of the section point, one mesh period apart; the last one ends the lane"
-        variables.append(coordinate(SECTION_POINT, "1", text, "", np.arange(section_points)))
-        for state in section:
-            text, symbol = STATE_WORDING[state]
-            real(SECTION + state, f"{text} at the stroboscopic section", symbol, SECTION_POINT)
-    if lyapunov:
-        name, text = LARGEST_EXPONENT, "largest Lyapunov exponent"
-        real(name, text, r"$\lambda_1$")
-        text = f"standard error of the {text}, 0 where it is that of a periodic orbit"
-        real(name + STANDARD_ERROR, text, r"$s_{\lambda_1}$")
-    if motion_meanings:
-        kind("motion", "kind of motion", motion_meanings)
-        of_teeth = f"periods of the excitation, {excitation_period} mesh periods each,"
-        text = "mesh periods" if excitation_period == 1 else of_teeth
-        text += " after which the motion repeats, 0 where it is not periodic"
-        add("int32", "period", text, "$n$")
-        text = "smallest distance after which the motion returns, of all states, scaled"
-        real("return_distance", text)
-        text = "bands a chaotic or quasi-periodic section hops between in turn, 0 for other motions"
-        add("int32", BANDS, text)
-    if record_meanings:
-        text = "whether the record holds one kind of motion, or another one before the labelled one"
-        kind(RECORD, text, record_meanings)
-    if exponents:
-        text = "number of the Lyapunov exponent, the largest first"
-        numbers = np.arange(1, len(states) + 1)
-        variables.append(coordinate(EXPONENT_NUMBER, "1", text, "$i$", numbers))
-        real(ALL_EXPONENTS, "all Lyapunov exponents", r"$\lambda_i$", EXPONENT_NUMBER)
-        text = "standard error of each Lyapunov exponent"
-        real(ALL_EXPONENTS + STANDARD_ERROR, text, "", EXPONENT_NUMBER)
-        text = "sum of all Lyapunov exponents as the damping gives it, exactly"
-        real("lyapunov_sum", text, r"$\sum\lambda_i$")
-    if crossings:
-        text = "clearance boundaries crossed per mesh period, tangential and axial together"
-        real(CROSSINGS, text)
-        real("slowest_crossing", "smallest speed of a gap at a crossing of its clearance boundary")
-        add("int32", "unsplit_steps", "steps with more crossings than they were split at")
-    for way in contact:
-        for name, text in CONTACT.items():
-            real(f"{name}_{way}", f"{text}, {way}")
-        kind(f"contact_state_{way}", f"kind of {way} contact", CONTACT_STATES)
-    for way in loads:
-        for name, text in FORCES.items():
-            real(f"{name}_{way}", f"{text}, {way}")
-    for name, text in LOADS.items() if loads else ():
-        real(name, text)
-    for state in chosen:
-        for name in EXTREMES:
-            real(f"{state}_{name}", f"{name.replace('_', ' ')} {STATE_WORDING[state][0]}")
-    if orders:
-        numbers = np.array(orders, dtype=np.float64)
-        variables.append(coordinate(ORDER, "1", "frequency over mesh frequency", "", numbers))
-        for state in (*chosen, "transmission_error"):
-            text, symbol = STATE_WORDING.get(state, ("transmission error", ""))
-            real(AMPLITUDE + state, f"amplitude of the {text}", symbol, ORDER)
-    if check_meanings:
-        halved = "when the step is halved"
-        real("section_error", f"change of the section of a periodic lane {halved}")
-        real(STEP_ERROR, f"change of the largest Lyapunov exponent {halved}")
-        kind("motion_changed", f"whether the lane moves in another way {halved}", check_meanings)
-    kind(STATUS, "status of the lane", status_meanings)
-    text = "mesh period in which the lane diverged, -1 where it did not"
-    add("int32", "diverged_period", text, fill_value=-1)
-    text = "number of the state variable, which its meaning names"
-    variables.append(coordinate(STATE, "1", text, "", np.arange(len(states)), tuple(states)))
-    for end in ("start", "end"):
-        real(f"{end}_state", f"state at the {end} of the lane", "", STATE)
-    errors = {
-        LARGEST_EXPONENT: (LARGEST_EXPONENT + STANDARD_ERROR, STEP_ERROR),
-        ALL_EXPONENTS: (ALL_EXPONENTS + STANDARD_ERROR,),
-        **dict.fromkeys((SECTION + state for state in section), ("section_error",)),
+    periods = f"periods of the excitation, {excitation_period} mesh periods each,"
+    # What stands for @ in the rows that are told with each of these.
+    subjects: dict[str, Sequence[str]] = {
+        "section": section if section_points > 0 else (),
+        "motion": [periods if excitation_period > 1 else "mesh periods"] if motion_meanings else (),
+        "contact": contact,
+        "forces": loads,
+        "chosen": chosen,
+        "amplitudes": (*chosen, "transmission_error") if orders else (),
     }
-    there = {variable.name for variable in variables}
-    told = {name: tuple(one for one in found if one in there) for name, found in errors.items()}
-    return [replace(variable, errors=told.get(variable.name, ())) for variable in variables]
+    once = {
+        "section points": subjects["section"],
+        "lyapunov": lyapunov,
+        "record": record_meanings,
+        "exponents": exponents,
+        "crossings": crossings,
+        "loads": loads,
+        "orders": orders,
+        "check": check_meanings,
+        "every sweep": True,
+    }
+    subjects |= {name: [""] for name, told in once.items() if told}
+    values: dict[str, Array] = {
+        SECTION_POINT: np.arange(section_points),
+        EXPONENT_NUMBER: np.arange(1, len(states) + 1),
+        ORDER: np.array(orders, dtype=np.float64),
+        STATE: np.arange(len(states)),
+    }
+    meanings = {
+        "motion": motion_meanings,
+        RECORD: record_meanings,
+        "contact_state_@": CONTACT_STATES,
+        "motion_changed": check_meanings,
+        STATUS: status_meanings,
+        STATE: states,
+    }
+    lane, variables = tuple(axis.name for axis in axes), list(axes)
+    for told_with, rows in _ROWS.items():
+        for subject, row in product(subjects.get(told_with, ()), rows):
+            wording = STATE_WORDING.get(subject, (subject.replace("_", " "), ""))
+            kinds = meanings.get(row["name"], ())
+            given: dict[str, Any] = {
+                "name": row["name"].replace("@", subject),
+                "units": "1",
+                "long_name": row["long_name"].replace("@", wording[0]),
+                "symbol": row["symbol"].replace("@", wording[1]),
+                "flags": tuple("_".join(meaning.split()) for meaning in kinds),
+            }
+            if row["type"] == "coordinate":
+                variables.append(coordinate(values=values[row["name"]], **given))
+                continue
+            none = np.dtype(row["type"]).type(row["none"]) if row["none"] else None
+            given |= {"fill_value": none, "errors": tuple(row["errors"].split())}
+            dims = (*lane, *row["along"].split())
+            variables.append(Variable(dims=dims, dtype=row["type"], **given))
+    there = {one.name for one in variables}
+    return [replace(v, errors=tuple(e for e in v.errors if e in there)) for v in variables]
 
 
 def step_choice_variables(
