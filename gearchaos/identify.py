@@ -51,7 +51,7 @@ def _identify(options: Namespace) -> int:
             "the package cma, which searches, is not installed; pip install gearchaos[identify]"
         )
     require_stable(problem.config, judge.values, problem.targets.corners())
-    output, keys = output_of(options), [one.name for one in problem.targets.parameter]
+    output, keys = output_of(options, ".csv"), [one.name for one in problem.targets.parameter]
     known, kept, facts = None, False, decisive_facts(problem)
     if options.resume and not options.overwrite and os.path.exists(output):
         (known, earlier), kept = read_tried(output, keys), True

@@ -26,9 +26,6 @@ Contents = tuple[
 ]
 """Variables, data, parameters and metadata, as for `Result`."""
 
-SEARCH = "gearchaos-identification"
-"""Schema of the candidates of a search, which are no result of a sweep."""
-
 SOON_HASHED = 1 << 30
 """Bytes whose checksum takes about a second."""
 
@@ -186,11 +183,6 @@ def _wording(notes: Mapping[str, Any]) -> dict[str, Any]:
 def _check_schema(metadata: Mapping[str, Any]) -> None:
     schema, version = metadata.get("schema"), str(metadata.get("schema_version", ""))
     own = SCHEMA_VERSION.split(".")[0]
-    if schema == SEARCH:
-        raise UnfitError(
-            "holds the candidates of a search, not the result of a sweep",
-            "`gearchaos identify TARGETS.toml --resume` goes on with it and reports what it found",
-        )
     if schema != SCHEMA:
         raise UnfitError(
             f'is not a gearchaos result: it lacks the attribute schema = "{SCHEMA}"',
