@@ -18,14 +18,13 @@ from gearchaos.configuration.keys import (
     key,
 )
 
-_SHAPE = '"fourier" takes the coefficients, "trapezoid" takes rise, top, fall, bottom, half_height'
+_SHAPE = '"fourier" takes the coefficients, "trapezoid" the contact ratio of [pair]'
 _KIND = '"sine": at mesh frequency, "teeth": as measured, "grade": drawn by an accuracy grade'
 _optional = partial(key, default=None)
 _mean = partial(key, "mean of the pitch error", "um", 0.0, default=0.0)
 _smoothing = partial(
     key, "share of the mesh period in which teeth take their load", "1", default=0.1, ge=0.01, le=1
 )
-_share = partial(key, units="1", example=0.25, default=None, ge=0, le=1)
 
 
 class Pair(Table):
@@ -78,15 +77,6 @@ class TrapezoidStiffness(Table):
     """Mesh stiffness as a trapezoid over the mesh period (Pan 2021, eqs 15-18)."""
 
     shape: Literal["trapezoid"] = key(_SHAPE, example="fourier")
-    rise: float | None = _share(
-        "rising share of the mesh period; no shares: from the contact ratio of [pair]"
-    )
-    top: float | None = _share("share of the mesh period at the top")
-    fall: float | None = _share("falling share of the mesh period")
-    bottom: float | None = _share("share of the mesh period at the bottom")
-    half_height: float | None = _optional(
-        "half the height of the trapezoid relative to the mean stiffness", "1", 0.111, ge=0, lt=1
-    )
     harmonics: int = key("number of harmonics kept of the trapezoid", default=6, ge=1, le=1000)
 
 
