@@ -47,7 +47,6 @@ def bifurcation(
     variable: str | None = None,
     *,
     between: Between = (None, None),
-    full_range: bool = False,
     color: str = BLACK,
     label: str | None = None,
     marker: str = ".",
@@ -71,8 +70,6 @@ def bifurcation(
         first section variable that the result has.
     between : (float or None, float or None)
         The part of the parameter range to show.
-    full_range : bool
-        Let the vertical axis reach every lane, however few lie far out.
     color, label, marker : str
         Of the dots, for diagrams of several results in the same axes: the limits then hold what
         those of each would, the triangles follow them, and the legend names the labels.
@@ -102,7 +99,7 @@ def bifurcation(
     for part, values in portions(lanes, rows):
         np.fmin.reduce(values, axis=1, out=low[part])
         np.fmax.reduce(values, axis=1, out=high[part])
-    own = Diagram(points, lanes, low, high, full_range=full_range)
+    own = Diagram(points, lanes, low, high)
     return close_panel(axes, result, own)
 
 
@@ -111,7 +108,6 @@ def lyapunov(
     result: Result,
     *,
     between: Between = (None, None),
-    full_range: bool = False,
     color: str = BLACK,
     label: str | None = None,
     marker: str = ".",
@@ -125,7 +121,7 @@ def lyapunov(
 
     Parameters
     ----------
-    axes, result, between, full_range, color, label, marker
+    axes, result, between, color, label, marker
         As for `bifurcation`.
 
     Raises
@@ -170,7 +166,7 @@ def lyapunov(
         look = {"ms": 3.0, "mfc": "none", "mew": 0.5, "color": VERMILION}
         named += axes.plot(x[mixed], exponent[mixed], "o", label="came from another motion", **look)
     axes.set_ylabel(axis_label(result, LARGEST_EXPONENT, line_length=20))
-    own = Diagram(line, lanes, whole, whole, np.nan_to_num(spread), full_range, named)
+    own = Diagram(line, lanes, whole, whole, np.nan_to_num(spread), named)
     close_panel(axes, result, own, hold_zero=True)
     marks = own.diverged, own.off_scale, own.legend
     return LyapunovArtists(line, points, band, bars, positive, zero, *marks)

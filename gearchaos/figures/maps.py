@@ -56,7 +56,6 @@ def parameter_map(
     variable: str = LABELS[0],
     *,
     between: Between = (None, None),
-    full_range: bool = False,
 ) -> ScalarMappable:
     """Draw one variable of the lanes as a map over two swept parameters into axes.
 
@@ -74,8 +73,6 @@ def parameter_map(
         "motion", any other variable with flags, or one with a number for each lane.
     between : (float or None, float or None)
         The part of the first parameter's range to show.
-    full_range : bool
-        Let the colours reach every lane, however few lie far out.
 
     Returns
     -------
@@ -112,7 +109,7 @@ def parameter_map(
     else:
         numbers = cells(result[variable].astype(np.float64))
         numbers[(numbers == result.variables[variable].fill_value) | np.isinf(numbers)] = np.nan
-        image = _number_cells(axes, edges, numbers, variable == LARGEST_EXPONENT, full_range)
+        image = _number_cells(axes, edges, numbers, variable == LARGEST_EXPONENT)
         none, ended = np.isnan(numbers), cells(result[STATUS]) != 0
         masks = {"diverged": none & ended, NO_VALUE: none & ~ended}
         looks = {name: look_of(name) for name in masks}
@@ -138,7 +135,6 @@ def map_page(
     variable: str | None = None,
     *,
     between: Between = (None, None),
-    full_range: bool = False,
     marked: Mapping[str, float] | None = None,
     width_mm: float = SINGLE_COLUMN_MM,
     height_mm: float | None = None,
@@ -150,7 +146,7 @@ def map_page(
 
     Parameters
     ----------
-    result, variable, between, full_range
+    result, variable, between
         As for `parameter_map`.
     marked : mapping of str to float, optional
         Values of the two parameters at which a line crosses the maps.
@@ -172,7 +168,7 @@ def map_page(
     with page(width_mm, height) as figure:
         panels = figure.subplots(*shape, sharex=True, sharey=True, squeeze=False).ravel().tolist()
         for axes, name in zip(panels, names, strict=True):
-            parameter_map(axes, result, name, between=between, full_range=full_range)
+            parameter_map(axes, result, name, between=between)
             few_ticks(axes)
             axes.label_outer()
             for axis, value in (marked or {}).items():
@@ -209,13 +205,13 @@ def _kinds(result: Result, variable: str) -> tuple[Array, dict[str, dict[str, An
 
 
 def _number_cells(
-    axes: Axes, edges: tuple[Floats, Floats], numbers: Floats, signed: bool, full_range: bool
+    axes: Axes, edges: tuple[Floats, Floats], numbers: Floats, signed: bool
 ) -> ScalarMappable:
     """Draw numbers (rows, columns), with the bar of their colours; robust limits may cut it."""
     there = numbers[np.isfinite(numbers)]
     there = there if there.size else np.zeros(1)
     ends = lowest, highest = there.min(), there.max()
-    low, high = np.clip(robust_limits(there, there, full_range=full_range), *ends)
+    low, high = np.clip(robust_limits(there, there), *ends)
     colours: Colormap = mpl.colormaps[NUMBERS]
     if signed:
         # Neither way is so short that zero would lie on the edge of the bar.

@@ -33,7 +33,6 @@ def bifurcation_page(
     variable: str | None = None,
     *,
     between: Between = (None, None),
-    full_range: bool = False,
     stages: bool | LabelledLanes = False,
     marked: tuple[str, Sequence[float]] | None = None,
     labels: Sequence[str] | None = None,
@@ -48,7 +47,7 @@ def bifurcation_page(
     ----------
     result : Result or sequence of Result
         Over one swept parameter; several are drawn over each other.
-    variable, between, full_range
+    variable, between
         As for `bifurcation`; amplitudes at mesh orders are drawn as by `waterfall`.
     stages : bool or LabelledLanes
         Shade the stages behind both panels. Lanes with other labels than those of the result may be
@@ -106,7 +105,7 @@ def bifurcation_page(
         grid = figure.subplots(panels, 1, sharex=True, squeeze=False, height_ratios=ratios)
         stack: list[Axes] = grid[:, 0].tolist()
         for one, name, (color, marker) in zip(results, labels, cycle(OVERLAID), strict=False):
-            shown: dict[str, Any] = {"between": between, "full_range": full_range}
+            shown: dict[str, Any] = {"between": between}
             if len(results) > 1:
                 shown |= {"color": color, "marker": marker, "label": plain(name) or "untitled"}
             if of_orders:
