@@ -4,7 +4,6 @@ RK4 with plain and with resolved steps, and flow maps, which need few steps. The
 flow maps find. Errors are those that 95 % of the periodic lanes do not exceed. The table goes to
 stdout, everything else to stderr; a figure (PNG and PDF) and the table as JSON are written under
 the name in --output.
-Exit codes: 0 done, 2 usage or configuration, 4 cannot read or write.
 """
 
 import json

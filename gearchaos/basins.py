@@ -1,8 +1,6 @@
 """Find the attractors of a sweep from many starts, and which share of the starts leads to each.
 
 Attractors keep their numbers along the sweep. The table goes to stdout, everything else to stderr.
-Exit codes: 0 done, 2 the command line asks for what cannot be, 4 a file cannot be read or written
-or holds no labels.
 """
 
 import argparse

@@ -2,7 +2,7 @@
 
 For bash: gearchaos completion bash > ~/.local/share/bash-completion/completions/gearchaos; for zsh:
 gearchaos completion zsh > a file named _gearchaos in a folder of $fpath. Needs pip install
-gearchaos[completion]. Exit codes: 0 done, 2 no such shell, 4 the package shtab is missing.
+gearchaos[completion].
 """
 
 import sys

@@ -1,7 +1,4 @@
-"""List the ready configurations, or copy one of them into the current folder.
-
-Exit codes: 0 done, 2 there is no such example, 4 the file exists already or cannot be written.
-"""
+"""List the ready configurations, or copy one of them into the current folder."""
 
 import sys
 import tomllib

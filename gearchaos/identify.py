@@ -3,9 +3,7 @@
 A targets file names stages, jumps, crises, exponents and increments that were observed, and the
 parameters that are free within bounds. The best sets that differ go to stdout, with how far each
 parameter can move before the fit is worse by one unit; every candidate that was tried goes to a
-file. Exit codes: 0 done, 2 the command line or the targets ask for what cannot be, 4 a file
-cannot be read or written, 130 interrupted and 143 terminated: candidates are kept and --resume
-goes on from them.
+file. Interrupted or terminated, candidates are kept and --resume goes on from them.
 """
 
 import os

@@ -1,8 +1,7 @@
 """Show what a result file holds: what was computed, with which parameters, how accurately, and on
 what. Only the file is read.
 
---verify reads all of the file and tries every checksum in it. Exit codes: 0 the file is sound, 2
-the command line asks for what cannot be, 4 the file cannot be read, is damaged or is not ours.
+--verify reads all of the file and tries every checksum in it.
 """
 
 import json

@@ -4,8 +4,7 @@ with time history, phase portrait, Poincare section and amplitude spectrum.
 
 A figure that this command drew before is replaced, so that it can be run again and again; any
 other file of that name is kept unless --overwrite is given. The paths of the figures go to
-stdout. Exit codes: 0 done, 2 the command line asks for what cannot be, 4 a file cannot be read
-or written.
+stdout.
 """
 
 import argparse

@@ -1,7 +1,6 @@
 """List the stages of a sweep: stretches of the swept parameter in which the motion keeps its label.
 
-The table goes to stdout, everything else to stderr. Exit codes: 0 done, 2 the command line asks
-for what cannot be, 4 the file cannot be read, is damaged or holds no labels.
+The table goes to stdout, everything else to stderr.
 """
 
 import argparse

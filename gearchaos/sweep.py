@@ -1,9 +1,7 @@
 """Compute the sweep that a TOML file describes and write it to an HDF5 file.
 
-The path of the result goes to stdout, everything else to stderr. Exit codes: 0 done, 2 the
-command line or the configuration asks for what cannot be, 3 done, but more lanes diverged than
-outputs.allowed_diverged_share, 4 a file cannot be read or written, 130 interrupted and 143
-terminated: finished blocks are kept and --resume goes on from them.
+The path of the result goes to stdout, everything else to stderr. Interrupted or terminated,
+finished blocks are kept and --resume goes on from them.
 """
 
 import sys
