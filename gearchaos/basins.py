@@ -39,7 +39,7 @@ def _basins(options: argparse.Namespace) -> int:
     from gearchaos.engine.running import compiling
     from gearchaos.figures import basins_page
     from gearchaos.figures.page import check_figures, save_figure
-    from gearchaos.results.overview import finite, slice_lines
+    from gearchaos.results.overview import plain, slice_lines
     from gearchaos.results.result import open_result
     from gearchaos.results.stage_table import slice_facts
     from gearchaos.results.variables import REPEATS, START
@@ -61,7 +61,7 @@ def _basins(options: argparse.Namespace) -> int:
             one["section"] = one["section"].tolist() if one["period"] else None
             one["number"] = one["number"] if one["number"] > 0 else None
         facts |= {"basins": basins, "entropy": found.entropy}
-        print(json.dumps(finite(facts), indent=1, allow_nan=False))
+        print(json.dumps(plain(facts), indent=1))
     else:
         print("\n".join([*table(found, slice_lines(where))]))
     if options.output:

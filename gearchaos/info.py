@@ -32,7 +32,7 @@ def _info(options: Namespace) -> int:
             verified = verify(options.result)
     summary = overview(options.result)
     if options.json:
-        text = json.dumps({**summary, "verified": verified}, indent=1, allow_nan=False)
+        text = json.dumps({**summary, "verified": verified}, indent=1)
     else:
         text = overview_page(summary, _settings(summary["metadata"]), verified)
     # Where the terminal knows few characters, a title must not become a traceback.

@@ -10,7 +10,7 @@ import sys
 import textwrap
 from collections.abc import Iterator, Sequence
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from gearchaos.command_line import OK, Command, coordinates, number, place, whole_number
 from gearchaos.errors import ConfigurationError
@@ -62,7 +62,7 @@ def _width(text: str) -> float:
 
 def _stages(options: argparse.Namespace) -> int:
     from gearchaos.results.jumps import apart, crises, jumps
-    from gearchaos.results.overview import finite, slice_lines
+    from gearchaos.results.overview import plain, slice_lines
     from gearchaos.results.result import open_result
     from gearchaos.results.scales import excitation_of
     from gearchaos.results.stage_table import labelled_lanes, one_axis, slice_facts, stage_table
@@ -87,18 +87,18 @@ def _stages(options: argparse.Namespace) -> int:
     several = [axis for axis in result.axes if axis in REPEATS]
     jumping, bursting = ([], []) if several else (jumps(result), crises(result))
     if options.json:
-        refined = {} if boundaries is None else {"boundaries": [*map(_named, boundaries)]}
+        refined = {} if boundaries is None else {"boundaries": boundaries}
         facts = {
             "parameter": result.axis,
             "slice": where,
-            "stages": [*map(_named, stages)],
-            **({"directions_apart": [*map(_named, stretches)]} if both else {}),
+            "stages": stages,
+            **({"directions_apart": stretches} if both else {}),
             **refined,
-            "jumps": [jump._asdict() for jump in jumping],
-            "crises": [crisis._asdict() for crisis in bursting],
-            "survival": outlasting and outlasting._asdict(),
+            "jumps": jumping,
+            "crises": bursting,
+            "survival": outlasting,
         }
-        print(json.dumps(finite(facts), indent=1, allow_nan=False))
+        print(json.dumps(plain(facts), indent=1))
         return OK
     mixed = int((result[RECORD] == 1).sum()) if RECORD in result else 0
     told = [*band_lines(stages), *remarks(jumping, bursting, mixed), *directions_apart(stretches)]
@@ -119,7 +119,7 @@ def _map_boundaries(result: "Result", options: argparse.Namespace) -> int:
     from gearchaos.engine.recomputing import refinable
     from gearchaos.engine.refinement import refined_map
     from gearchaos.engine.running import choose_threads, compiling
-    from gearchaos.results.overview import finite
+    from gearchaos.results.overview import plain
 
     choose_threads(options.threads)
     config = refinable(result, options.result)
@@ -138,11 +138,11 @@ def _map_boundaries(result: "Result", options: argparse.Namespace) -> int:
         facts = {
             "parameter": first,
             "second_parameter": second,
-            "rows": [{"value": at, "boundaries": [*map(_named, rows[at])]} for at in rows],
+            "rows": [{"value": at, "boundaries": found} for at, found in rows.items()],
             "lanes": lanes,
             "lanes_of_a_map_as_fine": fine,
         }
-        print(json.dumps(finite(facts), indent=1, allow_nan=False))
+        print(json.dumps(plain(facts), indent=1))
         return OK
     for value, found in rows.items():
         print(f"{second} = {value:.6g}", *boundary_list(found), sep="\n")
@@ -235,28 +235,6 @@ def boundary_list(boundaries: "Sequence[Boundary]") -> Iterator[str]:
             real, imaginary = boundary.multiplier.real, abs(boundary.multiplier.imag)
             pair = f" +- {imaginary:.4f}i" if imaginary else ""
             yield f"    multiplier {real:.4f}{pair}"
-
-
-_NAMES = {
-    "start": "from",
-    "end": "to",
-    "label": "motion",
-    "narrower": "narrower_stages",
-    "label_below": "motion_below",
-    "label_above": "motion_above",
-    "loss": "loss_of_stability",
-}
-"""Names in JSON of what stages and boundaries have, where they differ."""
-
-
-def _named(record: "Stage | Boundary | Apart") -> dict[str, Any]:
-    facts = {_NAMES.get(name, name): value for name, value in record._asdict().items()}
-    if "multiplier" in facts:
-        multiplier = facts.pop("multiplier")
-        facts |= {"multiplier_real": multiplier.real, "multiplier_imaginary": multiplier.imag}
-        facts["loss_of_stability"] = facts["loss_of_stability"] or None
-        facts["direction"] = facts["direction"] or None
-    return facts
 
 
 main = Command("stages", __doc__, _arguments, _stages, common=("threads",))

@@ -1,6 +1,5 @@
 """What a result file says about itself: plain numbers, texts, lists, and a page for a terminal."""
 
-import json
 import math
 import os
 import textwrap
@@ -86,14 +85,21 @@ def overview(path: str | os.PathLike[str]) -> dict[str, Any]:
     summary |= {"slice": {}, "stages": []}
     if result.axis not in known.UNSWEPT and all(name in result for name in known.LABELS):
         part = one_axis(result)
-        stages = [stage._asdict() for stage in stage_table(labelled_lanes(part))]
+        stages = stage_table(labelled_lanes(part))
         summary |= {"slice": slice_facts(result, part), "stages": stages}
-    return dict(finite(summary))
+    return dict(plain(summary))
 
 
-def finite(value: Any) -> Any:
-    """Replace what is not finite in nested tables and lists by None."""
-    return json.loads(json.dumps(value), parse_constant=lambda _: None)
+def plain(value: Any) -> Any:
+    """Make of records and complex numbers what JSON has; what is not finite is None."""
+    value = value._asdict() if hasattr(value, "_asdict") else value
+    if isinstance(value, Mapping):
+        return {name: plain(entry) for name, entry in value.items()}
+    if isinstance(value, list | tuple):
+        return [*map(plain, value)]
+    if isinstance(value, complex):
+        return plain([value.real, value.imag])
+    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def _range(values: Array) -> dict[str, float]:
