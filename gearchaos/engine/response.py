@@ -28,27 +28,12 @@ LARGEST_RESPONSE = 4 * 2**30
 def respond(config: Given, periods: int = DEFAULT_PERIODS, threads: int | None = None) -> Result:
     """Compute the motion at every step of the last mesh periods, for every value of the sweep.
 
-    Parameters
-    ----------
-    config : Configuration or path
-        From `load_config`, or the path of its file; transient, recorded periods, start and scene
-        are as configured.
-    periods : int
-        Mesh periods at the end of the recorded ones.
-    threads : int, optional
-        Threads to use; by default all that there are.
-
-    Returns
-    -------
-    Result
-        The variables of a sweep, and the motion along ``time``; its sections hold all states of
-        the scene in all recorded periods.
-
-    Raises
-    ------
-    ConfigurationError
-        If fewer periods are recorded, the motion does not fit into memory or there are not so many
-        threads.
+    ``config``, or the path of its file: transient, recorded periods, start and scene are as
+    configured; ``periods``: mesh periods at the end of the recorded ones; ``threads``: by default
+    all that there are. The result has the variables of a sweep, and the motion along ``time``; its
+    sections hold all states of the scene in all recorded periods. Raises ConfigurationError if
+    fewer periods are recorded, the motion does not fit into memory or there are not so many
+    threads.
     """
     choose_threads(threads)
     config = configuration_of(config)

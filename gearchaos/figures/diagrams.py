@@ -53,31 +53,18 @@ def bifurcation(
 ) -> Diagram:
     """Draw the bifurcation diagram of one section variable into axes.
 
-    Every section point is a small translucent dot: a periodic motion, whose points coincide,
-    shows as a crisp black line, and chaos as grey whose depth is the density of visits. The
-    dots are rasterised, so that a PDF stays small. Above `figures.lanes.MOST_DOTS` they are counted
-    by pixel, and fainter the more there are, so that chaos stays grey.
-    Diverged lanes get a red tick at the bottom, lanes beyond robust limits a triangle at the edge,
-    and a legend above says so.
+    Every section point is a small translucent dot: a periodic motion, whose points coincide, shows
+    as a crisp black line, and chaos as grey whose depth is the density of visits. The dots are
+    rasterised, so that a PDF stays small. Above `figures.lanes.MOST_DOTS` they are counted by
+    pixel, and fainter the more there are, so that chaos stays grey. Diverged lanes get a red tick
+    at the bottom, lanes beyond robust limits a triangle at the edge, and a legend above says so.
 
-    Parameters
-    ----------
-    axes : matplotlib.axes.Axes
-    result : Result
-        Over one swept parameter.
-    variable : str, optional
-        A section variable, or one with a number for each lane; default `section_delta_5`, or the
-        first section variable that the result has.
-    between : (float or None, float or None)
-        The part of the parameter range to show.
-    color, label, marker : str
-        Of the dots, for diagrams of several results in the same axes: the limits then hold what
-        those of each would, the triangles follow them, and the legend names the labels.
-
-    Raises
-    ------
-    FigureError
-        If the result has no such variable, no lane in the range, or two swept parameters.
+    ``result``: over one swept parameter; ``variable``: a section variable, or one with a number for
+    each lane, by default `section_delta_5`, or the first section variable that the result has;
+    ``between``: the part of the parameter range to show; ``color``, ``label``, ``marker`` of the
+    dots, for diagrams of several results in the same axes: the limits then hold what those of each
+    would, the triangles follow them, and the legend names the labels. Raises FigureError if the
+    result has no such variable, no lane in the range, or two swept parameters.
     """
     names = section_variables(result)
     numbers = [v for v in result.variables.values() if v.dtype == "float64"]
@@ -114,20 +101,12 @@ def lyapunov(
 ) -> LyapunovArtists:
     """Draw the largest Lyapunov exponent into axes, with zero line and uncertainty.
 
-    Diverged lanes are gaps with a red tick at the bottom; a positive exponent is hatched down
-    to zero; the vertical axis always holds zero, and lanes beyond robust limits get a triangle.
-    Of more lanes than a page can tell apart (`figures.lanes.COLUMNS`), line, shades and bars are
-    those of the lowest and the highest exponent in each column.
-
-    Parameters
-    ----------
-    axes, result, between, color, label, marker
-        As for `bifurcation`.
-
-    Raises
-    ------
-    FigureError
-        If the result has no Lyapunov exponents, no lane in the range, or two swept parameters.
+    Diverged lanes are gaps with a red tick at the bottom; a positive exponent is hatched down to
+    zero; the vertical axis always holds zero, and lanes beyond robust limits get a triangle. Of
+    more lanes than a page can tell apart (`figures.lanes.COLUMNS`), line, shades and bars are those
+    of the lowest and the highest exponent in each column. Parameters are as for `bifurcation`;
+    raises FigureError if the result has no Lyapunov exponents, no lane in the range, or two swept
+    parameters.
     """
     if LARGEST_EXPONENT not in result:
         raise FigureError("the result has no Lyapunov exponents: the sweep left them out")

@@ -45,24 +45,12 @@ def shares(
     unresolved among them; drawn around it is its confidence interval of 95 % (Wilson 1927), which
     takes gear pairs and starts for independent.
 
-    Parameters
-    ----------
-    axes, result, between
-        As for `bifurcation`, with labels of the motion of several gear pairs or starts.
-    contact : matplotlib.axes.Axes, optional
-        Where to draw the share of motions whose teeth lose contact, if the result tells.
-
-    Returns
-    -------
-    list
-        What is drawn into the first axes, with labels, in the order of a legend.
-
-    Raises
-    ------
-    FigureError
-        If there is no lane in the range, or two swept parameters.
-    ConfigurationError, FileError
-        If the result has neither several gear pairs nor several starts, or no labels.
+    ``axes``, ``result``, ``between``: as for `bifurcation`, with labels of the motion of several
+    gear pairs or starts; ``contact``: axes in which to draw the share of motions whose teeth lose
+    contact, if the result tells. Returns what is drawn into the first axes, with labels, in the
+    order of a legend. Raises FigureError if there is no lane in the range, or two swept parameters;
+    ConfigurationError or FileError if the result has neither several gear pairs nor several starts,
+    or no labels.
     """
     limits, counted = diagram_lanes(result, between).limits, motion_shares(result)
     values, known = counted.values, list(dict.fromkeys([*SHADES, *counted.motions]))

@@ -64,28 +64,13 @@ def parameter_map(
     zero. Lanes without a number are grey or hatched, and the legend says why. The cells are an
     image, so that a PDF stays small.
 
-    Parameters
-    ----------
-    axes : matplotlib.axes.Axes
-    result : Result
-        Over two swept parameters, the first one along x, with one lane for each pair of values.
-    variable : str
-        "motion", any other variable with flags, or one with a number for each lane.
-    between : (float or None, float or None)
-        The part of the first parameter's range to show.
-
-    Returns
-    -------
-    ScalarMappable
-        The image. Its array has the shape (values of the second parameter, values shown of the
-        first), with the number of the kind where there are kinds, masked where there is none.
-
-    Raises
-    ------
-    FigureError
-        If the result has no such variable, no lane in the range, or other axes than two parameters.
-    FileError
-        If the motion is wanted and the result has no labels.
+    ``result``: over two swept parameters, the first one along x, with one lane for each pair of
+    values; ``variable``: "motion", any other variable with flags, or one with a number for each
+    lane; ``between``: the part of the first parameter's range to show. Returns the image. Its array
+    has the shape (values of the second parameter, values shown of the first), with the number of
+    the kind where there are kinds, masked where there is none. Raises FigureError if the result has
+    no such variable, no lane in the range, or other axes than two parameters; FileError if the
+    motion is wanted and the result has no labels.
     """
     x_axis, y_axis = map_axes(result)
     lanes, y = select_lanes(result, between), np.asarray(result[y_axis], dtype=np.float64)
@@ -142,21 +127,10 @@ def map_page(
     """Draw the maps of motion and period (a), largest exponent (b) and state of contact (c).
 
     A result without one of them gives the panels that it has data for; a ``variable`` gives one
-    panel, of itself.
-
-    Parameters
-    ----------
-    result, variable, between
-        As for `parameter_map`.
-    marked : mapping of str to float, optional
-        Values of the two parameters at which a line crosses the maps.
-    width_mm, height_mm : float
-        Size of the page. Panels for which it is wide enough stand side by side.
-
-    Raises
-    ------
-    FigureError, FileError
-        As for `parameter_map`, and if there is nothing to draw.
+    panel, of itself. Parameters and errors as for `parameter_map`, and FigureError if there is
+    nothing to draw; ``marked``: values of the two parameters at which a line crosses the maps;
+    ``width_mm``, ``height_mm``: size of the page. Panels for which it is wide enough stand side by
+    side.
     """
     names = [name for name in SHOWN if name in result] if variable is None else [variable]
     if not names:

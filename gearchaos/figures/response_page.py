@@ -57,23 +57,11 @@ def response_page(
     pitch error, in um where b' is known, over revolutions of the driving gear, and points once a
     mesh period stand behind those of the section.
 
-    Parameters
-    ----------
-    result : Result
-        A response.
-    lane : int
-        Number of the lane, from 0, all axes of the result flattened.
-    coordinate : str, optional
-        Such as ``"delta_1"``; default ``"delta_5"``, the torsion. Of what is no coordinate, such
-        as ``"mesh_force_tangential"``, the page has the time history and its own spectrum.
-    width_mm, height_mm : float
-        Size of the page; 180 mm is two columns of a journal, and at 85 mm, one column, the panels
-        stand one above the other.
-
-    Raises
-    ------
-    FigureError
-        If the result is no response, has no such lane or variable, or the lane diverged.
+    ``result``, ``lane`` and errors: as for `time_history`; ``coordinate``: such as ``"delta_1"``,
+    by default ``"delta_5"``, the torsion. Of what is no coordinate, such as
+    ``"mesh_force_tangential"``, the page has the time history and its own spectrum. ``width_mm``,
+    ``height_mm``: size of the page; 180 mm is two columns of a journal, and at 85 mm, one column,
+    the panels stand one above the other.
     """
     coordinate = response.COORDINATE if coordinate is None else coordinate
     whole = coordinate in response.coordinates_of(result)

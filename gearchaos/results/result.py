@@ -31,24 +31,13 @@ DEFAULT_VARIABLE = "section_delta_5"
 class Result:
     """Named arrays of one sweep, in memory.
 
-    Parameters
-    ----------
-    axes : sequence of str
-        Names of the dimensions of the lanes: second swept parameter, first swept parameter,
-        realisation, start; those that there are.
-    variables : sequence of Variable
-        What there is, in the order of the file.
-    data : mapping of str to ndarray
-        The values of each variable, of the shape of its dimensions or with all axes flattened
-        into the first one; those that carry their own ``values`` may be left out.
-    parameters, metadata : mapping by name
-        Dimensionless groups with their origin; title, formulation, configuration, provenance.
-
-    Raises
-    ------
-    ValueError
-        If an array is missing, its shape contradicts the dimensions, or an axis is no ascending
-        row of values.
+    ``axes``: names of the dimensions of the lanes: second swept parameter, first swept parameter,
+    realisation, start; those that there are; ``variables``: what there is, in the order of the
+    file; ``data`` by name: the values of each variable, of the shape of its dimensions or with all
+    axes flattened into the first one; those that carry their own ``values`` may be left out;
+    ``parameters``, ``metadata`` by name: dimensionless groups with their origin; title,
+    formulation, configuration, provenance. Raises ValueError if an array is missing, its shape
+    contradicts the dimensions, or an axis is no ascending row of values.
     """
 
     def __init__(

@@ -33,25 +33,11 @@ def integrate(
 ) -> Outcome:
     """Integrate a batch of lanes from tau = 0, by RK4 or by flow maps.
 
-    Parameters
-    ----------
-    system : System
-    start : ndarray, shape (lanes, states)
-        States of eq. 13 at tau = 0.
-    plan : Plan
-        Steps, periods and what is kept.
-    tangent_start : ndarray, shape (lanes, states), optional
-        Tangent vectors at tau = 0; by default an equal share of every state.
-
-    Returns
-    -------
-    Outcome
-        Identical bit for bit for any number of threads, any split and any order of the lanes.
-
-    Raises
-    ------
-    ValueError
-        If flow maps are asked for with pitch errors tooth by tooth, or too many pairs are in mesh.
+    ``start`` (lanes, states): those of eq. 13 at tau = 0; ``plan``: steps, periods and what is
+    kept; ``tangent_start`` (lanes, states): tangent vectors at tau = 0, by default an equal share
+    of every state. The outcome is identical bit for bit for any number of threads, any split and
+    any order of the lanes. Raises ValueError if flow maps are asked for with pitch errors tooth by
+    tooth, or too many pairs are in mesh.
     """
     lanes, states = start.shape[0], len(system.states)
     steps = plan.steps_per_period
