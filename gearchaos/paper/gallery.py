@@ -78,12 +78,6 @@ def check_folder(folder: Path, overwrite: bool) -> None:
         raise FileError(f"{folder}: is a file; give the name of a folder as --output")
     images = [f"{name}.{kind}" for name, *_ in pictures() for kind in FORMATS]
     targets = [folder / name for name in (REPORT, *images, *RESULTS)]
-    present = [target.name for target in targets if target.exists()]
-    if present and not overwrite:
-        raise FileError(
-            f"{folder}: holds {present[0]} already; replace the gallery with --overwrite or choose "
-            "another --output"
-        )
     with writing(folder):
         folder.mkdir(parents=True, exist_ok=True)
     for target in targets:

@@ -14,8 +14,7 @@ from gearchaos_kernels.compilation import driver
 from gearchaos_kernels.flow_map import fewest_steps, maps_of, sharing
 from gearchaos_kernels.forcing import phase_table
 from gearchaos_kernels.rows import CONTACT_ROWS, ERROR, LANES, SIGNAL_ROWS, SIGNALS
-from gearchaos_kernels.status import Status
-from gearchaos_kernels.system import Floats, Outcome, Plan, Schedule, System
+from gearchaos_kernels.system import Floats, Outcome, Plan, Schedule, Status, System
 from gearchaos_kernels.teeth import tables_of
 
 Integers = NDArray[np.intp]

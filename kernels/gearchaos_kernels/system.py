@@ -1,6 +1,7 @@
 """What is integrated, how long, and what comes of it: the records that go in and out."""
 
 import math
+from enum import IntEnum
 from fractions import Fraction
 from typing import NamedTuple, Self
 
@@ -191,6 +192,21 @@ class Schedule(NamedTuple):
     section_points: int
     history_periods: int
     first_period: int
+
+
+class Status(IntEnum):
+    """Outcome of the integration of one lane; the values are those of the result file."""
+
+    OK = 0
+    DIVERGED = 1
+    TOO_FAST = 2
+
+
+STATUS_TEXTS = {
+    Status.OK: "integrated to the end",
+    Status.DIVERGED: "left the range of numbers (or became not a number) and was stopped",
+    Status.TOO_FAST: "moves faster than so few flow maps can follow, and was stopped",
+}
 
 
 class Outcome(NamedTuple):
