@@ -5,7 +5,6 @@ flow maps find. Errors are those that 95 % of the periodic lanes do not exceed. 
 stdout, everything else to stderr; a figure (PNG and PDF) is written under the name in --output.
 """
 
-import sys
 import time
 from argparse import ArgumentParser, Namespace
 from collections.abc import Sequence
@@ -159,6 +158,4 @@ def recommendation(settings: Sequence[Setting], error: float) -> str:
 
 
 main = Command("accuracy", __doc__, _arguments, _accuracy, common=("overwrite", "threads", "set"))
-
-if __name__ == "__main__":
-    sys.exit(main())
+main.start(__name__)

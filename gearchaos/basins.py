@@ -6,7 +6,6 @@ Attractors keep their numbers along the sweep. The table goes to stdout, everyth
 import argparse
 import json
 import math
-import sys
 import textwrap
 from collections.abc import Iterator
 from pathlib import Path
@@ -93,6 +92,4 @@ def table(found: "Basins", where: list[str]) -> Iterator[str]:
 
 
 main = Command("basins", __doc__, _arguments, _basins, common=("overwrite", "threads"))
-
-if __name__ == "__main__":
-    sys.exit(main())
+main.start(__name__)

@@ -118,6 +118,11 @@ class Command(NamedTuple):
                 text = str(error) or "out of memory"
                 return _report(error, [f"error: {text}"], CANNOT_READ_OR_WRITE)
 
+    def start(self, module: str) -> None:
+        """Run the command as a process where its module, by ``__name__``, is what was started."""
+        if module == "__main__":
+            sys.exit(self())
+
     def _code(self, arguments: list[str]) -> int:
         try:
             # Of negative numbers, argparse takes those with an exponent for options.

@@ -5,7 +5,6 @@ gearchaos completion zsh > a file named _gearchaos in a folder of $fpath. Needs 
 gearchaos[completion].
 """
 
-import sys
 from argparse import ArgumentParser, Namespace
 from importlib import import_module
 
@@ -35,6 +34,4 @@ def _complete(options: Namespace) -> int:
 
 
 main = Command("completion", __doc__, _arguments, _complete, writes=False)
-
-if __name__ == "__main__":
-    sys.exit(main())
+main.start(__name__)

@@ -4,7 +4,6 @@ The page is served to this machine alone, at the address that goes to stdout, un
 address in the browser is a link to what the page shows. Needs pip install gearchaos[explore].
 """
 
-import sys
 from argparse import ArgumentParser, Namespace
 from collections.abc import Sequence
 from contextlib import redirect_stderr, redirect_stdout
@@ -85,6 +84,4 @@ def _draw(arguments: Sequence[str]) -> None:
 
 
 main = Command("explore", __doc__, _arguments, _explore, writes=False)
-
-if __name__ == "__main__":
-    sys.exit(main())
+main.start(__name__)

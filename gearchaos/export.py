@@ -5,7 +5,6 @@ per section point. Needs pip install gearchaos[export].
 """
 
 import os
-import sys
 from argparse import ArgumentParser, Namespace
 from typing import Any
 
@@ -54,6 +53,4 @@ def _export(options: Namespace) -> int:
 
 
 main = Command("export", __doc__, _arguments, _export, common=("overwrite",))
-
-if __name__ == "__main__":
-    sys.exit(main())
+main.start(__name__)

@@ -7,7 +7,6 @@ file. Interrupted or terminated, candidates are kept and --resume goes on from t
 """
 
 import os
-import sys
 import time
 from argparse import ArgumentParser, Namespace
 from importlib.util import find_spec
@@ -84,6 +83,4 @@ def _identify(options: Namespace) -> int:
 
 
 main = Command("identify", __doc__, _arguments, _identify, ("output", "overwrite", "threads"))
-
-if __name__ == "__main__":
-    sys.exit(main())
+main.start(__name__)

@@ -63,6 +63,4 @@ def _settings(metadata: Mapping[str, Any]) -> list[str]:
 
 
 main = Command("info", __doc__, _arguments, _info, writes=False)
-
-if __name__ == "__main__":
-    sys.exit(main())
+main.start(__name__)

@@ -8,7 +8,6 @@ stdout.
 """
 
 import argparse
-import sys
 from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
@@ -245,6 +244,4 @@ def _lanes_in_words(result: "Result") -> str:
 
 
 main = Command("plot", __doc__, _arguments, _plot, common=("overwrite",))
-
-if __name__ == "__main__":
-    sys.exit(main())
+main.start(__name__)

@@ -4,7 +4,6 @@ The folder gets the figures (PNG and PDF), the results (HDF5) and a report with 
 report.md. The path of report.md goes to stdout, everything else to stderr.
 """
 
-import sys
 import time
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
@@ -40,6 +39,4 @@ def _reproduce(options: Namespace) -> int:
 
 
 main = Command("reproduce", __doc__, _arguments, _reproduce, common=("overwrite", "threads"))
-
-if __name__ == "__main__":
-    sys.exit(main())
+main.start(__name__)

@@ -7,7 +7,6 @@ The path of the result goes to stdout, everything else to stderr; python -m gear
 it.
 """
 
-import sys
 from argparse import ArgumentParser, Namespace
 from typing import TYPE_CHECKING
 
@@ -131,6 +130,4 @@ def _configuration(options: Namespace) -> "Asked":
 main = Command(
     "response", __doc__, _arguments, _respond, common=("output", "overwrite", "threads", "set")
 )
-
-if __name__ == "__main__":
-    sys.exit(main())
+main.start(__name__)

@@ -6,7 +6,6 @@ The table goes to stdout, everything else to stderr.
 import argparse
 import json
 import math
-import sys
 import textwrap
 from collections.abc import Iterator, Sequence
 from functools import partial
@@ -238,6 +237,4 @@ def boundary_list(boundaries: "Sequence[Boundary]") -> Iterator[str]:
 
 
 main = Command("stages", __doc__, _arguments, _stages, common=("threads",))
-
-if __name__ == "__main__":
-    sys.exit(main())
+main.start(__name__)

@@ -136,6 +136,4 @@ def _command(name: str, *arguments: str) -> str:
 main = Command(
     "sweep", __doc__, _arguments, _sweep, common=("output", "overwrite", "threads", "set")
 )
-
-if __name__ == "__main__":
-    sys.exit(main())
+main.start(__name__)

@@ -4,7 +4,7 @@
 # ruff: noqa: N815
 
 from functools import partial
-from typing import Annotated, Any, Literal, TypeAlias
+from typing import Annotated, Literal, TypeAlias
 
 from pydantic import BeforeValidator, Field
 
@@ -146,14 +146,10 @@ class GradeError(Table):
     eccentricity: float = key("share of an eccentricity", "1", default=0.5, ge=0, le=1)
 
 
-def _kind_of_all_files_before(given: Any) -> Any:
-    return {"kind": "sine", **given} if isinstance(given, dict) else given
-
-
 PitchError: TypeAlias = Annotated[
     SineError | TeethError | GradeError,
     Field(discriminator="kind"),
-    BeforeValidator(_kind_of_all_files_before),
+    BeforeValidator(lambda given: {"kind": "sine", **given} if isinstance(given, dict) else given),
 ]
 """``[pitch_error]``; without a kind it is a sine."""
 

@@ -109,7 +109,9 @@ def _polish(system: System, guess: Floats, plan: Plan) -> Orbits:
     points[~converged] = np.nan
     multipliers = np.full(points.shape, np.nan, dtype=np.complex128)
     if closed.size:
-        multipliers[closed] = _multipliers(period_jacobian(system.of(closed), points[closed], plan))
+        found = np.linalg.eigvals(period_jacobian(system.of(closed), points[closed], plan))
+        order = np.argsort(-np.abs(found), axis=1, kind="stable")
+        multipliers[closed] = np.take_along_axis(found, order, axis=1)
     return Orbits(points, multipliers, residual, converged)
 
 
@@ -135,9 +137,3 @@ def _repeats_earlier(section: Floats, points: Floats, scale: Floats) -> Mask:
         if periods % divisor == 0:
             repeats |= _distance(section[:, divisor - 1], points, scale) <= TOLERANCE
     return repeats
-
-
-def _multipliers(jacobian: Floats) -> Complex:
-    multipliers = np.linalg.eigvals(jacobian).astype(np.complex128)
-    order = np.argsort(-np.abs(multipliers), axis=1, kind="stable")
-    return np.take_along_axis(multipliers, order, axis=1)
