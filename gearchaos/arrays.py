@@ -10,11 +10,6 @@ Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 Mask = NDArray[np.bool_]
 
-Integers = NDArray[np.intp]
-"""Numbers of lanes, values or points."""
-
-Counts = NDArray[np.int32]
-"""Periods and bands, as a file holds them."""
-
-Codes = NDArray[np.uint8]
-"""Kinds, whose meanings an enumeration gives."""
+Integers = NDArray[np.intp]  # Numbers of lanes, values or points.
+Counts = NDArray[np.int32]  # Periods and bands, as a file holds them.
+Codes = NDArray[np.uint8]  # Kinds, whose meanings an enumeration gives.

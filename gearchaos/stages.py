@@ -22,8 +22,7 @@ if TYPE_CHECKING:
     from gearchaos.results.stage_table import Stage
 
 
-WIDTH = 80
-"""Columns of a terminal."""
+WIDTH = 80  # Columns of a terminal.
 
 
 def _arguments(parser: argparse.ArgumentParser) -> None:

@@ -9,8 +9,7 @@ from pydantic import BeforeValidator, Field, create_model, model_validator
 from gearchaos.configuration.keys import Harmonics, Numbers, Table, key
 from gearchaos.gear.groups import GROUP_TABLE, GroupRow
 
-MOST_LANES = 100_000_000
-"""Lanes of one run: what a file and a machine can still hold."""
+MOST_LANES = 100_000_000  # Lanes of one run: what a file and a machine can still hold.
 MOST_STEPS_PER_PERIOD = 1_000_000
 FLOW_MAP_STEPS = 24
 """Steps per period of flow maps: fewer cost more at a crossing, more cost more between them."""

@@ -20,11 +20,8 @@ ALIKE = 0.5
 GOES_ON = 0.3
 """Change up to which an attractor is the same at another value, in parts of all its averages."""
 
-LONG = 1000
-"""Mesh periods in which a lane settles, and then those over which its section is taken."""
-
-AT_ONCE = 1 << 20
-"""Section points that are held at once."""
+LONG = 1000  # Mesh periods in which a lane settles, and then those over which its section is taken.
+AT_ONCE = 1 << 20  # Section points that are held at once.
 
 
 class Attractor(NamedTuple):

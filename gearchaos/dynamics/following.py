@@ -15,14 +15,12 @@ from gearchaos_kernels import Plan, System
 from gearchaos.arrays import Codes, Complex, Counts, Floats, Mask
 from gearchaos.dynamics.orbits import Orbits, polish
 
-LONGEST_STEP = 1.0 / 16.0
-"""Share of the way along which an orbit is followed."""
+LONGEST_STEP = 1.0 / 16.0  # Share of the way along which an orbit is followed.
 
 MOST_ORBITS = 200
 """Orbits tried along the way; where they do not suffice nothing is known of what lies beyond."""
 
-NEAR_FOLD = 0.1
-"""An orbit that ends with a real multiplier this close to +1 ends in a fold."""
+NEAR_FOLD = 0.1  # An orbit that ends with a real multiplier this close to +1 ends in a fold.
 
 
 class StabilityLoss(IntEnum):

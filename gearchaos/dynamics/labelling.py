@@ -29,12 +29,10 @@ from gearchaos.records.period import coordinate_scale, return_distances
 LOOKS = (4, 16)
 """How many times the record doubtful lanes go on, and then those that are doubtful still."""
 
-WHOLE = 0.25
-"""Largest difference of the subsequences of a curve, see `subsequence_spread`."""
+WHOLE = 0.25  # Largest difference of the subsequences of a curve, see `subsequence_spread`.
 
 
-MARGIN = 1e-9
-"""Distance of a multiplier from the unit circle that rounding does not explain."""
+MARGIN = 1e-9  # Distance of a multiplier from the unit circle that rounding does not explain.
 
 
 class Told(NamedTuple):

@@ -12,8 +12,7 @@ from gearchaos.records.label import CHAOTIC_GROWTH
 from gearchaos.records.lyapunov import largest_exponent
 
 UNIFORM, MIXED, NOT_TOLD = 0, 1, 2
-MEANINGS = ("uniform", "mixed", "not_told")
-"""Meanings of the values of ``record``."""
+MEANINGS = ("uniform", "mixed", "not_told")  # Meanings of the values of ``record``.
 
 
 class LargestExponents(NamedTuple):

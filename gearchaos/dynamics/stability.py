@@ -17,8 +17,7 @@ from gearchaos_kernels import Groups, System, jacobian
 
 from gearchaos.arrays import Complex, Floats, Integers
 
-MOST_STEPS = 2**53
-"""Stands for every number of steps beyond it."""
+MOST_STEPS = 2**53  # Stands for every number of steps beyond it.
 
 OWNERS = {
     "delta_5": "torsion",

@@ -9,8 +9,7 @@ from gearchaos.arrays import Array, Floats, Integers
 from gearchaos.dynamics.largest_exponents import MIXED, UNIFORM
 
 NOT_CHECKED, SAME, CHANGED = 0, 1, 2
-MEANINGS = ("not_checked", "same", "changed")
-"""Meanings of the values of ``motion_changed``."""
+MEANINGS = ("not_checked", "same", "changed")  # Meanings of the values of ``motion_changed``.
 
 CHECKED = ("section_error", "exponent_step_error", "motion_changed")
 """Variables that the check yields."""

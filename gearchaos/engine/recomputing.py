@@ -16,8 +16,7 @@ from gearchaos.results.result import Result
 from gearchaos.results.stage_table import labelled_lanes
 from gearchaos.results.variables import axis_name
 
-MOST_LANES = 25
-"""Chaotic lanes that are tried, spread evenly over the sweep: they bound the cost."""
+MOST_LANES = 25  # Chaotic lanes that are tried, spread evenly over the sweep: they bound the cost.
 
 
 def computable(result: Result, name: str) -> Configuration:

@@ -21,8 +21,7 @@ from gearchaos.results.response_variables import (
 )
 from gearchaos.results.result import Result
 
-LARGEST_RESPONSE = 4 * 2**30
-"""Bytes that a response may take in memory."""
+LARGEST_RESPONSE = 4 * 2**30  # Bytes that a response may take in memory.
 
 
 def respond(config: Given, periods: int = DEFAULT_PERIODS, threads: int | None = None) -> Result:

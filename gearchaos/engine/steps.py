@@ -27,23 +27,18 @@ from gearchaos.records.difference import Solution, bound, difference
 from gearchaos.records.label import PERIODIC, UNRESOLVED
 from gearchaos.records.period import POINTS_NEEDED, RETURNS, motion_period
 
-LANES_AT_ONCE = 2**14
-"""Lanes whose stability is looked at together."""
-
-PILOT_LANES = 48
-"""Lanes on which the error is measured, spread evenly over the sweep."""
+LANES_AT_ONCE = 2**14  # Lanes whose stability is looked at together.
+PILOT_LANES = 48  # Lanes on which the error is measured, spread evenly over the sweep.
 
 MOST_BIAS = 0.05
 """Largest shift of an exponent by the step alone that is passed over, in parts of the exponent."""
 
-SURELY_FINE = 8
-"""So many times the fewest stable steps shift no exponent that matters."""
+SURELY_FINE = 8  # So many times the fewest stable steps shift no exponent that matters.
 
 PILOT_PERIODS = 150
 """Mesh periods in which a lane settles on its grid, and as many that are compared."""
 
-MOST_STEPS = 25_600
-"""Finest grid of the search, where the method needs one."""
+MOST_STEPS = 25_600  # Finest grid of the search, where the method needs one.
 
 
 class Candidate(NamedTuple):

@@ -29,8 +29,7 @@ Drawn = Artist | Container
 COLORS = ("#D6E6F3", "#EDBE62", "#5DB898", "#C284AD", "#B4602F", "#4C6E8E")
 """Of attractors by their numbers, over and over again; lightness tells them apart in grey."""
 
-MOST_POINTS = 500
-"""Section points that are drawn of an attractor."""
+MOST_POINTS = 500  # Section points that are drawn of an attractor.
 
 MOST_BARS = 24
 """More values than these are steps side by side, with a band instead of bars of confidence."""

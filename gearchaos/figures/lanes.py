@@ -20,11 +20,8 @@ from gearchaos.results.variables import STATUS, UNSWEPT
 
 Between = tuple[float | None, float | None]
 
-PAD = 0.05
-"""What is added to either end of an axis of one value, in parts of the value."""
-
-COLUMNS = 4000
-"""Columns of an axis that a page can tell apart: two of a journal at 600 dpi."""
+PAD = 0.05  # What is added to either end of an axis of one value, in parts of the value.
+COLUMNS = 4000  # Columns of an axis that a page can tell apart: two of a journal at 600 dpi.
 
 MOST_DOTS = 1 << 18
 """More points are counted: a panel of one column has about as many pixels at 300 dpi."""

@@ -29,8 +29,7 @@ from gearchaos.results.variables import DIRECTIONS, LABELS, LARGEST_EXPONENT, ST
 SHOWN = (LABELS[0], LARGEST_EXPONENT, *(f"contact_state_{way}" for way in DIRECTIONS))
 """What a page shows, if the result has it."""
 
-NO_VALUE = "no value"
-"""What there is of a lane that did not diverge, but has no number."""
+NO_VALUE = "no value"  # What there is of a lane that did not diverge, but has no number.
 
 NUMBERS = "YlGn"
 """Colours of numbers, and of kinds without colours of their own, the first ones light."""
@@ -40,8 +39,7 @@ SIGNS |= {0.3: "#E69F00", 0.65: "#A84300", 1.0: "#4A1500"}
 """Colours of exponents, in parts of the way from zero to the lowest and to the highest: blue as
 periodic motions are, orange as chaos is, which alone is dark in grey."""
 
-NARROWEST_MM = 60.0
-"""Of panels side by side; narrower ones stand on top of each other."""
+NARROWEST_MM = 60.0  # Of panels side by side; narrower ones stand on top of each other.
 
 KEY_COLUMNS = 3
 ROW_PT = 1.5 * SMALL_FONT_PT

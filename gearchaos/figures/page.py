@@ -22,8 +22,7 @@ from gearchaos.interrupts import check
 from gearchaos.results.atomic_file import check_output, replacing
 from gearchaos.version import software_version
 
-FORMATS: tuple[str, ...] = ("png", "pdf")
-"""What is written unless asked otherwise."""
+FORMATS: tuple[str, ...] = ("png", "pdf")  # What is written unless asked otherwise.
 
 ENDINGS = (*FORMATS, "svg", "eps", "tiff", "tif")
 FINENESS = {"pdf": 2, "svg": 2}

@@ -20,17 +20,12 @@ from gearchaos.results.response_variables import MESH_FORCE, TIME, acceleration_
 from gearchaos.results.result import Result, section_variables
 from gearchaos.results.scales import excitation_of
 
-COORDINATE = "delta_5"
-"""The coordinate that is drawn unless another is asked for: the torsion."""
+COORDINATE = "delta_5"  # The coordinate that is drawn unless another is asked for: the torsion.
 
 HIGHEST_ORDER = 8.0
-DECADES = 5
-"""Decades that a logarithmic spectrum shows, up to that of its highest line."""
-
-CONTACT_COLOURS = (ORANGE, "0.8", BLUE)
-"""Of teeth apart, of driving and of back flanks in contact."""
-STRIP_HEIGHT = 0.05
-"""Of what tells the contact along the foot of a panel, in parts of the panel."""
+DECADES = 5  # Decades that a logarithmic spectrum shows, up to that of its highest line.
+CONTACT_COLOURS = (ORANGE, "0.8", BLUE)  # Of teeth apart, of driving and of back flanks in contact.
+STRIP_HEIGHT = 0.05  # Of what tells the contact along the foot of a panel, in parts of the panel.
 
 _LINE_LENGTH = 26
 _MARGIN = 0.06

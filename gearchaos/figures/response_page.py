@@ -20,19 +20,15 @@ from gearchaos.results.response_variables import MESH_ERROR, MESH_FORCE, TIME, a
 from gearchaos.results.result import Result
 from gearchaos.results.scales import Excitation, excitation_of
 
-SIDE_BY_SIDE_MM = 120.0
-"""Width from which on two panels stand side by side."""
-
-SHOWN_PERIODS = 12
-"""Mesh periods at the end of the record that the time history shows."""
+SIDE_BY_SIDE_MM = 120.0  # Width from which on two panels stand side by side.
+SHOWN_PERIODS = 12  # Mesh periods at the end of the record that the time history shows.
 
 _PANEL_HEIGHT_MM = 52.0
 
 SHOWN_REVOLUTIONS = 2
 """Revolutions of the driving gear at the end of the record that the time histories show."""
 
-HIGHEST_ORDER = 3.5
-"""Multiple of the mesh order up to which the spectrum goes."""
+HIGHEST_ORDER = 3.5  # Multiple of the mesh order up to which the spectrum goes.
 
 MOST_TICKS = 120
 

@@ -22,10 +22,8 @@ from gearchaos.results.stage_table import LabelledLanes
 from gearchaos.results.variables import LABELS, LARGEST_EXPONENT, ORDER, WAYS
 
 HEIGHT_RATIOS = (1.6, 1.0)
-SHADE = "0.92"
-"""Where directions differ."""
-MOST_INTERVALS = (7, 8)
-"""Between the ticks of the lower panel, and of the one above it."""
+SHADE = "0.92"  # Where directions differ.
+MOST_INTERVALS = (7, 8)  # Between the ticks of the lower panel, and of the one above it.
 
 
 def bifurcation_page(

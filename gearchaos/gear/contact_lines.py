@@ -18,8 +18,7 @@ from gearchaos.errors import ConfigurationError
 MOST_CONTACT = 5.0
 """Largest total contact ratio: the kernels have room for seven pairs in mesh or next to it."""
 
-_SAMPLES = 64
-"""Places within a cell over which a share is averaged."""
+_SAMPLES = 64  # Places within a cell over which a share is averaged.
 
 
 def series_table(coefficients: Complex, points: int) -> Floats:

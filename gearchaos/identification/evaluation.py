@@ -23,8 +23,7 @@ KEPT_PERIODS = 8
 FINER = 4
 """How many times finer that motion is, so that its largest acceleration is not stepped over."""
 
-MOTIONS_AT_ONCE = 2**8
-"""Lanes whose finer motion is in memory at a time: all of its samples are."""
+MOTIONS_AT_ONCE = 2**8  # Lanes whose finer motion is in memory at a time: all of its samples are.
 
 
 class Records(NamedTuple):

@@ -11,11 +11,8 @@ from gearchaos.configuration.tables import SWEEPABLE_GROUPS
 from gearchaos.identification.search import RUNGS, STEPS_ALONE, Judge, distinct
 from gearchaos.identification.tried import Tried
 
-ONE_UNIT = 1.0
-"""By how much the misfit grows where a parameter counts as moved too far."""
-
-NEAREST = 3
-"""Steps in each direction whose misfits tell how even the best set's surroundings are."""
+ONE_UNIT = 1.0  # By how much the misfit grows where a parameter counts as moved too far.
+NEAREST = 3  # Steps in each direction whose misfits tell how even the best set's surroundings are.
 
 LABEL, COLUMN = 34, 12
 

@@ -37,8 +37,7 @@ RESULTS = {
 }
 """Result files by name: the attribute of `Reproduction`, and what they hold."""
 
-TOLERANCE_MM = 0.011
-"""Single pitch deviation of the driving gear in grade 7 (ISO 1328-1)."""
+TOLERANCE_MM = 0.011  # Single pitch deviation of the driving gear in grade 7 (ISO 1328-1).
 
 KINDS = ("derived", "fitted", "predicted")
 """What it is worth if a printed number agrees: `published.toml` says which is which."""

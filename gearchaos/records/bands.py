@@ -14,14 +14,12 @@ from gearchaos.records.period import LONGEST_PERIOD, coordinate_scale
 STRIDES = (2, 3, 5, 7)
 """Every so many points of a curve are averaged; what the windows of chaos are made of."""
 
-FEWEST = 16
-"""Points that every subsequence must have."""
+FEWEST = 16  # Points that every subsequence must have.
 
 MOST_POINTS = 512
 """Points, the last ones, of which the bands are counted: comparing all pairs costs their square."""
 
-NEIGHBOURS = 4
-"""Nearest points that must lie in the same band."""
+NEIGHBOURS = 4  # Nearest points that must lie in the same band.
 
 EXPLAINED = 0.1
 """Share of the variance beyond which subsequences may be bands; of 13 random ones it is 0.02."""

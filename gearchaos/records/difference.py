@@ -8,8 +8,7 @@ from gearchaos.arrays import Codes, Counts, Floats, Mask
 from gearchaos.records.label import UNRESOLVED
 from gearchaos.records.period import section_distance
 
-MOST = 0.95
-"""Share of the lanes that `bound` speaks for: the rest lies next to a bifurcation."""
+MOST = 0.95  # Share of the lanes that `bound` speaks for: the rest lies next to a bifurcation.
 
 _ANOTHER_ORBIT = 0.1
 

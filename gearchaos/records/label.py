@@ -13,14 +13,9 @@ PERIODIC, QUASI_PERIODIC, CHAOTIC, UNRESOLVED, DIVERGED, GROWS = range(6)
 MEANINGS = ("periodic", "quasi_periodic", "chaotic", "unresolved", "diverged", "grows")
 """Meanings of the values of ``motion``."""
 
-MOST_POINTS = 512
-"""Section points with which a motion is labelled: the last ones."""
-
-STANDARD_ERRORS = 3.0
-"""An exponent within so many of its standard errors is not told from zero."""
-
-CERTAIN = 6.0
-"""Standard errors beyond which a positive exponent is not doubted."""
+MOST_POINTS = 512  # Section points with which a motion is labelled: the last ones.
+STANDARD_ERRORS = 3.0  # An exponent within so many of its standard errors is not told from zero.
+CERTAIN = 6.0  # Standard errors beyond which a positive exponent is not doubted.
 
 CHAOTIC_GROWTH = 2.0
 """Logarithm of the growth over the record beyond which a disturbance counts as growing."""
@@ -31,14 +26,12 @@ NEUTRAL_GROWTH = 1.0
 AGREEMENT = 0.05
 """Largest difference of the weighted averages of two halves of a quasi-periodic record."""
 
-NEAR = 0.01
-"""Return distance below which a motion that was chaotic may be settling on an orbit."""
+NEAR = 0.01  # Return distance below which a motion that was chaotic may be settling on an orbit.
 
 SETTLING = 0.1
 """Return distance below which a motion that comes ever closer may be settling on an orbit."""
 
-LATEST = 16
-"""Section points at the end of a chaotic record that may have settled."""
+LATEST = 16  # Section points at the end of a chaotic record that may have settled.
 
 
 class Record(NamedTuple):

@@ -4,11 +4,8 @@ import numpy as np
 
 from gearchaos.arrays import Counts, Floats
 
-LONGEST_PERIOD = 16
-"""Longest period looked for, in mesh periods."""
-
-RETURNS = 3
-"""A period counts if the section holds it so many times."""
+LONGEST_PERIOD = 16  # Longest period looked for, in mesh periods.
+RETURNS = 3  # A period counts if the section holds it so many times.
 
 POINTS_NEEDED = RETURNS * LONGEST_PERIOD
 """Section points with which every period can be told; more are not looked at."""

@@ -22,8 +22,7 @@ from gearchaos.results.variables import Variable, lane_axes
 from gearchaos.version import Software
 
 Arrays: TypeAlias = Mapping[str, Array]
-Bounds: TypeAlias = tuple[int, int]
-"""First lane of a range, and the one after its last."""
+Bounds: TypeAlias = tuple[int, int]  # First lane of a range, and the one after its last.
 
 PIECE_BYTES = 1 << 28
 """Memory in which lanes that were computed in another order are brought into their own."""

@@ -13,8 +13,7 @@ from gearchaos.results.result import Result
 from gearchaos.results.stage_table import label_text, require_labels
 from gearchaos.results.variables import CROSSINGS, REPEATS
 
-BOX = 5
-"""Starts along each side of a box of which `basin_entropy` asks how mixed it is."""
+BOX = 5  # Starts along each side of a box of which `basin_entropy` asks how mixed it is.
 
 
 class Counted(NamedTuple):

@@ -19,17 +19,10 @@ from gearchaos.results.variables import DIRECTION, WAYS
 STEEPEST = 5.0
 """Neighbouring lanes lie this many times farther apart than those beside them where they jump."""
 
-SMALLEST = 0.02
-"""Smallest jump, relative to the size of the section over the sweep."""
-
-BESIDE = 8
-"""Lanes on either side of a crisis that are compared."""
-
-FEWEST = 3
-"""Lanes that there must be on either side, two of them chaotic."""
-
-SMALLEST_GROWTH = 0.15
-"""Growth of the extent that counts, relative to the largest one before."""
+SMALLEST = 0.02  # Smallest jump, relative to the size of the section over the sweep.
+BESIDE = 8  # Lanes on either side of a crisis that are compared.
+FEWEST = 3  # Lanes that there must be on either side, two of them chaotic.
+SMALLEST_GROWTH = 0.15  # Growth of the extent that counts, relative to the largest one before.
 
 
 class Jump(NamedTuple):

@@ -35,8 +35,7 @@ _INTEGRATION = (
 _RUN = "wall_time_seconds threads processor system software kernels git_commit created"
 """Names of metadata that are shown together."""
 
-MOST_STAGES = 20
-"""Of more stages, the first and the last ones are shown."""
+MOST_STAGES = 20  # Of more stages, the first and the last ones are shown.
 
 WIDTH = 80
 _LABEL = 18

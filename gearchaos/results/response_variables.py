@@ -9,16 +9,10 @@ from gearchaos.results.variables import DIRECTIONS, STATE_WORDING, Variable, coo
 TIME = "time"
 MESH_PERIOD = "mesh_period"
 MESH_ERROR = "mesh_error"
-MESH_FORCE = "mesh_force_"
-"""What the names of mesh forces begin with."""
-DEFAULT_PERIODS = 32
-"""Mesh periods of a response where their number is not given."""
-
-CONTACTS = ("apart", "driving_flank", "back_flank")
-"""Meanings of the contact states 0, 1 and 2."""
-
-NO_CONTACT_STATE = 255
-"""Contact state of a lane that diverged."""
+MESH_FORCE = "mesh_force_"  # What the names of mesh forces begin with.
+DEFAULT_PERIODS = 32  # Mesh periods of a response where their number is not given.
+CONTACTS = ("apart", "driving_flank", "back_flank")  # Meanings of the contact states 0, 1 and 2.
+NO_CONTACT_STATE = 255  # Contact state of a lane that diverged.
 
 
 def response_variables(

@@ -26,12 +26,10 @@ Contents = tuple[
 ]
 """Variables, data, parameters and metadata, as for `Result`."""
 
-SOON_HASHED = 1 << 30
-"""Bytes whose checksum takes about a second."""
+SOON_HASHED = 1 << 30  # Bytes whose checksum takes about a second.
 
 LONGEST_SYMBOL = 60
-MOST_PRINTED = 1000
-"""Characters of a symbol, and of a text on the terminal."""
+MOST_PRINTED = 1000  # Characters of a symbol, and of a text on the terminal.
 
 
 def read_result(path: str | os.PathLike[str], *, rows: bool = True) -> Contents:

@@ -16,12 +16,9 @@ from gearchaos.records.teeth import CONTACT_STATES
 
 START = "start"
 DIRECTION = "direction"
-REPEATS = (REALISATION, START)
-"""Axes of drawn gear pairs and of starts of one parameter value."""
-UNSWEPT = (*REPEATS, DIRECTION)
-"""Axes along which no parameter is swept."""
-WAYS = ("upwards", "downwards")
-"""Meanings of a direction in which a sweep carries its states."""
+REPEATS = (REALISATION, START)  # Axes of drawn gear pairs and of starts of one parameter value.
+UNSWEPT = (*REPEATS, DIRECTION)  # Axes along which no parameter is swept.
+WAYS = ("upwards", "downwards")  # Meanings of a direction in which a sweep carries its states.
 SECTION_POINT = "section_point"
 STATE = "state"
 EXPONENT_NUMBER = "exponent"
@@ -29,13 +26,9 @@ ORDER = "order"
 HARMONIC = "harmonic"
 """Dimensions: the start of a lane is one of its axes, the others belong to single variables."""
 
-SECTION = "section_"
-"""What the names of section variables begin with."""
-
-AMPLITUDE = "amplitude_"
-"""What the names of amplitudes begin with."""
-EXTREMES = ("smallest", "largest", "peak_to_peak")
-"""What the names of those of a state end with."""
+SECTION = "section_"  # What the names of section variables begin with.
+AMPLITUDE = "amplitude_"  # What the names of amplitudes begin with.
+EXTREMES = ("smallest", "largest", "peak_to_peak")  # What the names of those of a state end with.
 
 LARGEST_EXPONENT = "lyapunov_exponent"
 ALL_EXPONENTS = "lyapunov_exponents"
@@ -46,8 +39,7 @@ LABELS = ("motion", "period")
 BANDS = "bands"
 CROSSINGS = "crossings_per_period"
 STATUS = "status"
-DIRECTIONS = ("tangential", "axial")
-"""Directions in which teeth have a clearance."""
+DIRECTIONS = ("tangential", "axial")  # Directions in which teeth have a clearance.
 
 STATE_WORDING: dict[str, tuple[str, str]] = {
     "delta_5": ("relative torsional displacement", r"$\delta_5$"),
