@@ -49,11 +49,7 @@ many rows a bar of colours takes."""
 
 
 def parameter_map(
-    axes: Axes,
-    result: Result,
-    variable: str = LABELS[0],
-    *,
-    between: Between = (None, None),
+    axes: Axes, result: Result, variable: str = LABELS[0], *, between: Between = (None, None)
 ) -> ScalarMappable:
     """Draw one variable of the lanes as a map over two swept parameters into axes.
 
