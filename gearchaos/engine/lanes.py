@@ -15,16 +15,8 @@ from gearchaos.dynamics.systems import system_of
 from gearchaos.gear.derivation import SCALES, derive_scales
 from gearchaos.gear.groups import GROUP_TABLE
 from gearchaos.gear.tooth_deviations import REALISATION
+from gearchaos.results import variables as known
 from gearchaos.results.result_file import Parameter
-from gearchaos.results.variables import (
-    HARMONIC,
-    Variable,
-    axis_name,
-    coordinate,
-    direction_axis,
-    pair_axis,
-    start_axis,
-)
 
 Texts = tuple[str, str, str]
 
@@ -54,14 +46,14 @@ class Lanes:
         first = getattr(config.pitch_error, "first_realisation", 0)
         numbers = first + np.arange(getattr(config.pitch_error, "realisations", 1))
         if numbers.size > 1:
-            self.axes.append(pair_axis(numbers))
+            self.axes.append(known.pair_axis(numbers))
             self._of_systems[REALISATION] = numbers
         self.starts = config.start.size
         if self.starts > 1:
-            self.axes.append(start_axis(self.starts))
+            self.axes.append(known.start_axis(self.starts))
         self.directions = 2 if config.start.carry == "both" else 1
         if self.directions > 1:
-            self.axes.append(direction_axis())
+            self.axes.append(known.direction_axis())
         self.repeats = numbers.size * self.starts * self.directions
         self.effects = config.needed_effects
         self.states = states_of(self.effects)
@@ -126,7 +118,7 @@ class Lanes:
     @property
     def parameters(self) -> dict[str, Parameter]:
         """The groups of the model with their origin; those that no effect needs are left out."""
-        names = [axis_name(parameter) for parameter in self._values]
+        names = [known.axis_name(parameter) for parameter in self._values]
         sizes = [values.size for values in self._values.values()]
         others = [[n for n in range(len(names)) if n != own] for own in range(len(names))]
         swept = zip(self._values.items(), others, strict=True)
@@ -134,7 +126,7 @@ class Lanes:
         groups = groups_at(self.config, values)
 
         def entry(value: Any, origin: str, texts: Texts, is_list: bool = False) -> Parameter:
-            dims: tuple[str, ...] = (HARMONIC,) if is_list else ()
+            dims: tuple[str, ...] = (known.HARMONIC,) if is_list else ()
             if np.ndim(value) > 0 and not is_list:
                 origin = "swept"
                 along = [n for n, size in enumerate(np.shape(value)) if size > 1]
@@ -156,14 +148,14 @@ class Lanes:
         return parameters
 
 
-def axis_of(parameter: str, values: Floats) -> Variable:
+def axis_of(parameter: str, values: Floats) -> known.Variable:
     """Return the axis of a swept parameter with values (values,), as files name and word it."""
-    name = axis_name(parameter)
+    name = known.axis_name(parameter)
     if parameter in SWEEPABLE_GROUPS:
         row = SWEEPABLE_GROUPS[parameter]
-        return coordinate(name, row.units, row.long_name, row.mathtext, values)
+        return known.coordinate(name, row.units, row.long_name, row.mathtext, values)
     key = SWEEPABLE_KEYS[parameter]
-    return coordinate(name, key.units or "1", key.wording, "", values)
+    return known.coordinate(name, key.units or "1", key.wording, "", values)
 
 
 def start_states(config: Configuration, system: System, numbers: Integers) -> Floats:

@@ -10,14 +10,9 @@ from gearchaos_kernels import Outcome, Plan, Status, System, integrate
 from gearchaos.arrays import Integers
 from gearchaos.configuration.messages import Fault
 from gearchaos.configuration.run_tables import MOST_STEPS_PER_PERIOD
+from gearchaos.dynamics import stability
 from gearchaos.dynamics.labelling import Told
 from gearchaos.dynamics.largest_exponents import largest_exponents
-from gearchaos.dynamics.stability import (
-    StabilityLimit,
-    exponent_bias,
-    fewest_stable_steps,
-    stability_limit,
-)
 from gearchaos.dynamics.systems import plan_of
 from gearchaos.engine.lanes import Lanes
 from gearchaos.errors import ConfigurationError
@@ -94,9 +89,9 @@ def coarse_steps(lanes: Lanes, steps: int) -> str:
     system = lanes.system_of(lanes.spread(PILOT_LANES))
     if lanes.config.integration.method != "rk4":
         return ""
-    if steps >= SURELY_FINE * np.max(fewest_stable_steps(system)):
+    if steps >= SURELY_FINE * np.max(stability.fewest_stable_steps(system)):
         return ""
-    bias, true = exponent_bias(system, steps)
+    bias, true = stability.exponent_bias(system, steps)
     worst = int(np.argmax(np.abs(bias) - MOST_BIAS * np.abs(true)))
     if abs(bias[worst]) <= MOST_BIAS * abs(true[worst]):
         return ""
@@ -107,17 +102,17 @@ def coarse_steps(lanes: Lanes, steps: int) -> str:
     )
 
 
-def _limits(lanes: Lanes, steps: int) -> Iterator[StabilityLimit]:
+def _limits(lanes: Lanes, steps: int) -> Iterator[stability.StabilityLimit]:
     # Starts and pitch errors of one value share its stability.
     every = np.arange(0, len(lanes), lanes.repeats)
     for first in range(0, every.size, LANES_AT_ONCE):
         some = every[first : first + LANES_AT_ONCE]
-        limit = stability_limit(lanes.system_of(some), steps)
+        limit = stability.stability_limit(lanes.system_of(some), steps)
         if limit is not None:
             yield limit._replace(lanes=some[limit.lanes])
 
 
-def _fault(lanes: Lanes, worst: StabilityLimit, unstable: Integers, steps: int) -> Fault:
+def _fault(lanes: Lanes, worst: stability.StabilityLimit, unstable: Integers, steps: int) -> Fault:
     places = []
     swept = lanes.values_of(unstable)
     swept.pop(REALISATION, None)
