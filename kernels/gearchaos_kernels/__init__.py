@@ -17,23 +17,3 @@ from gearchaos_kernels.system import (
     System,
     Teeth,
 )
-
-__all__ = [
-    "CACHE_FOLDER",
-    "LANES",
-    "STATES",
-    "STATUS_TEXTS",
-    "Effects",
-    "Groups",
-    "MeshMotion",
-    "Outcome",
-    "Plan",
-    "Status",
-    "System",
-    "Teeth",
-    "integrate",
-    "jacobian",
-    "maps_memory",
-    "mesh_motion",
-    "source_hash",
-]
