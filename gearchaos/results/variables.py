@@ -6,9 +6,11 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 from itertools import product
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from gearchaos.arrays import Array
 from gearchaos.gear.tooth_deviations import REALISATION
@@ -41,29 +43,21 @@ CROSSINGS = "crossings_per_period"
 STATUS = "status"
 DIRECTIONS = ("tangential", "axial")  # Directions in which teeth have a clearance.
 
-STATE_WORDING: dict[str, tuple[str, str]] = {
-    "delta_5": ("relative torsional displacement", r"$\delta_5$"),
-    "delta_5_rate": ("relative torsional velocity", r"$\delta_5'$"),
-    "delta_1": ("transverse displacement of the driving gear", r"$\delta_1$"),
-    "delta_1_rate": ("transverse velocity of the driving gear", r"$\delta_1'$"),
-    "delta_2": ("transverse displacement of the driven gear", r"$\delta_2$"),
-    "delta_2_rate": ("transverse velocity of the driven gear", r"$\delta_2'$"),
-    "delta_3": ("axial displacement of the driving gear", r"$\delta_3$"),
-    "delta_3_rate": ("axial velocity of the driving gear", r"$\delta_3'$"),
-    "delta_4": ("axial displacement of the driven gear", r"$\delta_4$"),
-    "delta_4_rate": ("axial velocity of the driven gear", r"$\delta_4'$"),
-}
-"""Long name and mathtext symbol of each state (all dimensionless), in the one order of states."""
-
-
 _ROWS: dict[str, list[dict[str, str]]] = {}
-"""What a sweep yields, by what it is told with, in the order of the file.
+"""What files hold, by what it is told with, in their order, behind the words for states and others.
 
-In all three columns of texts, @ stands for a state or a direction and its wording.
+In all three columns of texts, @ stands for one of these.
 """
 with Path(__file__).with_name("variables.csv").open(encoding="utf-8", newline="") as _file:
     for _row in csv.DictReader(_file):
         _ROWS.setdefault(_row["told_with"], []).append(_row)
+
+_WORDING = {
+    kind: {row["name"]: (row["long_name"], row["symbol"]) for row in _ROWS[kind]}
+    for kind in ("state", "acceleration", "direction")
+}
+STATE_WORDING = _WORDING["state"]
+"""Long name and mathtext symbol of each state (all dimensionless), in the one order of states."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -200,10 +194,10 @@ def sweep_variables(
         "every sweep": True,
     }
     subjects |= {name: [""] for name, told in once.items() if told}
-    values: dict[str, Array] = {
+    values: dict[str, ArrayLike] = {
         SECTION_POINT: np.arange(section_points),
         EXPONENT_NUMBER: np.arange(1, len(states) + 1),
-        ORDER: np.array(orders, dtype=np.float64),
+        ORDER: [float(order) for order in orders],
         STATE: np.arange(len(states)),
     }
     meanings = {
@@ -214,27 +208,7 @@ def sweep_variables(
         STATUS: status_meanings,
         STATE: states,
     }
-    lane, variables = tuple(axis.name for axis in axes), list(axes)
-    for told_with, rows in _ROWS.items():
-        for subject, row in product(subjects.get(told_with, ()), rows):
-            wording = STATE_WORDING.get(subject, (subject.replace("_", " "), ""))
-            kinds = meanings.get(row["name"], ())
-            given: dict[str, Any] = {
-                "name": row["name"].replace("@", subject),
-                "units": "1",
-                "long_name": row["long_name"].replace("@", wording[0]),
-                "symbol": row["symbol"].replace("@", wording[1]),
-                "flags": tuple("_".join(meaning.split()) for meaning in kinds),
-            }
-            if row["type"] == "coordinate":
-                variables.append(coordinate(values=values[row["name"]], **given))
-                continue
-            none = np.dtype(row["type"]).type(row["none"]) if row["none"] else None
-            given |= {"fill_value": none, "errors": tuple(row["errors"].split())}
-            dims = (*lane, *row["along"].split())
-            variables.append(Variable(dims=dims, dtype=row["type"], **given))
-    there = {one.name for one in variables}
-    return [replace(v, errors=tuple(e for e in v.errors if e in there)) for v in variables]
+    return listed(axes, subjects, values, meanings)
 
 
 def step_choice_variables(
@@ -242,18 +216,42 @@ def step_choice_variables(
 ) -> list[Variable]:
     """List what was measured to choose the number of steps, one value per candidate.
 
-    The last candidate was taken; ``measured`` has the keys below.
+    The last candidate was taken; ``measured`` is by name.
     """
-    name = "candidate_steps"
-    wording = {
-        "section_error": "error of the section of periodic lanes against four times as many steps",
-        "exponent_error": "error of their exponent against four times as many steps",
-        "changed_share": "share of lanes that move in another way with four times as many steps",
-        "periodic_share": "share of lanes that move periodically: errors are measured on these",
-    }
-    text = "steps per period that were tried before the sweep; the last number was taken"
-    variables = [coordinate(name, "1", text, "$N$", np.asarray(steps, dtype=np.int32))]
-    for key, row in measured.items():
-        told = f"candidate_{key}", (name,), "float64", "1", wording[key]
-        variables.append(Variable(*told, values=np.asarray(row, dtype=np.float64)))
-    return variables
+    values = {"steps": steps, **measured}
+    return listed((), {"step choice": [""]}, {f"candidate_{key}": values[key] for key in values})
+
+
+def listed(
+    axes: Sequence[Variable],
+    subjects: Mapping[str, Sequence[str]],
+    values: Mapping[str, ArrayLike],
+    meanings: Mapping[str, Sequence[str]] = MappingProxyType({}),
+) -> list[Variable]:
+    """List axes, and what of variables.csv is told with these subjects, in the order of the file.
+
+    Each is as often there as there are subjects. ``values`` of what is known beforehand, and
+    ``meanings`` of 0, 1, ..., are by the names in the table.
+    """
+    lane, variables = tuple(axis.name for axis in axes), list(axes)
+    words = {name: words for kind in _WORDING.values() for name, words in kind.items()}
+    for told_with, rows in _ROWS.items():
+        for subject, row in product(subjects.get(told_with, ()), rows):
+            wording, symbol = words.get(subject, (subject.replace("_", " "), ""))
+            along, known = tuple(row["along"].split()), values.get(row["name"])
+            variables.append(
+                Variable(
+                    name=row["name"].replace("@", subject),
+                    dims=(*lane, *along) if known is None else along,
+                    dtype=row["type"],
+                    units="1",
+                    long_name=row["long_name"].replace("@", wording),
+                    symbol=row["symbol"].replace("@", symbol),
+                    fill_value=np.dtype(row["type"]).type(row["none"]) if row["none"] else None,
+                    flags=tuple("_".join(one.split()) for one in meanings.get(row["name"], ())),
+                    errors=tuple(row["errors"].split()),
+                    values=None if known is None else np.asarray(known, dtype=row["type"]),
+                )
+            )
+    there = {one.name for one in variables}
+    return [replace(v, errors=tuple(e for e in v.errors if e in there)) for v in variables]
