@@ -27,10 +27,8 @@ class Tables(Table):
     """The tables of a configuration, each sound by itself."""
 
     title: str = key("title of the sweep, for figures and files", default="")
-    formulation: Literal["physical", "published"] = key(
-        'gaps as the equations of motion give them, or as Pan 2021 prints them ("published")',
-        default="physical",
-    )
+    formulation: Literal["physical", "published"] = key(default="physical")
+    """gaps as the equations of motion give them, or as Pan 2021 prints them ("published")"""
     pair: Pair | None = key("catalogue data of the two gears", default=None)
     operation: Operation | None = key("the point of operation", default=None)
     mesh: Mesh | None = key("stiffness, damping and clearance of the mesh", default=None)
@@ -40,14 +38,12 @@ class Tables(Table):
     scene: Scene = key("which effects exist")
     start: Start = key("the state in which the lanes start", default=Start())
     sweep: Sweep = key("the swept parameter and its values")
-    second_sweep: Sweep | None = key(
-        "a second swept parameter: every value of it with every one of [sweep]", default=None
-    )
+    second_sweep: Sweep | None = key(default=None)
+    """a second swept parameter: every value of it with every one of [sweep]"""
     integration: Integration = key("the fixed grid of the integration", default=Integration())
     outputs: Outputs = key("what is kept of every lane", default=Outputs())
-    files: dict[str, str] | None = key(
-        "files that are named above, word for word, as a result keeps them", default=None
-    )
+    files: dict[str, str] | None = key(default=None)
+    """files that are named above, word for word, as a result keeps them"""
 
     @property
     def sweeps(self) -> dict[str, Sweep]:
