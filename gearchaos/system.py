@@ -129,7 +129,7 @@ class System:
             transient_periods=transient, recorded_periods=periods, history_periods=periods
         )
         outcome = kernels.integrate(self._record, self._start(start), plan)
-        if outcome.status[0] != Status.OK or outcome.history is None:
+        if outcome.status[0] != Status.OK:
             raise ConfigurationError(
                 f"{self.config.source}: the motion {kernels.STATUS_TEXTS[outcome.status[0]]} in "
                 f"mesh period {outcome.diverged_period[0]}; raise integration.steps_per_period or "

@@ -114,6 +114,5 @@ def _carry(
         plan._replace(transient_periods=0, section_points=0, history_periods=0, tangent=True),
         tangent_start=frame.transpose(0, 2, 1).reshape(-1, states),
     )
-    assert outcome.growth is not None
     vectors = outcome.end_tangent.reshape(lanes, states, states).transpose(0, 2, 1)
     return outcome.end_state[::states], vectors, outcome.growth.reshape(lanes, states, -1)

@@ -42,7 +42,6 @@ def largest_exponents(
     does not count. ``outcome``: with growth, integrated by ``plan``; ``period`` (lanes,) in
     excitation periods, 0 where a lane is not periodic.
     """
-    assert outcome.growth is not None
     values, errors = largest_exponent(outcome.growth, system.mesh_period)
     record = np.full(period.shape, NOT_TOLD, dtype=np.uint8)
     of_orbit = np.full((period.size, len(system.states)), np.nan)

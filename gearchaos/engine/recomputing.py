@@ -142,7 +142,6 @@ def survival(config: Configuration, result: Result, records: int) -> Survival:
         check()
         outcome = integrate(system, state, plan, tangent_start=tangent)
         state, tangent = outcome.end_state, outcome.end_tangent
-    assert outcome.growth is not None
     later = outcome.growth[:, plan.recorded_periods // 2 :]
     exponent, _ = largest_exponent(later, np.ones(lanes.size))
     growing = exponent * plan.recorded_periods > CHAOTIC_GROWTH

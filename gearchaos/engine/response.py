@@ -103,7 +103,6 @@ def _check_size(simulation: Simulation, periods: int) -> None:
 
 
 def _motion(system: System, outcome: Outcome, plan: Plan) -> dict[str, Array]:
-    assert outcome.history is not None
     turned = plan.transient_periods + plan.recorded_periods - plan.history_periods
     found = mesh_motion(system, outcome.history, plan.steps_per_period, turned)
     motion: dict[str, Array] = {

@@ -215,7 +215,10 @@ class Simulation:
             if anew.any():
                 begin[anew] = self.lanes.start_of(mine[anew])
             outcomes.append(kernels.integrate(self.lanes.system_of(mine), begin, plan))
-        return start, joined(outcomes)
+        if len(outcomes) == 1:
+            return start, outcomes[0]
+        every: Any = map(np.concatenate, zip(*outcomes, strict=True))
+        return start, kernels.Outcome(*every)
 
     def arrays(self, lanes: Integers, start: Floats, outcome: kernels.Outcome) -> dict[str, Any]:
         """Return what is kept of integrated lanes, by the name of the variable."""
@@ -242,7 +245,7 @@ class Simulation:
         if told is not None:
             arrays |= told.labels._asdict()
         largest = None
-        if outcome.growth is not None:
+        if plan.tangent:
             period = told.labels.period if told else np.zeros(lanes.size, dtype=np.int32)
             state = told.state if told else outcome.end_state
             largest = largest_exponents(system, outcome, self.recording, period, state)
@@ -298,7 +301,8 @@ class Simulation:
             some = told and labels_of(system, finer, half)
             fine = solution_of(system, finer, half, kept, some)
             some = told and Told(told.labels.of(checked), told.state[checked])
-            coarse = solution_of(system, outcome_of(outcome, checked), plan, kept, some)
+            theirs: Any = (array[checked] for array in outcome)
+            coarse = solution_of(system, kernels.Outcome(*theirs), plan, kept, some)
             found = difference(coarse, fine)
             section[checked], exponent[checked] = found.section_error, found.exponent_error
             motion[checked] = np.where(found.changed, error_check.CHANGED, error_check.SAME)
@@ -316,18 +320,3 @@ def states_told(outcome: kernels.Outcome, plan: kernels.Plan) -> dict[str, Float
         names = (f"{known.AMPLITUDE}{name}" for name in (*plan.states, "transmission_error"))
         told |= zip(names, np.moveaxis(outcome.amplitudes, 1, 0), strict=True)
     return told
-
-
-def joined(outcomes: list[kernels.Outcome]) -> kernels.Outcome:
-    """Join the outcomes of lanes that come one after the other."""
-    if len(outcomes) == 1:
-        return outcomes[0]
-    every: Any = zip(*outcomes, strict=True)
-    arrays: Any = (None if some[0] is None else np.concatenate(some) for some in every)
-    return kernels.Outcome(*arrays)
-
-
-def outcome_of(outcome: kernels.Outcome, lanes: Integers) -> kernels.Outcome:
-    """Return the outcome of some lanes."""
-    arrays: Any = (None if array is None else array[lanes] for array in outcome)
-    return kernels.Outcome(*arrays)

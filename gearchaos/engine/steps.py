@@ -151,7 +151,7 @@ def solution_of(
     else:
         period, state, motion = told.labels.period, told.state, told.labels.motion
     exponent = None
-    if outcome.growth is not None:
+    if plan.tangent:
         exponent = largest_exponents(system, outcome, plan, period, state).values
     columns = [system.states.index(name) for name in kept or system.states]
     diverged = outcome.status != Status.OK

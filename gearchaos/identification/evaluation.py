@@ -104,7 +104,6 @@ def require_stable(config: Configuration, values: Floats, parameters: dict[str, 
 
 def _records(system: System, outcome: Outcome, looked_at: Integers, plan: Plan) -> Records:
     """Return what lanes came to, each array with the lanes first."""
-    assert outcome.growth is not None
     sound = outcome.status == Status.OK
     # The torsion and its rate: the other coordinates follow them.
     distances = return_distances(outcome.section[..., :2])
@@ -122,7 +121,6 @@ def _records(system: System, outcome: Outcome, looked_at: Integers, plan: Plan) 
         lanes = looked_at[first : first + MOTIONS_AT_ONCE]
         some = system.of(lanes)
         motion = integrate(some, outcome.end_state[lanes], finer)
-        assert motion.history is not None
         found = mesh_motion(some, motion.history, finer.steps_per_period).accelerations
         acceleration[lanes] = np.max(found, axis=1)
     return Records(outcome.section[..., 0], period, exponent, acceleration, sound)

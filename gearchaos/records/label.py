@@ -38,12 +38,12 @@ class Record(NamedTuple):
     """What is known of some lanes after their transient.
 
     ``section`` (lanes, points, states): all states of the scene, once an excitation period;
-    ``growth`` (lanes, mesh periods): logarithm of the tangent vector's growth, or None;
+    ``growth`` (lanes, mesh periods): logarithm of the tangent vector's growth, or (lanes, 0);
     ``diverged`` (lanes,); ``torus`` (lanes,): whether the scene admits quasi-periodic motion.
     """
 
     section: Floats
-    growth: Floats | None
+    growth: Floats
     diverged: Mask
     torus: Mask
 
@@ -86,7 +86,7 @@ def label(record: Record) -> Labels:
     motion[period > 0] = PERIODIC
     motion[record.diverged] = DIVERGED
     rest = np.flatnonzero(motion == UNRESOLVED)
-    if record.growth is not None and rest.size:
+    if record.growth.size and rest.size:
         motion[rest] = _aperiodic(record.section[rest], record.growth[rest], record.torus[rest])
     smallest = np.min(np.where(np.isnan(distances), np.inf, distances), axis=1)
     own = distances[np.arange(period.size), np.maximum(period, 1) - 1]
@@ -125,7 +125,7 @@ def settling_periods(record: Record, labels: Labels) -> Counts:
     own = labels.period[lanes, np.newaxis]
     looked_at = (own == 0) | ((own > periods) & (own % periods == 0))
     falling = np.ones(lanes.size, dtype=np.bool_)
-    if record.growth is not None:
+    if record.growth.size:
         later = record.growth[lanes, record.growth.shape[1] // 2 :]
         falling = largest_exponent(later, np.ones(lanes.size))[0] < 0.0
     # All of a short record may return no better than its begin, and half of it tells fewer periods.
@@ -146,7 +146,7 @@ def doubtful(record: Record, labels: Labels) -> Mask:
     that is about to end for chaos as long as the exponent is within six standard errors of zero.
     """
     found = np.zeros(labels.motion.shape, dtype=np.bool_)
-    if record.growth is not None:
+    if record.growth.size:
         exponent, error = largest_exponent(record.growth, np.ones(found.size))
         weak = ~(exponent > CERTAIN * error)
         found = np.isin(labels.motion, (UNRESOLVED, QUASI_PERIODIC))

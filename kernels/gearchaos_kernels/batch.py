@@ -102,8 +102,6 @@ def integrate(
         # A scaled state may have the other sign.
         extremes=np.sort(outcome.extremes * scales[:, :-1], axis=2),
         amplitudes=np.abs(scales) * sums * (2.0 / samples),
-        growth=outcome.growth if plan.tangent else None,
-        history=outcome.history if plan.history_periods else None,
     )
 
 
