@@ -150,7 +150,7 @@ def solution_of(
         motion = np.where(period > 0, PERIODIC, UNRESOLVED)
     else:
         period, state, motion = told.labels.period, told.state, told.labels.motion
-    exponent = None
+    exponent = np.full(period.shape, np.nan)
     if plan.tangent:
         exponent = largest_exponents(system, outcome, plan, period, state).values
     columns = [system.states.index(name) for name in kept or system.states]

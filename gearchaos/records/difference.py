@@ -16,13 +16,13 @@ _ANOTHER_ORBIT = 0.1
 class Solution(NamedTuple):
     """What one grid gives for some lanes.
 
-    ``section`` (lanes, points, states), ``exponent`` (lanes,) or None where it was not computed,
+    ``section`` (lanes, points, states), ``exponent`` (lanes,), not a number where there is none,
     ``diverged`` (lanes,), ``motion`` (lanes,) as `records.label` has it, ``period`` (lanes,) in
     mesh periods, 0 where the motion is not periodic.
     """
 
     section: Floats
-    exponent: Floats | None
+    exponent: Floats
     diverged: Mask
     motion: Codes
     period: Counts
@@ -58,14 +58,11 @@ def difference(one: Solution, other: Solution) -> Difference:
     size = np.max(np.abs(other.section), axis=(1, 2), initial=0.0)
     apart = distance > _ANOTHER_ORBIT * size
     period[apart] = 0
-    exponent = np.full(period.shape, np.nan)
-    if one.exponent is not None and other.exponent is not None:
-        exponent = np.abs(one.exponent - other.exponent)
     told = (one.motion != UNRESOLVED) & (other.motion != UNRESOLVED)
     return Difference(
         period,
         np.where(period > 0, distance, np.nan),
-        exponent,
+        np.abs(one.exponent - other.exponent),
         (first != second)
         | apart
         | (told & (one.motion != other.motion))
