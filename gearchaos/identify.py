@@ -9,11 +9,9 @@ file. Interrupted or terminated, candidates are kept and --resume goes on from t
 import os
 import time
 from argparse import ArgumentParser, Namespace
-from importlib.util import find_spec
 from typing import TYPE_CHECKING
 
 from gearchaos.command_line import COMMON_OPTIONS, OK, Command
-from gearchaos.errors import ConfigurationError
 from gearchaos.finishing import output_of
 from gearchaos.progress import Progress, say
 
@@ -39,14 +37,12 @@ def _identify(options: Namespace) -> int:
     from gearchaos.identification.tried import read_tried, write_tried
     from gearchaos.results.atomic_file import check_output
     from gearchaos.results.block_folder import require_same
+    from gearchaos.results.tables import needed
 
     problem = load_targets(options.config, options.set)
     choose_threads(options.threads)
     judge = Judge(problem)
-    if find_spec("cma") is None:
-        raise ConfigurationError(
-            "the package cma, which searches, is not installed; pip install gearchaos[identify]"
-        )
+    needed("cma", "identify")
     require_stable(problem.config, judge.values, problem.targets.corners())
     output, keys = output_of(options, ".csv"), [one.name for one in problem.targets.parameter]
     known, kept, facts = None, False, decisive_facts(problem)

@@ -8,7 +8,6 @@ import sys
 import time
 from argparse import ArgumentParser, Namespace
 from contextlib import suppress
-from importlib.util import find_spec
 from typing import TYPE_CHECKING
 
 from gearchaos.command_line import OK, Command
@@ -70,6 +69,8 @@ def _sweep(options: Namespace) -> int:
 
 def _check_sharing(options: Namespace, config: "Configuration") -> None:
     """Refuse what --dask and --shard cannot do."""
+    from gearchaos.results.tables import needed
+
     for flag in ("dask", "shard"):
         if getattr(options, flag) is not None and config.start.carry != "none":
             raise ConfigurationError(
@@ -83,10 +84,7 @@ def _check_sharing(options: Namespace, config: "Configuration") -> None:
             f"--threads {options.threads}: the workers of a cluster use the cores that they have; "
             "start them with the variable NUMBA_NUM_THREADS to use fewer"
         )
-    if find_spec("distributed") is None:
-        raise ConfigurationError(
-            "--dask: dask.distributed is not installed; pip install gearchaos[dask]"
-        )
+    needed("distributed", "dask")
 
 
 def _compute(
