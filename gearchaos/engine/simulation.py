@@ -1,6 +1,6 @@
 """A configured sweep: what it yields, and the means to compute any block of its lanes."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import gearchaos_kernels as kernels
@@ -32,7 +32,7 @@ from gearchaos.records.difference import difference
 from gearchaos.records.label import MEANINGS as MOTION_MEANINGS
 from gearchaos.records.label import MOST_POINTS
 from gearchaos.records.period import POINTS_NEEDED
-from gearchaos.records.teeth import contact_told, loads_told
+from gearchaos.records.teeth import CONTACT_STATES, contact_told, loads_told
 from gearchaos.results import variables as known
 
 Arrays = Mapping[str, Array]
@@ -113,26 +113,45 @@ class Simulation:
     @property
     def variables(self) -> list[known.Variable]:
         """What the sweep yields."""
-        outputs, checked = self.config.outputs, self.config.integration.error_check > 0.0
-        of_the_lanes = known.sweep_variables(
-            self.lanes.axes,
-            states=self.lanes.states,
-            section=outputs.section,
-            section_points=outputs.section_points,
-            lyapunov=outputs.lyapunov,
-            crossings=self._splits_steps,
-            contact=self._directions if self.plan.contact and self._splits_steps else (),
-            loads=self._directions if self.plan.loads else (),
-            chosen=outputs.states,
-            orders=self.plan.orders,
-            exponents=outputs.exponents,
-            status_meanings=[status.name.lower() for status in kernels.STATUS_TEXTS],
-            check_meanings=error_check.MEANINGS if checked else (),
-            motion_meanings=MOTION_MEANINGS if outputs.motion else (),
-            record_meanings=RECORD_MEANINGS if outputs.motion and outputs.lyapunov else (),
-            excitation_period=self.lanes.repeats_after,
-        )
-        return of_the_lanes + self._choice
+        outputs, repeats = self.config.outputs, self.lanes.repeats_after
+        of_teeth = f"periods of the excitation, {repeats} mesh periods each,"
+        motions = [of_teeth if repeats > 1 else "mesh periods"]
+        touched = self.plan.contact and self._splits_steps
+        subjects: dict[str, Sequence[str]] = {
+            "section": outputs.section,
+            "motion": motions if outputs.motion else (),
+            "contact": self._directions if touched else (),
+            "forces": self._directions if self.plan.loads else (),
+            "chosen": outputs.states,
+            "amplitudes": (*outputs.states, "transmission_error") if self.plan.orders else (),
+        }
+        once = {
+            "section points": outputs.section,
+            "lyapunov": outputs.lyapunov,
+            "record": outputs.motion and outputs.lyapunov,
+            "exponents": outputs.exponents,
+            "crossings": self._splits_steps,
+            "loads": self.plan.loads,
+            "orders": self.plan.orders,
+            "check": self.config.integration.error_check > 0.0,
+            "every sweep": True,
+        }
+        subjects |= {name: [""] for name, told in once.items() if told}
+        values = {
+            known.SECTION_POINT: np.arange(outputs.section_points),
+            known.EXPONENT_NUMBER: np.arange(1, len(self.lanes.states) + 1),
+            known.ORDER: np.array([float(order) for order in self.plan.orders]),
+            known.STATE: np.arange(len(self.lanes.states)),
+        }
+        meanings = {
+            "motion": MOTION_MEANINGS,
+            known.RECORD: RECORD_MEANINGS,
+            "contact_state_@": CONTACT_STATES,
+            "motion_changed": error_check.MEANINGS,
+            known.STATUS: [status.name.lower() for status in kernels.STATUS_TEXTS],
+            known.STATE: self.lanes.states,
+        }
+        return known.listed(self.lanes.axes, subjects, values, meanings) + self._choice
 
     @property
     def _splits_steps(self) -> bool:

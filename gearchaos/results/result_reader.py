@@ -4,7 +4,6 @@ import os
 import stat
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
-from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +18,7 @@ from gearchaos.results import variables as known
 from gearchaos.results.atomic_file import checksum_fits, reason
 from gearchaos.results.result_file import ORIGINS, PARAMETERS, SCHEMA, SCHEMA_VERSION, Parameter
 from gearchaos.results.stored_dataset import UnfitError
-from gearchaos.results.variables import HARMONIC, STATE, Variable, coordinate
+from gearchaos.results.variables import HARMONIC, STATE, Variable
 
 Contents = tuple[
     list[Variable], dict[str, Array], dict[str, Parameter], dict[str, str | int | float]
@@ -199,38 +198,14 @@ def _check_variables(
     """Compare what a sweep must yield with what there is; more than that is welcome."""
     if not axes or len(set(axes)) < len(axes):
         raise UnfitError("does not name its axes, each once")
-    if STATE not in data:
-        raise UnfitError(f"lacks the variable {STATE}")
-    expected = known.sweep_variables(
-        [
-            coordinate(name, "", "", "", np.zeros(1, "i4" if name in known.UNSWEPT else "f8"))
-            for name in axes
-        ],
-        states=found[STATE].flags,
-        section=[
-            n.removeprefix(known.SECTION) for n in found if n.startswith(f"{known.SECTION}delta_")
-        ],
-        section_points=np.size(data.get(known.SECTION_POINT, ())),
-        lyapunov=known.LARGEST_EXPONENT in found,
-        status_meanings=(),
-        crossings=known.CROSSINGS in found,
-        contact=[way for way in known.DIRECTIONS if f"contact_state_{way}" in found],
-        loads=[way for way in known.DIRECTIONS if f"mesh_force_largest_{way}" in found],
-        chosen=[one for one in known.STATE_WORDING if f"{one}_peak_to_peak" in found],
-        orders=[Fraction(1)] if known.ORDER in found else [],
-        exponents=known.ALL_EXPONENTS in found,
-        check_meanings=["same"] if "motion_changed" in found else [],
-        motion_meanings=["periodic"] if "motion" in found else [],
-        record_meanings=["uniform"] if known.RECORD in found else [],
-    )
-    for due in expected:
-        got = found.get(due.name)
+    for due, dims, dtype in known.due(axes, found):
+        got = found.get(due)
         if got is None:
-            raise UnfitError(f"lacks the variable {due.name}")
-        if (got.dims, got.dtype) != (due.dims, due.dtype):
+            raise UnfitError(f"lacks the variable {due}")
+        if (got.dims, got.dtype) != (dims, dtype):
             raise UnfitError(
-                f"holds {due.name} as {got.dtype} over ({', '.join(got.dims)}), which should be "
-                f"{due.dtype} over ({', '.join(due.dims)})"
+                f"holds {due} as {got.dtype} over ({', '.join(got.dims)}), which should be "
+                f"{dtype} over ({', '.join(dims)})"
             )
     for name in axes:
         if not is_coordinate(data[name]):

@@ -1,9 +1,8 @@
 """What a sweep yields: name, dimensions, type, unit and wording of every variable, in one place."""
 
 import csv
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from fractions import Fraction
 from itertools import product
 from pathlib import Path
 from types import MappingProxyType
@@ -14,7 +13,6 @@ from numpy.typing import ArrayLike
 
 from gearchaos.arrays import Array
 from gearchaos.gear.tooth_deviations import REALISATION
-from gearchaos.records.teeth import CONTACT_STATES
 
 START = "start"
 DIRECTION = "direction"
@@ -143,74 +141,6 @@ def lane_axes(variables: Sequence[Variable]) -> tuple[str, ...]:
     return next(variable.dims for variable in variables if variable.name == STATUS)
 
 
-def sweep_variables(
-    axes: Sequence[Variable],
-    *,
-    states: Sequence[str],
-    section: Sequence[str],
-    section_points: int,
-    lyapunov: bool,
-    status_meanings: Sequence[str],
-    crossings: bool = False,
-    contact: Sequence[str] = (),
-    loads: Sequence[str] = (),
-    chosen: Sequence[str] = (),
-    orders: Sequence[Fraction] = (),
-    exponents: bool = False,
-    check_meanings: Sequence[str] = (),
-    motion_meanings: Sequence[str] = (),
-    record_meanings: Sequence[str] = (),
-    excitation_period: int = 1,
-) -> list[Variable]:
-    """List the variables of a sweep in the order of the file.
-
-    The axes are second swept parameter, first swept parameter, realisation, start, direction, those
-    there are; ``states`` those of the scene in its order, ``section`` those recorded at so many
-    section points, ``contact`` and ``loads`` the ways of which they are told, ``chosen`` the
-    states of which extremes are told, ``orders`` those of their amplitudes. Meanings are those
-    of 0, 1, ...: of ``status``, of ``motion_changed`` where lanes are computed twice to measure
-    their error, and of ``motion`` and ``record`` where they are labelled. A motion repeats after
-    whole excitation periods, of so many mesh periods each.
-    """
-    periods = f"periods of the excitation, {excitation_period} mesh periods each,"
-    # What stands for @ in the rows that are told with each of these.
-    subjects: dict[str, Sequence[str]] = {
-        "section": section if section_points > 0 else (),
-        "motion": [periods if excitation_period > 1 else "mesh periods"] if motion_meanings else (),
-        "contact": contact,
-        "forces": loads,
-        "chosen": chosen,
-        "amplitudes": (*chosen, "transmission_error") if orders else (),
-    }
-    once = {
-        "section points": subjects["section"],
-        "lyapunov": lyapunov,
-        "record": record_meanings,
-        "exponents": exponents,
-        "crossings": crossings,
-        "loads": loads,
-        "orders": orders,
-        "check": check_meanings,
-        "every sweep": True,
-    }
-    subjects |= {name: [""] for name, told in once.items() if told}
-    values: dict[str, ArrayLike] = {
-        SECTION_POINT: np.arange(section_points),
-        EXPONENT_NUMBER: np.arange(1, len(states) + 1),
-        ORDER: [float(order) for order in orders],
-        STATE: np.arange(len(states)),
-    }
-    meanings = {
-        "motion": motion_meanings,
-        RECORD: record_meanings,
-        "contact_state_@": CONTACT_STATES,
-        "motion_changed": check_meanings,
-        STATUS: status_meanings,
-        STATE: states,
-    }
-    return listed(axes, subjects, values, meanings)
-
-
 def step_choice_variables(
     steps: Sequence[int], measured: Mapping[str, Sequence[float]]
 ) -> list[Variable]:
@@ -220,6 +150,24 @@ def step_choice_variables(
     """
     values = {"steps": steps, **measured}
     return listed((), {"step choice": [""]}, {f"candidate_{key}": values[key] for key in values})
+
+
+def due(axes: Sequence[str], found: Collection[str]) -> Iterator[tuple[str, tuple[str, ...], str]]:
+    """Give name, dimensions and type of all that a file must hold that holds these variables.
+
+    Those are axes, what every sweep has, and what is told together with one that is there.
+    """
+    for axis in axes:
+        yield axis, (axis,), "int32" if axis in UNSWEPT else "float64"
+    subjects = (*STATE_WORDING, *DIRECTIONS, "transmission_error")
+    for told_with, (first, *others) in _ROWS.items():
+        for subject in subjects if "@" in first["name"] else ("",):
+            there = first["type"] and first["name"].replace("@", subject) in found
+            for row in (first, *others) if there or told_with == "every sweep" else ():
+                yield row["name"].replace("@", subject), _dims(axes, row), row["type"]
+        if told_with == "every sweep":
+            # What follows no sweep need have.
+            break
 
 
 def listed(
@@ -238,11 +186,11 @@ def listed(
     for told_with, rows in _ROWS.items():
         for subject, row in product(subjects.get(told_with, ()), rows):
             wording, symbol = words.get(subject, (subject.replace("_", " "), ""))
-            along, known = tuple(row["along"].split()), values.get(row["name"])
+            known = values.get(row["name"])
             variables.append(
                 Variable(
                     name=row["name"].replace("@", subject),
-                    dims=(*lane, *along) if known is None else along,
+                    dims=_dims(lane, row),
                     dtype=row["type"],
                     units="1",
                     long_name=row["long_name"].replace("@", wording),
@@ -255,3 +203,7 @@ def listed(
             )
     there = {one.name for one in variables}
     return [replace(v, errors=tuple(e for e in v.errors if e in there)) for v in variables]
+
+
+def _dims(axes: Sequence[str], row: Mapping[str, str]) -> tuple[str, ...]:
+    return (*(axes if row["per"] == "lane" else ()), *row["along"].split())

@@ -18,10 +18,10 @@ from gearchaos.results.variables import (
     coordinate,
     start_axis,
     step_choice_variables,
-    sweep_variables,
 )
 
 from .commands import SMALL
+from .listed_variables import sweep_variables
 
 Random = random.Random
 

@@ -17,7 +17,9 @@ from gearchaos.errors import FigureError
 from gearchaos.figures import bifurcation, bifurcation_page, lyapunov, save_figure
 from gearchaos.figures.panel import robust_limits
 from gearchaos.results.result import Result, open_result
-from gearchaos.results.variables import coordinate, start_axis, sweep_variables
+from gearchaos.results.variables import coordinate, start_axis
+
+from .listed_variables import sweep_variables
 
 POINTS = 60
 LANES = 121

@@ -13,7 +13,9 @@ from gearchaos.plot import main
 from gearchaos.records.label import MEANINGS
 from gearchaos.records.teeth import CONTACT_STATES
 from gearchaos.results.result import Result
-from gearchaos.results.variables import Variable, coordinate, start_axis, sweep_variables
+from gearchaos.results.variables import Variable, coordinate, start_axis
+
+from .listed_variables import sweep_variables
 
 SPEEDS = coordinate(
     "operation_speed_rpm", "rpm", "speed", "", np.array([900.0, 1000.0, 1300.0, 1500.0])

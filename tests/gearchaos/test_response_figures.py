@@ -22,7 +22,9 @@ from gearchaos.figures.response import coordinates_of, is_response, repeats_afte
 from gearchaos.plot import main
 from gearchaos.results.response_variables import response_variables
 from gearchaos.results.result import Result
-from gearchaos.results.variables import axis_name, coordinate, sweep_variables
+from gearchaos.results.variables import axis_name, coordinate
+
+from .listed_variables import sweep_variables
 
 STEPS, PERIODS, POINTS = 40, 8, 60
 STATES = ("delta_5", "delta_5_rate")
