@@ -2,13 +2,9 @@
 
 RK4 with plain and with resolved steps, and flow maps, which need few steps. The truth is what fine
 flow maps find. Errors are those that 95 % of the periodic lanes do not exceed. The table goes to
-stdout, everything else to stderr; a figure (PNG and PDF) and the table as JSON are written under
-the name in --output.
-Exit codes: 0 done, 2 usage or configuration, 4 cannot read or write.
+stdout, everything else to stderr; a figure (PNG and PDF) is written under the name in --output.
 """
 
-import json
-import sys
 import time
 from argparse import ArgumentParser, Namespace
 from collections.abc import Sequence
@@ -55,20 +51,21 @@ def _arguments(parser: ArgumentParser) -> None:
     add("--steps", type=_numbers_of_steps, default="50,100,200,400,800", metavar="N,N,...")
     count = partial(whole_number, low=1)
     add("--lanes", type=count, default=64, metavar="N", help="lanes to try (default: 64)")
-    add("-o", "--output", metavar="NAME", help="name of figure and JSON, without its ending")
+    add("-o", "--output", metavar="NAME", help="name of the figure, without its ending")
 
 
 def _accuracy(options: Namespace) -> int:
     from gearchaos.configuration import load_config
     from gearchaos.engine.running import choose_threads
     from gearchaos.engine.simulation import Simulation
-    from gearchaos.figures.page import FORMATS
+    from gearchaos.figures.page import FORMATS, save_figure
+    from gearchaos.figures.work_precision import work_precision_page
     from gearchaos.results.atomic_file import check_output
 
     steps = options.steps
     config = load_config(options.config, options.set)
     stem = options.output or f"{Path(options.config).stem}_accuracy"
-    targets = [f"{stem}.{ending}" for ending in (*FORMATS, "json")]
+    targets = [f"{stem}.{ending}" for ending in FORMATS]
     for target in targets:
         check_output(target, options.overwrite)
     choose_threads(options.threads)
@@ -94,34 +91,16 @@ def _accuracy(options: Namespace) -> int:
             "error can be measured; try more with --lanes, or others with --set"
         )
     print("\n".join(recommendation(settings, error) for error in WANTED))
-    _write(settings, config.title, targets, options.overwrite)
+    points = {m: [(s.steps, s.seconds, s.error) for s in settings if s.mode == m] for m in MODES}
+    page = work_precision_page(points)
+    for target in targets:
+        save_figure(page, target, title=config.title, overwrite=options.overwrite)
     say(f"written: {', '.join(targets)}")
     return OK
 
 
 def _numbers_of_steps(text: str) -> list[int]:
     return sorted({whole_number(one, 1, MOST_STEPS) for one in text.split(",")})
-
-
-def _write(settings: Sequence[Setting], title: str, targets: list[str], overwrite: bool) -> None:
-    from gearchaos.engine.provenance import provenance
-    from gearchaos.figures.page import save_figure
-    from gearchaos.figures.work_precision import work_precision_page
-    from gearchaos.results.atomic_file import replacing
-
-    points = {m: [(s.steps, s.seconds, s.error) for s in settings if s.mode == m] for m in MODES}
-    page = work_precision_page(points)
-    *pictures, table_file = targets
-    for target in pictures:
-        save_figure(page, target, title=title, overwrite=overwrite)
-    facts = {
-        "title": title,
-        "truth": f"{TRUTH_STEPS} flow maps per mesh period",
-        "settings": [setting._asdict() for setting in settings],
-        "machine": provenance(sum(setting.seconds for setting in settings)),
-    }
-    with replacing(table_file, overwrite=overwrite) as partial_file:
-        partial_file.write_text(json.dumps(facts, indent=1), encoding="utf-8")
 
 
 def measure(simulation: "Simulation", steps: Sequence[int], lanes: int) -> list[Setting]:
@@ -179,6 +158,4 @@ def recommendation(settings: Sequence[Setting], error: float) -> str:
 
 
 main = Command("accuracy", __doc__, _arguments, _accuracy, common=("overwrite", "threads", "set"))
-
-if __name__ == "__main__":
-    sys.exit(main())
+main.start(__name__)

@@ -1,14 +1,11 @@
 """Find the attractors of a sweep from many starts, and which share of the starts leads to each.
 
 Attractors keep their numbers along the sweep. The table goes to stdout, everything else to stderr.
-Exit codes: 0 done, 2 the command line asks for what cannot be, 4 a file cannot be read or written
-or holds no labels.
 """
 
 import argparse
 import json
 import math
-import sys
 import textwrap
 from collections.abc import Iterator
 from pathlib import Path
@@ -41,7 +38,7 @@ def _basins(options: argparse.Namespace) -> int:
     from gearchaos.engine.running import compiling
     from gearchaos.figures import basins_page
     from gearchaos.figures.page import check_figures, save_figure
-    from gearchaos.results.overview import finite, slice_lines
+    from gearchaos.results.overview import plain, slice_lines
     from gearchaos.results.result import open_result
     from gearchaos.results.stage_table import slice_facts
     from gearchaos.results.variables import REPEATS, START
@@ -63,7 +60,7 @@ def _basins(options: argparse.Namespace) -> int:
             one["section"] = one["section"].tolist() if one["period"] else None
             one["number"] = one["number"] if one["number"] > 0 else None
         facts |= {"basins": basins, "entropy": found.entropy}
-        print(json.dumps(finite(facts), indent=1, allow_nan=False))
+        print(json.dumps(plain(facts), indent=1))
     else:
         print("\n".join([*table(found, slice_lines(where))]))
     if options.output:
@@ -95,6 +92,4 @@ def table(found: "Basins", where: list[str]) -> Iterator[str]:
 
 
 main = Command("basins", __doc__, _arguments, _basins, common=("overwrite", "threads"))
-
-if __name__ == "__main__":
-    sys.exit(main())
+main.start(__name__)

@@ -23,6 +23,12 @@ CANNOT_READ_OR_WRITE = FileError.exit_code
 INTERRUPTED = 130
 CLOSED_PIPE = 141
 TERMINATED = 143
+EXIT_CODES = (
+    "Exit codes: 0 done, 2 the command line or the configuration asks for what cannot be, 3 done, "
+    "but more lanes diverged than outputs.allowed_diverged_share, 4 a file cannot be read or "
+    "written, is damaged or lacks something, or a package is missing, 130 interrupted, "
+    "143 terminated."
+)
 
 COMMANDS = {
     "sweep": "compute a sweep from a configuration file",
@@ -71,10 +77,11 @@ class Command(NamedTuple):
     interrupt, 143 for SIGTERM, 141 when the reader of the output has gone.
 
     ``name`` follows ``gearchaos``; ``text`` is what --help says before the options and, from the
-    first empty line on, after them; ``arguments`` adds the command's own to its parser, ``common``
-    names the `COMMON_OPTIONS` that it takes too. ``body`` does it, with the options and, as their
-    `arguments`, what was given; it imports what is heavy, so that --help answers at once. Where
-    the command ``writes``, it asks for interrupts at moments of its own choice, see `interrupts`.
+    first empty line on, after them, where the exit codes follow; ``arguments`` adds the command's
+    own to its parser, ``common`` names the `COMMON_OPTIONS` that it takes too. ``body`` does it,
+    with the options and, as their `arguments`, what was given; it imports what is heavy, so that
+    --help answers at once. Where the command ``writes``, it asks for interrupts at moments of its
+    own choice, see `interrupts`.
     """
 
     name: str
@@ -111,6 +118,11 @@ class Command(NamedTuple):
                 text = str(error) or "out of memory"
                 return _report(error, [f"error: {text}"], CANNOT_READ_OR_WRITE)
 
+    def start(self, module: str) -> None:
+        """Run the command as a process where its module, by ``__name__``, is what was started."""
+        if module == "__main__":
+            sys.exit(self())
+
     def _code(self, arguments: list[str]) -> int:
         try:
             # Of negative numbers, argparse takes those with an exponent for options.
@@ -129,7 +141,7 @@ class Command(NamedTuple):
         parser = ArgumentParser(
             prog=f"gearchaos {self.name}",
             description=description,
-            epilog=epilog,
+            epilog=f"{epilog}\n{EXIT_CODES}".strip(),
             allow_abbrev=False,
         )
         self.arguments(parser)

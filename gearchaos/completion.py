@@ -2,10 +2,9 @@
 
 For bash: gearchaos completion bash > ~/.local/share/bash-completion/completions/gearchaos; for zsh:
 gearchaos completion zsh > a file named _gearchaos in a folder of $fpath. Needs pip install
-gearchaos[completion]. Exit codes: 0 done, 2 no such shell, 4 the package shtab is missing.
+gearchaos[completion].
 """
 
-import sys
 from argparse import ArgumentParser, Namespace
 from importlib import import_module
 
@@ -35,6 +34,4 @@ def _complete(options: Namespace) -> int:
 
 
 main = Command("completion", __doc__, _arguments, _complete, writes=False)
-
-if __name__ == "__main__":
-    sys.exit(main())
+main.start(__name__)

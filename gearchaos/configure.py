@@ -1,6 +1,5 @@
 """Print the JSON Schema of a configuration file, for completion in editors."""
 
-import sys
 from argparse import ArgumentParser, Namespace
 
 from gearchaos.command_line import OK, Command
@@ -20,6 +19,4 @@ def _describe(options: Namespace) -> int:
 
 
 main = Command("configuration", __doc__, _arguments, _describe, writes=False)
-
-if __name__ == "__main__":
-    sys.exit(main())
+main.start(__name__)

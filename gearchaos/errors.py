@@ -6,10 +6,8 @@ from collections.abc import Iterable
 class GearchaosError(Exception):
     """A fault that is reported as plain text, never as a traceback.
 
-    Parameters
-    ----------
-    problems : str or iterable of str
-        One message per fault: what, where, the rule, the remedy. What is endless in it is cut.
+    ``problems``: one message or several, one per fault: what, where, the rule, the remedy. What is
+    endless in it is cut.
     """
 
     exit_code = 1

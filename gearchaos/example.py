@@ -1,9 +1,5 @@
-"""List the ready configurations, or copy one of them into the current folder.
+"""List the ready configurations, or copy one of them into the current folder."""
 
-Exit codes: 0 done, 2 there is no such example, 4 the file exists already or cannot be written.
-"""
-
-import sys
 import tomllib
 from argparse import ArgumentParser, Namespace
 
@@ -37,6 +33,4 @@ def _example(options: Namespace) -> int:
 
 
 main = Command("example", __doc__, _arguments, _example, common=("overwrite",))
-
-if __name__ == "__main__":
-    sys.exit(main())
+main.start(__name__)

@@ -1,12 +1,9 @@
 """Open a local page on a result: its diagram to zoom into, and the motion of any lane at a click.
 
 The page is served to this machine alone, at the address that goes to stdout, until Ctrl-C; the
-address in the browser is a link to what the page shows. Needs pip install gearchaos[explore]. Exit
-codes: 0 ended, 2 the port is taken or the file is a response, 4 the file cannot be read, or a
-package is missing.
+address in the browser is a link to what the page shows. Needs pip install gearchaos[explore].
 """
 
-import sys
 from argparse import ArgumentParser, Namespace
 from collections.abc import Sequence
 from contextlib import redirect_stderr, redirect_stdout
@@ -87,6 +84,4 @@ def _draw(arguments: Sequence[str]) -> None:
 
 
 main = Command("explore", __doc__, _arguments, _explore, writes=False)
-
-if __name__ == "__main__":
-    sys.exit(main())
+main.start(__name__)

@@ -1,12 +1,10 @@
 """Write a result as a table, .csv or .parquet, or as arrays for MATLAB and Octave, .mat.
 
 A table has a row per lane, and a column for each number of a lane; with --along section_point a row
-per section point. Needs pip install gearchaos[export]. Exit codes: 0 done, 2 nothing runs along
-that dimension or no such format, 4 a file cannot be read or written, or a package is missing.
+per section point. Needs pip install gearchaos[export].
 """
 
 import os
-import sys
 from argparse import ArgumentParser, Namespace
 from typing import Any
 
@@ -55,6 +53,4 @@ def _export(options: Namespace) -> int:
 
 
 main = Command("export", __doc__, _arguments, _export, common=("overwrite",))
-
-if __name__ == "__main__":
-    sys.exit(main())
+main.start(__name__)

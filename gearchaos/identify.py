@@ -3,20 +3,15 @@
 A targets file names stages, jumps, crises, exponents and increments that were observed, and the
 parameters that are free within bounds. The best sets that differ go to stdout, with how far each
 parameter can move before the fit is worse by one unit; every candidate that was tried goes to a
-file. Exit codes: 0 done, 2 the command line or the targets ask for what cannot be, 4 a file
-cannot be read or written, 130 interrupted and 143 terminated: candidates are kept and --resume
-goes on from them.
+file. Interrupted or terminated, candidates are kept and --resume goes on from them.
 """
 
 import os
-import sys
 import time
 from argparse import ArgumentParser, Namespace
-from importlib.util import find_spec
 from typing import TYPE_CHECKING
 
 from gearchaos.command_line import COMMON_OPTIONS, OK, Command
-from gearchaos.errors import ConfigurationError
 from gearchaos.finishing import output_of
 from gearchaos.progress import Progress, say
 
@@ -42,16 +37,14 @@ def _identify(options: Namespace) -> int:
     from gearchaos.identification.tried import read_tried, write_tried
     from gearchaos.results.atomic_file import check_output
     from gearchaos.results.block_folder import require_same
+    from gearchaos.results.tables import needed
 
     problem = load_targets(options.config, options.set)
     choose_threads(options.threads)
     judge = Judge(problem)
-    if find_spec("cma") is None:
-        raise ConfigurationError(
-            "the package cma, which searches, is not installed; pip install gearchaos[identify]"
-        )
+    needed("cma", "identify")
     require_stable(problem.config, judge.values, problem.targets.corners())
-    output, keys = output_of(options), [one.name for one in problem.targets.parameter]
+    output, keys = output_of(options, ".csv"), [one.name for one in problem.targets.parameter]
     known, kept, facts = None, False, decisive_facts(problem)
     if options.resume and not options.overwrite and os.path.exists(output):
         (known, earlier), kept = read_tried(output, keys), True
@@ -86,6 +79,4 @@ def _identify(options: Namespace) -> int:
 
 
 main = Command("identify", __doc__, _arguments, _identify, ("output", "overwrite", "threads"))
-
-if __name__ == "__main__":
-    sys.exit(main())
+main.start(__name__)

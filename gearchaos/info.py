@@ -1,8 +1,7 @@
 """Show what a result file holds: what was computed, with which parameters, how accurately, and on
 what. Only the file is read.
 
---verify reads all of the file and tries every checksum in it. Exit codes: 0 the file is sound, 2
-the command line asks for what cannot be, 4 the file cannot be read, is damaged or is not ours.
+--verify reads all of the file and tries every checksum in it.
 """
 
 import json
@@ -33,7 +32,7 @@ def _info(options: Namespace) -> int:
             verified = verify(options.result)
     summary = overview(options.result)
     if options.json:
-        text = json.dumps({**summary, "verified": verified}, indent=1, allow_nan=False)
+        text = json.dumps({**summary, "verified": verified}, indent=1)
     else:
         text = overview_page(summary, _settings(summary["metadata"]), verified)
     # Where the terminal knows few characters, a title must not become a traceback.
@@ -64,6 +63,4 @@ def _settings(metadata: Mapping[str, Any]) -> list[str]:
 
 
 main = Command("info", __doc__, _arguments, _info, writes=False)
-
-if __name__ == "__main__":
-    sys.exit(main())
+main.start(__name__)

@@ -2,11 +2,9 @@
 
 All that is needed lies beside the output: the blocks and the configuration to which they belong.
 They are verified, and removed once the result is there. The path of the result goes to stdout,
-everything else to stderr. Exit codes as those of the sweep command; 4 names the shards that are
-missing, and everything stays as it is.
+everything else to stderr. Where shards are missing they are named, and everything stays as it is.
 """
 
-import sys
 from argparse import ArgumentParser, Namespace
 from typing import TYPE_CHECKING
 
@@ -81,6 +79,4 @@ def _require_all(store: "BlockStore", found: "Finished", shards: object) -> None
 
 
 main = Command("merge", __doc__, _arguments, _merge, common=("overwrite",))
-
-if __name__ == "__main__":
-    sys.exit(main())
+main.start(__name__)

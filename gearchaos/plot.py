@@ -4,16 +4,14 @@ with time history, phase portrait, Poincare section and amplitude spectrum.
 
 A figure that this command drew before is replaced, so that it can be run again and again; any
 other file of that name is kept unless --overwrite is given. The paths of the figures go to
-stdout. Exit codes: 0 done, 2 the command line asks for what cannot be, 4 a file cannot be read
-or written.
+stdout.
 """
 
 import argparse
-import sys
 from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from gearchaos.command_line import OK, Command, coordinates, number, place, whole_number
 from gearchaos.errors import FigureError
@@ -87,14 +85,14 @@ def _sweep_sheets(results: "Sequence[Result]", options: argparse.Namespace) -> "
         rule = f"no swept parameter of the figure, which are {', '.join(swept)}"
         raise FigureError(f"--mark {unknown[0]}: is {rule}")
     if options.shares:
-        if len(results) > 1 or options.variable or options.stages or options.full_range:
-            rule = "draws one result, and no diagram: leave --variable, --stages, --full-range out"
+        if len(results) > 1 or options.variable or options.stages:
+            rule = "draws one result, and no diagram: leave --variable and --stages out"
             raise FigureError(f"--shares: {rule}")
         width = options.width or SINGLE_COLUMN_MM
         drawn = (options.low, options.high), width, options.height
         return [(f"{name}_shares", partial(shares_page, results[0], *drawn))]
     size = {"width_mm": options.width or SINGLE_COLUMN_MM, "height_mm": options.height}
-    shown = {"between": (options.low, options.high), "full_range": options.full_range}
+    shown: dict[str, Any] = {"between": (options.low, options.high)}
     if any(len(swept_axes(one)) > 1 for one in results):
         if len(results) > 1 or options.stages:
             raise FigureError(
@@ -117,10 +115,10 @@ def _response_sheets(results: "Sequence[Result]", options: argparse.Namespace) -
     from gearchaos.figures.response import COORDINATE
     from gearchaos.figures.style import DOUBLE_COLUMN_MM
 
-    for option in ("full_range", "stages", "shares", "mark"):
+    for option in ("stages", "shares", "mark"):
         if getattr(options, option):
             raise FigureError(
-                f"--{option.replace('_', '-')}: {options.result[0]} is a response; it belongs to "
+                f"--{option}: {options.result[0]} is a response; it belongs to "
                 "the diagram of a sweep"
             )
     (result,) = results
@@ -191,7 +189,6 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
     add("--shares", action="store_true", help=text)
     text = "dimensionless (default), or physical: um, m/s, N and 1/s instead of their scales"
     add("--units", choices=("dimensionless", "physical"), help=text)
-    add("--full-range", action="store_true", help="show every lane, however few lie far out")
     text = "width of the page (default: 85, one column of a journal; a response: 180, two)"
     add("--width", type=partial(millimetres, low=60.0), metavar="MM", help=text)
     text = "height of the page (default: by the width)"
@@ -247,6 +244,4 @@ def _lanes_in_words(result: "Result") -> str:
 
 
 main = Command("plot", __doc__, _arguments, _plot, common=("overwrite",))
-
-if __name__ == "__main__":
-    sys.exit(main())
+main.start(__name__)

@@ -1,11 +1,9 @@
 """Compute and draw everything that a paper shows, and compare every number it prints with ours.
 
-The folder gets the figures (PNG and PDF), the results (HDF5) and a
-report with the comparison, report.md. The path of report.md goes to stdout,
-everything else to stderr. Exit codes: 0 done, 2 usage, 4 cannot read or write.
+The folder gets the figures (PNG and PDF), the results (HDF5) and a report with the comparison,
+report.md. The path of report.md goes to stdout, everything else to stderr.
 """
 
-import sys
 import time
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
@@ -41,6 +39,4 @@ def _reproduce(options: Namespace) -> int:
 
 
 main = Command("reproduce", __doc__, _arguments, _reproduce, common=("overwrite", "threads"))
-
-if __name__ == "__main__":
-    sys.exit(main())
+main.start(__name__)

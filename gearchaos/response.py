@@ -4,11 +4,9 @@ result, the motion goes on from where one of its lanes ended, with no transient,
 again from where the lane started.
 
 The path of the result goes to stdout, everything else to stderr; python -m gearchaos.plot draws
-it. Exit codes: 0 done, 2 the command line or the configuration asks for what cannot be, 3 done, but
-more lanes diverged than outputs.allowed_diverged_share, 4 a file cannot be read or written.
+it.
 """
 
-import sys
 from argparse import ArgumentParser, Namespace
 from typing import TYPE_CHECKING
 
@@ -132,6 +130,4 @@ def _configuration(options: Namespace) -> "Asked":
 main = Command(
     "response", __doc__, _arguments, _respond, common=("output", "overwrite", "threads", "set")
 )
-
-if __name__ == "__main__":
-    sys.exit(main())
+main.start(__name__)

@@ -1,17 +1,15 @@
 """List the stages of a sweep: stretches of the swept parameter in which the motion keeps its label.
 
-The table goes to stdout, everything else to stderr. Exit codes: 0 done, 2 the command line asks
-for what cannot be, 4 the file cannot be read, is damaged or holds no labels.
+The table goes to stdout, everything else to stderr.
 """
 
 import argparse
 import json
 import math
-import sys
 import textwrap
 from collections.abc import Iterator, Sequence
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from gearchaos.command_line import OK, Command, coordinates, number, place, whole_number
 from gearchaos.errors import ConfigurationError
@@ -24,8 +22,7 @@ if TYPE_CHECKING:
     from gearchaos.results.stage_table import Stage
 
 
-WIDTH = 80
-"""Columns of a terminal."""
+WIDTH = 80  # Columns of a terminal.
 
 
 def _arguments(parser: argparse.ArgumentParser) -> None:
@@ -63,7 +60,7 @@ def _width(text: str) -> float:
 
 def _stages(options: argparse.Namespace) -> int:
     from gearchaos.results.jumps import apart, crises, jumps
-    from gearchaos.results.overview import finite, slice_lines
+    from gearchaos.results.overview import plain, slice_lines
     from gearchaos.results.result import open_result
     from gearchaos.results.scales import excitation_of
     from gearchaos.results.stage_table import labelled_lanes, one_axis, slice_facts, stage_table
@@ -88,18 +85,18 @@ def _stages(options: argparse.Namespace) -> int:
     several = [axis for axis in result.axes if axis in REPEATS]
     jumping, bursting = ([], []) if several else (jumps(result), crises(result))
     if options.json:
-        refined = {} if boundaries is None else {"boundaries": [*map(_named, boundaries)]}
+        refined = {} if boundaries is None else {"boundaries": boundaries}
         facts = {
             "parameter": result.axis,
             "slice": where,
-            "stages": [*map(_named, stages)],
-            **({"directions_apart": [*map(_named, stretches)]} if both else {}),
+            "stages": stages,
+            **({"directions_apart": stretches} if both else {}),
             **refined,
-            "jumps": [jump._asdict() for jump in jumping],
-            "crises": [crisis._asdict() for crisis in bursting],
-            "survival": outlasting and outlasting._asdict(),
+            "jumps": jumping,
+            "crises": bursting,
+            "survival": outlasting,
         }
-        print(json.dumps(finite(facts), indent=1, allow_nan=False))
+        print(json.dumps(plain(facts), indent=1))
         return OK
     mixed = int((result[RECORD] == 1).sum()) if RECORD in result else 0
     told = [*band_lines(stages), *remarks(jumping, bursting, mixed), *directions_apart(stretches)]
@@ -120,7 +117,7 @@ def _map_boundaries(result: "Result", options: argparse.Namespace) -> int:
     from gearchaos.engine.recomputing import refinable
     from gearchaos.engine.refinement import refined_map
     from gearchaos.engine.running import choose_threads, compiling
-    from gearchaos.results.overview import finite
+    from gearchaos.results.overview import plain
 
     choose_threads(options.threads)
     config = refinable(result, options.result)
@@ -139,11 +136,11 @@ def _map_boundaries(result: "Result", options: argparse.Namespace) -> int:
         facts = {
             "parameter": first,
             "second_parameter": second,
-            "rows": [{"value": at, "boundaries": [*map(_named, rows[at])]} for at in rows],
+            "rows": [{"value": at, "boundaries": found} for at, found in rows.items()],
             "lanes": lanes,
             "lanes_of_a_map_as_fine": fine,
         }
-        print(json.dumps(finite(facts), indent=1, allow_nan=False))
+        print(json.dumps(plain(facts), indent=1))
         return OK
     for value, found in rows.items():
         print(f"{second} = {value:.6g}", *boundary_list(found), sep="\n")
@@ -238,29 +235,5 @@ def boundary_list(boundaries: "Sequence[Boundary]") -> Iterator[str]:
             yield f"    multiplier {real:.4f}{pair}"
 
 
-_NAMES = {
-    "start": "from",
-    "end": "to",
-    "label": "motion",
-    "narrower": "narrower_stages",
-    "label_below": "motion_below",
-    "label_above": "motion_above",
-    "loss": "loss_of_stability",
-}
-"""Names in JSON of what stages and boundaries have, where they differ."""
-
-
-def _named(record: "Stage | Boundary | Apart") -> dict[str, Any]:
-    facts = {_NAMES.get(name, name): value for name, value in record._asdict().items()}
-    if "multiplier" in facts:
-        multiplier = facts.pop("multiplier")
-        facts |= {"multiplier_real": multiplier.real, "multiplier_imaginary": multiplier.imag}
-        facts["loss_of_stability"] = facts["loss_of_stability"] or None
-        facts["direction"] = facts["direction"] or None
-    return facts
-
-
 main = Command("stages", __doc__, _arguments, _stages, common=("threads",))
-
-if __name__ == "__main__":
-    sys.exit(main())
+main.start(__name__)

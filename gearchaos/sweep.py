@@ -1,16 +1,13 @@
 """Compute the sweep that a TOML file describes and write it to an HDF5 file.
 
-The path of the result goes to stdout, everything else to stderr. Exit codes: 0 done, 2 the
-command line or the configuration asks for what cannot be, 3 done, but more lanes diverged than
-outputs.allowed_diverged_share, 4 a file cannot be read or written, 130 interrupted and 143
-terminated: finished blocks are kept and --resume goes on from them.
+The path of the result goes to stdout, everything else to stderr. Interrupted or terminated,
+finished blocks are kept and --resume goes on from them.
 """
 
 import sys
 import time
 from argparse import ArgumentParser, Namespace
 from contextlib import suppress
-from importlib.util import find_spec
 from typing import TYPE_CHECKING
 
 from gearchaos.command_line import OK, Command
@@ -72,6 +69,8 @@ def _sweep(options: Namespace) -> int:
 
 def _check_sharing(options: Namespace, config: "Configuration") -> None:
     """Refuse what --dask and --shard cannot do."""
+    from gearchaos.results.tables import needed
+
     for flag in ("dask", "shard"):
         if getattr(options, flag) is not None and config.start.carry != "none":
             raise ConfigurationError(
@@ -85,10 +84,7 @@ def _check_sharing(options: Namespace, config: "Configuration") -> None:
             f"--threads {options.threads}: the workers of a cluster use the cores that they have; "
             "start them with the variable NUMBA_NUM_THREADS to use fewer"
         )
-    if find_spec("distributed") is None:
-        raise ConfigurationError(
-            "--dask: dask.distributed is not installed; pip install gearchaos[dask]"
-        )
+    needed("distributed", "dask")
 
 
 def _compute(
@@ -138,6 +134,4 @@ def _command(name: str, *arguments: str) -> str:
 main = Command(
     "sweep", __doc__, _arguments, _sweep, common=("output", "overwrite", "threads", "set")
 )
-
-if __name__ == "__main__":
-    sys.exit(main())
+main.start(__name__)

@@ -11,8 +11,8 @@ from typing import NamedTuple, Self
 import gearchaos_kernels as kernels
 import numpy as np
 from gearchaos_kernels import Plan, Status
-from numpy.typing import NDArray
 
+from gearchaos.arrays import Floats
 from gearchaos.configuration import Given, axis_values, configuration_of, swept_values
 from gearchaos.dynamics.exponents import Exponents, exponents, sum_of_exponents
 from gearchaos.dynamics.following import (
@@ -35,8 +35,6 @@ from gearchaos.records.amplitude_spectrum import SpectralLines, spectral_lines
 from gearchaos.results.response_variables import DEFAULT_PERIODS
 from gearchaos.results.result import Result
 
-Floats = NDArray[np.float64]
-
 
 class Trajectory(NamedTuple):
     """A motion: ``time`` (samples,) in mesh periods, ``states`` (samples, states) of eq. 13.
@@ -52,26 +50,12 @@ class Trajectory(NamedTuple):
 class System:
     """A gear pair with all its parameters fixed.
 
-    Parameters
-    ----------
-    config : Configuration or path
-        Scene, start and integration; what it sweeps is fixed here.
-    at : mapping of str to float, optional
-        Parameters by their paths, such as ``{"operation.speed_rpm": 12000.0}``.
-    **groups : float
-        Dimensionless groups by their names, such as ``pitch_error=10.75``.
-
-    Attributes
-    ----------
-    state : ndarray, shape (states,)
-        Where motions start unless another state is given: as the configuration says, or where the
-        lane of a result ended.
-
-    Raises
-    ------
-    ConfigurationError
-        If a swept parameter is left open, a parameter is unknown or out of its range, or the steps
-        per period are unstable.
+    ``config``, or the path of its file: scene, start and integration; what it sweeps is fixed by
+    ``at``, parameters by their paths, such as ``{"operation.speed_rpm": 12000.0}``, or by
+    ``groups``, by their names, such as ``pitch_error=10.75``. The attribute ``state`` (states,) is
+    where motions start unless another state is given: as the configuration says, or where the lane
+    of a result ended. Raises ConfigurationError if a swept parameter is left open, a parameter is
+    unknown or out of its range, or the steps per period are unstable.
     """
 
     def __init__(
@@ -96,17 +80,9 @@ class System:
     def of_lane(cls, result: Result, **coordinates: float | str) -> Self:
         """Return the system of one lane of a result; it starts where the lane ended.
 
-        Parameters
-        ----------
-        result : Result
-            Of a sweep or a response, with its configuration.
-        **coordinates : float
-            One for each axis of the result, by its name; the nearest lane is taken.
-
-        Raises
-        ------
-        ConfigurationError
-            If a coordinate is missing or of no axis.
+        ``result``: of a sweep or a response, with its configuration; ``coordinates``: one for each
+        of its axes, by name; the nearest lane is taken. Raises ConfigurationError if a coordinate
+        is missing or of no axis.
         """
         missing = [axis for axis in result.axes if axis not in coordinates]
         if missing:
@@ -146,18 +122,14 @@ class System:
     ) -> Trajectory:
         """Integrate the motion and keep every step of so many mesh periods after the transient.
 
-        ``start`` (states,) is the state at mesh phase 0, by default `state`.
-
-        Raises
-        ------
-        ConfigurationError
-            If the motion leaves the range of numbers.
+        ``start`` (states,) is the state at mesh phase 0, by default `state`. Raises
+        ConfigurationError if the motion leaves the range of numbers.
         """
         plan = self._plan._replace(
             transient_periods=transient, recorded_periods=periods, history_periods=periods
         )
         outcome = kernels.integrate(self._record, self._start(start), plan)
-        if outcome.status[0] != Status.OK or outcome.history is None:
+        if outcome.status[0] != Status.OK:
             raise ConfigurationError(
                 f"{self.config.source}: the motion {kernels.STATUS_TEXTS[outcome.status[0]]} in "
                 f"mesh period {outcome.diverged_period[0]}; raise integration.steps_per_period or "
@@ -180,12 +152,8 @@ class System:
 
         Of excitation periods: with pitch errors tooth by tooth these are `repeats_after` mesh
         periods, else one. ``guess`` (states,) is a state close to the orbit at its beginning, by
-        default the one after the configured transient.
-
-        Raises
-        ------
-        ConfigurationError
-            If there is no orbit of this period next to the guess.
+        default the one after the configured transient. Raises ConfigurationError if there is no
+        orbit of this period next to the guess.
         """
         if guess is None:
             repeats = self.repeats_after

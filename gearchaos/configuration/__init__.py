@@ -3,15 +3,3 @@
 from gearchaos.configuration.models import Configuration, Given, configuration_of, load_config
 from gearchaos.configuration.run_tables import EFFECTS, STATES
 from gearchaos.configuration.tables import axis_values, groups_at, swept_values
-
-__all__ = [
-    "EFFECTS",
-    "STATES",
-    "Configuration",
-    "Given",
-    "axis_values",
-    "configuration_of",
-    "groups_at",
-    "load_config",
-    "swept_values",
-]

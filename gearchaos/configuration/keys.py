@@ -24,6 +24,7 @@ class Table(BaseModel):
         validate_default=True,
         serialize_by_alias=True,
         protected_namespaces=(),
+        use_attribute_docstrings=True,
     )
 
     @model_validator(mode="before")
@@ -50,16 +51,17 @@ TeethPair: TypeAlias = Annotated[tuple[_Teeth, _Teeth], _AS_LIST]
 
 
 def key(
-    description: str, units: str = "", example: Any = None, *, default: Any = ..., **rules: Any
+    description: str = "", units: str = "", example: Any = None, *, default: Any = ..., **rules: Any
 ) -> Any:
     """Declare a key: what it is without its unit, its unit, an example, and its default.
 
-    The unit is empty where there is none and ``"1"`` for a dimensionless number, ``...`` as default
-    makes the key required, and the rules are constraints of `pydantic.Field`, such as ``gt=0``.
+    What takes more than the line of the declaration to say stands below it. The unit is empty where
+    there is none and ``"1"`` for a dimensionless number, ``...`` as default makes the key required,
+    and the rules are constraints of `pydantic.Field`, such as ``gt=0``.
     """
     return Field(
         default,
-        description=f"{description}, in {units}" if units not in ("", "1") else description,
+        description=f"{description}, in {units}" if units not in ("", "1") else description or None,
         examples=None if example is None else [example],
         json_schema_extra={"units": units} if units else None,
         **rules,
@@ -83,7 +85,11 @@ class Key:
     @property
     def wording(self) -> str:
         """The meaning without the unit."""
-        return (self.field.description or "").removesuffix(f", in {self.units}")
+        return self._described.removesuffix(f", in {self.units}")
+
+    @property
+    def _described(self) -> str:
+        return " ".join((self.field.description or "").split())
 
     @property
     def is_number(self) -> bool:
@@ -107,7 +113,7 @@ class Key:
     def remedy(self) -> str:
         """What belongs here, with an example where there is one."""
         example = f", such as {toml_literal(self.field.examples[0])}" if self.field.examples else ""
-        return f"expected: {self.field.description}{example}"
+        return f"expected: {self._described}{example}"
 
 
 def keys_of(model: type[Table], path: str = "") -> Iterator[Key]:

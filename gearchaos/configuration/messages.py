@@ -12,8 +12,7 @@ from pydantic_core import ErrorDetails
 from gearchaos.configuration.keys import Key
 from gearchaos.configuration.toml_text import quoted_key
 
-MOST_SHOWN = 100
-"""Faults that are worded; a file with more of them is hardly a configuration."""
+MOST_SHOWN = 100  # Faults that are worded; a file with more of them is hardly a configuration.
 
 _RULES = {
     "missing": "is missing",
@@ -54,8 +53,7 @@ _FOUND = {
 NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?")
 
 
-_TAGS = ("kind", "shape")
-"""Keys by which the kinds of a table are told apart."""
+_TAGS = ("kind", "shape")  # Keys by which the kinds of a table are told apart.
 
 
 class Fault(NamedTuple):

@@ -148,14 +148,9 @@ def load_config(path: str | os.PathLike[str], overrides: Iterable[str] = ()) -> 
     """Read a configuration from a TOML file.
 
     The path ``-`` is standard input. Overrides are such as ``"integration.steps_per_period=100"``;
-    what is not TOML is taken as text.
-
-    Raises
-    ------
-    FileError
-        If the file cannot be read.
-    ConfigurationError
-        If it is not a sound configuration: one message per fault, all faults at once.
+    what is not TOML is taken as text. Raises FileError if the file cannot be read,
+    ConfigurationError if it is not a sound configuration: one message per fault, all faults at
+    once.
     """
     source = os.fspath(path)
     return Configuration.from_toml(text_of_file(source), source, overrides)

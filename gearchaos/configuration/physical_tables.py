@@ -4,7 +4,7 @@
 # ruff: noqa: N815
 
 from functools import partial
-from typing import Annotated, Any, Literal, TypeAlias
+from typing import Annotated, Literal, TypeAlias
 
 from pydantic import BeforeValidator, Field
 
@@ -18,14 +18,13 @@ from gearchaos.configuration.keys import (
     key,
 )
 
-_SHAPE = '"fourier" takes the coefficients, "trapezoid" takes rise, top, fall, bottom, half_height'
+_SHAPE = '"fourier" takes the coefficients, "trapezoid" the contact ratio of [pair]'
 _KIND = '"sine": at mesh frequency, "teeth": as measured, "grade": drawn by an accuracy grade'
 _optional = partial(key, default=None)
 _mean = partial(key, "mean of the pitch error", "um", 0.0, default=0.0)
 _smoothing = partial(
     key, "share of the mesh period in which teeth take their load", "1", default=0.1, ge=0.01, le=1
 )
-_share = partial(key, units="1", example=0.25, default=None, ge=0, le=1)
 
 
 class Pair(Table):
@@ -78,15 +77,6 @@ class TrapezoidStiffness(Table):
     """Mesh stiffness as a trapezoid over the mesh period (Pan 2021, eqs 15-18)."""
 
     shape: Literal["trapezoid"] = key(_SHAPE, example="fourier")
-    rise: float | None = _share(
-        "rising share of the mesh period; no shares: from the contact ratio of [pair]"
-    )
-    top: float | None = _share("share of the mesh period at the top")
-    fall: float | None = _share("falling share of the mesh period")
-    bottom: float | None = _share("share of the mesh period at the bottom")
-    half_height: float | None = _optional(
-        "half the height of the trapezoid relative to the mean stiffness", "1", 0.111, ge=0, lt=1
-    )
     harmonics: int = key("number of harmonics kept of the trapezoid", default=6, ge=1, le=1000)
 
 
@@ -126,9 +116,8 @@ class GearDeviations(Table):
     file: str | None = _optional("CSV file instead of a list, relative to the configuration")
     column: str | None = _optional("heading of the column to take", example="Fp")
     holds: Literal["cumulative", "single"] = key("what the column holds", default="cumulative")
-    counted: Literal["with_rotation", "against_rotation"] = key(
-        "direction in which teeth are counted and deviations positive", default="with_rotation"
-    )
+    counted: Literal["with_rotation", "against_rotation"] = key(default="with_rotation")
+    """direction in which teeth are counted and deviations positive"""
     flank: Literal["right", "left"] | None = _optional("flank that was measured, for the record")
 
 
@@ -156,14 +145,10 @@ class GradeError(Table):
     eccentricity: float = key("share of an eccentricity", "1", default=0.5, ge=0, le=1)
 
 
-def _kind_of_all_files_before(given: Any) -> Any:
-    return {"kind": "sine", **given} if isinstance(given, dict) else given
-
-
 PitchError: TypeAlias = Annotated[
     SineError | TeethError | GradeError,
     Field(discriminator="kind"),
-    BeforeValidator(_kind_of_all_files_before),
+    BeforeValidator(lambda given: {"kind": "sine", **given} if isinstance(given, dict) else given),
 ]
 """``[pitch_error]``; without a kind it is a sine."""
 

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from gearchaos.arrays import Floats
 from gearchaos.configuration.messages import NUMBER, Fault, shown
 from gearchaos.configuration.physical_tables import (
     GearDeviations,
@@ -17,7 +18,7 @@ from gearchaos.configuration.physical_tables import (
     TeethError,
 )
 from gearchaos.configuration.rules import reads
-from gearchaos.configuration.tables import SWEEPABLE_KEYS, FloatArray, Tables, swept_values
+from gearchaos.configuration.tables import SWEEPABLE_KEYS, Tables, swept_values
 from gearchaos.configuration.toml_text import text_of_file
 from gearchaos.errors import GearchaosError
 from gearchaos.gear.tooth_deviations import counted_deviations, tooth_deviations
@@ -161,7 +162,7 @@ def _keys_belong_to_the_kind(config: Tables) -> Iterator[Fault]:
             yield Fault(key, rule, "choose another pitch_error.kind, or sweep pitch_error", name)
 
 
-def grade_faults(config: Tables, swept: Mapping[str, FloatArray]) -> Iterator[Fault]:
+def grade_faults(config: Tables, swept: Mapping[str, Floats]) -> Iterator[Fault]:
     """Yield what is wrong with the grades of the lanes; ``swept`` has both ends of every sweep."""
     if not isinstance(config.pitch_error, GradeError):
         return

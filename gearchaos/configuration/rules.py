@@ -1,6 +1,5 @@
 """Rules that tie several keys of a configuration together, but for those of the sweeps."""
 
-import math
 from collections import Counter
 from collections.abc import Callable, Iterator
 from functools import partial
@@ -48,40 +47,11 @@ def _length_scale_is_known(config: Tables) -> Iterator[Fault]:
         yield Fault(swept[backlash], rule, f"give {scale}", backlash)
 
 
-@reads("mesh")
-def _shares_fill_the_period(config: Tables) -> Iterator[Fault]:
-    shares = _shares(config)
-    if shares is None:
-        return
-    if 0 < len(shares) < 4:
-        rule = f"gives {len(shares)} of the four shares rise, top, fall, bottom"
-        remedy = "give all four, or none to take them from the contact ratio of [pair]"
-        yield Fault("mesh.stiffness", rule, remedy)
-    elif shares and not math.isclose(sum(shares), 1.0, abs_tol=1e-9):
-        rule = f"rise + top + fall + bottom = {sum(shares):.12g}, must be 1"
-        yield Fault("mesh.stiffness", rule, "the four are shares of one mesh period")
-    half_height = config.physical()["mesh.stiffness.half_height"]
-    if (half_height is None) == bool(shares):
-        rule = "must be given with the four shares, and only with them"
-        remedy = "without both the contact ratio of [pair] decides"
-        yield Fault("mesh.stiffness.half_height", rule, remedy, half_height)
-
-
 @reads("mesh", "pair")
 def _contact_ratio_is_known(config: Tables) -> Iterator[Fault]:
-    if config.pair is None and _shares(config) == []:
-        rule = "a trapezoid without shares takes its shape from the contact ratio of [pair]"
-        remedy = "give [pair], or rise, top, fall, bottom and half_height"
-        yield Fault("mesh.stiffness", rule, remedy)
-
-
-def _shares(config: Tables) -> list[float] | None:
-    """Return the shares that are given of a trapezoid; None where there is no trapezoid."""
-    given = config.physical()
-    if given["mesh.stiffness.shape"] != "trapezoid":
-        return None
-    shares = (given[f"mesh.stiffness.{name}"] for name in ("rise", "top", "fall", "bottom"))
-    return [share for share in shares if share is not None]
+    if config.pair is None and config.physical()["mesh.stiffness.shape"] == "trapezoid":
+        rule = "a trapezoid takes its shape from the contact ratio of [pair]"
+        yield Fault("mesh.stiffness", rule, 'give [pair], or shape = "fourier"')
 
 
 def _named_once(table: str, key: str, config: Tables) -> Iterator[Fault]:

@@ -9,8 +9,7 @@ from pydantic import BeforeValidator, Field, create_model, model_validator
 from gearchaos.configuration.keys import Harmonics, Numbers, Table, key
 from gearchaos.gear.groups import GROUP_TABLE, GroupRow
 
-MOST_LANES = 100_000_000
-"""Lanes of one run: what a file and a machine can still hold."""
+MOST_LANES = 100_000_000  # Lanes of one run: what a file and a machine can still hold.
 MOST_STEPS_PER_PERIOD = 1_000_000
 FLOW_MAP_STEPS = 24
 """Steps per period of flow maps: fewer cost more at a crossing, more cost more between them."""
@@ -97,43 +96,23 @@ _Box = dict[State, Annotated[tuple[float, float], Field(strict=False)]]
 class Start(Table):
     """The state in which the lanes start."""
 
-    kind: Literal["rest", "contact", "given", "random", "grid"] = key(
-        "all zero, on the contact flank, as in `state`, at random, or on a grid", default="rest"
-    )
-    state: dict[State, float] = key(
-        'start values by state for kind = "given", and beside a box; those not named are 0',
-        example={"delta_5": 1.0},
-        default={},
-    )
-    box: _Box = key(
-        "lowest and highest start value by state: where a grid reaches, both ends included, or "
-        "where random starts are uniform; those not named are as in `state`",
-        example={"delta_5": [-2.0, 2.0], "delta_5_rate": [-1.5, 1.5]},
-        default={},
-    )
-    drawn: _Box = key(
-        'for kind = "grid": lowest and highest start value of states that are drawn beside it',
-        example={"delta_1": [-0.5, 0.5]},
-        default={},
-    )
-    spread: float = key(
-        'for kind = "random" without a box: every state is uniform between minus and plus this',
-        "1",
-        default=1.0,
-        gt=0,
-    )
+    kind: Literal["rest", "contact", "given", "random", "grid"] = key(default="rest")
+    """all zero, on the contact flank, as in `state`, at random, or on a grid"""
+    state: dict[State, float] = key(example={"delta_5": 1.0}, default={})
+    """start values by state for kind = "given", and beside a box; those not named are 0"""
+    box: _Box = key(example={"delta_5": [-2.0, 2.0], "delta_5_rate": [-1.5, 1.5]}, default={})
+    """lowest and highest start value by state: where a grid reaches, both ends included, or where
+    random starts are uniform; those not named are as in `state`"""
+    drawn: _Box = key(example={"delta_1": [-0.5, 0.5]}, default={})
+    """for kind = "grid": lowest and highest start value of states that are drawn beside it"""
+    spread: float = key(units="1", default=1.0, gt=0)
+    """for kind = "random" without a box: every state is uniform between minus and plus this"""
     seed: int = key("seed of what is drawn", default=0, ge=0, le=2**32 - 1)
-    count: int = key(
-        "random starts per parameter value, or points of a grid along each state of its box",
-        default=1,
-        ge=1,
-        le=_MOST_STARTS,
-    )
-    carry: Literal["none", "upwards", "downwards", "both"] = key(
-        "whether each value of [sweep] starts from the end state of the one before it, and in "
-        "which direction; both are two sweeps side by side, the axis `direction` of one result",
-        default="none",
-    )
+    count: int = key(default=1, ge=1, le=_MOST_STARTS)
+    """random starts per parameter value, or points of a grid along each state of its box"""
+    carry: Literal["none", "upwards", "downwards", "both"] = key(default="none")
+    """whether each value of [sweep] starts from the end state of the one before it, and in which
+    direction; both are two sweeps side by side, the axis `direction` of one result"""
 
     @property
     def counted(self) -> int:
@@ -150,21 +129,14 @@ class Start(Table):
 class Sweep(Table):
     """A swept parameter and its values, from/to/count or a list."""
 
-    parameter: str = key(
-        "a group by its name, or a physical key by its path such as operation.speed_rpm",
-        example="pitch_error",
-    )
+    parameter: str = key(example="pitch_error")
+    """a group by its name, or a physical key by its path such as operation.speed_rpm"""
     from_: float | None = key("first value", example=0.0, default=None, alias="from")
     to: float | None = key("last value", example=15.0, default=None)
-    count: int | None = key(
-        "number of values, evenly spaced", example=1501, default=None, ge=1, le=_MOST_VALUES
-    )
-    values: Numbers | None = key(
-        "the values themselves, instead of from, to and count",
-        example=[1.0, 2.0],
-        default=None,
-        min_length=1,
-    )
+    count: int | None = key(example=1501, default=None, ge=1, le=_MOST_VALUES)
+    """number of values, evenly spaced"""
+    values: Numbers | None = key(example=[1.0, 2.0], default=None, min_length=1)
+    """the values themselves, instead of from, to and count"""
 
     @property
     def size(self) -> int:
@@ -175,11 +147,9 @@ class Sweep(Table):
 class Integration(Table):
     """The method, on a fixed grid over the mesh period."""
 
-    method: Literal["rk4", "flow_map"] = key(
-        "classical Runge-Kutta of order 4, or maps of whole steps that are exact between crossings "
-        "and at them",
-        default="rk4",
-    )
+    method: Literal["rk4", "flow_map"] = key(default="rk4")
+    """classical Runge-Kutta of order 4, or maps of whole steps that are exact between crossings and
+    at them"""
     steps_per_period: int = key(
         f'steps per mesh period; {FLOW_MAP_STEPS} with method = "flow_map", where nothing else is '
         "given",
@@ -187,36 +157,21 @@ class Integration(Table):
         ge=1,
         le=MOST_STEPS_PER_PERIOD,
     )
-    tolerance: float | None = key(
-        "largest error of section and exponent; the steps are then doubled, from steps_per_period "
-        "on, until lanes of the sweep that are tried beforehand reach it; flow maps are tried once",
-        example=1e-6,
-        default=None,
-        gt=0,
-    )
-    error_check: float = key(
-        "share of the lanes that are computed again with half the step, to measure their error",
-        "1",
-        default=0.0,
-        ge=0,
-        le=1,
-    )
-    crossings: Literal["resolved", "plain"] = key(
-        "whether a step that crosses a clearance boundary is split there, which keeps the order "
-        "of the method, or is a plain step; flow maps resolve every crossing",
-        default="resolved",
-    )
-    unstable: Literal["refuse", "raise"] = key(
-        "whether a number of steps below the stability limit of a lane is refused, or raised to "
-        "it; flow maps have none",
-        default="refuse",
-    )
-    transient_periods: int = key(
-        "mesh periods discarded before anything is recorded", default=500, ge=0, le=1_000_000_000
-    )
-    recorded_periods: int = key(
-        "mesh periods observed after the transient", default=500, ge=1, le=1_000_000_000
-    )
+    tolerance: float | None = key(example=1e-6, default=None, gt=0)
+    """largest error of section and exponent; the steps are then doubled, from steps_per_period on,
+    until lanes of the sweep that are tried beforehand reach it; flow maps are tried once"""
+    error_check: float = key(units="1", default=0.0, ge=0, le=1)
+    """share of the lanes that are computed again with half the step, to measure their error"""
+    crossings: Literal["resolved", "plain"] = key(default="resolved")
+    """whether a step that crosses a clearance boundary is split there, which keeps the order of the
+    method, or is a plain step; flow maps resolve every crossing"""
+    unstable: Literal["refuse", "raise"] = key(default="refuse")
+    """whether a number of steps below the stability limit of a lane is refused, or raised to it;
+    flow maps have none"""
+    transient_periods: int = key(default=500, ge=0, le=1_000_000_000)
+    """mesh periods discarded before anything is recorded"""
+    recorded_periods: int = key(default=500, ge=1, le=1_000_000_000)
+    """mesh periods observed after the transient"""
 
     @model_validator(mode="before")
     @classmethod
@@ -234,37 +189,24 @@ class Outputs(Table):
     )
     section_points: int = key("last mesh periods of the section that are kept", default=100, ge=1)
     lyapunov: bool = key("whether the largest Lyapunov exponent is computed", default=True)
-    motion: bool = key(
-        "whether the motion is labelled: its kind, its period, and the distance of its return",
-        default=True,
-    )
-    contact: bool = key(
-        "whether the shares of time on either flank and the impacts on it are told", default=False
-    )
-    loads: bool = key(
-        "whether mesh forces, load factors and the transmission error are told", default=False
-    )
-    states: Annotated[tuple[State, ...], Field(strict=False)] = key(
-        "states of which extremes, and amplitudes at the orders, are told",
-        example=["delta_5"],
-        default=(),
-    )
+    motion: bool = key(default=True)
+    """whether the motion is labelled: its kind, its period, and the distance of its return"""
+    contact: bool = key(default=False)
+    """whether the shares of time on either flank and the impacts on it are told"""
+    loads: bool = key(default=False)
+    """whether mesh forces, load factors and the transmission error are told"""
+    states: Annotated[tuple[State, ...], Field(strict=False)] = key(example=["delta_5"], default=())
+    """states of which extremes, and amplitudes at the orders, are told"""
     orders: Annotated[tuple[Order, ...], Field(strict=False, max_length=1000)] = key(
         "multiples of the mesh frequency at which amplitudes of the transmission error are told; "
         "the record has whole cycles of them",
         example=["1/3", "1/2", 1, 2],
         default=(),
     )
-    exponents: bool = key(
-        "whether all Lyapunov exponents are computed, at about ten times the cost", default=False
-    )
-    allowed_diverged_share: float = key(
-        "share of diverged lanes above which the command reports failure",
-        "1",
-        default=0.0,
-        ge=0,
-        le=1,
-    )
+    exponents: bool = key(default=False)
+    """whether all Lyapunov exponents are computed, at about ten times the cost"""
+    allowed_diverged_share: float = key(units="1", default=0.0, ge=0, le=1)
+    """share of diverged lanes above which the command reports failure"""
 
     @property
     def mesh_orders(self) -> tuple[Fraction, ...]:

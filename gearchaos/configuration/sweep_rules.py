@@ -5,6 +5,7 @@ from collections.abc import Collection, Iterator, Mapping
 
 import numpy as np
 
+from gearchaos.arrays import Floats
 from gearchaos.configuration.messages import Fault, suggestion
 from gearchaos.configuration.pitch_errors import OF_DRAWN_GEARS, grade_faults
 from gearchaos.configuration.rules import reads
@@ -13,7 +14,6 @@ from gearchaos.configuration.tables import (
     PHYSICAL_KEYS,
     SWEEPABLE_GROUPS,
     SWEEPABLE_KEYS,
-    FloatArray,
     Tables,
     groups_at,
     swept_values,
@@ -145,14 +145,14 @@ def lane_faults(config: Tables) -> Iterator[Fault]:
             yield _without_effect(config, table, some[sweep.parameter])
 
 
-def _some_values(sweep: Sweep) -> FloatArray:
+def _some_values(sweep: Sweep) -> Floats:
     """Return the ends of a sweep and a value between them; a value that is alone comes twice."""
     values = swept_values(sweep)
     some = values[[0, values.size // 2, -1]]
     return np.unique(some) if values.size > 1 else some[:2]
 
 
-def _refused(config: Tables, some: Mapping[str, FloatArray]) -> Iterator[Fault]:
+def _refused(config: Tables, some: Mapping[str, Floats]) -> Iterator[Fault]:
     """Yield the sweeps that make the stiffness differ between lanes; each does so alone."""
     for table, sweep in config.sweeps.items():
         try:
@@ -172,7 +172,7 @@ def _moved(config: Tables, groups: Groups, axis: int, count: int) -> bool:
     return False
 
 
-def _without_effect(config: Tables, table: str, values: FloatArray) -> Fault:
+def _without_effect(config: Tables, table: str, values: Floats) -> Fault:
     parameter, swept = config.sweeps[table].parameter, config.swept
     derived = derive_groups({**config.physical(), parameter: values}, without=HARMONICS)
     names = [name for name, value in derived.items() if np.ndim(value) > 0]

@@ -1,11 +1,12 @@
 """The tables of a configuration, the swept values and the groups; `models` checks them."""
 
 from collections.abc import Mapping
-from typing import Any, Literal, TypeAlias
+from typing import Any, Literal
 
 import numpy as np
 import numpy.typing as npt
 
+from gearchaos.arrays import Floats
 from gearchaos.configuration.keys import Table, key, keys_of
 from gearchaos.configuration.physical_tables import Bearings, Mesh, Operation, Pair, PitchError
 from gearchaos.configuration.run_tables import (
@@ -21,17 +22,13 @@ from gearchaos.configuration.toml_text import flat_tables
 from gearchaos.gear.groups import GROUPS_BY_NAME, Groups, resolve_groups
 from gearchaos.gear.tooth_deviations import REALISATION
 
-FloatArray: TypeAlias = npt.NDArray[np.float64]
-
 
 class Tables(Table):
     """The tables of a configuration, each sound by itself."""
 
     title: str = key("title of the sweep, for figures and files", default="")
-    formulation: Literal["physical", "published"] = key(
-        'gaps as the equations of motion give them, or as Pan 2021 prints them ("published")',
-        default="physical",
-    )
+    formulation: Literal["physical", "published"] = key(default="physical")
+    """gaps as the equations of motion give them, or as Pan 2021 prints them ("published")"""
     pair: Pair | None = key("catalogue data of the two gears", default=None)
     operation: Operation | None = key("the point of operation", default=None)
     mesh: Mesh | None = key("stiffness, damping and clearance of the mesh", default=None)
@@ -41,14 +38,12 @@ class Tables(Table):
     scene: Scene = key("which effects exist")
     start: Start = key("the state in which the lanes start", default=Start())
     sweep: Sweep = key("the swept parameter and its values")
-    second_sweep: Sweep | None = key(
-        "a second swept parameter: every value of it with every one of [sweep]", default=None
-    )
+    second_sweep: Sweep | None = key(default=None)
+    """a second swept parameter: every value of it with every one of [sweep]"""
     integration: Integration = key("the fixed grid of the integration", default=Integration())
     outputs: Outputs = key("what is kept of every lane", default=Outputs())
-    files: dict[str, str] | None = key(
-        "files that are named above, word for word, as a result keeps them", default=None
-    )
+    files: dict[str, str] | None = key(default=None)
+    """files that are named above, word for word, as a result keeps them"""
 
     @property
     def sweeps(self) -> dict[str, Sweep]:
@@ -103,7 +98,7 @@ SWEEPABLE_GROUPS = {name: row for name, row in GROUPS_BY_NAME.items() if not row
 """Groups that a sweep may vary, by name."""
 
 
-def swept_values(sweep: Sweep) -> FloatArray:
+def swept_values(sweep: Sweep) -> Floats:
     """Return the values of a sweep, shape (values,), in the unit of its parameter, ascending."""
     if sweep.values is not None:
         return np.sort(np.asarray(sweep.values, dtype=np.float64))
@@ -117,7 +112,7 @@ def swept_values(sweep: Sweep) -> FloatArray:
     return values
 
 
-def axis_values(config: Tables) -> dict[str, FloatArray]:
+def axis_values(config: Tables) -> dict[str, Floats]:
     """Return the swept values by parameter, in the order of the axes: [second_sweep] first.
 
     Each has the shape (values,); a parameter is in its own unit.

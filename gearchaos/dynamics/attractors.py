@@ -4,15 +4,12 @@ from typing import NamedTuple
 
 import numpy as np
 from gearchaos_kernels import Plan, System, integrate
-from numpy.typing import NDArray
 
+from gearchaos.arrays import Codes, Complex, Counts, Floats, Integers
 from gearchaos.dynamics.orbits import polish
 from gearchaos.interrupts import check
 from gearchaos.records.label import CHAOTIC, PERIODIC, QUASI_PERIODIC
 from gearchaos.records.period import POINTS_NEEDED, coordinate_scale
-
-Floats = NDArray[np.float64]
-Lanes = NDArray[np.intp]
 
 REACH = 1e-3
 """Distance from a periodic orbit within which a lane has come to it, in the scale of each state."""
@@ -23,11 +20,8 @@ ALIKE = 0.5
 GOES_ON = 0.3
 """Change up to which an attractor is the same at another value, in parts of all its averages."""
 
-LONG = 1000
-"""Mesh periods in which a lane settles, and then those over which its section is taken."""
-
-AT_ONCE = 1 << 20
-"""Section points that are held at once."""
+LONG = 1000  # Mesh periods in which a lane settles, and then those over which its section is taken.
+AT_ONCE = 1 << 20  # Section points that are held at once.
 
 
 class Attractor(NamedTuple):
@@ -40,7 +34,7 @@ class Attractor(NamedTuple):
 
     lane: int
     points: Floats
-    multipliers: NDArray[np.complex128]
+    multipliers: Complex
 
     @property
     def averages(self) -> Floats:
@@ -49,13 +43,8 @@ class Attractor(NamedTuple):
 
 
 def find_attractors(
-    system: System,
-    group: Lanes,
-    state: Floats,
-    motion: NDArray[np.uint8],
-    period: NDArray[np.int32],
-    plan: Plan,
-) -> tuple[list[Attractor], Lanes]:
+    system: System, group: Integers, state: Floats, motion: Codes, period: Counts, plan: Plan
+) -> tuple[list[Attractor], Integers]:
     """Find the attractors of lanes, and to which of them each has come: its place in the list.
 
     Lanes go on for twice `LONG` mesh periods, first one of each group, motion and period, then ever
@@ -100,7 +89,7 @@ def find_attractors(
     return found, place
 
 
-def numbers_along(value: Lanes, sizes: Lanes, averages: Floats) -> Lanes:
+def numbers_along(value: Integers, sizes: Integers, averages: Floats) -> Integers:
     """Number attractors such that what goes on along a sweep keeps its number, (attractors,).
 
     Of those at one value and those seen last under each number, the two whose ``averages``

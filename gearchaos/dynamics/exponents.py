@@ -9,11 +9,9 @@ from typing import NamedTuple, Self
 
 import numpy as np
 from gearchaos_kernels import Plan, System, integrate, jacobian
-from numpy.typing import NDArray
 
+from gearchaos.arrays import Floats
 from gearchaos.records.lyapunov import largest_exponent
-
-Floats = NDArray[np.float64]
 
 SMALLEST_RESOLVED = 1e-8
 """Share of a tangent vector that must be left when those before it are taken out."""
@@ -116,6 +114,5 @@ def _carry(
         plan._replace(transient_periods=0, section_points=0, history_periods=0, tangent=True),
         tangent_start=frame.transpose(0, 2, 1).reshape(-1, states),
     )
-    assert outcome.growth is not None
     vectors = outcome.end_tangent.reshape(lanes, states, states).transpose(0, 2, 1)
     return outcome.end_state[::states], vectors, outcome.growth.reshape(lanes, states, -1)

@@ -11,22 +11,16 @@ from typing import NamedTuple
 
 import numpy as np
 from gearchaos_kernels import Plan, System
-from numpy.typing import NDArray
 
+from gearchaos.arrays import Codes, Complex, Counts, Floats, Mask
 from gearchaos.dynamics.orbits import Orbits, polish
 
-Floats = NDArray[np.float64]
-
-Complex = NDArray[np.complex128]
-
-LONGEST_STEP = 1.0 / 16.0
-"""Share of the way along which an orbit is followed."""
+LONGEST_STEP = 1.0 / 16.0  # Share of the way along which an orbit is followed.
 
 MOST_ORBITS = 200
 """Orbits tried along the way; where they do not suffice nothing is known of what lies beyond."""
 
-NEAR_FOLD = 0.1
-"""An orbit that ends with a real multiplier this close to +1 ends in a fold."""
+NEAR_FOLD = 0.1  # An orbit that ends with a real multiplier this close to +1 ends in a fold.
 
 
 class StabilityLoss(IntEnum):
@@ -60,7 +54,7 @@ class Orbit(NamedTuple):
 
     period: int
     point: Floats
-    multipliers: NDArray[np.complex128]
+    multipliers: Complex
     exponent: float
     residual: float
 
@@ -93,7 +87,7 @@ class Losses(NamedTuple):
     pair that with the positive imaginary part.
     """
 
-    kind: NDArray[np.uint8]
+    kind: Codes
     multiplier: Complex
 
 
@@ -151,7 +145,7 @@ def loss_of_stability(stable: Complex, beyond: Complex) -> Losses:
 def follow(
     system_at: Callable[[Floats], System],
     guess: Floats,
-    period: NDArray[np.int32],
+    period: Counts,
     first: Floats,
     last: Floats,
     width: float,
@@ -170,7 +164,7 @@ def follow(
     distance: with too large a width it is not yet `NEAR_FOLD`.
     """
 
-    def orbits(share: Floats, guess: Floats, followed: NDArray[np.bool_]) -> Orbits:
+    def orbits(share: Floats, guess: Floats, followed: Mask) -> Orbits:
         system = system_at(first + share * (last - first))
         sought = np.where(followed, period, np.int32(0))
         return polish(system, guess, sought, plan)
@@ -210,7 +204,7 @@ def follow(
     )
 
 
-def _chosen(lanes: NDArray[np.bool_], one: Orbits, other: Orbits) -> Orbits:
+def _chosen(lanes: Mask, one: Orbits, other: Orbits) -> Orbits:
     """Take some lanes from one, the rest from the other."""
     return Orbits(
         *(

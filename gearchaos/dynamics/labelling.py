@@ -4,44 +4,28 @@ from typing import NamedTuple
 
 import numpy as np
 from gearchaos_kernels import Outcome, Plan, Status, System, integrate
-from numpy.typing import NDArray
 
+from gearchaos.arrays import Counts, Floats, Integers, Mask
 from gearchaos.dynamics.exponents import period_jacobian, sum_of_exponents
 from gearchaos.dynamics.orbits import polish
+from gearchaos.records import label
 from gearchaos.records.bands import band_count, subsequence_spread
-from gearchaos.records.label import (
-    CHAOTIC,
-    DIVERGED,
-    GROWS,
-    MOST_POINTS,
-    PERIODIC,
-    QUASI_PERIODIC,
-    SETTLING,
-    UNRESOLVED,
-    Labels,
-    Record,
-    doubtful,
-    label,
-    settling_periods,
-)
 from gearchaos.records.period import coordinate_scale, return_distances
 
 LOOKS = (4, 16)
 """How many times the record doubtful lanes go on, and then those that are doubtful still."""
 
-WHOLE = 0.25
-"""Largest difference of the subsequences of a curve, see `subsequence_spread`."""
+WHOLE = 0.25  # Largest difference of the subsequences of a curve, see `subsequence_spread`.
 
 
-MARGIN = 1e-9
-"""Distance of a multiplier from the unit circle that rounding does not explain."""
+MARGIN = 1e-9  # Distance of a multiplier from the unit circle that rounding does not explain.
 
 
 class Told(NamedTuple):
     """Labels, and the state (lanes, states) at the end of the look that told each."""
 
-    labels: Labels
-    state: NDArray[np.float64]
+    labels: label.Labels
+    state: Floats
 
 
 def labels_of(system: System, outcome: Outcome, plan: Plan) -> Told:
@@ -53,15 +37,15 @@ def labels_of(system: System, outcome: Outcome, plan: Plan) -> Told:
     """
     repeats = system.repeats_after
     outcome = outcome.every(repeats)
-    record = _record(system, outcome, MOST_POINTS)
+    record = _record(system, outcome, label.MOST_POINTS)
     labels = _told(system, outcome, plan, record)
-    lanes = np.flatnonzero(doubtful(record, labels))
+    lanes = np.flatnonzero(label.doubtful(record, labels))
     state, tangent = outcome.end_state.copy(), outcome.end_tangent.copy()
     for longer in LOOKS:
         further = plan._replace(
             transient_periods=0,
             recorded_periods=longer * plan.recorded_periods,
-            section_points=longer * min(MOST_POINTS * repeats, plan.recorded_periods),
+            section_points=longer * min(label.MOST_POINTS * repeats, plan.recorded_periods),
             history_periods=0,
             contact=False,
             loads=False,
@@ -81,49 +65,49 @@ def labels_of(system: System, outcome: Outcome, plan: Plan) -> Told:
             labels.bands[some] = told.bands
             _measure_return(labels, record.section, some[told.period > 0])
         sound = np.isfinite(state[lanes]).all(axis=1)
-        lanes = lanes[sound & (labels.motion[lanes] == UNRESOLVED)]
+        lanes = lanes[sound & (labels.motion[lanes] == label.UNRESOLVED)]
     # Nothing is known of it, not that it diverges.
-    labels.motion[outcome.status == Status.TOO_FAST] = UNRESOLVED
+    labels.motion[outcome.status == Status.TOO_FAST] = label.UNRESOLVED
     return Told(labels, state)
 
 
-def _told(system: System, outcome: Outcome, plan: Plan, record: Record) -> Labels:
+def _told(system: System, outcome: Outcome, plan: Plan, record: label.Record) -> label.Labels:
     """Return what one record tells."""
-    labels = label(record)
+    labels = label.label(record)
     if not system.effects.backlash:
         _tell_linear(system, plan, labels)
-    _settle(system, outcome, plan, labels, settling_periods(record, labels))
-    lanes = np.flatnonzero(np.isin(labels.motion, (CHAOTIC, QUASI_PERIODIC)))
+    _settle(system, outcome, plan, labels, label.settling_periods(record, labels))
+    lanes = np.flatnonzero(np.isin(labels.motion, (label.CHAOTIC, label.QUASI_PERIODIC)))
     labels.bands[lanes] = band_count(record.section[lanes])
     return labels
 
 
-def _told_again(system: System, outcome: Outcome, plan: Plan) -> Labels:
+def _told_again(system: System, outcome: Outcome, plan: Plan) -> label.Labels:
     """Return what a longer record tells; also of a torus, that it is not a cascade."""
     labels = _told(system, outcome, plan, _record(system, outcome, plan.section_points))
-    tori = np.flatnonzero(labels.motion == QUASI_PERIODIC)
+    tori = np.flatnonzero(labels.motion == label.QUASI_PERIODIC)
     hopping = tori[subsequence_spread(outcome.section[tori]) > WHOLE]
     # What diverges only now has not done so in what is kept.
-    refused = np.concatenate([hopping, np.flatnonzero(labels.motion == DIVERGED)])
-    labels.motion[refused], labels.bands[refused] = UNRESOLVED, 0
+    refused = np.concatenate([hopping, np.flatnonzero(labels.motion == label.DIVERGED)])
+    labels.motion[refused], labels.bands[refused] = label.UNRESOLVED, 0
     return labels
 
 
-def _tell_linear(system: System, plan: Plan, labels: Labels) -> None:
+def _tell_linear(system: System, plan: Plan, labels: label.Labels) -> None:
     """Tell growth without bound by the multipliers, in place: what is linear is never chaotic."""
     once = plan._replace(recorded_periods=system.repeats_after)
     jacobian = period_jacobian(system, np.zeros((system.lanes, len(system.states))), once)
     size = np.max(np.abs(np.linalg.eigvals(np.nan_to_num(jacobian))), axis=1)
     grows = size > 1.0 + MARGIN
-    labels.motion[grows] = GROWS
+    labels.motion[grows] = label.GROWS
     labels.period[grows] = 0
     # Without damping a forced oscillation goes around a torus.
-    settles = (labels.motion == QUASI_PERIODIC) & (size < 1.0 - MARGIN)
-    labels.motion[settles | (labels.motion == CHAOTIC) & ~grows] = UNRESOLVED
+    settles = (labels.motion == label.QUASI_PERIODIC) & (size < 1.0 - MARGIN)
+    labels.motion[settles | (labels.motion == label.CHAOTIC) & ~grows] = label.UNRESOLVED
 
 
-def _record(system: System, outcome: Outcome, most_points: int) -> Record:
-    return Record(
+def _record(system: System, outcome: Outcome, most_points: int) -> label.Record:
+    return label.Record(
         outcome.section[:, -most_points:],
         outcome.growth,
         outcome.status != Status.OK,
@@ -131,13 +115,13 @@ def _record(system: System, outcome: Outcome, most_points: int) -> Record:
     )
 
 
-def _measure_return(labels: Labels, section: NDArray[np.float64], lanes: NDArray[np.intp]) -> None:
+def _measure_return(labels: label.Labels, section: Floats, lanes: Integers) -> None:
     """Keep how near their own period brings the record of some lanes back to itself."""
     distances = return_distances(section[lanes])
     labels.return_distance[lanes] = distances[np.arange(lanes.size), labels.period[lanes] - 1]
 
 
-def _admits_tori(system: System) -> NDArray[np.bool_]:
+def _admits_tori(system: System) -> Mask:
     """Whether quasi-periodic motion can exist at all.
 
     With two states and damping the period map contracts every area by the same factor; a closed
@@ -149,7 +133,7 @@ def _admits_tori(system: System) -> NDArray[np.bool_]:
 
 
 def _settle(
-    system: System, outcome: Outcome, plan: Plan, labels: Labels, period: NDArray[np.int32]
+    system: System, outcome: Outcome, plan: Plan, labels: label.Labels, period: Counts
 ) -> None:
     """Give the lanes that have come close to a stable orbit its period, in place."""
     searched = period > 0
@@ -161,8 +145,8 @@ def _settle(
         periods = np.full(tried.size, n, dtype=np.int32)
         orbits = polish(system.of(tried), end, periods, plan)
         apart = np.abs(orbits.points - end) / coordinate_scale(outcome.section[tried])
-        settled = tried[(np.max(apart, axis=1) <= SETTLING) & orbits.stable]
+        settled = tried[(np.max(apart, axis=1) <= label.SETTLING) & orbits.stable]
         searched[settled] = False
-        labels.motion[settled] = PERIODIC
+        labels.motion[settled] = label.PERIODIC
         labels.period[settled] = n
         _measure_return(labels, outcome.section, settled)

@@ -4,18 +4,15 @@ from typing import NamedTuple
 
 import numpy as np
 from gearchaos_kernels import Outcome, Plan, System
-from numpy.typing import NDArray
 
+from gearchaos.arrays import Codes, Counts, Floats
 from gearchaos.dynamics.exponents import SMALLEST_RESOLVED
 from gearchaos.dynamics.orbits import polish
 from gearchaos.records.label import CHAOTIC_GROWTH
 from gearchaos.records.lyapunov import largest_exponent
 
-Floats = NDArray[np.float64]
-
 UNIFORM, MIXED, NOT_TOLD = 0, 1, 2
-MEANINGS = ("uniform", "mixed", "not_told")
-"""Meanings of the values of ``record``."""
+MEANINGS = ("uniform", "mixed", "not_told")  # Meanings of the values of ``record``.
 
 
 class LargestExponents(NamedTuple):
@@ -31,12 +28,12 @@ class LargestExponents(NamedTuple):
 
     values: Floats
     standard_errors: Floats
-    record: NDArray[np.uint8]
+    record: Codes
     of_orbit: Floats
 
 
 def largest_exponents(
-    system: System, outcome: Outcome, plan: Plan, period: NDArray[np.int32], state: Floats
+    system: System, outcome: Outcome, plan: Plan, period: Counts, state: Floats
 ) -> LargestExponents:
     """Tell the exponent of lanes from the multipliers of their orbits, or else from their records.
 
@@ -45,7 +42,6 @@ def largest_exponents(
     does not count. ``outcome``: with growth, integrated by ``plan``; ``period`` (lanes,) in
     excitation periods, 0 where a lane is not periodic.
     """
-    assert outcome.growth is not None
     values, errors = largest_exponent(outcome.growth, system.mesh_period)
     record = np.full(period.shape, NOT_TOLD, dtype=np.uint8)
     of_orbit = np.full((period.size, len(system.states)), np.nan)

@@ -4,12 +4,10 @@ from typing import NamedTuple
 
 import numpy as np
 from gearchaos_kernels import Plan, System, integrate
-from numpy.typing import NDArray
 
+from gearchaos.arrays import Complex, Counts, Floats, Mask
 from gearchaos.dynamics.exponents import period_jacobian
 from gearchaos.records.period import TOLERANCE, coordinate_scale
-
-Floats = NDArray[np.float64]
 
 CLOSED = 1e-12
 """Return distance, relative to the scale of each coordinate, at which an orbit is closed."""
@@ -32,18 +30,18 @@ class Orbits(NamedTuple):
     """
 
     points: Floats
-    multipliers: NDArray[np.complex128]
+    multipliers: Complex
     residual: Floats
-    converged: NDArray[np.bool_]
+    converged: Mask
 
     @property
-    def stable(self) -> NDArray[np.bool_]:
+    def stable(self) -> Mask:
         """Whether there is an orbit, and all its multipliers lie inside the unit circle."""
-        inside: NDArray[np.bool_] = np.abs(self.multipliers[:, 0]) < 1.0
+        inside: Mask = np.abs(self.multipliers[:, 0]) < 1.0
         return inside
 
 
-def polish(system: System, guess: Floats, period: NDArray[np.int32], plan: Plan) -> Orbits:
+def polish(system: System, guess: Floats, period: Counts, plan: Plan) -> Orbits:
     """Find the periodic orbit next to the guess of every lane.
 
     Newton's method on the map over ``period`` excitation periods, with its Jacobian from the
@@ -111,7 +109,9 @@ def _polish(system: System, guess: Floats, plan: Plan) -> Orbits:
     points[~converged] = np.nan
     multipliers = np.full(points.shape, np.nan, dtype=np.complex128)
     if closed.size:
-        multipliers[closed] = _multipliers(period_jacobian(system.of(closed), points[closed], plan))
+        found = np.linalg.eigvals(period_jacobian(system.of(closed), points[closed], plan))
+        order = np.argsort(-np.abs(found), axis=1, kind="stable")
+        multipliers[closed] = np.take_along_axis(found, order, axis=1)
     return Orbits(points, multipliers, residual, converged)
 
 
@@ -129,7 +129,7 @@ def _distance(one: Floats, other: Floats, scale: Floats) -> Floats:
     return distance
 
 
-def _repeats_earlier(section: Floats, points: Floats, scale: Floats) -> NDArray[np.bool_]:
+def _repeats_earlier(section: Floats, points: Floats, scale: Floats) -> Mask:
     """Whether a point comes back after a proper divisor of the period."""
     periods = section.shape[1]
     repeats = np.zeros(points.shape[0], dtype=np.bool_)
@@ -137,9 +137,3 @@ def _repeats_earlier(section: Floats, points: Floats, scale: Floats) -> NDArray[
         if periods % divisor == 0:
             repeats |= _distance(section[:, divisor - 1], points, scale) <= TOLERANCE
     return repeats
-
-
-def _multipliers(jacobian: Floats) -> NDArray[np.complex128]:
-    multipliers = np.linalg.eigvals(jacobian).astype(np.complex128)
-    order = np.argsort(-np.abs(multipliers), axis=1, kind="stable")
-    return np.take_along_axis(multipliers, order, axis=1)

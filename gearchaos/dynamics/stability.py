@@ -14,13 +14,10 @@ from typing import NamedTuple
 
 import numpy as np
 from gearchaos_kernels import Groups, System, jacobian
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
+from gearchaos.arrays import Complex, Floats, Integers
 
-MOST_STEPS = 2**53
-"""Stands for every number of steps beyond it."""
+MOST_STEPS = 2**53  # Stands for every number of steps beyond it.
 
 OWNERS = {
     "delta_5": "torsion",
@@ -47,7 +44,7 @@ class StabilityLimit(NamedTuple):
     most in its mode.
     """
 
-    lanes: NDArray[np.intp]
+    lanes: Integers
     fewest: Integers
     eigenvalue: complex
     owner: str
@@ -80,7 +77,7 @@ def fewest_stable_steps(system: System) -> Integers:
     demand = np.max([_demand(block) for _, block in _diagonal_blocks(system)], axis=0)
     with np.errstate(over="ignore"):
         steps: Floats = np.ceil(demand * (1.0 - ROUNDING) * system.mesh_period)
-    return np.clip(steps, 1.0, MOST_STEPS).astype(np.int64)
+    return np.clip(steps, 1.0, MOST_STEPS).astype(np.intp)
 
 
 def exponent_bias(system: System, steps: int) -> tuple[Floats, Floats]:
@@ -98,7 +95,7 @@ def exponent_bias(system: System, steps: int) -> tuple[Floats, Floats]:
     return computed - true, true
 
 
-def amplification(z: NDArray[np.complex128]) -> Floats:
+def amplification(z: Complex) -> Floats:
     """Return abs(R(z)), by which one step multiplies a mode, for z = h lambda."""
     return np.abs(1.0 + z * (1.0 + z / 2.0 * (1.0 + z / 3.0 * (1.0 + z / 4.0))))
 
@@ -117,7 +114,7 @@ _ANGLES = np.linspace(0.5 * np.pi, np.pi, _RAYS)
 _LENGTHS = _reach(_ANGLES)
 
 
-def steps_per_time(eigenvalues: NDArray[np.complex128]) -> Floats:
+def steps_per_time(eigenvalues: Complex) -> Floats:
     """Return the fewest stable steps per unit of time for every eigenvalue.
 
     It is abs(lambda) over the length of the ray through lambda, and 0 where the real part is

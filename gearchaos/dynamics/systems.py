@@ -5,16 +5,14 @@ from typing import Any
 
 import numpy as np
 from gearchaos_kernels import Effects, Groups, Plan, System, Teeth
-from numpy.typing import NDArray
 
+from gearchaos.arrays import Floats
 from gearchaos.configuration import Configuration
 from gearchaos.configuration.tables import groups_at, physical_at
 from gearchaos.errors import ConfigurationError
 from gearchaos.gear.contact_lines import contact_shares
 from gearchaos.gear.derivation import Quantities
 from gearchaos.gear.tooth_deviations import tooth_deviations
-
-Floats = NDArray[np.float64]
 
 
 def plan_of(config: Configuration, **others: Any) -> Plan:

@@ -10,22 +10,14 @@ from gearchaos.engine.running import choose_threads
 from gearchaos.errors import ConfigurationError, FileError
 from gearchaos.records.label import UNRESOLVED
 from gearchaos.records.wilson import wilson_interval
+from gearchaos.results import variables as known
 from gearchaos.results.ensembles import Basin, Basins, basin_entropy, in_order
 from gearchaos.results.result import Result
 from gearchaos.results.stage_table import label_text, require_labels
-from gearchaos.results.variables import (
-    LABELS,
-    LARGEST_EXPONENT,
-    REPEATS,
-    STANDARD_ERROR,
-    START,
-    STEP_ERROR,
-    axis_name,
-)
 
 NO_MEANS = (
     *("return_distance", "section_error", "lyapunov_sum"),
-    *(STEP_ERROR, LARGEST_EXPONENT + STANDARD_ERROR),
+    *(known.STEP_ERROR, known.LARGEST_EXPONENT + known.STANDARD_ERROR),
 )
 """Numbers of a lane that tell of its computation alone."""
 
@@ -39,14 +31,14 @@ def find_basins(result: Result, name: str = "the result", threads: int | None = 
     """
     require_labels(result, name)
     config = computable(result, name).replace("start.carry", "none")
-    swept = [axis for axis in result.axes if axis not in REPEATS]
-    if {*result.axes} != {*swept, START} or len(swept) > 1:
+    swept = [axis for axis in result.axes if axis not in known.REPEATS]
+    if {*result.axes} != {*swept, known.START} or len(swept) > 1:
         raise ConfigurationError(
             f"{name}: has the axes {', '.join(result.axes)}; basins are those of several starts "
             'over one parameter: set start.kind = "grid" or start.count, fix others with sel (--at)'
         )
     choose_threads(threads)
-    motion, period = (result.lanes(label) for label in LABELS)
+    motion, period = (result.lanes(label) for label in known.LABELS)
     lanes, starts = Lanes(config), config.start.size
     if (len(lanes), lanes.states) != (motion.size, result.variables["state"].flags):
         raise FileError(f"{name}: holds the configuration of other lanes; run the sweep again")
@@ -60,7 +52,7 @@ def find_basins(result: Result, name: str = "the result", threads: int | None = 
     # What has a motion, but no orbit next to its state, is not told either.
     numbers = -np.maximum(motion, UNRESOLVED).astype(np.intp)
     numbers[place >= 0] = numbers_along(value, sizes, averages)[place[place >= 0]]
-    parameter = swept[0] if swept else axis_name(config.sweep.parameter)
+    parameter = swept[0] if swept else known.axis_name(config.sweep.parameter)
     values = np.atleast_1d(result[parameter] if swept else result.fixed[parameter])
     numeric = [v for v in result.variables.values() if v.dtype == "float64"]
     contact = {n: v.flags for n, v in result.variables.items() if n.startswith("contact_state_")}
@@ -71,9 +63,9 @@ def find_basins(result: Result, name: str = "the result", threads: int | None = 
             mine = here[numbers[here] == number]
             first, orbit = mine[0], found[place[mine[0]]] if number > 0 else None
             code, repeats = (motion[first], int(period[first])) if orbit else (-number, 0)
-            known = {one: np.ma.masked_invalid(result.lanes(one)[mine]) for one in told}
-            means = {one: float(np.ma.filled(kept.mean(), np.nan)) for one, kept in known.items()}
-            exponent = means.pop(LARGEST_EXPONENT, np.nan)
+            kept = {one: np.ma.masked_invalid(result.lanes(one)[mine]) for one in told}
+            means = {one: float(np.ma.filled(n.mean(), np.nan)) for one, n in kept.items()}
+            exponent = means.pop(known.LARGEST_EXPONENT, np.nan)
             multiplier = float(np.abs(orbit.multipliers[0])) if orbit else np.nan
             if multiplier > 0.0:
                 exponent = float(np.log(multiplier) / (repeats * system.excitation_period[first]))

@@ -25,11 +25,8 @@ from gearchaos.interrupts import check
 from gearchaos.progress import notice, say
 from gearchaos.version import Software, software_version
 
-BLOCKS_PER_WORKER = 2
-"""One that is computed, and one that waits, so that a worker need not wait."""
-
-_HOURS_WITHOUT_WORKERS = 24.0
-"""Their jobs may stand in a queue."""
+BLOCKS_PER_WORKER = 2  # One that is computed, and one that waits, so that a worker need not wait.
+_HOURS_WITHOUT_WORKERS = 24.0  # Their jobs may stand in a queue.
 _SECONDS_TO_IMPORT = 300.0
 _SECONDS_BETWEEN_LOOKS = 0.2
 

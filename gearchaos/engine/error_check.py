@@ -1,17 +1,15 @@
 """The error of some lanes of a sweep, measured by computing them again with half the step."""
 
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 from gearchaos_kernels import Status
-from numpy.typing import NDArray
 
+from gearchaos.arrays import Array, Floats, Integers
 from gearchaos.dynamics.largest_exponents import MIXED, UNIFORM
 
 NOT_CHECKED, SAME, CHANGED = 0, 1, 2
-MEANINGS = ("not_checked", "same", "changed")
-"""Meanings of the values of ``motion_changed``."""
+MEANINGS = ("not_checked", "same", "changed")  # Meanings of the values of ``motion_changed``.
 
 CHECKED = ("section_error", "exponent_step_error", "motion_changed")
 """Variables that the check yields."""
@@ -19,7 +17,7 @@ CHECKED = ("section_error", "exponent_step_error", "motion_changed")
 _OF_THE_RECORD = "lyapunov_exponent_standard_error"
 
 
-def checked_lanes(numbers: NDArray[np.intp], share: float) -> NDArray[np.intp]:
+def checked_lanes(numbers: Integers, share: float) -> Integers:
     """Return which of the lanes with these numbers, of shape (lanes,), are checked.
 
     The share is spread evenly over the whole sweep and depends on the number of a lane alone.
@@ -35,7 +33,7 @@ class Tally:
         self._unsplit_lanes = self._unsplit_steps = 0
         self._checked = {name: [np.zeros(0)] for name in (*CHECKED, _OF_THE_RECORD)}
 
-    def add(self, arrays: Mapping[str, NDArray[Any]]) -> None:
+    def add(self, arrays: Mapping[str, Array]) -> None:
         """Count the lanes of one block."""
         self.diverged += int(np.count_nonzero(arrays["status"]))
         self._too_fast += int(np.count_nonzero(arrays["status"] == Status.TOO_FAST))
@@ -95,5 +93,5 @@ class Tally:
         return f"{text}{np.count_nonzero(motion == CHANGED)} move in another way"
 
 
-def _spread(errors: NDArray[np.float64]) -> str:
+def _spread(errors: Floats) -> str:
     return f"{np.nanmedian(errors):.1e} (median) to {np.nanmax(errors):.1e}"

@@ -14,8 +14,7 @@ from gearchaos.records.period import LONGEST_PERIOD, RETURNS
 LONGEST_EXCITATION = 50_000
 """Mesh periods after which pitch errors repeat, at most: a record holds some of them."""
 
-PHASES = 1001
-"""Mesh phases at which the sign of the mesh stiffness is looked at."""
+PHASES = 1001  # Mesh phases at which the sign of the mesh stiffness is looked at.
 
 
 def whole_lengths(lanes: Lanes) -> dict[str, int]:

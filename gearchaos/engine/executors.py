@@ -14,8 +14,9 @@ from typing import TYPE_CHECKING, TypeAlias
 import numba
 import numpy as np
 
+from gearchaos.arrays import Floats
 from gearchaos.engine.error_check import Tally
-from gearchaos.engine.simulation import Arrays, Bounds, Floats, Simulation
+from gearchaos.engine.simulation import Arrays, Bounds, Simulation
 from gearchaos.errors import FileError, GearchaosError
 from gearchaos.interrupts import check
 from gearchaos.progress import Progress

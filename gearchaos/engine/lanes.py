@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 from gearchaos_kernels import System
-from numpy.typing import NDArray
 
+from gearchaos.arrays import Array, Floats, Integers
 from gearchaos.configuration import Configuration, axis_values, swept_values
 from gearchaos.configuration.run_tables import states_of
 from gearchaos.configuration.tables import SWEEPABLE_GROUPS, SWEEPABLE_KEYS, groups_at, physical_at
@@ -15,19 +15,9 @@ from gearchaos.dynamics.systems import system_of
 from gearchaos.gear.derivation import SCALES, derive_scales
 from gearchaos.gear.groups import GROUP_TABLE
 from gearchaos.gear.tooth_deviations import REALISATION
+from gearchaos.results import variables as known
 from gearchaos.results.result_file import Parameter
-from gearchaos.results.variables import (
-    HARMONIC,
-    Variable,
-    axis_name,
-    coordinate,
-    direction_axis,
-    pair_axis,
-    start_axis,
-)
 
-Floats = NDArray[np.float64]
-Numbers = NDArray[np.intp]
 Texts = tuple[str, str, str]
 
 _DRAWS_PER_LANE = 12
@@ -52,18 +42,18 @@ class Lanes:
         self._values = axis_values(config)
         self.axes = [axis_of(parameter, values) for parameter, values in self._values.items()]
         # What the system of a lane depends on, in the order of the axes.
-        self._of_systems: dict[str, NDArray[Any]] = dict(self._values)
+        self._of_systems: dict[str, Array] = dict(self._values)
         first = getattr(config.pitch_error, "first_realisation", 0)
         numbers = first + np.arange(getattr(config.pitch_error, "realisations", 1))
         if numbers.size > 1:
-            self.axes.append(pair_axis(numbers))
+            self.axes.append(known.pair_axis(numbers))
             self._of_systems[REALISATION] = numbers
         self.starts = config.start.size
         if self.starts > 1:
-            self.axes.append(start_axis(self.starts))
+            self.axes.append(known.start_axis(self.starts))
         self.directions = 2 if config.start.carry == "both" else 1
         if self.directions > 1:
-            self.axes.append(direction_axis())
+            self.axes.append(known.direction_axis())
         self.repeats = numbers.size * self.starts * self.directions
         self.effects = config.needed_effects
         self.states = states_of(self.effects)
@@ -87,7 +77,7 @@ class Lanes:
         carried = self.config.start.carry != "none"
         return len(self) // (swept_values(self.config.sweep).size if carried else 1)
 
-    def computed_at(self, places: Numbers) -> Numbers:
+    def computed_at(self, places: Integers) -> Integers:
         """Return the lanes at some places in the order of computation.
 
         A carried sweep takes a lane of each line along the first swept parameter, then the next one
@@ -105,22 +95,22 @@ class Lanes:
         place = (line, value, repeat, direction)
         return np.ravel_multi_index(place, (lines, values, repeats, directions))
 
-    def values_of(self, lanes: Numbers) -> dict[str, Floats]:
+    def values_of(self, lanes: Integers) -> dict[str, Floats]:
         """Return the value of each swept parameter in some lanes, and the number of the pair."""
         index = np.unravel_index(lanes, self.shape)
         found = zip(self._of_systems.items(), index, strict=False)
         return {parameter: values[at] for (parameter, values), at in found}
 
-    def system_of(self, lanes: Numbers) -> System:
+    def system_of(self, lanes: Integers) -> System:
         """Return the system of some lanes."""
         return system_of(self.config, self.values_of(lanes), self.effects)
 
-    def start_of(self, lanes: Numbers) -> Floats:
+    def start_of(self, lanes: Integers) -> Floats:
         """Return the configured start states of some lanes, shape (lanes, states)."""
         # Both directions of a carried sweep begin alike.
         return start_states(self.config, self.system_of(lanes), lanes // self.directions)
 
-    def spread(self, count: int) -> Numbers:
+    def spread(self, count: int) -> Integers:
         """Return the numbers of at most so many lanes, spread evenly over all."""
         chosen = np.linspace(0, len(self) - 1, min(count, len(self)))
         return np.unique(chosen.round().astype(np.intp))
@@ -128,7 +118,7 @@ class Lanes:
     @property
     def parameters(self) -> dict[str, Parameter]:
         """The groups of the model with their origin; those that no effect needs are left out."""
-        names = [axis_name(parameter) for parameter in self._values]
+        names = [known.axis_name(parameter) for parameter in self._values]
         sizes = [values.size for values in self._values.values()]
         others = [[n for n in range(len(names)) if n != own] for own in range(len(names))]
         swept = zip(self._values.items(), others, strict=True)
@@ -136,7 +126,7 @@ class Lanes:
         groups = groups_at(self.config, values)
 
         def entry(value: Any, origin: str, texts: Texts, is_list: bool = False) -> Parameter:
-            dims: tuple[str, ...] = (HARMONIC,) if is_list else ()
+            dims: tuple[str, ...] = (known.HARMONIC,) if is_list else ()
             if np.ndim(value) > 0 and not is_list:
                 origin = "swept"
                 along = [n for n, size in enumerate(np.shape(value)) if size > 1]
@@ -158,17 +148,17 @@ class Lanes:
         return parameters
 
 
-def axis_of(parameter: str, values: Floats) -> Variable:
+def axis_of(parameter: str, values: Floats) -> known.Variable:
     """Return the axis of a swept parameter with values (values,), as files name and word it."""
-    name = axis_name(parameter)
+    name = known.axis_name(parameter)
     if parameter in SWEEPABLE_GROUPS:
         row = SWEEPABLE_GROUPS[parameter]
-        return coordinate(name, row.units, row.long_name, row.mathtext, values)
+        return known.coordinate(name, row.units, row.long_name, row.mathtext, values)
     key = SWEEPABLE_KEYS[parameter]
-    return coordinate(name, key.units or "1", key.wording, "", values)
+    return known.coordinate(name, key.units or "1", key.wording, "", values)
 
 
-def start_states(config: Configuration, system: System, numbers: Numbers) -> Floats:
+def start_states(config: Configuration, system: System, numbers: Integers) -> Floats:
     """Return the start states, shape (lanes, states), of lanes with this system.
 
     ``numbers`` (lanes,): those that they have in the whole sweep: the random state of a lane
@@ -199,7 +189,7 @@ def start_states(config: Configuration, system: System, numbers: Numbers) -> Flo
     return np.stack(columns, axis=1).astype(np.float64)
 
 
-def _draws(seed: int, run: Numbers) -> Floats:
+def _draws(seed: int, run: Integers) -> Floats:
     """Draw the random numbers of consecutive lanes, shape (lanes, draws)."""
     generator = np.random.Philox(seed)
     generator.advance(int(run[0]) * (_DRAWS_PER_LANE // _PHILOX_WIDTH))

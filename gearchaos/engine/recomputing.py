@@ -16,8 +16,7 @@ from gearchaos.results.result import Result
 from gearchaos.results.stage_table import labelled_lanes
 from gearchaos.results.variables import axis_name
 
-MOST_LANES = 25
-"""Chaotic lanes that are tried, spread evenly over the sweep: they bound the cost."""
+MOST_LANES = 25  # Chaotic lanes that are tried, spread evenly over the sweep: they bound the cost.
 
 
 def computable(result: Result, name: str) -> Configuration:
@@ -143,7 +142,6 @@ def survival(config: Configuration, result: Result, records: int) -> Survival:
         check()
         outcome = integrate(system, state, plan, tangent_start=tangent)
         state, tangent = outcome.end_state, outcome.end_tangent
-    assert outcome.growth is not None
     later = outcome.growth[:, plan.recorded_periods // 2 :]
     exponent, _ = largest_exponent(later, np.ones(lanes.size))
     growing = exponent * plan.recorded_periods > CHAOTIC_GROWTH

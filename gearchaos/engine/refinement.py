@@ -2,13 +2,13 @@
 
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numba
 import numpy as np
 from gearchaos_kernels import System, integrate
-from numpy.typing import NDArray
 
+from gearchaos.arrays import Array, Floats
 from gearchaos.configuration import Configuration, swept_values
 from gearchaos.dynamics.following import (
     STABILITY_LOSS_TEXTS,
@@ -20,7 +20,7 @@ from gearchaos.dynamics.following import (
 )
 from gearchaos.dynamics.labelling import LOOKS, labels_of
 from gearchaos.dynamics.systems import plan_of, system_of
-from gearchaos.engine.lanes import Floats, start_states
+from gearchaos.engine.lanes import start_states
 from gearchaos.engine.simulation import Simulation
 from gearchaos.interrupts import check
 from gearchaos.records.label import MEANINGS
@@ -172,7 +172,7 @@ def refined_jumps(
     return sorted(found, key=lambda boundary: boundary.below)
 
 
-def _edges_of(result: Result) -> NDArray[Any]:
+def _edges_of(result: Result) -> Array:
     """Return the edges that the lanes of a result with labels are, in their order."""
     told = [result.lanes(name) for name in (*LABELS, "end_state")]
     edges = _edges(result.along(result.axis), result.variables["motion"].flags, *told)
@@ -183,8 +183,8 @@ def _edges_of(result: Result) -> NDArray[Any]:
 
 
 def _edges(
-    values: Floats, flags: Sequence[str], motion: NDArray[Any], period: NDArray[Any], state: Floats
-) -> NDArray[Any]:
+    values: Floats, flags: Sequence[str], motion: Array, period: Array, state: Floats
+) -> Array:
     """Return of each lane value, label, period, state, and whether that is far from its orbit."""
     fields = [("value", "f8"), ("label", object), ("period", "i4"), ("far", "?")]
     edges = np.zeros(values.size, [*fields, ("state", "f8", state.shape[1:])])
@@ -194,7 +194,7 @@ def _edges(
     return edges
 
 
-def _computed(simulation: Simulation, values: Mapping[str, Floats]) -> NDArray[Any]:
+def _computed(simulation: Simulation, values: Mapping[str, Floats]) -> Array:
     """Compute lanes at values of the swept parameters, the first one first, as the sweep would."""
     config, plan = simulation.config, simulation.recording
     (axis, *_), found = values.values(), []
@@ -210,7 +210,7 @@ def _computed(simulation: Simulation, values: Mapping[str, Floats]) -> NDArray[A
 
 
 def _losses(
-    config: Configuration, below: NDArray[Any], above: NDArray[Any], spacing: Floats
+    config: Configuration, below: Array, above: Array, spacing: Floats
 ) -> list[tuple[str, complex]]:
     """Follow the orbits below a boundary upwards, and those above it downwards."""
     # Close to a bifurcation the label changes a little before or after it: one lane further.
@@ -231,7 +231,7 @@ def _losses(
 
 
 def _followed(
-    config: Configuration, edge: NDArray[Any], last: Floats, width: float = np.inf
+    config: Configuration, edge: Array, last: Floats, width: float = np.inf
 ) -> tuple[Followed, Losses]:
     def system(values: Floats) -> System:
         return system_of(config, {config.sweep.parameter: values}, config.needed_effects)

@@ -1,13 +1,12 @@
 """The time response: the motion at every step, after the transient."""
 
 import time
-from typing import Any
 
 import numpy as np
 from gearchaos_kernels import Outcome, Plan, Status, System, mesh_motion
-from numpy.typing import NDArray
 from tqdm import tqdm
 
+from gearchaos.arrays import Array
 from gearchaos.configuration import Configuration, Given, configuration_of
 from gearchaos.engine.running import choose_threads, metadata, result_of
 from gearchaos.engine.simulation import Simulation
@@ -22,34 +21,18 @@ from gearchaos.results.response_variables import (
 )
 from gearchaos.results.result import Result
 
-LARGEST_RESPONSE = 4 * 2**30
-"""Bytes that a response may take in memory."""
+LARGEST_RESPONSE = 4 * 2**30  # Bytes that a response may take in memory.
 
 
 def respond(config: Given, periods: int = DEFAULT_PERIODS, threads: int | None = None) -> Result:
     """Compute the motion at every step of the last mesh periods, for every value of the sweep.
 
-    Parameters
-    ----------
-    config : Configuration or path
-        From `load_config`, or the path of its file; transient, recorded periods, start and scene
-        are as configured.
-    periods : int
-        Mesh periods at the end of the recorded ones.
-    threads : int, optional
-        Threads to use; by default all that there are.
-
-    Returns
-    -------
-    Result
-        The variables of a sweep, and the motion along ``time``; its sections hold all states of
-        the scene in all recorded periods.
-
-    Raises
-    ------
-    ConfigurationError
-        If fewer periods are recorded, the motion does not fit into memory or there are not so many
-        threads.
+    ``config``, or the path of its file: transient, recorded periods, start and scene are as
+    configured; ``periods``: mesh periods at the end of the recorded ones; ``threads``: by default
+    all that there are. The result has the variables of a sweep, and the motion along ``time``; its
+    sections hold all states of the scene in all recorded periods. Raises ConfigurationError if
+    fewer periods are recorded, the motion does not fit into memory or there are not so many
+    threads.
     """
     choose_threads(threads)
     config = configuration_of(config)
@@ -119,11 +102,10 @@ def _check_size(simulation: Simulation, periods: int) -> None:
         )
 
 
-def _motion(system: System, outcome: Outcome, plan: Plan) -> dict[str, NDArray[Any]]:
-    assert outcome.history is not None
+def _motion(system: System, outcome: Outcome, plan: Plan) -> dict[str, Array]:
     turned = plan.transient_periods + plan.recorded_periods - plan.history_periods
     found = mesh_motion(system, outcome.history, plan.steps_per_period, turned)
-    motion: dict[str, NDArray[Any]] = {
+    motion: dict[str, Array] = {
         name: outcome.history[..., column].copy() for column, name in enumerate(system.states)
     }
     for column, name in enumerate(system.states[::2]):

@@ -55,24 +55,10 @@ def compiling() -> Iterator[None]:
 def run(config: Given, threads: int | None = None, progress: bool = False) -> Result:
     """Compute a sweep in memory.
 
-    Parameters
-    ----------
-    config : Configuration or path
-        From `load_config`, or the path of its file.
-    threads : int, optional
-        Threads to use; by default all that there are.
-    progress : bool
-        Whether to show a progress bar on stderr.
-
-    Returns
-    -------
-    Result
-        Named arrays with units; `Result.save` writes them to a file.
-
-    Raises
-    ------
-    ConfigurationError
-        If there are not so many threads.
+    ``config``: from `load_config`, or the path of its file; ``threads``: by default all that there
+    are; ``progress``: whether to show a progress bar on stderr. The result has named arrays with
+    units; `Result.save` writes them to a file. Raises ConfigurationError if there are not so many
+    threads.
     """
     choose_threads(threads)
     with speaking(quiet=not progress):

@@ -1,21 +1,12 @@
 """A configured sweep: what it yields, and the means to compute any block of its lanes."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
+import gearchaos_kernels as kernels
 import numpy as np
-from gearchaos_kernels import (
-    LANES,
-    STATUS_TEXTS,
-    Outcome,
-    Plan,
-    Status,
-    System,
-    integrate,
-    maps_memory,
-)
-from numpy.typing import NDArray
 
+from gearchaos.arrays import Array, Floats, Integers
 from gearchaos.configuration import Configuration
 from gearchaos.dynamics.exponents import exponents, sum_of_exponents
 from gearchaos.dynamics.labelling import LOOKS, Told, labels_of
@@ -23,14 +14,7 @@ from gearchaos.dynamics.largest_exponents import MEANINGS as RECORD_MEANINGS
 from gearchaos.dynamics.largest_exponents import largest_exponents
 from gearchaos.dynamics.stability import fewest_stable_steps
 from gearchaos.dynamics.systems import plan_of
-from gearchaos.engine.error_check import (
-    CHANGED,
-    CHECKED,
-    MEANINGS,
-    NOT_CHECKED,
-    SAME,
-    checked_lanes,
-)
+from gearchaos.engine import error_check
 from gearchaos.engine.excitation import remarks, whole_lengths
 from gearchaos.engine.lanes import Lanes
 from gearchaos.engine.steps import (
@@ -48,19 +32,11 @@ from gearchaos.records.difference import difference
 from gearchaos.records.label import MEANINGS as MOTION_MEANINGS
 from gearchaos.records.label import MOST_POINTS
 from gearchaos.records.period import POINTS_NEEDED
-from gearchaos.records.teeth import contact_told, loads_told
-from gearchaos.results.variables import (
-    AMPLITUDE,
-    DIRECTIONS,
-    EXTREMES,
-    Variable,
-    step_choice_variables,
-    sweep_variables,
-)
+from gearchaos.records.teeth import CONTACT_STATES, contact_told, loads_told
+from gearchaos.results import variables as known
 
-Arrays = Mapping[str, NDArray[Any]]
+Arrays = Mapping[str, Array]
 Bounds = tuple[int, int]
-Floats = NDArray[np.float64]
 
 
 class Simulation:
@@ -92,7 +68,7 @@ class Simulation:
         coarse = coarse_steps(self.lanes, steps) if judged else ""
         notes = [note, coarse, *remarks(self.lanes, lengths)]
         self.notes = [text for text in notes if text]
-        self._choice: list[Variable] = []
+        self._choice: list[known.Variable] = []
 
     def choose_steps(self) -> None:
         """Measure which number of steps the configured tolerance needs, and take it."""
@@ -110,7 +86,7 @@ class Simulation:
             4 * coarsest if self.plan.method == "flow_map" else MOST_STEPS,
         )
         steps, *measured = zip(*candidates, strict=True)
-        self._choice = step_choice_variables(
+        self._choice = known.step_choice_variables(
             steps, dict(zip(Candidate._fields[1:], measured, strict=True))
         )
         best = candidates[-1]
@@ -127,7 +103,7 @@ class Simulation:
         return self.config.start.carry != "none"
 
     @property
-    def recording(self) -> Plan:
+    def recording(self) -> kernels.Plan:
         """The plan with all that is recorded: what is kept, and what the labels are read off."""
         checked = POINTS_NEEDED if self.config.integration.error_check > 0.0 else 0
         wanted = MOST_POINTS if self.config.outputs.motion else checked
@@ -135,28 +111,47 @@ class Simulation:
         return self.plan._replace(section_points=max(self.plan.section_points, enough))
 
     @property
-    def variables(self) -> list[Variable]:
+    def variables(self) -> list[known.Variable]:
         """What the sweep yields."""
-        outputs, checked = self.config.outputs, self.config.integration.error_check > 0.0
-        of_the_lanes = sweep_variables(
-            self.lanes.axes,
-            states=self.lanes.states,
-            section=outputs.section,
-            section_points=outputs.section_points,
-            lyapunov=outputs.lyapunov,
-            crossings=self._splits_steps,
-            contact=self._directions if self.plan.contact and self._splits_steps else (),
-            loads=self._directions if self.plan.loads else (),
-            chosen=outputs.states,
-            orders=self.plan.orders,
-            exponents=outputs.exponents,
-            status_meanings=[status.name.lower() for status in STATUS_TEXTS],
-            check_meanings=MEANINGS if checked else (),
-            motion_meanings=MOTION_MEANINGS if outputs.motion else (),
-            record_meanings=RECORD_MEANINGS if outputs.motion and outputs.lyapunov else (),
-            excitation_period=self.lanes.repeats_after,
-        )
-        return of_the_lanes + self._choice
+        outputs, repeats = self.config.outputs, self.lanes.repeats_after
+        of_teeth = f"periods of the excitation, {repeats} mesh periods each,"
+        motions = [of_teeth if repeats > 1 else "mesh periods"]
+        touched = self.plan.contact and self._splits_steps
+        subjects: dict[str, Sequence[str]] = {
+            "section": outputs.section,
+            "motion": motions if outputs.motion else (),
+            "contact": self._directions if touched else (),
+            "forces": self._directions if self.plan.loads else (),
+            "chosen": outputs.states,
+            "amplitudes": (*outputs.states, "transmission_error") if self.plan.orders else (),
+        }
+        once = {
+            "section points": outputs.section,
+            "lyapunov": outputs.lyapunov,
+            "record": outputs.motion and outputs.lyapunov,
+            "exponents": outputs.exponents,
+            "crossings": self._splits_steps,
+            "loads": self.plan.loads,
+            "orders": self.plan.orders,
+            "check": self.config.integration.error_check > 0.0,
+            "every sweep": True,
+        }
+        subjects |= {name: [""] for name, told in once.items() if told}
+        values = {
+            known.SECTION_POINT: np.arange(outputs.section_points),
+            known.EXPONENT_NUMBER: np.arange(1, len(self.lanes.states) + 1),
+            known.ORDER: np.array([float(order) for order in self.plan.orders]),
+            known.STATE: np.arange(len(self.lanes.states)),
+        }
+        meanings = {
+            "motion": MOTION_MEANINGS,
+            known.RECORD: RECORD_MEANINGS,
+            "contact_state_@": CONTACT_STATES,
+            "motion_changed": error_check.MEANINGS,
+            known.STATUS: [status.name.lower() for status in kernels.STATUS_TEXTS],
+            known.STATE: self.lanes.states,
+        }
+        return known.listed(self.lanes.axes, subjects, values, meanings) + self._choice
 
     @property
     def _splits_steps(self) -> bool:
@@ -165,7 +160,7 @@ class Simulation:
     @property
     def _directions(self) -> tuple[str, ...]:
         """Directions in which teeth touch."""
-        return DIRECTIONS[: 1 + ("axial" in self.lanes.effects)]
+        return known.DIRECTIONS[: 1 + ("axial" in self.lanes.effects)]
 
     def rehearse(self, periods: int = 0) -> None:
         """Integrate the first lane, and so many mesh periods of it step by step.
@@ -175,7 +170,7 @@ class Simulation:
         plan = self.plan._replace(transient_periods=0, section_points=0)
         plan = plan._replace(recorded_periods=periods, history_periods=periods)
         first = np.arange(1)
-        integrate(self.lanes.system_of(first), self.lanes.start_of(first), plan)
+        kernels.integrate(self.lanes.system_of(first), self.lanes.start_of(first), plan)
 
     def block_memory(self, threads: int) -> int:
         """Return about how many bytes the arrays of one block take while it is computed."""
@@ -191,12 +186,14 @@ class Simulation:
         if self.plan.method == "flow_map":
             for block in np.arange(lanes), np.arange(len(self.lanes) - lanes, len(self.lanes)):
                 system = self.lanes.system_of(block)
-                maps = max(maps, maps_memory(system, self.plan, fewest_stable_steps(system)))
+                maps = max(
+                    maps, kernels.maps_memory(system, self.plan, fewest_stable_steps(system))
+                )
         return 8 * records * numbers + maps
 
     def block_lanes(self, threads: int) -> int:
         """Return how many lanes make a block: work for every thread, and progress to be seen."""
-        lanes = LANES * max(8, 2 * threads)
+        lanes = kernels.LANES * max(8, 2 * threads)
         # What is left over of lanes side by side would fill no vector.
         return lanes - lanes % min(lanes, self.lanes.side_by_side)
 
@@ -214,8 +211,8 @@ class Simulation:
         return self.arrays(lanes, *self.integrate(lanes, self.recording, carried))
 
     def integrate(
-        self, lanes: NDArray[np.intp], plan: Plan, carried: Floats | None = None
-    ) -> tuple[Floats, Outcome]:
+        self, lanes: Integers, plan: kernels.Plan, carried: Floats | None = None
+    ) -> tuple[Floats, kernels.Outcome]:
         """Integrate lanes by a plan, and return their start states as well.
 
         The lanes are consecutive in the order of computation. ``carried`` (lanes side by side,
@@ -227,7 +224,7 @@ class Simulation:
         start = np.full((lanes.size, len(self.lanes.states)), np.nan)
         if carried is not None:
             start[:many] = carried[: lanes.size]
-        outcomes: list[Outcome] = []
+        outcomes: list[kernels.Outcome] = []
         for at in range(0, lanes.size, many):
             mine, begin = lanes[at : at + many], start[at : at + many]
             if outcomes:
@@ -236,13 +233,16 @@ class Simulation:
             anew = ~np.isfinite(begin).all(axis=1)
             if anew.any():
                 begin[anew] = self.lanes.start_of(mine[anew])
-            outcomes.append(integrate(self.lanes.system_of(mine), begin, plan))
-        return start, joined(outcomes)
+            outcomes.append(kernels.integrate(self.lanes.system_of(mine), begin, plan))
+        if len(outcomes) == 1:
+            return start, outcomes[0]
+        every: Any = map(np.concatenate, zip(*outcomes, strict=True))
+        return start, kernels.Outcome(*every)
 
-    def arrays(self, lanes: NDArray[np.intp], start: Floats, outcome: Outcome) -> dict[str, Any]:
+    def arrays(self, lanes: Integers, start: Floats, outcome: kernels.Outcome) -> dict[str, Any]:
         """Return what is kept of integrated lanes, by the name of the variable."""
         system, plan, outputs = self.lanes.system_of(lanes), self.plan, self.config.outputs
-        sound = outcome.status == Status.OK
+        sound = outcome.status == kernels.Status.OK
         arrays: dict[str, Any] = {
             "status": outcome.status,
             "diverged_period": outcome.diverged_period,
@@ -264,7 +264,7 @@ class Simulation:
         if told is not None:
             arrays |= told.labels._asdict()
         largest = None
-        if outcome.growth is not None:
+        if plan.tangent:
             period = told.labels.period if told else np.zeros(lanes.size, dtype=np.int32)
             state = told.state if told else outcome.end_state
             largest = largest_exponents(system, outcome, self.recording, period, state)
@@ -283,9 +283,9 @@ class Simulation:
             arrays |= self._check(lanes, start, outcome, told)
         return arrays
 
-    def _told_of_teeth(self, system: System, outcome: Outcome) -> dict[str, NDArray[Any]]:
+    def _told_of_teeth(self, system: kernels.System, outcome: kernels.Outcome) -> dict[str, Array]:
         """Return what is kept of contact, loads and states; of lanes that diverged none of it."""
-        told: dict[str, NDArray[Any]] = {}
+        told: dict[str, Array] = {}
         if self.plan.contact and self._splits_steps:
             for way, columns in zip(
                 self._directions, np.split(outcome.contact, 2, 1), strict=False
@@ -298,58 +298,44 @@ class Simulation:
         told |= states_told(outcome, self.plan)
         for values in told.values():
             if values.dtype != np.uint8:
-                values[outcome.status != Status.OK] = np.nan
+                values[outcome.status != kernels.Status.OK] = np.nan
         return told
 
     def _check(
-        self, lanes: NDArray[np.intp], start: Floats, outcome: Outcome, told: Told | None
-    ) -> dict[str, NDArray[Any]]:
+        self, lanes: Integers, start: Floats, outcome: kernels.Outcome, told: Told | None
+    ) -> dict[str, Array]:
         """Integrate and label the checked lanes of a block again with half the step, and compare.
 
         Compared is what the labels know: the file may keep fewer section points.
         """
         plan, kept = self.recording, self.config.outputs.section
         share = self.config.integration.error_check
-        checked = checked_lanes(lanes // self.lanes.directions, share)
+        checked = error_check.checked_lanes(lanes // self.lanes.directions, share)
         section, exponent = np.full((2, lanes.size), np.nan)
-        motion = np.full(lanes.size, NOT_CHECKED, dtype=np.uint8)
+        motion = np.full(lanes.size, error_check.NOT_CHECKED, dtype=np.uint8)
         if checked.size:
             half = plan._replace(steps_per_period=2 * plan.steps_per_period)
             system = self.lanes.system_of(lanes[checked])
-            finer = integrate(system, start[checked], half)
+            finer = kernels.integrate(system, start[checked], half)
             some = told and labels_of(system, finer, half)
             fine = solution_of(system, finer, half, kept, some)
             some = told and Told(told.labels.of(checked), told.state[checked])
-            coarse = solution_of(system, outcome_of(outcome, checked), plan, kept, some)
+            theirs: Any = (array[checked] for array in outcome)
+            coarse = solution_of(system, kernels.Outcome(*theirs), plan, kept, some)
             found = difference(coarse, fine)
             section[checked], exponent[checked] = found.section_error, found.exponent_error
-            motion[checked] = np.where(found.changed, CHANGED, SAME)
-        return dict(zip(CHECKED, (section, exponent, motion), strict=True))
+            motion[checked] = np.where(found.changed, error_check.CHANGED, error_check.SAME)
+        return dict(zip(error_check.CHECKED, (section, exponent, motion), strict=True))
 
 
-def states_told(outcome: Outcome, plan: Plan) -> dict[str, Floats]:
+def states_told(outcome: kernels.Outcome, plan: kernels.Plan) -> dict[str, Floats]:
     """Return extremes of the states of a plan, and amplitudes at its orders, by name."""
     told: dict[str, Floats] = {}
     for number, state in enumerate(plan.states):
         smallest, largest = outcome.extremes[:, number].T
         ends = smallest, largest, largest - smallest
-        told |= {f"{state}_{name}": end for name, end in zip(EXTREMES, ends, strict=True)}
+        told |= {f"{state}_{name}": end for name, end in zip(known.EXTREMES, ends, strict=True)}
     if plan.orders:
-        names = (f"{AMPLITUDE}{name}" for name in (*plan.states, "transmission_error"))
+        names = (f"{known.AMPLITUDE}{name}" for name in (*plan.states, "transmission_error"))
         told |= zip(names, np.moveaxis(outcome.amplitudes, 1, 0), strict=True)
     return told
-
-
-def joined(outcomes: list[Outcome]) -> Outcome:
-    """Join the outcomes of lanes that come one after the other."""
-    if len(outcomes) == 1:
-        return outcomes[0]
-    every: Any = zip(*outcomes, strict=True)
-    arrays: Any = (None if some[0] is None else np.concatenate(some) for some in every)
-    return Outcome(*arrays)
-
-
-def outcome_of(outcome: Outcome, lanes: NDArray[np.intp]) -> Outcome:
-    """Return the outcome of some lanes."""
-    arrays: Any = (None if array is None else array[lanes] for array in outcome)
-    return Outcome(*arrays)

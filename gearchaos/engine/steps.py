@@ -6,18 +6,13 @@ from typing import NamedTuple
 
 import numpy as np
 from gearchaos_kernels import Outcome, Plan, Status, System, integrate
-from numpy.typing import NDArray
 
+from gearchaos.arrays import Integers
 from gearchaos.configuration.messages import Fault
 from gearchaos.configuration.run_tables import MOST_STEPS_PER_PERIOD
+from gearchaos.dynamics import stability
 from gearchaos.dynamics.labelling import Told
 from gearchaos.dynamics.largest_exponents import largest_exponents
-from gearchaos.dynamics.stability import (
-    StabilityLimit,
-    exponent_bias,
-    fewest_stable_steps,
-    stability_limit,
-)
 from gearchaos.dynamics.systems import plan_of
 from gearchaos.engine.lanes import Lanes
 from gearchaos.errors import ConfigurationError
@@ -27,23 +22,18 @@ from gearchaos.records.difference import Solution, bound, difference
 from gearchaos.records.label import PERIODIC, UNRESOLVED
 from gearchaos.records.period import POINTS_NEEDED, RETURNS, motion_period
 
-LANES_AT_ONCE = 2**14
-"""Lanes whose stability is looked at together."""
-
-PILOT_LANES = 48
-"""Lanes on which the error is measured, spread evenly over the sweep."""
+LANES_AT_ONCE = 2**14  # Lanes whose stability is looked at together.
+PILOT_LANES = 48  # Lanes on which the error is measured, spread evenly over the sweep.
 
 MOST_BIAS = 0.05
 """Largest shift of an exponent by the step alone that is passed over, in parts of the exponent."""
 
-SURELY_FINE = 8
-"""So many times the fewest stable steps shift no exponent that matters."""
+SURELY_FINE = 8  # So many times the fewest stable steps shift no exponent that matters.
 
 PILOT_PERIODS = 150
 """Mesh periods in which a lane settles on its grid, and as many that are compared."""
 
-MOST_STEPS = 25_600
-"""Finest grid of the search, where the method needs one."""
+MOST_STEPS = 25_600  # Finest grid of the search, where the method needs one.
 
 
 class Candidate(NamedTuple):
@@ -99,9 +89,9 @@ def coarse_steps(lanes: Lanes, steps: int) -> str:
     system = lanes.system_of(lanes.spread(PILOT_LANES))
     if lanes.config.integration.method != "rk4":
         return ""
-    if steps >= SURELY_FINE * np.max(fewest_stable_steps(system)):
+    if steps >= SURELY_FINE * np.max(stability.fewest_stable_steps(system)):
         return ""
-    bias, true = exponent_bias(system, steps)
+    bias, true = stability.exponent_bias(system, steps)
     worst = int(np.argmax(np.abs(bias) - MOST_BIAS * np.abs(true)))
     if abs(bias[worst]) <= MOST_BIAS * abs(true[worst]):
         return ""
@@ -112,17 +102,17 @@ def coarse_steps(lanes: Lanes, steps: int) -> str:
     )
 
 
-def _limits(lanes: Lanes, steps: int) -> Iterator[StabilityLimit]:
+def _limits(lanes: Lanes, steps: int) -> Iterator[stability.StabilityLimit]:
     # Starts and pitch errors of one value share its stability.
     every = np.arange(0, len(lanes), lanes.repeats)
     for first in range(0, every.size, LANES_AT_ONCE):
         some = every[first : first + LANES_AT_ONCE]
-        limit = stability_limit(lanes.system_of(some), steps)
+        limit = stability.stability_limit(lanes.system_of(some), steps)
         if limit is not None:
             yield limit._replace(lanes=some[limit.lanes])
 
 
-def _fault(lanes: Lanes, worst: StabilityLimit, unstable: NDArray[np.intp], steps: int) -> Fault:
+def _fault(lanes: Lanes, worst: stability.StabilityLimit, unstable: Integers, steps: int) -> Fault:
     places = []
     swept = lanes.values_of(unstable)
     swept.pop(REALISATION, None)
@@ -160,8 +150,8 @@ def solution_of(
         motion = np.where(period > 0, PERIODIC, UNRESOLVED)
     else:
         period, state, motion = told.labels.period, told.state, told.labels.motion
-    exponent = None
-    if outcome.growth is not None:
+    exponent = np.full(period.shape, np.nan)
+    if plan.tangent:
         exponent = largest_exponents(system, outcome, plan, period, state).values
     columns = [system.states.index(name) for name in kept or system.states]
     diverged = outcome.status != Status.OK

@@ -31,8 +31,7 @@ from gearchaos.results.stage_table import label_text
 from gearchaos.results.variables import LABELS, LARGEST_EXPONENT, SECTION, STATUS, coordinate_text
 
 WIDE = {"sizing_mode": "stretch_width"}
-HALF = {"flex": "1 1 560px", "min-width": "0"}
-"""Side by side where the window is wide enough."""
+HALF = {"flex": "1 1 560px", "min-width": "0"}  # Side by side where the window is wide enough.
 
 
 class Page:

@@ -47,40 +47,24 @@ def bifurcation(
     variable: str | None = None,
     *,
     between: Between = (None, None),
-    full_range: bool = False,
     color: str = BLACK,
     label: str | None = None,
     marker: str = ".",
 ) -> Diagram:
     """Draw the bifurcation diagram of one section variable into axes.
 
-    Every section point is a small translucent dot: a periodic motion, whose points coincide,
-    shows as a crisp black line, and chaos as grey whose depth is the density of visits. The
-    dots are rasterised, so that a PDF stays small. Above `figures.lanes.MOST_DOTS` they are counted
-    by pixel, and fainter the more there are, so that chaos stays grey.
-    Diverged lanes get a red tick at the bottom, lanes beyond robust limits a triangle at the edge,
-    and a legend above says so.
+    Every section point is a small translucent dot: a periodic motion, whose points coincide, shows
+    as a crisp black line, and chaos as grey whose depth is the density of visits. The dots are
+    rasterised, so that a PDF stays small. Above `figures.lanes.MOST_DOTS` they are counted by
+    pixel, and fainter the more there are, so that chaos stays grey. Diverged lanes get a red tick
+    at the bottom, lanes beyond robust limits a triangle at the edge, and a legend above says so.
 
-    Parameters
-    ----------
-    axes : matplotlib.axes.Axes
-    result : Result
-        Over one swept parameter.
-    variable : str, optional
-        A section variable, or one with a number for each lane; default `section_delta_5`, or the
-        first section variable that the result has.
-    between : (float or None, float or None)
-        The part of the parameter range to show.
-    full_range : bool
-        Let the vertical axis reach every lane, however few lie far out.
-    color, label, marker : str
-        Of the dots, for diagrams of several results in the same axes: the limits then hold what
-        those of each would, the triangles follow them, and the legend names the labels.
-
-    Raises
-    ------
-    FigureError
-        If the result has no such variable, no lane in the range, or two swept parameters.
+    ``result``: over one swept parameter; ``variable``: a section variable, or one with a number for
+    each lane, by default `section_delta_5`, or the first section variable that the result has;
+    ``between``: the part of the parameter range to show; ``color``, ``label``, ``marker`` of the
+    dots, for diagrams of several results in the same axes: the limits then hold what those of each
+    would, the triangles follow them, and the legend names the labels. Raises FigureError if the
+    result has no such variable, no lane in the range, or two swept parameters.
     """
     names = section_variables(result)
     numbers = [v for v in result.variables.values() if v.dtype == "float64"]
@@ -102,7 +86,7 @@ def bifurcation(
     for part, values in portions(lanes, rows):
         np.fmin.reduce(values, axis=1, out=low[part])
         np.fmax.reduce(values, axis=1, out=high[part])
-    own = Diagram(points, lanes, low, high, full_range=full_range)
+    own = Diagram(points, lanes, low, high)
     return close_panel(axes, result, own)
 
 
@@ -111,27 +95,18 @@ def lyapunov(
     result: Result,
     *,
     between: Between = (None, None),
-    full_range: bool = False,
     color: str = BLACK,
     label: str | None = None,
     marker: str = ".",
 ) -> LyapunovArtists:
     """Draw the largest Lyapunov exponent into axes, with zero line and uncertainty.
 
-    Diverged lanes are gaps with a red tick at the bottom; a positive exponent is hatched down
-    to zero; the vertical axis always holds zero, and lanes beyond robust limits get a triangle.
-    Of more lanes than a page can tell apart (`figures.lanes.COLUMNS`), line, shades and bars are
-    those of the lowest and the highest exponent in each column.
-
-    Parameters
-    ----------
-    axes, result, between, full_range, color, label, marker
-        As for `bifurcation`.
-
-    Raises
-    ------
-    FigureError
-        If the result has no Lyapunov exponents, no lane in the range, or two swept parameters.
+    Diverged lanes are gaps with a red tick at the bottom; a positive exponent is hatched down to
+    zero; the vertical axis always holds zero, and lanes beyond robust limits get a triangle. Of
+    more lanes than a page can tell apart (`figures.lanes.COLUMNS`), line, shades and bars are those
+    of the lowest and the highest exponent in each column. Parameters are as for `bifurcation`;
+    raises FigureError if the result has no Lyapunov exponents, no lane in the range, or two swept
+    parameters.
     """
     if LARGEST_EXPONENT not in result:
         raise FigureError("the result has no Lyapunov exponents: the sweep left them out")
@@ -170,7 +145,7 @@ def lyapunov(
         look = {"ms": 3.0, "mfc": "none", "mew": 0.5, "color": VERMILION}
         named += axes.plot(x[mixed], exponent[mixed], "o", label="came from another motion", **look)
     axes.set_ylabel(axis_label(result, LARGEST_EXPONENT, line_length=20))
-    own = Diagram(line, lanes, whole, whole, np.nan_to_num(spread), full_range, named)
+    own = Diagram(line, lanes, whole, whole, np.nan_to_num(spread), named)
     close_panel(axes, result, own, hold_zero=True)
     marks = own.diverged, own.off_scale, own.legend
     return LyapunovArtists(line, points, band, bars, positive, zero, *marks)

@@ -12,9 +12,10 @@ from matplotlib.container import Container
 from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator, NullLocator
 
+from gearchaos.arrays import Floats
 from gearchaos.errors import FigureError
 from gearchaos.figures.labels import axis_label, in_words, legend_title
-from gearchaos.figures.lanes import Between, Floats, cell_edges, diagram_lanes
+from gearchaos.figures.lanes import Between, cell_edges, diagram_lanes
 from gearchaos.figures.page import Page, few_ticks, legend_below, letter, page, remark
 from gearchaos.figures.stages import SHADES, look_of
 from gearchaos.figures.style import BLACK, SINGLE_COLUMN_MM
@@ -28,8 +29,7 @@ Drawn = Artist | Container
 COLORS = ("#D6E6F3", "#EDBE62", "#5DB898", "#C284AD", "#B4602F", "#4C6E8E")
 """Of attractors by their numbers, over and over again; lightness tells them apart in grey."""
 
-MOST_POINTS = 500
-"""Section points that are drawn of an attractor."""
+MOST_POINTS = 500  # Section points that are drawn of an attractor.
 
 MOST_BARS = 24
 """More values than these are steps side by side, with a band instead of bars of confidence."""
@@ -44,24 +44,12 @@ def shares(
     unresolved among them; drawn around it is its confidence interval of 95 % (Wilson 1927), which
     takes gear pairs and starts for independent.
 
-    Parameters
-    ----------
-    axes, result, between
-        As for `bifurcation`, with labels of the motion of several gear pairs or starts.
-    contact : matplotlib.axes.Axes, optional
-        Where to draw the share of motions whose teeth lose contact, if the result tells.
-
-    Returns
-    -------
-    list
-        What is drawn into the first axes, with labels, in the order of a legend.
-
-    Raises
-    ------
-    FigureError
-        If there is no lane in the range, or two swept parameters.
-    ConfigurationError, FileError
-        If the result has neither several gear pairs nor several starts, or no labels.
+    ``axes``, ``result``, ``between``: as for `bifurcation`, with labels of the motion of several
+    gear pairs or starts; ``contact``: axes in which to draw the share of motions whose teeth lose
+    contact, if the result tells. Returns what is drawn into the first axes, with labels, in the
+    order of a legend. Raises FigureError if there is no lane in the range, or two swept parameters;
+    ConfigurationError or FileError if the result has neither several gear pairs nor several starts,
+    or no labels.
     """
     limits, counted = diagram_lanes(result, between).limits, motion_shares(result)
     values, known = counted.values, list(dict.fromkeys([*SHADES, *counted.motions]))

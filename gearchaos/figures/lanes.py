@@ -13,19 +13,15 @@ from matplotlib.lines import Line2D
 from matplotlib.transforms import IdentityTransform
 from numpy.typing import NDArray
 
+from gearchaos.arrays import Floats, Integers, Mask
 from gearchaos.errors import FigureError
 from gearchaos.results.result import Result
 from gearchaos.results.variables import STATUS, UNSWEPT
 
-Floats = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 Between = tuple[float | None, float | None]
 
-PAD = 0.05
-"""What is added to either end of an axis of one value, in parts of the value."""
-
-COLUMNS = 4000
-"""Columns of an axis that a page can tell apart: two of a journal at 600 dpi."""
+PAD = 0.05  # What is added to either end of an axis of one value, in parts of the value.
+COLUMNS = 4000  # Columns of an axis that a page can tell apart: two of a journal at 600 dpi.
 
 MOST_DOTS = 1 << 18
 """More points are counted: a panel of one column has about as many pixels at 300 dpi."""
@@ -38,7 +34,7 @@ class Lanes(NamedTuple):
     ``diverged`` (lanes,): whether the status is any but 0.
     """
 
-    numbers: NDArray[np.intp]
+    numbers: Integers
     parameter: Floats
     diverged: Mask
     limits: tuple[float, float]
@@ -116,7 +112,7 @@ def cell_edges(values: Floats) -> Floats:
     return np.concatenate([outermost[:1], halfway, outermost[1:]])
 
 
-def columns(parameter: Floats, limits: tuple[float, float]) -> NDArray[np.intp]:
+def columns(parameter: Floats, limits: tuple[float, float]) -> Integers:
     """Return where in an ascending parameter each column of an axis begins.
 
     If there are not several values for each of the `COLUMNS`, every one begins a column.
@@ -127,7 +123,7 @@ def columns(parameter: Floats, limits: tuple[float, float]) -> NDArray[np.intp]:
     return np.flatnonzero(np.diff(number, prepend=-1.0))
 
 
-def outermost(lanes: Lanes, values: Floats) -> NDArray[np.intp]:
+def outermost(lanes: Lanes, values: Floats) -> Integers:
     """Return which lanes have the lowest or the highest value of their column, or none in a gap."""
     first = columns(lanes.parameter, lanes.limits)
     sizes = np.diff(first, append=values.size)

@@ -13,11 +13,11 @@ from matplotlib.patches import Patch, PathPatch
 from matplotlib.path import Path
 from matplotlib.ticker import MaxNLocator
 from matplotlib.transforms import offset_copy
-from numpy.typing import NDArray
 
+from gearchaos.arrays import Array, Floats, Mask
 from gearchaos.errors import FigureError
 from gearchaos.figures.labels import axis_label, in_words, legend_title
-from gearchaos.figures.lanes import Between, Floats, Mask, cell_edges, map_axes, select_lanes
+from gearchaos.figures.lanes import Between, cell_edges, map_axes, select_lanes
 from gearchaos.figures.page import Page, few_ticks, footnote, page
 from gearchaos.figures.panel import robust_limits
 from gearchaos.figures.stages import look_of
@@ -29,8 +29,7 @@ from gearchaos.results.variables import DIRECTIONS, LABELS, LARGEST_EXPONENT, ST
 SHOWN = (LABELS[0], LARGEST_EXPONENT, *(f"contact_state_{way}" for way in DIRECTIONS))
 """What a page shows, if the result has it."""
 
-NO_VALUE = "no value"
-"""What there is of a lane that did not diverge, but has no number."""
+NO_VALUE = "no value"  # What there is of a lane that did not diverge, but has no number.
 
 NUMBERS = "YlGn"
 """Colours of numbers, and of kinds without colours of their own, the first ones light."""
@@ -40,8 +39,7 @@ SIGNS |= {0.3: "#E69F00", 0.65: "#A84300", 1.0: "#4A1500"}
 """Colours of exponents, in parts of the way from zero to the lowest and to the highest: blue as
 periodic motions are, orange as chaos is, which alone is dark in grey."""
 
-NARROWEST_MM = 60.0
-"""Of panels side by side; narrower ones stand on top of each other."""
+NARROWEST_MM = 60.0  # Of panels side by side; narrower ones stand on top of each other.
 
 KEY_COLUMNS = 3
 ROW_PT = 1.5 * SMALL_FONT_PT
@@ -51,12 +49,7 @@ many rows a bar of colours takes."""
 
 
 def parameter_map(
-    axes: Axes,
-    result: Result,
-    variable: str = LABELS[0],
-    *,
-    between: Between = (None, None),
-    full_range: bool = False,
+    axes: Axes, result: Result, variable: str = LABELS[0], *, between: Between = (None, None)
 ) -> ScalarMappable:
     """Draw one variable of the lanes as a map over two swept parameters into axes.
 
@@ -65,37 +58,20 @@ def parameter_map(
     zero. Lanes without a number are grey or hatched, and the legend says why. The cells are an
     image, so that a PDF stays small.
 
-    Parameters
-    ----------
-    axes : matplotlib.axes.Axes
-    result : Result
-        Over two swept parameters, the first one along x, with one lane for each pair of values.
-    variable : str
-        "motion", any other variable with flags, or one with a number for each lane.
-    between : (float or None, float or None)
-        The part of the first parameter's range to show.
-    full_range : bool
-        Let the colours reach every lane, however few lie far out.
-
-    Returns
-    -------
-    ScalarMappable
-        The image. Its array has the shape (values of the second parameter, values shown of the
-        first), with the number of the kind where there are kinds, masked where there is none.
-
-    Raises
-    ------
-    FigureError
-        If the result has no such variable, no lane in the range, or other axes than two parameters.
-    FileError
-        If the motion is wanted and the result has no labels.
+    ``result``: over two swept parameters, the first one along x, with one lane for each pair of
+    values; ``variable``: "motion", any other variable with flags, or one with a number for each
+    lane; ``between``: the part of the first parameter's range to show. Returns the image. Its array
+    has the shape (values of the second parameter, values shown of the first), with the number of
+    the kind where there are kinds, masked where there is none. Raises FigureError if the result has
+    no such variable, no lane in the range, or other axes than two parameters; FileError if the
+    motion is wanted and the result has no labels.
     """
     x_axis, y_axis = map_axes(result)
     lanes, y = select_lanes(result, between), np.asarray(result[y_axis], dtype=np.float64)
     x = lanes.parameter[:: y.size]
     edges = cell_edges(x), cell_edges(y)
 
-    def cells(values: NDArray[Any]) -> NDArray[Any]:
+    def cells(values: Array) -> Array:
         return values.ravel()[lanes.numbers].reshape(x.size, y.size).T
 
     image: ScalarMappable
@@ -112,7 +88,7 @@ def parameter_map(
     else:
         numbers = cells(result[variable].astype(np.float64))
         numbers[(numbers == result.variables[variable].fill_value) | np.isinf(numbers)] = np.nan
-        image = _number_cells(axes, edges, numbers, variable == LARGEST_EXPONENT, full_range)
+        image = _number_cells(axes, edges, numbers, variable == LARGEST_EXPONENT)
         none, ended = np.isnan(numbers), cells(result[STATUS]) != 0
         masks = {"diverged": none & ended, NO_VALUE: none & ~ended}
         looks = {name: look_of(name) for name in masks}
@@ -138,7 +114,6 @@ def map_page(
     variable: str | None = None,
     *,
     between: Between = (None, None),
-    full_range: bool = False,
     marked: Mapping[str, float] | None = None,
     width_mm: float = SINGLE_COLUMN_MM,
     height_mm: float | None = None,
@@ -146,21 +121,10 @@ def map_page(
     """Draw the maps of motion and period (a), largest exponent (b) and state of contact (c).
 
     A result without one of them gives the panels that it has data for; a ``variable`` gives one
-    panel, of itself.
-
-    Parameters
-    ----------
-    result, variable, between, full_range
-        As for `parameter_map`.
-    marked : mapping of str to float, optional
-        Values of the two parameters at which a line crosses the maps.
-    width_mm, height_mm : float
-        Size of the page. Panels for which it is wide enough stand side by side.
-
-    Raises
-    ------
-    FigureError, FileError
-        As for `parameter_map`, and if there is nothing to draw.
+    panel, of itself. Parameters and errors as for `parameter_map`, and FigureError if there is
+    nothing to draw; ``marked``: values of the two parameters at which a line crosses the maps;
+    ``width_mm``, ``height_mm``: size of the page. Panels for which it is wide enough stand side by
+    side.
     """
     names = [name for name in SHOWN if name in result] if variable is None else [variable]
     if not names:
@@ -172,7 +136,7 @@ def map_page(
     with page(width_mm, height) as figure:
         panels = figure.subplots(*shape, sharex=True, sharey=True, squeeze=False).ravel().tolist()
         for axes, name in zip(panels, names, strict=True):
-            parameter_map(axes, result, name, between=between, full_range=full_range)
+            parameter_map(axes, result, name, between=between)
             few_ticks(axes)
             axes.label_outer()
             for axis, value in (marked or {}).items():
@@ -196,7 +160,7 @@ def map_page(
     return figure
 
 
-def _kinds(result: Result, variable: str) -> tuple[NDArray[Any], dict[str, dict[str, Any]]]:
+def _kinds(result: Result, variable: str) -> tuple[Array, dict[str, dict[str, Any]]]:
     """Return the number of each lane's kind, and by the names of 0, 1, ... how it is filled."""
     if variable in LABELS:
         kinds, names = motion_kinds(result)
@@ -209,13 +173,13 @@ def _kinds(result: Result, variable: str) -> tuple[NDArray[Any], dict[str, dict[
 
 
 def _number_cells(
-    axes: Axes, edges: tuple[Floats, Floats], numbers: Floats, signed: bool, full_range: bool
+    axes: Axes, edges: tuple[Floats, Floats], numbers: Floats, signed: bool
 ) -> ScalarMappable:
     """Draw numbers (rows, columns), with the bar of their colours; robust limits may cut it."""
     there = numbers[np.isfinite(numbers)]
     there = there if there.size else np.zeros(1)
     ends = lowest, highest = there.min(), there.max()
-    low, high = np.clip(robust_limits(there, there, full_range=full_range), *ends)
+    low, high = np.clip(robust_limits(there, there), *ends)
     colours: Colormap = mpl.colormaps[NUMBERS]
     if signed:
         # Neither way is so short that zero would lie on the edge of the bar.

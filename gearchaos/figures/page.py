@@ -22,8 +22,7 @@ from gearchaos.interrupts import check
 from gearchaos.results.atomic_file import check_output, replacing
 from gearchaos.version import software_version
 
-FORMATS: tuple[str, ...] = ("png", "pdf")
-"""What is written unless asked otherwise."""
+FORMATS: tuple[str, ...] = ("png", "pdf")  # What is written unless asked otherwise.
 
 ENDINGS = (*FORMATS, "svg", "eps", "tiff", "tif")
 FINENESS = {"pdf": 2, "svg": 2}
@@ -100,28 +99,12 @@ def save_figure(
 ) -> None:
     """Write a figure in one of the formats of `ENDINGS`, complete or not at all.
 
-    The file carries the title and the version of the software, but no date: the same figure
-    gives the same bits.
-
-    Parameters
-    ----------
-    figure : Figure
-    path : path
-        Its ending says the format, such as `.png` or `.pdf`.
-    title : str
-        For the file's metadata.
-    dpi : int
-        Pixels per inch. The rasterised points in a PDF or SVG get twice as many, since they will
-        be looked at more closely. EPS knows no transparency: its panels are pictures.
-    overwrite : bool
-        Whether an existing file is replaced.
-
-    Raises
-    ------
-    FigureError
-        If the ending names no known format.
-    FileError
-        If the file cannot be written.
+    The file carries the title and the version of the software, but no date: the same figure gives
+    the same bits. The ending of the ``path`` says the format, such as `.png` or `.pdf`; ``title``:
+    for the file's metadata; ``dpi``: pixels per inch. The rasterised points in a PDF or SVG get
+    twice as many, since they will be looked at more closely. EPS knows no transparency: its panels
+    are pictures. ``overwrite``: whether an existing file is replaced. Raises FigureError if the
+    ending names no known format, FileError if the file cannot be written.
     """
     kind = Path(path).suffix.lower().removeprefix(".")
     if kind not in ENDINGS:

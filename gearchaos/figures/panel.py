@@ -11,8 +11,9 @@ from matplotlib.axes import Axes
 from matplotlib.legend import Legend
 from matplotlib.lines import Line2D
 
+from gearchaos.arrays import Floats
 from gearchaos.figures.labels import axis_label, short
-from gearchaos.figures.lanes import Floats, Lanes, columns
+from gearchaos.figures.lanes import Lanes, columns
 from gearchaos.figures.style import BLACK, GREY, LEGEND, VERMILION
 from gearchaos.results.result import Result
 
@@ -26,7 +27,7 @@ class Diagram:
 
     ``points``: what shows the lanes, lane after lane; ``low``, ``high`` (lanes,): lowest and
     highest value of each lane, not a number where there is none; ``spread``, (lanes,) or one for
-    all: what the limits leave room for beyond these; ``full_range``: as for `robust_limits`;
+    all: what the limits leave room for beyond these;
     ``named``: what the legend names beside the points; ``diverged``: the rug of diverged lanes;
     ``off_scale``: triangles for lanes beyond bottom and top; ``legend``: of all these.
     """
@@ -36,7 +37,6 @@ class Diagram:
     low: Floats
     high: Floats
     spread: Floats | float = 0.0
-    full_range: bool = False
     named: list[Artist] = field(default_factory=list)
     diverged: Line2D | None = None
     off_scale: list[Line2D] = field(default_factory=list)
@@ -71,9 +71,7 @@ def close_panel(axes: Axes, result: Result, own: Diagram, *, hold_zero: bool = F
     most = np.concatenate([one.high + one.spread for one in drawn])
     there = np.isfinite(least)
     if there.any():
-        full_range = any(one.full_range for one in drawn)
-        ends = least[there], most[there]
-        axes.set_ylim(robust_limits(*ends, hold_zero=hold_zero, full_range=full_range))
+        axes.set_ylim(robust_limits(least[there], most[there], hold_zero=hold_zero))
     else:
         _say_nothing_to_show(axes, own.lanes)
     for one in drawn:
@@ -86,15 +84,13 @@ def close_panel(axes: Axes, result: Result, own: Diagram, *, hold_zero: bool = F
     return own
 
 
-def robust_limits(
-    low: Floats, high: Floats, *, hold_zero: bool = False, full_range: bool = False
-) -> tuple[float, float]:
+def robust_limits(low: Floats, high: Floats, *, hold_zero: bool = False) -> tuple[float, float]:
     """Return limits that a few outlying lanes cannot stretch.
 
     Where the outermost 3 % of the lanes at either end would take more than half of the height
     from all the others, those that lie far out are left out; a triangle then says so. ``low``,
     ``high`` (lanes,): lowest and highest value of each lane, all finite; ``hold_zero``: zero is
-    part of what is to be shown; ``full_range``: every lane is shown, however far it lies.
+    part of what is to be shown.
     """
     bottom, top = float(low.min()), float(high.max())
     inner_bottom = float(np.quantile(low, OUTLYING_SHARE))
@@ -103,7 +99,7 @@ def robust_limits(
         bottom, inner_bottom = min(bottom, 0.0), min(inner_bottom, 0.0)
         top, inner_top = max(top, 0.0), max(inner_top, 0.0)
     inner = inner_top - inner_bottom
-    if not full_range and 0.0 < 2.0 * inner < top - bottom:
+    if 0.0 < 2.0 * inner < top - bottom:
         bottom = min(inner_bottom, float(low[low >= inner_bottom - inner / 2.0].min()))
         top = max(inner_top, float(high[high <= inner_top + inner / 2.0].max()))
     pad = MARGIN * (top - bottom) or abs(top) * MARGIN or 0.5

@@ -8,9 +8,10 @@ from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator
 
+from gearchaos.arrays import Floats
 from gearchaos.errors import FigureError
 from gearchaos.figures.labels import axis_label, place_of, plain, unit_of
-from gearchaos.figures.lanes import Between, Floats
+from gearchaos.figures.lanes import Between
 from gearchaos.figures.page import remark
 from gearchaos.figures.style import BLACK, BLUE, LEGEND, ORANGE, VERMILION
 from gearchaos.records.amplitude_spectrum import spectral_lines
@@ -19,17 +20,12 @@ from gearchaos.results.response_variables import MESH_FORCE, TIME, acceleration_
 from gearchaos.results.result import Result, section_variables
 from gearchaos.results.scales import excitation_of
 
-COORDINATE = "delta_5"
-"""The coordinate that is drawn unless another is asked for: the torsion."""
+COORDINATE = "delta_5"  # The coordinate that is drawn unless another is asked for: the torsion.
 
 HIGHEST_ORDER = 8.0
-DECADES = 5
-"""Decades that a logarithmic spectrum shows, up to that of its highest line."""
-
-CONTACT_COLOURS = (ORANGE, "0.8", BLUE)
-"""Of teeth apart, of driving and of back flanks in contact."""
-STRIP_HEIGHT = 0.05
-"""Of what tells the contact along the foot of a panel, in parts of the panel."""
+DECADES = 5  # Decades that a logarithmic spectrum shows, up to that of its highest line.
+CONTACT_COLOURS = (ORANGE, "0.8", BLUE)  # Of teeth apart, of driving and of back flanks in contact.
+STRIP_HEIGHT = 0.05  # Of what tells the contact along the foot of a panel, in parts of the panel.
 
 _LINE_LENGTH = 26
 _MARGIN = 0.06
@@ -48,22 +44,10 @@ def time_history(
 ) -> Line2D:
     """Draw a variable against time in mesh periods.
 
-    Parameters
-    ----------
-    axes : matplotlib.axes.Axes
-    result : Result
-        A response.
-    lane : int
-        Number of the lane, from 0, all axes of the result flattened.
-    variable : str
-        A variable over time, such as ``"delta_5_acceleration"`` or ``"mesh_force_tangential"``.
-    between : (float or None, float or None)
-        Mesh periods to show; None: as far as the record goes.
-
-    Raises
-    ------
-    FigureError
-        If the result is no response, or has no such lane or variable, or the lane diverged.
+    ``result``: a response; ``lane``: number of the lane, from 0, all axes of the result flattened;
+    ``variable``: one over time, such as ``"delta_5_acceleration"`` or ``"mesh_force_tangential"``;
+    ``between``: mesh periods to show; None: as far as the record goes. Raises FigureError if the
+    result is no response, or has no such lane or variable, or the lane diverged.
     """
     values = motion_of(result, lane, variable)
     time = result[TIME]
@@ -157,22 +141,13 @@ def amplitude_spectrum(
 
     A motion that repeats is transformed over as many of its periods as the record holds, so that
     all its lines are those of the transform; any other one over as many periods of the excitation.
-    Errors as for `time_history`; each of the lines that are returned begins at the bottom of the
-    axes.
+    Each of the lines that are returned begins at the bottom of the axes.
 
-    Parameters
-    ----------
-    axes, result, lane
-        As for `time_history`.
-    variable : str, optional
-        A variable over time; default ``"delta_5_acceleration"``.
-    highest : float
-        Multiple of the mesh frequency up to which lines are shown.
-    window : str, optional
-        ``"rectangular"``, exact for a motion that repeats, or ``"hann"``; default by whether it
-        repeats within the record.
-    logarithmic : bool
-        Show five decades up to that of the highest line, instead of a linear scale.
+    ``axes``, ``result``, ``lane`` and errors: as for `time_history`; ``variable``: one over time,
+    by default ``"delta_5_acceleration"``; ``highest``: multiple of the mesh frequency up to which
+    lines are shown; ``window``: ``"rectangular"``, exact for a motion that repeats, or ``"hann"``,
+    by default by whether it repeats within the record; ``logarithmic``: show five decades up to
+    that of the highest line, instead of a linear scale.
     """
     variable = variable or acceleration_of(COORDINATE)
     values, steps = motion_of(result, lane, variable), samples_per_period(result)

@@ -20,19 +20,15 @@ from gearchaos.results.response_variables import MESH_ERROR, MESH_FORCE, TIME, a
 from gearchaos.results.result import Result
 from gearchaos.results.scales import Excitation, excitation_of
 
-SIDE_BY_SIDE_MM = 120.0
-"""Width from which on two panels stand side by side."""
-
-SHOWN_PERIODS = 12
-"""Mesh periods at the end of the record that the time history shows."""
+SIDE_BY_SIDE_MM = 120.0  # Width from which on two panels stand side by side.
+SHOWN_PERIODS = 12  # Mesh periods at the end of the record that the time history shows.
 
 _PANEL_HEIGHT_MM = 52.0
 
 SHOWN_REVOLUTIONS = 2
 """Revolutions of the driving gear at the end of the record that the time histories show."""
 
-HIGHEST_ORDER = 3.5
-"""Multiple of the mesh order up to which the spectrum goes."""
+HIGHEST_ORDER = 3.5  # Multiple of the mesh order up to which the spectrum goes.
 
 MOST_TICKS = 120
 
@@ -57,23 +53,11 @@ def response_page(
     pitch error, in um where b' is known, over revolutions of the driving gear, and points once a
     mesh period stand behind those of the section.
 
-    Parameters
-    ----------
-    result : Result
-        A response.
-    lane : int
-        Number of the lane, from 0, all axes of the result flattened.
-    coordinate : str, optional
-        Such as ``"delta_1"``; default ``"delta_5"``, the torsion. Of what is no coordinate, such
-        as ``"mesh_force_tangential"``, the page has the time history and its own spectrum.
-    width_mm, height_mm : float
-        Size of the page; 180 mm is two columns of a journal, and at 85 mm, one column, the panels
-        stand one above the other.
-
-    Raises
-    ------
-    FigureError
-        If the result is no response, has no such lane or variable, or the lane diverged.
+    ``result``, ``lane`` and errors: as for `time_history`; ``coordinate``: such as ``"delta_1"``,
+    by default ``"delta_5"``, the torsion. Of what is no coordinate, such as
+    ``"mesh_force_tangential"``, the page has the time history and its own spectrum. ``width_mm``,
+    ``height_mm``: size of the page; 180 mm is two columns of a journal, and at 85 mm, one column,
+    the panels stand one above the other.
     """
     coordinate = response.COORDINATE if coordinate is None else coordinate
     whole = coordinate in response.coordinates_of(result)

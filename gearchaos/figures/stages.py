@@ -65,27 +65,13 @@ def shade_stages(
 ) -> StageArtists:
     """Shade the stages of a sweep behind what the axes show, limits and labels left as they are.
 
-    Parameters
-    ----------
-    axes : matplotlib.axes.Axes
-        With the swept parameter along x, limits set.
-    result : Result
-        Over one swept parameter, with labels of the motion. Values whose starts or gear pairs come
-        to different motions are "several motions"; so is a stage that hides too many narrower ones.
-    lanes : LabelledLanes, optional
-        Lanes with other labels than those of the result.
-    narrowest : float, optional
-        Narrower stages go into what surrounds them; default a 150th of the axis.
-    legend : bool
-        Put a legend of the shades below everything in the figure, which needs the constrained
-        layout.
-
-    Raises
-    ------
-    FileError
-        If the result has no labels.
-    FigureError
-        If it has several swept parameters.
+    ``axes``: with the swept parameter along x, limits set; ``result``: over one swept parameter,
+    with labels of the motion. Values whose starts or gear pairs come to different motions are
+    "several motions"; so is a stage that hides too many narrower ones. ``lanes``: with other labels
+    than those of the result; ``narrowest``: narrower stages go into what surrounds them, by default
+    a 150th of the axis; ``legend``: put a legend of the shades below everything in the figure,
+    which needs the constrained layout. Raises FileError if the result has no labels, FigureError if
+    it has several swept parameters.
     """
     diagram_lanes(result)  # Refuses two swept parameters.
     lanes = labelled_lanes(result, repeats=True) if lanes is None else lanes

@@ -22,10 +22,8 @@ from gearchaos.results.stage_table import LabelledLanes
 from gearchaos.results.variables import LABELS, LARGEST_EXPONENT, ORDER, WAYS
 
 HEIGHT_RATIOS = (1.6, 1.0)
-SHADE = "0.92"
-"""Where directions differ."""
-MOST_INTERVALS = (7, 8)
-"""Between the ticks of the lower panel, and of the one above it."""
+SHADE = "0.92"  # Where directions differ.
+MOST_INTERVALS = (7, 8)  # Between the ticks of the lower panel, and of the one above it.
 
 
 def bifurcation_page(
@@ -33,7 +31,6 @@ def bifurcation_page(
     variable: str | None = None,
     *,
     between: Between = (None, None),
-    full_range: bool = False,
     stages: bool | LabelledLanes = False,
     marked: tuple[str, Sequence[float]] | None = None,
     labels: Sequence[str] | None = None,
@@ -42,38 +39,21 @@ def bifurcation_page(
 ) -> Page:
     """Draw the bifurcation diagram (a) over the Lyapunov chart (b).
 
-    A result without section points or without exponents gives the one panel it has data for.
+    A result without section points or without exponents gives the one panel it has data for. The
+    page is a Figure not known to pyplot, which a notebook shows; `savefig` or
+    `gearchaos.figures.save_figure` writes it.
 
-    Parameters
-    ----------
-    result : Result or sequence of Result
-        Over one swept parameter; several are drawn over each other.
-    variable, between, full_range
-        As for `bifurcation`; amplitudes at mesh orders are drawn as by `waterfall`.
-    stages : bool or LabelledLanes
-        Shade the stages behind both panels. Lanes with other labels than those of the result may be
-        given.
-    marked : (str, sequence of float), optional
-        A few words, and the values of the parameter of which they tell: ticks at the upper edge.
-    labels : sequence of str, optional
-        What the legend calls each of several results; default their titles.
-    width_mm, height_mm : float
-        Size of the page; 85 mm is one column of a journal and 180 mm two. The default height
-        follows from the width and the number of panels.
+    ``result``: over one swept parameter, or several of them, drawn over each other; ``variable``,
+    ``between``: as for `bifurcation`; amplitudes at mesh orders are drawn as by `waterfall`;
+    ``stages``: shade the stages behind both panels, also those of lanes with other labels than
+    those of the result; ``marked``: a few words, and the values of the parameter of which they
+    tell: ticks at the upper edge; ``labels``: what the legend calls each of several results, by
+    default their titles; ``width_mm``, ``height_mm``: size of the page; 85 mm is one column of a
+    journal and 180 mm two. The default height follows from the width and the number of panels.
 
-    Returns
-    -------
-    Page
-        A Figure not known to pyplot, which a notebook shows; `savefig` or
-        `gearchaos.figures.save_figure` writes it.
-
-    Raises
-    ------
-    FigureError
-        If the result has nothing to draw, no such variable or no lane in the range, or runs over
-        two parameters; if several results run over different parameters or stages are wanted.
-    FileError
-        If stages are wanted and the result has no labels of the motion.
+    Raises FigureError if the result has nothing to draw, no such variable or no lane in the range,
+    or runs over two parameters; if several results run over different parameters or stages are
+    wanted. Raises FileError if stages are wanted and the result has no labels of the motion.
     """
     # A variable that was asked for and is not there is an error, not a page without it.
     files = [result] if isinstance(result, Result) else list(result)
@@ -106,7 +86,7 @@ def bifurcation_page(
         grid = figure.subplots(panels, 1, sharex=True, squeeze=False, height_ratios=ratios)
         stack: list[Axes] = grid[:, 0].tolist()
         for one, name, (color, marker) in zip(results, labels, cycle(OVERLAID), strict=False):
-            shown: dict[str, Any] = {"between": between, "full_range": full_range}
+            shown: dict[str, Any] = {"between": between}
             if len(results) > 1:
                 shown |= {"color": color, "marker": marker, "label": plain(name) or "untitled"}
             if of_orders:

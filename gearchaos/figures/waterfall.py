@@ -16,8 +16,7 @@ from gearchaos.figures.stages import look_of
 from gearchaos.results.result import Result
 from gearchaos.results.variables import ORDER
 
-DECADES = 5
-"""Below the largest amplitude; what is smaller has the lightest colour."""
+DECADES = 5  # Below the largest amplitude; what is smaller has the lightest colour.
 
 
 def waterfall(axes: Axes, result: Result, variable: str, *, between: Between = (None, None)) -> Any:

@@ -8,23 +8,20 @@ until the pair has been in mesh for their sum, in mesh periods.
 
 import math
 from dataclasses import dataclass
-from typing import Self, TypeAlias
+from typing import Self
 
 import numpy as np
-import numpy.typing as npt
 
+from gearchaos.arrays import Complex, Floats
 from gearchaos.errors import ConfigurationError
-
-FloatArray: TypeAlias = npt.NDArray[np.float64]
 
 MOST_CONTACT = 5.0
 """Largest total contact ratio: the kernels have room for seven pairs in mesh or next to it."""
 
-_SAMPLES = 64
-"""Places within a cell over which a share is averaged."""
+_SAMPLES = 64  # Places within a cell over which a share is averaged.
 
 
-def series_table(coefficients: npt.NDArray[np.complex128], points: int) -> FloatArray:
+def series_table(coefficients: Complex, points: int) -> Floats:
     """Return kappa of a Fourier series at phases 0, 1/points, ..., shape (points,).
 
     ``coefficients`` (harmonics,): a_n - i c_n of eq. 19, so that kappa = 1 + Re(sum of coefficient
@@ -33,7 +30,7 @@ def series_table(coefficients: npt.NDArray[np.complex128], points: int) -> Float
     n = np.arange(1, coefficients.size + 1)
     # Whole numbers modulo points keep the phase exact for high harmonics.
     turns = np.outer(np.arange(points), n) % points / points
-    variation: FloatArray = (np.exp(2j * np.pi * turns) @ coefficients).real
+    variation: Floats = (np.exp(2j * np.pi * turns) @ coefficients).real
     return 1.0 + variation
 
 
@@ -81,7 +78,7 @@ class TrapezoidalStiffness:
             half_height = 1.0 / (2.0 * transverse) if u > 0.0 else 0.0
         return cls(slope_time, abs(u - v), slope_time, abs(1.0 - u - v), half_height)
 
-    def table(self, points: int) -> FloatArray:
+    def table(self, points: int) -> Floats:
         """Return kappa at phases 0, 1/points, ..., shape (points,); after the jump at a jump."""
         ends_of_parts = np.cumsum([0.0, self.rise, self.top, self.fall])
         phases = np.arange(points) / points
@@ -89,7 +86,7 @@ class TrapezoidalStiffness:
         mean_of_shape = self.top - self.bottom
         return 1.0 + self.half_height * (shape - mean_of_shape)
 
-    def coefficients(self, harmonics: int) -> npt.NDArray[np.complex128]:
+    def coefficients(self, harmonics: int) -> Complex:
         """Return the exact Fourier coefficients of this shape, as `series_table` takes them.
 
         The derivative of the shape is one box over the rise and one over the fall, whose
@@ -99,13 +96,13 @@ class TrapezoidalStiffness:
         middle_of_fall = self.rise + self.top + self.fall / 2.0
         up = np.exp(-1j * np.pi * n * self.rise) * np.sinc(n * self.rise)
         down = np.exp(-2j * np.pi * n * middle_of_fall) * np.sinc(n * self.fall)
-        found: npt.NDArray[np.complex128] = 2.0 * self.half_height * (up - down) / (1j * np.pi * n)
+        found: Complex = 2.0 * self.half_height * (up - down) / (1j * np.pi * n)
         return found
 
 
 def contact_shares(
     transverse: float, overlap: float, smoothing: float, fundamental: complex = 0.0
-) -> tuple[FloatArray, int, float]:
+) -> tuple[Floats, int, float]:
     """Return the share of a tooth pair in the mesh force while it is in mesh.
 
     Its mean shares (cells,) from its entry on, the cells of a mesh period, and the mesh phase, in
@@ -135,7 +132,7 @@ def contact_shares(
     return shares, per_period, float(entry)
 
 
-def _contact_line(place: FloatArray, transverse: float, overlap: float) -> FloatArray:
+def _contact_line(place: Floats, transverse: float, overlap: float) -> Floats:
     """Length of the contact line of a pair, relative, so many mesh periods after its entry."""
     if overlap == 0.0:
         return np.where(place < transverse, 1.0, 0.0)

@@ -173,14 +173,10 @@ class Quantities:
             mean = _common_to_lanes(self["mesh.mean_stiffness_N_per_um_mm"])
             cosine = np.divide(self["mesh.stiffness.cosine_N_per_um_mm"], mean)
             return cosine, np.divide(self["mesh.stiffness.sine_N_per_um_mm"], mean)
-        if self.physical["mesh.stiffness.rise"] is None:
-            trapezoid = TrapezoidalStiffness.from_contact_ratios(
-                _common_to_lanes(self.pair.transverse_contact_ratio),
-                _common_to_lanes(self.pair.overlap_contact_ratio),
-            )
-        else:
-            parts = ("rise", "top", "fall", "bottom", "half_height")
-            trapezoid = TrapezoidalStiffness(*(self[f"mesh.stiffness.{part}"] for part in parts))
+        trapezoid = TrapezoidalStiffness.from_contact_ratios(
+            _common_to_lanes(self.pair.transverse_contact_ratio),
+            _common_to_lanes(self.pair.overlap_contact_ratio),
+        )
         coefficients = trapezoid.coefficients(self["mesh.stiffness.harmonics"])
         return coefficients.real, -coefficients.imag
 

@@ -4,9 +4,10 @@ from dataclasses import dataclass
 from typing import TypeAlias
 
 import numpy as np
-import numpy.typing as npt
 
-Value: TypeAlias = float | npt.NDArray[np.float64]
+from gearchaos.arrays import Floats
+
+Value: TypeAlias = float | Floats
 PairOfValues: TypeAlias = tuple[Value, Value]
 
 

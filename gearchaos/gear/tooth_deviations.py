@@ -1,14 +1,13 @@
 """Cumulative pitch deviations of both gears, listed or drawn, as teeth come into mesh."""
 
 from collections.abc import Mapping
-from typing import Any, NamedTuple, TypeAlias
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
+from gearchaos.arrays import Floats, Integers
 from gearchaos.iso1328 import cumulative_pitch_um, single_pitch_um
-
-FloatArray: TypeAlias = npt.NDArray[np.float64]
 
 REALISATION = "realisation"
 """Name under which the values of lanes hold the number of the drawn gear pair."""
@@ -26,9 +25,9 @@ class Deviations(NamedTuple):
     the shape of the lanes: which of the profiles a lane has.
     """
 
-    driving: FloatArray
-    driven: FloatArray
-    profile: npt.NDArray[np.intp]
+    driving: Floats
+    driven: Floats
+    profile: Integers
 
 
 def tooth_deviations(error: Any, pair: Any, values: Mapping[str, npt.ArrayLike]) -> Deviations:
@@ -56,7 +55,7 @@ def tooth_deviations(error: Any, pair: Any, values: Mapping[str, npt.ArrayLike])
     return Deviations(driving, driven, profile.reshape(lanes))
 
 
-def _drawn(error: Any, gear: int, teeth: int, rows: FloatArray) -> FloatArray:
+def _drawn(error: Any, gear: int, teeth: int, rows: Floats) -> Floats:
     numbers, grades, shares, modules, helix_angles = rows.T
     diameters = teeth * modules / np.cos(np.radians(helix_angles))
     sizes = list(zip(grades, modules, diameters, strict=True))
@@ -65,7 +64,7 @@ def _drawn(error: Any, gear: int, teeth: int, rows: FloatArray) -> FloatArray:
     return drawn_gears(numbers, error.seed, gear, teeth, single, cumulative, shares)
 
 
-def listed_deviations(gear: Any) -> FloatArray:
+def listed_deviations(gear: Any) -> Floats:
     """Return the deviations of a gear from its table in ``[pitch_error]``, shape (1, teeth), in um.
 
     By ISO 1328-1 a deviation is positive where the flank lies farther on in the direction of
@@ -79,13 +78,13 @@ def listed_deviations(gear: Any) -> FloatArray:
     return 0.0 - deviations[np.newaxis]
 
 
-def counted_deviations(gear: Any) -> FloatArray:
+def counted_deviations(gear: Any) -> Floats:
     """Return cumulative deviations (teeth,) of a table relative to tooth 0, as they were counted.
 
     The single one of tooth k is that of the pitch from tooth k - 1 to it; what is left of their
     sum is spread evenly over all teeth.
     """
-    deviations: FloatArray = np.array(gear.cumulative_um or gear.single_um, dtype=np.float64)
+    deviations: Floats = np.array(gear.cumulative_um or gear.single_um, dtype=np.float64)
     if gear.cumulative_um is None:
         deviations = np.cumsum(deviations - np.mean(deviations))
     deviations -= deviations[0]
@@ -100,7 +99,7 @@ def drawn_gears(
     single_um: npt.ArrayLike,
     cumulative_um: npt.ArrayLike,
     eccentricity: npt.ArrayLike = 0.5,
-) -> FloatArray:
+) -> Floats:
     """Draw cumulative pitch deviations, shape (realisations, teeth), in um, 0 on tooth 0.
 
     The single deviations are independent and normal, made to sum to zero, and an eccentricity of
@@ -128,10 +127,10 @@ def drawn_gears(
     steps = np.abs(form - np.roll(form, 1, axis=1)).max(axis=1, keepdims=True)
     spread = np.ptp(form, axis=1, keepdims=True)
     scale = np.minimum(single / (steps + _TINY), range_ / (spread + _TINY))
-    drawn: FloatArray = np.round(scale * (form - form[:, :1]), 6)
+    drawn: Floats = np.round(scale * (form - form[:, :1]), 6)
     return drawn
 
 
-def _exact(values: FloatArray) -> FloatArray:
+def _exact(values: Floats) -> Floats:
     """Round where machines may differ, to a grid on which sums are exact in any order."""
     return np.rint(values * 2.0**20) / 2.0**20

@@ -4,8 +4,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from gearchaos_kernels import Outcome, Plan, Status, System, integrate, mesh_motion
-from numpy.typing import NDArray
 
+from gearchaos.arrays import Counts, Floats, Integers, Mask
 from gearchaos.configuration import Configuration
 from gearchaos.dynamics.stability import stability_limit
 from gearchaos.dynamics.systems import plan_of, system_of
@@ -13,9 +13,6 @@ from gearchaos.engine.lanes import start_states
 from gearchaos.errors import ConfigurationError
 from gearchaos.records.lyapunov import largest_exponent
 from gearchaos.records.period import period_of, return_distances
-
-Floats = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 RETURN = 1e-3
 """Return distance that counts as periodic: what is compared are short runs on coarse grids."""
@@ -26,8 +23,7 @@ KEPT_PERIODS = 8
 FINER = 4
 """How many times finer that motion is, so that its largest acceleration is not stepped over."""
 
-MOTIONS_AT_ONCE = 2**8
-"""Lanes whose finer motion is in memory at a time: all of its samples are."""
+MOTIONS_AT_ONCE = 2**8  # Lanes whose finer motion is in memory at a time: all of its samples are.
 
 
 class Records(NamedTuple):
@@ -40,12 +36,12 @@ class Records(NamedTuple):
     """
 
     section: Floats
-    period: NDArray[np.int32]
+    period: Counts
     exponent: Floats
     acceleration: Floats
     sound: Mask
 
-    def at(self, values: NDArray[np.intp]) -> "Records":
+    def at(self, values: Integers) -> "Records":
         """Return what there is at some of the swept values, by their numbers."""
         arrays: Any = (array[:, values] for array in self)
         return Records(*arrays)
@@ -106,9 +102,8 @@ def require_stable(config: Configuration, values: Floats, parameters: dict[str, 
         )
 
 
-def _records(system: System, outcome: Outcome, looked_at: NDArray[np.intp], plan: Plan) -> Records:
+def _records(system: System, outcome: Outcome, looked_at: Integers, plan: Plan) -> Records:
     """Return what lanes came to, each array with the lanes first."""
-    assert outcome.growth is not None
     sound = outcome.status == Status.OK
     # The torsion and its rate: the other coordinates follow them.
     distances = return_distances(outcome.section[..., :2])
@@ -126,7 +121,6 @@ def _records(system: System, outcome: Outcome, looked_at: NDArray[np.intp], plan
         lanes = looked_at[first : first + MOTIONS_AT_ONCE]
         some = system.of(lanes)
         motion = integrate(some, outcome.end_state[lanes], finer)
-        assert motion.history is not None
         found = mesh_motion(some, motion.history, finer.steps_per_period).accelerations
         acceleration[lanes] = np.max(found, axis=1)
     return Records(outcome.section[..., 0], period, exponent, acceleration, sound)

@@ -25,8 +25,7 @@ from gearchaos.records.period import LONGEST_PERIOD, POINTS_NEEDED
 MOTION = re.compile(r"(?P<kind>period|bands) (?P<number>[1-9]\d?)|chaotic|aperiodic")
 """The motions that a stage may have."""
 
-OBSERVATIONS = ("stage", "jump", "crisis", "exponent", "increment")
-"""Tables of what was observed."""
+OBSERVATIONS = ("stage", "jump", "crisis", "exponent", "increment")  # Tables of what was observed.
 
 
 class Problem(NamedTuple):

@@ -4,19 +4,14 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from gearchaos.identification.evaluation import Mask, Records
+from gearchaos.arrays import Floats, Mask
+from gearchaos.identification.evaluation import Records
 from gearchaos.identification.targets import Exponent, Increment, Place, Stage, Targets
 from gearchaos.results.jumps import jump_sizes
 
-Floats = NDArray[np.float64]
-
-GROWTH = 1.2
-"""Least factor by which the section of a chaotic motion grows where there is a crisis."""
-
-NOWHERE = 100.0
-"""Widths that a number is off which a candidate does not have."""
+GROWTH = 1.2  # Least factor by which the section of a chaotic motion grows where there is a crisis.
+NOWHERE = 100.0  # Widths that a number is off which a candidate does not have.
 
 
 @dataclass(frozen=True)

@@ -5,19 +5,14 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
-from numpy.typing import NDArray
 
+from gearchaos.arrays import Floats
 from gearchaos.configuration.tables import SWEEPABLE_GROUPS
 from gearchaos.identification.search import RUNGS, STEPS_ALONE, Judge, distinct
 from gearchaos.identification.tried import Tried
 
-Floats = NDArray[np.float64]
-
-ONE_UNIT = 1.0
-"""By how much the misfit grows where a parameter counts as moved too far."""
-
-NEAREST = 3
-"""Steps in each direction whose misfits tell how even the best set's surroundings are."""
+ONE_UNIT = 1.0  # By how much the misfit grows where a parameter counts as moved too far.
+NEAREST = 3  # Steps in each direction whose misfits tell how even the best set's surroundings are.
 
 LABEL, COLUMN = 34, 12
 

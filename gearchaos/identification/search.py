@@ -11,8 +11,8 @@ from importlib.metadata import version
 from typing import Any, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gearchaos.arrays import Floats
 from gearchaos.configuration.run_tables import states_of
 from gearchaos.configuration.toml_text import toml_text
 from gearchaos.engine.provenance import SOFTWARE
@@ -24,29 +24,17 @@ from gearchaos.identification.targets import Search
 from gearchaos.identification.tried import Tried, tried_of
 from gearchaos.interrupts import check
 
-Floats = NDArray[np.float64]
-
-DRAWN = 0
-"""Number of the run to which drawn candidates belong; those of CMA-ES count from 1."""
-
-STEPS_ALONE = -1
-"""Number of the run of the steps away from the best candidate."""
-
-FIRST_SPREAD = 0.2
-"""Standard deviation with which CMA-ES begins, as a share of the bounds."""
-
-RUNGS = 20
-"""Steps away from the best candidate, for each parameter and direction."""
-
-STARTS = 4
-"""Drawn sets kept for each run to begin from: runs that end early are followed by more."""
+DRAWN = 0  # Number of the run to which drawn candidates belong; those of CMA-ES count from 1.
+STEPS_ALONE = -1  # Number of the run of the steps away from the best candidate.
+FIRST_SPREAD = 0.2  # Standard deviation with which CMA-ES begins, as a share of the bounds.
+RUNGS = 20  # Steps away from the best candidate, for each parameter and direction.
+STARTS = 4  # Drawn sets kept for each run to begin from: runs that end early are followed by more.
 
 MOST_CENTRES = 5
 """Where one of those steps is better than the best candidate, they begin again from it."""
 
 SECONDS_BETWEEN_SNAPSHOTS = 20.0
-LANES_AT_ONCE = 2**13
-"""Lanes of one batch: enough for all threads, and little memory."""
+LANES_AT_ONCE = 2**13  # Lanes of one batch: enough for all threads, and little memory.
 
 Proposals: TypeAlias = Generator[tuple[int, Floats], Floats, None]
 """Candidates that are tried together: the number of their run, and their points."""

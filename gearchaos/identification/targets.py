@@ -5,12 +5,11 @@ from itertools import product
 from typing import Annotated, Literal, TypeAlias, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
+from gearchaos.arrays import Floats
 from gearchaos.configuration.keys import Table, key
 
-Floats = NDArray[np.float64]
 Pair: TypeAlias = Annotated[tuple[float, float], Field(strict=False)]
 Entry = TypeVar("Entry")
 Coordinate: TypeAlias = Literal["delta_5", "delta_1", "delta_2", "delta_3", "delta_4"]
@@ -86,13 +85,9 @@ class Search(Table):
     drawn: int = key("as many of them drawn evenly within the bounds, to begin with", default=2000)
     runs: int = key("searches that share the others, from the best drawn sets", default=4, ge=1)
     population: int = key("sets of one generation", default=32, ge=4, le=10_000)
-    apart: float = key(
-        "largest difference, as a share of its bounds, that a parameter must have for two sets to "
-        "differ",
-        default=0.1,
-        gt=0,
-        le=1,
-    )
+    apart: float = key(default=0.1, gt=0, le=1)
+    """largest difference, as a share of its bounds, that a parameter must have for two sets to
+    differ"""
 
 
 class Targets(Table):

@@ -34,17 +34,13 @@ from gearchaos.system import System
 LOW, HIGH = 0.5, 2.0
 """Pitch errors between which both motions are followed, in multiples of e(tau)."""
 
-STEP = 0.01
-"""Step of the carried sweeps."""
-
-FINENESS = 10
-"""Parts of a step between which the place of a hop is told."""
+STEP = 0.01  # Step of the carried sweeps.
+FINENESS = 10  # Parts of a step between which the place of a hop is told.
 
 FOLLOWING = {"transient_periods": 100, "recorded_periods": POINTS_NEEDED}
 """Mesh periods of a carried sweep per value: its motion changes little from one to the next."""
 
-ACCURACY = 1e-5
-"""To which the ends of the interval are located, in multiples of e(tau)."""
+ACCURACY = 1e-5  # To which the ends of the interval are located, in multiples of e(tau).
 
 STARTS = ("rest", "contact")
 """Kinds of start states whose change from one motion to the other is looked for."""

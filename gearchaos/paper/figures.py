@@ -8,8 +8,8 @@ from typing import Any, TypeAlias
 import numpy as np
 from matplotlib.axes import Axes
 
+from gearchaos.arrays import Floats
 from gearchaos.figures import bifurcation_page
-from gearchaos.figures.lanes import Floats
 from gearchaos.figures.page import Page, column, few_ticks, letter, remark
 from gearchaos.figures.panel import legend_above
 from gearchaos.figures.response import (
@@ -33,17 +33,13 @@ from gearchaos.records.amplitude_spectrum import spectral_lines
 from gearchaos.results.response_variables import TIME, acceleration_of
 from gearchaos.results.result import Result
 
-CYCLE = np.arange(1001) / 1000
-"""Mesh phases, in parts of the mesh period."""
+CYCLE = np.arange(1001) / 1000  # Mesh phases, in parts of the mesh period.
 
 HIGHEST_ORDER = 8
 TIME_LABEL = r"Time in mesh periods, $\Omega\tau/2\pi$"
 PANEL_MM = 27.0
-SHOWN_PERIODS = 4.0
-"""Mesh periods of the histories of figures 5 and 14."""
-
-LONG_HISTORY = 16.0
-"""Mesh periods of the histories of figures 8 to 13."""
+SHOWN_PERIODS = 4.0  # Mesh periods of the histories of figures 5 and 14.
+LONG_HISTORY = 16.0  # Mesh periods of the histories of figures 8 to 13.
 
 Curves: TypeAlias = Sequence[tuple[float, str, float]]
 """Pitch errors, the colours of their curves, and how far the lines of their spectra step aside."""

@@ -37,8 +37,7 @@ RESULTS = {
 }
 """Result files by name: the attribute of `Reproduction`, and what they hold."""
 
-TOLERANCE_MM = 0.011
-"""Single pitch deviation of the driving gear in grade 7 (ISO 1328-1)."""
+TOLERANCE_MM = 0.011  # Single pitch deviation of the driving gear in grade 7 (ISO 1328-1).
 
 KINDS = ("derived", "fitted", "predicted")
 """What it is worth if a printed number agrees: `published.toml` says which is which."""
@@ -78,12 +77,6 @@ def check_folder(folder: Path, overwrite: bool) -> None:
         raise FileError(f"{folder}: is a file; give the name of a folder as --output")
     images = [f"{name}.{kind}" for name, *_ in pictures() for kind in FORMATS]
     targets = [folder / name for name in (REPORT, *images, *RESULTS)]
-    present = [target.name for target in targets if target.exists()]
-    if present and not overwrite:
-        raise FileError(
-            f"{folder}: holds {present[0]} already; replace the gallery with --overwrite or choose "
-            "another --output"
-        )
     with writing(folder):
         folder.mkdir(parents=True, exist_ok=True)
     for target in targets:

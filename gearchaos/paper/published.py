@@ -6,8 +6,8 @@ from importlib.resources import files
 from types import SimpleNamespace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gearchaos.arrays import Complex
 from gearchaos.gear.contact_lines import TrapezoidalStiffness
 
 
@@ -38,9 +38,9 @@ def contact_line_stiffness() -> TrapezoidalStiffness:
     return TrapezoidalStiffness(**lines.parts, half_height=half_height)
 
 
-def printed_coefficients() -> NDArray[np.complex128]:
+def printed_coefficients() -> Complex:
     """Return the coefficients of Table 2 relative to the mean stiffness, as `series_table` does."""
     mean, harmonics = published().numbers["mean_stiffness"].value, published().harmonics
     cosine, sine = (np.divide(wave, mean) for wave in (harmonics.cosine, harmonics.sine))
-    series: NDArray[np.complex128] = cosine - 1j * sine
+    series: Complex = cosine - 1j * sine
     return series

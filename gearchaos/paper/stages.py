@@ -9,12 +9,10 @@ interior crisis ends it: the attractor takes in at once what was beside it.
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gearchaos.arrays import Floats, Mask
 from gearchaos.results.result import Result
 from gearchaos.results.stage_table import LabelledLanes, labelled_lanes
-
-Floats = NDArray[np.float64]
 
 TWO_BANDS = "two bands"
 TOUCHING = "two bands that touch"
@@ -82,6 +80,6 @@ def motions_between(lanes: LabelledLanes, first: float, last: float) -> list[str
     return [str(label) for label in lanes.labels[inside]]
 
 
-def _longer(lanes: LabelledLanes) -> NDArray[np.bool_]:
+def _longer(lanes: LabelledLanes) -> Mask:
     # What is unresolved may be a period 2 that is slow to settle.
     return np.asarray((lanes.period > 2) | np.isin(lanes.labels, ("chaotic", "quasi-periodic")))

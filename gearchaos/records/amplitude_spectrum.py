@@ -4,9 +4,8 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from gearchaos.arrays import Floats
 
 WINDOWS: dict[str, Callable[[int], Floats]] = {
     "rectangular": np.ones,

@@ -7,23 +7,19 @@ rotation every n-th point goes everywhere.
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gearchaos.arrays import Counts, Floats, Mask
 from gearchaos.records.period import LONGEST_PERIOD, coordinate_scale
-
-Floats = NDArray[np.float64]
 
 STRIDES = (2, 3, 5, 7)
 """Every so many points of a curve are averaged; what the windows of chaos are made of."""
 
-FEWEST = 16
-"""Points that every subsequence must have."""
+FEWEST = 16  # Points that every subsequence must have.
 
 MOST_POINTS = 512
 """Points, the last ones, of which the bands are counted: comparing all pairs costs their square."""
 
-NEIGHBOURS = 4
-"""Nearest points that must lie in the same band."""
+NEIGHBOURS = 4  # Nearest points that must lie in the same band.
 
 EXPLAINED = 0.1
 """Share of the variance beyond which subsequences may be bands; of 13 random ones it is 0.02."""
@@ -57,7 +53,7 @@ def subsequence_spread(section: Floats) -> Floats:
     return smallest
 
 
-def band_count(section: Floats) -> NDArray[np.int32]:
+def band_count(section: Floats) -> Counts:
     """Return on how many bands every section lies, which are visited in turn, shape (lanes,).
 
     The largest n <= 16 such that every n-th point stays away from the other ones: the four nearest
@@ -75,7 +71,7 @@ def band_count(section: Floats) -> NDArray[np.int32]:
     return count
 
 
-def _may_have_bands(section: Floats) -> NDArray[np.bool_]:
+def _may_have_bands(section: Floats) -> Mask:
     """Whether subsequences explain much of a coordinate's variance: looking at pairs is dear."""
     lanes, points, states = section.shape
     found = np.zeros(lanes, dtype=np.bool_)

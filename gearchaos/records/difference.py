@@ -3,15 +3,12 @@
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gearchaos.arrays import Codes, Counts, Floats, Mask
 from gearchaos.records.label import UNRESOLVED
 from gearchaos.records.period import section_distance
 
-Floats = NDArray[np.float64]
-
-MOST = 0.95
-"""Share of the lanes that `bound` speaks for: the rest lies next to a bifurcation."""
+MOST = 0.95  # Share of the lanes that `bound` speaks for: the rest lies next to a bifurcation.
 
 _ANOTHER_ORBIT = 0.1
 
@@ -19,16 +16,16 @@ _ANOTHER_ORBIT = 0.1
 class Solution(NamedTuple):
     """What one grid gives for some lanes.
 
-    ``section`` (lanes, points, states), ``exponent`` (lanes,) or None where it was not computed,
+    ``section`` (lanes, points, states), ``exponent`` (lanes,), not a number where there is none,
     ``diverged`` (lanes,), ``motion`` (lanes,) as `records.label` has it, ``period`` (lanes,) in
     mesh periods, 0 where the motion is not periodic.
     """
 
     section: Floats
-    exponent: Floats | None
-    diverged: NDArray[np.bool_]
-    motion: NDArray[np.uint8]
-    period: NDArray[np.int32]
+    exponent: Floats
+    diverged: Mask
+    motion: Codes
+    period: Counts
 
 
 class Difference(NamedTuple):
@@ -41,10 +38,10 @@ class Difference(NamedTuple):
     way.
     """
 
-    period: NDArray[np.int32]
+    period: Counts
     section_error: Floats
     exponent_error: Floats
-    changed: NDArray[np.bool_]
+    changed: Mask
 
 
 def difference(one: Solution, other: Solution) -> Difference:
@@ -61,14 +58,11 @@ def difference(one: Solution, other: Solution) -> Difference:
     size = np.max(np.abs(other.section), axis=(1, 2), initial=0.0)
     apart = distance > _ANOTHER_ORBIT * size
     period[apart] = 0
-    exponent = np.full(period.shape, np.nan)
-    if one.exponent is not None and other.exponent is not None:
-        exponent = np.abs(one.exponent - other.exponent)
     told = (one.motion != UNRESOLVED) & (other.motion != UNRESOLVED)
     return Difference(
         period,
         np.where(period > 0, distance, np.nan),
-        exponent,
+        np.abs(one.exponent - other.exponent),
         (first != second)
         | apart
         | (told & (one.motion != other.motion))

@@ -3,28 +3,19 @@
 from typing import Any, NamedTuple, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gearchaos.arrays import Codes, Counts, Floats, Integers, Mask
 from gearchaos.records.bands import smooth_weights
 from gearchaos.records.lyapunov import largest_exponent
 from gearchaos.records.period import POINTS_NEEDED, period_of, return_distances
-
-Floats = NDArray[np.float64]
-
-Mask = NDArray[np.bool_]
 
 PERIODIC, QUASI_PERIODIC, CHAOTIC, UNRESOLVED, DIVERGED, GROWS = range(6)
 MEANINGS = ("periodic", "quasi_periodic", "chaotic", "unresolved", "diverged", "grows")
 """Meanings of the values of ``motion``."""
 
-MOST_POINTS = 512
-"""Section points with which a motion is labelled: the last ones."""
-
-STANDARD_ERRORS = 3.0
-"""An exponent within so many of its standard errors is not told from zero."""
-
-CERTAIN = 6.0
-"""Standard errors beyond which a positive exponent is not doubted."""
+MOST_POINTS = 512  # Section points with which a motion is labelled: the last ones.
+STANDARD_ERRORS = 3.0  # An exponent within so many of its standard errors is not told from zero.
+CERTAIN = 6.0  # Standard errors beyond which a positive exponent is not doubted.
 
 CHAOTIC_GROWTH = 2.0
 """Logarithm of the growth over the record beyond which a disturbance counts as growing."""
@@ -35,26 +26,24 @@ NEUTRAL_GROWTH = 1.0
 AGREEMENT = 0.05
 """Largest difference of the weighted averages of two halves of a quasi-periodic record."""
 
-NEAR = 0.01
-"""Return distance below which a motion that was chaotic may be settling on an orbit."""
+NEAR = 0.01  # Return distance below which a motion that was chaotic may be settling on an orbit.
 
 SETTLING = 0.1
 """Return distance below which a motion that comes ever closer may be settling on an orbit."""
 
-LATEST = 16
-"""Section points at the end of a chaotic record that may have settled."""
+LATEST = 16  # Section points at the end of a chaotic record that may have settled.
 
 
 class Record(NamedTuple):
     """What is known of some lanes after their transient.
 
     ``section`` (lanes, points, states): all states of the scene, once an excitation period;
-    ``growth`` (lanes, mesh periods): logarithm of the tangent vector's growth, or None;
+    ``growth`` (lanes, mesh periods): logarithm of the tangent vector's growth, or (lanes, 0);
     ``diverged`` (lanes,); ``torus`` (lanes,): whether the scene admits quasi-periodic motion.
     """
 
     section: Floats
-    growth: Floats | None
+    growth: Floats
     diverged: Mask
     torus: Mask
 
@@ -68,12 +57,12 @@ class Labels(NamedTuple):
     where it is neither or has not been looked at.
     """
 
-    motion: NDArray[np.uint8]
-    period: NDArray[np.int32]
+    motion: Codes
+    period: Counts
     return_distance: Floats
-    bands: NDArray[np.int32]
+    bands: Counts
 
-    def of(self, lanes: NDArray[np.intp]) -> Self:
+    def of(self, lanes: Integers) -> Self:
         """Return the labels of some lanes."""
         some: Any = (label[lanes] for label in self)
         return type(self)(*some)
@@ -97,7 +86,7 @@ def label(record: Record) -> Labels:
     motion[period > 0] = PERIODIC
     motion[record.diverged] = DIVERGED
     rest = np.flatnonzero(motion == UNRESOLVED)
-    if record.growth is not None and rest.size:
+    if record.growth.size and rest.size:
         motion[rest] = _aperiodic(record.section[rest], record.growth[rest], record.torus[rest])
     smallest = np.min(np.where(np.isnan(distances), np.inf, distances), axis=1)
     own = distances[np.arange(period.size), np.maximum(period, 1) - 1]
@@ -106,7 +95,7 @@ def label(record: Record) -> Labels:
     return Labels(motion, period, distance, np.zeros_like(period))
 
 
-def settling_periods(record: Record, labels: Labels) -> NDArray[np.int32]:
+def settling_periods(record: Record, labels: Labels) -> Counts:
     """Return the period of the orbit on which a lane may still be settling, 0 for none.
 
     A lane settles where its return distance after some period is small and smaller than in the
@@ -136,7 +125,7 @@ def settling_periods(record: Record, labels: Labels) -> NDArray[np.int32]:
     own = labels.period[lanes, np.newaxis]
     looked_at = (own == 0) | ((own > periods) & (own % periods == 0))
     falling = np.ones(lanes.size, dtype=np.bool_)
-    if record.growth is not None:
+    if record.growth.size:
         later = record.growth[lanes, record.growth.shape[1] // 2 :]
         falling = largest_exponent(later, np.ones(lanes.size))[0] < 0.0
     # All of a short record may return no better than its begin, and half of it tells fewer periods.
@@ -157,7 +146,7 @@ def doubtful(record: Record, labels: Labels) -> Mask:
     that is about to end for chaos as long as the exponent is within six standard errors of zero.
     """
     found = np.zeros(labels.motion.shape, dtype=np.bool_)
-    if record.growth is not None:
+    if record.growth.size:
         exponent, error = largest_exponent(record.growth, np.ones(found.size))
         weak = ~(exponent > CERTAIN * error)
         found = np.isin(labels.motion, (UNRESOLVED, QUASI_PERIODIC))
@@ -191,7 +180,7 @@ def halves_differ_by(section: Floats) -> Floats:
     return largest
 
 
-def _aperiodic(section: Floats, growth: Floats, torus: Mask) -> NDArray[np.uint8]:
+def _aperiodic(section: Floats, growth: Floats, torus: Mask) -> Codes:
     """Tell chaotic, quasi-periodic and unresolved lanes that do not return."""
     periods = growth.shape[1]
     one = np.ones(growth.shape[0])

@@ -2,9 +2,8 @@
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from gearchaos.arrays import Floats
 
 BLOCKS = 8
 """Blocks side by side whose estimates give the standard error; half-way blocks lie between them."""

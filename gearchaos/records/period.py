@@ -1,13 +1,11 @@
 """The period of a motion, read off its stroboscopic section."""
 
 import numpy as np
-from numpy.typing import NDArray
 
-LONGEST_PERIOD = 16
-"""Longest period looked for, in mesh periods."""
+from gearchaos.arrays import Counts, Floats
 
-RETURNS = 3
-"""A period counts if the section holds it so many times."""
+LONGEST_PERIOD = 16  # Longest period looked for, in mesh periods.
+RETURNS = 3  # A period counts if the section holds it so many times.
 
 POINTS_NEEDED = RETURNS * LONGEST_PERIOD
 """Section points with which every period can be told; more are not looked at."""
@@ -18,7 +16,7 @@ TOLERANCE = 1e-5
 _SMALLEST_SCALE = 1e-3
 
 
-def motion_period(section: NDArray[np.float64]) -> NDArray[np.int32]:
+def motion_period(section: Floats) -> Counts:
     """Return after how many mesh periods the motion of each lane repeats, shape (lanes,).
 
     The smallest n <= 16 for which the last 48 points of the section (lanes, points, states), or all
@@ -31,14 +29,14 @@ def motion_period(section: NDArray[np.float64]) -> NDArray[np.int32]:
     return period_of(return_distances(section))
 
 
-def period_of(distances: NDArray[np.float64], tolerance: float = TOLERANCE) -> NDArray[np.int32]:
+def period_of(distances: Floats, tolerance: float = TOLERANCE) -> Counts:
     """Return the smallest period whose return distance (lanes, 16) is within tolerance, or 0."""
     returns = distances <= tolerance
     first = np.argmax(returns, axis=1) + 1
     return np.where(returns.any(axis=1), first, 0).astype(np.int32)
 
 
-def return_distances(section: NDArray[np.float64]) -> NDArray[np.float64]:
+def return_distances(section: Floats) -> Floats:
     """Return how far from itself every section comes back after 1, 2, ... 16 mesh periods.
 
     Of the last 48 points of a section (lanes, points, states) the largest distance, (lanes, 16),
@@ -55,20 +53,18 @@ def return_distances(section: NDArray[np.float64]) -> NDArray[np.float64]:
     return distances
 
 
-def coordinate_scale(section: NDArray[np.float64]) -> NDArray[np.float64]:
+def coordinate_scale(section: Floats) -> Floats:
     """Return what distances in every coordinate are measured by, shape (lanes, states).
 
     The largest magnitude of the coordinate on the section (lanes, points, states), or a thousandth
     of that of the largest coordinate where this is more; positive.
     """
-    scale: NDArray[np.float64] = np.max(np.abs(section), axis=1)
+    scale: Floats = np.max(np.abs(section), axis=1)
     scale = np.maximum(scale, _SMALLEST_SCALE * np.max(scale, axis=1, keepdims=True))
     return np.maximum(scale, np.finfo(np.float64).tiny)
 
 
-def section_distance(
-    one: NDArray[np.float64], other: NDArray[np.float64], period: NDArray[np.int32]
-) -> NDArray[np.float64]:
+def section_distance(one: Floats, other: Floats, period: Counts) -> Floats:
     """Return the largest distance between the sections of two periodic motions.
 
     Over one common period (lanes,) and all states of both sections (lanes, points, states); NaN

@@ -1,51 +1,21 @@
 """What the teeth do over a record: contact and impacts, mesh forces, transmission error."""
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from gearchaos.arrays import Array, Floats
 
 HELD, SINGLE_SIDED, DOUBLE_SIDED, FREE = range(4)
 CONTACT_STATES = ("held", "single_sided_impact", "double_sided_impact", "free")
 """Meanings of the values of ``contact_state``: teeth that never part, meet on one flank, meet on
 both flanks, never meet."""
 
-CONTACT = {
-    "time_driving": "share of the recorded time on the driving flank",
-    "time_back": "share of the recorded time on the back flank",
-    "time_apart": "share of the recorded time between the flanks",
-    "impacts_driving": "impacts on the driving flank per mesh period",
-    "impacts_back": "impacts on the back flank per mesh period",
-    "approach_mean": "mean speed of approach at an impact",
-    "approach_largest": "largest speed of approach at an impact",
-}
-"""What is told of each direction, by name."""
 
-FORCES = {
-    "mesh_force_largest": "largest mesh force",
-    "mesh_force_smallest": "smallest mesh force",
-    "mesh_force_mean": "mean mesh force",
-    "mesh_force_rms": "root mean square of the mesh force",
-}
-"""What is told of the mesh force in each direction, by name."""
+def contact_told(contact: Floats, periods: int) -> dict[str, Array]:
+    """Return what is told of one direction, each of shape (lanes,), by name.
 
-LOADS = {
-    "load_factor_largest": "largest tangential mesh force over the static one",
-    "load_factor_rms": "root mean square of the tangential mesh force over the static one",
-    "transmission_error_mean": "mean transmission error",
-    "transmission_error_peak_to_peak": "largest less smallest transmission error",
-    "transmission_error_rms": "root mean square of the transmission error about its mean",
-}
-"""What else is told, by name."""
-
-
-def contact_told(contact: Floats, periods: int) -> dict[str, NDArray[Any]]:
-    """Return what is told of one direction, each of shape (lanes,), by the names of `CONTACT`.
-
-    With the ``contact_state``. ``contact`` (lanes, 6), one half of that of an `Outcome`, is that of
+    ``contact`` (lanes, 6), one half of that of an `Outcome`, is that of
     so many mesh periods. Speeds are not a number without any impact.
     """
     driving, on_driving, back, on_back, speeds, largest = contact.T
@@ -79,8 +49,9 @@ def loads_told(loads: Floats, static: Floats, directions: Sequence[str]) -> dict
     force, _, error = signals = np.moveaxis(loads, 0, 2)
     told: dict[str, Floats] = {}
     for way, (*values, square) in zip(directions, signals, strict=False):
-        values.append(np.sqrt(square))
-        told |= {f"{name}_{way}": row for name, row in zip(FORCES, values, strict=True)}
+        forces = zip(("largest", "smallest", "mean"), values, strict=True)
+        told |= {f"mesh_force_{name}_{way}": row for name, row in forces}
+        told[f"mesh_force_rms_{way}"] = np.sqrt(square)
     static = np.where(static == 0.0, np.nan, static)
     largest, smallest, mean, square = error
     told["load_factor_largest"] = np.where(static > 0.0, force[0], force[1]) / static

@@ -1,13 +1,15 @@
 """The confidence interval of a share that was counted."""
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
+
+from gearchaos.arrays import Floats
 
 CONFIDENCE_95 = 1.959963984540054
 """Standard deviations of a normal distribution within which 95 % of it lie."""
 
 
-def wilson_interval(counted: ArrayLike, of: ArrayLike) -> NDArray[np.float64]:
+def wilson_interval(counted: ArrayLike, of: ArrayLike) -> Floats:
     """Return the interval that holds a share with a confidence of 95 %, shape (..., 2).
 
     Where ``counted`` of so many independent trials had a property, the ends are the shares from

@@ -12,8 +12,8 @@ from pathlib import Path
 from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gearchaos.arrays import Array, Integers
 from gearchaos.errors import FileError
 from gearchaos.results.atomic_file import PARTIAL, reason, replacing, unlinked_content
 from gearchaos.results.block_folder import LOCK, MANIFEST, StoreLock, folder_of, settle_manifest
@@ -21,11 +21,8 @@ from gearchaos.results.result_file import Metadata, Parameter, write_result
 from gearchaos.results.variables import Variable, lane_axes
 from gearchaos.version import Software
 
-Arrays: TypeAlias = Mapping[str, NDArray[Any]]
-Bounds: TypeAlias = tuple[int, int]
-"""First lane of a range, and the one after its last."""
-
-Numbers: TypeAlias = NDArray[np.intp]
+Arrays: TypeAlias = Mapping[str, Array]
+Bounds: TypeAlias = tuple[int, int]  # First lane of a range, and the one after its last.
 
 PIECE_BYTES = 1 << 28
 """Memory in which lanes that were computed in another order are brought into their own."""
@@ -159,7 +156,7 @@ class BlockStore(AbstractContextManager["BlockStore"]):
             file.write(self._digest(first, last, records.data))
             file.write(records.data)
 
-    def read(self, first: int, last: int) -> dict[str, NDArray[Any]]:
+    def read(self, first: int, last: int) -> dict[str, Array]:
         """Give the arrays of one block; FileError if it is missing, damaged or of another sweep."""
         path = self._path(first, last)
         if not 0 <= first < last <= self.lanes:
@@ -185,7 +182,7 @@ class BlockStore(AbstractContextManager["BlockStore"]):
         *,
         overwrite: bool = False,
         found: Finished | None = None,
-        computed_at: Callable[[Numbers], Numbers] | None = None,
+        computed_at: Callable[[Integers], Integers] | None = None,
     ) -> Path:
         """Make the result file of all blocks, one block in memory at a time, and tidy up.
 
@@ -213,8 +210,8 @@ class BlockStore(AbstractContextManager["BlockStore"]):
             raise FileError([*found.problems, missing])
 
     def _in_order_of_lanes(
-        self, bounds: Sequence[Bounds], computed_at: Callable[[Numbers], Numbers]
-    ) -> Iterator[tuple[int, int, dict[str, NDArray[Any]]]]:
+        self, bounds: Sequence[Bounds], computed_at: Callable[[Integers], Integers]
+    ) -> Iterator[tuple[int, int, dict[str, Array]]]:
         size = max(1, PIECE_BYTES // self._record.itemsize)
         for first in range(0, self.lanes, size):
             last = min(first + size, self.lanes)

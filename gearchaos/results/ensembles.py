@@ -6,23 +6,21 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from gearchaos.arrays import Counts, Floats, Integers
 from gearchaos.errors import ConfigurationError
 from gearchaos.records.wilson import wilson_interval
 from gearchaos.results.result import Result
 from gearchaos.results.stage_table import label_text, require_labels
 from gearchaos.results.variables import CROSSINGS, REPEATS
 
-Floats = NDArray[np.float64]
-
-BOX = 5
-"""Starts along each side of a box of which `basin_entropy` asks how mixed it is."""
+BOX = 5  # Starts along each side of a box of which `basin_entropy` asks how mixed it is.
 
 
 class Counted(NamedTuple):
     """How many lanes of each value have a property: ``counts`` of ``lanes``, both (values,)."""
 
-    counts: NDArray[np.intp]
-    lanes: NDArray[np.intp]
+    counts: Integers
+    lanes: Integers
 
     @property
     def shares(self) -> Floats:
@@ -46,12 +44,12 @@ class Shares(NamedTuple):
 
     values: Floats
     motions: tuple[str, ...]
-    counts: NDArray[np.intp]
+    counts: Integers
     other: Counted
     apart: Counted | None
 
 
-def motion_kinds(result: Result) -> tuple[NDArray[np.int32], list[str]]:
+def motion_kinds(result: Result) -> tuple[Counts, list[str]]:
     """Number the kinds of motion: period 1, 2, 3, 4 or more, then those without a period.
 
     Returns the number of each lane's kind, of the shape of the axes, and the names of 0, 1, ...
@@ -126,7 +124,7 @@ class Basins(NamedTuple):
     result: Result
     parameter: str
     values: Floats
-    numbers: NDArray[np.intp]
+    numbers: Integers
     basins: list[Basin]
     grid: dict[str, Floats]
     entropy: list[tuple[float, float]]

@@ -8,30 +8,21 @@ hundred points may miss them: the lane beside the crisis is told from what sever
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gearchaos.arrays import Counts, Floats, Integers, Mask
 from gearchaos.records.period import TOLERANCE, section_distance
 from gearchaos.results.result import Result, section_variables
 from gearchaos.results.scales import excitation_of
 from gearchaos.results.stage_table import labelled_lanes
 from gearchaos.results.variables import DIRECTION, WAYS
 
-Floats = NDArray[np.float64]
-
 STEEPEST = 5.0
 """Neighbouring lanes lie this many times farther apart than those beside them where they jump."""
 
-SMALLEST = 0.02
-"""Smallest jump, relative to the size of the section over the sweep."""
-
-BESIDE = 8
-"""Lanes on either side of a crisis that are compared."""
-
-FEWEST = 3
-"""Lanes that there must be on either side, two of them chaotic."""
-
-SMALLEST_GROWTH = 0.15
-"""Growth of the extent that counts, relative to the largest one before."""
+SMALLEST = 0.02  # Smallest jump, relative to the size of the section over the sweep.
+BESIDE = 8  # Lanes on either side of a crisis that are compared.
+FEWEST = 3  # Lanes that there must be on either side, two of them chaotic.
+SMALLEST_GROWTH = 0.15  # Growth of the extent that counts, relative to the largest one before.
 
 
 class Jump(NamedTuple):
@@ -116,7 +107,7 @@ def size_of(sections: Floats) -> Floats:
 
 
 def jump_sizes(
-    period: NDArray[np.int32], section: Floats, cells: Floats | float = 1.0, alone: float = np.nan
+    period: Counts, section: Floats, cells: Floats | float = 1.0, alone: float = np.nan
 ) -> Floats:
     """Return how far neighbouring lanes move apart where they jump, else 0, shape (lanes - 1,).
 
@@ -159,7 +150,7 @@ def crises(result: Result) -> list[Crisis]:
     return [found[lane][1] for lane in sorted(found)]
 
 
-def grows_at(extent: Floats, chaotic: NDArray[np.bool_]) -> NDArray[np.intp]:
+def grows_at(extent: Floats, chaotic: Mask) -> Integers:
     """Return the lanes at which the extent of chaotic sections grows at once, in ascending order.
 
     ``extent`` (lanes,) of the section in one coordinate, in the order of the swept value;

@@ -1,6 +1,5 @@
 """What a result file says about itself: plain numbers, texts, lists, and a page for a terminal."""
 
-import json
 import math
 import os
 import textwrap
@@ -9,8 +8,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gearchaos.arrays import Array
 from gearchaos.results import variables as known
 from gearchaos.results.result import Result
 from gearchaos.results.result_file import Parameter
@@ -36,8 +35,7 @@ _INTEGRATION = (
 _RUN = "wall_time_seconds threads processor system software kernels git_commit created"
 """Names of metadata that are shown together."""
 
-MOST_STAGES = 20
-"""Of more stages, the first and the last ones are shown."""
+MOST_STAGES = 20  # Of more stages, the first and the last ones are shown.
 
 WIDTH = 80
 _LABEL = 18
@@ -86,17 +84,24 @@ def overview(path: str | os.PathLike[str]) -> dict[str, Any]:
     summary |= {"slice": {}, "stages": []}
     if result.axis not in known.UNSWEPT and all(name in result for name in known.LABELS):
         part = one_axis(result)
-        stages = [stage._asdict() for stage in stage_table(labelled_lanes(part))]
+        stages = stage_table(labelled_lanes(part))
         summary |= {"slice": slice_facts(result, part), "stages": stages}
-    return dict(finite(summary))
+    return dict(plain(summary))
 
 
-def finite(value: Any) -> Any:
-    """Replace what is not finite in nested tables and lists by None."""
-    return json.loads(json.dumps(value), parse_constant=lambda _: None)
+def plain(value: Any) -> Any:
+    """Make of records and complex numbers what JSON has; what is not finite is None."""
+    value = value._asdict() if hasattr(value, "_asdict") else value
+    if isinstance(value, Mapping):
+        return {name: plain(entry) for name, entry in value.items()}
+    if isinstance(value, list | tuple):
+        return [*map(plain, value)]
+    if isinstance(value, complex):
+        return plain([value.real, value.imag])
+    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
-def _range(values: NDArray[Any]) -> dict[str, float]:
+def _range(values: Array) -> dict[str, float]:
     return {"least": float(values.min()), "greatest": float(values.max())}
 
 
@@ -112,7 +117,7 @@ def _wording(entry: known.Variable | Parameter) -> dict[str, str]:
     return {"units": entry.units, "long_name": entry.long_name}
 
 
-def _spread(values: NDArray[Any]) -> dict[str, Any]:
+def _spread(values: Array) -> dict[str, Any]:
     sound = values[np.isfinite(values)]
     if sound.size == 0:
         return {"lanes": 0, "median": None, "greatest": None}

@@ -12,8 +12,8 @@ from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gearchaos.arrays import Array
 from gearchaos.errors import ConfigurationError, FileError
 from gearchaos.results import tables
 from gearchaos.results import variables as known
@@ -31,24 +31,13 @@ DEFAULT_VARIABLE = "section_delta_5"
 class Result:
     """Named arrays of one sweep, in memory.
 
-    Parameters
-    ----------
-    axes : sequence of str
-        Names of the dimensions of the lanes: second swept parameter, first swept parameter,
-        realisation, start; those that there are.
-    variables : sequence of Variable
-        What there is, in the order of the file.
-    data : mapping of str to ndarray
-        The values of each variable, of the shape of its dimensions or with all axes flattened
-        into the first one; those that carry their own ``values`` may be left out.
-    parameters, metadata : mapping by name
-        Dimensionless groups with their origin; title, formulation, configuration, provenance.
-
-    Raises
-    ------
-    ValueError
-        If an array is missing, its shape contradicts the dimensions, or an axis is no ascending
-        row of values.
+    ``axes``: names of the dimensions of the lanes: second swept parameter, first swept parameter,
+    realisation, start; those that there are; ``variables``: what there is, in the order of the
+    file; ``data`` by name: the values of each variable, of the shape of its dimensions or with all
+    axes flattened into the first one; those that carry their own ``values`` may be left out;
+    ``parameters``, ``metadata`` by name: dimensionless groups with their origin; title,
+    formulation, configuration, provenance. Raises ValueError if an array is missing, its shape
+    contradicts the dimensions, or an axis is no ascending row of values.
     """
 
     def __init__(
@@ -62,7 +51,7 @@ class Result:
         self.axes = tuple(axes)
         self.parameters = dict(parameters)
         self.metadata = {**metadata, **own_metadata(self.axes)}
-        self._data: dict[str, NDArray[Any]] = {}
+        self._data: dict[str, Array] = {}
         for variable in variables:
             values = data.get(variable.name, variable.values)
             if values is None:
@@ -111,7 +100,7 @@ class Result:
     def __len__(self) -> int:
         return len(self._data)
 
-    def __getitem__(self, name: str) -> NDArray[Any]:
+    def __getitem__(self, name: str) -> Array:
         """Give the values of a variable, of the shape of its dimensions.
 
         Raises KeyError if there is no such variable; the message lists those there are.
@@ -126,13 +115,13 @@ class Result:
         """Give units, long_name, symbol and, for the status, flag_values and flag_meanings."""
         return self.variables[self._known(name)].attributes
 
-    def lanes(self, name: str) -> NDArray[Any]:
+    def lanes(self, name: str) -> Array:
         """Give a variable of the lanes with all axes flattened into the first dimension."""
         values = self[name]
         count = math.prod(values.shape[: len(self.axes)])
         return values.reshape(count, *values.shape[len(self.axes) :])
 
-    def along(self, axis: str) -> NDArray[Any]:
+    def along(self, axis: str) -> Array:
         """Give the value of an axis for every lane in that order, shape (lanes,)."""
         grid = np.meshgrid(*(self[name] for name in self.axes), indexing="ij")
         return np.ravel(grid[self.axes.index(axis)])

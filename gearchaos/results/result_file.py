@@ -12,8 +12,8 @@ from typing import Any, TypeAlias
 
 import h5py
 import numpy as np
-from numpy.typing import NDArray
 
+from gearchaos.arrays import Array, Floats
 from gearchaos.interrupts import check
 from gearchaos.results.atomic_file import append_checksum, replacing
 from gearchaos.results.variables import HARMONIC, Variable, diagram_axis, lane_axes
@@ -26,7 +26,7 @@ DIMS = "dims"
 """Attribute with the names of dimensions: HDF5 keeps its own list of them in the global heap."""
 
 ORIGINS = ("given", "derived", "default", "swept")
-Block: TypeAlias = tuple[int, int, Mapping[str, NDArray[Any]]]
+Block: TypeAlias = tuple[int, int, Mapping[str, Array]]
 Metadata: TypeAlias = Mapping[str, str | int | float]
 
 _CHUNK_BYTES = 1 << 19
@@ -44,7 +44,7 @@ class Parameter:
     variable.
     """
 
-    value: float | NDArray[np.float64]
+    value: float | Floats
     origin: str
     units: str = "1"
     long_name: str = ""
@@ -71,15 +71,14 @@ def write_result(
     *,
     overwrite: bool = False,
     scratch: str | os.PathLike[str] | None = None,
-    schema: str = SCHEMA,
 ) -> None:
     """Write a result block by block; the file appears complete or not at all.
 
     The variables come in this order. Of every one without values of its own, by name, a block
     (first, last, arrays) holds the lanes first to last - 1, in C order over the axes: shape
     (last - first, own dimensions). ``scratch`` is a folder for the temporary file, on the same file
-    system; by default that of the file; ``schema``: what kind of file it is. Raises FileError if
-    the file cannot be written, or exists and is not to be overwritten.
+    system; by default that of the file. Raises FileError if the file cannot be written, or exists
+    and is not to be overwritten.
     """
     axes = lane_axes(variables)
     everything = [*variables, *_harmonics(parameters)]
@@ -90,7 +89,7 @@ def write_result(
             Sink(partial) as sink,
             h5py.File(sink, "w", track_order=True, rdcc_nbytes=CACHE_BYTES) as file,
         ):
-            _write_metadata(file, {**metadata, **own_metadata(axes), "schema": schema})
+            _write_metadata(file, {**metadata, **own_metadata(axes)})
             for variable in everything:
                 _create(file, variable, tuple(sizes[dim] for dim in variable.dims))
             for variable in everything:

@@ -4,14 +4,13 @@ import os
 import stat
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
-from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
 import h5py
 import numpy as np
-from numpy.typing import NDArray
 
+from gearchaos.arrays import Array
 from gearchaos.errors import FileError
 from gearchaos.gear.groups import LARGEST_VALUE
 from gearchaos.results import stored_dataset as stored
@@ -19,22 +18,17 @@ from gearchaos.results import variables as known
 from gearchaos.results.atomic_file import checksum_fits, reason
 from gearchaos.results.result_file import ORIGINS, PARAMETERS, SCHEMA, SCHEMA_VERSION, Parameter
 from gearchaos.results.stored_dataset import UnfitError
-from gearchaos.results.variables import HARMONIC, STATE, Variable, coordinate
+from gearchaos.results.variables import HARMONIC, STATE, Variable
 
 Contents = tuple[
-    list[Variable], dict[str, NDArray[Any]], dict[str, Parameter], dict[str, str | int | float]
+    list[Variable], dict[str, Array], dict[str, Parameter], dict[str, str | int | float]
 ]
 """Variables, data, parameters and metadata, as for `Result`."""
 
-SEARCH = "gearchaos-identification"
-"""Schema of the candidates of a search, which are no result of a sweep."""
-
-SOON_HASHED = 1 << 30
-"""Bytes whose checksum takes about a second."""
+SOON_HASHED = 1 << 30  # Bytes whose checksum takes about a second.
 
 LONGEST_SYMBOL = 60
-MOST_PRINTED = 1000
-"""Characters of a symbol, and of a text on the terminal."""
+MOST_PRINTED = 1000  # Characters of a symbol, and of a text on the terminal.
 
 
 def read_result(path: str | os.PathLike[str], *, rows: bool = True) -> Contents:
@@ -102,7 +96,7 @@ def fixed_coordinates(metadata: Mapping[str, Any]) -> dict[str, float]:
     return {name: float(value) for name, _, value in pairs}
 
 
-def is_coordinate(values: NDArray[Any]) -> bool:
+def is_coordinate(values: Array) -> bool:
     """Tell whether values are those of an axis: numbers that ascend, none twice, none too large."""
     numbers = values.ndim == 1 and values.size > 0 and values.dtype.kind in "if"
     small = numbers and (np.abs(values) <= LARGEST_VALUE).all()
@@ -136,7 +130,7 @@ def _read(file: h5py.File, rows: bool) -> Contents:
     datasets = stored.datasets_of(file)
     grouped = {name: datasets.pop(name) for name in list(datasets) if "/" in name}
     variables: dict[str, Variable] = {}
-    data: dict[str, NDArray[Any]] = {}
+    data: dict[str, Array] = {}
     sizes: dict[str, int] = {}
     for name, dataset in datasets.items():
         text = stored.text_of(dataset)
@@ -186,11 +180,6 @@ def _wording(notes: Mapping[str, Any]) -> dict[str, Any]:
 def _check_schema(metadata: Mapping[str, Any]) -> None:
     schema, version = metadata.get("schema"), str(metadata.get("schema_version", ""))
     own = SCHEMA_VERSION.split(".")[0]
-    if schema == SEARCH:
-        raise UnfitError(
-            "holds the candidates of a search, not the result of a sweep",
-            "`gearchaos identify TARGETS.toml --resume` goes on with it and reports what it found",
-        )
     if schema != SCHEMA:
         raise UnfitError(
             f'is not a gearchaos result: it lacks the attribute schema = "{SCHEMA}"',
@@ -204,43 +193,19 @@ def _check_schema(metadata: Mapping[str, Any]) -> None:
 
 
 def _check_variables(
-    axes: tuple[str, ...], found: Mapping[str, Variable], data: Mapping[str, NDArray[Any]]
+    axes: tuple[str, ...], found: Mapping[str, Variable], data: Mapping[str, Array]
 ) -> None:
     """Compare what a sweep must yield with what there is; more than that is welcome."""
     if not axes or len(set(axes)) < len(axes):
         raise UnfitError("does not name its axes, each once")
-    if STATE not in data:
-        raise UnfitError(f"lacks the variable {STATE}")
-    expected = known.sweep_variables(
-        [
-            coordinate(name, "", "", "", np.zeros(1, "i4" if name in known.UNSWEPT else "f8"))
-            for name in axes
-        ],
-        states=found[STATE].flags,
-        section=[
-            n.removeprefix(known.SECTION) for n in found if n.startswith(f"{known.SECTION}delta_")
-        ],
-        section_points=np.size(data.get(known.SECTION_POINT, ())),
-        lyapunov=known.LARGEST_EXPONENT in found,
-        status_meanings=(),
-        crossings=known.CROSSINGS in found,
-        contact=[way for way in known.DIRECTIONS if f"contact_state_{way}" in found],
-        loads=[way for way in known.DIRECTIONS if f"mesh_force_largest_{way}" in found],
-        chosen=[one for one in known.STATE_WORDING if f"{one}_peak_to_peak" in found],
-        orders=[Fraction(1)] if known.ORDER in found else [],
-        exponents=known.ALL_EXPONENTS in found,
-        check_meanings=["same"] if "motion_changed" in found else [],
-        motion_meanings=["periodic"] if "motion" in found else [],
-        record_meanings=["uniform"] if known.RECORD in found else [],
-    )
-    for due in expected:
-        got = found.get(due.name)
+    for due, dims, dtype in known.due(axes, found):
+        got = found.get(due)
         if got is None:
-            raise UnfitError(f"lacks the variable {due.name}")
-        if (got.dims, got.dtype) != (due.dims, due.dtype):
+            raise UnfitError(f"lacks the variable {due}")
+        if (got.dims, got.dtype) != (dims, dtype):
             raise UnfitError(
-                f"holds {due.name} as {got.dtype} over ({', '.join(got.dims)}), which should be "
-                f"{due.dtype} over ({', '.join(due.dims)})"
+                f"holds {due} as {got.dtype} over ({', '.join(got.dims)}), which should be "
+                f"{dtype} over ({', '.join(dims)})"
             )
     for name in axes:
         if not is_coordinate(data[name]):

@@ -6,8 +6,8 @@ from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gearchaos.arrays import Array
 from gearchaos.errors import ConfigurationError
 from gearchaos.gear.derivation import FREQUENCY, LENGTH, STIFFNESS
 from gearchaos.results.result_file import Parameter
@@ -54,8 +54,8 @@ def unit_of(name: str) -> Unit:
 
 
 def in_physical_units(
-    variable: Variable, values: NDArray[Any], parameters: Mapping[str, Parameter]
-) -> tuple[Variable, NDArray[Any]]:
+    variable: Variable, values: Array, parameters: Mapping[str, Parameter]
+) -> tuple[Variable, Array]:
     """Return a variable and its values in physical units; pure numbers come as they are.
 
     Raises ConfigurationError if a scale is not among the parameters, or varies along an axis that

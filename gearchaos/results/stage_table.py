@@ -8,11 +8,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from gearchaos.arrays import Counts, Floats
 from gearchaos.errors import ConfigurationError, FileError
 from gearchaos.results.result import Result
 from gearchaos.results.variables import BANDS, LABELS, LARGEST_EXPONENT, REPEATS, UNSWEPT
-
-Floats = NDArray[np.float64]
 
 
 class LabelledLanes(NamedTuple):
@@ -25,9 +24,9 @@ class LabelledLanes(NamedTuple):
 
     values: Floats
     labels: NDArray[np.str_]
-    period: NDArray[np.int32]
+    period: Counts
     exponent: Floats
-    bands: NDArray[np.int32]
+    bands: Counts
 
 
 class Stage(NamedTuple):

@@ -10,8 +10,8 @@ from typing import Any
 
 import h5py
 import numpy as np
-from numpy.typing import NDArray
 
+from gearchaos.arrays import Array
 from gearchaos.results.atomic_file import reason
 from gearchaos.results.result_file import DIMS, PARAMETERS
 
@@ -101,7 +101,7 @@ def dtype_of(name: str, dataset: h5py.Dataset) -> str:
     return _DTYPES[dataset.dtype.str[1:]]
 
 
-def values_of(name: str, dataset: h5py.Dataset) -> NDArray[Any]:
+def values_of(name: str, dataset: h5py.Dataset) -> Array:
     """Read the whole of a dataset, in the byte order of this machine."""
     try:
         return np.asarray(dataset[...], dtype=dtype_of(name, dataset))

@@ -1,5 +1,6 @@
 """Results for other libraries: an xarray Dataset, a pandas DataFrame."""
 
+import warnings
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
@@ -15,7 +16,10 @@ if TYPE_CHECKING:
 def needed(package: str, extra: str = "export") -> Any:
     """Import a package of an extra of gearchaos; raises FileError if it is missing."""
     try:
-        return import_module(package)
+        with warnings.catch_warnings():
+            # What it has to say of other packages is not for who uses it here.
+            warnings.simplefilter("ignore")
+            return import_module(package)
     except ImportError as error:
         text = f"the package {package.partition('.')[0]} is not installed"
         raise FileError(f"{text}; pip install gearchaos[{extra}]") from error

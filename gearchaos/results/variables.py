@@ -1,24 +1,24 @@
 """What a sweep yields: name, dimensions, type, unit and wording of every variable, in one place."""
 
-from collections.abc import Mapping, Sequence
+import csv
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from fractions import Fraction
+from itertools import product
+from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike
 
+from gearchaos.arrays import Array
 from gearchaos.gear.tooth_deviations import REALISATION
-from gearchaos.records.teeth import CONTACT, CONTACT_STATES, FORCES, LOADS
 
 START = "start"
 DIRECTION = "direction"
-REPEATS = (REALISATION, START)
-"""Axes of drawn gear pairs and of starts of one parameter value."""
-UNSWEPT = (*REPEATS, DIRECTION)
-"""Axes along which no parameter is swept."""
-WAYS = ("upwards", "downwards")
-"""Meanings of a direction in which a sweep carries its states."""
+REPEATS = (REALISATION, START)  # Axes of drawn gear pairs and of starts of one parameter value.
+UNSWEPT = (*REPEATS, DIRECTION)  # Axes along which no parameter is swept.
+WAYS = ("upwards", "downwards")  # Meanings of a direction in which a sweep carries its states.
 SECTION_POINT = "section_point"
 STATE = "state"
 EXPONENT_NUMBER = "exponent"
@@ -26,13 +26,9 @@ ORDER = "order"
 HARMONIC = "harmonic"
 """Dimensions: the start of a lane is one of its axes, the others belong to single variables."""
 
-SECTION = "section_"
-"""What the names of section variables begin with."""
-
-AMPLITUDE = "amplitude_"
-"""What the names of amplitudes begin with."""
-EXTREMES = ("smallest", "largest", "peak_to_peak")
-"""What the names of those of a state end with."""
+SECTION = "section_"  # What the names of section variables begin with.
+AMPLITUDE = "amplitude_"  # What the names of amplitudes begin with.
+EXTREMES = ("smallest", "largest", "peak_to_peak")  # What the names of those of a state end with.
 
 LARGEST_EXPONENT = "lyapunov_exponent"
 ALL_EXPONENTS = "lyapunov_exponents"
@@ -43,21 +39,22 @@ LABELS = ("motion", "period")
 BANDS = "bands"
 CROSSINGS = "crossings_per_period"
 STATUS = "status"
-DIRECTIONS = ("tangential", "axial")
-"""Directions in which teeth have a clearance."""
+DIRECTIONS = ("tangential", "axial")  # Directions in which teeth have a clearance.
 
-STATE_WORDING: dict[str, tuple[str, str]] = {
-    "delta_5": ("relative torsional displacement", r"$\delta_5$"),
-    "delta_5_rate": ("relative torsional velocity", r"$\delta_5'$"),
-    "delta_1": ("transverse displacement of the driving gear", r"$\delta_1$"),
-    "delta_1_rate": ("transverse velocity of the driving gear", r"$\delta_1'$"),
-    "delta_2": ("transverse displacement of the driven gear", r"$\delta_2$"),
-    "delta_2_rate": ("transverse velocity of the driven gear", r"$\delta_2'$"),
-    "delta_3": ("axial displacement of the driving gear", r"$\delta_3$"),
-    "delta_3_rate": ("axial velocity of the driving gear", r"$\delta_3'$"),
-    "delta_4": ("axial displacement of the driven gear", r"$\delta_4$"),
-    "delta_4_rate": ("axial velocity of the driven gear", r"$\delta_4'$"),
+_ROWS: dict[str, list[dict[str, str]]] = {}
+"""What files hold, by what it is told with, in their order, behind the words for states and others.
+
+In all three columns of texts, @ stands for one of these.
+"""
+with Path(__file__).with_name("variables.csv").open(encoding="utf-8", newline="") as _file:
+    for _row in csv.DictReader(_file):
+        _ROWS.setdefault(_row["told_with"], []).append(_row)
+
+_WORDING = {
+    kind: {row["name"]: (row["long_name"], row["symbol"]) for row in _ROWS[kind]}
+    for kind in ("state", "acceleration", "direction")
 }
+STATE_WORDING = _WORDING["state"]
 """Long name and mathtext symbol of each state (all dimensionless), in the one order of states."""
 
 
@@ -99,12 +96,7 @@ class Variable:
 
 
 def coordinate(
-    name: str,
-    units: str,
-    long_name: str,
-    symbol: str,
-    values: NDArray[Any],
-    flags: tuple[str, ...] = (),
+    name: str, units: str, long_name: str, symbol: str, values: Array, flags: tuple[str, ...] = ()
 ) -> Variable:
     """Give a variable that is a dimension of its own, such as an axis: its values ascend."""
     dtype = {"i": "int32", "f": "float64"}[values.dtype.kind]
@@ -122,7 +114,7 @@ def start_axis(count: int) -> Variable:
     return coordinate(START, "1", text, "", np.arange(count))
 
 
-def pair_axis(numbers: NDArray[Any]) -> Variable:
+def pair_axis(numbers: Array) -> Variable:
     """Give the axis of several drawn gear pairs, of these numbers."""
     return coordinate(REALISATION, "1", "drawn gear pair", "", numbers)
 
@@ -149,142 +141,69 @@ def lane_axes(variables: Sequence[Variable]) -> tuple[str, ...]:
     return next(variable.dims for variable in variables if variable.name == STATUS)
 
 
-def sweep_variables(
-    axes: Sequence[Variable],
-    *,
-    states: Sequence[str],
-    section: Sequence[str],
-    section_points: int,
-    lyapunov: bool,
-    status_meanings: Sequence[str],
-    crossings: bool = False,
-    contact: Sequence[str] = (),
-    loads: Sequence[str] = (),
-    chosen: Sequence[str] = (),
-    orders: Sequence[Fraction] = (),
-    exponents: bool = False,
-    check_meanings: Sequence[str] = (),
-    motion_meanings: Sequence[str] = (),
-    record_meanings: Sequence[str] = (),
-    excitation_period: int = 1,
-) -> list[Variable]:
-    """List the variables of a sweep in the order of the file.
-
-    The axes are second swept parameter, first swept parameter, realisation, start, direction, those
-    there are; ``states`` those of the scene in its order, ``section`` those recorded at so many
-    section points, ``contact`` and ``loads`` the ways of which they are told, ``chosen`` the
-    states of which extremes are told, ``orders`` those of their amplitudes. Meanings are those
-    of 0, 1, ...: of ``status``, of ``motion_changed`` where lanes are computed twice to measure
-    their error, and of ``motion`` and ``record`` where they are labelled. A motion repeats after
-    whole excitation periods, of so many mesh periods each.
-    """
-    names = tuple(axis.name for axis in axes)
-    variables = list(axes)
-
-    def add(dtype: str, name: str, text: str, symbol: str = "", *dims: str, **more: Any) -> None:
-        variables.append(Variable(name, (*names, *dims), dtype, "1", text, symbol, **more))
-
-    def real(name: str, text: str, symbol: str = "", *dims: str) -> None:
-        add("float64", name, text, symbol, *dims, fill_value=float("nan"))
-
-    def kind(name: str, text: str, meanings: Sequence[str]) -> None:
-        add("uint8", name, text, flags=tuple("_".join(meaning.split()) for meaning in meanings))
-
-    if section and section_points > 0:
-        text = "number of the section point, one mesh period apart; the last one ends the lane"
-        variables.append(coordinate(SECTION_POINT, "1", text, "", np.arange(section_points)))
-        for state in section:
-            text, symbol = STATE_WORDING[state]
-            real(SECTION + state, f"{text} at the stroboscopic section", symbol, SECTION_POINT)
-    if lyapunov:
-        name, text = LARGEST_EXPONENT, "largest Lyapunov exponent"
-        real(name, text, r"$\lambda_1$")
-        text = f"standard error of the {text}, 0 where it is that of a periodic orbit"
-        real(name + STANDARD_ERROR, text, r"$s_{\lambda_1}$")
-    if motion_meanings:
-        kind("motion", "kind of motion", motion_meanings)
-        of_teeth = f"periods of the excitation, {excitation_period} mesh periods each,"
-        text = "mesh periods" if excitation_period == 1 else of_teeth
-        text += " after which the motion repeats, 0 where it is not periodic"
-        add("int32", "period", text, "$n$")
-        text = "smallest distance after which the motion returns, of all states, scaled"
-        real("return_distance", text)
-        text = "bands a chaotic or quasi-periodic section hops between in turn, 0 for other motions"
-        add("int32", BANDS, text)
-    if record_meanings:
-        text = "whether the record holds one kind of motion, or another one before the labelled one"
-        kind(RECORD, text, record_meanings)
-    if exponents:
-        text = "number of the Lyapunov exponent, the largest first"
-        numbers = np.arange(1, len(states) + 1)
-        variables.append(coordinate(EXPONENT_NUMBER, "1", text, "$i$", numbers))
-        real(ALL_EXPONENTS, "all Lyapunov exponents", r"$\lambda_i$", EXPONENT_NUMBER)
-        text = "standard error of each Lyapunov exponent"
-        real(ALL_EXPONENTS + STANDARD_ERROR, text, "", EXPONENT_NUMBER)
-        text = "sum of all Lyapunov exponents as the damping gives it, exactly"
-        real("lyapunov_sum", text, r"$\sum\lambda_i$")
-    if crossings:
-        text = "clearance boundaries crossed per mesh period, tangential and axial together"
-        real(CROSSINGS, text)
-        real("slowest_crossing", "smallest speed of a gap at a crossing of its clearance boundary")
-        add("int32", "unsplit_steps", "steps with more crossings than they were split at")
-    for way in contact:
-        for name, text in CONTACT.items():
-            real(f"{name}_{way}", f"{text}, {way}")
-        kind(f"contact_state_{way}", f"kind of {way} contact", CONTACT_STATES)
-    for way in loads:
-        for name, text in FORCES.items():
-            real(f"{name}_{way}", f"{text}, {way}")
-    for name, text in LOADS.items() if loads else ():
-        real(name, text)
-    for state in chosen:
-        for name in EXTREMES:
-            real(f"{state}_{name}", f"{name.replace('_', ' ')} {STATE_WORDING[state][0]}")
-    if orders:
-        numbers = np.array(orders, dtype=np.float64)
-        variables.append(coordinate(ORDER, "1", "frequency over mesh frequency", "", numbers))
-        for state in (*chosen, "transmission_error"):
-            text, symbol = STATE_WORDING.get(state, ("transmission error", ""))
-            real(AMPLITUDE + state, f"amplitude of the {text}", symbol, ORDER)
-    if check_meanings:
-        halved = "when the step is halved"
-        real("section_error", f"change of the section of a periodic lane {halved}")
-        real(STEP_ERROR, f"change of the largest Lyapunov exponent {halved}")
-        kind("motion_changed", f"whether the lane moves in another way {halved}", check_meanings)
-    kind(STATUS, "status of the lane", status_meanings)
-    text = "mesh period in which the lane diverged, -1 where it did not"
-    add("int32", "diverged_period", text, fill_value=-1)
-    text = "number of the state variable, which its meaning names"
-    variables.append(coordinate(STATE, "1", text, "", np.arange(len(states)), tuple(states)))
-    for end in ("start", "end"):
-        real(f"{end}_state", f"state at the {end} of the lane", "", STATE)
-    errors = {
-        LARGEST_EXPONENT: (LARGEST_EXPONENT + STANDARD_ERROR, STEP_ERROR),
-        ALL_EXPONENTS: (ALL_EXPONENTS + STANDARD_ERROR,),
-        **dict.fromkeys((SECTION + state for state in section), ("section_error",)),
-    }
-    there = {variable.name for variable in variables}
-    told = {name: tuple(one for one in found if one in there) for name, found in errors.items()}
-    return [replace(variable, errors=told.get(variable.name, ())) for variable in variables]
-
-
 def step_choice_variables(
     steps: Sequence[int], measured: Mapping[str, Sequence[float]]
 ) -> list[Variable]:
     """List what was measured to choose the number of steps, one value per candidate.
 
-    The last candidate was taken; ``measured`` has the keys below.
+    The last candidate was taken; ``measured`` is by name.
     """
-    name = "candidate_steps"
-    wording = {
-        "section_error": "error of the section of periodic lanes against four times as many steps",
-        "exponent_error": "error of their exponent against four times as many steps",
-        "changed_share": "share of lanes that move in another way with four times as many steps",
-        "periodic_share": "share of lanes that move periodically: errors are measured on these",
-    }
-    text = "steps per period that were tried before the sweep; the last number was taken"
-    variables = [coordinate(name, "1", text, "$N$", np.asarray(steps, dtype=np.int32))]
-    for key, row in measured.items():
-        told = f"candidate_{key}", (name,), "float64", "1", wording[key]
-        variables.append(Variable(*told, values=np.asarray(row, dtype=np.float64)))
-    return variables
+    values = {"steps": steps, **measured}
+    return listed((), {"step choice": [""]}, {f"candidate_{key}": values[key] for key in values})
+
+
+def due(axes: Sequence[str], found: Collection[str]) -> Iterator[tuple[str, tuple[str, ...], str]]:
+    """Give name, dimensions and type of all that a file must hold that holds these variables.
+
+    Those are axes, what every sweep has, and what is told together with one that is there.
+    """
+    for axis in axes:
+        yield axis, (axis,), "int32" if axis in UNSWEPT else "float64"
+    subjects = (*STATE_WORDING, *DIRECTIONS, "transmission_error")
+    for told_with, (first, *others) in _ROWS.items():
+        for subject in subjects if "@" in first["name"] else ("",):
+            there = first["type"] and first["name"].replace("@", subject) in found
+            for row in (first, *others) if there or told_with == "every sweep" else ():
+                yield row["name"].replace("@", subject), _dims(axes, row), row["type"]
+        if told_with == "every sweep":
+            # What follows no sweep need have.
+            break
+
+
+def listed(
+    axes: Sequence[Variable],
+    subjects: Mapping[str, Sequence[str]],
+    values: Mapping[str, ArrayLike],
+    meanings: Mapping[str, Sequence[str]] = MappingProxyType({}),
+) -> list[Variable]:
+    """List axes, and what of variables.csv is told with these subjects, in the order of the file.
+
+    Each is as often there as there are subjects. ``values`` of what is known beforehand, and
+    ``meanings`` of 0, 1, ..., are by the names in the table.
+    """
+    lane, variables = tuple(axis.name for axis in axes), list(axes)
+    words = {name: words for kind in _WORDING.values() for name, words in kind.items()}
+    for told_with, rows in _ROWS.items():
+        for subject, row in product(subjects.get(told_with, ()), rows):
+            wording, symbol = words.get(subject, (subject.replace("_", " "), ""))
+            known = values.get(row["name"])
+            variables.append(
+                Variable(
+                    name=row["name"].replace("@", subject),
+                    dims=_dims(lane, row),
+                    dtype=row["type"],
+                    units="1",
+                    long_name=row["long_name"].replace("@", wording),
+                    symbol=row["symbol"].replace("@", symbol),
+                    fill_value=np.dtype(row["type"]).type(row["none"]) if row["none"] else None,
+                    flags=tuple("_".join(one.split()) for one in meanings.get(row["name"], ())),
+                    errors=tuple(row["errors"].split()),
+                    values=None if known is None else np.asarray(known, dtype=row["type"]),
+                )
+            )
+    there = {one.name for one in variables}
+    return [replace(v, errors=tuple(e for e in v.errors if e in there)) for v in variables]
+
+
+def _dims(axes: Sequence[str], row: Mapping[str, str]) -> tuple[str, ...]:
+    return (*(axes if row["per"] == "lane" else ()), *row["along"].split())

@@ -5,34 +5,15 @@ from gearchaos_kernels.compilation import CACHE_FOLDER, source_hash
 from gearchaos_kernels.evaluation import jacobian, mesh_motion
 from gearchaos_kernels.flow_map import maps_memory
 from gearchaos_kernels.rows import LANES
-from gearchaos_kernels.status import STATUS_TEXTS, Status
 from gearchaos_kernels.system import (
     STATES,
+    STATUS_TEXTS,
     Effects,
     Groups,
     MeshMotion,
     Outcome,
     Plan,
+    Status,
     System,
     Teeth,
 )
-
-__all__ = [
-    "CACHE_FOLDER",
-    "LANES",
-    "STATES",
-    "STATUS_TEXTS",
-    "Effects",
-    "Groups",
-    "MeshMotion",
-    "Outcome",
-    "Plan",
-    "Status",
-    "System",
-    "Teeth",
-    "integrate",
-    "jacobian",
-    "maps_memory",
-    "mesh_motion",
-    "source_hash",
-]

@@ -14,8 +14,7 @@ from gearchaos_kernels.compilation import driver
 from gearchaos_kernels.flow_map import fewest_steps, maps_of, sharing
 from gearchaos_kernels.forcing import phase_table
 from gearchaos_kernels.rows import CONTACT_ROWS, ERROR, LANES, SIGNAL_ROWS, SIGNALS
-from gearchaos_kernels.status import Status
-from gearchaos_kernels.system import Floats, Outcome, Plan, Schedule, System
+from gearchaos_kernels.system import Floats, Outcome, Plan, Schedule, Status, System
 from gearchaos_kernels.teeth import tables_of
 
 Integers = NDArray[np.intp]
@@ -33,25 +32,11 @@ def integrate(
 ) -> Outcome:
     """Integrate a batch of lanes from tau = 0, by RK4 or by flow maps.
 
-    Parameters
-    ----------
-    system : System
-    start : ndarray, shape (lanes, states)
-        States of eq. 13 at tau = 0.
-    plan : Plan
-        Steps, periods and what is kept.
-    tangent_start : ndarray, shape (lanes, states), optional
-        Tangent vectors at tau = 0; by default an equal share of every state.
-
-    Returns
-    -------
-    Outcome
-        Identical bit for bit for any number of threads, any split and any order of the lanes.
-
-    Raises
-    ------
-    ValueError
-        If flow maps are asked for with pitch errors tooth by tooth, or too many pairs are in mesh.
+    ``start`` (lanes, states): those of eq. 13 at tau = 0; ``plan``: steps, periods and what is
+    kept; ``tangent_start`` (lanes, states): tangent vectors at tau = 0, by default an equal share
+    of every state. The outcome is identical bit for bit for any number of threads, any split and
+    any order of the lanes. Raises ValueError if flow maps are asked for with pitch errors tooth by
+    tooth, or too many pairs are in mesh.
     """
     lanes, states = start.shape[0], len(system.states)
     steps = plan.steps_per_period
@@ -117,8 +102,6 @@ def integrate(
         # A scaled state may have the other sign.
         extremes=np.sort(outcome.extremes * scales[:, :-1], axis=2),
         amplitudes=np.abs(scales) * sums * (2.0 / samples),
-        growth=outcome.growth if plan.tangent else None,
-        history=outcome.history if plan.history_periods else None,
     )
 
 

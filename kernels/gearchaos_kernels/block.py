@@ -41,7 +41,7 @@ from gearchaos_kernels.loads import begin_loads, tell_loads
 from gearchaos_kernels.rk4 import step, tangent_step
 from gearchaos_kernels.rows import LANES, STRIDE
 from gearchaos_kernels.splitting import split_step
-from gearchaos_kernels.status import Status
+from gearchaos_kernels.system import Status
 from gearchaos_kernels.teeth import engage, on_grid, point_on_grid, with_teeth
 
 LARGEST_STATE = 1e100

@@ -34,8 +34,7 @@ from gearchaos_kernels.cache import KernelCache, cache_folder
 FASTMATH = {"contract", "nsz"}
 """Fused multiply-add and unsigned zeros only: NaN and infinity keep their meaning."""
 
-CACHE_LINE = 64
-"""Bytes that one aligned 512-bit vector occupies."""
+CACHE_LINE = 64  # Bytes that one aligned 512-bit vector occupies.
 
 
 def source_hash() -> str:

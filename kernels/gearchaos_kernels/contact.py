@@ -11,8 +11,7 @@ from gearchaos_kernels import rows
 from gearchaos_kernels.compilation import scalar
 from gearchaos_kernels.rows import STRIDE, Branch, Branches
 
-NEVER = 2.0
-"""Fraction of a step returned where the step does not leave its branch: beyond its end."""
+NEVER = 2.0  # Fraction of a step returned where the step does not leave its branch: beyond its end.
 
 _THIRD = 1.0 / 3.0
 _ITERATIONS = 60

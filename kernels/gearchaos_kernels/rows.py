@@ -20,8 +20,7 @@ from typing import NamedTuple
 
 from gearchaos_kernels.system import STATES
 
-LANES = 32
-"""Lanes of one block: a few vectors wide, small enough for the first-level cache."""
+LANES = 32  # Lanes of one block: a few vectors wide, small enough for the first-level cache.
 
 STRIDE = LANES + 8
 """Distance between rows: no two rows fall on the same cache set at a distance of 4096 bytes."""
@@ -93,22 +92,17 @@ TANGENTIAL_BRANCH = COEFFICIENTS + len(Lane._fields)
 AXIAL_BRANCH = TANGENTIAL_BRANCH + len(Branch._fields)
 SUSPECT = AXIAL_BRANCH + len(Branch._fields)
 """Row that marks the lanes whose step may have left a contact branch."""
-GROWTH = SUSPECT + 1
-"""Row of the logarithm of the tangent vector's growth since the period began."""
+GROWTH = SUSPECT + 1  # Row of the logarithm of the tangent vector's growth since the period began.
 CROSSINGS, SLOWEST, OVERFLOWS = range(GROWTH + 1, GROWTH + 4)
 """Clearance boundaries that a lane crossed, the smallest speed there, steps with too many."""
-FORCES = OVERFLOWS + 1
-"""First row of what forces a lane where a step is a map; see `flow_map`."""
-MARGINS = FORCES + 5
-"""Rows of how far either gap may stray from its cubic in a step that is a map."""
+FORCES = OVERFLOWS + 1  # First row of what forces a lane where a step is a map; see `flow_map`.
+MARGINS = FORCES + 5  # Rows of how far either gap may stray from its cubic in a step that is a map.
 NARROW, MOST_PAIRS = 4, 7
 """Tooth pairs in mesh at once: with more than the first the loop is another one."""
-PAIRS = MARGINS + 2
-"""First row of their errors; see `teeth`."""
+PAIRS = MARGINS + 2  # First row of their errors; see `teeth`.
 SHARED = PAIRS + MOST_PAIRS
 """Rows of the mesh phase where the last step ended, with the error that they share."""
-CONTACT = SHARED + 4
-"""First row of what is told of the contact: tangential, then axial."""
+CONTACT = SHARED + 4  # First row of what is told of the contact: tangential, then axial.
 CONTACT_ROWS, SPEEDS = 6, 4
 """Rows of one direction: time in steps and impacts on either flank, sum and largest of speeds."""
 LOADS = CONTACT + 2 * CONTACT_ROWS

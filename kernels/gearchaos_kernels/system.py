@@ -1,6 +1,7 @@
 """What is integrated, how long, and what comes of it: the records that go in and out."""
 
 import math
+from enum import IntEnum
 from fractions import Fraction
 from typing import NamedTuple, Self
 
@@ -193,11 +194,26 @@ class Schedule(NamedTuple):
     first_period: int
 
 
+class Status(IntEnum):
+    """Outcome of the integration of one lane; the values are those of the result file."""
+
+    OK = 0
+    DIVERGED = 1
+    TOO_FAST = 2
+
+
+STATUS_TEXTS = {
+    Status.OK: "integrated to the end",
+    Status.DIVERGED: "left the range of numbers (or became not a number) and was stopped",
+    Status.TOO_FAST: "moves faster than so few flow maps can follow, and was stopped",
+}
+
+
 class Outcome(NamedTuple):
     """What a batch yields; lanes first, states those of the system.
 
     ``section`` (lanes, section points, states); ``growth`` (lanes, recorded periods): the
-    logarithm of the tangent vector's growth over each recorded period, None without tangent;
+    logarithm of the tangent vector's growth over each recorded period, or (lanes, 0);
     ``end_state``, ``end_tangent`` (lanes, states); ``status`` (lanes,) of `Status`;
     ``diverged_period`` (lanes,): number of the period in which a lane diverged, or -1;
     ``crossings`` (lanes,): clearance boundaries crossed in the recorded periods;
@@ -209,11 +225,11 @@ class Outcome(NamedTuple):
     of approach, in the recorded periods; ``loads`` (lanes, 3, 4), or (lanes, 0, 4): largest and
     smallest value, mean and mean square of N_y, N_z and delta_5 + e there; ``extremes`` (lanes,
     states of the plan, 2): smallest and largest value, ``amplitudes`` (lanes, states + 1, orders);
-    ``history`` (lanes, history periods times steps + 1, states): the state at every step, or None.
+    ``history`` (lanes, history periods times steps + 1, states): the state at every step.
     """
 
     section: Floats
-    growth: Floats | None
+    growth: Floats
     end_state: Floats
     end_tangent: Floats
     status: NDArray[np.uint8]
@@ -225,7 +241,7 @@ class Outcome(NamedTuple):
     loads: Floats
     extremes: Floats
     amplitudes: Floats
-    history: Floats | None
+    history: Floats
 
     def every(self, periods: int) -> Self:
         """Return it with the section once every so many mesh periods, up to the end."""

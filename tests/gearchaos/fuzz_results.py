@@ -18,10 +18,10 @@ from gearchaos.results.variables import (
     coordinate,
     start_axis,
     step_choice_variables,
-    sweep_variables,
 )
 
 from .commands import SMALL
+from .listed_variables import sweep_variables
 
 Random = random.Random
 
@@ -35,7 +35,8 @@ GOOD_AXES = ((LOAD,), (ERRORS, LOAD, start_axis(2)), (ERRORS, LOAD), (LOAD, star
 def good_result(path: Path, axes: tuple[Variable, ...] = GOOD_AXES[0]) -> None:
     """Write a sound result file with every kind of variable that a sweep has."""
     states = list(STATE_WORDING)[:2]
-    choice = dict.fromkeys(("section_error", "exponent_error", "changed_share"), (1e-3, 1e-7))
+    told = ("section_error", "exponent_error", "changed_share", "periodic_share")
+    choice = dict.fromkeys(told, (1e-3, 1e-7))
     variables = sweep_variables(
         axes,
         states=states,

@@ -18,7 +18,7 @@ from gearchaos.errors import FileError
 from gearchaos.results.block_folder import StoreLock, read_manifest, require_same
 from gearchaos.results.block_store import BlockStore
 from gearchaos.results.result import Parameter, Result, open_result
-from gearchaos.results.variables import Variable, coordinate, start_axis, sweep_variables
+from gearchaos.results.variables import Variable, coordinate, listed, start_axis
 from gearchaos.version import Software
 
 LANES = 100
@@ -32,15 +32,17 @@ values = [1.0, 2.0]
 """
 
 
+def of_a_sweep(axes: Sequence[Variable]) -> list[Variable]:
+    told = ("section points", "lyapunov", "every sweep")
+    subjects = {"section": ["delta_5"], **{name: [""] for name in told}}
+    values = {"section_point": np.arange(POINTS), "state": np.arange(2)}
+    states = ["delta_5", "delta_5_rate"]
+    return listed(axes, subjects, values, {"status": ["ok", "diverged"], "state": states})
+
+
 def variables(lanes: int = LANES) -> list[Variable]:
-    return sweep_variables(
-        [coordinate("load", "1", "static load", "$f_n$", np.arange(float(lanes)))],
-        states=["delta_5", "delta_5_rate"],
-        section=["delta_5"],
-        section_points=POINTS,
-        lyapunov=True,
-        status_meanings=["ok", "diverged"],
-    )
+    values = np.arange(float(lanes))
+    return of_a_sweep([coordinate("load", "1", "static load", "$f_n$", values)])
 
 
 VARIABLES = variables()
@@ -400,12 +402,13 @@ def test_merging_takes_the_memory_of_a_block(output: Path) -> None:
 import numpy as np
 from test_block_store import CONFIGURATION, POINTS, SOFTWARE
 from gearchaos.results.block_store import BlockStore
-from gearchaos.results.variables import coordinate, sweep_variables
+from gearchaos.results.variables import coordinate, listed
 points, size, count = 500, 250, 80
-variables = sweep_variables(
+variables = listed(
     [coordinate("load", "1", "load", "", np.arange(float(size * count)))],
-        states=["delta_5"],
-    section=["delta_5"], section_points=points, lyapunov=False, status_meanings=["ok"],
+    {"section points": [""], "section": ["delta_5"], "every sweep": [""]},
+    {"section_point": np.arange(points), "state": np.arange(1)},
+    {"status": ["ok"], "state": ["delta_5"]},
 )
 random = np.random.default_rng(0)
 one = {
@@ -565,10 +568,7 @@ def test_several_axes_become_one_file_from_blocks_that_cut_them(output: Path) ->
         coordinate("pitch_error", "1", "pitch error", "", np.arange(5.0)),
         start_axis(5),
     ]
-    several = sweep_variables(
-        axes, states=["delta_5", "delta_5_rate"], section=["delta_5"], section_points=POINTS,
-        lyapunov=True, status_meanings=["ok", "diverged"],
-    )  # fmt: skip
+    several = of_a_sweep(axes)
     with BlockStore(output, several, CONFIGURATION, SOFTWARE) as store:
         assert store.lanes == LANES
         fill(store)

@@ -93,8 +93,8 @@ def test_refined_jumps_are_the_folds(folder, folds):
     for jump, fold in zip((downwards, upwards), folds, strict=True):
         assert jump["above"] - jump["below"] <= 1.1e-5
         assert jump["below"] - 1e-5 <= fold <= jump["above"] + 1e-5
-        assert jump["loss_of_stability"].startswith("fold")
-        assert jump["multiplier_real"] > 0.9
+        assert jump["loss"].startswith("fold")
+        assert jump["multiplier"][0] > 0.9
 
 
 def test_the_table_tells_where_directions_differ_within_80_columns(folder):

@@ -83,7 +83,8 @@ to = 4000.0
 count = 8
 """
 
-SHARES = "{shape='trapezoid', rise=0.25, top=0.25, fall=0.25, bottom=0.25, half_height=0.1}"
+HARMONICS = [-1.2, 0.0, 0.1, 0.0, 0.0, 0.02]
+FOURIER = f"{{shape='fourier', cosine_N_per_um_mm={HARMONICS}, sine_N_per_um_mm={HARMONICS}}}"
 
 
 @pytest.mark.parametrize("path", SWEEPS, ids=lambda path: path.stem)
@@ -220,7 +221,7 @@ def test_the_axes_are_the_second_sweep_and_the_sweep():
 
 def test_groups_have_the_broadcast_shape_of_what_they_depend_on():
     config = Configuration.from_toml(
-        PHYSICAL, overrides=[second("pair.face_width_mm", 14.0, 15.0), "mesh.stiffness=" + SHARES]
+        PHYSICAL, overrides=[second("pair.face_width_mm", 14.0, 15.0), "mesh.stiffness=" + FOURIER]
     )
     axes = axis_values(config)
     widths, speeds = axes["pair.face_width_mm"], axes["operation.speed_rpm"]

@@ -13,7 +13,6 @@ ROOT = Path(__file__).resolve().parents[2]
 PAN2021 = ROOT / "sweeps" / "pan2021.toml"
 TEXT = PAN2021.read_text(encoding="utf-8")
 
-TRAPEZOID = 'shape = "trapezoid", rise = 0.25, top = 0.25, fall = 0.25'
 FREE_OF_GROUPS = "groups={mesh_frequency=1.0, damping_ratio=0.1, pitch_error_amplitude=0.1}"
 
 
@@ -87,24 +86,6 @@ ONE_FAULT = [
         "mesh.half_backlash_um = 0.0",
         "cannot be the length scale",
         "give mesh.length_scale_um",
-    ),
-    (
-        f"mesh.stiffness={{ {TRAPEZOID}, half_height = 0.1 }}",
-        "mesh.stiffness",
-        "gives 3 of the four shares",
-        "give all four",
-    ),
-    (
-        f"mesh.stiffness={{ {TRAPEZOID}, bottom = 0.3, half_height = 0.1 }}",
-        "mesh.stiffness",
-        "rise + top + fall + bottom = 1.05, must be 1",
-        "shares of one mesh period",
-    ),
-    (
-        f"mesh.stiffness={{ {TRAPEZOID}, bottom = 0.25 }}",
-        "mesh.stiffness.half_height",
-        "must be given with the four shares",
-        "contact ratio",
     ),
     (
         'scene.effects=["backlash", "pitch_error", "backlash"]',

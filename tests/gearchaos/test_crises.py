@@ -6,7 +6,9 @@ import pytest
 from gearchaos.records.label import CHAOTIC, MEANINGS, PERIODIC
 from gearchaos.results.jumps import crises, grows_at
 from gearchaos.results.result import Result
-from gearchaos.results.variables import coordinate, sweep_variables
+from gearchaos.results.variables import coordinate
+
+from .listed_variables import sweep_variables
 
 MERGING = 1.5 * np.sqrt(3.0)
 """Where the two chaotic sets of the cubic map meet: its maximum comes to its zero."""

@@ -299,5 +299,5 @@ def test_without_the_extra_the_message_names_it(tmp_path):
     code = "import sys; sys.modules['distributed'] = None; from gearchaos.sweep import main; "
     command = [sys.executable, "-c", f"{code}sys.exit(main())", "gears.toml", "--dask", "local:1"]
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
-    assert (done.returncode, done.stdout) == (2, "")
+    assert (done.returncode, done.stdout) == (4, "")
     assert "pip install gearchaos[dask]" in done.stderr

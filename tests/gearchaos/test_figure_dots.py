@@ -10,7 +10,9 @@ from matplotlib.figure import Figure
 from gearchaos.figures import bifurcation, lyapunov
 from gearchaos.figures.lanes import COLUMNS, MOST_DOTS, DenseDots, Lanes, counts, dots
 from gearchaos.results.result import Result
-from gearchaos.results.variables import coordinate, sweep_variables
+from gearchaos.results.variables import coordinate
+
+from .listed_variables import sweep_variables
 
 RANDOM = np.random.default_rng(7)
 

@@ -17,7 +17,9 @@ from gearchaos.errors import FigureError
 from gearchaos.figures import bifurcation, bifurcation_page, lyapunov, save_figure
 from gearchaos.figures.panel import robust_limits
 from gearchaos.results.result import Result, open_result
-from gearchaos.results.variables import coordinate, start_axis, sweep_variables
+from gearchaos.results.variables import coordinate, start_axis
+
+from .listed_variables import sweep_variables
 
 POINTS = 60
 LANES = 121
@@ -195,8 +197,6 @@ def test_a_few_outlying_lanes_are_marked_and_do_not_flatten_the_rest(axes, resul
     diagram = bifurcation(axes, result)
     assert axes.get_ylim()[1] < 1.1
     np.testing.assert_array_equal(diagram.off_scale[0].get_xdata(), result["growth"][[60]])
-    assert bifurcation(axes, result, full_range=True).off_scale == []
-    assert axes.get_ylim()[1] > 1e4
 
 
 def test_a_second_result_widens_the_limits_and_every_lane_is_seen_or_marked(axes, result):
@@ -218,8 +218,6 @@ def test_a_second_result_widens_the_limits_and_every_lane_is_seen_or_marked(axes
     names = [text.get_text() for text in second.legend.get_texts()]
     assert names == ["above", "off scale (to 1e+04)", "below"]
     assert second.points.get_color() == "#0072B2" and second.points.get_marker() == "^"
-    bifurcation(axes, other, full_range=True)
-    assert axes.get_ylim()[1] > 1e4 and first.off_scale == []
 
 
 def test_results_over_each_other_share_a_page_and_are_named(result):

@@ -34,11 +34,6 @@ PHYSICAL = {
     "mesh.stiffness.shape": "fourier",
     "mesh.stiffness.cosine_N_per_um_mm": (-1.202, 0.0, -0.1339),
     "mesh.stiffness.sine_N_per_um_mm": (1.203, 0.0, -0.1335),
-    "mesh.stiffness.rise": None,
-    "mesh.stiffness.top": None,
-    "mesh.stiffness.fall": None,
-    "mesh.stiffness.bottom": None,
-    "mesh.stiffness.half_height": None,
     "mesh.stiffness.harmonics": None,
     "pitch_error.kind": "sine",
     "pitch_error.amplitude_um": 11.0,
@@ -197,16 +192,7 @@ def test_a_missing_quantity_loses_exactly_the_groups_that_need_it(absent, lost):
     )
 
 
-def test_pan_2021_trapezoid_gives_the_harmonics_of_table_2():
-    parts = dict.fromkeys(("rise", "top", "fall", "bottom"), 0.25)
-    shape = trapezoid(**parts, half_height=1 / 9, harmonics=6)
-    groups = resolve_groups(physical(**shape), {})
-    assert groups.stiffness_cosine.shape == groups.stiffness_sine.shape == (6,)
-    assert groups.stiffness_cosine[0] * 13.3548 == pytest.approx(-1.202, abs=1e-3)
-    assert groups.stiffness_sine[0] * 13.3548 == pytest.approx(1.203, abs=1e-3)
-
-
-def test_trapezoid_without_fractions_comes_from_the_contact_ratios_of_the_pair():
+def test_a_trapezoid_comes_from_the_contact_ratios_of_the_pair():
     groups = resolve_groups(physical(**trapezoid()), {})
     # The exact contact ratios are 1.5050 and 0.7539, near the 1.5 and 0.75 behind Table 2.
     assert groups.stiffness_cosine.size == 6

@@ -75,7 +75,8 @@ def test_what_bears_a_known_name_but_is_something_else_is_left_out(good):
         del file["candidate_section_error"]
         file["candidate_section_error"] = np.zeros(2, "u1")
         file["candidate_section_error"].attrs["dims"] = "candidate_steps"
-    assert overview(good)["step_choice"].keys() == {"steps", "exponent_error", "changed_share"}
+    others = {"steps", "exponent_error", "changed_share", "periodic_share"}
+    assert overview(good)["step_choice"].keys() == others
     assert info(good).code == 0
 
 

@@ -13,7 +13,9 @@ from gearchaos.plot import main
 from gearchaos.records.label import MEANINGS
 from gearchaos.records.teeth import CONTACT_STATES
 from gearchaos.results.result import Result
-from gearchaos.results.variables import Variable, coordinate, start_axis, sweep_variables
+from gearchaos.results.variables import Variable, coordinate, start_axis
+
+from .listed_variables import sweep_variables
 
 SPEEDS = coordinate(
     "operation_speed_rpm", "rpm", "speed", "", np.array([900.0, 1000.0, 1300.0, 1500.0])
@@ -81,7 +83,7 @@ def test_every_cell_has_the_colour_of_its_motion_and_period(variable):
 
 def test_numbers_are_those_of_the_file_and_what_diverged_is_named():
     for variable in ("lyapunov_exponent", "time_apart_tangential", "approach_mean_tangential"):
-        axes, image = drawn(variable, full_range=True)
+        axes, image = drawn(variable)
         values = image.get_array()
         assert np.array_equal(values.filled(np.nan), RESULT[variable], equal_nan=True)
         missing = ["diverged"] + ["no value"] * (variable == "approach_mean_tangential")

@@ -147,7 +147,7 @@ def test_growth_within_its_error_or_over_too_short_a_record_is_not_chaos():
 
 def test_without_an_exponent_a_motion_is_periodic_or_unresolved():
     for section, wanted in ((circle(GOLDEN), UNRESOLVED), (np.ones((60, 2)), PERIODIC)):
-        without = record(section)._replace(growth=None)
+        without = record(section)._replace(growth=np.zeros((1, 0)))
         labels = label(without)
         assert labels.motion.tolist() == [wanted]
 
@@ -232,5 +232,5 @@ def test_chaos_is_doubted_as_long_as_it_is_within_six_standard_errors(errors, do
 
 
 def test_without_an_exponent_a_longer_record_would_tell_nothing_of_chaos():
-    without = record(circle(GOLDEN / POINTS))._replace(growth=None)
+    without = record(circle(GOLDEN / POINTS))._replace(growth=np.zeros((1, 0)))
     assert not doubtful(without, label(without)).any()

@@ -12,7 +12,9 @@ import pytest
 
 from gearchaos.plot import main
 from gearchaos.results.result import Result
-from gearchaos.results.variables import coordinate, sweep_variables
+from gearchaos.results.variables import coordinate
+
+from .listed_variables import sweep_variables
 
 PICTURES = {"png": b"\x89PNG", "pdf": b"%PDF", "svg": b"<?xml", "eps": b"%!PS", "tiff": b"II*\0"}
 

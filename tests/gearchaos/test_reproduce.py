@@ -584,7 +584,7 @@ def test_the_gallery_in_the_documentation_is_whole():
 
 @pytest.mark.slow
 def test_an_existing_gallery_is_kept(folder):
-    with pytest.raises(FileError, match=r"holds report.md already.*--overwrite"):
+    with pytest.raises(FileError, match=r"report.md: exists already.*--overwrite"):
         check_folder(folder, overwrite=False)
     check_folder(folder, overwrite=True)
 

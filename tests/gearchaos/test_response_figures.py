@@ -22,7 +22,9 @@ from gearchaos.figures.response import coordinates_of, is_response, repeats_afte
 from gearchaos.plot import main
 from gearchaos.results.response_variables import response_variables
 from gearchaos.results.result import Result
-from gearchaos.results.variables import axis_name, coordinate, sweep_variables
+from gearchaos.results.variables import axis_name, coordinate
+
+from .listed_variables import sweep_variables
 
 STEPS, PERIODS, POINTS = 40, 8, 60
 STATES = ("delta_5", "delta_5_rate")
@@ -273,7 +275,7 @@ def test_what_is_no_coordinate_has_its_history_and_its_own_spectrum(path, result
     ("arguments", "message"),
     [
         (["--output", "all.png"], "is one png file, but there are several pages to draw"),
-        (["--full-range"], "is a response; it belongs to the diagram of a sweep"),
+        (["--stages"], "is a response; it belongs to the diagram of a sweep"),
         (["--variable", "delta_3"], "no variable 'delta_3' over time in the result; it has delta"),
         (["--from", "13"], "the result has 5.86 to 12.5"),
     ],

@@ -15,7 +15,9 @@ from hypothesis import strategies as st
 from gearchaos.errors import ConfigurationError, FileError
 from gearchaos.results.result import Parameter, Result, open_result, section_variables
 from gearchaos.results.result_file import hyperslabs, write_result
-from gearchaos.results.variables import Variable, coordinate, start_axis, sweep_variables
+from gearchaos.results.variables import Variable, coordinate, start_axis
+
+from .listed_variables import sweep_variables
 
 POINTS = 6
 LOADS = coordinate("load", "1", "static load", "$f_n$", np.linspace(0.1, 0.5, 3))

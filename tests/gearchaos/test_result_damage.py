@@ -13,7 +13,9 @@ import pytest
 
 from gearchaos.errors import FileError
 from gearchaos.results.result import Parameter, Result, open_result
-from gearchaos.results.variables import coordinate, sweep_variables
+from gearchaos.results.variables import coordinate
+
+from .listed_variables import sweep_variables
 
 CHECKSUM_LINE = 82
 

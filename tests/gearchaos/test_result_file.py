@@ -24,8 +24,9 @@ from gearchaos.results.variables import (
     direction_axis,
     pair_axis,
     start_axis,
-    sweep_variables,
 )
+
+from .listed_variables import sweep_variables
 
 LANES = 300
 POINTS = 1000

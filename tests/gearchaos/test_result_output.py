@@ -15,20 +15,23 @@ import pytest
 from gearchaos.errors import FileError
 from gearchaos.results.atomic_file import check_output, replacing
 from gearchaos.results.result import Result, open_result
-from gearchaos.results.variables import coordinate, sweep_variables
+from gearchaos.results.variables import coordinate
+
+from .listed_variables import sweep_variables
 
 PROGRAM = """
 import sys
 import numpy as np
 from gearchaos.errors import FileError
 from gearchaos.results.result import Result
-from gearchaos.results.variables import coordinate, sweep_variables
+from gearchaos.results.variables import coordinate, listed
 
 def result(lanes):
-    variables = sweep_variables(
+    variables = listed(
         [coordinate("load", "1", "static load", "$f_n$", np.arange(float(lanes)))],
-        states=["delta_5"],
-        section=["delta_5"], section_points=100, lyapunov=False, status_meanings=["ok", "diverged"],
+        {"section points": [""], "section": ["delta_5"], "every sweep": [""]},
+        {"section_point": np.arange(100), "state": np.arange(1)},
+        {"status": ["ok", "diverged"], "state": ["delta_5"]},
     )
     sizes = {"section_point": 100, "state": 1}
     random = np.random.default_rng(0)

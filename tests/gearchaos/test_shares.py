@@ -17,7 +17,9 @@ from gearchaos.records.label import MEANINGS
 from gearchaos.records.wilson import wilson_interval
 from gearchaos.results.ensembles import motion_shares
 from gearchaos.results.result import Result
-from gearchaos.results.variables import coordinate, pair_axis, start_axis, sweep_variables
+from gearchaos.results.variables import coordinate, pair_axis, start_axis
+
+from .listed_variables import sweep_variables
 
 INTERVAL = "not period 1, 95 % confidence"
 PAIRS, STARTS, TEETH_MEET = 10, 2, 798
@@ -229,8 +231,8 @@ def test_the_command_draws_a_slice(path, capsys):
     ("arguments", "message"),
     [
         ([], "the axes load, pitch_error_grade, realisation, start"),
-        (["--at", "load=1", "--stages"], "leave --variable, --stages"),
-        (["--at", "load=1", "--variable", "section_delta_5"], "leave --variable, --stages"),
+        (["--at", "load=1", "--stages"], "leave --variable and --stages out"),
+        (["--at", "load=1", "--variable", "section_delta_5"], "leave --variable and --stages out"),
         (["--at", "load=1", "--from", "10"], "the result has 5 to 9"),
     ],
 )

@@ -13,7 +13,9 @@ from gearchaos.figures.stages import HATCHES, SHADES, shade_stages
 from gearchaos.records.label import MEANINGS
 from gearchaos.results.result import Result
 from gearchaos.results.stage_table import labelled_lanes
-from gearchaos.results.variables import coordinate, sweep_variables
+from gearchaos.results.variables import coordinate
+
+from .listed_variables import sweep_variables
 
 KINDS = {str(n): (0, n) for n in (1, 2, 3, 5)}
 KINDS |= {letter: (kind, 0) for kind, letter in enumerate("qcudg", 1)}

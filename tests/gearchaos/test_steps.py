@@ -28,10 +28,11 @@ def method_of_order_four(steps: int) -> Solution:
     return solution(section, -0.01 + error * np.ones(20))
 
 
-def solution(section: np.ndarray, exponent: np.ndarray | None = None) -> Solution:
+def solution(section: np.ndarray, exponent: float | np.ndarray = np.nan) -> Solution:
     period = motion_period(section)
     motion = np.where(period > 0, PERIODIC, UNRESOLVED)
-    return Solution(section, exponent, np.zeros(20, dtype=bool), motion, period)
+    diverged = np.zeros(20, dtype=bool)
+    return Solution(section, np.broadcast_to(exponent, 20), diverged, motion, period)
 
 
 @pytest.mark.parametrize("tolerance", [1e-4, 1e-6, 1e-8])

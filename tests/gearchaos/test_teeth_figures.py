@@ -18,10 +18,11 @@ from gearchaos.plot import main as plot
 from gearchaos.results.response_variables import response_variables
 from gearchaos.results.result import Parameter, Result
 from gearchaos.results.scales import Excitation, excitation_of
-from gearchaos.results.variables import coordinate, sweep_variables
+from gearchaos.results.variables import coordinate
 from gearchaos.stages import main as stages
 
 from .commands import small_config
+from .listed_variables import sweep_variables
 
 STEPS, DRIVING, DRIVEN = 8, 4, 6
 MEET = 12

@@ -222,7 +222,7 @@ def test_a_slice_is_refined_like_the_sweep_of_one_parameter_that_it_is(tmp_path)
     assert light == alone
     # The multiplier of period 1 passes -1 at 10.6085; just beyond, a motion leaves it too slowly to
     # be told by so short a record.
-    assert [edge["motion_above"] for edge in light["boundaries"]] == ["unresolved", "period 1"]
+    assert [edge["label_above"] for edge in light["boundaries"]] == ["unresolved", "period 1"]
     assert light["boundaries"][0]["below"] == pytest.approx(10.6085, abs=0.01)
     assert all(0.0 < edge["above"] - edge["below"] <= 0.01 for edge in light["boundaries"])
     assert heavy["boundaries"] == []
@@ -258,7 +258,7 @@ def test_the_boundaries_of_a_map_are_those_of_its_rows_and_what_rows_beside_show
     whole = json.loads(of_the_file("stages", path, *width, "--json"))
     assert (whole["parameter"], whole["second_parameter"]) == ("pitch_error", "load")
     loads = gearchaos.open_result(path)["load"].tolist()
-    edges = ("below", "above", "motion_below", "motion_above")
+    edges = ("below", "above", "label_below", "label_above")
     found = {
         row["value"]: [[one[key] for key in edges] for one in row["boundaries"]]
         for row in whole["rows"]

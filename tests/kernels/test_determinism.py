@@ -43,12 +43,7 @@ def whole(integrate) -> Outcome:
 
 
 def joined(parts: list[Outcome]) -> Outcome:
-    return Outcome(
-        *(
-            None if arrays[0] is None else np.concatenate(arrays)
-            for arrays in zip(*parts, strict=True)
-        )
-    )
+    return Outcome(*map(np.concatenate, zip(*parts, strict=True)))
 
 
 def test_two_lanes_of_this_test_diverge_and_the_others_differ_from_one_another(whole):
