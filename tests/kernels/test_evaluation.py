@@ -91,6 +91,8 @@ def test_accelerations_are_those_of_the_twin(scene):
             found = motion.accelerations[number]
             wanted = wanted[:, [column // 2 for column in kept[0::2]]]
             np.testing.assert_allclose(found, wanted, rtol=1e-11, atol=1e-11)
+            errors = [twin.error(instant)[0] for instant in tau]
+            np.testing.assert_allclose(motion.pitch_error[number], errors, rtol=0, atol=1e-13)
 
 
 def with_delta_5(values) -> np.ndarray:
