@@ -5,7 +5,7 @@ All examples have a tangent vector and split steps; few scenes, because each is 
 
 import numpy as np
 from gearchaos_kernels import Effects, Groups, Status
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from .reference import (
@@ -181,6 +181,8 @@ def test_a_motion_is_finite_or_its_lane_says_that_it_is_not(scene, given, start,
 @PROPERTY
 @given(scenes, groups, starts, st.sampled_from([7, 50]))
 def test_a_motion_turned_around_is_the_motion_of_the_pair_turned_around(scene, given, start, steps):
+    # A clearance below the rounding of its gap is left on the side to which that rounds.
+    assume(given["half_backlash"] == 0.0 or given["half_backlash"] > 1e-12)
     model = pair_of(scene, given)
     turned = {name: -getattr(model, name) for name in LENGTHS if name != "half_backlash"}
     how = {"steps": steps, "periods": PERIODS, "resolved": True}
