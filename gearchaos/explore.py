@@ -48,6 +48,9 @@ def _explore(options: Namespace) -> int:
     except OSError as error:
         rule = f"{reason(error)}; choose another port, or 0 for any that is free"
         raise ConfigurationError(f"--port {options.port}: {rule}") from error
+    # Before datashader makes Numba ready: for which processor is then settled for all code.
+    import gearchaos_kernels  # noqa: F401
+
     panel, *_ = (needed(package, "explore") for package in PACKAGES)
     from tornado.web import ErrorHandler
 

@@ -13,7 +13,7 @@ os.environ.setdefault("OMP_WAIT_POLICY", "passive")
 settings.register_profile("repeatable", derandomize=True, deadline=None)
 settings.load_profile("repeatable")
 
-FIRST = ("vectorisation", "plot", "oracle", "shard_option", "hard_groups", "loads")
+FIRST = ("vectorisation", "plot", "oracle", "shard_option", "hard_groups", "flow_map", "loads")
 FIRST += ("swept_parameters", "sweep_interrupted", "dask")
 """Files of which none shall be the last that runs, while other processes have nothing left to do.
 

@@ -10,6 +10,7 @@ Every flag is named here and nowhere else. Three facts about Numba shape this fi
   unaligned stack. Both cost up to half of the speed of the lane loop.
 """
 
+import gc
 import hashlib
 from collections.abc import Callable
 from pathlib import Path
@@ -124,10 +125,15 @@ class _DriverCompiler(_Compiler):
         self.state.library = codegen.create_library(self.state.func_id.func_qualname)
         self.state.library.enable_object_caching()
         codegen._library_class = _LinkedOnly
+        # Next to nothing of what a compilation makes is rubbish before its end.
+        collecting = gc.isenabled()
+        gc.disable()
         try:
             return super()._compile_core()
         finally:
             del codegen._library_class
+            if collecting:
+                gc.enable()
 
 
 def _decorate(

@@ -78,6 +78,7 @@ lyapunov = true
 
 LINEAR = (
     *("--set", 'scene.effects=["pitch_error"]'),
+    *("--set", "pitch_error.phase_deg=0.0"),
     *("--set", 'outputs.section=["delta_5"]'),
     *("--set", "outputs.lyapunov=false"),
 )

@@ -30,12 +30,19 @@ def test_carried_sweep_is_the_chain_of_its_lanes_made_by_hand(direction, method)
         assert np.array_equal(arrays["end_state"][value], state)
 
 
-@pytest.mark.parametrize("direction", ["upwards", "downwards", "both"])
-@pytest.mark.parametrize("overrides", [(), RANDOM, ("integration.method=flow_map", *RANDOM)])
+@pytest.mark.parametrize(
+    ("direction", "overrides"),
+    [
+        ("upwards", RANDOM),
+        ("downwards", ()),
+        ("both", ()),
+        ("both", ("integration.method=flow_map", *RANDOM)),
+    ],
+)
 def test_carried_sweep_does_not_depend_on_the_size_of_its_blocks(direction, overrides):
     sweep = simulation(f"start.carry={direction}", *overrides)
     whole = computed(sweep)
-    for values in (1, 4, 9):
+    for values in (1, 4):
         assert_same(computed(sweep, values), whole)
     # Blocks may end between lanes that are side by side.
     odd = computed_blocks(sweep, sweep.blocks(sweep.lanes.side_by_side + 1))
@@ -52,7 +59,7 @@ def test_both_directions_at_once_are_the_two_sweeps_bit_for_bit(overrides):
         assert_same(one, computed(simulation(f"start.carry={direction}", *more)))
 
 
-@pytest.mark.parametrize("direction", ["upwards", "downwards", "both"])
+@pytest.mark.parametrize("direction", ["upwards", "both"])
 def test_carried_sweep_goes_on_from_a_finished_block(direction):
     sweep = simulation(f"start.carry={direction}", *RANDOM)
     bounds = sweep.blocks(8)

@@ -255,3 +255,19 @@ def test_what_is_wrong_is_told_in_a_sentence(path, tmp_path, monkeypatch, capsys
     monkeypatch.setitem(sys.modules, "panel", None)
     code, text = said(str(path), "--port", "0")
     assert code == 4 and "panel is not installed; pip install gearchaos[explore]" in text
+
+
+def test_the_page_runs_the_code_that_other_commands_have_compiled(path):
+    # Whoever makes Numba ready first decides for which processor: it has to be the kernels.
+    code = """if True:
+        import sys
+        from gearchaos.explore import main
+        sys.modules["panel"] = None
+        main([sys.argv[1], "--no-browser", "--port", "0"])
+        from numba.core.registry import cpu_target
+        made_for = cpu_target.target_context.codegen().magic_tuple()
+        sys.exit("-prefer-256-bit" not in made_for[-1])"""
+    command = [sys.executable, "-c", code, str(path)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert "panel is not installed" in done.stderr
+    assert done.returncode == 0

@@ -115,7 +115,7 @@ def test_a_file_that_the_command_did_not_draw_is_kept(result_file, ending, capsy
     assert "--overwrite" in err
     assert foreign.read_text() == "a photograph of gearchaos"
     assert len(list(result_file.parent.iterdir())) == 2
-    assert main([str(result_file), *kinds, "--overwrite"]) == 0
+    assert main([str(result_file), "--format", ending[1:], "--overwrite"]) == 0
     assert foreign.stat().st_size > 5000
 
 

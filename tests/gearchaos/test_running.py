@@ -18,8 +18,8 @@ def config(tmp_path):
     "overrides",
     [
         ["sweep.count=200"],
-        ["start.kind=random", "start.count=7", "start.seed=3"],
-        ["start.kind=random", "start.count=7", "start.carry=downwards"],
+        ["sweep.count=9", "start.kind=random", "start.count=7", "start.seed=3"],
+        ["sweep.count=9", "start.kind=random", "start.count=7", "start.carry=downwards"],
         ["start.carry=upwards", "outputs.section=[]"],
     ],
     ids=["plain", "random", "random, carried", "carried, no section"],

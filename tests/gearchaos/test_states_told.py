@@ -12,9 +12,11 @@ from gearchaos.results.scales import unit_of
 
 from .commands import run_module
 from .short_sweeps import PAN2021, SHORT
+from .test_contact_told import AXIAL
 
 ASKED = (
     *SHORT,
+    *AXIAL,
     "outputs.states=['delta_5','delta_1_rate']",
     "outputs.orders=[1,'1/2','2/4','3/2',2]",
     "outputs.loads=true",

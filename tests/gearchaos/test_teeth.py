@@ -112,6 +112,14 @@ def test_the_error_in_a_response_is_that_of_the_teeth_in_mesh():
     assert mean == pytest.approx(-np.mean(deviations) * np.cos(alpha_t), rel=1e-9)
 
 
+def test_forces_after_a_transient_are_those_of_the_teeth_that_it_has_come_to():
+    system = gearchaos.System(configured(), pitch_error=1.0)
+    whole, later = (system.mesh_motion(system.integrate(6 - n, n)) for n in (0, 4))
+    steps = whole.pitch_error.size // 6
+    assert np.array_equal(later.pitch_error, whole.pitch_error[4 * steps :])
+    assert later.force_tangential == pytest.approx(whole.force_tangential[4 * steps :], abs=1e-11)
+
+
 def test_a_contact_ratio_that_no_pair_of_gears_can_have_is_refused():
     wide = {**TABLES["pair"], "face_width_mm": 150.0}
     with pytest.raises(gearchaos.ConfigurationError, match="total contact ratio"):

@@ -4,8 +4,8 @@ All examples have a tangent vector and split steps; few scenes, because each is 
 """
 
 import numpy as np
-from gearchaos_kernels import Groups, Status
-from hypothesis import given, settings
+from gearchaos_kernels import Effects, Groups, Status
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from .reference import (
@@ -44,7 +44,6 @@ groups = st.fixed_dictionaries(
         "half_backlash": st.sampled_from([0.0, 1e-9, 1e-3, 0.1, 1.0, 1e9]) | numbers(0.0, 2.0),
         "error_mean": numbers(-0.5, 0.5),
         "error_amplitude": numbers(0.0, 2.0),
-        # Never zero: the loop without phase is compiled apart.
         "error_phase": st.floats(0.1, 6.0),
         "stiffness_variation_scale": numbers(0.0, 2.0),
         "mass_ratio_p": st.floats(0.05, 1.0),
@@ -56,6 +55,11 @@ groups = st.fixed_dictionaries(
 scenes = st.sampled_from([FULL, NO_AXIAL, CLEARANCE, NO_BACKLASH])
 starts = st.lists(numbers(-3.0, 3.0), min_size=10, max_size=10).map(np.array)
 anything = st.sampled_from([0.0, 1e-300, 1e-9, 1.0, 1e3, 1e9, 1e30, 1e150, np.inf, np.nan])
+
+
+def pair_of(scene: Effects, given: dict[str, float]) -> Groups:
+    """Return the pair of an example; a loop with a phase of the error is compiled apart."""
+    return pan2021(0.0, **{**given, **({"error_phase": 0.0} if scene == NO_AXIAL else {})})
 
 
 def value(model: Groups, name: str) -> float:
@@ -116,7 +120,7 @@ def bound(before, power, leak, rises, tau) -> np.ndarray:
 @PROPERTY
 @given(groups, starts)
 def test_the_energy_of_a_motion_is_bounded_by_what_load_error_and_stiffness_put_in(given, start):
-    model = pan2021(0.0, **given)
+    model = pair_of(FULL, given)
     outcome = run(model, FULL, start, steps=200, periods=PERIODS, resolved=True)
     assert outcome.status.tolist() == [Status.OK]
 
@@ -156,7 +160,7 @@ def test_the_energy_of_a_motion_is_bounded_by_what_load_error_and_stiffness_put_
 def test_a_motion_is_finite_or_its_lane_says_that_it_is_not(scene, given, start, steps, size, row):
     with np.errstate(invalid="ignore"):
         start[row] *= size
-    model = pan2021(0.0, **given)
+    model = pair_of(scene, given)
     outcome = run(model, scene, start, steps=steps, periods=PERIODS, resolved=True)
     if outcome.status[0] == Status.OK:
         kept = PERIODS
@@ -177,7 +181,9 @@ def test_a_motion_is_finite_or_its_lane_says_that_it_is_not(scene, given, start,
 @PROPERTY
 @given(scenes, groups, starts, st.sampled_from([7, 50]))
 def test_a_motion_turned_around_is_the_motion_of_the_pair_turned_around(scene, given, start, steps):
-    model = pan2021(0.0, **given)
+    # A clearance below the rounding of its gap is left on the side to which that rounds.
+    assume(given["half_backlash"] == 0.0 or given["half_backlash"] > 1e-12)
+    model = pair_of(scene, given)
     turned = {name: -getattr(model, name) for name in LENGTHS if name != "half_backlash"}
     how = {"steps": steps, "periods": PERIODS, "resolved": True}
     one = run(model, scene, start, **how)
@@ -193,7 +199,7 @@ def test_a_motion_turned_around_is_the_motion_of_the_pair_turned_around(scene, g
 @given(scenes, groups, starts, st.sampled_from([7, 50]), st.integers(-30, 30))
 def test_a_motion_scales_with_every_length_of_its_pair(scene, given, start, steps, power):
     factor = 2.0**power
-    model = pan2021(0.0, **given)
+    model = pair_of(scene, given)
     scaled = model._replace(**{name: factor * getattr(model, name) for name in LENGTHS})
     how = {"steps": steps, "periods": 3, "resolved": True}
     one = run(model, scene, start, **how)

@@ -39,7 +39,17 @@ EXACT = 1e-10
 def scene_of(solution: dict) -> Effects:
     if "effects" not in solution:
         return Effects(axial=solution["scene"] == "full")
+    if solution["scene"] == "constant_stiffness":
+        return Effects()
     return Effects(**{effect: effect in solution["effects"] for effect in Effects._fields})
+
+
+def pair_of(solution: dict) -> Groups:
+    """Return the pair of a solution; what is constant need not be absent, and compiled apart."""
+    constant = (
+        {"stiffness_variation_scale": 0.0} if solution["scene"] == "constant_stiffness" else {}
+    )
+    return pan2021(solution["pitch_error"], **constant)
 
 
 def name_of(solution: dict) -> str:
@@ -58,7 +68,7 @@ def follow(solution: dict, steps: int, model: Groups | None = None, **how) -> Ou
     orbit = "section_points" in solution
     how = {"periods": 2 * solution["period"] if orbit else solution["periods"][-1], **how}
     return run(
-        pan2021(solution["pitch_error"]) if model is None else model,
+        pair_of(solution) if model is None else model,
         scene_of(solution),
         stored_state(solution["section_points"][0] if orbit else solution["start"]),
         steps=steps,

@@ -79,11 +79,12 @@ def test_every_two_effects_are_there_in_all_four_combinations():
 @pytest.mark.parametrize("physical", [False, True])
 def test_kernels_share_the_errors_of_the_teeth_in_mesh(physical):
     teeth = drawn_teeth(3, 2, lanes=2)
-    outcome = run(MODEL, FULL, START, steps=STEPS, periods=PERIODS, physical=physical, teeth=teeth)
+    how = {"steps": STEPS, "periods": PERIODS, "physical": physical, "teeth": teeth}
+    outcome = run(MODEL, NO_BACKLASH, START, **how)
     for number in range(2):
         groups = lane(number)
         groups.profile = teeth.profile[number]
-        twin = Twin(groups, FULL, physical, teeth).integrate(START[number], STEPS, PERIODS)
+        twin = Twin(groups, NO_BACKLASH, physical, teeth).integrate(START[number], STEPS, PERIODS)
         assert outcome.section[number] == pytest.approx(twin.states, rel=0, abs=ROUNDING)
         assert outcome.growth[number] == pytest.approx(twin.growth, rel=0, abs=ROUNDING)
 
