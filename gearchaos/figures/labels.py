@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Mapping
+from functools import cache
 
 from matplotlib.mathtext import MathTextParser
 
@@ -97,6 +98,7 @@ def _broken(words: list[str], line_length: int) -> list[str]:
     return lines
 
 
+@cache
 def _formula(text: str) -> str:
     """Return a symbol that is no formula as plain text."""
     # A file may come from anywhere; a formula that matplotlib cannot read would fail at drawing.

@@ -14,10 +14,12 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 from matplotlib.legend import Legend
+from matplotlib.mathtext import MathTextParser
 from matplotlib.ticker import AutoMinorLocator, MaxNLocator
 
 from gearchaos.errors import FigureError, FileError
 from gearchaos.figures.style import LEGEND, MM_PER_INCH, SINGLE_COLUMN_MM, SMALL_FONT_PT, style
+from gearchaos.figures.ticks import light
 from gearchaos.interrupts import check
 from gearchaos.results.atomic_file import check_output, replacing
 from gearchaos.version import software_version
@@ -32,6 +34,22 @@ SIGNATURE = "gearchaos"
 OWN = rb"(Software[\0 ]|/Creator \(|%%Creator: |<dc:creator>\s*<cc:Agent>\s*<dc:title>)gearchaos "
 
 NOTEBOOK_DPI = 200
+FAST = {"compress_level": 1}
+"""A sixth larger, in two thirds of the time."""
+
+
+FORMULAE = MathTextParser("path")
+"""Keeps what it has read of formulae: the next page has most of them again."""
+
+
+class Canvas(FigureCanvasAgg):
+    """What pages are measured and drawn with."""
+
+    def get_renderer(self) -> Any:
+        """Return what draws, and reads formulae for all pages."""
+        renderer = super().get_renderer()  # type: ignore[no-untyped-call]
+        renderer.mathtext_parser = FORMULAE
+        return renderer
 
 
 class Page(Figure):
@@ -51,8 +69,10 @@ def page(width_mm: float, height_mm: float) -> Iterator[Page]:
         size = (width_mm / MM_PER_INCH, height_mm / MM_PER_INCH)
         layout = ConstrainedLayoutEngine()
         figure = Page(figsize=size, layout=layout)
-        FigureCanvasAgg(figure)
+        Canvas(figure)
         yield figure
+        for axes in figure.axes:
+            light(axes)
         # Ticks are made when they are first measured, in the style of that moment.
         layout.execute(figure)
         # The layout is found; looking for it again takes longer than the drawing itself. The engine
@@ -130,7 +150,7 @@ def save_figure(
     title = "".join(filter(str.isprintable, title))
     software = f"{SIGNATURE} {software_version()}"
     facts: dict[str, dict[str, Any]] = {
-        "png": {"metadata": {"Title": title, "Software": software}},
+        "png": {"metadata": {"Title": title, "Software": software}, "pil_kwargs": FAST},
         "pdf": {"metadata": {"Title": title, "Creator": software, "CreationDate": None}},
         "svg": {"metadata": {"Title": title, "Creator": software, "Date": None}},
         "eps": {"metadata": {"Creator": software}},

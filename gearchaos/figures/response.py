@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.lines import Line2D
-from matplotlib.ticker import MaxNLocator
+from matplotlib.ticker import MaxNLocator, NullFormatter
 
 from gearchaos.errors import FigureError
 from gearchaos.figures.labels import axis_label, place_of, plain, unit_of
@@ -190,6 +190,7 @@ def amplitude_spectrum(
         top = 10.0 ** np.ceil(np.log10(top))
         floor = top * 10.0**-DECADES
         axes.set_yscale("log")
+        axes.yaxis.set_minor_formatter(NullFormatter())
     seen = amplitude > floor
     width = 0.5 if np.count_nonzero(amplitude > 1e-3 * top) > _MANY_LINES else 1.0
     lines = axes.vlines(order[seen], floor, amplitude[seen], color=BLUE, linewidth=width)

@@ -45,8 +45,10 @@ TICKS = {
 }
 """Settings for the ticks of either axis."""
 
-# The STIX fonts come with matplotlib, so that a figure is the same on every machine.
 _STYLE: dict[Any, Any] = {
+    # That of `save_figure`: what is measured for the layout is then known when the page is drawn.
+    "figure.dpi": 300,
+    # The STIX fonts come with matplotlib, so that a figure is the same on every machine.
     "font.family": "STIXGeneral",
     "mathtext.fontset": "stix",
     "font.size": FONT_PT,
