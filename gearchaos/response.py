@@ -79,7 +79,7 @@ def _lane(options: Namespace) -> "Asked":
         rule = "is a result, and goes on with its own configuration; name a lane with --at"
         raise ConfigurationError(f"{options.config}: {rule}, without --set or --pitch-error")
     result = open_result(options.config)
-    lane = result.sel("nearest", **coordinates(options.at, result.axes))
+    lane = result.sel("within", **coordinates(options.at, result.axes))
     if lane.axes:
         rest = " and ".join(f"--at {axis}=VALUE" for axis in lane.axes)
         raise ConfigurationError(f"{options.config}: name one lane, with {rest} as well")

@@ -212,7 +212,7 @@ class Page:
         """Show the motion of the lane next to the values that the switches give."""
         fault, self._motion, start = "", None, self._value("motion_from")
         try:
-            lane = self._result.sel("nearest", **{a: self._value(a) for a in self._result.axes})
+            lane = self._result.sel("within", **{a: self._value(a) for a in self._result.axes})
             self._fixed = lane.fixed
             at = {a: self._shown[a][self._result[a] == lane.fixed[a]][0] for a in self._swept}
             with pn.io.unlocked():

@@ -1,15 +1,31 @@
 """Axis labels from what the result file says about its variables."""
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from functools import cache
 
 from matplotlib.mathtext import MathTextParser
 
+from gearchaos.configuration.messages import suggestion
+from gearchaos.records.teeth import CONTACT, FORCES, LOADS
 from gearchaos.results import scales
 from gearchaos.results.result import Result
 from gearchaos.results.scales import excitation_of
-from gearchaos.results.variables import DIRECTION, START, coordinate_text
+from gearchaos.results.variables import (
+    AMPLITUDE,
+    DIRECTION,
+    LARGEST_EXPONENT,
+    START,
+    coordinate_text,
+)
+
+KEPT_BY = {
+    "loads = true": (*LOADS, *FORCES),
+    "contact = true": (*CONTACT, "contact_state"),
+    "orders = [1, 2]": (AMPLITUDE,),
+    "lyapunov = true": (LARGEST_EXPONENT,),
+}
+"""Keys of [outputs], and how the names begin of what a sweep keeps with them."""
 
 
 def axis_label(result: Result, name: str, line_length: int = 60) -> str:
@@ -34,7 +50,7 @@ def axis_label(result: Result, name: str, line_length: int = 60) -> str:
 
 def unit_of(result: Result, name: str) -> str:
     """Word the unit of a variable, or what its numbers are multiples of; "" of a pure number."""
-    written = result.variables[name].units
+    written = (result.fixed_axes | result.variables)[name].units
     if written in ("", "1"):
         return scales.unit_of(name).stands_for
     words = plain(re.sub(r"\bum\b", "\N{MICRO SIGN}m", written))
@@ -62,18 +78,28 @@ def in_words(result: Result, place: Mapping[str, float]) -> str:
     """Word a place on the axes of a result, such as ``$P$ = 5.86, start 0``."""
     texts = []
     for axis, value in place.items():
-        attributes = result.attributes(axis) if axis in result else {}
-        wording = str(attributes.get("long_name", "")) or axis.replace("_", " ")
-        name = _formula(attributes.get("symbol", "")) or plain(wording)
-        unit = f" {unit_of(result, axis).removeprefix('unit ')}".rstrip() if axis in result else ""
+        known = (result.fixed_axes | result.variables).get(axis)
+        wording = (known and known.long_name) or axis.replace("_", " ")
+        name = (known and _formula(known.symbol)) or plain(wording)
+        unit = f" {unit_of(result, axis).removeprefix('unit ')}".rstrip() if known else ""
         words = {START: f"start {value:g}", DIRECTION: coordinate_text(axis, value)}
         texts.append(words.get(axis, f"{name} = {value:.6g}{unit}"))
     return ", ".join(texts)
 
 
-def in_a_name(place: Mapping[str, float]) -> str:
+def in_a_name(place: Mapping[str, float], digits: int = 12) -> str:
     """Word a place for the name of a file: ``_pitch_error_5.86_start_0``."""
-    return "".join(f"_{axis}_{coordinate_text(axis, value)}" for axis, value in place.items())
+    texts = (f"_{axis}_{coordinate_text(axis, value, digits)}" for axis, value in place.items())
+    return "".join(texts)
+
+
+def instead_of(variable: str, there: Iterable[str]) -> str:
+    """Say what there is instead of a variable, and which key would keep it or which is meant."""
+    there = list(there)
+    for key, names in KEPT_BY.items():
+        if variable.startswith(names) and not any(one.startswith(names) for one in there):
+            return f"it has {', '.join(there)}; set outputs.{key} and compute it again to have it"
+    return "; ".join(filter(None, [f"it has {', '.join(there)}", suggestion(variable, there)]))
 
 
 def short(value: float, digits: int = 4, sign: str = "-") -> str:

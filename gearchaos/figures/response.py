@@ -9,7 +9,7 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import MaxNLocator, NullFormatter
 
 from gearchaos.errors import FigureError
-from gearchaos.figures.labels import axis_label, place_of, plain, unit_of
+from gearchaos.figures.labels import axis_label, instead_of, place_of, plain, unit_of
 from gearchaos.figures.lanes import Between, Floats
 from gearchaos.figures.page import remark
 from gearchaos.figures.style import BLACK, BLUE, LEGEND, ORANGE, VERMILION
@@ -216,7 +216,7 @@ def response_variables_of(result: Result) -> tuple[str, ...]:
     return tuple(
         name
         for name in result
-        if TIME in result.dims(name)[1:] and not result.variables[name].flags
+        if TIME in result.dims(name)[len(result.axes) :] and not result.variables[name].flags
     )
 
 
@@ -263,7 +263,7 @@ def motion_of(result: Result, lane: int, variable: str) -> Floats:
         )
     if variable not in names:
         raise FigureError(
-            f"no variable {variable!r} over time in the result; it has {', '.join(names)}"
+            f"no variable {variable!r} over time in the result; {instead_of(variable, names)}"
         )
     lanes = result.along(result.axis).size
     if not 0 <= lane < lanes:

@@ -76,6 +76,7 @@ def response_page(
         If the result is no response, has no such lane or variable, or the lane diverged.
     """
     coordinate = response.COORDINATE if coordinate is None else coordinate
+    response.motion_of(result, lane, coordinate)
     whole = coordinate in response.coordinates_of(result)
     if excitation_of(result.metadata).of_teeth:
         return _teeth_page(result, lane, coordinate, (width_mm, height_mm))

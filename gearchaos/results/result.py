@@ -62,6 +62,7 @@ class Result:
         self.axes = tuple(axes)
         self.parameters = dict(parameters)
         self.metadata = {**metadata, **own_metadata(self.axes)}
+        self.fixed_axes: dict[str, Variable] = {}
         self._data: dict[str, NDArray[Any]] = {}
         for variable in variables:
             values = data.get(variable.name, variable.values)
@@ -133,16 +134,25 @@ class Result:
         return values.reshape(count, *values.shape[len(self.axes) :])
 
     def along(self, axis: str) -> NDArray[Any]:
-        """Give the value of an axis for every lane in that order, shape (lanes,)."""
+        """Give the value of an axis for every lane in that order, shape (lanes,).
+
+        Raises ConfigurationError if there is no such axis.
+        """
+        if axis not in self.axes:
+            rule = "runs over no axis" if not self.axes else f"has no axis {axis!r}"
+            raise ConfigurationError(f"the result {rule}; leave one that is wanted in sel")
         grid = np.meshgrid(*(self[name] for name in self.axes), indexing="ij")
         return np.ravel(grid[self.axes.index(axis)])
 
-    def sel(self, method: Literal["nearest"] | None = None, **coordinates: float | str) -> Result:
+    def sel(
+        self, method: Literal["nearest", "within"] | None = None, **coordinates: float | str
+    ) -> Result:
         """Fix axes at one of their values each; what is left runs over the other axes.
 
         Coordinates are by the name of their axis, and directions by their own, such as
-        ``direction="upwards"``; those that were met are in `fixed`. With
-        ``"nearest"`` the nearest value is taken, the larger of two; by default a value must be met
+        ``direction="upwards"``; those that were met are in `fixed`, and their axes in `fixed_axes`.
+        With ``"nearest"`` the nearest value is taken, the larger of two, with ``"within"`` as well,
+        but nothing further than half a step beyond the outermost; by default a value must be met
         exactly. Raises ConfigurationError if there is no such axis or value; the message names the
         nearest.
         """
@@ -159,10 +169,17 @@ class Result:
             # Far from all of them, every difference would be the same number.
             near = np.clip(wanted, values[0], values[-1])
             number = values.size - 1 - int(np.argmin(np.abs(values - near)[::-1]))
-            if method != "nearest" and values[number] != wanted:
+            if method is None and values[number] != wanted:
                 raise ConfigurationError(
                     f"{name} = {wanted:g}: is none of the {values.size} values of the result; the "
                     f'nearest is {values[number]!s}: give it, or method="nearest"'
+                )
+            steps = np.diff(values) if values.size > 1 else [math.inf]
+            reach = values[0] - steps[0] / 2.0, values[-1] + steps[-1] / 2.0
+            if method == "within" and not reach[0] <= wanted <= reach[1]:
+                raise ConfigurationError(
+                    f"{name} = {wanted:g}: lies beyond the values of the result, {values[0]:g} to "
+                    f"{values[-1]:g}; give one between these"
                 )
             index[name] = number
         if not index:
@@ -177,7 +194,7 @@ class Result:
             return tuple(dim for dim in dims if dim not in index)
 
         left = [variable for variable in self.variables.values() if variable.name not in index]
-        return Result(
+        found = Result(
             rest(self.axes),
             [replace(variable, dims=rest(variable.dims)) for variable in left],
             {variable.name: part(self[variable.name], variable.dims) for variable in left},
@@ -187,6 +204,8 @@ class Result:
             },
             {**self.metadata, "fixed": fixed},
         )
+        found.fixed_axes = self.fixed_axes | {name: self.variables[name] for name in index}
+        return found
 
     def physical(self, *names: str) -> Result:
         """Give these variables, by default all, in physical units: um, m/s, N, 1/s.
@@ -202,7 +221,9 @@ class Result:
         }
         variables = {**self.variables, **{name: one for name, (one, _) in changed.items()}}
         data = {**self._data, **{name: values for name, (_, values) in changed.items()}}
-        return Result(self.axes, [*variables.values()], data, self.parameters, self.metadata)
+        found = Result(self.axes, [*variables.values()], data, self.parameters, self.metadata)
+        found.fixed_axes = self.fixed_axes
+        return found
 
     def save(self, path: str | os.PathLike[str], overwrite: bool = False) -> None:
         """Write the result to an HDF5 file, which appears complete or not at all.
