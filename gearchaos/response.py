@@ -19,8 +19,8 @@ from gearchaos.finishing import ending, output_of
 if TYPE_CHECKING:
     from gearchaos.configuration import Configuration
 
-    Asked = tuple[Configuration, str, list[str]]
-    """What to compute, the configuration as it was written, and what to say of it."""
+    Asked = tuple[Configuration, str, list[str], dict[str, float]]
+    """What to compute, the configuration as it was written, what to say of it, and its place."""
 
 PITCH_ERROR = "pitch_error"
 
@@ -48,7 +48,7 @@ def _arguments(parser: ArgumentParser) -> None:
 def _respond(options: Namespace) -> int:
     from h5py import is_hdf5
 
-    config, text, note = (_lane if is_hdf5(options.config) else _configuration)(options)
+    config, text, note, place = (_lane if is_hdf5(options.config) else _configuration)(options)
     from gearchaos.engine.response import compute_response, prepared
     from gearchaos.engine.running import choose_threads, prepare
     from gearchaos.results.atomic_file import check_output
@@ -59,13 +59,13 @@ def _respond(options: Namespace) -> int:
     check_output(output, options.overwrite)
     simulation.notes += note
     prepare(simulation, history_periods=1)
-    result = compute_response(simulation, options.periods, text)
+    result = compute_response(simulation, options.periods, text, place)
     result.save(output, overwrite=options.overwrite)
     diverged, lanes = int((result["status"] != 0).sum()), len(simulation.lanes)
     text = (
         f"{lanes} lane{'s' if lanes != 1 else ''} over {' by '.join(result.axes)}, "
         f"{options.periods} mesh periods of {simulation.plan.steps_per_period} steps, "
-        f"{diverged} diverged"
+        f"{diverged} diverged{' or too fast' if config.integration.method == 'flow_map' else ''}"
     )
     return ending(simulation, output, diverged, text)
 
@@ -85,7 +85,7 @@ def _lane(options: Namespace) -> "Asked":
         raise ConfigurationError(f"{options.config}: name one lane, with {rest} as well")
     note = f"goes on from the {options.begin} of the lane {lane.where} of {options.config}"
     config = continued(lane, options.config, options.begin)
-    return config, str(lane.metadata["configuration"]), [note]
+    return config, str(lane.metadata["configuration"]), [note], lane.fixed
 
 
 def _configuration(options: Namespace) -> "Asked":
@@ -126,7 +126,7 @@ def _configuration(options: Namespace) -> "Asked":
             "before it, and values by themselves have none; run the sweep, then: gearchaos "
             "response RESULT.h5 --at VALUE"
         )
-    return config, config.text, []
+    return config, config.text, [], {}
 
 
 main = Command(

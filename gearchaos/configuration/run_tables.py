@@ -215,7 +215,11 @@ class Integration(Table):
         "mesh periods discarded before anything is recorded", default=500, ge=0, le=1_000_000_000
     )
     recorded_periods: int = key(
-        "mesh periods observed after the transient", default=500, ge=1, le=1_000_000_000
+        "mesh periods observed after the transient; where teeth have errors of their own, this and "
+        "the transient are raised to whole periods of the excitation, three of them at least",
+        default=500,
+        ge=1,
+        le=1_000_000_000,
     )
 
     @model_validator(mode="before")

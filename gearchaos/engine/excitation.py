@@ -9,6 +9,7 @@ from gearchaos.engine.lanes import Lanes
 from gearchaos.engine.steps import PILOT_LANES
 from gearchaos.errors import ConfigurationError
 from gearchaos.gear.contact_lines import series_table
+from gearchaos.gear.derivation import LENGTH
 from gearchaos.records.period import LONGEST_PERIOD, RETURNS
 
 LONGEST_EXCITATION = 50_000
@@ -38,10 +39,13 @@ def whole_lengths(lanes: Lanes) -> dict[str, int]:
     orders, record = lanes.config.outputs.mesh_orders, lengths["recorded_periods"]
     most = integration.steps_per_period / 2
     if unfit := [str(one) for one in orders if record % one.denominator or one >= most]:
+        raised = (
+            f", raised to whole periods of the excitation, {repeats} each," if repeats > 1 else ""
+        )
         whole = math.lcm(repeats, *(order.denominator for order in orders))
         raise ConfigurationError(
             f"{lanes.config.source}: outputs.orders: {', '.join(unfit)}: must have whole cycles in "
-            f"the record of {record} mesh periods and more than two steps in each; set "
+            f"the record of {record} mesh periods{raised} and more than two steps in each; set "
             f"integration.recorded_periods to a multiple of {whole}, such as "
             f"{whole * math.ceil(record / whole)}, and keep to orders below {most:g}"
         )
@@ -49,9 +53,9 @@ def whole_lengths(lanes: Lanes) -> dict[str, int]:
 
 
 def remarks(lanes: Lanes, lengths: Mapping[str, int]) -> list[str]:
-    """Return what a user should know of teeth and stiffness; ``lengths`` from `whole_lengths`."""
+    """Return what a user should know of the excitation; ``lengths`` from `whole_lengths`."""
     teeth = [_longer(lanes, lengths), _parting_pairs(lanes)] if lanes.repeats_after > 1 else []
-    return [*teeth, _negative_stiffness(lanes)]
+    return [*teeth, _negative_stiffness(lanes), _mistaken_units(lanes)]
 
 
 def _longer(lanes: Lanes, lengths: Mapping[str, int]) -> str:
@@ -84,9 +88,31 @@ def _parting_pairs(lanes: Lanes) -> str:
         return ""
     return (
         f"in {parting:.0%} of the lanes neighbouring tooth pairs differ by up to "
-        f"{apart.max():.2g}, more than the static deflection there; single pairs may then part "
+        f"{apart.max():.2g} b', more than the static deflection there; single pairs may then part "
         "while their neighbours carry, which the model leaves out"
     )
+
+
+def _mistaken_units(lanes: Lanes) -> str:
+    """Tell which lengths do not suit the module, as those in another unit do not."""
+    pair, groups = lanes.config.pair, lanes.parameters
+
+    def largest(*names: str) -> float:
+        return math.prod(
+            float(np.abs(groups[n].value).max()) if n in groups else 0.0 for n in names
+        )
+
+    module = pair and pair.normal_module_mm
+    if pair is None or not module:
+        return ""
+    lengths = {"static deflection": largest("load", LENGTH)}
+    if lanes.repeats_after == 1:
+        lengths["pitch error"] = largest("pitch_error", "pitch_error_amplitude", LENGTH)
+    found = [f"{name} {um:.4g} um" for name, um in lengths.items() if um > 100.0 * module]
+    if (pair.face_width_mm or math.inf) < module:
+        found.append(f"face width {pair.face_width_mm:g} mm")
+    rule = f"unlikely at a normal module of {module:g} mm; are the units those of the keys?"
+    return f"{', '.join(found)}: {rule}" if found else ""
 
 
 def _negative_stiffness(lanes: Lanes) -> str:

@@ -17,6 +17,8 @@ from gearchaos.results.response_variables import MESH_FORCE, TIME, acceleration_
 from gearchaos.results.result import Result
 
 FORCE = f"{MESH_FORCE}tangential"
+SCALES = ("linear", "linear", "log", "linear")
+"""Of the panels of `show`."""
 LOOK = {
     "height": 290,
     "sizing_mode": "stretch_width",
@@ -24,9 +26,14 @@ LOOK = {
 }
 
 
-def panels() -> list[Any]:
-    """Make four empty panels, the third with a logarithmic axis upwards, for `show`."""
-    return [_panel(scale) for scale in ("linear", "linear", "log", "linear")]
+def empty_panel(scale: str) -> Any:
+    """Make a panel for `show`, with a linear or a logarithmic ("log") axis upwards."""
+    panel = figure(y_axis_type=scale, tooltips="$x, $y", **LOOK)
+    panel.toolbar.logo, panel.toolbar.autohide = None, True
+    panel.axis.axis_label_text_font_style = "normal"
+    panel.extra_y_ranges = {"strip": Range1d(0.0, 1.0)}
+    panel.add_layout(Legend(orientation="horizontal", padding=0, border_line_width=0), "above")
+    return panel
 
 
 def show(shown: list[Any], motion: Result, coordinate: str) -> None:
@@ -46,15 +53,6 @@ def show(shown: list[Any], motion: Result, coordinate: str) -> None:
     figures.contact_strip(force, motion, 0, FORCE)
     for panel, axes in zip(shown, drawn, strict=True):
         _show(panel, axes)
-
-
-def _panel(scale: str) -> Any:
-    panel = figure(y_axis_type=scale, tooltips="$x, $y", **LOOK)
-    panel.toolbar.logo, panel.toolbar.autohide = None, True
-    panel.axis.axis_label_text_font_style = "normal"
-    panel.extra_y_ranges = {"strip": Range1d(0.0, 1.0)}
-    panel.add_layout(Legend(orientation="horizontal", padding=0, border_line_width=0), "above")
-    return panel
 
 
 def _show(shown: Any, axes: Axes) -> None:

@@ -12,7 +12,6 @@ from typing import Any
 import holoviews as hv
 import numpy as np
 import panel as pn
-from bokeh.document import Document
 from bokeh.models import CrosshairTool, Span
 
 from gearchaos.engine.recomputing import continued
@@ -20,7 +19,7 @@ from gearchaos.engine.response import compute_response, prepared
 from gearchaos.engine.running import compiling
 from gearchaos.errors import FigureError
 from gearchaos.explorer.charts import diagram, plain_text, two_parameter_map
-from gearchaos.explorer.motion import FORCE, panels, show
+from gearchaos.explorer.motion import FORCE, SCALES, empty_panel, show
 from gearchaos.figures.labels import in_words, unit_of
 from gearchaos.figures.lanes import diagram_lanes, swept_axes
 from gearchaos.figures.page import FORMATS
@@ -60,8 +59,9 @@ class Page:
         self._window = pn.widgets.LiteralInput(value=[], visible=False)
         texts = (pn.pane.HTML("", **WIDE) for _ in range(5))
         self._pointed, self._lane, self._fault, self._kinds, self._commands = texts
-        self._charts, self._panels = pn.Column(**WIDE), panels()
-        self._marks: list[list[Span]] = []
+        self._charts, self._panels = pn.Column(**WIDE), [*map(empty_panel, SCALES)]
+        ways = zip(("height", "width"), self._swept, strict=False)
+        self._marks = [Span(dimension=way, line_color=VERMILION) for way, _ in ways]
         self._steady = True
         self._fixed: Mapping[str, float] = {}
         self._motion: Result | None = None
@@ -158,22 +158,18 @@ class Page:
             self._say(_reason(error))
             return
         line = Span(dimension="height", line_color=GREY)
+        zero = Span(dimension="width", location=0.0, line_color=GREY, line_dash="dashed")
         if ends := self._ends:
             charts[0].opts(ylim=tuple(ends[2:]))
         for chart in charts:
             chart.opts(**({"xlim": tuple(ends[:2])} if ends else {}))
-            chart.opts(tools=[CrosshairTool(overlay=line)], active_tools=["box_zoom"])
+            # Below the diagram there is the chart of exponents.
+            lines = self._marks if chart is charts[0] else [zero, *self._marks]
+            chart.opts(tools=[CrosshairTool(overlay=line)], hooks=[partial(_marked, lines)])
+            chart.opts(active_tools=["box_zoom"])
             hv.streams.PointerXY(source=chart).add_subscriber(self._point)
             hv.streams.Tap(source=chart).add_subscriber(self._click)
         hv.streams.RangeXY(source=charts[0]).add_subscriber(self._zoom)
-        ways = ("height", "width")[: len(self._swept)]
-        look: Any = {"line_color": VERMILION, "line_width": 1.5}
-        self._marks = [[Span(dimension=way, **look) for way in ways] for _ in charts]
-        zero = Span(dimension="width", location=0.0, line_color=GREY, line_dash="dashed")
-        for chart, marks in zip(charts, self._marks, strict=True):
-            # Below the diagram there is the chart of exponents.
-            shown = marks if chart is charts[0] else [zero, *marks]
-            chart.opts(hooks=[partial(_marked, shown)])
         self._charts[:] = [pn.pane.HoloViews(hv.Layout(charts).cols(1), **WIDE)]
         swatch = "<span style='background:{}; border:1px solid; padding:0 .6em'></span> {} &emsp;"
         texts = (swatch.format(colour, escape(name)) for name, colour in kinds.items())
@@ -216,15 +212,15 @@ class Page:
             self._fixed = lane.fixed
             at = {a: self._shown[a][self._result[a] == lane.fixed[a]][0] for a in self._swept}
             with pn.io.unlocked():
-                for marks in self._marks:
-                    for mark, value in zip(marks, at.values(), strict=True):
-                        mark.location = float(value)
+                for mark, value in zip(self._marks, at.values(), strict=True):
+                    mark.location = float(value)
             self._lane.object = self._words(at)
             self._say_commands()
             config = continued(lane, self._path, start)
             with compiling():
-                motion = compute_response(prepared(config, self._periods), self._periods, "")
-            with pn.io.unlocked(), (pn.state.curdoc or Document()).models.freeze():
+                simulation = prepared(config, self._periods)
+                motion = compute_response(simulation, self._periods, "", lane.fixed)
+            with pn.io.unlocked(), pn.state.curdoc.models.freeze():
                 show(self._panels, self._in_units(motion), self._coordinate)
             self._motion = motion
         except Exception as error:

@@ -1,31 +1,18 @@
 """Axis labels from what the result file says about its variables."""
 
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping, Sequence
+from difflib import get_close_matches
 from functools import cache
+from typing import Any
 
 from matplotlib.mathtext import MathTextParser
 
-from gearchaos.configuration.messages import suggestion
-from gearchaos.records.teeth import CONTACT, FORCES, LOADS
+from gearchaos.gear.tooth_deviations import REALISATION
 from gearchaos.results import scales
 from gearchaos.results.result import Result
 from gearchaos.results.scales import excitation_of
-from gearchaos.results.variables import (
-    AMPLITUDE,
-    DIRECTION,
-    LARGEST_EXPONENT,
-    START,
-    coordinate_text,
-)
-
-KEPT_BY = {
-    "loads = true": (*LOADS, *FORCES),
-    "contact = true": (*CONTACT, "contact_state"),
-    "orders = [1, 2]": (AMPLITUDE,),
-    "lyapunov = true": (LARGEST_EXPONENT,),
-}
-"""Keys of [outputs], and how the names begin of what a sweep keeps with them."""
+from gearchaos.results.variables import DIRECTION, KEPT_BY, START, coordinate_text
 
 
 def axis_label(result: Result, name: str, line_length: int = 60) -> str:
@@ -50,7 +37,8 @@ def axis_label(result: Result, name: str, line_length: int = 60) -> str:
 
 def unit_of(result: Result, name: str) -> str:
     """Word the unit of a variable, or what its numbers are multiples of; "" of a pure number."""
-    written = (result.fixed_axes | result.variables)[name].units
+    known: Any = result.parameters | result.fixed_axes | result.variables
+    written = known[name].units
     if written in ("", "1"):
         return scales.unit_of(name).stands_for
     words = plain(re.sub(r"\bum\b", "\N{MICRO SIGN}m", written))
@@ -78,28 +66,28 @@ def in_words(result: Result, place: Mapping[str, float]) -> str:
     """Word a place on the axes of a result, such as ``$P$ = 5.86, start 0``."""
     texts = []
     for axis, value in place.items():
-        known = (result.fixed_axes | result.variables).get(axis)
+        known: Any = (result.parameters | result.fixed_axes | result.variables).get(axis)
         wording = (known and known.long_name) or axis.replace("_", " ")
         name = (known and _formula(known.symbol)) or plain(wording)
         unit = f" {unit_of(result, axis).removeprefix('unit ')}".rstrip() if known else ""
-        words = {START: f"start {value:g}", DIRECTION: coordinate_text(axis, value)}
+        words = {START: f"start {value:g}", REALISATION: f"gear pair {value:g}"}
+        words[DIRECTION] = coordinate_text(axis, value)
         texts.append(words.get(axis, f"{name} = {value:.6g}{unit}"))
     return ", ".join(texts)
 
 
 def in_a_name(place: Mapping[str, float], digits: int = 12) -> str:
     """Word a place for the name of a file: ``_pitch_error_5.86_start_0``."""
-    texts = (f"_{axis}_{coordinate_text(axis, value, digits)}" for axis, value in place.items())
-    return "".join(texts)
+    return "".join(f"_{axis}_{coordinate_text(axis, at, digits)}" for axis, at in place.items())
 
 
-def instead_of(variable: str, there: Iterable[str]) -> str:
+def instead_of(variable: str, there: Sequence[str]) -> str:
     """Say what there is instead of a variable, and which key would keep it or which is meant."""
-    there = list(there)
+    hint = "".join(f"; did you mean {one}?" for one in get_close_matches(variable, there, 1))
     for key, names in KEPT_BY.items():
         if variable.startswith(names) and not any(one.startswith(names) for one in there):
-            return f"it has {', '.join(there)}; set outputs.{key} and compute it again to have it"
-    return "; ".join(filter(None, [f"it has {', '.join(there)}", suggestion(variable, there)]))
+            hint = f"; set outputs.{key} and compute it again to have it"
+    return f"it has {', '.join(there)}{hint}"
 
 
 def short(value: float, digits: int = 4, sign: str = "-") -> str:

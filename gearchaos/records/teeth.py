@@ -36,7 +36,7 @@ LOADS = {
     "load_factor_largest": "largest tangential mesh force over the static one",
     "load_factor_rms": "root mean square of the tangential mesh force over the static one",
     "transmission_error_mean": "mean transmission error",
-    "transmission_error_peak_to_peak": "largest less smallest transmission error",
+    "transmission_error_peak_to_peak": "transmission error, peak to peak",
     "transmission_error_rms": "root mean square of the transmission error about its mean",
 }
 """What else is told, by name."""

@@ -43,6 +43,8 @@ class Result:
         into the first one; those that carry their own ``values`` may be left out.
     parameters, metadata : mapping by name
         Dimensionless groups with their origin; title, formulation, configuration, provenance.
+    fixed_axes : mapping of str to Variable
+        Axes that `sel` has fixed.
 
     Raises
     ------
@@ -58,11 +60,12 @@ class Result:
         data: Mapping[str, Any],
         parameters: Mapping[str, Parameter],
         metadata: Mapping[str, str | int | float],
+        fixed_axes: Mapping[str, Variable] = {},
     ) -> None:
         self.axes = tuple(axes)
         self.parameters = dict(parameters)
         self.metadata = {**metadata, **own_metadata(self.axes)}
-        self.fixed_axes: dict[str, Variable] = {}
+        self.fixed_axes = dict(fixed_axes)
         self._data: dict[str, NDArray[Any]] = {}
         for variable in variables:
             values = data.get(variable.name, variable.values)
@@ -139,8 +142,8 @@ class Result:
         Raises ConfigurationError if there is no such axis.
         """
         if axis not in self.axes:
-            rule = "runs over no axis" if not self.axes else f"has no axis {axis!r}"
-            raise ConfigurationError(f"the result {rule}; leave one that is wanted in sel")
+            there = ", ".join(self.axes) or "none: leave one in sel"
+            raise ConfigurationError(f"no axis {axis!r} in the result; it has {there}")
         grid = np.meshgrid(*(self[name] for name in self.axes), indexing="ij")
         return np.ravel(grid[self.axes.index(axis)])
 
@@ -194,7 +197,7 @@ class Result:
             return tuple(dim for dim in dims if dim not in index)
 
         left = [variable for variable in self.variables.values() if variable.name not in index]
-        found = Result(
+        return Result(
             rest(self.axes),
             [replace(variable, dims=rest(variable.dims)) for variable in left],
             {variable.name: part(self[variable.name], variable.dims) for variable in left},
@@ -203,9 +206,8 @@ class Result:
                 for name, entry in self.parameters.items()
             },
             {**self.metadata, "fixed": fixed},
+            {**self.fixed_axes, **{name: self.variables[name] for name in index}},
         )
-        found.fixed_axes = self.fixed_axes | {name: self.variables[name] for name in index}
-        return found
 
     def physical(self, *names: str) -> Result:
         """Give these variables, by default all, in physical units: um, m/s, N, 1/s.
@@ -221,9 +223,8 @@ class Result:
         }
         variables = {**self.variables, **{name: one for name, (one, _) in changed.items()}}
         data = {**self._data, **{name: values for name, (_, values) in changed.items()}}
-        found = Result(self.axes, [*variables.values()], data, self.parameters, self.metadata)
-        found.fixed_axes = self.fixed_axes
-        return found
+        facts = self.parameters, self.metadata, self.fixed_axes
+        return Result(self.axes, [*variables.values()], data, *facts)
 
     def save(self, path: str | os.PathLike[str], overwrite: bool = False) -> None:
         """Write the result to an HDF5 file, which appears complete or not at all.

@@ -46,6 +46,14 @@ STATUS = "status"
 DIRECTIONS = ("tangential", "axial")
 """Directions in which teeth have a clearance."""
 
+KEPT_BY = {
+    "loads = true": (*LOADS, *FORCES),
+    "contact = true": (*CONTACT, "contact_state"),
+    "orders = [1, 2]": (AMPLITUDE,),
+    "lyapunov = true": (LARGEST_EXPONENT,),
+}
+"""Keys of [outputs], and how the names begin of what a sweep keeps with them."""
+
 STATE_WORDING: dict[str, tuple[str, str]] = {
     "delta_5": ("relative torsional displacement", r"$\delta_5$"),
     "delta_5_rate": ("relative torsional velocity", r"$\delta_5'$"),

@@ -45,7 +45,7 @@ def test_a_slice_is_named_as_its_axis_was():
 
 @pytest.mark.parametrize("draw", [bifurcation, lyapunov])
 def test_a_single_lane_is_no_diagram(draw):
-    with pytest.raises(ConfigurationError, match="the result runs over no axis; leave one"):
+    with pytest.raises(ConfigurationError, match="it has none: leave one in sel"):
         draw(Figure().subplots(), BOTH.sel("nearest", load=0.3, pitch_error=1.0))
 
 

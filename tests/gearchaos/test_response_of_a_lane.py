@@ -8,6 +8,7 @@ from gearchaos_kernels import integrate
 
 from gearchaos import Result, load_config, open_result, run
 from gearchaos.engine.simulation import Simulation
+from gearchaos.figures.labels import in_words, place_of
 from gearchaos.response import main
 
 from .short_sweeps import METHODS, PAN2021, SHORT
@@ -74,6 +75,8 @@ def test_every_axis_of_a_result_names_its_lane(tmp_path, capsys):
     np.testing.assert_array_equal(found["start_state"][0], result["end_state"][1, 1, 1])
     assert found.axes == ("pitch_error",)
     assert found.parameters["load"].value == 0.2
+    assert found.fixed == {"load": 0.2, "start": 1.0}
+    assert in_words(found, place_of(found, 0)) == "$f_n$ = 0.2, start 1, $P$ = 7.5"
     sweep, output = str(tmp_path / "sweep.h5"), str(tmp_path / "none.h5")
     for arguments, message in {
         ("--at", "7"): "--at 7: must be NAME=VALUE, each of the axes load, pitch_error, start once",
