@@ -60,12 +60,10 @@ def describe(simulation: Simulation, output: str, shard: Shard | None, as_json: 
     unused = f" (nothing that is kept needs {unused})" if unused else ""
     pair, groups = {}, lanes.parameters
     if config.pair is not None and {FREQUENCY, LENGTH} <= {*groups}:
-        names = FREQUENCY, LENGTH, "load"
-        frequency, length, load = (float(np.mean(groups[name].value)) for name in names)
-        hertz = frequency / (2.0 * math.pi)
-        rpm = 60.0 * hertz / config.pair.teeth[0]
-        text = f"natural frequency {hertz:.4g} Hz, that of the mesh at {rpm:.0f} rpm"
-        pair = {"pair": f"{text}; static deflection {load * length:.4g} um"}
+        length, load = (np.mean(groups[name].value) for name in (LENGTH, "load"))
+        hertz = np.mean(groups[FREQUENCY].value) / (2.0 * math.pi)
+        text = f"{hertz:.4g} Hz, that of the mesh at {60.0 * hertz / config.pair.teeth[0]:.0f} rpm"
+        pair = {"pair": f"natural frequency {text}; static deflection {load * length:.4g} um"}
     for key, value in {
         "output": f"{output}{' (exists)' if os.path.exists(output) else ''}",
         **pair,

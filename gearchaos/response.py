@@ -10,7 +10,7 @@ more lanes diverged than outputs.allowed_diverged_share, 4 a file cannot be read
 
 import sys
 from argparse import ArgumentParser, Namespace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from gearchaos.command_line import Command, coordinates, number, place
 from gearchaos.errors import ConfigurationError
@@ -19,7 +19,7 @@ from gearchaos.finishing import ending, output_of
 if TYPE_CHECKING:
     from gearchaos.configuration import Configuration
 
-    Asked = tuple[Configuration, str, list[str], dict[str, float]]
+    Asked = tuple[Configuration, str, list[str], Any]
     """What to compute, the configuration as it was written, what to say of it, and its place."""
 
 PITCH_ERROR = "pitch_error"
@@ -48,7 +48,7 @@ def _arguments(parser: ArgumentParser) -> None:
 def _respond(options: Namespace) -> int:
     from h5py import is_hdf5
 
-    config, text, note, place = (_lane if is_hdf5(options.config) else _configuration)(options)
+    config, text, note, fixed = (_lane if is_hdf5(options.config) else _configuration)(options)
     from gearchaos.engine.response import compute_response, prepared
     from gearchaos.engine.running import choose_threads, prepare
     from gearchaos.results.atomic_file import check_output
@@ -59,7 +59,7 @@ def _respond(options: Namespace) -> int:
     check_output(output, options.overwrite)
     simulation.notes += note
     prepare(simulation, history_periods=1)
-    result = compute_response(simulation, options.periods, text, place)
+    result = compute_response(simulation, options.periods, text, fixed)
     result.save(output, overwrite=options.overwrite)
     diverged, lanes = int((result["status"] != 0).sum()), len(simulation.lanes)
     text = (
@@ -85,7 +85,7 @@ def _lane(options: Namespace) -> "Asked":
         raise ConfigurationError(f"{options.config}: name one lane, with {rest} as well")
     note = f"goes on from the {options.begin} of the lane {lane.where} of {options.config}"
     config = continued(lane, options.config, options.begin)
-    return config, str(lane.metadata["configuration"]), [note], lane.fixed
+    return config, str(lane.metadata["configuration"]), [note], lane.metadata["fixed"]
 
 
 def _configuration(options: Namespace) -> "Asked":
@@ -126,7 +126,7 @@ def _configuration(options: Namespace) -> "Asked":
             "before it, and values by themselves have none; run the sweep, then: gearchaos "
             "response RESULT.h5 --at VALUE"
         )
-    return config, config.text, [], {}
+    return config, config.text, [], ""
 
 
 main = Command(

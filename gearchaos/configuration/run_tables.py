@@ -215,8 +215,8 @@ class Integration(Table):
         "mesh periods discarded before anything is recorded", default=500, ge=0, le=1_000_000_000
     )
     recorded_periods: int = key(
-        "mesh periods observed after the transient; where teeth have errors of their own, this and "
-        "the transient are raised to whole periods of the excitation, three of them at least",
+        "mesh periods observed after the transient; raised, as that is, to whole periods of the "
+        "excitation where teeth have errors of their own",
         default=500,
         ge=1,
         le=1_000_000_000,

@@ -95,24 +95,18 @@ def _parting_pairs(lanes: Lanes) -> str:
 
 def _mistaken_units(lanes: Lanes) -> str:
     """Tell which lengths do not suit the module, as those in another unit do not."""
-    pair, groups = lanes.config.pair, lanes.parameters
-
-    def largest(*names: str) -> float:
-        return math.prod(
-            float(np.abs(groups[n].value).max()) if n in groups else 0.0 for n in names
-        )
-
-    module = pair and pair.normal_module_mm
-    if pair is None or not module:
+    pair, groups, found = lanes.config.pair, lanes.parameters, []
+    if pair is None or not pair.normal_module_mm:
         return ""
-    lengths = {"static deflection": largest("load", LENGTH)}
-    if lanes.repeats_after == 1:
-        lengths["pitch error"] = largest("pitch_error", "pitch_error_amplitude", LENGTH)
-    found = [f"{name} {um:.4g} um" for name, um in lengths.items() if um > 100.0 * module]
-    if (pair.face_width_mm or math.inf) < module:
+    error = () if lanes.repeats_after > 1 else ("pitch_error", "pitch_error_amplitude", LENGTH)
+    for what, names in {"static deflection": ("load", LENGTH), "pitch error": error}.items():
+        if names and {*names} <= {*groups}:
+            um = math.prod(float(np.abs(groups[name].value).max()) for name in names)
+            found += [f"{what} {um:.4g} um"] if um > 100.0 * pair.normal_module_mm else []
+    if (pair.face_width_mm or math.inf) < pair.normal_module_mm:
         found.append(f"face width {pair.face_width_mm:g} mm")
-    rule = f"unlikely at a normal module of {module:g} mm; are the units those of the keys?"
-    return f"{', '.join(found)}: {rule}" if found else ""
+    rule = f"unlikely at a normal module of {pair.normal_module_mm:g} mm; are the units those of"
+    return f"{', '.join(found)}: {rule} the keys?" if found else ""
 
 
 def _negative_stiffness(lanes: Lanes) -> str:

@@ -1,7 +1,6 @@
 """The time response: the motion at every step, after the transient."""
 
 import time
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -75,13 +74,11 @@ def prepared(config: Configuration, periods: int) -> Simulation:
     return Simulation(whole.replace("outputs.section_points", recorded))
 
 
-def compute_response(
-    simulation: Simulation, periods: int, text: str, place: Mapping[str, float] = {}
-) -> Result:
+def compute_response(simulation: Simulation, periods: int, text: str, fixed: str = "") -> Result:
     """Compute all lanes of a simulation from `prepared`; keep the last so many mesh periods.
 
-    ``text``: the configuration as it was written; ``place``: where on the axes of a result the lane
-    lies that goes on. Raises ConfigurationError if the motion does not fit into memory.
+    ``text``: the configuration as it was written; ``fixed``: as in the metadata of the lane that
+    goes on. Raises ConfigurationError if the motion does not fit into memory.
     """
     _check_size(simulation, periods)
     began = time.monotonic()
@@ -100,14 +97,12 @@ def compute_response(
         periods=periods,
         steps_per_period=plan.steps_per_period,
     )
-    axes = [axis.name for axis in simulation.lanes.axes]
-    fixed = " ".join(f"{axis}={at!r}" for axis, at in place.items() if axis not in axes)
     facts = {
         **metadata(simulation, time.monotonic() - began),
         "kind": "response",
         "response_periods": periods,
         "configuration": text,
-        **({"fixed": fixed} if fixed else {}),
+        "fixed": fixed,
     }
     return result_of(simulation, [arrays], facts, variables)
 

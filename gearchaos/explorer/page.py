@@ -218,8 +218,8 @@ class Page:
             self._say_commands()
             config = continued(lane, self._path, start)
             with compiling():
-                simulation = prepared(config, self._periods)
-                motion = compute_response(simulation, self._periods, "", lane.fixed)
+                told = prepared(config, self._periods), self._periods, ""
+                motion = compute_response(*told, str(lane.metadata["fixed"]))
             with pn.io.unlocked(), pn.state.curdoc.models.freeze():
                 show(self._panels, self._in_units(motion), self._coordinate)
             self._motion = motion

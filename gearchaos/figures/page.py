@@ -40,16 +40,6 @@ FORMULAE = MathTextParser("path")
 """Keeps what it has read of formulae: the next page has most of them again."""
 
 
-class Canvas(FigureCanvasAgg):
-    """What pages are measured and drawn with."""
-
-    def get_renderer(self) -> Any:
-        """Return what draws, and reads formulae for all pages."""
-        renderer = super().get_renderer()  # type: ignore[no-untyped-call]
-        renderer.mathtext_parser = FORMULAE
-        return renderer
-
-
 class Page(Figure):
     """A matplotlib figure that a notebook shows by itself, without pyplot."""
 
@@ -67,7 +57,8 @@ def page(width_mm: float, height_mm: float) -> Iterator[Page]:
         size = (width_mm / MM_PER_INCH, height_mm / MM_PER_INCH)
         layout = ConstrainedLayoutEngine()
         figure = Page(figsize=size, layout=layout)
-        Canvas(figure)
+        canvas: Any = FigureCanvasAgg(figure)
+        canvas.get_renderer().mathtext_parser = FORMULAE
         yield figure
         for axes in figure.axes:
             light(axes)

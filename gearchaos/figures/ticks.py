@@ -10,9 +10,6 @@ from matplotlib.ticker import NullFormatter, ScalarFormatter
 
 def light(axes: Axes) -> None:
     """Let what is slow of the ticks of finished axes be drawn by what follows in this module."""
-    for spine in axes.spines.values():
-        # With ticks that point inwards, no wider than the panel.
-        spine.set_in_layout(False)
     for axis in (axes.xaxis, axes.yaxis):
         if type(axis.get_major_formatter()) is ScalarFormatter:
             axis.set_major_formatter(PlainNumbers())
@@ -54,8 +51,7 @@ class FineTicks(Artist):
         lines = tick.tick1line, tick.tick2line
         self._ends = [(line, end) for end, line in enumerate(lines) if line.get_visible()]
         parts: Any = ("left", "right", "bottom", "top")
-        off = {f"{label}{part}": False for part in parts for label in ("", "label")}
-        axis.set_tick_params(which="minor", **off)
+        axis.set_tick_params(which="minor", **{n: False for p in parts for n in (p, f"label{p}")})
         for line, _ in self._ends:
             line.set_visible(True)
 

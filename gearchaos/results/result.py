@@ -25,6 +25,7 @@ from gearchaos.results.variables import Variable, coordinate_text, diagram_axis
 
 __all__ = ["Parameter", "Result", "open_result", "section_variables"]
 
+Method = Literal["nearest", "within"] | None
 DEFAULT_VARIABLE = "section_delta_5"
 
 
@@ -97,8 +98,9 @@ class Result:
 
     @property
     def fixed(self) -> dict[str, float]:
-        """Coordinates of the axes that `sel` has fixed."""
-        return fixed_coordinates(self.metadata)
+        """Coordinates of the axes that `sel` has fixed, or of the lane from which this goes on."""
+        found = fixed_coordinates(self.metadata)
+        return {axis: value for axis, value in found.items() if axis not in self.axes}
 
     @property
     def where(self) -> str:
@@ -147,9 +149,7 @@ class Result:
         grid = np.meshgrid(*(self[name] for name in self.axes), indexing="ij")
         return np.ravel(grid[self.axes.index(axis)])
 
-    def sel(
-        self, method: Literal["nearest", "within"] | None = None, **coordinates: float | str
-    ) -> Result:
+    def sel(self, method: Method = None, **coordinates: float | str) -> Result:
         """Fix axes at one of their values each; what is left runs over the other axes.
 
         Coordinates are by the name of their axis, and directions by their own, such as
