@@ -56,6 +56,7 @@ _STYLE: dict[Any, Any] = {
     "axes.titlesize": FONT_PT,
     "axes.titleweight": "bold",
     "axes.titlepad": 3.0,
+    "axes.titley": 1.0,
     "axes.labelpad": 2.5,
     "axes.linewidth": 0.6,
     "axes.formatter.use_mathtext": True,

@@ -3,23 +3,25 @@
 from typing import Any
 
 from matplotlib.artist import Artist
-from matplotlib.axes import Axes
 from matplotlib.axis import Axis, XAxis
 from matplotlib.ticker import NullFormatter, ScalarFormatter
 
+from gearchaos.figures.style import FONT_PT
 
-def light(axes: Axes) -> None:
+
+def light(axes: Any) -> None:
     """Let what is slow of the ticks of finished axes be drawn by what follows in this module."""
     for axis in (axes.xaxis, axes.yaxis):
         if type(axis.get_major_formatter()) is ScalarFormatter:
             axis.set_major_formatter(PlainNumbers())
         if isinstance(axis.get_minor_formatter(), NullFormatter):
             axes.add_artist(FineTicks(axis))
+    # A power of ten stands where titles do, which look for none: that takes long.
     formatter = axes.yaxis.get_major_formatter()
     formatter.format_ticks(axes.yaxis.get_majorticklocs().tolist())
-    if not formatter.get_offset():
-        # Nothing is above the panel that its titles would have to be moved for.
-        axes.set_title(axes.get_title(), y=1.0)
+    if formatter.get_offset():
+        pad = 72.0 * axes.titleOffsetTrans.get_matrix()[1, 2] / axes.figure.dpi
+        axes.set_title(axes.get_title(), pad=pad + 1.25 * FONT_PT)
 
 
 class PlainNumbers(ScalarFormatter):

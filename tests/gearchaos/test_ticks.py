@@ -44,4 +44,13 @@ def test_numbers_at_ticks_are_text_and_letters_stand_above_their_power_of_ten(sc
     (title,) = [text for text in axes.get_children() if getattr(text, "_text", "") == "(a)"]
     boxes = [text.get_window_extent() for text in (title, offset)]
     assert not power or boxes[0].y0 >= boxes[1].y1 - 1.0
-    assert (title.get_position()[1] == 1.0) == (not power)
+
+
+def test_titles_keep_the_distance_that_they_were_given():
+    with page(85.0, 60.0) as figure:
+        axes = figure.subplots()
+        axes.set_title("far", loc="left", pad=20.0)
+    figure.canvas.draw()
+    (title,) = [text for text in axes.get_children() if getattr(text, "_text", "") == "far"]
+    above = title.get_window_extent().y0 - axes.bbox.y1
+    assert above == pytest.approx(20.0 / 72.0 * figure.dpi, abs=12.0)
