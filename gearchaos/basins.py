@@ -46,7 +46,7 @@ def _basins(options: argparse.Namespace) -> int:
     whole = open_result(options.result)
     if options.output:
         check_figures([options.output], [options.result], options.overwrite)
-    part = whole.sel("nearest", **coordinates(options.at, whole.axes, whole.axis))
+    part = whole.sel("within", **coordinates(options.at, whole.axes, whole.axis))
     kept = {START} | ({part.axis} - {*REPEATS})
     part = part.sel(**{axis: part[axis][0] for axis in part.axes if axis not in kept})
     with compiling():

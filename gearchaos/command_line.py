@@ -175,11 +175,14 @@ def whole_number(text: str, low: float, high: float = math.inf) -> int:
 
 
 def place(text: str) -> tuple[str, float]:
-    """Read NAME=VALUE off the command line, or a VALUE, which has an empty name."""
+    """Read NAME=VALUE off the command line, or a VALUE, which has an empty name.
+
+    A way, such as "upwards", needs none.
+    """
     from gearchaos.results.variables import DIRECTION, WAYS
 
     name, _, value = text.rpartition("=")
-    if name.strip() == DIRECTION and value in WAYS:
+    if name.strip() in ("", DIRECTION) and value in WAYS:
         return DIRECTION, float(WAYS.index(value))
     return name.strip(), number(value)
 

@@ -17,6 +17,7 @@ from tqdm import tqdm
 from gearchaos.configuration import Configuration, swept_values
 from gearchaos.engine.simulation import Simulation
 from gearchaos.engine.store_filling import Shard
+from gearchaos.gear.derivation import FREQUENCY, LENGTH
 from gearchaos.progress import notice
 from gearchaos.results.block_store import PIECE_BYTES, lanes_and_record
 from gearchaos.results.result_file import CACHE_BYTES
@@ -57,8 +58,15 @@ def describe(simulation: Simulation, output: str, shard: Shard | None, as_json: 
         spans.append("in both directions")
     unused = ", ".join(name for name in config.scene.effects if name not in lanes.effects)
     unused = f" (nothing that is kept needs {unused})" if unused else ""
+    pair, groups = {}, lanes.parameters
+    if config.pair is not None and {FREQUENCY, LENGTH} <= {*groups}:
+        length, load = (np.mean(groups[name].value) for name in (LENGTH, "load"))
+        hertz = np.mean(groups[FREQUENCY].value) / (2.0 * math.pi)
+        text = f"{hertz:.4g} Hz, that of the mesh at {60.0 * hertz / config.pair.teeth[0]:.0f} rpm"
+        pair = {"pair": f"natural frequency {text}; static deflection {load * length:.4g} um"}
     for key, value in {
         "output": f"{output}{' (exists)' if os.path.exists(output) else ''}",
+        **pair,
         "effects": ", ".join(config.scene.effects) or "none",
         "states": f"{len(lanes.states)}{unused}",
         "lanes": f"{own}{'' if shard is None else f' of {every}'} ({', '.join(spans)})",

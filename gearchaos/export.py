@@ -1,7 +1,8 @@
 """Write a result as a table, .csv or .parquet, or as arrays for MATLAB and Octave, .mat.
 
 A table has a row per lane, and a column for each number of a lane; with --along section_point a row
-per section point. Needs pip install gearchaos[export].
+per section point. CSV has units in brackets behind the headings, Parquet in the attributes that
+pandas reads. Needs pip install gearchaos[export].
 """
 
 import os
@@ -19,6 +20,8 @@ def _arguments(parser: ArgumentParser) -> None:
     add("result", metavar="RESULT.h5", help="result file of a sweep or a response")
     add("output", metavar="PATH", help="file to write, ending in .csv, .parquet or .mat")
     text = "rows also run along this dimension, such as section_point, state or time"
+    text = "dimensionless (default), or physical: um, m/s, N and 1/s instead of their scales"
+    add("--units", choices=("dimensionless", "physical"), help=text)
     add("--along", action="append", default=[], metavar="NAME", help=text)
 
 
@@ -33,6 +36,7 @@ def _export(options: Namespace) -> int:
     if not options.output.lower().endswith(ENDINGS):
         raise ConfigurationError(f"{options.output}: must end in {', '.join(ENDINGS)}")
     result = open_result(options.result)
+    result = result.physical() if options.units == "physical" else result
     if os.path.exists(options.output) and os.path.samefile(options.output, options.result):
         raise FileError(f"{options.output}: is the result file itself; choose another name")
     check_output(options.output, options.overwrite)
@@ -44,7 +48,10 @@ def _export(options: Namespace) -> int:
             arrays |= {**words, "metadata": result.metadata}
             needed("scipy.io").savemat(partial, arrays, appendmat=False)
         elif kind == "csv":
-            result.to_dataframe(*options.along).to_csv(partial)
+            frame = result.to_dataframe(*options.along)
+            pure, units = ("", "1"), frame.attrs["units"]
+            headings = {n: f"{n} [{units[n]}]" for n in units if units[n] not in pure}
+            frame.rename(columns=headings).rename_axis(index=headings).to_csv(partial)
         else:
             needed("pyarrow")
             result.to_dataframe(*options.along).to_parquet(partial, engine="pyarrow")

@@ -74,7 +74,7 @@ def _sweep_sheets(results: "Sequence[Result]", options: argparse.Namespace) -> "
     from gearchaos.results.result import DEFAULT_VARIABLE
 
     # A detail does not take the place of the whole.
-    name = in_a_name(results[0].fixed)
+    name = in_a_name(results[0].fixed, digits=6)
     if options.variable not in (None, DEFAULT_VARIABLE):
         name += f"_{options.variable}"
     for word, end in (("from", options.low), ("to", options.high)):
@@ -93,11 +93,14 @@ def _sweep_sheets(results: "Sequence[Result]", options: argparse.Namespace) -> "
         return [(f"{name}_shares", partial(shares_page, results[0], *drawn))]
     size = {"width_mm": options.width or SINGLE_COLUMN_MM, "height_mm": options.height}
     shown: dict[str, Any] = {"between": (options.low, options.high)}
-    if any(len(swept_axes(one)) > 1 for one in results):
+    maps = [number for number, one in enumerate(results) if len(swept_axes(one)) > 1]
+    if maps:
         if len(results) > 1 or options.stages:
+            one = results[maps[0]]
+            axis, other = swept_axes(one)
             raise FigureError(
-                f"{options.result[0]}: runs over {' and '.join(swept)}: a map is drawn alone and "
-                f"without --stages; --at {swept[0]}={results[0][swept[0]][0]:g} draws a diagram"
+                f"{options.result[maps[0]]}: runs over {axis} and {other}: a map is drawn alone "
+                f"and without --stages; --at {axis}={one[axis][0]:g} draws a diagram"
             )
         draw = partial(map_page, results[0], options.variable, marked=marked, **shown, **size)
         return [(name, draw)]
@@ -148,7 +151,7 @@ def _opened(path: Path, at: Sequence[tuple[str, float]]) -> "Result":
                 f"--at {' and '.join(fixed)}: nothing is left to draw against; choose values of "
                 f"{result.axis} with --from and --to"
             )
-        result = result.sel(method="nearest", **fixed)
+        result = result.sel(method="within", **fixed)
         if len(left) > 1:
             break
     return result

@@ -8,7 +8,7 @@ it.
 """
 
 from argparse import ArgumentParser, Namespace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from gearchaos.command_line import Command, coordinates, number, place
 from gearchaos.errors import ConfigurationError
@@ -17,8 +17,8 @@ from gearchaos.finishing import ending, output_of
 if TYPE_CHECKING:
     from gearchaos.configuration import Configuration
 
-    Asked = tuple[Configuration, str, list[str]]
-    """What to compute, the configuration as it was written, and what to say of it."""
+    Asked = tuple[Configuration, str, list[str], Any]
+    """What to compute, the configuration as it was written, what to say of it, and its place."""
 
 PITCH_ERROR = "pitch_error"
 
@@ -46,7 +46,7 @@ def _arguments(parser: ArgumentParser) -> None:
 def _respond(options: Namespace) -> int:
     from h5py import is_hdf5
 
-    config, text, note = (_lane if is_hdf5(options.config) else _configuration)(options)
+    config, text, note, fixed = (_lane if is_hdf5(options.config) else _configuration)(options)
     from gearchaos.engine.response import compute_response, prepared
     from gearchaos.engine.running import choose_threads, prepare
     from gearchaos.results.atomic_file import check_output
@@ -57,13 +57,13 @@ def _respond(options: Namespace) -> int:
     check_output(output, options.overwrite)
     simulation.notes += note
     prepare(simulation, history_periods=1)
-    result = compute_response(simulation, options.periods, text)
+    result = compute_response(simulation, options.periods, text, fixed)
     result.save(output, overwrite=options.overwrite)
     diverged, lanes = int((result["status"] != 0).sum()), len(simulation.lanes)
     text = (
         f"{lanes} lane{'s' if lanes != 1 else ''} over {' by '.join(result.axes)}, "
         f"{options.periods} mesh periods of {simulation.plan.steps_per_period} steps, "
-        f"{diverged} diverged"
+        f"{diverged} diverged{' or too fast' if config.integration.method == 'flow_map' else ''}"
     )
     return ending(simulation, output, diverged, text)
 
@@ -77,13 +77,13 @@ def _lane(options: Namespace) -> "Asked":
         rule = "is a result, and goes on with its own configuration; name a lane with --at"
         raise ConfigurationError(f"{options.config}: {rule}, without --set or --pitch-error")
     result = open_result(options.config)
-    lane = result.sel("nearest", **coordinates(options.at, result.axes))
+    lane = result.sel("within", **coordinates(options.at, result.axes))
     if lane.axes:
         rest = " and ".join(f"--at {axis}=VALUE" for axis in lane.axes)
         raise ConfigurationError(f"{options.config}: name one lane, with {rest} as well")
     note = f"goes on from the {options.begin} of the lane {lane.where} of {options.config}"
     config = continued(lane, options.config, options.begin)
-    return config, str(lane.metadata["configuration"]), [note]
+    return config, str(lane.metadata["configuration"]), [note], lane.metadata["fixed"]
 
 
 def _configuration(options: Namespace) -> "Asked":
@@ -124,7 +124,7 @@ def _configuration(options: Namespace) -> "Asked":
             "before it, and values by themselves have none; run the sweep, then: gearchaos "
             "response RESULT.h5 --at VALUE"
         )
-    return config, config.text, []
+    return config, config.text, [], ""
 
 
 main = Command(

@@ -171,7 +171,8 @@ class Integration(Table):
     transient_periods: int = key(default=500, ge=0, le=1_000_000_000)
     """mesh periods discarded before anything is recorded"""
     recorded_periods: int = key(default=500, ge=1, le=1_000_000_000)
-    """mesh periods observed after the transient"""
+    """mesh periods observed after the transient; raised, as that is, to whole periods of the
+    excitation where teeth have errors of their own"""
 
     @model_validator(mode="before")
     @classmethod

@@ -9,6 +9,7 @@ from gearchaos.engine.lanes import Lanes
 from gearchaos.engine.steps import PILOT_LANES
 from gearchaos.errors import ConfigurationError
 from gearchaos.gear.contact_lines import series_table
+from gearchaos.gear.derivation import LENGTH
 from gearchaos.records.period import LONGEST_PERIOD, RETURNS
 
 LONGEST_EXCITATION = 50_000
@@ -37,10 +38,13 @@ def whole_lengths(lanes: Lanes) -> dict[str, int]:
     orders, record = lanes.config.outputs.mesh_orders, lengths["recorded_periods"]
     most = integration.steps_per_period / 2
     if unfit := [str(one) for one in orders if record % one.denominator or one >= most]:
+        raised = (
+            f", raised to whole periods of the excitation, {repeats} each," if repeats > 1 else ""
+        )
         whole = math.lcm(repeats, *(order.denominator for order in orders))
         raise ConfigurationError(
             f"{lanes.config.source}: outputs.orders: {', '.join(unfit)}: must have whole cycles in "
-            f"the record of {record} mesh periods and more than two steps in each; set "
+            f"the record of {record} mesh periods{raised} and more than two steps in each; set "
             f"integration.recorded_periods to a multiple of {whole}, such as "
             f"{whole * math.ceil(record / whole)}, and keep to orders below {most:g}"
         )
@@ -48,9 +52,9 @@ def whole_lengths(lanes: Lanes) -> dict[str, int]:
 
 
 def remarks(lanes: Lanes, lengths: Mapping[str, int]) -> list[str]:
-    """Return what a user should know of teeth and stiffness; ``lengths`` from `whole_lengths`."""
+    """Return what a user should know of the excitation; ``lengths`` from `whole_lengths`."""
     teeth = [_longer(lanes, lengths), _parting_pairs(lanes)] if lanes.repeats_after > 1 else []
-    return [*teeth, _negative_stiffness(lanes)]
+    return [*teeth, _negative_stiffness(lanes), _mistaken_units(lanes)]
 
 
 def _longer(lanes: Lanes, lengths: Mapping[str, int]) -> str:
@@ -83,9 +87,25 @@ def _parting_pairs(lanes: Lanes) -> str:
         return ""
     return (
         f"in {parting:.0%} of the lanes neighbouring tooth pairs differ by up to "
-        f"{apart.max():.2g}, more than the static deflection there; single pairs may then part "
+        f"{apart.max():.2g} b', more than the static deflection there; single pairs may then part "
         "while their neighbours carry, which the model leaves out"
     )
+
+
+def _mistaken_units(lanes: Lanes) -> str:
+    """Tell which lengths do not suit the module, as those in another unit do not."""
+    pair, groups, found = lanes.config.pair, lanes.parameters, []
+    if pair is None or not pair.normal_module_mm:
+        return ""
+    error = () if lanes.repeats_after > 1 else ("pitch_error", "pitch_error_amplitude", LENGTH)
+    for what, names in {"static deflection": ("load", LENGTH), "pitch error": error}.items():
+        if names and {*names} <= {*groups}:
+            um = math.prod(float(np.abs(groups[name].value).max()) for name in names)
+            found += [f"{what} {um:.4g} um"] if um > 100.0 * pair.normal_module_mm else []
+    if (pair.face_width_mm or math.inf) < pair.normal_module_mm:
+        found.append(f"face width {pair.face_width_mm:g} mm")
+    rule = f"unlikely at a normal module of {pair.normal_module_mm:g} mm; are the units those of"
+    return f"{', '.join(found)}: {rule} the keys?" if found else ""
 
 
 def _negative_stiffness(lanes: Lanes) -> str:

@@ -91,8 +91,10 @@ def continued(lane: Result, name: str, begin: str = "end") -> Configuration:
     """
     config, ended = computable(lane, name), lane[f"{begin}_state"].tolist()
     if not np.isfinite(ended).all():
+        fast = lane["status"] == Status.TOO_FAST
+        fault = "was too fast for its flow maps" if fast else "diverged"
         raise ConfigurationError(
-            f"{name}: {lane.where}: this lane diverged, choose another with --at"
+            f"{name}: {lane.where}: this lane {fault}, choose another with --at"
         )
     state = dict(zip(lane.variables["state"].flags, ended, strict=True))
     for key, value in {

@@ -57,11 +57,11 @@ def prepared(config: Configuration, periods: int) -> Simulation:
     return Simulation(whole.replace("outputs.section_points", recorded))
 
 
-def compute_response(simulation: Simulation, periods: int, text: str) -> Result:
+def compute_response(simulation: Simulation, periods: int, text: str, fixed: str = "") -> Result:
     """Compute all lanes of a simulation from `prepared`; keep the last so many mesh periods.
 
-    ``text``: the configuration as it was written. Raises ConfigurationError if the motion does not
-    fit into memory.
+    ``text``: the configuration as it was written; ``fixed``: as in the metadata of the lane that
+    goes on. Raises ConfigurationError if the motion does not fit into memory.
     """
     _check_size(simulation, periods)
     began = time.monotonic()
@@ -85,6 +85,7 @@ def compute_response(simulation: Simulation, periods: int, text: str) -> Result:
         "kind": "response",
         "response_periods": periods,
         "configuration": text,
+        "fixed": fixed,
     }
     return result_of(simulation, [arrays], facts, variables)
 

@@ -40,10 +40,8 @@ def diagram(result: Result, variable: str) -> Charts:
     for name in drawn:
         rows = result.lanes(name)[lanes.numbers].reshape(lanes.numbers.size, -1)
         rows = np.where(lanes.diverged[:, np.newaxis], np.nan, rows)
-        there, dimensions = (
-            rows[np.isfinite(rows).any(axis=1)],
-            _dimensions(result, result.axis, name),
-        )
+        there = rows[np.isfinite(rows).any(axis=1)]
+        dimensions = _dimensions(result, result.axis, name)
         points = np.repeat(lanes.parameter, rows.shape[1]), rows.ravel()
         if charts:
             drawn_line = rasterize(hv.Curve(points, *dimensions), aggregator="any")

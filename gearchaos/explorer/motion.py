@@ -3,7 +3,7 @@
 from typing import Any
 
 import numpy as np
-from bokeh.models import Range1d
+from bokeh.models import Legend, LegendItem, Range1d
 from bokeh.plotting import figure
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
@@ -17,6 +17,8 @@ from gearchaos.results.response_variables import MESH_FORCE, TIME, acceleration_
 from gearchaos.results.result import Result
 
 FORCE = f"{MESH_FORCE}tangential"
+SCALES = ("linear", "linear", "log", "linear")
+"""Of the panels of `show`."""
 LOOK = {
     "height": 290,
     "sizing_mode": "stretch_width",
@@ -24,7 +26,17 @@ LOOK = {
 }
 
 
-def panels(motion: Result, coordinate: str) -> list[Any]:
+def empty_panel(scale: str) -> Any:
+    """Make a panel for `show`, with a linear or a logarithmic ("log") axis upwards."""
+    panel = figure(y_axis_type=scale, tooltips="$x, $y", **LOOK)
+    panel.toolbar.logo, panel.toolbar.autohide = None, True
+    panel.axis.axis_label_text_font_style = "normal"
+    panel.extra_y_ranges = {"strip": Range1d(0.0, 1.0)}
+    panel.add_layout(Legend(orientation="horizontal", padding=0, border_line_width=0), "above")
+    return panel
+
+
+def show(shown: list[Any], motion: Result, coordinate: str) -> None:
     """Show the lane of a response: time history, phase portrait with section, spectrum, mesh force.
 
     Raises FigureError if it diverged.
@@ -39,17 +51,15 @@ def panels(motion: Result, coordinate: str) -> list[Any]:
     figures.amplitude_spectrum(spectrum, motion, 0, acceleration_of(coordinate), **look)
     figures.time_history(force, motion, 0, FORCE, **late)
     figures.contact_strip(force, motion, 0, FORCE)
-    return [_panel(axes) for axes in drawn]
+    for panel, axes in zip(shown, drawn, strict=True):
+        _show(panel, axes)
 
 
-def _panel(axes: Axes) -> Any:
-    """Show what was drawn into axes of matplotlib."""
-    labels = {"x_axis_label": axes.get_xlabel(), "y_axis_label": axes.get_ylabel()}
-    words = {name: plain_text(label) for name, label in labels.items()}
-    shown = figure(y_axis_type=axes.get_yscale(), tooltips="$x, $y", **LOOK, **words)
-    shown.toolbar.logo, shown.toolbar.autohide = None, True
-    shown.axis.axis_label_text_font_style = "normal"
-    shown.extra_y_ranges = {"strip": Range1d(0.0, 1.0)}
+def _show(shown: Any, axes: Axes) -> None:
+    """Show what was drawn into axes of matplotlib, in the place of what the panel showed."""
+    shown.xaxis.axis_label = plain_text(axes.get_xlabel())
+    shown.yaxis.axis_label = plain_text(axes.get_ylabel())
+    shown.renderers, items = [], []
     one: Any
     for one in axes.lines:
         draw = shown.scatter if one.get_linestyle() == "None" else shown.line
@@ -62,9 +72,6 @@ def _panel(axes: Axes) -> Any:
         if isinstance(one, LineCollection):
             shown.segment(left, bottom, right, top, color=color)
         else:
-            place = {"y_range_name": "strip", "legend_label": str(one.get_label())}
-            shown.quad(left, right, top, bottom, color=color, **place)
-    for legend in shown.legend:
-        legend.orientation, legend.padding, legend.border_line_width = "horizontal", 0, 0
-        shown.add_layout(legend, "above")
-    return shown
+            strip = shown.quad(left, right, top, bottom, color=color, y_range_name="strip")
+            items.append(LegendItem(label=str(one.get_label()), renderers=[strip]))
+    shown.above[0].items = items

@@ -19,7 +19,7 @@ from gearchaos.engine.response import compute_response, prepared
 from gearchaos.engine.running import compiling
 from gearchaos.errors import FigureError
 from gearchaos.explorer.charts import diagram, plain_text, two_parameter_map
-from gearchaos.explorer.motion import FORCE, panels
+from gearchaos.explorer.motion import FORCE, SCALES, empty_panel, show
 from gearchaos.figures.labels import in_words, unit_of
 from gearchaos.figures.lanes import diagram_lanes, swept_axes
 from gearchaos.figures.page import FORMATS
@@ -58,8 +58,10 @@ class Page:
         self._window = pn.widgets.LiteralInput(value=[], visible=False)
         texts = (pn.pane.HTML("", **WIDE) for _ in range(5))
         self._pointed, self._lane, self._fault, self._kinds, self._commands = texts
-        self._charts, self._panels = pn.Column(**WIDE), pn.GridBox(ncols=2, **WIDE)
-        self._place, self._steady = hv.streams.Pipe(data=()), True
+        self._charts, self._panels = pn.Column(**WIDE), [*map(empty_panel, SCALES)]
+        ways = zip(("height", "width"), self._swept, strict=False)
+        self._marks = [Span(dimension=way, line_color=VERMILION) for way, _ in ways]
+        self._steady = True
         self._fixed: Mapping[str, float] = {}
         self._motion: Result | None = None
         self._refused: dict[str, str] = {}
@@ -93,7 +95,7 @@ class Page:
             self._fault,
             pn.FlexBox(
                 pn.Column(self._pointed, self._charts, self._kinds, styles=HALF),
-                pn.Column(self._lane, self._panels, styles=HALF),
+                pn.Column(self._lane, pn.GridBox(*self._panels, ncols=2, **WIDE), styles=HALF),
                 **WIDE,
             ),
             pn.FlexBox(*saves),
@@ -155,27 +157,23 @@ class Page:
             self._say(_reason(error))
             return
         line = Span(dimension="height", line_color=GREY)
+        zero = Span(dimension="width", location=0.0, line_color=GREY, line_dash="dashed")
         if ends := self._ends:
             charts[0].opts(ylim=tuple(ends[2:]))
         for chart in charts:
             chart.opts(**({"xlim": tuple(ends[:2])} if ends else {}))
-            chart.opts(tools=[CrosshairTool(overlay=line)])
+            # Below the diagram there is the chart of exponents.
+            lines = self._marks if chart is charts[0] else [zero, *self._marks]
+            chart.opts(tools=[CrosshairTool(overlay=line)], hooks=[partial(_marked, lines)])
+            chart.opts(active_tools=["box_zoom"])
             hv.streams.PointerXY(source=chart).add_subscriber(self._point)
             hv.streams.Tap(source=chart).add_subscriber(self._click)
         hv.streams.RangeXY(source=charts[0]).add_subscriber(self._zoom)
-        mark = hv.DynamicMap(self._mark, streams=[self._place])
-        drag = hv.opts.Overlay(active_tools=["box_zoom"])
-        layout = hv.Layout([(chart * mark).opts(drag) for chart in charts]).cols(1)
-        self._charts[:] = [pn.pane.HoloViews(layout, **WIDE)]
+        self._charts[:] = [pn.pane.HoloViews(hv.Layout(charts).cols(1), **WIDE)]
         swatch = "<span style='background:{}; border:1px solid; padding:0 .6em'></span> {} &emsp;"
         texts = (swatch.format(colour, escape(name)) for name, colour in kinds.items())
         self._kinds.object = "".join(texts)
         self._move()
-
-    def _mark(self, data: tuple[float, ...]) -> Any:
-        if len(data) == 2:
-            return hv.Points([data]).opts(color=VERMILION, marker="x", size=12, line_width=3)
-        return hv.VLine(*data).opts(color=VERMILION, line_width=1.5)
 
     def _nearest(self, x: float | None, y: float | None) -> dict[str, int]:
         """Return the number of the value next to a place in a chart, for each swept axis."""
@@ -209,16 +207,20 @@ class Page:
         """Show the motion of the lane next to the values that the switches give."""
         fault, self._motion, start = "", None, self._value("motion_from")
         try:
-            lane = self._result.sel("nearest", **{a: self._value(a) for a in self._result.axes})
+            lane = self._result.sel("within", **{a: self._value(a) for a in self._result.axes})
             self._fixed = lane.fixed
             at = {a: self._shown[a][self._result[a] == lane.fixed[a]][0] for a in self._swept}
-            self._place.send(tuple(at.values()))
+            with pn.io.unlocked():
+                for mark, value in zip(self._marks, at.values(), strict=True):
+                    mark.location = float(value)
             self._lane.object = self._words(at)
             self._say_commands()
             config = continued(lane, self._path, start)
             with compiling():
-                motion = compute_response(prepared(config, self._periods), self._periods, "")
-            self._panels[:] = panels(self._in_units(motion), self._coordinate)
+                told = prepared(config, self._periods), self._periods, ""
+                motion = compute_response(*told, str(lane.metadata["fixed"]))
+            with pn.io.unlocked(), pn.state.curdoc.models.freeze():
+                show(self._panels, self._in_units(motion), self._coordinate)
             self._motion = motion
         except Exception as error:
             fault = _reason(error)
@@ -279,6 +281,12 @@ class Page:
                 self._motion.save(path)
             self._draw([path, *words, "--output", str(target)])
             return BytesIO(target.read_bytes())
+
+
+def _marked(marks: Sequence[Span], plot: Any, _element: Any) -> None:
+    """Draw marks into the panel of a chart, whenever it is drawn anew."""
+    if marks[0] not in plot.state.center:
+        plot.state.center = [*plot.state.center, *marks]
 
 
 def _reason(error: Exception) -> str:

@@ -11,7 +11,7 @@ from matplotlib.legend import Legend
 from matplotlib.lines import Line2D
 
 from gearchaos.errors import FigureError
-from gearchaos.figures.labels import axis_label
+from gearchaos.figures.labels import axis_label, instead_of
 from gearchaos.figures.lanes import MOST_DOTS, Between, diagram_lanes, dots, outermost, portions
 from gearchaos.figures.panel import Diagram, close_panel
 from gearchaos.figures.style import BLACK, GREY, VERMILION
@@ -73,8 +73,8 @@ def bifurcation(
         raise FigureError("the result has no section points: the sweep did not record any")
     variable = names[0] if variable is None else variable
     if variable not in (*names, *of_lanes):
-        there = ", ".join((*names, *of_lanes))
-        raise FigureError(f"no variable {variable!r} of the diagram in the result; it has {there}")
+        there = instead_of(variable, (*names, *of_lanes))
+        raise FigureError(f"no variable {variable!r} of the diagram in the result; {there}")
     lanes = diagram_lanes(result, between)
     rows = result.lanes(variable).reshape(result.lanes(STATUS).size, -1)
     of_a_lane = max(1, rows.shape[1])
@@ -139,7 +139,7 @@ def lyapunov(
     (line,) = axes.plot(x, exponent, ls=line_style, lw=0.6, color=color, label=label)
     look = {"markersize": lanes.dot_size(1.0), "color": color, "marker": marker}
     points = dots(axes, lanes._replace(diverged=~lonely), stored[:, np.newaxis], **look)
-    named: list[Artist] = [band] if np.isfinite(whole + spread).any() else []
+    named: list[Artist] = [band] if (spread[np.isfinite(whole)] > 0.0).any() else []
     if RECORD in result and (mixed := result.lanes(RECORD)[lanes.numbers][drawn] == 1).any():
         # Orbits that were reached within the record.
         look = {"ms": 3.0, "mfc": "none", "mew": 0.5, "color": VERMILION}

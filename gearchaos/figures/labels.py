@@ -1,14 +1,18 @@
 """Axis labels from what the result file says about its variables."""
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from difflib import get_close_matches
+from functools import cache
+from typing import Any
 
 from matplotlib.mathtext import MathTextParser
 
+from gearchaos.gear.tooth_deviations import REALISATION
 from gearchaos.results import scales
 from gearchaos.results.result import Result
 from gearchaos.results.scales import excitation_of
-from gearchaos.results.variables import DIRECTION, START, coordinate_text
+from gearchaos.results.variables import DIRECTION, KEPT_BY, START, coordinate_text
 
 
 def axis_label(result: Result, name: str, line_length: int = 60) -> str:
@@ -33,7 +37,8 @@ def axis_label(result: Result, name: str, line_length: int = 60) -> str:
 
 def unit_of(result: Result, name: str) -> str:
     """Word the unit of a variable, or what its numbers are multiples of; "" of a pure number."""
-    written = result.variables[name].units
+    known: Any = result.parameters | result.fixed_axes | result.variables
+    written = known[name].units
     if written in ("", "1"):
         return scales.unit_of(name).stands_for
     words = plain(re.sub(r"\bum\b", "\N{MICRO SIGN}m", written))
@@ -61,18 +66,28 @@ def in_words(result: Result, place: Mapping[str, float]) -> str:
     """Word a place on the axes of a result, such as ``$P$ = 5.86, start 0``."""
     texts = []
     for axis, value in place.items():
-        attributes = result.attributes(axis) if axis in result else {}
-        wording = str(attributes.get("long_name", "")) or axis.replace("_", " ")
-        name = _formula(attributes.get("symbol", "")) or plain(wording)
-        unit = f" {unit_of(result, axis).removeprefix('unit ')}".rstrip() if axis in result else ""
-        words = {START: f"start {value:g}", DIRECTION: coordinate_text(axis, value)}
+        known: Any = (result.parameters | result.fixed_axes | result.variables).get(axis)
+        wording = (known and known.long_name) or axis.replace("_", " ")
+        name = (known and _formula(known.symbol)) or plain(wording)
+        unit = f" {unit_of(result, axis).removeprefix('unit ')}".rstrip() if known else ""
+        words = {START: f"start {value:g}", REALISATION: f"gear pair {value:g}"}
+        words[DIRECTION] = coordinate_text(axis, value)
         texts.append(words.get(axis, f"{name} = {value:.6g}{unit}"))
     return ", ".join(texts)
 
 
-def in_a_name(place: Mapping[str, float]) -> str:
+def in_a_name(place: Mapping[str, float], digits: int = 12) -> str:
     """Word a place for the name of a file: ``_pitch_error_5.86_start_0``."""
-    return "".join(f"_{axis}_{coordinate_text(axis, value)}" for axis, value in place.items())
+    return "".join(f"_{axis}_{coordinate_text(axis, at, digits)}" for axis, at in place.items())
+
+
+def instead_of(variable: str, there: Sequence[str]) -> str:
+    """Say what there is instead of a variable, and which key would keep it or which is meant."""
+    hint = "".join(f"; did you mean {one}?" for one in get_close_matches(variable, there, 1))
+    for key, names in KEPT_BY.items():
+        if variable.startswith(names) and not any(one.startswith(names) for one in there):
+            hint = f"; set outputs.{key} and compute it again to have it"
+    return f"it has {', '.join(there)}{hint}"
 
 
 def short(value: float, digits: int = 4, sign: str = "-") -> str:
@@ -97,6 +112,7 @@ def _broken(words: list[str], line_length: int) -> list[str]:
     return lines
 
 
+@cache
 def _formula(text: str) -> str:
     """Return a symbol that is no formula as plain text."""
     # A file may come from anywhere; a formula that matplotlib cannot read would fail at drawing.

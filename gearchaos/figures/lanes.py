@@ -65,7 +65,9 @@ def map_axes(result: Result) -> tuple[str, str]:
     """Name the axes along x and y of a map; FigureError if the result has others, or too few."""
     swept = swept_axes(result)
     if len(swept) != 2:
-        raise FigureError(f"a map shows two swept parameters; the result has {', '.join(swept)}")
+        raise FigureError(
+            f"a map shows two swept parameters; the result has {', '.join(swept) or 'none'}"
+        )
     if more := [axis for axis in result.axes if axis not in swept]:
         where = " ".join(f"--at {axis}={result[axis][0]:g}" for axis in more)
         raise FigureError(

@@ -60,7 +60,8 @@ def close_panel(axes: Axes, result: Result, own: Diagram, *, hold_zero: bool = F
     axes.set_xlabel(axis_label(result, result.axis))
     color, label = own.points.get_color(), str(own.points.get_label())
     if not label.startswith("_"):
-        look: dict[str, Any] = {"marker": "s", "ms": 3.5, "ls": "none"}
+        shape = own.points.get_marker(), own.points.get_linestyle()
+        look: dict[str, Any] = {**dict(zip(("marker", "ls"), shape, strict=True)), "ms": 4.0}
         own.named.insert(0, Line2D([], [], color=color, label=label, **look))
     if own.lanes.diverged.any():
         look = {"marker": "|", "ms": 8.0, "mew": 0.8, "color": VERMILION}
@@ -153,6 +154,10 @@ def legend_above(axes: Axes, handles: Sequence[Artist]) -> Legend | None:
     """Place a legend above the right end of the axes, where it hides nothing."""
     if not handles:
         return None
-    columns = -(-len(handles) // -(-len(handles) // 3))
+    # What the axes are wide, and a column: its mark and gaps, and so much for each letter.
+    room = axes.get_window_extent().width / axes.figure.dpi * 72.0
+    column = 17.0 + 3.2 * max(len(str(one.get_label())) for one in handles)
+    most = int(np.clip(room // column, 1, 3))
+    columns = -(-len(handles) // -(-len(handles) // most))
     place: Any = {"loc": "lower right", "bbox_to_anchor": (1.0, 1.0), "borderaxespad": 0.3}
     return axes.legend(handles=handles, ncols=columns, **place, **LEGEND)

@@ -6,11 +6,11 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.lines import Line2D
-from matplotlib.ticker import MaxNLocator
+from matplotlib.ticker import MaxNLocator, NullFormatter
 
 from gearchaos.arrays import Floats
 from gearchaos.errors import FigureError
-from gearchaos.figures.labels import axis_label, place_of, plain, unit_of
+from gearchaos.figures.labels import axis_label, instead_of, place_of, plain, unit_of
 from gearchaos.figures.lanes import Between
 from gearchaos.figures.page import remark
 from gearchaos.figures.style import BLACK, BLUE, LEGEND, ORANGE, VERMILION
@@ -165,6 +165,7 @@ def amplitude_spectrum(
         top = 10.0 ** np.ceil(np.log10(top))
         floor = top * 10.0**-DECADES
         axes.set_yscale("log")
+        axes.yaxis.set_minor_formatter(NullFormatter())
     seen = amplitude > floor
     width = 0.5 if np.count_nonzero(amplitude > 1e-3 * top) > _MANY_LINES else 1.0
     lines = axes.vlines(order[seen], floor, amplitude[seen], color=BLUE, linewidth=width)
@@ -190,7 +191,7 @@ def response_variables_of(result: Result) -> tuple[str, ...]:
     return tuple(
         name
         for name in result
-        if TIME in result.dims(name)[1:] and not result.variables[name].flags
+        if TIME in result.dims(name)[len(result.axes) :] and not result.variables[name].flags
     )
 
 
@@ -237,7 +238,7 @@ def motion_of(result: Result, lane: int, variable: str) -> Floats:
         )
     if variable not in names:
         raise FigureError(
-            f"no variable {variable!r} over time in the result; it has {', '.join(names)}"
+            f"no variable {variable!r} over time in the result; {instead_of(variable, names)}"
         )
     lanes = result.along(result.axis).size
     if not 0 <= lane < lanes:

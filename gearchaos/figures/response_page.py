@@ -60,88 +60,72 @@ def response_page(
     the panels stand one above the other.
     """
     coordinate = response.COORDINATE if coordinate is None else coordinate
-    whole = coordinate in response.coordinates_of(result)
-    if excitation_of(result.metadata).of_teeth:
-        return _teeth_page(result, lane, coordinate, (width_mm, height_mm))
-    columns, count = 2 if width_mm >= SIDE_BY_SIDE_MM else 1, 4 if whole else 2
-    with page(width_mm, height_mm or _PANEL_HEIGHT_MM * count / columns) as figure:
-        panels = figure.subplots(count // columns, columns, squeeze=False)
-        history, *planes, spectrum = panels.ravel()
-        last = result[TIME][-1]
-        shown = (max(0.0, last - SHOWN_PERIODS), last)
+    response.motion_of(result, lane, coordinate)
+    whole, side_by_side = coordinate in response.coordinates_of(result), width_mm >= SIDE_BY_SIDE_MM
+    excitation, last = excitation_of(result.metadata), float(result[TIME][-1])
+    teeth = excitation.driving_teeth if excitation.of_teeth else 0
+    shown = (max(0.0, last - (SHOWN_REVOLUTIONS * teeth or SHOWN_PERIODS)), last)
+    layout = ("hp;sf" if whole else "hf") if side_by_side else ("h;p;s;f" if whole else "h;f")
+    heights = [_PANEL_HEIGHT_MM] * (layout.count(";") + 1)
+    if teeth:
+        with suppress(ConfigurationError):
+            result = result.physical(MESH_ERROR)
+        layout = ("ee;hh;ps;ff" if side_by_side else "e;h;p;s;f") if whole else "e;h;f"
+        heights = [_HEIGHTS_MM[row[0]] for row in layout.split(";")]
+    with page(width_mm, height_mm or sum(heights)) as figure:
+        panels = figure.subplot_mosaic(layout, height_ratios=heights)
+        history, spectrum = panels["h"], panels["f"]
         response.time_history(history, result, lane, coordinate, between=shown)
         if coordinate.startswith(MESH_FORCE):
             response.contact_strip(history, result, lane, coordinate)
-        texts = [in_words(result, place_of(result, lane))]
+        few_ticks(history, None if teeth else 6, 6)
+        remark(panels["e" if teeth else "h"], in_words(result, place_of(result, lane)))
+        foot = [form_in_words(result)]
         if whole:
-            response.phase_portrait(planes[0], result, lane, coordinate)
-            response.poincare_section(planes[1], result, lane, coordinate)
-            points = result.lanes(f"section_{coordinate}").shape[1]
-            # A lane may have come to rest on its orbit within the longer of the two records.
-            texts += [f"last {periods} mesh periods" for periods in (round(float(last)), points)]
+            curve, _ = response.phase_portrait(panels["p"], result, lane, coordinate)
+            points = response.poincare_section(panels["s"], result, lane, coordinate)
+            late = f", black: last {SHOWN_REVOLUTIONS} revolutions" if teeth and shown[0] else ""
+            remark(panels["p"], f"last {round(last)} mesh periods{late}")
+            if teeth:
+                repeats, n = response.repeats_after(result, lane), excitation.excitation_period
+                period = f"period {repeats // n} of the excitation, {repeats} mesh periods"
+                remark(panels["s"], period if repeats else "")
+                late_curve = np.array(curve.get_data())[:, result[TIME] >= shown[0]]
+                panels["p"].plot(*late_curve, "k", linewidth=0.4)
+                curve.set(color="0.85", linewidth=0.3, zorder=1, rasterized=True)
+                foot.append("points once a mesh period (grey) and once an excitation period (red)")
+            else:
+                # A lane may have come to rest on its orbit within the longer of the two records.
+                remark(panels["s"], f"last {np.size(points.get_xdata())} mesh periods")
+            for name in "ps":
+                few_ticks(panels[name], 6, 6)
         variable = acceleration_of(coordinate) if whole else coordinate
-        response.amplitude_spectrum(spectrum, result, lane, variable, logarithmic=True)
-        letter(panels.ravel())
-        for axes, words in zip((history, *planes), texts, strict=True):
-            few_ticks(axes, 6, 6)
-            remark(axes, words)
-        footnote(figure, form_in_words(result))
-        figure.align_ylabels(panels)
-    return figure
-
-
-def _teeth_page(
-    result: Result, lane: int, coordinate: str, size_mm: tuple[float, float | None]
-) -> Page:
-    """Draw the page of a lane whose teeth have errors of their own."""
-    excitation = excitation_of(result.metadata)
-    teeth, n = excitation.driving_teeth, excitation.excitation_period
-    with suppress(ConfigurationError):
-        result = result.physical(MESH_ERROR)
-    whole = coordinate in response.coordinates_of(result)
-    side_by_side = size_mm[0] >= SIDE_BY_SIDE_MM
-    layout = ("ee;hh;ps;ff" if side_by_side else "e;h;p;s;f") if whole else "e;h;f"
-    heights = [_HEIGHTS_MM[row[0]] for row in layout.split(";")]
-    with page(size_mm[0], size_mm[1] or sum(heights)) as figure:
-        panels = [*figure.subplot_mosaic(layout, height_ratios=heights).values()]
-        top, below, *planes, spectrum = panels
-        time, foot = result[TIME], [form_in_words(result)]
-        shown = (max(0.0, time[-1] - SHOWN_REVOLUTIONS * teeth), time[-1])
-        response.time_history(top, result, lane, MESH_ERROR, between=shown)
-        response.time_history(below, result, lane, coordinate, between=shown)
-        if coordinate.startswith(MESH_FORCE):
-            response.contact_strip(below, result, lane, coordinate)
-        top.sharex(below)
-        for axes, most in ((top, 4), (below, 6)):
-            few_ticks(axes, None, most)
-            _in_revolutions(axes, teeth)
-        top.set_xlabel("")
-        top.tick_params(labelbottom=False)
-        remark(top, in_words(result, place_of(result, lane)))
-        remark(below, f"excitation period: {n} mesh periods")
-        held, repeats = round(float(time[-1])), response.repeats_after(result, lane)
-        if whole:
-            portrait, section = planes
-            curve, _ = response.phase_portrait(portrait, result, lane, coordinate)
-            response.poincare_section(section, result, lane, coordinate)
-            late = f", black: last {SHOWN_REVOLUTIONS} revolutions" if shown[0] else ""
-            remark(portrait, f"last {held} mesh periods{late}")
-            portrait.plot(*np.array(curve.get_data())[:, time >= shown[0]], "k", linewidth=0.4)
-            curve.set(color="0.85", linewidth=0.3, zorder=1, rasterized=True)
-            if repeats:
-                words = f"period {repeats // n} of the excitation, {repeats} mesh periods"
-                remark(section, words)
-            foot.append("points once a mesh period (grey) and once an excitation period (red)")
-        variable = acceleration_of(coordinate) if whole else coordinate
-        look: dict[str, Any] = {"highest": HIGHEST_ORDER, "logarithmic": True}
-        lines = response.amplitude_spectrum(spectrum, result, lane, variable, **look)
-        _in_shaft_orders(spectrum, lines, excitation, held >= n)
-        for axes in planes:
-            few_ticks(axes, 6, 6)
-        letter(panels)
+        look: dict[str, Any] = {"highest": HIGHEST_ORDER} if teeth else {}
+        lines = response.amplitude_spectrum(
+            spectrum, result, lane, variable, logarithmic=True, **look
+        )
+        if teeth:
+            _pitch_error_above(panels["e"], history, result, lane, excitation)
+            resolved = round(last) >= excitation.excitation_period
+            _in_shaft_orders(spectrum, lines, excitation, resolved)
+        letter(panels.values())
         footnote(figure, "\n".join(filter(None, foot)))
-        figure.align_ylabels(panels)
+        figure.align_ylabels([*panels.values()])
     return figure
+
+
+def _pitch_error_above(
+    top: Axes, history: Axes, result: Result, lane: int, excitation: Excitation
+) -> None:
+    """Draw the pitch error over the time history, and let both count revolutions."""
+    response.time_history(top, result, lane, MESH_ERROR, between=history.get_xlim())
+    top.sharex(history)
+    few_ticks(top, None, 4)
+    for axes in (top, history):
+        _in_revolutions(axes, excitation.driving_teeth)
+    remark(history, f"excitation period: {excitation.excitation_period} mesh periods")
+    top.set_xlabel("")
+    top.tick_params(labelbottom=False)
 
 
 def _in_revolutions(axes: Axes, teeth: int) -> None:

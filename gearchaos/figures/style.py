@@ -45,8 +45,10 @@ TICKS = {
 }
 """Settings for the ticks of either axis."""
 
-# The STIX fonts come with matplotlib, so that a figure is the same on every machine.
 _STYLE: dict[Any, Any] = {
+    # That of `save_figure`: what is measured for the layout is then known when the page is drawn.
+    "figure.dpi": 300,
+    # The STIX fonts come with matplotlib, so that a figure is the same on every machine.
     "font.family": "STIXGeneral",
     "mathtext.fontset": "stix",
     "font.size": FONT_PT,
@@ -54,6 +56,7 @@ _STYLE: dict[Any, Any] = {
     "axes.titlesize": FONT_PT,
     "axes.titleweight": "bold",
     "axes.titlepad": 3.0,
+    "axes.titley": 1.0,
     "axes.labelpad": 2.5,
     "axes.linewidth": 0.6,
     "axes.formatter.use_mathtext": True,

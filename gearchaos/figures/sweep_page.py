@@ -85,17 +85,22 @@ def bifurcation_page(
         ratios = HEIGHT_RATIOS if panels == 2 else (1.0,)
         grid = figure.subplots(panels, 1, sharex=True, squeeze=False, height_ratios=ratios)
         stack: list[Axes] = grid[:, 0].tolist()
-        for one, name, (color, marker) in zip(results, labels, cycle(OVERLAID), strict=False):
+        looks = zip(results, labels, cycle(OVERLAID), strict=False)
+        for number, (one, name, (color, marker)) in enumerate(looks):
             shown: dict[str, Any] = {"between": between}
             if len(results) > 1:
                 shown |= {"color": color, "marker": marker, "label": plain(name) or "untitled"}
             if of_orders:
                 waterfall(stack[0], one, str(variable), between=between)
             elif variable is not None or section_variables(one):
-                bifurcation(stack[0], one, variable, **shown)
+                # Dots lie on larger marks, and thin lines on wide ones: where results agree, both
+                # are seen.
+                drawn = bifurcation(stack[0], one, variable, **shown)
+                drawn.points.set_zorder(2.0 - 0.01 * number)
             if LARGEST_EXPONENT in one:
                 # A legend of the colours is enough.
-                lyapunov(stack[-1], one, **shown | ({"label": None} if panels == 2 else {}))
+                curve = lyapunov(stack[-1], one, **shown | ({"label": None} if panels == 2 else {}))
+                curve.line.set(zorder=2.0 - 0.01 * number, linewidth=0.6 * (number + 1))
         if panels == 2:
             stack[0].set_xlabel("")
             letter(stack)

@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.colors import LogNorm
 
 from gearchaos.errors import FigureError
-from gearchaos.figures.labels import axis_label
+from gearchaos.figures.labels import axis_label, instead_of
 from gearchaos.figures.lanes import Between, cell_edges, diagram_lanes
 from gearchaos.figures.maps import NO_VALUE
 from gearchaos.figures.stages import look_of
@@ -29,7 +29,9 @@ def waterfall(axes: Axes, result: Result, variable: str, *, between: Between = (
     """
     there = [name for name in result if result.dims(name) == (*result.axes, ORDER)]
     if variable not in there:
-        raise FigureError(f"no amplitudes {variable!r} in the result; it has {', '.join(there)}")
+        raise FigureError(
+            f"no amplitudes {variable!r} in the result; {instead_of(variable, there)}"
+        )
     lanes = diagram_lanes(result, between)
     values = np.unique(lanes.parameter)
     if axes.images or values.size < lanes.numbers.size:

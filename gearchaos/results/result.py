@@ -25,6 +25,7 @@ from gearchaos.results.variables import Variable, coordinate_text, diagram_axis
 
 __all__ = ["Parameter", "Result", "open_result", "section_variables"]
 
+Method = Literal["nearest", "within"] | None
 DEFAULT_VARIABLE = "section_delta_5"
 
 
@@ -36,7 +37,8 @@ class Result:
     file; ``data`` by name: the values of each variable, of the shape of its dimensions or with all
     axes flattened into the first one; those that carry their own ``values`` may be left out;
     ``parameters``, ``metadata`` by name: dimensionless groups with their origin; title,
-    formulation, configuration, provenance. Raises ValueError if an array is missing, its shape
+    formulation, configuration, provenance; ``fixed_axes`` by name: axes
+    that `sel` has fixed. Raises ValueError if an array is missing, its shape
     contradicts the dimensions, or an axis is no ascending row of values.
     """
 
@@ -47,10 +49,12 @@ class Result:
         data: Mapping[str, Any],
         parameters: Mapping[str, Parameter],
         metadata: Mapping[str, str | int | float],
+        fixed_axes: Mapping[str, Variable] = {},
     ) -> None:
         self.axes = tuple(axes)
         self.parameters = dict(parameters)
         self.metadata = {**metadata, **own_metadata(self.axes)}
+        self.fixed_axes = dict(fixed_axes)
         self._data: dict[str, Array] = {}
         for variable in variables:
             values = data.get(variable.name, variable.values)
@@ -82,8 +86,9 @@ class Result:
 
     @property
     def fixed(self) -> dict[str, float]:
-        """Coordinates of the axes that `sel` has fixed."""
-        return fixed_coordinates(self.metadata)
+        """Coordinates of the axes that `sel` has fixed, or of the lane from which this goes on."""
+        found = fixed_coordinates(self.metadata)
+        return {axis: value for axis, value in found.items() if axis not in self.axes}
 
     @property
     def where(self) -> str:
@@ -122,16 +127,23 @@ class Result:
         return values.reshape(count, *values.shape[len(self.axes) :])
 
     def along(self, axis: str) -> Array:
-        """Give the value of an axis for every lane in that order, shape (lanes,)."""
+        """Give the value of an axis for every lane in that order, shape (lanes,).
+
+        Raises ConfigurationError if there is no such axis.
+        """
+        if axis not in self.axes:
+            there = ", ".join(self.axes) or "none: leave one in sel"
+            raise ConfigurationError(f"no axis {axis!r} in the result; it has {there}")
         grid = np.meshgrid(*(self[name] for name in self.axes), indexing="ij")
         return np.ravel(grid[self.axes.index(axis)])
 
-    def sel(self, method: Literal["nearest"] | None = None, **coordinates: float | str) -> Result:
+    def sel(self, method: Method = None, **coordinates: float | str) -> Result:
         """Fix axes at one of their values each; what is left runs over the other axes.
 
         Coordinates are by the name of their axis, and directions by their own, such as
-        ``direction="upwards"``; those that were met are in `fixed`. With
-        ``"nearest"`` the nearest value is taken, the larger of two; by default a value must be met
+        ``direction="upwards"``; those that were met are in `fixed`, and their axes in `fixed_axes`.
+        With ``"nearest"`` the nearest value is taken, the larger of two, with ``"within"`` as well,
+        but nothing further than half a step beyond the outermost; by default a value must be met
         exactly. Raises ConfigurationError if there is no such axis or value; the message names the
         nearest.
         """
@@ -148,10 +160,17 @@ class Result:
             # Far from all of them, every difference would be the same number.
             near = np.clip(wanted, values[0], values[-1])
             number = values.size - 1 - int(np.argmin(np.abs(values - near)[::-1]))
-            if method != "nearest" and values[number] != wanted:
+            if method is None and values[number] != wanted:
                 raise ConfigurationError(
                     f"{name} = {wanted:g}: is none of the {values.size} values of the result; the "
                     f'nearest is {values[number]!s}: give it, or method="nearest"'
+                )
+            steps = np.diff(values) if values.size > 1 else [math.inf]
+            reach = values[0] - steps[0] / 2.0, values[-1] + steps[-1] / 2.0
+            if method == "within" and not reach[0] <= wanted <= reach[1]:
+                raise ConfigurationError(
+                    f"{name} = {wanted:g}: lies beyond the values of the result, {values[0]:g} to "
+                    f"{values[-1]:g}; give one between these"
                 )
             index[name] = number
         if not index:
@@ -175,6 +194,7 @@ class Result:
                 for name, entry in self.parameters.items()
             },
             {**self.metadata, "fixed": fixed},
+            {**self.fixed_axes, **{name: self.variables[name] for name in index}},
         )
 
     def physical(self, *names: str) -> Result:
@@ -191,7 +211,8 @@ class Result:
         }
         variables = {**self.variables, **{name: one for name, (one, _) in changed.items()}}
         data = {**self._data, **{name: values for name, (_, values) in changed.items()}}
-        return Result(self.axes, [*variables.values()], data, self.parameters, self.metadata)
+        facts = self.parameters, self.metadata, self.fixed_axes
+        return Result(self.axes, [*variables.values()], data, *facts)
 
     def save(self, path: str | os.PathLike[str], overwrite: bool = False) -> None:
         """Write the result to an HDF5 file, which appears complete or not at all.

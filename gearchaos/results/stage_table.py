@@ -104,9 +104,9 @@ def one_axis(result: Result, kept: Sequence[str] = (), /, **coordinates: float) 
     """Take the slice of a result along one swept parameter, at the coordinates nearest to these.
 
     Other axes are fixed at their first value, but for those that are ``kept``. Raises
-    ConfigurationError if there is no such axis, or if no swept parameter is left.
+    ConfigurationError if there is no such axis or value, or if no swept parameter is left.
     """
-    part = result.sel("nearest", **coordinates)
+    part = result.sel("within", **coordinates)
     if part.axis in ("", *UNSWEPT):
         raise ConfigurationError(f"{', '.join(coordinates)}: fixed, no swept parameter is left")
     kept = (part.axis, *kept)

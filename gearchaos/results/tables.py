@@ -42,8 +42,8 @@ def to_xarray(result: "Result") -> Any:
 def to_dataframe(result: "Result", *along: str) -> Any:
     """Give a `pandas.DataFrame` with a row per lane, or per lane and, say, "section_point".
 
-    Flags are words. Raises ConfigurationError if nothing runs along it, FileError if pandas is not
-    installed.
+    Flags are words; ``attrs["units"]`` has the units of index and columns by their names. Raises
+    ConfigurationError if nothing runs along it, FileError if pandas is not installed.
     """
     pandas, dims = needed("pandas"), (*result.axes, *along)
     columns: dict[str, Any] = {}
@@ -59,4 +59,6 @@ def to_dataframe(result: "Result", *along: str) -> Any:
     words = {dim: np.array(result.variables[dim].flags) for dim in dims}
     levels = [words[dim][result[dim]] if words[dim].size else result[dim] for dim in dims]
     index = pandas.MultiIndex.from_product(levels, names=dims)
-    return pandas.DataFrame(columns, index.get_level_values(0) if len(dims) == 1 else index)
+    frame = pandas.DataFrame(columns, index.get_level_values(0) if len(dims) == 1 else index)
+    frame.attrs["units"] = {name: result.variables[name].units for name in (*dims, *columns)}
+    return frame

@@ -54,6 +54,17 @@ _WORDING = {
     kind: {row["name"]: (row["long_name"], row["symbol"]) for row in _ROWS[kind]}
     for kind in ("state", "acceleration", "direction")
 }
+KEPT_BY = {
+    key: tuple(row["name"].split("@")[0] for kind in kinds for row in _ROWS[kind])
+    for key, kinds in {
+        "loads = true": ("forces", "loads"),
+        "contact = true": ("contact",),
+        "orders = [1, 2]": ("amplitudes",),
+        "lyapunov = true": ("lyapunov",),
+    }.items()
+}
+"""Keys of [outputs], and how the names begin of what a sweep keeps with them."""
+
 STATE_WORDING = _WORDING["state"]
 """Long name and mathtext symbol of each state (all dimensionless), in the one order of states."""
 

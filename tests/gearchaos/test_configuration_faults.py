@@ -395,6 +395,11 @@ def test_a_group_of_the_axial_pair_is_swept_where_something_kept_depends_on_it()
 def test_what_is_not_toml_is_located():
     with pytest.raises(ConfigurationError, match=r"x\.toml: not valid TOML: .* line 2, column"):
         Configuration.from_toml("title = 'a'\ntitle 'b'", "x.toml")
+    for twice, key in (("title = 'a'\ntitle = 'b'", "title"), ("[pair]\n[pair]", r"\[pair\]")):
+        with pytest.raises(
+            ConfigurationError, match=rf"x\.toml: line 2: {key} is there twice; keep"
+        ):
+            Configuration.from_toml(twice, "x.toml")
 
 
 @pytest.mark.parametrize(

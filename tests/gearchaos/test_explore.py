@@ -36,6 +36,7 @@ OPTIONS += " --disable-component-update --disable-sync"
 ASKED = ("start.carry='both'", "sweep.count=20", "outputs.section_points=10")
 HOSTILE = '<img src="x" onerror="document.hacked = 1"> $$\\href{javascript:0}{x}$$'
 PERIODS = 10
+LINES = "one => one.center.filter(line => line.type == 'Span').map(line => line.location)"
 FIGURES = """() => [...Bokeh.documents[0]._all_models.values()]
     .filter(one => one.type == "Figure")"""
 PANELS = (
@@ -159,6 +160,9 @@ def test_a_click_shows_the_motion_of_the_lane_with_the_values_of_the_file(page, 
     assert section["x"] == motion["section_delta_5"][0].tolist()
     # The motion goes on from the end of the lane: its first point is the last of the file.
     assert curve["x"][0] == lane["end_state"][0] == lane["section_delta_5"][-1]
+    # A line at the lane in both charts, and that of zero among the exponents.
+    lines = page.evaluate(f"({FIGURES})().slice(0, 2).map({LINES})")
+    assert [sorted(at) for at in lines] == [[value], [0.0, value]]
     force, *strips = shown["Tangential mesh force, N_y (unit kₘb′)"]
     assert force["y"] == motion["mesh_force_tangential"][0].tolist()
     assert sum(len(strip["left"]) for strip in strips) > 0

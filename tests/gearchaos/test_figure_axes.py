@@ -1,12 +1,17 @@
 """A diagram runs over one parameter; of several axes it says which slice it shows."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from gearchaos.errors import FigureError
+from gearchaos.errors import ConfigurationError, FigureError
 from gearchaos.figures import bifurcation, bifurcation_page, lyapunov, shade_stages
+from gearchaos.figures.labels import in_words
+from gearchaos.figures.style import OVERLAID
 from gearchaos.plot import main
+from gearchaos.results.result import Result
 
 from .test_result_axes import AXES, result_over
 
@@ -24,11 +29,47 @@ def test_two_swept_parameters_are_refused_with_their_names_and_the_remedy(draw):
 def test_a_slice_of_two_parameters_is_drawn_and_named():
     one = BOTH.sel(load=0.3, method="nearest")
     page = bifurcation_page(one)
-    assert page.get_suptitle() == "load = 0.3"
+    assert page.get_suptitle() == "$f_n$ = 0.3"
     axes = Figure().subplots()
     points = bifurcation(axes, one).points
     well = one["status"] == 0
     np.testing.assert_array_equal(points.get_ydata(), one["section_delta_5"][well].ravel())
+
+
+def test_a_slice_is_named_as_its_axis_was():
+    speeds = replace(BOTH.variables["load"], units="rpm", long_name="speed", symbol="")
+    variables = [*(BOTH.variables | {"load": speeds}).values()]
+    both = Result(BOTH.axes, variables, {n: BOTH[n] for n in BOTH}, {}, BOTH.metadata)
+    assert in_words(both.sel(load=0.3, method="nearest"), {"load": 0.3}) == "speed = 0.3 rpm"
+
+
+@pytest.mark.parametrize("draw", [bifurcation, lyapunov])
+def test_a_single_lane_is_no_diagram(draw):
+    with pytest.raises(ConfigurationError, match="it has none: leave one in sel"):
+        draw(Figure().subplots(), BOTH.sel("nearest", load=0.3, pitch_error=1.0))
+
+
+def test_many_names_stay_on_the_page_and_beside_its_letter():
+    several = [BOTH.sel(load=load, method="nearest") for load in BOTH["load"][:3]]
+    names = [f"{number}, a pair with a name of its own" for number in range(len(several))]
+    page = bifurcation_page(several, labels=names)
+    page.canvas.draw()
+    legend = page.axes[0].get_legend()
+    box, letter = legend.get_window_extent(), page.axes[0]._left_title.get_window_extent()
+    assert letter.x1 < box.x0 < box.x1 <= page.bbox.width
+    for lines in (legend.legend_handles, page.axes[0].lines):
+        marks = [line.get_marker() for line in lines if line.get_label() in names]
+        assert marks == [marker for _, marker in OVERLAID[: len(several)]]
+    heights = [line.get_zorder() for line in page.axes[0].lines if line.get_label() in names]
+    assert len(heights) > 1 and heights == sorted({*heights}, reverse=True)
+
+
+def test_standard_errors_are_named_where_there_are_some():
+    one = BOTH.sel(load=0.3, method="nearest")
+    assert "standard errors" in lyapunov(Figure().subplots(), one).legend.get_texts()[0].get_text()
+    one["lyapunov_exponent_standard_error"][:] = 0.0
+    legend = lyapunov(Figure().subplots(), one).legend
+    assert legend is None or "errors" not in str([text.get_text() for text in legend.get_texts()])
 
 
 def test_the_diagram_shows_all_starts_and_the_stages_say_where_they_differ():
@@ -86,3 +127,10 @@ def test_a_slice_that_cannot_be_drawn_is_told(arguments, message, tmp_path, caps
     out, err = capsys.readouterr()
     assert out == "" and message in err
     assert len(list(tmp_path.iterdir())) == 1
+
+
+def test_of_several_files_the_map_is_the_one_that_is_refused(tmp_path, capsys):
+    result_over(AXES["one start"]).save(tmp_path / "one.h5")
+    BOTH.save(tmp_path / "both.h5")
+    assert main([str(tmp_path / "one.h5"), str(tmp_path / "both.h5")]) == 2
+    assert "both.h5: runs over load and pitch_error: a map is drawn" in capsys.readouterr().err

@@ -4,8 +4,11 @@ import numpy as np
 import pytest
 
 import gearchaos
+from gearchaos.engine.simulation import Simulation
+from gearchaos.export import main as export
 from gearchaos.figures.labels import unit_of
 from gearchaos.plot import main as plot
+from gearchaos.sweep import main as sweep
 
 from .commands import small_config
 from .short_sweeps import PAN2021, SHORT
@@ -28,6 +31,33 @@ def path(tmp_path_factory):
 @pytest.fixture(scope="module")
 def result(path):
     return gearchaos.open_result(path)
+
+
+def test_what_a_mistaken_unit_makes_of_a_pair_is_told(tmp_path):
+    def notes(*overrides: str) -> str:
+        given = (*ASKED, "integration.unstable=raise", *overrides)
+        return " ".join(Simulation(gearchaos.load_config(small_config(tmp_path), given)).notes)
+
+    assert "unlikely" not in notes()
+    told = notes("pair.face_width_mm=0.02", "pitch_error.amplitude_um=8000.0", "sweep.to=1.0")
+    assert "pitch error 8000 um, face width 0.02 mm: unlikely at a normal module of" in told
+    assert "static deflection" in notes("mesh.mean_stiffness_N_per_um_mm=0.01")
+
+
+def test_a_dry_run_tells_frequency_and_deflection_of_the_pair(path, result, capsys):
+    assert sweep([str(small_config(path.parent)), "--dry-run"]) == 0
+    hertz = result.parameters["scaling_frequency"].value / (2.0 * np.pi)
+    assert f"natural frequency {hertz:.4g} Hz" in capsys.readouterr().err
+
+
+def test_a_table_says_its_units(path, tmp_path):
+    pandas = pytest.importorskip("pandas")
+    target = str(tmp_path / "pair.csv")
+    assert export([str(path), target, "--units", "physical"]) == 0
+    read, frame = pandas.read_csv(target), gearchaos.open_result(path).physical().to_dataframe()
+    name = "mesh_force_largest_tangential"
+    np.testing.assert_array_equal(read[f"{name} [N]"], frame[name])
+    assert frame.attrs["units"][name] == "N" and "period" in read.columns
 
 
 def test_lengths_times_and_forces_are_those_of_the_pair(result):

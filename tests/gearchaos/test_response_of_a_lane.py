@@ -8,6 +8,7 @@ from gearchaos_kernels import integrate
 
 from gearchaos import Result, load_config, open_result, run
 from gearchaos.engine.simulation import Simulation
+from gearchaos.figures.labels import in_words, place_of
 from gearchaos.response import main
 
 from .short_sweeps import METHODS, PAN2021, SHORT
@@ -74,17 +75,21 @@ def test_every_axis_of_a_result_names_its_lane(tmp_path, capsys):
     np.testing.assert_array_equal(found["start_state"][0], result["end_state"][1, 1, 1])
     assert found.axes == ("pitch_error",)
     assert found.parameters["load"].value == 0.2
+    assert found.fixed == {"load": 0.2, "start": 1.0}
+    assert in_words(found, place_of(found, 0)) == "$f_n$ = 0.2, start 1, $P$ = 7.5"
     sweep, output = str(tmp_path / "sweep.h5"), str(tmp_path / "none.h5")
     for arguments, message in {
         ("--at", "7"): "--at 7: must be NAME=VALUE, each of the axes load, pitch_error, start once",
-        ("--at", "load=0"): "name one lane, with --at pitch_error=VALUE and --at start=VALUE as",
+        ("--at", "load=0.1"): "name one lane, with --at pitch_error=VALUE and --at start=VALUE as",
+        ("--at", "load=0.3"): "load = 0.3: lies beyond the values of the result, 0.1 to 0.2",
+        ("--at", "upwards"): "direction: is no axis of the result",
         ("--at", "torque=0"): "torque: is no axis of the result; its axes: load, pitch_error",
         ("--pitch-error", "7"): "is a result, and goes on with its own configuration; name a lane",
         ("--at", "7", "--set", "sweep.count=3"): "with --at, without --set or --pitch-error",
     }.items():
         assert main([sweep, *arguments, "-o", output]) == 2
         assert message in capsys.readouterr().err
-    assert main([sweep, "--at", "load=0", "-o", sweep]) == 2
+    assert main([sweep, "--at", "load=0.1", "-o", sweep]) == 2
     assert not Path(output).exists()
 
 

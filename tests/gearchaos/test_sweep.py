@@ -115,6 +115,7 @@ def test_a_dry_run_tells_lanes_steps_memory_and_time_and_writes_nothing(tmp_path
     # the start and 10 at the end, return distance; unsplit steps, period of divergence and of the
     # motion, bands; status, kind of motion, kind of record.
     assert told.pop("file") == f"about {120 * (8 * 35 + 4 * 4 + 3) / 1000:.1f}kB before compression"
+    assert told.pop("pair").startswith("natural frequency 7291 Hz")
     assert told == {
         "output": "gears.h5",
         "states": "10",

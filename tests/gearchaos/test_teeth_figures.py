@@ -282,9 +282,7 @@ def test_a_sweep_and_a_response_know_their_teeth(tmp_path):
     response = gearchaos.respond(config.replace("integration.recorded_periods", 54), periods=18)
     assert excitation_of(response.metadata) == excitation_of(result.metadata)
     page = response_page(response, 0)
-    assert (
-        page.axes[0].get_title("right") == "accuracy grade of both gears = 5, drawn gear pair = 0"
-    )
+    assert page.axes[0].get_title("right") == "accuracy grade of both gears = 5, gear pair 0"
     assert page.axes[4].get_xlabel() == "Order of the driving shaft (mesh: 6)"
 
 
