@@ -30,7 +30,7 @@ from numpy.typing import NDArray
 from gearchaos_kernels.block_memory import Present, flags
 from gearchaos_kernels.coefficients import lane_coefficients
 from gearchaos_kernels.flow_layout import Layout, layout
-from gearchaos_kernels.flow_series import TAIL, make_maps, series_of_forcing
+from gearchaos_kernels.flow_series import TAIL, make_maps, right_sides, series_of_forcing
 from gearchaos_kernels.rows import LANES
 from gearchaos_kernels.system import Floats, Groups, Plan, System
 
@@ -164,6 +164,8 @@ def _make(system: System, steps: int, present: Present) -> list[Floats]:
     A motion so fast that no steps resolve it has maps that are not a number.
     """
     place: Layout = layout.py_func(present)
+    # In one line: a parallel loop takes no tuple within a tuple.
+    places = tuple(int(number) for number in np.hstack(place))
     unit = {name: np.full(system.lanes, value) for name, value in _UNIT.items()}
     system = system._replace(groups=system.groups._replace(**unit))
     made = [np.full((steps, place.step_size), np.nan)] * system.lanes
@@ -174,7 +176,8 @@ def _make(system: System, steps: int, present: Present) -> list[Floats]:
         edges = 2.0 * np.pi / count * np.arange(count + 1)
         for column, values in enumerate((np.sin(edges), np.cos(edges))):
             tables[:, :, column], tables[:, :, column + 2] = values[:-1], values[1:]
-        make_maps(coefficients, series_of_forcing(system, count), tables, tails, present)
+        right_side = right_sides(coefficients, present)
+        make_maps(right_side, series_of_forcing(system, count), tables, tails, places)
         for number in np.flatnonzero(tails < TAIL):
             made[left[number]] = tables[number].copy()
         left = left[~(tails < TAIL) & np.isfinite(coefficients).all(axis=1)]

@@ -11,10 +11,16 @@ from numba import prange
 from numpy.polynomial import chebyshev
 
 from gearchaos_kernels import rows
-from gearchaos_kernels.block_memory import aligned_memory, fill_lane, read_state, write_state
-from gearchaos_kernels.compilation import driver, part
+from gearchaos_kernels.block_memory import (
+    Present,
+    aligned_memory,
+    fill_lane,
+    read_state,
+    write_state,
+)
+from gearchaos_kernels.compilation import driver, evaluator, part
 from gearchaos_kernels.equations import Directions, accelerations, gaps_at
-from gearchaos_kernels.flow_layout import BOUNDS, HEADER, TERMS, fourth_derivative, layout
+from gearchaos_kernels.flow_layout import BOUNDS, HEADER, TERMS, Layout, fourth_derivative, layout
 from gearchaos_kernels.forcing import Phase, forcing_at
 from gearchaos_kernels.rows import STRIDE, Coordinates, State
 from gearchaos_kernels.system import Floats, System
@@ -58,20 +64,47 @@ class RightSide(NamedTuple):
 
     ``rates`` (states, states + 3): without mesh stiffness, by state and by drive, sine and cosine
     of the error; ``gaps`` (2, states + 3): both gaps, by the same; ``mobility`` (states, 2): what a
-    force of one in the mesh takes away, the axial one with its share of the stiffness.
+    force of one in the mesh takes away, the axial one with its share of the stiffness;
+    ``stiffness`` (2,): mean and scale of the variation. Of all lanes in front of that, or of one.
     """
 
     rates: Floats
     gaps: Floats
     mobility: Floats
+    stiffness: Floats
+
+
+def right_sides(coefficients: Floats, present: Present) -> RightSide:
+    """Return eq. 13 of lanes as matrices."""
+    lanes, states = len(coefficients), layout.py_func(present).states
+    shapes = (states, states + 3), (2, states + 3), (states, 2), (2,)
+    result = RightSide(*(np.zeros((lanes, *shape)) for shape in shapes))
+    differentiate(coefficients, result, present)
+    return result
+
+
+@evaluator
+def differentiate(coefficients, result, present):
+    """Apply the formulas of eq. 13 to one unit after the other, lane by lane."""
+    for lane in range(coefficients.shape[0]):
+        differentiate_lane(coefficients[lane], of_lane(result, lane), present)
 
 
 @part
-def differentiate(coefficients, right_side, present):
-    """Apply the formulas of eq. 13 of a lane to one unit after the other; return the lane."""
+def of_lane(right_side, lane):
+    """Return the matrices of one lane."""
+    rates, gaps, mobility, stiffness = right_side
+    return RightSide(rates[lane], gaps[lane], mobility[lane], stiffness[lane])
+
+
+@part
+def differentiate_lane(coefficients, right_side, present):
+    """Apply the formulas of eq. 13 of a lane to one unit after the other."""
     states = right_side.rates.shape[0]
     memory = aligned_memory()
     lane = fill_lane(memory, 0, coefficients)
+    right_side.stiffness[0] = lane.mean_stiffness
+    right_side.stiffness[1] = lane.stiffness_variation
     zero = Coordinates(0.0, 0.0, 0.0, 0.0, 0.0)
     rest = State(zero, zero)
     for column in range(states + 3):
@@ -101,7 +134,6 @@ def differentiate(coefficients, right_side, present):
         write_state(memory, rows.STATE, 0, result, present)
         for line in range(states):
             right_side.mobility[line, way] = memory[(rows.STATE + line) * STRIDE]
-    return lane
 
 
 def series_of_forcing(system: System, steps: int) -> Floats:
@@ -123,22 +155,24 @@ def series_of_forcing(system: System, steps: int) -> Floats:
 
 
 @driver
-def make_maps(coefficients, forcing, tables, tails, present):
-    """Fill the maps of lanes, shape (lanes, steps, size of a step), and tell what series leave."""
+def make_maps(right_side, forcing, tables, tails, places):
+    """Fill the maps of lanes, shape (lanes, steps, size of a step), and tell what series leave.
+
+    Compiled once for all scenes: ``places`` are the numbers of their layout.
+    """
     for number in prange(tables.shape[0]):
         # One type of number inside and outside of the parallel loop: else two are compiled.
         lane = np.int64(number)
-        tails[lane] = fill_maps(coefficients[lane], forcing, tables[lane], present)
+        tails[lane] = fill_maps(of_lane(right_side, lane), forcing, tables[lane], places)
 
 
 @part
-def fill_maps(coefficients, forcing, table, present):
+def fill_maps(right_side, forcing, table, places):
     """Fill the maps of a lane, shape (steps, size of a step); return what series leave."""
-    place = layout(present)
-    states = place.states
-    rates, gaps = np.zeros((states, states + 3)), np.zeros((2, states + 3))
-    right_side = RightSide(rates, gaps, np.zeros((states, 2)))
-    lane = differentiate(coefficients, right_side, present)
+    states, columns, width, gap_y, gap_z, switch_y, switch_z, size, pairs, ways, step = places
+    gaps, switches = (gap_y, gap_z), (switch_y, switch_z)
+    place = Layout(states, columns, width, gaps, switches, size, pairs, ways, step)
+    mean, variation = right_side.stiffness[0], right_side.stiffness[1]
     tail = 0.0
     for first in range(0, table.shape[0], TOGETHER):
         some = table[first : first + TOGETHER]
@@ -151,10 +185,10 @@ def fill_maps(coefficients, forcing, table, present):
             engaged[0, at] = 1.0 - pair % 2
             engaged[1, at] = 1.0 - pair // 2
             for term in range(ORDER):
-                acting[0, term, at] = lane.stiffness_variation * near[0, term, step]
+                acting[0, term, at] = variation * near[0, term, step]
                 acting[1, term, at] = near[1, term, step]
                 acting[2, term, at] = near[2, term, step]
-            acting[0, 0, at] += lane.mean_stiffness
+            acting[0, 0, at] += mean
         tail = np.maximum(tail, fill_steps(right_side, engaged, acting, some, place))
         if not tail < TAIL:
             break
@@ -168,7 +202,7 @@ def fill_steps(right_side, engaged, forcing, table, place):
     In every array the last numbers are those of these steps, pair by pair.
     """
     states, columns, ways = place.states, place.columns, place.ways
-    rates, gaps, mobility = right_side
+    rates, gaps, mobility, _ = right_side
     width = engaged.shape[1]
     error = states + 1 + ways
 
