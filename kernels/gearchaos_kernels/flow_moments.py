@@ -99,12 +99,16 @@ def guess_fall(value_left, slope_left, value_right, slope_right, width):
 @scalar
 def polynomial(numbers, first, stride, at):
     """Return the value of a polynomial, and its slope; its terms stand so far apart."""
-    value = numbers[first + (TERMS - 1) * stride]
-    slope = 0.0
-    for term in range(TERMS - 2, -1, -1):
-        slope = slope * at + value
-        value = value * at + numbers[first + term * stride]
-    return value, slope
+    # Even and odd terms, which do not wait for each other.
+    square = at * at
+    even, odd = numbers[first + (TERMS - 2) * stride], numbers[first + (TERMS - 1) * stride]
+    even_slope, odd_slope = 0.0, 0.0
+    for term in range(TERMS - 4, -1, -2):
+        even_slope = even_slope * square + even
+        odd_slope = odd_slope * square + odd
+        even = even * square + numbers[first + term * stride]
+        odd = odd * square + numbers[first + (term + 1) * stride]
+    return even + at * odd, odd + 2.0 * at * (even_slope + at * odd_slope)
 
 
 @part
