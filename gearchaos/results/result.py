@@ -37,9 +37,9 @@ class Result:
     file; ``data`` by name: the values of each variable, of the shape of its dimensions or with all
     axes flattened into the first one; those that carry their own ``values`` may be left out;
     ``parameters``, ``metadata`` by name: dimensionless groups with their origin; title,
-    formulation, configuration, provenance; ``fixed_axes`` by name: axes
-    that `sel` has fixed. Raises ValueError if an array is missing, its shape
-    contradicts the dimensions, or an axis is no ascending row of values.
+    formulation, configuration, provenance; ``fixed_axes`` by name: axes that `sel` has fixed.
+    Raises ValueError if an array is missing, its shape contradicts the dimensions, or an axis is no
+    ascending row of values.
     """
 
     def __init__(

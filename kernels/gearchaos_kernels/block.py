@@ -1,7 +1,7 @@
 """One block of lanes through all its mesh periods, on one thread.
 
 A method takes one step in every slot, and says how many lanes may have left a contact branch; those
-are looked at one by one. The loop over slots in `step_block` has a whole Runge-Kutta step in plain
+are looked at again. The loop over slots in `step_block` has a whole Runge-Kutta step in plain
 local numbers as its body: this is what the compiler turns into vector instructions. `flow_steps`
 takes the other kind. What is done once per mesh period (section, check for divergence) stands
 outside, and so does scaling the tangent vectors.
@@ -30,7 +30,7 @@ from gearchaos_kernels.block_memory import (
 )
 from gearchaos_kernels.chosen import begin_chosen, end_chosen, half_of, tell_chosen
 from gearchaos_kernels.compilation import align_stack, part, scalar
-from gearchaos_kernels.contact import branches_at, end_contact, step_may_leave
+from gearchaos_kernels.contact import branches_at, end_contact, ways_that_may_leave
 from gearchaos_kernels.equations import gaps_at
 from gearchaos_kernels.flow_crossings import cross
 from gearchaos_kernels.flow_layout import KNOWN, OWN, Work, layout
@@ -217,9 +217,9 @@ def step_block(memory, phases, present):
             after, slopes = step(state, 1.0, lane, during, branches, present)
             gaps = gaps_at(state, lane, during.begin, present)
             gaps_after = gaps_at(after, lane, during.end, present)
-            suspect = step_may_leave(gaps, gaps_after, branches, (0.0, 0.0), present)
-            suspects += 1 if suspect else 0
-            memory[rows.SUSPECT * STRIDE + slot] = 1.0 if suspect else 0.0
+            ways = ways_that_may_leave(gaps, gaps_after, branches, (0.0, 0.0), present)
+            suspects += 1 if ways != 0.0 else 0
+            memory[rows.SUSPECT * STRIDE + slot] = ways
         if present.resolved is not None or present.loads is not None:
             write_state(memory, rows.STATE_BEFORE, slot, state, present)
         write_state(memory, rows.STATE, slot, after, present)

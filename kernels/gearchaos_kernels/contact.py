@@ -101,12 +101,14 @@ def row_of_flank(offset):
 
 
 @scalar
-def step_may_leave(begin, end, branches, margins, present):
-    """Tell whether a step from one pair of gaps to another may leave a branch of either."""
-    suspect = may_leave(begin.tangential, end.tangential, branches.tangential, margins[0])
+def ways_that_may_leave(begin, end, branches, margins, present):
+    """Return which gaps may leave their branches in a step: 1 tangential, 2 axial, 3 both."""
+    ways = (
+        1.0 if may_leave(begin.tangential, end.tangential, branches.tangential, margins[0]) else 0.0
+    )
     if present.axial is not None:
-        suspect |= may_leave(begin.axial, end.axial, branches.axial, margins[1])
-    return suspect
+        ways += 2.0 if may_leave(begin.axial, end.axial, branches.axial, margins[1]) else 0.0
+    return ways
 
 
 @scalar

@@ -24,7 +24,6 @@ from gearchaos_kernels.flow_layout import (
     END,
     GAP,
     GAPS,
-    HEADER,
     INPUTS,
     MOMENT,
     OWN,
@@ -36,9 +35,8 @@ from gearchaos_kernels.flow_layout import (
 from gearchaos_kernels.flow_moments import UNKNOWN, find_moments
 from gearchaos_kernels.flow_steps import (
     gather,
+    maps_on,
     mean_errors,
-    offset_of,
-    pair_of,
     phases_of,
     scatter,
     store_offsets,
@@ -97,7 +95,7 @@ def look_along(memory, slot, numbers, own, way, table, row, present):
     lane = read_lane(memory, slot)
     branches = read_branches(memory, slot)
     gap = own + GAPS + way * GAP
-    at = row + HEADER + pair_of(branches, present) * place.size + place.gaps[way]
+    at = maps_on(branches, row, present) + place.gaps[way]
     error = mean_errors(lane, present)[way]
     vectors.look_along(numbers, gap, own + INPUTS, error, table, at, present)
     branch = branches[way]
@@ -140,7 +138,7 @@ def cross_over(memory, slot, numbers, own, table, row, number, recorded, present
     way = 1 if axially else 0
     gap = own + GAPS + way * GAP
     crossed = crossed_at(numbers, gap)
-    columns = row + HEADER + pair_of(branches, present) * place.size + place.gaps[way]
+    columns = maps_on(branches, row, present) + place.gaps[way]
     at_step = number + 0.5 * (1.0 + moment)
     branches, branch, following = contact.leave(
         memory, slot, axially, crossed, branches, lane, at_step, recorded, present
@@ -157,9 +155,9 @@ def cross_over(memory, slot, numbers, own, table, row, number, recorded, present
     # One of the two offsets is that of the flank, the other one 0.
     numbers[gap] -= branch.offset + following.offset
     sign = branch.engaged - following.engaged
-    switch = row + HEADER + pair_of(branches, present) * place.size + place.switches[way]
+    switch = maps_on(branches, row, present) + place.switches[way]
     vectors.add_switch(numbers, own, gap, moment, sign, table, switch, present)
-    offset = offset_of(way, lane, branches, present)
+    offset = memory[(rows.FORCES + 1 + way) * STRIDE + slot]
     numbers[own + INPUTS + place.states + 1 + way] = offset
     numbers[own + DONE] = moment
 
@@ -173,7 +171,7 @@ def arrive(memory, slot, numbers, own, table, row, present):
     for line in range(place.states):
         memory[(rows.STATE + line) * STRIDE + slot] = numbers[own + INPUTS + line]
     elsewhere = read_state(memory, rows.STATE, slot, present)
-    at = row + HEADER + pair_of(branches, present) * place.size
+    at = maps_on(branches, row, present)
     scatter(memory, slot, table, at, numbers, own, present)
     after = read_state(memory, rows.STATE, slot, present)
     begin, end = phases_of(table, row)

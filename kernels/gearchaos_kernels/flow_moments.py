@@ -62,16 +62,13 @@ def find_side_by_side(columns):
         slope_left = side * columns[(BEGIN + 1) * VECTOR + n]
         value_right = side * columns[END * VECTOR + n] + distance
         slope_right = side * columns[(END + 1) * VECTOR + n]
-        point1 = value_left + 2.0 * _THIRD * slope_left
-        point2 = value_right - 2.0 * _THIRD * slope_right
-        stray = columns[BEND * VECTOR + n] * 2.0 * _THIRD
-        stays = min(point1, point2) >= stray / 12.0 and value_right >= 0.0
+        ends = value_left, slope_left, value_right, slope_right
+        lowest, highest, steepest = bounds_of(ends, 2.0, columns[BEND * VECTOR + n])
+        stays = lowest >= 0.0 and value_right >= 0.0
         # From the other side: a lane between the flanks may meet either.
-        farthest = max(max(point1, point2) + stray / 12.0, value_right)
-        one_way = distance < 0.0 or farthest <= 2.0 * distance
-        steepest = max(max(2.0 * slope_left, 3.0 * (point2 - point1)), 2.0 * slope_right)
-        falls = steepest < -0.2 * stray and value_right < 0.0
-        guess = guess_fall(value_left, slope_left, value_right, slope_right, 2.0)
+        one_way = distance < 0.0 or max(highest, value_right) <= 2.0 * distance
+        falls = steepest < 0.0 and value_right < 0.0
+        guess = guess_fall(ends, 2.0)
         at = min(max(guess - 1.0, -1.0), 1.0)
         value, slope, correction = 0.0, 0.0, 0.0
         for _ in range(_ITERATIONS):
@@ -87,8 +84,26 @@ def find_side_by_side(columns):
 
 
 @scalar
-def guess_fall(value_left, slope_left, value_right, slope_right, width):
+def bounds_of(ends, width, bend):
+    """Bound a gap within a piece, from below and above, and the rise of its steepest slope.
+
+    ``ends``: value and slope on the left and on the right; ``bend``: more than the fourth
+    derivative. The gap and the cubic differ by bend (width^4 / 24) t^2 (1 - t)^2 at most.
+    """
+    value_left, slope_left, value_right, slope_right = ends
+    point1 = value_left + _THIRD * width * slope_left
+    point2 = value_right - _THIRD * width * slope_right
+    stray = bend * width**4 / 24.0
+    steepest = max(max(width * slope_left, 3.0 * (point2 - point1)), width * slope_right)
+    # Their slopes differ by less than a fifth of the same number.
+    lowest, highest = min(point1, point2), max(point1, point2)
+    return lowest - stray / 12.0, highest + stray / 12.0, steepest + 0.2 * stray
+
+
+@scalar
+def guess_fall(ends, width):
     """Return where in a piece a gap falls below 0, by the cubic of the place over the value."""
+    value_left, slope_left, value_right, slope_right = ends
     fallen = value_left - value_right
     done = value_left / fallen
     early = (1.0 - done) * (-fallen / slope_left - width)
@@ -138,19 +153,14 @@ def first_below(numbers, gap, side, distance, left):
     value_right, slope_right = gap_at(given, right)
     for _ in range(_LOOKS):
         width = right - left
-        # The polynomial and the cubic differ by bend (width^4 / 24) t^2 (1 - t)^2 at most.
-        stray = numbers[gap + BEND] * width**4 / 24.0
-        point1 = value_left + _THIRD * width * slope_left
-        point2 = value_right - _THIRD * width * slope_right
-        clear = min(point1, point2) >= stray / 12.0 and value_right >= 0.0
+        ends = value_left, slope_left, value_right, slope_right
+        lowest, _, steepest = bounds_of(ends, width, numbers[gap + BEND])
+        clear = lowest >= 0.0 and value_right >= 0.0
         if not clear:
-            # Their slopes differ by less than a fifth of the same number.
-            steepest = max(width * slope_left, 3.0 * (point2 - point1), width * slope_right)
-            if steepest < -stray * 0.2 and value_right < 0.0:
-                guess = left + guess_fall(value_left, slope_left, value_right, slope_right, width)
-                guess = min(max(guess, left), right)
+            if steepest < 0.0 and value_right < 0.0:
+                guess = min(max(left + guess_fall(ends, width), left), right)
                 return contact.falling_root(gap_at, given, left, right, guess)
-            clear = steepest < -stray * 0.2
+            clear = steepest < 0.0
             if not clear and width < _NARROW:
                 if value_right < 0.0:
                     return right

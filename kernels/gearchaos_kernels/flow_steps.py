@@ -11,21 +11,13 @@ from gearchaos_kernels import flow_vectors as vectors
 from gearchaos_kernels.block_memory import read_branches, read_lane, read_state
 from gearchaos_kernels.compilation import scalar
 from gearchaos_kernels.equations import gaps_at
-from gearchaos_kernels.flow_layout import (
-    HEADER,
-    INPUTS,
-    RESULT,
-    TANGENT_INPUTS,
-    layout,
-)
+from gearchaos_kernels.flow_layout import HEADER, INPUTS, RESULT, TANGENT_INPUTS, layout
 from gearchaos_kernels.flow_vectors import VECTOR
 from gearchaos_kernels.forcing import Phase, forcing_at
 from gearchaos_kernels.rows import LANES, STRIDE, Branch, Branches
 
 ALWAYS = Branch(1.0, 0.0, -math.inf, math.inf)
 """The branch of a mesh without clearance."""
-
-HARD = -2.0
 
 
 @scalar
@@ -82,6 +74,12 @@ def pair_of(branches, present):
 
 
 @scalar
+def maps_on(branches, row, present):
+    """Return where in their table the maps of a step on a pair of branches begin."""
+    return row + HEADER + pair_of(branches, present) * layout(present).size
+
+
+@scalar
 def move_block(memory, table, row, slots, numbers, present):
     """Take one step in so many slots; return how many may have left a contact branch."""
     place = layout(present)
@@ -115,7 +113,7 @@ def move_lane(memory, table, row, numbers, present):
         memory[(rows.MARGINS + 1) * STRIDE] = margins[1]
     at = row + HEADER
     if present.resolved is not None:
-        at += pair_of(read_branches(memory, 0), present) * place.size
+        at = maps_on(read_branches(memory, 0), row, present)
     scatter(memory, 0, table, at, numbers, 0, present)
     return count_suspects(memory, 1, table, row, present)
 
@@ -166,14 +164,7 @@ def count_suspects(memory, slots, table, row, present):
         gaps_after = gaps_at(after, lane, forcing_at(lane, end, present), present)
         at = rows.MARGINS * STRIDE + slot
         margins = memory[at], memory[at + STRIDE]
-        ways = 0.0
-        if contact.may_leave(
-            gaps.tangential, gaps_after.tangential, branches.tangential, margins[0]
-        ):
-            ways = 1.0
-        if present.axial is not None:
-            if contact.may_leave(gaps.axial, gaps_after.axial, branches.axial, margins[1]):
-                ways += 2.0
+        ways = contact.ways_that_may_leave(gaps, gaps_after, branches, margins, present)
         suspects += 1 if ways != 0.0 else 0
         memory[rows.SUSPECT * STRIDE + slot] = ways
     return suspects

@@ -91,7 +91,7 @@ COEFFICIENTS = 2 * BEFORE
 TANGENTIAL_BRANCH = COEFFICIENTS + len(Lane._fields)
 AXIAL_BRANCH = TANGENTIAL_BRANCH + len(Branch._fields)
 SUSPECT = AXIAL_BRANCH + len(Branch._fields)
-"""Row that marks the lanes whose step may have left a contact branch."""
+"""Row of the gaps that may have left their branches in a step: 1 tangential, 2 axial, 3 both."""
 GROWTH = SUSPECT + 1  # Row of the logarithm of the tangent vector's growth since the period began.
 CROSSINGS, SLOWEST, OVERFLOWS = range(GROWTH + 1, GROWTH + 4)
 """Clearance boundaries that a lane crossed, the smallest speed there, steps with too many."""
