@@ -21,6 +21,8 @@ MOST_POINTS = 512
 
 NEIGHBOURS = 4  # Nearest points that must lie in the same band.
 
+PORTION = 64  # Points looked at together: most chaotic sections show soon that they have one band.
+
 EXPLAINED = 0.1
 """Share of the variance beyond which subsequences may be bands; of 13 random ones it is 0.02."""
 
@@ -88,14 +90,17 @@ def _may_have_bands(section: Floats) -> Mask:
 
 def _common_step(points: Floats) -> int:
     """Return the greatest common divisor of the steps in time between nearest neighbours."""
-    apart = np.zeros((points.shape[0], points.shape[0]))
-    for coordinate in points.T:
-        apart += np.subtract.outer(coordinate, coordinate) ** 2
-    np.fill_diagonal(apart, np.inf)
-    nearest = np.argpartition(apart, NEIGHBOURS, axis=1)[:, :NEIGHBOURS]
-    return int(
-        np.gcd.reduce(np.abs(nearest - np.arange(points.shape[0])[:, np.newaxis]), axis=None)
-    )
+    every, common = np.arange(points.shape[0]), 0
+    for some in np.split(every, every[::PORTION][1:]):
+        apart = np.zeros((some.size, every.size))
+        for coordinate in points.T:
+            apart += np.subtract.outer(coordinate[some], coordinate) ** 2
+        apart[np.arange(some.size), some] = np.inf
+        nearest = np.argpartition(apart, NEIGHBOURS, axis=1)[:, :NEIGHBOURS]
+        common = int(np.gcd.reduce(np.abs(nearest - some[:, np.newaxis]), axis=None, initial=common))
+        if common == 1:
+            break
+    return common
 
 
 def smooth_weights(points: int) -> Floats:

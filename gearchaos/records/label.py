@@ -194,8 +194,8 @@ def _aperiodic(section: Floats, growth: Floats, torus: Mask) -> Codes:
     first, last = section[:, :quarter], section[:, -quarter:]
     ratio = np.max(np.abs(last), axis=(1, 2)) / np.max(np.abs(first), axis=(1, 2))
     grows = chaotic & (np.log(ratio) > exponent * (section.shape[1] - quarter) / 2.0)
-    enough = section.shape[1] >= 2 * POINTS_NEEDED
-    quasi_periodic = enough & torus & neutral & (halves_differ_by(section) <= AGREEMENT)
+    quasi_periodic = torus & neutral & (section.shape[1] >= 2 * POINTS_NEEDED)
+    quasi_periodic[quasi_periodic] = halves_differ_by(section[quasi_periodic]) <= AGREEMENT
     motion = np.where(chaotic, CHAOTIC, np.where(quasi_periodic, QUASI_PERIODIC, UNRESOLVED))
     motion[grows] = GROWS
     return motion.astype(np.uint8)

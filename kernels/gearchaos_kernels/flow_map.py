@@ -134,7 +134,7 @@ def maps_of(system: System, steps: int, present: Present) -> Maps:
     while done < len(names):
         some = range(done, min(done + together, len(names)))
         new = [number for number in some if names[number] not in _kept.places]
-        made = _make(system.of(new), steps, present)
+        made = _make(system.of(new), steps, present) if new else []
         size = sum(maps.size for maps in made)
         if _kept.used + size > _kept.table.size:
             if done:
