@@ -97,7 +97,8 @@ def _common_step(points: Floats) -> int:
             apart += np.subtract.outer(coordinate[some], coordinate) ** 2
         apart[np.arange(some.size), some] = np.inf
         nearest = np.argpartition(apart, NEIGHBOURS, axis=1)[:, :NEIGHBOURS]
-        common = int(np.gcd.reduce(np.abs(nearest - some[:, np.newaxis]), axis=None, initial=common))
+        steps = np.abs(nearest - some[:, np.newaxis])
+        common = int(np.gcd.reduce(steps, axis=None, initial=common))
         if common == 1:
             break
     return common

@@ -89,16 +89,17 @@ def integrate(
         if maps.size:
             unmapped = np.repeat(np.isnan(maps[blocks[:, 3]]), blocks[:, 1])
             outcome.status[order[unmapped]] = Status.TOO_FAST
+    sums = outcome.amplitudes.reshape(lanes, len(columns) + 1, len(plan.orders))
+    if not present.loads:
+        return outcome._replace(amplitudes=sums)
     step = system.mesh_period / steps_taken
     samples = (steps_taken * max(1, plan.recorded_periods))[:, np.newaxis, np.newaxis]
-    if present.loads is not None:
-        # Forces come per step squared, and the sums of Simpson's rule.
-        outcome.loads[:, :, 2:] /= 6.0 * samples
-        outcome.loads[:, :2] /= step[:, np.newaxis, np.newaxis] ** 2
-        outcome.loads[:, :2, 3] /= step[:, np.newaxis] ** 2
+    # Forces come per step squared, and the sums of Simpson's rule.
+    outcome.loads[:, :, 2:] /= 6.0 * samples
+    outcome.loads[:, :2] /= step[:, np.newaxis, np.newaxis] ** 2
+    outcome.loads[:, :2, 3] /= step[:, np.newaxis] ** 2
     scales = np.pad(state_scales(system, step)[:, columns], ((0, 0), (0, 1)), constant_values=1.0)
     scales = scales[..., np.newaxis]
-    sums = outcome.amplitudes.reshape(lanes, len(columns) + 1, len(plan.orders))
     return outcome._replace(
         # A scaled state may have the other sign.
         extremes=np.sort(outcome.extremes * scales[:, :-1], axis=2),

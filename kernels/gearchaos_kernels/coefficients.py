@@ -31,9 +31,9 @@ def state_scales(system: System, step: Floats) -> Floats:
     for present, way in ((effects.transverse, cosine), (effects.axial, sine)):
         if present:
             displacements += [way * groups.mass_ratio_p, -way * groups.mass_ratio_g]
-    scales = np.repeat(np.stack(displacements, axis=1), 2, axis=1)
-    scales[:, 1::2] /= step[:, np.newaxis]
-    return scales
+    scales = np.repeat(np.array(displacements), 2, axis=0)
+    scales[1::2] /= step
+    return scales.T.copy()
 
 
 def lane_coefficients(system: System, step: Floats) -> Floats:
@@ -67,7 +67,7 @@ def lane_coefficients(system: System, step: Floats) -> Floats:
         tangential_speed=cosine / step,
         axial_speed=sine / step,
     )
-    return np.stack(np.broadcast_arrays(*lane), axis=1).astype(np.float64)
+    return np.array(lane, dtype=np.float64).T.copy()
 
 
 def steps_between_scalings(

@@ -155,7 +155,7 @@ def maps_of(system: System, steps: int, present: Present) -> Maps:
 
 def _own_groups(system: System) -> Floats:
     """Return the groups on which maps depend, shape (lanes, groups)."""
-    return np.stack([getattr(system.groups, name) for name in OWN], axis=1)
+    return np.array([getattr(system.groups, name) for name in OWN]).T.copy()
 
 
 def _make(system: System, steps: int, present: Present) -> list[Floats]:
