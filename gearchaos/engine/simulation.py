@@ -23,6 +23,7 @@ from gearchaos.engine.steps import (
     Candidate,
     choose_steps,
     coarse_steps,
+    needless_maps,
     pilot,
     solution_of,
     stable_steps,
@@ -66,7 +67,7 @@ class Simulation:
         )
         judged = outputs.lyapunov and integration.tolerance is None
         coarse = coarse_steps(self.lanes, steps) if judged else ""
-        notes = [note, coarse, *remarks(self.lanes, lengths)]
+        notes = [note, coarse, needless_maps(self.lanes, self.plan), *remarks(self.lanes, lengths)]
         self.notes = [text for text in notes if text]
         self._choice: list[known.Variable] = []
 

@@ -5,11 +5,11 @@ from collections.abc import Callable, Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
-from gearchaos_kernels import Outcome, Plan, Status, System, integrate
+from gearchaos_kernels import MOST_MAP_BYTES, Outcome, Plan, Status, System, integrate, maps_memory
 
 from gearchaos.arrays import Integers
 from gearchaos.configuration.messages import Fault
-from gearchaos.configuration.run_tables import MOST_STEPS_PER_PERIOD
+from gearchaos.configuration.run_tables import FLOW_MAP_STEPS, MOST_STEPS_PER_PERIOD
 from gearchaos.dynamics import stability
 from gearchaos.dynamics.labelling import Told
 from gearchaos.dynamics.largest_exponents import largest_exponents
@@ -99,6 +99,20 @@ def coarse_steps(lanes: Lanes, steps: int) -> str:
         f"{steps} steps per period shift Lyapunov exponents by about {bias[worst]:.1g} (that of "
         f"the pair in contact is {true[worst]:.2g}), and no standard error shows it; raise "
         "integration.steps_per_period, or measure it with integration.error_check"
+    )
+
+
+def needless_maps(lanes: Lanes, plan: Plan) -> str:
+    """Tell where flow maps are too many to be kept and fewer would do; empty where they are not."""
+    if plan.method != "flow_map" or plan.told_by_steps or plan.steps_per_period <= FLOW_MAP_STEPS:
+        return ""
+    system = lanes.system_of(np.arange(min(len(lanes), LANES_AT_ONCE)))
+    if maps_memory(system, plan, np.ones(system.lanes, dtype=np.int64)) <= 2 * MOST_MAP_BYTES:
+        return ""
+    return (
+        f"integration.steps_per_period = {plan.steps_per_period}: lanes that differ in more than "
+        f"pitch error, load and clearance have flow maps of their own, so many that they are made "
+        f"again for every look at a lane; {FLOW_MAP_STEPS} steps are as exact and much faster"
     )
 
 

@@ -40,7 +40,7 @@ MOST_STEPS = 4096
 TOLD_STEPS = 240
 """Steps per period that loads need, which come from parabolas, and extremes and amplitudes."""
 
-MOST_BYTES = 2**27
+MOST_MAP_BYTES = 2**27
 """Maps that are kept in memory, unless those of one group of lanes are more."""
 
 _UNIT = {
@@ -96,7 +96,7 @@ def maps_memory(system: System, plan: Plan, stable: NDArray[np.int64]) -> int:
     divided = steps * 2.0 ** np.ceil(np.log2(np.maximum(needed / steps, 1.0)))
     sizes = 8 * place.step_size * np.minimum(divided, max(steps, MOST_STEPS))
     # Those that are kept, and those that are being made.
-    return 2 * int(min(sizes.sum(), MOST_BYTES + sizes.max()))
+    return 2 * int(min(sizes.sum(), MOST_MAP_BYTES + sizes.max()))
 
 
 class _Kept:
@@ -106,7 +106,7 @@ class _Kept:
     """
 
     def __init__(self, size: int) -> None:
-        self.table = np.empty(max(size, MOST_BYTES // 8))
+        self.table = np.empty(max(size, MOST_MAP_BYTES // 8))
         self.used = 0
         self.places: dict[Hashable, tuple[int, int]] = {}
 
@@ -148,7 +148,7 @@ def maps_of(system: System, steps: int, present: Present) -> Maps:
         # Lanes side by side need about as many steps.
         steps_made, _ = _kept.places[names[done - 1]]
         size = 8 * steps_made * layout.py_func(present).step_size
-        together = max(1, min(LANES, MOST_BYTES // (4 * size)))
+        together = max(1, min(LANES, MOST_MAP_BYTES // (4 * size)))
     places = np.array([_kept.places[name] for name in names[:done]], dtype=np.intp)
     return Maps(_kept.table, places[:, 0], places[:, 1])
 

@@ -262,6 +262,20 @@ def test_a_state_at_rest_without_load_stays_there_with_any_number_of_steps():
     assert np.all(outcome.end_state == 0.0)
 
 
+def test_more_flow_maps_than_are_kept_are_told():
+    swept = "sweep={parameter='mesh_frequency',from=0.5,to=1.5,count=1000}"
+    finer = "integration.steps_per_period=200"
+    for settings, many in (
+        ([swept, finer], True),
+        ([swept, "integration.steps_per_period=24"], False),
+        ([finer], False),
+        ([swept, finer, "outputs.loads=true"], False),  # They need so many steps.
+        ([swept, finer, "integration.method=rk4"], False),
+    ):
+        sweep = simulation("integration.method=flow_map", *settings)
+        assert any("made again for every look" in note for note in sweep.notes) == many
+
+
 def test_flow_maps_have_no_limit_and_say_so():
     sweep = simulation("integration.method=flow_map", "integration.steps_per_period=3")
     assert sweep.plan.steps_per_period == 3
