@@ -10,7 +10,6 @@ the longest stable one are stable.
 """
 
 from collections.abc import Iterator
-from typing import NamedTuple
 
 import numpy as np
 from gearchaos_kernels import Groups, System, jacobian
@@ -19,50 +18,12 @@ from gearchaos.arrays import Complex, Floats, Integers
 
 MOST_STEPS = 2**53  # Stands for every number of steps beyond it.
 
-OWNERS = {
-    "delta_5": "torsion",
-    "delta_1": "transverse bearing of the driving gear",
-    "delta_2": "transverse bearing of the driven gear",
-    "delta_3": "axial bearing of the driving gear",
-    "delta_4": "axial bearing of the driven gear",
-}
-"""What moves in each coordinate."""
-
 ROUNDING = 1e-9
 """Relative error granted to eigenvalues: an undamped mode lies on the imaginary axis up to that."""
 
 _BEYOND_MEASURE = 1e150
 _POINTS_PER_WAVE = 64
 _RAYS = 2**14
-
-
-class StabilityLimit(NamedTuple):
-    """Why a number of steps per period is unstable.
-
-    ``lanes``, ``fewest`` (unstable lanes,): their numbers, and the fewest stable steps of each;
-    ``eigenvalue``: the one that asks for the most steps, per unit of tau; ``owner``: what moves
-    most in its mode.
-    """
-
-    lanes: Integers
-    fewest: Integers
-    eigenvalue: complex
-    owner: str
-
-    @property
-    def steps(self) -> int:
-        """Fewest steps per period with which all lanes are stable."""
-        return int(np.max(self.fewest))
-
-
-def stability_limit(system: System, steps: int) -> StabilityLimit | None:
-    """Find the lanes in which so many steps per period are unstable; None if there are none."""
-    fewest = fewest_stable_steps(system)
-    unstable = np.flatnonzero(fewest > steps)
-    if unstable.size == 0:
-        return None
-    eigenvalue, owner = _strictest_mode(system.of(unstable[[np.argmax(fewest[unstable])]]))
-    return StabilityLimit(unstable, fewest[unstable], eigenvalue, owner)
 
 
 def fewest_stable_steps(system: System) -> Integers:
@@ -73,8 +34,10 @@ def fewest_stable_steps(system: System) -> Integers:
     time only may survive with fewer steps. Eigenvalues whose real part is positive grow by
     themselves and set no limit. Every larger number of steps, shape (lanes,), is stable too.
     """
-    system = _measurable(system)
-    demand = np.max([_demand(block) for _, block in _diagonal_blocks(system)], axis=0)
+    # Groups that no computation could hold are cut short of overflow.
+    clipped = (np.clip(group, -_BEYOND_MEASURE, _BEYOND_MEASURE) for group in system.groups)
+    system = system._replace(groups=Groups(*clipped))
+    demand = np.max([_demand(block) for block in _diagonal_blocks(system)], axis=0)
     with np.errstate(over="ignore"):
         steps: Floats = np.ceil(demand * (1.0 - ROUNDING) * system.mesh_period)
     return np.clip(steps, 1.0, MOST_STEPS).astype(np.intp)
@@ -125,12 +88,6 @@ def steps_per_time(eigenvalues: Complex) -> Floats:
     return np.where(eigenvalues.real <= ROUNDING * size, size / ray, 0.0)
 
 
-def _measurable(system: System) -> System:
-    """Return the system with groups that no computation could hold cut short of overflow."""
-    clipped = (np.clip(group, -_BEYOND_MEASURE, _BEYOND_MEASURE) for group in system.groups)
-    return system._replace(groups=Groups(*clipped))
-
-
 def _stiffnesses(system: System) -> Floats:
     """kappa f' on the branches, shape (stiffnesses, lanes): no contact and the extremes of it."""
     values = [np.ones(system.lanes)]
@@ -145,8 +102,8 @@ def _stiffnesses(system: System) -> Floats:
     return np.stack(values)
 
 
-def _diagonal_blocks(system: System) -> Iterator[tuple[int, Floats]]:
-    """Jacobians of tangential and axial motion at every stiffness, each with its first state.
+def _diagonal_blocks(system: System) -> Iterator[Floats]:
+    """Jacobians of tangential and axial motion at every stiffness.
 
     The axial motion acts on nothing else, so that the eigenvalues of any branch are those of its
     tangential block together with those of its axial one.
@@ -154,9 +111,9 @@ def _diagonal_blocks(system: System) -> Iterator[tuple[int, Floats]]:
     axial = 6 if system.effects.transverse else 2
     for stiffness in _stiffnesses(system):
         whole = jacobian(system, stiffness, stiffness)
-        yield 0, whole[:, :axial, :axial]
+        yield whole[:, :axial, :axial]
         if system.effects.axial:
-            yield axial, whole[:, axial:, axial:]
+            yield whole[:, axial:, axial:]
 
 
 def _demand(block: Floats) -> Floats:
@@ -168,18 +125,3 @@ def _demand(block: Floats) -> Floats:
     eigenvalues = np.linalg.eigvals(block[distinct]).astype(np.complex128)
     demand: Floats = np.max(steps_per_time(eigenvalues), axis=1)
     return demand[kind]
-
-
-def _strictest_mode(system: System) -> tuple[complex, str]:
-    """Return the eigenvalue of one lane that asks for the most steps, and what moves with it."""
-    system = _measurable(system)
-    most, strictest, owner = -1.0, 0j, ""
-    for first, block in _diagonal_blocks(system):
-        values, vectors = np.linalg.eig(block[0].astype(np.complex128))
-        demand = steps_per_time(values)
-        mode = np.argmax(demand)
-        if demand[mode] > most:
-            most, strictest = demand[mode], complex(values[mode])
-            moving = first + 2 * int(np.argmax(np.abs(vectors[1::2, mode])))
-            owner = OWNERS[system.states[moving]]
-    return strictest, owner

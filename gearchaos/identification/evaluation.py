@@ -7,7 +7,7 @@ from gearchaos_kernels import Outcome, Plan, Status, System, integrate, mesh_mot
 
 from gearchaos.arrays import Counts, Floats, Integers, Mask
 from gearchaos.configuration import Configuration
-from gearchaos.dynamics.stability import stability_limit
+from gearchaos.dynamics.stability import fewest_stable_steps
 from gearchaos.dynamics.systems import plan_of, system_of
 from gearchaos.engine.lanes import start_states
 from gearchaos.errors import ConfigurationError
@@ -91,14 +91,14 @@ def require_stable(config: Configuration, values: Floats, parameters: dict[str, 
     candidates = len(next(iter(parameters.values())))
     swept = {config.sweep.parameter: np.tile(ends, candidates)}
     fixed = {key: np.repeat(value, ends.size) for key, value in parameters.items()}
-    limit = stability_limit(system_of(config, swept | fixed, config.needed_effects), steps)
-    if limit is not None:
-        worst = limit.lanes[np.argmax(limit.fewest)]
+    fewest = fewest_stable_steps(system_of(config, swept | fixed, config.needed_effects))
+    worst = np.argmax(fewest)
+    if fewest[worst] > steps:
         where = ", ".join(f"{key} = {value[worst]:.6g}" for key, value in (swept | fixed).items())
         raise ConfigurationError(
             f"{config.source}: integration.steps_per_period = {steps}: RK4 is unstable below "
-            f"{limit.steps} steps per period because of the {limit.owner}, with {where}; raise it "
-            "in `set` of the targets file, or narrow the bounds there"
+            f"{fewest[worst]} steps per period with {where}; raise it in `set` of the targets "
+            "file, or narrow the bounds there"
         )
 
 

@@ -12,7 +12,6 @@ from gearchaos.dynamics.stability import (
     MOST_STEPS,
     exponent_bias,
     fewest_stable_steps,
-    stability_limit,
     steps_per_time,
 )
 from gearchaos.gear.contact_lines import series_table
@@ -156,38 +155,20 @@ def test_lanes_that_share_some_groups_but_not_all_are_told_apart():
     assert fewest(FULL, grid) == pytest.approx(wanted, rel=0.02, abs=1.0)
 
 
-def test_limit_names_the_lanes_the_steps_and_the_cause():
-    stiffness = np.linspace(10.0, 1000.0, 100)
-    model = pan2021(1.0, transverse_stiffness_g=stiffness)
-    limit = stability_limit(system_of(model), 60)
-    assert limit is not None
-    steps = fewest(FULL, model)
-    assert np.array_equal(limit.lanes, np.flatnonzero(steps > 60))
-    assert np.array_equal(limit.fewest, steps[limit.lanes])
-    assert limit.owner == "transverse bearing of the driven gear"
-    assert limit.eigenvalue.imag**2 == pytest.approx(1000.0, rel=1e-2)
-
-
-def test_the_refusal_names_lanes_steps_and_cause():
+def test_the_refusal_names_lanes_and_steps():
     swept = 'sweep={parameter="transverse_stiffness_g", from=10.0, to=1000.0, count=100}'
     fixed = ("groups.pitch_error=1.0", "integration.steps_per_period=60")
     with pytest.raises(ConfigurationError) as refused:
         simulation(swept, *fixed)
-    limit = stability_limit(
-        system_of(
-            pan2021(1.0, transverse_stiffness_g=np.linspace(10.0, 1000.0, 100)),
-            Effects(axial=False),
-        ),
-        60,
-    )
-    first = 10.0 * (1 + limit.lanes[0])
+    stiffness = np.linspace(10.0, 1000.0, 100)
+    steps = fewest(Effects(axial=False), pan2021(1.0, transverse_stiffness_g=stiffness))
+    first = stiffness[steps > 60][0]
     (text,) = refused.value.problems
     assert text.split(": ", 1)[1] == (
         "integration.steps_per_period = 60: RK4 is unstable below "
-        f"{limit.steps} steps per period for {limit.lanes.size} of 100 lanes "
-        f"(transverse_stiffness_g from {first:g} to 1000), because of the eigenvalue "
-        "-0.00914 ± 31.6i of the transverse bearing of the driven gear; "
-        f'raise it to {limit.steps} or more, or set integration.unstable = "raise"'
+        f"{steps.max()} steps per period for {np.sum(steps > 60)} of 100 lanes "
+        f"(transverse_stiffness_g from {first:g} to 1000); "
+        f'raise it to {steps.max()} or more, or set integration.unstable = "raise"'
     )
 
 
@@ -201,8 +182,7 @@ def test_the_refusal_of_two_parameters_names_both():
     with pytest.raises(ConfigurationError) as refused:
         simulation(*both)
     (text,) = refused.value.problems
-    assert "1 of 2 lanes (mesh_frequency = 0.01, damping_ratio = 2), because" in text
-    assert "of the torsion; raise it to" in text
+    assert "1 of 2 lanes (mesh_frequency = 0.01, damping_ratio = 2); raise it to" in text
 
 
 def test_steps_are_raised_to_the_limit_of_the_strictest_lane():
@@ -215,46 +195,26 @@ def test_steps_are_raised_to_the_limit_of_the_strictest_lane():
         "start.kind=random",
         "start.count=3",
     )
-    system = raised.lanes.system_of(np.arange(60))
-    limit = stability_limit(system, 60)
-    assert raised.plan.steps_per_period == limit.steps == fewest_stable_steps(system).max()
+    steps = fewest_stable_steps(raised.lanes.system_of(np.arange(60)))
+    assert raised.plan.steps_per_period == steps.max()
     # At the limit itself, exponents are not to be trusted: the second note.
     note, further = raised.notes
     assert "shift Lyapunov exponents" in further
-    assert f"raised from 60 to {limit.steps}" in note
-    assert note.endswith(f"the stability limit of {limit.lanes.size} of 60 lanes")
+    assert f"raised from 60 to {steps.max()}" in note
+    assert note.endswith(f"the stability limit of {np.sum(steps > 60)} of 60 lanes")
 
 
 @pytest.mark.parametrize("direction", ["transverse", "axial"])
-@pytest.mark.parametrize(("gear", "word"), [("p", "driving"), ("g", "driven")])
-def test_limit_names_the_stiffest_bearing(direction, gear, word):
+@pytest.mark.parametrize("gear", ["p", "g"])
+def test_the_stiffest_bearing_sets_the_limit(direction, gear):
     model = pan2021(1.0, **{f"{direction}_stiffness_{gear}": 1e4})
-    limit = stability_limit(system_of(model), 100)
-    assert limit is not None
-    assert limit.owner == f"{direction} bearing of the {word} gear"
-    assert limit.steps == fewest(FULL, model)[0]
-
-
-def test_limit_of_a_decay_names_a_real_eigenvalue():
-    limit = stability_limit(system_of(oscillator(2.0), TORSION), 100)
-    assert limit is not None
-    assert limit.owner == "torsion"
-    assert limit.eigenvalue == pytest.approx(-2.0 - np.sqrt(3.0))
-
-
-@pytest.mark.parametrize("steps", [16, 17, 18, 100])
-def test_a_stable_number_of_steps_has_no_limit(steps):
-    assert stability_limit(system_of(pan2021([0.0, 15.0])), steps) is None
-    assert stability_limit(system_of(pan2021([0.0, 15.0])), 15) is not None
+    assert fewest(FULL, model)[0] == pytest.approx(PERIOD * 100.0 / np.sqrt(8.0), rel=0.02)
 
 
 @pytest.mark.parametrize("name", ["transverse_stiffness_p", "damping_ratio", "axial_damping_g"])
 def test_groups_beyond_all_measure_ask_for_more_steps_than_there_are(name):
     model = pan2021(1.0, **{name: np.array([1.0, 1e300, 1.7e308])})
     assert fewest(FULL, model)[1:].tolist() == [MOST_STEPS, MOST_STEPS]
-    limit = stability_limit(system_of(model), 10**6)
-    assert limit is not None
-    assert limit.lanes.tolist() == [1, 2]
 
 
 def test_a_state_at_rest_without_load_stays_there_with_any_number_of_steps():
