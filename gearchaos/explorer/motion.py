@@ -46,9 +46,7 @@ def show(shown: list[Any], motion: Result, coordinate: str) -> None:
     figures.time_history(history, motion, 0, coordinate, **late)
     figures.phase_portrait(portrait, motion, 0, coordinate)
     figures.poincare_section(portrait, motion, 0, coordinate)
-    window = "rectangular" if figures.repeats_after(motion, 0) else "hann"
-    look: Any = {"window": window, "logarithmic": True}
-    figures.amplitude_spectrum(spectrum, motion, 0, acceleration_of(coordinate), **look)
+    figures.amplitude_spectrum(spectrum, motion, 0, acceleration_of(coordinate))
     figures.time_history(force, motion, 0, FORCE, **late)
     figures.contact_strip(force, motion, 0, FORCE)
     for panel, axes in zip(shown, drawn, strict=True):

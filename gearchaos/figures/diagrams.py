@@ -1,14 +1,11 @@
 """The diagrams of a sweep over its parameter: section points, and the largest Lyapunov exponent."""
 
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
-from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.colors import to_rgb
-from matplotlib.legend import Legend
-from matplotlib.lines import Line2D
 
 from gearchaos.errors import FigureError
 from gearchaos.figures.labels import axis_label, instead_of
@@ -19,26 +16,6 @@ from gearchaos.results.result import Result, section_variables
 from gearchaos.results.variables import LARGEST_EXPONENT, RECORD, STANDARD_ERROR, STATUS
 
 BAND_STANDARD_ERRORS = 2.0
-
-
-class LyapunovArtists(NamedTuple):
-    """What `lyapunov` has drawn, beside what a `Diagram` has.
-
-    ``line``: the exponents drawn, by the parameter, not a number where a lane diverged;
-    ``points``: exponents without a neighbour to draw a line to, between diverged lanes, or all of
-    them where a parameter value has several starts; ``band``, ``bars``: two standard errors to
-    either side, of the line and of the points; ``positive``: between a positive exponent and zero.
-    """
-
-    line: Line2D
-    points: Line2D
-    band: PolyCollection
-    bars: LineCollection
-    positive: PolyCollection
-    zero: Line2D
-    diverged: Line2D | None
-    off_scale: list[Line2D]
-    legend: Legend | None
 
 
 def bifurcation(
@@ -98,14 +75,17 @@ def lyapunov(
     color: str = BLACK,
     label: str | None = None,
     marker: str = ".",
-) -> LyapunovArtists:
+) -> Diagram:
     """Draw the largest Lyapunov exponent into axes, with zero line and uncertainty.
 
     Diverged lanes are gaps with a red tick at the bottom; a positive exponent is hatched down to
     zero; the vertical axis always holds zero, and lanes beyond robust limits get a triangle. Of
     more lanes than a page can tell apart (`figures.lanes.COLUMNS`), line, shades and bars are those
-    of the lowest and the highest exponent in each column. Parameters are as for `bifurcation`;
-    raises FigureError if the result has no Lyapunov exponents, no lane in the range, or two swept
+    of the lowest and the highest exponent in each column. Of what is returned ``points`` is the
+    line of the exponents; its ``parts`` are the ``dots`` of those without a neighbour to draw a
+    line to, or of all where a value has several starts, the ``band`` and ``bars`` of two standard
+    errors, what is ``positive``, and ``zero``. Parameters are as for `bifurcation`; raises
+    FigureError if the result has no Lyapunov exponents, no lane in the range, or two swept
     parameters.
     """
     if LARGEST_EXPONENT not in result:
@@ -145,7 +125,6 @@ def lyapunov(
         look = {"ms": 3.0, "mfc": "none", "mew": 0.5, "color": VERMILION}
         named += axes.plot(x[mixed], exponent[mixed], "o", label="came from another motion", **look)
     axes.set_ylabel(axis_label(result, LARGEST_EXPONENT, line_length=20))
-    own = Diagram(line, lanes, whole, whole, np.nan_to_num(spread), named)
-    close_panel(axes, result, own, hold_zero=True)
-    marks = own.diverged, own.off_scale, own.legend
-    return LyapunovArtists(line, points, band, bars, positive, zero, *marks)
+    parts = {"dots": points, "band": band, "bars": bars, "positive": positive, "zero": zero}
+    own = Diagram(line, lanes, whole, whole, np.nan_to_num(spread), named, parts)
+    return close_panel(axes, result, own, hold_zero=True)

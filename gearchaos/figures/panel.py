@@ -27,8 +27,8 @@ class Diagram:
 
     ``points``: what shows the lanes, lane after lane; ``low``, ``high`` (lanes,): lowest and
     highest value of each lane, not a number where there is none; ``spread``, (lanes,) or one for
-    all: what the limits leave room for beyond these;
-    ``named``: what the legend names beside the points; ``diverged``: the rug of diverged lanes;
+    all: what the limits leave room for beyond these; ``named``: what the legend names beside the
+    points; ``parts``: what else is drawn, by name; ``diverged``: the rug of diverged lanes;
     ``off_scale``: triangles for lanes beyond bottom and top; ``legend``: of all these.
     """
 
@@ -38,6 +38,7 @@ class Diagram:
     high: Floats
     spread: Floats | float = 0.0
     named: list[Artist] = field(default_factory=list)
+    parts: dict[str, Any] = field(default_factory=dict)
     diverged: Line2D | None = None
     off_scale: list[Line2D] = field(default_factory=list)
     legend: Legend | None = None

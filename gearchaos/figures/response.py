@@ -23,7 +23,7 @@ from gearchaos.results.scales import excitation_of
 COORDINATE = "delta_5"  # The coordinate that is drawn unless another is asked for: the torsion.
 
 HIGHEST_ORDER = 8.0
-DECADES = 5  # Decades that a logarithmic spectrum shows, up to that of its highest line.
+DECADES = 5  # Decades that a spectrum shows, up to that of its highest line.
 CONTACT_COLOURS = (ORANGE, "0.8", BLUE)  # Of teeth apart, of driving and of back flanks in contact.
 STRIP_HEIGHT = 0.05  # Of what tells the contact along the foot of a panel, in parts of the panel.
 
@@ -134,38 +134,33 @@ def amplitude_spectrum(
     variable: str | None = None,
     *,
     highest: float = HIGHEST_ORDER,
-    window: str | None = None,
-    logarithmic: bool = False,
 ) -> LineCollection:
     """Draw the single-sided amplitude spectrum; a sine of amplitude A is a line of height A.
 
-    A motion that repeats is transformed over as many of its periods as the record holds, so that
-    all its lines are those of the transform; any other one over as many periods of the excitation.
-    Each of the lines that are returned begins at the bottom of the axes.
+    A motion that repeats is transformed over as many of its periods as the record holds, with a
+    rectangular window, so that all its lines are those of the transform; any other one over as many
+    periods of the excitation, with the window of Hann. Each of the lines that are returned begins
+    at the bottom of the axes, five decades below the top.
 
     ``axes``, ``result``, ``lane`` and errors: as for `time_history`; ``variable``: one over time,
     by default ``"delta_5_acceleration"``; ``highest``: multiple of the mesh frequency up to which
-    lines are shown; ``window``: ``"rectangular"``, exact for a motion that repeats, or ``"hann"``,
-    by default by whether it repeats within the record; ``logarithmic``: show five decades up to
-    that of the highest line, instead of a linear scale.
+    lines are shown.
     """
     variable = variable or acceleration_of(COORDINATE)
     values, steps = motion_of(result, lane, variable), samples_per_period(result)
     held, excitation = values.size // steps, excitation_of(result.metadata).excitation_period
     repeats = repeats_after(result, lane)
     period = next((n for n in (repeats, excitation) if 0 < n <= held), 1)
-    window = window or ("rectangular" if 0 < repeats <= held else "hann")
+    window = "Rectangular" if 0 < repeats <= held else "Hann"
     periods = held // period * period
     record = values[-1 - periods * steps : -1]
-    order, amplitude = spectral_lines(record, steps, window)
+    order, amplitude = spectral_lines(record, steps, hann=window == "Hann")
     shown = order <= highest
     order, amplitude = order[shown], amplitude[shown]
-    top, floor = (1.0 + _MARGIN) * float(amplitude.max()) or 1.0, 0.0
-    if logarithmic:
-        top = 10.0 ** np.ceil(np.log10(top))
-        floor = top * 10.0**-DECADES
-        axes.set_yscale("log")
-        axes.yaxis.set_minor_formatter(NullFormatter())
+    top = 10.0 ** np.ceil(np.log10((1.0 + _MARGIN) * float(amplitude.max()) or 1.0))
+    floor = top * 10.0**-DECADES
+    axes.set_yscale("log")
+    axes.yaxis.set_minor_formatter(NullFormatter())
     seen = amplitude > floor
     width = 0.5 if np.count_nonzero(amplitude > 1e-3 * top) > _MANY_LINES else 1.0
     lines = axes.vlines(order[seen], floor, amplitude[seen], color=BLUE, linewidth=width)
@@ -177,7 +172,7 @@ def amplitude_spectrum(
     symbol = result.attributes(variable).get("symbol") or plain(variable)
     axes.set_ylabel(f"Amplitude of {symbol} ({unit_of(result, variable)})")
     plural = "s" if periods > 1 else ""
-    remark(axes, f"{window.capitalize()} window, {periods} mesh period{plural}")
+    remark(axes, f"{window} window, {periods} mesh period{plural}")
     return lines
 
 

@@ -101,9 +101,7 @@ def response_page(
                 few_ticks(panels[name], 6, 6)
         variable = acceleration_of(coordinate) if whole else coordinate
         look: dict[str, Any] = {"highest": HIGHEST_ORDER} if teeth else {}
-        lines = response.amplitude_spectrum(
-            spectrum, result, lane, variable, logarithmic=True, **look
-        )
+        lines = response.amplitude_spectrum(spectrum, result, lane, variable, **look)
         if teeth:
             _pitch_error_above(panels["e"], history, result, lane, excitation)
             resolved = round(last) >= excitation.excitation_period

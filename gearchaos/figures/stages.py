@@ -1,11 +1,10 @@
 """Stages of a sweep as shades behind a diagram, so that its parts can be named."""
 
 from itertools import pairwise
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.legend import Legend
 from matplotlib.patches import Patch, Rectangle
 
 from gearchaos.figures.labels import legend_title
@@ -47,14 +46,6 @@ NARROWEST_SHARE = 1.0 / 150.0
 """Narrower stages, in parts of the axis, go into what surrounds them: half a mm in a column."""
 
 
-class StageArtists(NamedTuple):
-    """What `shade_stages` has drawn: one rectangle per stage, and the legend."""
-
-    stages: list[Stage]
-    shades: list[Rectangle]
-    legend: Legend | None
-
-
 def shade_stages(
     axes: Axes,
     result: Result,
@@ -62,7 +53,7 @@ def shade_stages(
     lanes: LabelledLanes | None = None,
     narrowest: float | None = None,
     legend: bool = True,
-) -> StageArtists:
+) -> list[Rectangle]:
     """Shade the stages of a sweep behind what the axes show, limits and labels left as they are.
 
     ``axes``: with the swept parameter along x, limits set; ``result``: over one swept parameter,
@@ -70,8 +61,8 @@ def shade_stages(
     "several motions"; so is a stage that hides too many narrower ones. ``lanes``: with other labels
     than those of the result; ``narrowest``: narrower stages go into what surrounds them, by default
     a 150th of the axis; ``legend``: put a legend of the shades below everything in the figure,
-    which needs the constrained layout. Raises FileError if the result has no labels, FigureError if
-    it has several swept parameters.
+    which needs the constrained layout. Returns a rectangle for each stage within the axes. Raises
+    FileError if the result has no labels, FigureError if it has several swept parameters.
     """
     diagram_lanes(result)  # Refuses two swept parameters.
     lanes = labelled_lanes(result, repeats=True) if lanes is None else lanes
@@ -87,16 +78,14 @@ def shade_stages(
             shades.append(axes.axvspan(*place, linewidth=0.0, zorder=0.0, **look_of(kind)))
             drawn.add(kind)
     axes.set_xlim(low, high)
-    if not legend:
-        return StageArtists(stages, shades, None)
-    named = [kind for kind in dict.fromkeys([*SHADES, *kinds]) if kind in drawn]
-    handles = [Patch(linewidth=0.3, label=kind, **look_of(kind)) for kind in named]
-    # Above the axes are the panel's letter and the marks of lanes that cannot be shown; and a line
-    # at the foot of the page would lie on the legend.
-    figure: Any = axes.figure
-    return StageArtists(
-        stages, shades, legend_below(figure, handles, legend_title(result), columns=5)
-    )
+    if legend:
+        named = [kind for kind in dict.fromkeys([*SHADES, *kinds]) if kind in drawn]
+        handles = [Patch(linewidth=0.3, label=kind, **look_of(kind)) for kind in named]
+        # Above the axes are the panel's letter and the marks of lanes that cannot be shown; and a
+        # line at the foot of the page would lie on the legend.
+        figure: Any = axes.figure
+        legend_below(figure, handles, legend_title(result), columns=5)
+    return shades
 
 
 def look_of(kind: str) -> dict[str, Any]:

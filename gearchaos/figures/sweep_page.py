@@ -100,7 +100,7 @@ def bifurcation_page(
             if LARGEST_EXPONENT in one:
                 # A legend of the colours is enough.
                 curve = lyapunov(stack[-1], one, **shown | ({"label": None} if panels == 2 else {}))
-                curve.line.set(zorder=2.0 - 0.01 * number, linewidth=0.6 * (number + 1))
+                curve.points.set(zorder=2.0 - 0.01 * number, linewidth=0.6 * (number + 1))
         if panels == 2:
             stack[0].set_xlabel("")
             letter(stack)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from gearchaos.records.amplitude_spectrum import WINDOWS, spectral_lines
+from gearchaos.records.amplitude_spectrum import spectral_lines
 
 STEPS, PERIODS = 20, 12
 TIME = np.arange(PERIODS * STEPS) / STEPS
@@ -14,10 +14,10 @@ def wave(amplitude: float, order: float, phase: float = 0.4) -> np.ndarray:
     return amplitude * np.sin(2.0 * np.pi * order * TIME + phase)
 
 
-@pytest.mark.parametrize("window", WINDOWS)
+@pytest.mark.parametrize("hann", [False, True])
 @pytest.mark.parametrize("order", [0.25, 1.0, 7 / 3, 9.0])
-def test_a_sine_of_amplitude_a_is_a_line_of_height_a(window, order):
-    lines = spectral_lines(wave(1.7, order), STEPS, window)
+def test_a_sine_of_amplitude_a_is_a_line_of_height_a(hann, order):
+    lines = spectral_lines(wave(1.7, order), STEPS, hann)
     peak = np.argmax(lines.amplitude)
     assert lines.order[peak] == pytest.approx(order)
     assert lines.amplitude[peak] == pytest.approx(1.7, rel=ROUNDING)
@@ -31,7 +31,7 @@ def test_a_rectangular_window_over_whole_periods_shows_nothing_else():
 
 
 def test_the_hann_window_spreads_a_line_to_its_neighbours_and_keeps_the_mean_apart():
-    lines = spectral_lines(wave(1.0, 1.0) - 3.0, STEPS, "hann")
+    lines = spectral_lines(wave(1.0, 1.0) - 3.0, STEPS, hann=True)
     expected = np.zeros(PERIODS * STEPS // 2 + 1)
     expected[[0, PERIODS - 1, PERIODS, PERIODS + 1]] = 3.0, 0.5, 1.0, 0.5
     np.testing.assert_allclose(lines.amplitude, expected, atol=ROUNDING)
@@ -40,7 +40,7 @@ def test_the_hann_window_spreads_a_line_to_its_neighbours_and_keeps_the_mean_apa
 def test_the_hann_window_keeps_down_what_leaks_from_a_wave_that_does_not_fit():
     between_lines = wave(1.0, 1.0 + 0.5 / PERIODS)
     far = slice(4 * PERIODS, None)
-    plain, hann = (spectral_lines(between_lines, STEPS, window).amplitude for window in WINDOWS)
+    plain, hann = (spectral_lines(between_lines, STEPS, hann).amplitude for hann in (False, True))
     assert np.max(hann[far]) < 0.01 * np.max(plain[far])
 
 
@@ -72,15 +72,7 @@ def test_the_lines_hold_the_mean_square_of_the_motion(samples):
 def test_motions_side_by_side_are_transformed_one_by_one():
     both = np.stack([wave(1.0, 1.0) + 1.0, wave(2.0, 3.0)])
     before = both.copy()
-    amplitude = spectral_lines(both, STEPS, "hann").amplitude
+    amplitude = spectral_lines(both, STEPS, hann=True).amplitude
     for row, motion in zip(amplitude, both, strict=True):
-        np.testing.assert_array_equal(row, spectral_lines(motion, STEPS, "hann").amplitude)
+        np.testing.assert_array_equal(row, spectral_lines(motion, STEPS, hann=True).amplitude)
     np.testing.assert_array_equal(both, before)
-
-
-def test_what_is_no_whole_number_of_periods_and_unknown_windows_are_refused():
-    for samples in (0, STEPS + 1):
-        with pytest.raises(ValueError, match="whole mesh periods of 20 samples"):
-            spectral_lines(np.zeros(samples), STEPS)
-    with pytest.raises(ValueError, match="'kaiser'; there are rectangular, hann"):
-        spectral_lines(TIME, STEPS, "kaiser")

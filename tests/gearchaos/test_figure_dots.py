@@ -129,7 +129,7 @@ def test_of_very_many_lanes_the_outermost_of_each_column_are_drawn():
     result = wide_sweep(50_000, 1, exponent=exponent)
     axes = panel()
     chart = lyapunov(axes, result)
-    x, y = chart.line.get_data()
+    x, y = chart.points.get_data()
     assert x.size <= 2 * COLUMNS + 2
     assert (np.nanmin(y), np.nanmax(y)) == (-0.75, 0.75)
     np.testing.assert_array_equal(y, exponent[np.searchsorted(result["load"], x)])

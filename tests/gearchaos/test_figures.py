@@ -135,14 +135,14 @@ def test_a_diverged_lane_is_marked_and_its_points_are_not_drawn(axes):
     assert artists.points.get_xdata().size == (LANES - 2) * POINTS
     chart = lyapunov(axes, result)
     np.testing.assert_array_equal(chart.diverged.get_xdata(), result["growth"][[7, 50]])
-    np.testing.assert_array_equal(np.flatnonzero(np.isnan(chart.line.get_ydata())), [7, 50])
+    np.testing.assert_array_equal(np.flatnonzero(np.isnan(chart.points.get_ydata())), [7, 50])
 
 
 def test_values_left_over_in_a_diverged_lane_are_not_drawn(axes):
     result = logistic_sweep([3.0, 3.1, 3.2])
     result["status"][1] = 1
     assert 3.1 not in bifurcation(axes, result).points.get_xdata()
-    assert np.isnan(lyapunov(axes, result).line.get_ydata()[1])
+    assert np.isnan(lyapunov(axes, result).points.get_ydata()[1])
 
 
 def test_nothing_is_marked_where_every_lane_is_well(axes, result):
@@ -153,13 +153,13 @@ def test_nothing_is_marked_where_every_lane_is_well(axes, result):
 def test_the_chart_shows_exponent_uncertainty_zero_and_positive_part(axes, result):
     chart = lyapunov(axes, result)
     exponent, error = (result[f"lyapunov_exponent{end}"] for end in ("", "_standard_error"))
-    np.testing.assert_array_equal(chart.line.get_xdata(), result["growth"])
-    np.testing.assert_array_equal(chart.line.get_ydata(), exponent)
-    band = chart.band.get_paths()[0].vertices[:, 1]
+    np.testing.assert_array_equal(chart.points.get_xdata(), result["growth"])
+    np.testing.assert_array_equal(chart.points.get_ydata(), exponent)
+    band = chart.parts["band"].get_paths()[0].vertices[:, 1]
     np.testing.assert_allclose(band.max(), (exponent + 2 * error).max())
     np.testing.assert_allclose(band.min(), (exponent - 2 * error).min())
-    assert set(chart.zero.get_ydata()) == {0.0}
-    heights = np.concatenate([path.vertices[:, 1] for path in chart.positive.get_paths()])
+    assert set(chart.parts["zero"].get_ydata()) == {0.0}
+    heights = np.concatenate([path.vertices[:, 1] for path in chart.parts["positive"].get_paths()])
     assert heights.min() >= 0.0
     assert heights.max() == exponent.max() > 0.4
     assert axes.get_ylim()[0] < 0.0 < axes.get_ylim()[1]
@@ -168,22 +168,23 @@ def test_the_chart_shows_exponent_uncertainty_zero_and_positive_part(axes, resul
 def test_several_starts_of_one_value_are_not_joined_by_a_line(axes):
     result = logistic_sweep([3.0, 3.3, 3.9], starts=2)
     chart = lyapunov(axes, result)
-    assert chart.line.get_linestyle() == "None"
-    np.testing.assert_array_equal(chart.points.get_xdata(), result.along("growth"))
-    assert len(chart.bars.get_segments()) == 6
+    assert chart.points.get_linestyle() == "None"
+    np.testing.assert_array_equal(chart.parts["dots"].get_xdata(), result.along("growth"))
+    assert len(chart.parts["bars"].get_segments()) == 6
     assert bifurcation(axes, result).points.get_xdata().size == 6 * POINTS
 
 
 def test_few_values_have_large_dots_however_many_starts_they_have(axes):
     few, many = logistic_sweep([3.0, 3.5, 3.9], starts=40), logistic_sweep(np.linspace(3, 3.9, 900))
     for draw, least in ((bifurcation, 0.8), (lyapunov, 1.0)):
-        assert draw(axes, few).points.get_markersize() == 3.0
-        assert draw(axes, many).points.get_markersize() == least
+        for result, size in ((few, 3.0), (many, least)):
+            drawn = draw(axes, result)
+            assert drawn.parts.get("dots", drawn.points).get_markersize() == size
 
 
 def test_a_lane_between_diverged_ones_is_still_seen(axes):
     chart = lyapunov(axes, logistic_sweep([3.0, 3.1, 3.2, 3.3], diverged=[0, 2]))
-    np.testing.assert_array_equal(chart.points.get_xdata(), [3.1, 3.3])
+    np.testing.assert_array_equal(chart.parts["dots"].get_xdata(), [3.1, 3.3])
 
 
 def test_a_few_outlying_lanes_are_marked_and_do_not_flatten_the_rest(axes, result):

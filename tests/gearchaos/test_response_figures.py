@@ -139,11 +139,10 @@ def heights(lines) -> dict[float, float]:
     return {round(float(x), 9): float(y) for x, y in ends}
 
 
-@pytest.mark.parametrize("logarithmic", [False, True])
-def test_the_lines_of_the_spectrum_are_the_waves(axes, result, logarithmic):
+def test_the_lines_of_the_spectrum_are_the_waves(axes, result):
     """Eight periods do not hold a motion of period 3: six of them are transformed."""
     assert repeats_after(result, 0) == 3
-    lines = heights(amplitude_spectrum(axes, result, 0, "delta_5", logarithmic=logarithmic))
+    lines = heights(amplitude_spectrum(axes, result, 0, "delta_5"))
     high = {order: height for order, height in lines.items() if height > 1e-9}
     assert high == pytest.approx({0.0: MEAN, round(2 / 3, 9): SLOW, 1.0: FAST})
     assert axes.get_title("right") == "Rectangular window, 6 mesh periods"
@@ -158,9 +157,9 @@ def test_the_spectrum_is_that_of_the_acceleration_unless_asked_otherwise(axes, r
 
 def test_a_motion_that_does_not_repeat_is_transformed_as_a_whole(axes, result):
     assert repeats_after(result, 1) == 0
-    lines = heights(amplitude_spectrum(axes, result, 1, "delta_5", window="hann", highest=2.0))
+    lines = heights(amplitude_spectrum(axes, result, 1, "delta_5", highest=2.0))
     assert axes.get_title("right") == "Hann window, 8 mesh periods"
-    assert max(lines) == 2.0
+    assert max(lines) <= 2.0
     assert lines[1.0] == pytest.approx(FAST, rel=0.05)
 
 
@@ -266,7 +265,7 @@ def test_what_is_no_coordinate_has_its_history_and_its_own_spectrum(path, result
     history, spectrum = response_page(result, 0, name).axes
     np.testing.assert_array_equal(history.lines[0].get_ydata(), result[name][0])
     alone = Figure().subplots()
-    amplitude_spectrum(alone, result, 0, name, logarithmic=True)
+    amplitude_spectrum(alone, result, 0, name)
     for one, other in zip(spectrum.collections, alone.collections, strict=True):
         np.testing.assert_array_equal(one.get_segments(), other.get_segments())
 
