@@ -15,25 +15,3 @@ from gearchaos.figures.response_page import response_page
 from gearchaos.figures.stages import shade_stages
 from gearchaos.figures.sweep_page import bifurcation_page
 from gearchaos.figures.waterfall import waterfall
-
-__all__ = [
-    "amplitude_spectrum",
-    "basins",
-    "basins_page",
-    "bifurcation",
-    "bifurcation_page",
-    "contact_strip",
-    "fractions",
-    "lyapunov",
-    "map_page",
-    "parameter_map",
-    "phase_portrait",
-    "poincare_section",
-    "response_page",
-    "save_figure",
-    "shade_stages",
-    "shares",
-    "shares_page",
-    "time_history",
-    "waterfall",
-]

@@ -74,8 +74,6 @@ def close_panel(axes: Axes, result: Result, own: Diagram, *, hold_zero: bool = F
     there = np.isfinite(least)
     if there.any():
         axes.set_ylim(robust_limits(least[there], most[there], hold_zero=hold_zero))
-    else:
-        _say_nothing_to_show(axes, own.lanes)
     for one in drawn:
         for mark in one.off_scale:
             mark.remove()
@@ -128,16 +126,6 @@ def _marks(axes: Axes, parameter: Floats, height: float, label: str, **look: Any
     parameter = parameter[columns(parameter, axes.get_xlim())]
     look |= {"linestyle": "none", "transform": axes.get_xaxis_transform(), "zorder": 4}
     return axes.plot(parameter, np.full(parameter.size, height), label=label, **look)[0]
-
-
-def _say_nothing_to_show(axes: Axes, lanes: Lanes) -> None:
-    """Write into an empty panel why it is empty."""
-    diverged = f"all {lanes.numbers.size} lanes diverged"
-    reason = diverged if lanes.diverged.all() else "no finite values"
-    axes.set_ylim(-1.0, 1.0)
-    axes.tick_params(axis="y", which="both", left=False, right=False, labelleft=False)
-    text = axes.text(0.5, 0.5, reason, transform=axes.transAxes, ha="center", va="center")
-    text.set_backgroundcolor("white")
 
 
 def mark_values(panels: Sequence[Axes], label: str, values: Sequence[float]) -> None:

@@ -1,5 +1,6 @@
-"""How the figures look: sizes for a journal column, fonts, and colours that also print in grey."""
+"""How the figures look: sizes for a journal column, and colours that also print in grey."""
 
+from pathlib import Path
 from typing import Any
 
 import matplotlib as mpl
@@ -20,8 +21,11 @@ GREY = "#595959"
 OVERLAID = ((BLACK, "."), (BLUE, "^"), (GREEN, "v"), (PURPLE, "s"), (ORANGE, "D"))
 """Colours and markers of several results in the same axes."""
 
-SMALL_FONT_PT = 7.0
-FONT_PT = 8.0
+_STYLE = mpl.rc_params_from_file(
+    Path(__file__).with_name("journal.mplstyle"), use_default_template=False
+)
+SMALL_FONT_PT = _STYLE["legend.fontsize"]
+FONT_PT = _STYLE["font.size"]
 
 LEGEND: dict[str, Any] = {
     "frameon": False,
@@ -33,48 +37,6 @@ LEGEND: dict[str, Any] = {
     "columnspacing": 1.0,
 }
 """Arguments of a legend outside of the axes."""
-
-TICKS = {
-    "labelsize": SMALL_FONT_PT,
-    "direction": "in",
-    "minor.visible": True,
-    "major.size": 2.8,
-    "minor.size": 1.5,
-    "major.width": 0.5,
-    "minor.width": 0.4,
-}
-"""Settings for the ticks of either axis."""
-
-_STYLE: dict[Any, Any] = {
-    # That of `save_figure`: what is measured for the layout is then known when the page is drawn.
-    "figure.dpi": 300,
-    # The STIX fonts come with matplotlib, so that a figure is the same on every machine.
-    "font.family": "STIXGeneral",
-    "mathtext.fontset": "stix",
-    "font.size": FONT_PT,
-    "axes.labelsize": FONT_PT,
-    "axes.titlesize": FONT_PT,
-    "axes.titleweight": "bold",
-    "axes.titlepad": 3.0,
-    "axes.titley": 1.0,
-    "axes.labelpad": 2.5,
-    "axes.linewidth": 0.6,
-    "axes.formatter.use_mathtext": True,
-    "legend.fontsize": SMALL_FONT_PT,
-    "figure.titlesize": SMALL_FONT_PT,
-    **{f"{axis}tick.{name}": value for axis in "xy" for name, value in TICKS.items()},
-    "xtick.top": True,
-    "ytick.right": True,
-    "hatch.linewidth": 0.3,
-    "figure.constrained_layout.h_pad": 0.02,
-    "figure.constrained_layout.w_pad": 0.02,
-    # Journals ask for TrueType; matplotlib's default, Type 3, cannot be edited.
-    "pdf.fonttype": 42,
-    "ps.fonttype": 42,
-    "svg.hashsalt": "gearchaos",
-    # Ticks in front of what is drawn, so that EPS can make one picture of the latter.
-    "axes.axisbelow": False,
-}
 
 # Whatever a user's settings say: the page is as large as the figure, and laid out once.
 _LAYOUT: dict[Any, Any] = {

@@ -67,15 +67,7 @@ class Rule:
         return f"agrees within {agrees} {self.measure}, in kind within {in_kind}"
 
 
-RULES = {
-    "derived": Rule("of the printed number", 0.001, 0.1),
-    "coefficient": Rule("of the first harmonic", 0.001, 0.01),
-    "boundary": Rule("of the printed place", 0.1, 0.5, relative=False),
-    "amplitude": Rule("of the printed number", 0.05, 0.25),
-    "exponent": Rule("of the printed number", 0.1, 0.5),
-    "stage": Rule("of both spans together that is not common to them", 0.1, 0.5),
-}
-"""The rules by the names that `published.toml` uses."""
+RULES = {name: Rule(**row) for name, row in published().rules.items()}
 
 
 class Row(NamedTuple):

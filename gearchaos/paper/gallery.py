@@ -2,7 +2,7 @@
 
 import re
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 from importlib.resources import files
 from itertools import chain
@@ -16,10 +16,10 @@ from gearchaos.figures.labels import short
 from gearchaos.figures.page import FORMATS, Page, save_figure
 from gearchaos.figures.response import coordinates_of
 from gearchaos.paper import figures
-from gearchaos.paper.comparison import NONE, RULES, WINDOW, Row, Verdict, compare, signed
+from gearchaos.paper.comparison import RULES, WINDOW, Row, Verdict, compare, signed
 from gearchaos.paper.computation import Reproduction, lane_of, largest_acceleration
 from gearchaos.paper.published import published
-from gearchaos.paper.stages import OUT_OF_TURN, TWO_BANDS, motions_between, out_of_turn
+from gearchaos.paper.stages import OUT_OF_TURN, TWO_BANDS
 from gearchaos.progress import say
 from gearchaos.results.atomic_file import check_output, replacing, writing
 from gearchaos.results.response_variables import acceleration_of
@@ -110,12 +110,12 @@ def _report(found: Reproduction) -> str:
     rows = [row for table in tables.values() for row in table]
     length_scale = TOLERANCE_MM / found.group("pitch_error_amplitude")
     template = files("gearchaos.paper").joinpath("report_text.md").read_text(encoding="utf-8")
-    text = template.format(
+    on_two = found.lanes.exponent[found.lanes.labels == TWO_BANDS]
+    return template.format(
         version=software_version(),
         rows=len(rows),
         counts=Counter(row.verdict for row in rows),
         kinds={kind: _counts(row for row in rows if row.kind == kind) for kind in KINDS},
-        disagreements=_disagreements(rows),
         rules=RULES,
         window=WINDOW,
         out_of_turn=OUT_OF_TURN,
@@ -125,33 +125,17 @@ def _report(found: Reproduction) -> str:
         length_scale=length_scale,
         backlash=length_scale * found.group("half_backlash"),
         table_3=_table_3(found.response),
-        stages=" ".join(_chaotic_stages(found)),
+        band_exponents=[signed(end, 3) for end in (on_two.min(), on_two.max())],
         shown={motion.figure: motion for motion in published().motions},
-        **_of_the_bands(found),
         **_of_the_hop(found),
         **_of_the_increments(found),
         files="\n".join(f"- `{name}`: {words}" for name, (_, words) in RESULTS.items()),
     )
-    # Who cannot see a picture is told how its caption begins.
-    without_words = r"!\[\](?=\(\S+\)\n\n([^:;\n]+))"
-    return re.sub(without_words, lambda picture: f"![{picture[1].replace('*', '')}]", text)
 
 
 def _counts(rows: Iterable[Row]) -> str:
     counts = Counter(row.verdict for row in rows)
     return " | ".join(map(str, (counts.total(), *(counts[verdict] for verdict in Verdict))))
-
-
-def _disagreements(rows: Iterable[Row]) -> str:
-    lines = [
-        f"- **{row.quantity}** ({row.where}): {row.published} in the paper, "
-        f"{row.ours if row.ours != NONE else 'not found'} here."
-        for row in rows
-        if row.verdict is Verdict.DOES_NOT
-    ]
-    if not lines:
-        return "Everything agrees at least in kind."
-    return "\n".join(["Does not agree:\n", *lines])
 
 
 def _table(rows: Iterable[Row]) -> str:
@@ -175,31 +159,6 @@ def _table_3(response: Result) -> str:
 
 def _line(*cells: object) -> str:
     return f"| {' | '.join(map(str, cells))} |"
-
-
-def _chaotic_stages(found: Reproduction) -> Iterator[str]:
-    """Tell what lies in the stages that the paper calls chaotic or by a name of its own."""
-    for stage in published().stages:
-        if stage.printed != stage.motion or stage.motion == "chaotic":
-            motions = motions_between(found.lanes, stage.first, stage.last)
-            counts = Counter(motions).most_common(6)
-            worded = ", ".join(f"{count} {label}" for label, count in counts)
-            yield (
-                f'In the paper\'s stage "{stage.printed}", {stage.first:g} to {stage.last:g} e(τ), '
-                f"the {len(motions)} lanes of the sweep are: {worded}."
-            )
-
-
-def _of_the_bands(found: Reproduction) -> dict[str, Any]:
-    on_two = found.lanes.labels == TWO_BANDS
-    values, exponents = found.lanes.values[on_two], found.lanes.exponent[on_two]
-    shares = out_of_turn(found.sweep["section_delta_5"])[on_two]
-    return {
-        "bands_apart": values[shares == 0.0].max(),
-        "last_on_bands": values.max(),
-        "most_out_of_turn": shares.max(),
-        "band_exponents": [signed(end, 3) for end in (exponents.min(), exponents.max())],
-    }
 
 
 def _of_the_hop(found: Reproduction) -> dict[str, Any]:

@@ -510,7 +510,7 @@ def test_every_motion_in_the_report_is_the_label_of_its_lane(report, found):
 
 
 @pytest.mark.slow
-def test_the_verdicts_of_the_report_are_counted_and_those_that_differ_listed(report):
+def test_the_verdicts_of_the_report_are_counted(report):
     compared = [row for table in tables(report).values() for row in table if len(row) == 7]
     verdicts = [row[6].strip("*") for row in compared]
     assert set(verdicts) <= {"agrees", "agrees in kind", "does not agree"}
@@ -518,14 +518,6 @@ def test_the_verdicts_of_the_report_are_counted_and_those_that_differ_listed(rep
     assert [int(count) for count in counts.groups()] == [
         len(compared),
         *(verdicts.count(verdict) for verdict in Verdict),
-    ]
-    listed = re.findall(
-        r"^- \*\*(.+?)\*\* \((.+?)\): (.+) in the paper, (.+) here\.$", report, re.M
-    )
-    assert listed == [
-        (row[0], row[1], row[3], "not found" if row[4] == "–" else row[4])
-        for row in compared
-        if row[6] == "**does not agree**"
     ]
 
 

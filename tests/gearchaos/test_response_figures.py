@@ -166,8 +166,6 @@ def test_a_motion_that_does_not_repeat_is_transformed_as_a_whole(axes, result):
 @pytest.mark.parametrize(
     ("lane", "variable", "message"),
     [
-        (2, "delta_5", "no lane 2 in the result; it has 0 to 1"),
-        (-1, "delta_5", "no lane -1"),
         (0, "delta_9", "no variable 'delta_9' over time in the result; it has delta_5, "),
         (0, "contact_tangential", "no variable 'contact_tangential' over time"),
         (1, "delta_5", "pitch_error = 12.5: the lane diverged"),
