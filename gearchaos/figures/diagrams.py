@@ -12,7 +12,7 @@ from gearchaos.figures.labels import axis_label, instead_of
 from gearchaos.figures.lanes import MOST_DOTS, Between, diagram_lanes, dots, outermost, portions
 from gearchaos.figures.panel import Diagram, close_panel
 from gearchaos.figures.style import BLACK, GREY, VERMILION
-from gearchaos.results.result import Result, section_variables
+from gearchaos.results.result import DEFAULT_VARIABLE, Result, section_variables
 from gearchaos.results.variables import LARGEST_EXPONENT, RECORD, STANDARD_ERROR, STATUS
 
 BAND_STANDARD_ERRORS = 2.0
@@ -46,9 +46,7 @@ def bifurcation(
     names = section_variables(result)
     numbers = [v for v in result.variables.values() if v.dtype == "float64"]
     of_lanes = [v.name for v in numbers if v.dims == result.axes and v.name not in result.axes]
-    if not names and variable is None:
-        raise FigureError("the result has no section points: the sweep did not record any")
-    variable = names[0] if variable is None else variable
+    variable = variable or next(iter(names), DEFAULT_VARIABLE)
     if variable not in (*names, *of_lanes):
         there = instead_of(variable, (*names, *of_lanes))
         raise FigureError(f"no variable {variable!r} of the diagram in the result; {there}")

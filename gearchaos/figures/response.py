@@ -54,10 +54,6 @@ def time_history(
     low = time[0] if between[0] is None else between[0]
     high = time[-1] if between[1] is None else between[1]
     shown = (time >= low) & (time <= high)
-    if np.count_nonzero(shown) < 2:
-        raise FigureError(
-            f"nothing between {low:g} and {high:g} mesh periods; the record has {time[-1]:g}"
-        )
     (line,) = axes.plot(time[shown], values[shown], color=BLACK, linewidth=0.6)
     axes.set_xlim(low, high)
     _label(axes, result, TIME, variable)

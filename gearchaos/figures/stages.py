@@ -51,23 +51,22 @@ def shade_stages(
     result: Result,
     *,
     lanes: LabelledLanes | None = None,
-    narrowest: float | None = None,
     legend: bool = True,
 ) -> list[Rectangle]:
     """Shade the stages of a sweep behind what the axes show, limits and labels left as they are.
 
     ``axes``: with the swept parameter along x, limits set; ``result``: over one swept parameter,
     with labels of the motion. Values whose starts or gear pairs come to different motions are
-    "several motions"; so is a stage that hides too many narrower ones. ``lanes``: with other labels
-    than those of the result; ``narrowest``: narrower stages go into what surrounds them, by default
-    a 150th of the axis; ``legend``: put a legend of the shades below everything in the figure,
-    which needs the constrained layout. Returns a rectangle for each stage within the axes. Raises
-    FileError if the result has no labels, FigureError if it has several swept parameters.
+    "several motions"; so is a stage that hides too many of those narrower than a 150th of the axis.
+    ``lanes``: with other labels than those of the result; ``legend``: put a legend of the shades
+    below everything in the figure, which needs the constrained layout. Returns a rectangle for each
+    stage within the axes. Raises FileError if the result has no labels, FigureError if it has
+    several swept parameters.
     """
     diagram_lanes(result)  # Refuses two swept parameters.
     lanes = labelled_lanes(result, repeats=True) if lanes is None else lanes
     low, high = sorted(axes.get_xlim())
-    stages = stage_table(lanes, NARROWEST_SHARE * (high - low) if narrowest is None else narrowest)
+    stages = stage_table(lanes, NARROWEST_SHARE * (high - low))
     # Neighbours meet halfway between their lanes, and the outermost reach to the ends of the axis.
     edges = [low, *((one.end + other.start) / 2.0 for one, other in pairwise(stages)), high]
     kinds = [_kind(stage, lanes) for stage in stages]

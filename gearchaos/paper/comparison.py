@@ -67,7 +67,7 @@ class Rule:
         return f"agrees within {agrees} {self.measure}, in kind within {in_kind}"
 
 
-RULES = {name: Rule(**row) for name, row in published().rules.items()}
+RULES = {name: Rule(**vars(row)) for name, row in vars(published().rules).items()}
 
 
 class Row(NamedTuple):
@@ -86,7 +86,7 @@ def compare(found: Reproduction) -> dict[str, list[Row]]:
     """Compare a reproduction with all that the paper prints: the tables of the report, by name."""
     printed, ours = published(), found.numbers
     numbers = defaultdict(list)
-    for key, number in printed.numbers.items():
+    for key, number in vars(printed.numbers).items():
         row = _row(number.quantity, number, number.value, ours[key], unit=number.unit)
         numbers[number.table].append(row)
     stages = counterparts(printed.stages, found.lanes)
@@ -103,7 +103,7 @@ def compare(found: Reproduction) -> dict[str, list[Row]]:
 
 
 def _harmonics() -> Iterator[Row]:
-    table, mean = published().harmonics, published().numbers["mean_stiffness"].value
+    table, mean = published().harmonics, published().numbers.mean_stiffness.value
     ours = mean * contact_line_stiffness().coefficients(len(table.cosine))
     first = math.hypot(table.cosine[0], table.sine[0])
     for letter, theirs, mine in (("a", table.cosine, ours.real), ("c", table.sine, -ours.imag)):
@@ -120,7 +120,7 @@ def _increments(found: Reproduction) -> Iterator[Row]:
 
 
 def _stages(found: Reproduction, pairs: list[tuple[Printed, Stage | None]]) -> Iterator[Row]:
-    labels, kind = found.lanes.labels, published().kinds["stages"]
+    labels, kind = found.lanes.labels, published().kinds.stages
     for printed, stage in pairs:
         mine, difference, verdict = NONE, NONE, Verdict.DOES_NOT
         if stage is not None:
@@ -152,7 +152,7 @@ def _motions(found: Reproduction) -> Iterator[Row]:
         near = motions_between(found.lanes, p - reach, p + reach)
         ours = mine if other == mine else f"{mine}; {other} from the contact flank"
         verdict = motion_verdict(shown.motion, mine, (other, *near))
-        place = f"motion at {p:g} e(τ)", f"figure {shown.figure}", published().kinds["motions"]
+        place = f"motion at {p:g} e(τ)", f"figure {shown.figure}", published().kinds.motions
         yield Row(*place, shown.printed, ours, NONE, verdict)
 
 

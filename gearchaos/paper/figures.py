@@ -62,7 +62,7 @@ def pitch_error_page(found: Reproduction) -> Page:
 
 def mesh_stiffness_page(found: Reproduction) -> Page:
     """Draw the mesh stiffness of the contact lines and its Fourier fit (figure 4)."""
-    mean = published().numbers["mean_stiffness"].value
+    mean = published().numbers.mean_stiffness.value
     scale, points = found.group("stiffness_variation_scale"), CYCLE.size - 1
     tables = contact_line_stiffness().table(points), series_table(printed_coefficients(), points)
     trapezoid, series = (mean * np.append(table, table[0]) for table in tables)
@@ -170,7 +170,7 @@ def _stack(
 def diagram_page(found: Reproduction) -> Page:
     """Draw bifurcation diagram and exponent; ticks where the paper has boundaries and the hop."""
     boundaries = [after.first for _, after in pairwise(published().stages)]
-    places = [published().numbers["hop"].value, *boundaries]
+    places = [published().numbers.hop.value, *boundaries]
     return bifurcation_page(found.sweep, stages=found.lanes, marked=("changes in Pan 2021", places))
 
 

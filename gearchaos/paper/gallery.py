@@ -120,7 +120,7 @@ def _report(found: Reproduction) -> str:
         window=WINDOW,
         out_of_turn=OUT_OF_TURN,
         tables={name: _table(table) for name, table in tables.items()},
-        printed={key: number.value for key, number in published().numbers.items()},
+        printed={key: number.value for key, number in vars(published().numbers).items()},
         found=found,
         length_scale=length_scale,
         backlash=length_scale * found.group("half_backlash"),
@@ -150,7 +150,7 @@ def _table_3(response: Result) -> str:
     lines = []
     for name in coordinates_of(response):
         before, after = (largest_acceleration(response, p, name) for p in (0.0, 1.0))
-        theirs = short(published().numbers[f"added_{name}"].value)
+        theirs = short(getattr(published().numbers, f"added_{name}").value)
         wording = response.attributes(acceleration_of(name))["long_name"]
         added = short(after - before, sign="+")
         lines.append(_line(wording, short(before), short(after), added, theirs))
@@ -163,7 +163,7 @@ def _line(*cells: object) -> str:
 
 def _of_the_hop(found: Reproduction) -> dict[str, Any]:
     hop, paper = found.hop, published().numbers
-    place = paper["hop"].value
+    place = paper.hop.value
     there = hop.sweeps.sel(pitch_error=place, method="nearest")
     before = found.sweep[found.sweep.axis] <= hop.changes["rest"][0]
     return {
@@ -172,7 +172,7 @@ def _of_the_hop(found: Reproduction) -> dict[str, Any]:
         "crossings": there[CROSSINGS],
         "hop_share": (place - hop.first.above) / (hop.last.below - hop.first.above),
         "exponents": [signed(exponent, 5) for exponent in chain(*found.exponents)],
-        "printed_exponent": signed(paper["hop_exponent_before"].value, 4),
+        "printed_exponent": signed(paper.hop_exponent_before.value, 4),
         "exponent_spread": np.ptp(found.sweep["lyapunov_exponent"][before]),
     }
 

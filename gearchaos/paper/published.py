@@ -1,33 +1,28 @@
 """What Pan 2021 prints, read from `published.toml`, which says what each entry is."""
 
+import json
 import tomllib
 from functools import cache
 from importlib.resources import files
 from types import SimpleNamespace
+from typing import TypeAlias
 
 import numpy as np
 
 from gearchaos.arrays import Complex
 from gearchaos.gear.contact_lines import TrapezoidalStiffness
 
-
-class Printed(SimpleNamespace):
-    """A table of `published.toml`, with its keys as attributes."""
+Printed: TypeAlias = SimpleNamespace
+"""A table of `published.toml`, with its keys as attributes."""
 
 
 @cache
 def published() -> Printed:
-    """Read all that the paper prints; ``numbers`` has its tables by their names."""
+    """Read all that the paper prints."""
     text = files("gearchaos.paper").joinpath("published.toml").read_text(encoding="utf-8")
-    tables = tomllib.loads(text)
-    tables["numbers"] = {key: Printed(**row) for key, row in tables["numbers"].items()}
-    for name in ("contact_lines", "harmonics", "increments", "boundaries"):
-        tables[name] = Printed(**tables[name])
-    for name in ("stages", "motions"):
-        # What the paper calls as this project does is written once.
-        rows = ({"printed": row["motion"], **row} for row in tables[name])
-        tables[name] = [Printed(**row) for row in rows]
-    return Printed(**tables)
+    tables = json.dumps(tomllib.loads(text))
+    read: Printed = json.loads(tables, object_hook=lambda table: Printed(**table))
+    return read
 
 
 def contact_line_stiffness() -> TrapezoidalStiffness:
@@ -35,12 +30,12 @@ def contact_line_stiffness() -> TrapezoidalStiffness:
     lines = published().contact_lines
     # Half of the variation relative to its mean, with equal rise and fall.
     half_height = (lines.longest - lines.shortest) / (lines.longest + lines.shortest)
-    return TrapezoidalStiffness(**lines.parts, half_height=half_height)
+    return TrapezoidalStiffness(**vars(lines.parts), half_height=half_height)
 
 
 def printed_coefficients() -> Complex:
     """Return the coefficients of Table 2 relative to the mean stiffness, as `series_table` does."""
-    mean, harmonics = published().numbers["mean_stiffness"].value, published().harmonics
+    mean, harmonics = published().numbers.mean_stiffness.value, published().harmonics
     cosine, sine = (np.divide(wave, mean) for wave in (harmonics.cosine, harmonics.sine))
     series: Complex = cosine - 1j * sine
     return series

@@ -29,19 +29,16 @@ class Crisis(NamedTuple):
     after: float
 
 
-def crisis_of(sweep: Result) -> Crisis | None:
+def crisis_of(sweep: Result) -> Crisis:
     """Find the greatest growth, from a lane to the next, of the widest section so far.
 
-    Among the lanes from the first motion on two bands to the first that no longer takes turns; None
-    where there are fewer than three.
+    Among the lanes from the first motion on two bands to the first that no longer takes turns.
     """
     lanes, section = labelled_lanes(sweep), sweep["section_delta_5"]
     shares = out_of_turn(section)
     first = int(np.argmax(_longer(lanes) & (shares == 0.0)))
     turning = np.logical_and.accumulate(shares[first:] <= OUT_OF_TURN)
     widest = np.maximum.accumulate(np.ptp(section[first:][turning], axis=1))
-    if widest.size < 3:
-        return None
     last = int(np.argmax(widest[1:] / widest[:-1]))
     place = float(lanes.values[first + last + 1])
     return Crisis(place, float(widest[last]), float(widest[last + 1]))

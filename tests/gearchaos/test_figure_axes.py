@@ -79,7 +79,7 @@ def test_the_diagram_shows_all_starts_and_the_stages_say_where_they_differ():
     motion = STARTS["motion"]
     same = (motion == motion[:, :1]).all(axis=1)
     assert same.any() and not same.all()
-    for shade in shade_stages(page.axes[0], STARTS, narrowest=0.0):
+    for shade in shade_stages(page.axes[0], STARTS):
         low, high = shade.get_x(), shade.get_x() + shade.get_width()
         alike = same[(STARTS[STARTS.axis] > low) & (STARTS[STARTS.axis] < high)]
         several = shade.get_hatch() == HATCHES["several motions"]

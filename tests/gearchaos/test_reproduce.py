@@ -21,7 +21,7 @@ from gearchaos.paper.comparison import (
     motion_verdict,
     overlap_verdict,
 )
-from gearchaos.paper.computation import compute, find_hop, lane_of, largest_acceleration
+from gearchaos.paper.computation import compute, lane_of, largest_acceleration
 from gearchaos.paper.gallery import KINDS, check_folder, pictures, write_gallery
 from gearchaos.paper.published import contact_line_stiffness, printed_coefficients, published
 from gearchaos.paper.stages import OUT_OF_TURN, out_of_turn
@@ -117,7 +117,7 @@ def test_the_motion_at_one_pitch_error():
 
 def test_the_configuration_and_the_printed_numbers_say_the_same():
     printed = published()
-    numbers = {key: number.value for key, number in printed.numbers.items()}
+    numbers = {key: number.value for key, number in vars(printed.numbers).items()}
     for name in ("pan2021.toml", "pan2021_full.toml", "pan2021_first.toml"):
         config = load_config(sweep_file(name))
         assert config.mesh.mean_stiffness_N_per_um_mm == numbers["mean_stiffness"]
@@ -154,7 +154,7 @@ def test_the_documentation_and_the_printed_numbers_say_the_same():
         added = next(row[0] for name, row in rows.items() if name.startswith(f"{direction} accel"))
         for state, value in zip(states, numbers(added), strict=True):
             said[f"added_delta_{state}"] = value
-    assert said == {key: number.value for key, number in printed.numbers.items()}
+    assert said == {key: number.value for key, number in vars(printed.numbers).items()}
     increments = next(row[0] for name, row in rows.items() if name.startswith("increments"))
     assert numbers(increments) == [*printed.increments.values]
     stages = [row[1] for row in tables(text)["9. What agrees and what does not"]]
@@ -168,7 +168,7 @@ def test_stages_follow_one_another_and_every_rule_is_known():
     printed = published()
     for before, after in zip(printed.stages, printed.stages[1:], strict=False):
         assert after.first == pytest.approx(before.last + 0.01)
-    assert {number.rule for number in printed.numbers.values()} <= set(RULES)
+    assert {number.rule for number in vars(printed.numbers).values()} <= set(RULES)
     assert len(printed.increments.pitch_errors) == len(printed.increments.values) + 1
 
 
@@ -187,12 +187,6 @@ def test_the_fit_of_figure_4_leaves_the_trapezoid_by_its_missing_harmonics_alone
     missing = size * np.sum(1.0 / np.arange(7.0, 20001.0, 2.0) ** 2)
     of_table_2 = np.sum(np.abs(trapezoid.coefficients(6) - printed))
     assert size / 49.0 < apart < missing + of_table_2
-
-
-def test_without_clearance_there_is_no_hop():
-    """A linear system has one motion: sweeps upwards and downwards agree."""
-    config = load_config(sweep_file("pan2021.toml"), [*COARSE, "groups.half_backlash=0.0"])
-    assert find_hop(config, step=0.5) is None
 
 
 @pytest.fixture(scope="module")
@@ -226,8 +220,8 @@ def test_bands_that_take_turns_are_told_from_what_does_not():
 
 def test_what_was_printed_is_of_three_kinds():
     printed = published()
-    kinds = [number.kind for number in printed.numbers.values()]
-    kinds += [printed.harmonics.kind, printed.increments.kind, *printed.kinds.values()]
+    kinds = [number.kind for number in vars(printed.numbers).values()]
+    kinds += [printed.harmonics.kind, printed.increments.kind, *vars(printed.kinds).values()]
     kinds.append(printed.boundaries.kind)
     assert {*kinds} == {*KINDS}
 
@@ -235,11 +229,13 @@ def test_what_was_printed_is_of_three_kinds():
 @pytest.mark.slow
 def test_every_printed_number_is_compared(found):
     printed = published()
-    assert found.numbers.keys() == printed.numbers.keys()
+    assert found.numbers.keys() == vars(printed.numbers).keys()
     rows = [row for table in compare(found).values() for row in table]
     harmonics = len(printed.harmonics.cosine) + len(printed.harmonics.sine)
     spans = len(printed.stages) + (len(printed.stages) - 1) + len(printed.motions)
-    assert len(rows) == len(printed.numbers) + harmonics + spans + len(printed.increments.values)
+    assert len(rows) == len(vars(printed.numbers)) + harmonics + spans + len(
+        printed.increments.values
+    )
 
 
 @pytest.mark.slow
@@ -278,10 +274,9 @@ def test_increments_of_separated_teeth_are_those_of_the_forcing(found):
 @pytest.mark.slow
 def test_both_motions_exist_between_the_folds_and_only_one_parts_the_teeth(found):
     hop = found.hop
-    assert hop is not None
     before, after = hop.changes["rest"]
     assert hop.first.above < before < after < hop.last.below
-    assert hop.first.above < published().numbers["hop"].value < hop.last.below
+    assert hop.first.above < published().numbers.hop.value < hop.last.below
     crossings = hop.sweeps.sel(pitch_error=after, method="nearest")["crossings_per_period"]
     assert crossings[0] == 0.0 < crossings[1]
 
@@ -361,8 +356,8 @@ def test_every_derived_number_in_the_report_is_the_computed_one(report, found):
 @pytest.mark.slow
 def test_what_the_report_says_of_the_slips_follows_from_what_is_printed(report, found):
     printed, lines = published().numbers, published().contact_lines
-    width, stiffness = 1e3 * found.pair.face_width, printed["mean_stiffness"].value
-    xi, damping = printed["damping_ratio"].value, printed["mesh_damping"].value
+    width, stiffness = 1e3 * found.pair.face_width, printed.mean_stiffness.value
+    xi, damping = printed.damping_ratio.value, printed.mesh_damping.value
     said = {
         r"m<sub>e</sub> = (\S+) kg; Table 1": (damping / (2.0 * xi)) ** 2 / (stiffness * 1e6),
         r"stiffness of all (\S+) mm": width,

@@ -176,11 +176,6 @@ def test_what_cannot_be_drawn_is_told(axes, lane, variable, message):
         time_history(axes, known_response(diverged=(1,)), lane, variable)
 
 
-def test_a_part_of_the_record_that_does_not_exist_is_told(axes, result):
-    with pytest.raises(FigureError, match="between 9 and 12 mesh periods; the record has 8"):
-        time_history(axes, result, 0, between=(9.0, 12.0))
-
-
 @pytest.mark.parametrize(
     ("lane", "width", "height"), [(0, 180.0, None), (0, 85.0, None), (1, 180.0, 150.0)]
 )

@@ -82,7 +82,7 @@ def test_every_label_has_a_shade_of_its_own():
     named = np.where(np.array([*letters]) == "b", "two bands", labelled.labels)
     named = np.where(np.array([*letters]) == "m", "several motions", named)
     lanes = labelled._replace(labels=named)
-    figure, _, colours = shaded(known, (0.0, 10.0), narrowest=0.0, lanes=lanes)
+    figure, _, colours = shaded(known, (0.0, 10.0), lanes=lanes)
     assert colours == list(SHADES.values())
     assert len({*colours}) == len(SHADES)
     assert named_by(figure) == list(SHADES)
