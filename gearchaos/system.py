@@ -21,7 +21,6 @@ from gearchaos.dynamics.following import (
     Orbit,
     StabilityLoss,
     follow,
-    loss_of_stability,
 )
 from gearchaos.dynamics.orbits import Orbits, polish
 from gearchaos.dynamics.stability import fewest_stable_steps
@@ -188,15 +187,14 @@ class System:
             width,
             self._plan,
         )
-        losses = loss_of_stability(followed.stable.multipliers, followed.beyond.multipliers)
-        loss = StabilityLoss(int(losses.kind[0]))
+        loss = StabilityLoss(int(followed.loss[0]))
         return Branch(
             float(followed.stable_value[0]),
             self._orbit(followed.stable, orbit.period),
             float(followed.beyond_value[0]),
             loss,
             STABILITY_LOSS_TEXTS[loss],
-            complex(losses.multiplier[0]),
+            complex(followed.multiplier[0]),
         )
 
     def exponents(self, start: Floats | None = None) -> Exponents:

@@ -80,34 +80,28 @@ class Branch(NamedTuple):
     multiplier: complex
 
 
-class Losses(NamedTuple):
-    """How the orbits of some lanes lose stability.
-
-    ``kind`` (lanes,) of `StabilityLoss`; ``multiplier`` (lanes,), complex: the one that tells, of a
-    pair that with the positive imaginary part.
-    """
-
-    kind: Codes
-    multiplier: Complex
-
-
 class Followed(NamedTuple):
     """The orbits of some lanes, followed until they lose stability or to the end of the way.
 
     ``stable_value``, ``beyond_value`` (lanes,): the last value of the parameter with a stable
     orbit, and the first one at which it is unstable or not found; both are the end of the way
     where the orbit is stable all along, and not a number where there is none at the beginning.
-    ``stable``, ``beyond``: the `Orbits` there.
+    ``stable``, ``beyond``: the `Orbits` there; ``loss``, ``multiplier``: see `loss_of_stability`.
     """
 
     stable_value: Floats
     stable: Orbits
     beyond_value: Floats
     beyond: Orbits
+    loss: Codes
+    multiplier: Complex
 
 
-def loss_of_stability(stable: Complex, beyond: Complex) -> Losses:
+def loss_of_stability(stable: Complex, beyond: Complex) -> tuple[Codes, Complex]:
     """Tell from the multipliers on either side of a boundary how the orbit loses stability.
+
+    Returned are the `StabilityLoss` and the multiplier that tells, of a pair that with the positive
+    imaginary part, both (lanes,).
 
     ``stable``, ``beyond`` (lanes, states): those of the same orbit, largest modulus first, where it
     is stable and as near as possible beyond; not a number where there is no such orbit. An orbit
@@ -139,7 +133,7 @@ def loss_of_stability(stable: Complex, beyond: Complex) -> Losses:
         StabilityLoss.NEIMARK_SACKER,
     ).astype(np.uint8)
     multiplier[kind == StabilityLoss.NOT_FOLLOWED] = np.nan
-    return Losses(kind, multiplier)
+    return kind, multiplier
 
 
 def follow(
@@ -201,6 +195,7 @@ def follow(
         stable,
         np.where(exists, first + end * (last - first), np.nan),
         beyond,
+        *loss_of_stability(stable.multipliers, beyond.multipliers),
     )
 
 

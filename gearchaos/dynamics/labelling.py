@@ -37,9 +37,8 @@ def labels_of(system: System, outcome: Outcome, plan: Plan) -> Told:
     """
     repeats = system.repeats_after
     outcome = outcome.every(repeats)
-    record = _record(system, outcome, label.MOST_POINTS)
-    labels = _told(system, outcome, plan, record)
-    lanes = np.flatnonzero(label.doubtful(record, labels))
+    labels = _told(system, outcome, plan, label.MOST_POINTS)
+    lanes = np.flatnonzero(label.doubtful(outcome.growth, labels))
     state, tangent = outcome.end_state.copy(), outcome.end_tangent.copy()
     for longer in LOOKS:
         further = plan._replace(
@@ -63,7 +62,7 @@ def labels_of(system: System, outcome: Outcome, plan: Plan) -> Told:
             told = _told_again(part, again, further)
             labels.motion[some], labels.period[some] = told.motion, told.period
             labels.bands[some] = told.bands
-            _measure_return(labels, record.section, some[told.period > 0])
+            _measure_return(labels, outcome.section, some[told.period > 0])
         sound = np.isfinite(state[lanes]).all(axis=1)
         lanes = lanes[sound & (labels.motion[lanes] == label.UNRESOLVED)]
     # Nothing is known of it, not that it diverges.
@@ -71,20 +70,22 @@ def labels_of(system: System, outcome: Outcome, plan: Plan) -> Told:
     return Told(labels, state)
 
 
-def _told(system: System, outcome: Outcome, plan: Plan, record: label.Record) -> label.Labels:
+def _told(system: System, outcome: Outcome, plan: Plan, most_points: int) -> label.Labels:
     """Return what one record tells."""
+    section, diverged = outcome.section[:, -most_points:], outcome.status != Status.OK
+    record = label.Record(section, outcome.growth, diverged, _admits_tori(system))
     labels = label.label(record)
     if not system.effects.backlash:
         _tell_linear(system, plan, labels)
     _settle(system, outcome, plan, labels, label.settling_periods(record, labels))
     lanes = np.flatnonzero(np.isin(labels.motion, (label.CHAOTIC, label.QUASI_PERIODIC)))
-    labels.bands[lanes] = band_count(record.section[lanes])
+    labels.bands[lanes] = band_count(section[lanes])
     return labels
 
 
 def _told_again(system: System, outcome: Outcome, plan: Plan) -> label.Labels:
     """Return what a longer record tells; also of a torus, that it is not a cascade."""
-    labels = _told(system, outcome, plan, _record(system, outcome, plan.section_points))
+    labels = _told(system, outcome, plan, plan.section_points)
     tori = np.flatnonzero(labels.motion == label.QUASI_PERIODIC)
     hopping = tori[subsequence_spread(outcome.section[tori]) > WHOLE]
     # What diverges only now has not done so in what is kept.
@@ -104,15 +105,6 @@ def _tell_linear(system: System, plan: Plan, labels: label.Labels) -> None:
     # Without damping a forced oscillation goes around a torus.
     settles = (labels.motion == label.QUASI_PERIODIC) & (size < 1.0 - MARGIN)
     labels.motion[settles | (labels.motion == label.CHAOTIC) & ~grows] = label.UNRESOLVED
-
-
-def _record(system: System, outcome: Outcome, most_points: int) -> label.Record:
-    return label.Record(
-        outcome.section[:, -most_points:],
-        outcome.growth,
-        outcome.status != Status.OK,
-        _admits_tori(system),
-    )
 
 
 def _measure_return(labels: label.Labels, section: Floats, lanes: Integers) -> None:

@@ -13,10 +13,8 @@ from gearchaos.configuration import Configuration, swept_values
 from gearchaos.dynamics.following import (
     STABILITY_LOSS_TEXTS,
     Followed,
-    Losses,
     StabilityLoss,
     follow,
-    loss_of_stability,
 )
 from gearchaos.dynamics.labelling import LOOKS, labels_of
 from gearchaos.dynamics.systems import plan_of, system_of
@@ -159,15 +157,15 @@ def refined_jumps(
         if not last.size:
             continue
         further = 2.0 * beyond["value"] - last["value"]
-        followed, losses = _followed(config, edges[inner[there]], further, width)
-        goes_on = np.isin(losses.kind, (StabilityLoss.STAYS_STABLE, StabilityLoss.NOT_FOLLOWED))
+        followed = _followed(config, edges[inner[there]], further, width)
+        goes_on = np.isin(followed.loss, (StabilityLoss.STAYS_STABLE, StabilityLoss.NOT_FOLLOWED))
         stable = np.where(goes_on, last["value"], followed.stable_value)
         lost = np.where(goes_on, beyond["value"], followed.beyond_value)
-        for n, kind in enumerate(losses.kind):
+        for n, kind in enumerate(followed.loss):
             told = STABILITY_LOSS_TEXTS[StabilityLoss(kind)] if last["period"][n] else ""
             sides = (float(stable[n]), last["label"][n]), (float(lost[n]), beyond["label"][n])
             (below, one), (above, other) = sides[::step]
-            multiplier = complex(losses.multiplier[n])
+            multiplier = complex(followed.multiplier[n])
             found.append(Boundary(below, above, one, other, told, multiplier, way))
     return sorted(found, key=lambda boundary: boundary.below)
 
@@ -214,13 +212,13 @@ def _losses(
 ) -> list[tuple[str, complex]]:
     """Follow the orbits below a boundary upwards, and those above it downwards."""
     # Close to a bifurcation the label changes a little before or after it: one lane further.
-    _, upwards = _followed(config, below, above["value"] + spacing)
-    _, downwards = _followed(config, above, below["value"] - spacing)
+    upwards = _followed(config, below, above["value"] + spacing)
+    downwards = _followed(config, above, below["value"] - spacing)
     told = []
     for number in range(spacing.size):
         sides = [
-            (StabilityLoss(losses.kind[number]), complex(losses.multiplier[number]))
-            for losses, edge in ((upwards, below), (downwards, above))
+            (StabilityLoss(followed.loss[number]), complex(followed.multiplier[number]))
+            for followed, edge in ((upwards, below), (downwards, above))
             if edge["period"][number] > 0
         ]
         tells, multiplier = min(
@@ -230,9 +228,7 @@ def _losses(
     return told
 
 
-def _followed(
-    config: Configuration, edge: Array, last: Floats, width: float = np.inf
-) -> tuple[Followed, Losses]:
+def _followed(config: Configuration, edge: Array, last: Floats, width: float = np.inf) -> Followed:
     def system(values: Floats) -> System:
         return system_of(config, {config.sweep.parameter: values}, config.needed_effects)
 
@@ -244,7 +240,7 @@ def _followed(
         further = plan_of(config, transient_periods=longer, recorded_periods=0)
         state[lanes] = integrate(system(first[lanes]), state[lanes], further).end_state
     lowest, highest = swept_values(config.sweep)[[0, -1]]
-    followed = follow(
+    return follow(
         system,
         state,
         edge["period"],
@@ -253,4 +249,3 @@ def _followed(
         min(width, float(np.min(np.abs(last - first))) * FOLLOWED_WIDTH),
         plan_of(config),
     )
-    return followed, loss_of_stability(followed.stable.multipliers, followed.beyond.multipliers)

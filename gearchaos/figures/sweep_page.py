@@ -116,10 +116,7 @@ def bifurcation_page(
             for axes in stack:
                 shade_stages(axes, results[0], lanes=given, legend=axes is stack[0])
         else:
-            forms = [form_in_words(one) for one in results]
-            own = [name for name, form in zip(labels, forms, strict=True) if form]
-            whose = f"{plain(', '.join(own))}: " if 0 < len(own) < len(forms) else ""
-            footnote(figure, whose + max(forms))
+            footnote(figure, max(map(form_in_words, results)))
         places = dict.fromkeys(in_words(one, one.fixed) for one in files if one.fixed)
         if places:
             figure.suptitle("; ".join(places))

@@ -13,7 +13,6 @@ import numpy as np
 from gearchaos.figures.labels import short
 from gearchaos.paper.computation import Reproduction, largest_acceleration
 from gearchaos.paper.published import Printed, contact_line_stiffness, published
-from gearchaos.paper.stages import motions_between
 from gearchaos.results.stage_table import LabelledLanes, Stage, stage_table
 
 WINDOW = 0.1
@@ -149,7 +148,8 @@ def _motions(found: Reproduction) -> Iterator[Row]:
     for shown in published().motions:
         p = shown.pitch_error
         mine, other = found.motions_at(p)
-        near = motions_between(found.lanes, p - reach, p + reach)
+        # A value at the end of the reach but for rounding is within it.
+        near = found.lanes.labels[np.abs(found.lanes.values - p) <= reach + 1e-9]
         ours = mine if other == mine else f"{mine}; {other} from the contact flank"
         verdict = motion_verdict(shown.motion, mine, (other, *near))
         place = f"motion at {p:g} e(τ)", f"figure {shown.figure}", published().kinds.motions

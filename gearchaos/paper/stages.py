@@ -69,14 +69,6 @@ def out_of_turn(section: Floats) -> Floats:
     return np.asarray(np.mean(above[:, 1:] == above[:, :-1], axis=1))
 
 
-def motions_between(lanes: LabelledLanes, first: float, last: float) -> list[str]:
-    """Return the motions of the lanes from one value to another, both included."""
-    # A value that is the first or the last but for rounding is inside.
-    margin = 1e-9 * (abs(first) + abs(last))
-    inside = (lanes.values >= first - margin) & (lanes.values <= last + margin)
-    return [str(label) for label in lanes.labels[inside]]
-
-
 def _longer(lanes: LabelledLanes) -> Mask:
     # What is unresolved may be a period 2 that is slow to settle.
     return np.asarray((lanes.period > 2) | np.isin(lanes.labels, ("chaotic", "quasi-periodic")))

@@ -88,9 +88,8 @@ def label(record: Record) -> Labels:
     rest = np.flatnonzero(motion == UNRESOLVED)
     if record.growth.size and rest.size:
         motion[rest] = _aperiodic(record.section[rest], record.growth[rest], record.torus[rest])
-    smallest = np.min(np.where(np.isnan(distances), np.inf, distances), axis=1)
     own = distances[np.arange(period.size), np.maximum(period, 1) - 1]
-    distance = np.where(period > 0, own, np.where(np.isfinite(smallest), smallest, np.nan))
+    distance = np.where(period > 0, own, np.fmin.reduce(distances, axis=1))
     distance[record.diverged] = np.nan
     return Labels(motion, period, distance, np.zeros_like(period))
 
@@ -137,7 +136,7 @@ def settling_periods(record: Record, labels: Labels) -> Counts:
     return found
 
 
-def doubtful(record: Record, labels: Labels) -> Mask:
+def doubtful(growth: Floats, labels: Labels) -> Mask:
     """Whether a longer record may tell another motion than this one did.
 
     Next to a resonance one turn of a torus may take more than a hundred periods, next to a
@@ -146,8 +145,8 @@ def doubtful(record: Record, labels: Labels) -> Mask:
     that is about to end for chaos as long as the exponent is within six standard errors of zero.
     """
     found = np.zeros(labels.motion.shape, dtype=np.bool_)
-    if record.growth.size:
-        exponent, error = largest_exponent(record.growth, np.ones(found.size))
+    if growth.size:
+        exponent, error = largest_exponent(growth, np.ones(found.size))
         weak = ~(exponent > CERTAIN * error)
         found = np.isin(labels.motion, (UNRESOLVED, QUASI_PERIODIC))
         found |= (labels.motion == CHAOTIC) & weak

@@ -203,7 +203,7 @@ def test_a_record_too_short_for_anything_is_unresolved_without_a_distance():
 
 def in_doubt(section: np.ndarray, growth: np.ndarray | None = None) -> bool:
     one = record(section, growth)
-    return bool(doubtful(one, label(one))[0])
+    return bool(doubtful(one.growth, label(one))[0])
 
 
 def test_a_turn_as_long_as_the_record_is_for_a_longer_one_to_tell():
@@ -217,7 +217,7 @@ def test_a_torus_is_doubted_and_a_period_is_not():
     assert in_doubt(circle(GOLDEN))
     assert not in_doubt(circle(0.25))
     broken = record(np.full((POINTS, 2), np.nan), np.full(POINTS, np.nan))
-    assert not doubtful(broken, label(broken)).any()
+    assert not doubtful(broken.growth, label(broken)).any()
 
 
 @pytest.mark.parametrize(("errors", "doubted"), [(4.0, True), (8.0, False)])
@@ -233,4 +233,4 @@ def test_chaos_is_doubted_as_long_as_it_is_within_six_standard_errors(errors, do
 
 def test_without_an_exponent_a_longer_record_would_tell_nothing_of_chaos():
     without = record(circle(GOLDEN / POINTS))._replace(growth=np.zeros((1, 0)))
-    assert not doubtful(without, label(without)).any()
+    assert not doubtful(without.growth, label(without)).any()
