@@ -9,8 +9,6 @@ falls. But on every ray of the left half plane it passes 1 only once, so that al
 the longest stable one are stable.
 """
 
-from collections.abc import Iterator
-
 import numpy as np
 from gearchaos_kernels import Groups, System, jacobian
 
@@ -37,7 +35,9 @@ def fewest_stable_steps(system: System) -> Integers:
     # Groups that no computation could hold are cut short of overflow.
     clipped = (np.clip(group, -_BEYOND_MEASURE, _BEYOND_MEASURE) for group in system.groups)
     system = system._replace(groups=Groups(*clipped))
-    demand = np.max([_demand(block) for block in _diagonal_blocks(system)], axis=0)
+    # The axial motion acts on nothing else: both directions in contact or apart are all there is.
+    held = (jacobian(system, stiffness, stiffness) for stiffness in _stiffnesses(system))
+    demand = np.max([_demand(matrix) for matrix in held], axis=0)
     with np.errstate(over="ignore"):
         steps: Floats = np.ceil(demand * (1.0 - ROUNDING) * system.mesh_period)
     return np.clip(steps, 1.0, MOST_STEPS).astype(np.intp)
@@ -102,26 +102,12 @@ def _stiffnesses(system: System) -> Floats:
     return np.stack(values)
 
 
-def _diagonal_blocks(system: System) -> Iterator[Floats]:
-    """Jacobians of tangential and axial motion at every stiffness.
-
-    The axial motion acts on nothing else, so that the eigenvalues of any branch are those of its
-    tangential block together with those of its axial one.
-    """
-    axial = 6 if system.effects.transverse else 2
-    for stiffness in _stiffnesses(system):
-        whole = jacobian(system, stiffness, stiffness)
-        yield whole[:, :axial, :axial]
-        if system.effects.axial:
-            yield whole[:, axial:, axial:]
-
-
-def _demand(block: Floats) -> Floats:
+def _demand(matrix: Floats) -> Floats:
     """Return the fewest stable steps per unit of tau of every matrix."""
     # As bytes, which are sorted much faster than rows of numbers.
-    rows = np.ascontiguousarray(block).reshape(block.shape[0], -1)
+    rows = np.ascontiguousarray(matrix).reshape(matrix.shape[0], -1)
     every = rows.view(np.dtype((np.void, rows.itemsize * rows.shape[1])))[:, 0]
     _, distinct, kind = np.unique(every, return_index=True, return_inverse=True)
-    eigenvalues = np.linalg.eigvals(block[distinct]).astype(np.complex128)
+    eigenvalues = np.linalg.eigvals(matrix[distinct]).astype(np.complex128)
     demand: Floats = np.max(steps_per_time(eigenvalues), axis=1)
     return demand[kind]
