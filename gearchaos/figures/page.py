@@ -148,18 +148,12 @@ def save_figure(
 def check_figures(paths: Sequence[Path], results: Sequence[str | Path], overwrite: bool) -> None:
     """Make sure that figures of results can be written, before anything is computed for them.
 
-    What `save_figure` wrote is replaced. Raises FileError with all that stands in the way.
+    What `save_figure` wrote is replaced. Raises FileError if something else stands in the way.
     """
-    problems: list[str] = []
     for path in paths:
-        try:
-            if path.exists() and any(path.samefile(result) for result in results):
-                raise FileError(f"{path}: is a result file itself; choose another --output")
-            check_output(path, overwrite or _is_own(path))
-        except FileError as error:
-            problems += error.problems
-    if problems:
-        raise FileError(problems)
+        if path.exists() and any(path.samefile(result) for result in results):
+            raise FileError(f"{path}: is a result file itself; choose another --output")
+        check_output(path, overwrite or _is_own(path))
 
 
 def _is_own(path: Path) -> bool:

@@ -147,11 +147,10 @@ def _motions(found: Reproduction) -> Iterator[Row]:
     reach = RULES["boundary"].in_kind
     for shown in published().motions:
         p = shown.pitch_error
-        mine, other = found.motions_at(p)
+        ours = found.motion_at(p)
         # A value at the end of the reach but for rounding is within it.
         near = found.lanes.labels[np.abs(found.lanes.values - p) <= reach + 1e-9]
-        ours = mine if other == mine else f"{mine}; {other} from the contact flank"
-        verdict = motion_verdict(shown.motion, mine, (other, *near))
+        verdict = motion_verdict(shown.motion, ours, near.tolist())
         place = f"motion at {p:g} e(τ)", f"figure {shown.figure}", published().kinds.motions
         yield Row(*place, shown.printed, ours, NONE, verdict)
 
@@ -179,14 +178,11 @@ def overlap_verdict(published: tuple[float, float], ours: tuple[float, float]) -
     return RULES["stage"].verdict(1.0, max(common, 0.0) / together)
 
 
-def motion_verdict(published: str, ours: str, also: tuple[str, ...]) -> Verdict:
-    """Judge the label of the motion at one pitch error.
-
-    ``also`` are those found from another start or within the boundary rule's widest distance.
-    """
+def motion_verdict(published: str, ours: str, near: Sequence[str]) -> Verdict:
+    """Judge the motion at one pitch error; near are those within reach of the boundary rule."""
     if ours == published:
         return Verdict.AGREES
-    return Verdict.IN_KIND if published in also else Verdict.DOES_NOT
+    return Verdict.IN_KIND if published in near else Verdict.DOES_NOT
 
 
 def signed(value: float, digits: int = 2) -> str:

@@ -68,8 +68,8 @@ class Reproduction:
     with the interval in which two motions coexist; ``exponents``: the largest ones before and after
     it, starting at rest, of all ten states and of six; ``response``: all effects, at rest at the
     start, without pitch error and at those of figures 5, 6, 14 and 15 and of Table 3;
-    ``motions``, ``motions_from_contact``: at the pitch errors of figures 8 to 13, by the start;
-    ``crisis``: where the diagram of figure 7 widens at once.
+    ``motions``: at the pitch errors of figures 8 to 13; ``crisis``: where the diagram of figure 7
+    widens at once.
     """
 
     config: Configuration
@@ -78,7 +78,6 @@ class Reproduction:
     exponents: tuple[list[float], list[float]]
     response: Result
     motions: Result
-    motions_from_contact: Result
     crisis: Crisis
 
     @cached_property
@@ -86,11 +85,10 @@ class Reproduction:
         """The lanes of the diagram, labelled as the paper does."""
         return lanes_as_printed(self.sweep, self.crisis)
 
-    def motions_at(self, pitch_error: float) -> list[str]:
-        """Return the motion at a pitch error, from rest and from contact, as a figure shows it."""
-        both = self.motions, self.motions_from_contact
-        lanes = [lanes_as_printed(result, self.crisis, strictly=True) for result in both]
-        return [str(one.labels[lane_of(self.motions, pitch_error)]) for one in lanes]
+    def motion_at(self, pitch_error: float) -> str:
+        """Return the motion at a pitch error as a figure shows it."""
+        lanes = lanes_as_printed(self.motions, self.crisis, strictly=True)
+        return str(lanes.labels[lane_of(self.motions, pitch_error)])
 
     def group(self, name: str) -> float:
         """Return a group that all lanes of the sweep share."""
@@ -161,12 +159,8 @@ def compute(
     response = respond(_at(full, [0.0, *published().increments.pitch_errors]), periods, threads)
     say("figures 8 to 13: motions at six pitch errors")
     shown = _at(config, [motion.pitch_error for motion in published().motions])
-    motions, from_contact = (
-        respond(shown.replace("start", {"kind": kind}), periods, threads)
-        for kind in ("rest", "contact")
-    )
-    crisis = crisis_of(sweep)
-    return Reproduction(config, sweep, hop, (ten, six), response, motions, from_contact, crisis)
+    motions = respond(shown, periods, threads)
+    return Reproduction(config, sweep, hop, (ten, six), response, motions, crisis_of(sweep))
 
 
 def find_hop(config: Configuration, step: float, threads: int | None) -> Hop:

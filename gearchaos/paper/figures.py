@@ -186,12 +186,7 @@ def hop_page(found: Reproduction) -> Page:
 
 def motion_page(found: Reproduction, shown: Printed) -> Page:
     """Draw history, phase portrait and Poincare section at one pitch error (figures 8 to 13)."""
-    at_rest, from_contact = found.motions_at(shown.pitch_error)
-    result, label = found.motions, at_rest
-    # Unless only the start from the contact flank comes to the motion that the paper shows.
-    if at_rest != shown.motion == from_contact:
-        result, label = found.motions_from_contact, f"{from_contact}, from the contact flank"
-    lane = lane_of(result, shown.pitch_error)
+    result, lane = found.motions, lane_of(found.motions, shown.pitch_error)
     with column(86.0) as figure:
         look: dict[str, Any] = {"height_ratios": (0.8, 1.0), "gridspec_kw": {"wspace": 0.1}}
         history, portrait, section = figure.subplot_mosaic("hh;ps", **look).values()
@@ -205,6 +200,6 @@ def motion_page(found: Reproduction, shown: Printed) -> Page:
             axes.set(xlabel=r"$\delta_5$", ylabel=r"$\delta_5'$")
             few_ticks(axes, 5, 6)
         letter((history, portrait, section))
-        remark(history, f"$P$ = {shown.pitch_error:g}, {label}")
+        remark(history, f"$P$ = {shown.pitch_error:g}, {found.motion_at(shown.pitch_error)}")
         remark(section, f"{result['section_delta_5'].shape[1]} points")
     return figure

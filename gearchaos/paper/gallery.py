@@ -32,8 +32,7 @@ DPI = 200
 RESULTS = {
     "sweep.h5": ("sweep", "figure 7, a sweep over the pitch error"),
     "accelerations.h5": ("response", "figures 5, 6, 14 and 15 and Table 3, a response"),
-    "motions.h5": ("motions", "figures 8 to 13, a response, starting at rest"),
-    "motions_from_contact.h5": ("motions_from_contact", "the same, starting on the contact flank"),
+    "motions.h5": ("motions", "figures 8 to 13, a response"),
 }
 """Result files by name: the attribute of `Reproduction`, and what they hold."""
 
