@@ -38,18 +38,14 @@ LEGEND: dict[str, Any] = {
 }
 """Arguments of a legend outside of the axes."""
 
-# Whatever a user's settings say: the page is as large as the figure, and laid out once.
-_LAYOUT: dict[Any, Any] = {
-    "savefig.bbox": None,
-    "figure.autolayout": False,
-    "figure.constrained_layout.use": False,
-}
-
 
 def style() -> dict[Any, Any]:
     """Return settings for `matplotlib.rc_context`; what a user has set otherwise stays."""
     now, default = mpl.rcParams, mpl.rcParamsDefault
     return {
         **{key: now[key] if now[key] != default[key] else _STYLE[key] for key in _STYLE},
-        **_LAYOUT,
+        # Whatever they are: the page is as large as the figure, and laid out once.
+        "savefig.bbox": None,
+        "figure.autolayout": False,
+        "figure.constrained_layout.use": False,
     }

@@ -3,7 +3,6 @@
 import math
 from collections import defaultdict
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from enum import StrEnum
 from itertools import pairwise
 from typing import NamedTuple
@@ -29,44 +28,7 @@ class Verdict(StrEnum):
     DOES_NOT = "does not agree"
 
 
-@dataclass(frozen=True)
-class Rule:
-    """How far a computed number may lie from a printed one.
-
-    ``measure``: what the distance is measured by, in words; ``agrees``, ``in_kind``: the largest
-    distances with these verdicts; ``relative``: whether these are shares, shown in percent.
-    """
-
-    measure: str
-    agrees: float
-    in_kind: float
-    relative: bool = True
-
-    def verdict(self, published: float, ours: float, size: float | None = None) -> Verdict:
-        """Judge a number, not a number where there is no such thing.
-
-        Where the rule is relative the distance is divided by ``size``, by default the printed one.
-        """
-        distance = abs(ours - published)
-        if self.relative:
-            distance /= abs(published if size is None else size)
-        if not math.isfinite(distance):
-            return Verdict.DOES_NOT
-        # A distance that is the limit but for rounding is within it.
-        within = distance * (1.0 - 1e-9)
-        if within <= self.agrees:
-            return Verdict.AGREES
-        return Verdict.IN_KIND if within <= self.in_kind else Verdict.DOES_NOT
-
-    def __str__(self) -> str:
-        agrees, in_kind = (
-            f"{100 * limit:g} %" if self.relative else f"{limit:g} e(τ)"
-            for limit in (self.agrees, self.in_kind)
-        )
-        return f"agrees within {agrees} {self.measure}, in kind within {in_kind}"
-
-
-RULES = {name: Rule(**vars(row)) for name, row in vars(published().rules).items()}
+RULES = vars(published().rules)
 
 
 class Row(NamedTuple):
@@ -121,7 +83,7 @@ def _increments(found: Reproduction) -> Iterator[Row]:
 def _stages(found: Reproduction, pairs: list[tuple[Printed, Stage | None]]) -> Iterator[Row]:
     labels, kind = found.lanes.labels, published().kinds.stages
     for printed, stage in pairs:
-        mine, difference, verdict = NONE, NONE, Verdict.DOES_NOT
+        mine, difference, judged = NONE, NONE, Verdict.DOES_NOT
         if stage is not None:
             share = np.mean(labels[stage.first : stage.last + 1] == stage.label)
             mine = f"{stage.start:.2f} – {stage.end:.2f}"
@@ -130,9 +92,9 @@ def _stages(found: Reproduction, pairs: list[tuple[Printed, Stage | None]]) -> I
                 mine += f", in {math.floor(100.0 * share)} % of its lanes"
             ends = (stage.start - printed.first, stage.end - printed.last)
             difference = ", ".join(map(signed, ends))
-            verdict = overlap_verdict((printed.first, printed.last), (stage.start, stage.end))
+            judged = overlap_verdict((printed.first, printed.last), (stage.start, stage.end))
         theirs = f"{printed.first:.2f} – {printed.last:.2f}"
-        yield Row(printed.printed, "figure 7", kind, theirs, mine, difference, verdict)
+        yield Row(printed.printed, "figure 7", kind, theirs, mine, difference, judged)
 
 
 def _boundaries(pairs: list[tuple[Printed, Stage | None]]) -> Iterator[Row]:
@@ -150,9 +112,9 @@ def _motions(found: Reproduction) -> Iterator[Row]:
         ours = found.motion_at(p)
         # A value at the end of the reach but for rounding is within it.
         near = found.lanes.labels[np.abs(found.lanes.values - p) <= reach + 1e-9]
-        verdict = motion_verdict(shown.motion, ours, near.tolist())
+        judged = motion_verdict(shown.motion, ours, near.tolist())
         place = f"motion at {p:g} e(τ)", f"figure {shown.figure}", published().kinds.motions
-        yield Row(*place, shown.printed, ours, NONE, verdict)
+        yield Row(*place, shown.printed, ours, NONE, judged)
 
 
 def counterparts(printed: Sequence[Printed], lanes: LabelledLanes) -> list[Stage | None]:
@@ -171,11 +133,26 @@ def counterparts(printed: Sequence[Printed], lanes: LabelledLanes) -> list[Stage
     return found
 
 
+def verdict(rule: Printed, published: float, ours: float, size: float | None = None) -> Verdict:
+    """Judge a number, not a number where there is no such thing.
+
+    Where the rule is relative the distance is divided by ``size``, by default the printed one.
+    """
+    distance = abs(ours - published)
+    if rule.relative:
+        distance /= abs(published if size is None else size)
+    # A distance that is the limit but for rounding is within it.
+    within = distance * (1.0 - 1e-9)
+    if within <= rule.agrees:
+        return Verdict.AGREES
+    return Verdict.IN_KIND if within <= rule.in_kind else Verdict.DOES_NOT
+
+
 def overlap_verdict(published: tuple[float, float], ours: tuple[float, float]) -> Verdict:
     """Judge a span, its first and last value, by how much of both together is common to them."""
     common = min(published[1], ours[1]) - max(published[0], ours[0])
     together = max(published[1], ours[1]) - min(published[0], ours[0])
-    return RULES["stage"].verdict(1.0, max(common, 0.0) / together)
+    return verdict(RULES["stage"], 1.0, max(common, 0.0) / together)
 
 
 def motion_verdict(published: str, ours: str, near: Sequence[str]) -> Verdict:
@@ -209,10 +186,9 @@ def _row(
         if rule.relative:
             share = 100.0 * (ours - theirs) / abs(theirs if size is None else size)
             difference = f"{signed(share, 1 if abs(share) >= 1.0 else 3)} %"
-    verdict = rule.verdict(theirs, ours, size)
-    where, kind = printed.where, printed.kind
+    where, kind, judged = printed.where, printed.kind, verdict(rule, theirs, ours, size)
     printed_number = f"{_number(theirs)} {unit}".rstrip()
-    return Row(quantity, where, kind, printed_number, mine, difference, verdict)
+    return Row(quantity, where, kind, printed_number, mine, difference, judged)
 
 
 def _number(value: float) -> str:

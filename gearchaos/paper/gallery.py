@@ -29,12 +29,8 @@ from gearchaos.version import software_version
 
 REPORT = "report.md"
 DPI = 200
-RESULTS = {
-    "sweep.h5": ("sweep", "figure 7, a sweep over the pitch error"),
-    "accelerations.h5": ("response", "figures 5, 6, 14 and 15 and Table 3, a response"),
-    "motions.h5": ("motions", "figures 8 to 13, a response"),
-}
-"""Result files by name: the attribute of `Reproduction`, and what they hold."""
+RESULTS = {"sweep.h5": "sweep", "accelerations.h5": "response", "motions.h5": "motions"}
+"""Result files by name, and the attributes of `Reproduction` that they hold."""
 
 TOLERANCE_MM = 0.011  # Single pitch deviation of the driving gear in grade 7 (ISO 1328-1).
 
@@ -90,7 +86,7 @@ def write_gallery(
     ``formats``: of the figures, ``"png"`` among them: that is what the report shows. Raises
     FileError if a file cannot be written.
     """
-    for name, (attribute, _) in RESULTS.items():
+    for name, attribute in RESULTS.items():
         say(f"writing {name}")
         getattr(found, attribute).save(folder / name, overwrite=overwrite)
     for name, title, draw in pictures():
@@ -128,7 +124,6 @@ def _report(found: Reproduction) -> str:
         shown={motion.figure: motion for motion in published().motions},
         **_of_the_hop(found),
         **_of_the_increments(found),
-        files="\n".join(f"- `{name}`: {words}" for name, (_, words) in RESULTS.items()),
     )
 
 

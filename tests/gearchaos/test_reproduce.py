@@ -14,12 +14,14 @@ from gearchaos.gear.contact_lines import series_table
 from gearchaos.paper.comparison import (
     RULES,
     WINDOW,
-    Rule,
     Verdict,
     compare,
     counterparts,
     motion_verdict,
     overlap_verdict,
+)
+from gearchaos.paper.comparison import (
+    verdict as verdict_of,
 )
 from gearchaos.paper.computation import compute, lane_of, largest_acceleration
 from gearchaos.paper.gallery import KINDS, check_folder, pictures, write_gallery
@@ -69,30 +71,30 @@ def numbers(text: str | list[str]) -> list[float]:
     [(10.0, AGREES), (10.5, AGREES), (9.4, IN_KIND), (12.5, IN_KIND), (7.4, DOES_NOT)],
 )
 def test_a_relative_rule_judges_by_shares_of_the_printed_number(ours, verdict):
-    assert Rule("", 0.05, 0.25).verdict(10.0, ours) is verdict
-    assert Rule("", 0.05, 0.25).verdict(-10.0, -ours) is verdict
+    assert verdict_of(RULES["amplitude"], 10.0, ours) is verdict
+    assert verdict_of(RULES["amplitude"], -10.0, -ours) is verdict
 
 
 def test_a_relative_rule_tells_signs_apart():
-    assert RULES["exponent"].verdict(-0.0043, 0.0043) is DOES_NOT
+    assert verdict_of(RULES["exponent"], -0.0043, 0.0043) is DOES_NOT
 
 
 def test_small_harmonics_are_judged_by_the_first_one():
     rule = RULES["coefficient"]
-    assert rule.verdict(1e-4, 0.0) is DOES_NOT
-    assert rule.verdict(1e-4, 0.0, size=1.7) is AGREES
+    assert verdict_of(rule, 1e-4, 0.0) is DOES_NOT
+    assert verdict_of(rule, 1e-4, 0.0, size=1.7) is AGREES
 
 
 @pytest.mark.parametrize(
     ("ours", "verdict"), [(1.22, AGREES), (1.23, IN_KIND), (1.62, IN_KIND), (1.63, DOES_NOT)]
 )
 def test_a_boundary_is_judged_by_its_distance(ours, verdict):
-    assert RULES["boundary"].verdict(1.12, ours) is verdict
+    assert verdict_of(RULES["boundary"], 1.12, ours) is verdict
 
 
 @pytest.mark.parametrize("rule", RULES.values())
 def test_what_was_not_found_does_not_agree(rule):
-    assert rule.verdict(1.0, math.nan) is DOES_NOT
+    assert verdict_of(rule, 1.0, math.nan) is DOES_NOT
     assert 0.0 < rule.agrees < rule.in_kind
 
 
