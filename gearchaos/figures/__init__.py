@@ -1,6 +1,6 @@
 """Figures drawn from result files alone: no kernel, no simulation, no pyplot."""
 
-from gearchaos.figures.diagrams import bifurcation, lyapunov
+from gearchaos.figures.diagrams import bifurcation, lyapunov, waterfall
 from gearchaos.figures.ensembles import basins, basins_page, fractions, shares, shares_page
 from gearchaos.figures.maps import map_page, parameter_map
 from gearchaos.figures.page import save_figure
@@ -14,4 +14,3 @@ from gearchaos.figures.response import (
 from gearchaos.figures.response_page import response_page
 from gearchaos.figures.stages import shade_stages
 from gearchaos.figures.sweep_page import bifurcation_page
-from gearchaos.figures.waterfall import waterfall

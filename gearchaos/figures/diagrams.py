@@ -1,21 +1,26 @@
-"""The diagrams of a sweep over its parameter: section points, and the largest Lyapunov exponent."""
+"""The diagrams of a sweep over its parameter: section points, largest exponent, amplitudes."""
 
+from fractions import Fraction
 from typing import Any
 
+import matplotlib as mpl
 import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
-from matplotlib.colors import to_rgb
+from matplotlib.colors import LogNorm, to_rgb
 
 from gearchaos.errors import FigureError
 from gearchaos.figures.labels import axis_label, instead_of
-from gearchaos.figures.lanes import MOST_DOTS, Between, diagram_lanes, dots, outermost, portions
+from gearchaos.figures.lanes import MOST_DOTS, Between, cell_edges, diagram_lanes, dots, outermost, portions
+from gearchaos.figures.maps import NO_VALUE
 from gearchaos.figures.panel import Diagram, close_panel
+from gearchaos.figures.stages import look_of
 from gearchaos.figures.style import BLACK, GREY, VERMILION
 from gearchaos.results.result import DEFAULT_VARIABLE, Result, section_variables
-from gearchaos.results.variables import LARGEST_EXPONENT, RECORD, STANDARD_ERROR, STATUS
+from gearchaos.results.variables import LARGEST_EXPONENT, ORDER, RECORD, STANDARD_ERROR, STATUS
 
 BAND_STANDARD_ERRORS = 2.0
+DECADES = 5  # Below the largest amplitude; what is smaller has the lightest colour.
 
 
 def bifurcation(
@@ -126,3 +131,38 @@ def lyapunov(
     parts = {"dots": points, "band": band, "bars": bars, "positive": positive, "zero": zero}
     own = Diagram(line, lanes, whole, whole, np.nan_to_num(spread), named, parts)
     return close_panel(axes, result, own, hold_zero=True)
+
+
+def waterfall(axes: Axes, result: Result, variable: str, *, between: Between = (None, None)) -> Any:
+    """Draw amplitudes of the lanes of a sweep into axes, a row for each mesh order.
+
+    Colours are logarithmic, lanes without amplitudes grey. ``variable``: such as
+    "amplitude_transmission_error"; ``between``: as for `bifurcation`. Returns the image. Raises
+    FigureError if the result has no such amplitudes, no lane in the range, two swept parameters or
+    several lanes for one value.
+    """
+    there = [name for name in result if result.dims(name) == (*result.axes, ORDER)]
+    if variable not in there:
+        raise FigureError(
+            f"no amplitudes {variable!r} in the result; {instead_of(variable, there)}"
+        )
+    lanes = diagram_lanes(result, between)
+    values = np.unique(lanes.parameter)
+    if axes.images or values.size < lanes.numbers.size:
+        rule = "is drawn of one result, with one lane for each value"
+        raise FigureError(f"{variable}: {rule}; choose them with --at (in Python: result.sel)")
+    amplitudes = result.lanes(variable)[lanes.numbers].T
+    most = float(np.nanmax(amplitudes, initial=0.0)) or 1.0
+    least = most / 10.0**DECADES
+    colours = mpl.colormaps["YlGnBu"].with_extremes(bad=look_of(NO_VALUE)["facecolor"])
+    edges = cell_edges(values), np.arange(len(amplitudes) + 1) - 0.5
+    look: Any = {"cmap": colours, "norm": LogNorm(least, most), "zorder": 1.0}
+    image = axes.pcolorfast(*edges, np.ma.masked_invalid(np.maximum(amplitudes, least)), **look)
+    names = [str(Fraction(order).limit_denominator(1_000_000)) for order in result[ORDER]]
+    axes.set_yticks(range(len(names)), names)
+    axes.tick_params(axis="y", which="minor", left=False, right=False)
+    axes.set(xlim=lanes.limits, xlabel=axis_label(result, result.axis), ylabel="Mesh order")
+    assert axes.figure is not None
+    label: Any = {"location": "top", "label": axis_label(result, variable), "extend": "min"}
+    axes.figure.colorbar(image, ax=axes, aspect=40, **label)
+    return image

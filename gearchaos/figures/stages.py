@@ -1,6 +1,8 @@
 """Stages of a sweep as shades behind a diagram, so that its parts can be named."""
 
+import csv
 from itertools import pairwise
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -15,29 +17,11 @@ from gearchaos.results.stage_table import LabelledLanes, Stage, labelled_lanes, 
 
 # Blues that darken with the period, but for period 3, the window in chaos that is looked for. Those
 # without hatching differ in lightness, and all are light enough for black points to stand out.
-SHADES = {
-    "period 1": "#F4F8FC",
-    "period 2": "#D3E7F7",
-    "period 3": "#DDB6DE",
-    "period 4 or more": "#82B1DE",
-    "two bands": "#CDE8E2",
-    "quasi-periodic": "#DCEFD2",
-    "chaotic": "#F5CC8E",
-    "several motions": "#FFFFFF",
-    "unresolved": "#BFBFBF",
-    "diverged": "#E78F81",
-    "grows": "#F3C6DC",
-}
-"""Colour of each kind of stage, in the order of the legend."""
-
-HATCHES = {
-    "two bands": "----",
-    "quasi-periodic": "....",
-    "several motions": "\\" * 6,
-    "unresolved": "xxxx",
-    "diverged": "++++",
-    "grows": "||||",
-}
+with Path(__file__).with_name("shades.csv").open(encoding="utf-8", newline="") as _file:
+    _ROWS = [*csv.DictReader(_file)]
+SHADES = {row["kind"]: row["colour"] for row in _ROWS}
+HATCHES = {row["kind"]: row["hatch"] for row in _ROWS if row["hatch"]}
+"""Colour and hatching of each kind of stage, in the order of the legend."""
 
 OWN_SHARE = 0.75
 """Of the lanes of a stage, at least this share has its motion, or it is one of several motions."""

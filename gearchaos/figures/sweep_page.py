@@ -8,14 +8,13 @@ from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 
 from gearchaos.errors import FigureError
-from gearchaos.figures.diagrams import bifurcation, lyapunov
+from gearchaos.figures.diagrams import bifurcation, lyapunov, waterfall
 from gearchaos.figures.labels import form_in_words, in_words, plain
 from gearchaos.figures.lanes import Between
 from gearchaos.figures.page import Page, few_ticks, footnote, letter, page
 from gearchaos.figures.panel import legend_above, mark_values
 from gearchaos.figures.stages import NARROWEST_SHARE, shade_stages
 from gearchaos.figures.style import OVERLAID, SINGLE_COLUMN_MM
-from gearchaos.figures.waterfall import waterfall
 from gearchaos.results.jumps import apart, directions_of
 from gearchaos.results.result import Result, section_variables
 from gearchaos.results.stage_table import LabelledLanes
