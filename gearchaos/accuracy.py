@@ -94,7 +94,7 @@ def _accuracy(options: Namespace) -> int:
     points = {m: [(s.steps, s.seconds, s.error) for s in settings if s.mode == m] for m in MODES}
     page = work_precision_page(points)
     for target in targets:
-        save_figure(page, target, title=config.title, overwrite=options.overwrite)
+        save_figure(page, target, overwrite=options.overwrite)
     say(f"written: {', '.join(targets)}")
     return OK
 

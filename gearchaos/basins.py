@@ -64,8 +64,7 @@ def _basins(options: argparse.Namespace) -> int:
     else:
         print("\n".join([*table(found, slice_lines(where))]))
     if options.output:
-        title = str(whole.metadata.get("title", ""))
-        save_figure(basins_page(found), options.output, title=title)
+        save_figure(basins_page(found), options.output)
     return OK
 
 

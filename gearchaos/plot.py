@@ -44,12 +44,11 @@ def _plot(options: argparse.Namespace) -> int:
         sheets = [(f"{name}_physical", draw) for name, draw in sheets]
     targets = [_targets(options, name, len(sheets) == 1) for name, _ in sheets]
     check_figures([path for paths in targets for path in paths], options.result, options.overwrite)
-    title = ", ".join(_titles(results, options.result))
     with Progress(len(sheets), unit="page") as bar:
         for (_, draw), paths in zip(sheets, targets, strict=True):
             figure = draw()
             for path in paths:
-                save_figure(figure, path, title=title, dpi=options.dpi)
+                save_figure(figure, path, dpi=options.dpi)
                 bar.write(str(path))
             bar.advance(1)
     width, height = (25.4 * inches for inches in figure.get_size_inches())

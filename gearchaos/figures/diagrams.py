@@ -11,7 +11,15 @@ from matplotlib.colors import LogNorm, to_rgb
 
 from gearchaos.errors import FigureError
 from gearchaos.figures.labels import axis_label, instead_of
-from gearchaos.figures.lanes import MOST_DOTS, Between, cell_edges, diagram_lanes, dots, outermost, portions
+from gearchaos.figures.lanes import (
+    MOST_DOTS,
+    Between,
+    cell_edges,
+    diagram_lanes,
+    dots,
+    outermost,
+    portions,
+)
 from gearchaos.figures.maps import NO_VALUE
 from gearchaos.figures.panel import Diagram, close_panel
 from gearchaos.figures.stages import look_of

@@ -104,32 +104,30 @@ def few_ticks(axes: Axes, x: int | None = 5, y: int | None = 4) -> None:
 
 
 def save_figure(
-    figure: Figure, path: str | Path, *, title: str = "", dpi: int = 300, overwrite: bool = True
+    figure: Figure, path: str | Path, *, dpi: int = 300, overwrite: bool = True
 ) -> None:
     """Write a figure in one of the formats of `ENDINGS`, complete or not at all.
 
-    The file carries the title and the version of the software, but no date: the same figure gives
-    the same bits. The ending of the ``path`` says the format, such as `.png` or `.pdf`; ``title``:
-    for the file's metadata; ``dpi``: pixels per inch. The rasterised points in a PDF or SVG get
-    twice as many, since they will be looked at more closely. EPS knows no transparency: its panels
-    are pictures. ``overwrite``: whether an existing file is replaced. Raises FigureError if the
-    ending names no known format, FileError if the file cannot be written.
+    The file carries the version of the software, but no date: the same figure gives the same bits.
+    The ending of the ``path`` says the format, such as `.png` or `.pdf`; ``dpi``: pixels per inch.
+    The rasterised points in a PDF or SVG get twice as many, since they will be looked at more
+    closely. EPS knows no transparency: its panels are pictures. ``overwrite``: whether an existing
+    file is replaced. Raises FigureError if the ending names no known format, FileError if the file
+    cannot be written.
     """
     kind = Path(path).suffix.lower().removeprefix(".")
     if kind not in ENDINGS:
         raise FigureError(f"{path}: a figure ends in {' or '.join('.' + f for f in ENDINGS)}")
-    # The name of a file, which may not be Unicode, can serve as a title.
-    title = "".join(filter(str.isprintable, title))
     software = f"{SIGNATURE} {software_version()}"
     # A sixth larger, in two thirds of the time.
     fast = {"pil_kwargs": {"compress_level": 1}}
     facts: dict[str, dict[str, Any]] = {
-        "png": {"metadata": {"Title": title, "Software": software}, **fast},
-        "pdf": {"metadata": {"Title": title, "Creator": software, "CreationDate": None}},
-        "svg": {"metadata": {"Title": title, "Creator": software, "Date": None}},
+        "png": {"metadata": {"Software": software}, **fast},
+        "pdf": {"metadata": {"Creator": software, "CreationDate": None}},
+        "svg": {"metadata": {"Creator": software, "Date": None}},
         "eps": {"metadata": {"Creator": software}},
     }
-    tags = {"description": title, "software": f"Software {software}", "compression": "tiff_lzw"}
+    tags = {"software": f"Software {software}", "compression": "tiff_lzw"}
     dpi *= FINENESS.get(kind, 1)
     drawn, before = BytesIO(), [axes.get_rasterization_zorder() for axes in figure.axes]
     check()

@@ -94,7 +94,7 @@ def write_gallery(
         page = draw(found)
         for kind in formats:
             target = folder / f"{name}.{kind}"
-            save_figure(page, target, title=title, dpi=DPI, overwrite=overwrite)
+            save_figure(page, target, dpi=DPI, overwrite=overwrite)
     with replacing(folder / REPORT, overwrite=overwrite) as partly_written:
         partly_written.write_text(_report(found), encoding="utf-8")
     return folder / REPORT

@@ -342,7 +342,7 @@ def test_a_page_has_the_font_and_the_background_that_the_user_has_set(result):
 def test_the_same_result_gives_the_same_bits(result, kind, tmp_path):
     names = [tmp_path / f"{n}.{kind}" for n in range(2)]
     for name in names:
-        save_figure(bifurcation_page(result), name, title="Größe 1 µm")
+        save_figure(bifurcation_page(result), name)
     assert names[0].read_bytes() == names[1].read_bytes()
 
 
