@@ -20,7 +20,6 @@ from gearchaos.engine.lanes import Lanes
 from gearchaos.engine.steps import (
     MOST_STEPS,
     PILOT_LANES,
-    Candidate,
     choose_steps,
     coarse_steps,
     needless_maps,
@@ -69,7 +68,6 @@ class Simulation:
         coarse = coarse_steps(self.lanes, steps) if judged else ""
         notes = [note, coarse, needless_maps(self.lanes, self.plan), *remarks(self.lanes, lengths)]
         self.notes = [text for text in notes if text]
-        self._choice: list[known.Variable] = []
 
     def choose_steps(self) -> None:
         """Measure which number of steps the configured tolerance needs, and take it."""
@@ -86,17 +84,15 @@ class Simulation:
             # Finer flow maps are no more exact.
             4 * coarsest if self.plan.method == "flow_map" else MOST_STEPS,
         )
-        steps, *measured = zip(*candidates, strict=True)
-        self._choice = known.step_choice_variables(
-            steps, dict(zip(Candidate._fields[1:], measured, strict=True))
-        )
-        best = candidates[-1]
-        self.plan = self.plan._replace(steps_per_period=best.steps)
-        self.notes.append(
-            f"{best.steps} steps per period: on the {best.periodic_share * lanes:.0f} of {lanes} "
-            f"lanes that move periodically the error is {best.error:.1e}, wanted is {tolerance:g}; "
-            f"{best.changed_share * lanes:.0f} move in another way with finer steps"
-        )
+        self.plan = self.plan._replace(steps_per_period=candidates[-1].steps)
+        exponent = ", their exponent by {:.1e}" if self.plan.tangent else ""
+        self.notes += [
+            f"{tried.steps} steps per period: {tried.periodic_share * lanes:.0f} of {lanes} lanes "
+            f"move periodically, their section is off by {tried.section_error:.1e}"
+            f"{exponent.format(tried.exponent_error)}, wanted is {tolerance:g}; "
+            f"{tried.changed_share * lanes:.0f} move in another way with finer steps"
+            for tried in candidates
+        ]
 
     @property
     def carried(self) -> bool:
@@ -152,7 +148,7 @@ class Simulation:
             known.STATUS: [status.name.lower() for status in kernels.STATUS_TEXTS],
             known.STATE: self.lanes.states,
         }
-        return known.listed(self.lanes.axes, subjects, values, meanings) + self._choice
+        return known.listed(self.lanes.axes, subjects, values, meanings)
 
     @property
     def _splits_steps(self) -> bool:

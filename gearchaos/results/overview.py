@@ -27,13 +27,8 @@ ERRORS = {
 }
 """Variables that are errors, with what they are of, and from what they come."""
 
-_CANDIDATE = "candidate_"
-_SETTINGS = "title effects formulation start carry fixed"
-_INTEGRATION = (
-    "method steps_per_period crossings tolerance unstable transient_periods recorded_periods"
-)
-_RUN = "wall_time_seconds threads processor system software kernels git_commit created"
-"""Names of metadata that are shown together."""
+ELSEWHERE = ("title", "notes", "configuration", "configuration_resolved")
+"""Metadata that have their own place on a page."""
 
 MOST_STAGES = 20  # Of more stages, the first and the last ones are shown.
 
@@ -52,36 +47,32 @@ def overview(path: str | os.PathLike[str]) -> dict[str, Any]:
     variables, data, parameters, metadata = read_result(path, rows=False)
     read = [variable for variable in variables if variable.name in data]
     result = Result(str(metadata["axes"]).split(), read, data, parameters, metadata)
-    sizes = {dim: size for v in read for dim, size in zip(v.dims, data[v.name].shape, strict=True)}
+    of_axes = [result.variables[axis] for axis in result.axes]
+    # What bears a known name may be something else in a file that others have changed.
+    of_lanes = [v for v in read if v.dims == result.axes and v.name not in result.axes]
+    errors = {v.name: data[v.name] for v in of_lanes if v.name in ERRORS}
+    # The exponents of orbits have no standard error.
+    recorded = {name: errors[name] > 0.0 for name in errors if name.endswith(known.STANDARD_ERROR)}
     summary: dict[str, Any] = {
         "file": os.fspath(path),
         "bytes": Path(path).stat().st_size,
-        "lanes": math.prod(sizes[axis] for axis in result.axes),
+        "lanes": math.prod(axis.values.size for axis in of_axes),
         "axes": {
-            axis: {"values": sizes[axis], **_range(data[axis]), **_wording(result.variables[axis])}
-            | ({"meanings": flags} if (flags := result.variables[axis].flags) else {})
-            for axis in result.axes
+            axis.name: {**_spread(axis.values), **_wording(axis), "meanings": axis.flags}
+            for axis in of_axes
         },
         "metadata": metadata,
         "parameters": {name: _parameter(entry) for name, entry in parameters.items()},
-        **{facts: {} for facts in ("counts", "errors", "step_choice", "variables")},
+        "counts": {
+            v.name: dict(zip(v.flags, _counted(data[v.name], len(v.flags)), strict=False))
+            for v in of_lanes
+            if v.flags and v.dtype == "uint8"
+        },
+        "errors": {name: _spread(errors[name][recorded.get(name, ...)]) for name in errors},
+        "variables": {v.name: {"dims": v.dims, "dtype": v.dtype, **_wording(v)} for v in variables},
+        "slice": {},
+        "stages": [],
     }
-    # What bears a known name may be something else in a file that others have changed.
-    for v in read:
-        values, of_the_lanes = data[v.name], v.dims == result.axes and v.name not in result.axes
-        if of_the_lanes and v.flags and v.dtype == "uint8":
-            numbers = np.bincount(values.ravel(), minlength=len(v.flags)).tolist()
-            summary["counts"][v.name] = dict(zip(v.flags, numbers, strict=False))
-        elif of_the_lanes and v.name in ERRORS and v.dtype == "float64":
-            # The exponents of orbits have no standard error.
-            counted = values > 0.0 if v.name.endswith(known.STANDARD_ERROR) else ...
-            summary["errors"][v.name] = _spread(values[counted])
-        elif v.dims == (f"{_CANDIDATE}steps",) and v.dtype in ("float64", "int32"):
-            summary["step_choice"][v.name.removeprefix(_CANDIDATE)] = values.tolist()
-    for v in variables:
-        shape = {"dims": v.dims, "shape": [sizes.get(dim) for dim in v.dims]}
-        summary["variables"][v.name] = {**shape, "dtype": v.dtype, **_wording(v)}
-    summary |= {"slice": {}, "stages": []}
     if result.axis not in known.UNSWEPT and all(name in result for name in known.LABELS):
         part = one_axis(result)
         stages = stage_table(labelled_lanes(part))
@@ -101,15 +92,11 @@ def plain(value: Any) -> Any:
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
-def _range(values: Array) -> dict[str, float]:
-    return {"least": float(values.min()), "greatest": float(values.max())}
-
-
 def _parameter(parameter: Parameter) -> dict[str, Any]:
     value = np.asarray(parameter.value)
     # What differs from lane to lane may be a million numbers.
     along_axes = parameter.dims not in ((), (known.HARMONIC,))
-    content = _range(value) if along_axes else {"value": value.tolist()}
+    content = _spread(value) if along_axes else {"value": value.tolist()}
     return {"origin": parameter.origin, **content, **_wording(parameter)}
 
 
@@ -117,11 +104,15 @@ def _wording(entry: known.Variable | Parameter) -> dict[str, str]:
     return {"units": entry.units, "long_name": entry.long_name}
 
 
+def _counted(values: Array, flags: int) -> list[int]:
+    counts: list[int] = np.bincount(values.ravel(), minlength=flags).tolist()
+    return counts
+
+
 def _spread(values: Array) -> dict[str, Any]:
     sound = values[np.isfinite(values)]
-    if sound.size == 0:
-        return {"lanes": 0, "median": None, "greatest": None}
-    return {"lanes": sound.size, "median": float(np.median(sound)), "greatest": float(sound.max())}
+    spread = np.quantile(sound, (0.0, 0.5, 1.0)).tolist() if sound.size else [None] * 3
+    return {"values": sound.size, **dict(zip(("least", "median", "greatest"), spread, strict=True))}
 
 
 def overview_page(
@@ -130,12 +121,19 @@ def overview_page(
     """Write an overview as text, with the keys of the configuration and what fits, a line each."""
     sections = {
         "": _file(overview),
-        "Accuracy": _accuracy(overview),
-        "Run": _metadata(overview, _RUN),
+        "Errors": _errors(overview["errors"]),
+        "Run": (
+            _entry(name.replace("_", " "), value if isinstance(value, str) else _number(value))
+            for name, value in overview["metadata"].items()
+            if name not in ELSEWHERE and value not in (None, "")
+        ),
         "Stages": _stages(overview),
         "Dimensionless groups": _groups(overview["parameters"]),
         "Configuration": (_wrapped(line, "  ") for line in settings),
-        "Variables": _variables(overview["variables"]),
+        "Variables": (
+            _wrapped(f"{name} ({', '.join(one['dims'])}) {one['dtype']}{_units(one)}", "  ")
+            for name, one in overview["variables"].items()
+        ),
         "Verified": (_wrapped(line, "  ") for line in verified),
     }
     pages = [
@@ -162,13 +160,11 @@ def _number(value: float | None) -> str:
 
 def _file(overview: Mapping[str, Any]) -> Iterator[str]:
     metadata = overview["metadata"]
-    size = f"{overview['bytes']:,} bytes, {metadata['schema']} {metadata['schema_version']}"
-    yield _entry("file", f"{overview['file']} ({size})")
-    yield from _metadata(overview, _SETTINGS)
+    yield _entry("file", f"{overview['file']} ({overview['bytes']:,} bytes)")
+    yield _entry("title", str(metadata.get("title", "")))
     for name, axis in overview["axes"].items():
         values = "1 value" if axis["values"] == 1 else f"{axis['values']} values"
-        span = f"{_number(axis['least'])} to {_number(axis['greatest'])}{_units(axis)}"
-        span = " and ".join(axis.get("meanings", [span]))
+        span = " and ".join(axis["meanings"]) or f"{_span(axis)}{_units(axis)}"
         yield _entry("axis", f"{name} ({axis['long_name']}), {values}, {span}")
     yield _entry("lanes", f"{overview['lanes']}")
     for name, counts in overview["counts"].items():
@@ -177,17 +173,12 @@ def _file(overview: Mapping[str, Any]) -> Iterator[str]:
         yield _entry("note", note)
 
 
-def _accuracy(overview: Mapping[str, Any]) -> Iterator[str]:
-    yield from _metadata(overview, _INTEGRATION)
-    for name, spread in overview["errors"].items():
-        if spread["lanes"]:
+def _errors(errors: Mapping[str, Any]) -> Iterator[str]:
+    for name, spread in errors.items():
+        if spread["values"]:
             span = f"{spread['median']:.1e} (median) to {spread['greatest']:.1e}"
             label, cause = ERRORS[name]
-            yield _entry(label, f"{span} in {spread['lanes']} lanes, {cause}")
-    choice = dict(overview["step_choice"])
-    for row, steps in enumerate(choice.pop("steps", [])):
-        measured = ", ".join(f"{name} {_number(values[row])}" for name, values in choice.items())
-        yield _entry("step choice", f"{steps} steps: {measured}")
+            yield _entry(label, f"{span} in {spread['values']} lanes, {cause}")
 
 
 def _stages(overview: Mapping[str, Any]) -> Iterator[str]:
@@ -207,29 +198,17 @@ def _stages(overview: Mapping[str, Any]) -> Iterator[str]:
     yield from (_wrapped(line, "  ") for line in [*head, *lines])
 
 
-def _metadata(overview: Mapping[str, Any], names: str) -> Iterator[str]:
-    for name in names.split():
-        value = overview["metadata"].get(name)
-        if value not in (None, ""):
-            text = value if isinstance(value, str) else _number(value)
-            yield _entry(name.replace("_", " "), text)
-
-
 def _groups(parameters: Mapping[str, Any]) -> Iterator[str]:
     for name, entry in parameters.items():
-        text = ", ".join(map(_number, np.ravel(entry.get("value", []))))
-        if "least" in entry:
-            text = f"{_number(entry['least'])} to {_number(entry['greatest'])}"
-        yield _wrapped(f"{name:26} {text}{_units(entry)} ({entry['origin']})", "  ", " " * 29)
-
-
-def _variables(variables: Mapping[str, Any]) -> Iterator[str]:
-    for name, variable in variables.items():
-        dims = ", ".join(
-            dim if size is None else f"{dim}: {size}"
-            for dim, size in zip(variable["dims"], variable["shape"], strict=True)
+        value = (
+            ", ".join(map(_number, np.ravel(entry["value"]))) if "value" in entry else _span(entry)
         )
-        yield _wrapped(f"{name} ({dims}) {variable['dtype']}{_units(variable)}", "  ", "      ")
+        text = f"{name:26} {value}{_units(entry)} ({entry['origin']})"
+        yield _wrapped(text, "  ", " " * 29)
+
+
+def _span(spread: Mapping[str, Any]) -> str:
+    return f"{_number(spread['least'])} to {_number(spread['greatest'])}"
 
 
 def _units(entry: Mapping[str, Any]) -> str:

@@ -3,7 +3,7 @@
 import os
 import stat
 from collections.abc import Iterator, Mapping
-from contextlib import suppress
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -39,20 +39,48 @@ def read_result(path: str | os.PathLike[str], *, rows: bool = True) -> Contents:
     out, and the checksum of a file above 1 GiB is left unchecked. Raises FileError if the file is
     missing, damaged, of another kind or of another major format version.
     """
-    name = os.fspath(path)
+    with _opened(path, in_full=rows) as (file, _):
+        return _read(file, rows)
+
+
+def verify(path: str | os.PathLike[str]) -> list[str]:
+    """Read all of a result file, piece by piece, and say what was found sound, a phrase each.
+
+    Raises FileError if anything is damaged or contradicts the format.
+    """
+    with _opened(path, in_full=True) as (file, fits):
+        variables, _, parameters, metadata = _read(file, rows=False)
+        for name in (variable.name for variable in variables):
+            for piece in file[name].iter_chunks() if file[name].chunks else [...]:
+                stored.values_of(name, file[name], piece)
+    foreign = "there is no checksum of the file: another program than gearchaos has written to it"
+    return [
+        "the checksum of the file fits" if fits else foreign,
+        "all numbers can be read, and fit the checksums of their chunks where there are any",
+        f"format {metadata['schema']} {metadata['schema_version']}: {len(variables)} variables and "
+        f"{len(parameters)} {PARAMETERS} have their types, dimensions and sizes",
+    ]
+
+
+@contextmanager
+def _opened(path: str | os.PathLike[str], in_full: bool) -> Iterator[tuple[h5py.File, bool | None]]:
+    """Open a file, with whether its checksum fits, and word what goes wrong with it."""
+    name, fits = os.fspath(path), None
     try:
         found = Path(name).stat()
         if not stat.S_ISREG(found.st_mode):
             raise FileError(f"{name}: is not a regular file; give the name of a result file")
-        if (rows or found.st_size <= SOON_HASHED) and checksum_fits(Path(name)) is False:
-            raise FileError(f"{name}: is damaged (its checksum does not fit); run the sweep again")
+        if in_full or found.st_size <= SOON_HASHED:
+            fits = checksum_fits(Path(name))
     except (OSError, ValueError) as error:
         raise FileError(
             f"{name}: cannot be read: {reason(error)}; give the name of a result file"
         ) from error
+    if fits is False:
+        raise FileError(f"{name}: is damaged (its checksum does not fit); run the sweep again")
     try:
         with h5py.File(name, "r") as file:
-            return _read(file, rows)
+            yield file, fits
     except UnfitError as error:
         raise FileError(f"{name}: {printable(str(error))}") from error
     except Exception as error:
@@ -62,32 +90,6 @@ def read_result(path: str | os.PathLike[str], *, rows: bool = True) -> Contents:
             raise FileError(f"{name}: is not an HDF5 file; {remedy}") from error
         why = printable(reason(error))
         raise FileError(f"{name}: is damaged ({why}); run the sweep again") from error
-
-
-def verify(path: str | os.PathLike[str]) -> list[str]:
-    """Read all of a result file, piece by piece, and say what was found sound, a phrase each.
-
-    Raises FileError if anything is damaged or contradicts the format; it names arrays and rows.
-    """
-    try:
-        variables, _, parameters, metadata = read_result(path, rows=False)
-    except FileError as error:
-        raise FileError([*error.problems, *_damaged_pieces(path)]) from error
-    # Of a large file the reader has not tried the checksum.
-    fits = checksum_fits(Path(path))
-    damage = f"{path}: is damaged (its checksum does not fit); run the sweep again"
-    if problems := [*([damage] if fits is False else []), *_damaged_pieces(path)]:
-        raise FileError(problems)
-    with h5py.File(path, "r") as file:
-        datasets = stored.datasets_of(file).values()
-        summed = sum(one.id.get_num_chunks() for one in datasets if one.fletcher32)
-    foreign = "there is no checksum of the file: another program than gearchaos has written to it"
-    return [
-        foreign if fits is None else "the checksum of the file fits",
-        f"{summed} chunks of numbers fit their checksums",
-        f"format {metadata['schema']} {metadata['schema_version']}: {len(variables)} variables and "
-        f"{len(parameters)} {PARAMETERS} have their types, dimensions and sizes",
-    ]
 
 
 def fixed_coordinates(metadata: Mapping[str, Any]) -> dict[str, float]:
@@ -107,20 +109,6 @@ def printable(text: str) -> str:
     """Return a text of a file, if long its start, without what acts on a terminal."""
     text = text if len(text) <= MOST_PRINTED else f"{text[:MOST_PRINTED]}..."
     return "".join(c if c.isprintable() else "\N{REPLACEMENT CHARACTER}" for c in text)
-
-
-def _damaged_pieces(path: str | os.PathLike[str]) -> Iterator[str]:
-    """Name the arrays, and the rows of them, that cannot be read; one sentence each."""
-    # Where the damage has reached further, the reader has said so already.
-    if Path(path).is_file():
-        with suppress(Exception), h5py.File(path, "r") as file:
-            for name, dataset in stored.datasets_of(file).items():
-                for piece in dataset.iter_chunks() if dataset.chunks else [()]:
-                    try:
-                        dataset[piece]
-                    except OSError:
-                        rows = f", rows {piece[0].start} to {piece[0].stop - 1}" if piece else ""
-                        yield f"{path}: is damaged in {name}{rows}"
 
 
 def _read(file: h5py.File, rows: bool) -> Contents:

@@ -101,10 +101,10 @@ def dtype_of(name: str, dataset: h5py.Dataset) -> str:
     return _DTYPES[dataset.dtype.str[1:]]
 
 
-def values_of(name: str, dataset: h5py.Dataset) -> Array:
-    """Read the whole of a dataset, in the byte order of this machine."""
+def values_of(name: str, dataset: h5py.Dataset, piece: Any = ...) -> Array:
+    """Read a dataset, or a piece of it, in the byte order of this machine."""
     try:
-        return np.asarray(dataset[...], dtype=dtype_of(name, dataset))
+        return np.asarray(dataset[piece], dtype=dtype_of(name, dataset))
     except OSError as error:
         raise UnfitError(f"is damaged in {name} ({reason(error)})") from error
 

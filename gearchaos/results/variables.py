@@ -152,17 +152,6 @@ def lane_axes(variables: Sequence[Variable]) -> tuple[str, ...]:
     return next(variable.dims for variable in variables if variable.name == STATUS)
 
 
-def step_choice_variables(
-    steps: Sequence[int], measured: Mapping[str, Sequence[float]]
-) -> list[Variable]:
-    """List what was measured to choose the number of steps, one value per candidate.
-
-    The last candidate was taken; ``measured`` is by name.
-    """
-    values = {"steps": steps, **measured}
-    return listed((), {"step choice": [""]}, {f"candidate_{key}": values[key] for key in values})
-
-
 def due(axes: Sequence[str], found: Collection[str]) -> Iterator[tuple[str, tuple[str, ...], str]]:
     """Give name, dimensions and type of all that a file must hold that holds these variables.
 

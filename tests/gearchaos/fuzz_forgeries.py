@@ -104,7 +104,7 @@ def _swelling(file: h5py.File) -> None:
 
 def _many_datasets(file: h5py.File) -> None:
     for number in range(10_000):
-        file.id.links.create_hard(b"x%d" % number, file.id, b"candidate_steps")
+        file.id.links.create_hard(b"x%d" % number, file.id, b"status")
 
 
 def _many_attributes(file: h5py.File) -> None:

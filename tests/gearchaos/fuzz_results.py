@@ -17,7 +17,6 @@ from gearchaos.results.variables import (
     Variable,
     coordinate,
     start_axis,
-    step_choice_variables,
 )
 
 from .commands import SMALL
@@ -35,8 +34,6 @@ GOOD_AXES = ((LOAD,), (ERRORS, LOAD, start_axis(2)), (ERRORS, LOAD), (LOAD, star
 def good_result(path: Path, axes: tuple[Variable, ...] = GOOD_AXES[0]) -> None:
     """Write a sound result file with every kind of variable that a sweep has."""
     states = list(STATE_WORDING)[:2]
-    told = ("section_error", "exponent_error", "changed_share", "periodic_share")
-    choice = dict.fromkeys(told, (1e-3, 1e-7))
     variables = sweep_variables(
         axes,
         states=states,
@@ -50,7 +47,6 @@ def good_result(path: Path, axes: tuple[Variable, ...] = GOOD_AXES[0]) -> None:
         motion_meanings=["periodic", "quasi_periodic", "chaotic", "unresolved", "diverged"],
         record_meanings=["uniform", "mixed"],
     )
-    variables += step_choice_variables([50, 100], choice)
     sizes = {axis.name: axis.values.size for axis in axes}
     sizes |= {"section_point": POINTS, "state": 2, "exponent": 2}
     numbers = np.random.default_rng(5)
