@@ -46,14 +46,14 @@ class Lanes:
         first = getattr(config.pitch_error, "first_realisation", 0)
         numbers = first + np.arange(getattr(config.pitch_error, "realisations", 1))
         if numbers.size > 1:
-            self.axes.append(known.pair_axis(numbers))
+            self.axes.append(known.unswept_axis(REALISATION, numbers))
             self._of_systems[REALISATION] = numbers
         self.starts = config.start.size
         if self.starts > 1:
-            self.axes.append(known.start_axis(self.starts))
+            self.axes.append(known.unswept_axis(known.START, np.arange(self.starts)))
         self.directions = 2 if config.start.carry == "both" else 1
         if self.directions > 1:
-            self.axes.append(known.direction_axis())
+            self.axes.append(known.unswept_axis(known.DIRECTION, np.arange(2)))
         self.repeats = numbers.size * self.starts * self.directions
         self.effects = config.needed_effects
         self.states = states_of(self.effects)

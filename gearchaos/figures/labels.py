@@ -12,7 +12,7 @@ from gearchaos.gear.tooth_deviations import REALISATION
 from gearchaos.results import scales
 from gearchaos.results.result import Result
 from gearchaos.results.scales import excitation_of
-from gearchaos.results.variables import DIRECTION, KEPT_BY, START, coordinate_text
+from gearchaos.results.variables import DIRECTION, START, coordinate_text
 
 
 def axis_label(result: Result, name: str, line_length: int = 60) -> str:
@@ -82,11 +82,8 @@ def in_a_name(place: Mapping[str, float], digits: int = 12) -> str:
 
 
 def instead_of(variable: str, there: Sequence[str]) -> str:
-    """Say what there is instead of a variable, and which key would keep it or which is meant."""
+    """Say what there is instead of a variable, and which is meant."""
     hint = "".join(f"; did you mean {one}?" for one in get_close_matches(variable, there, 1))
-    for key, names in KEPT_BY.items():
-        if variable.startswith(names) and not any(one.startswith(names) for one in there):
-            hint = f"; set outputs.{key} and compute it again to have it"
     return f"it has {', '.join(there)}{hint}"
 
 

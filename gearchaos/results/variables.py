@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from gearchaos.arrays import Array
+from gearchaos.arrays import Array, Floats
 from gearchaos.gear.tooth_deviations import REALISATION
 
 START = "start"
@@ -54,17 +54,6 @@ _WORDING = {
     kind: {row["name"]: (row["long_name"], row["symbol"]) for row in _ROWS[kind]}
     for kind in ("state", "acceleration", "direction")
 }
-KEPT_BY = {
-    key: tuple(row["name"].split("@")[0] for kind in kinds for row in _ROWS[kind])
-    for key, kinds in {
-        "loads = true": ("forces", "loads"),
-        "contact = true": ("contact",),
-        "orders = [1, 2]": ("amplitudes",),
-        "lyapunov = true": ("lyapunov",),
-    }.items()
-}
-"""Keys of [outputs], and how the names begin of what a sweep keeps with them."""
-
 STATE_WORDING = _WORDING["state"]
 """Long name and mathtext symbol of each state (all dimensionless), in the one order of states."""
 
@@ -106,12 +95,9 @@ class Variable:
         return attributes
 
 
-def coordinate(
-    name: str, units: str, long_name: str, symbol: str, values: Array, flags: tuple[str, ...] = ()
-) -> Variable:
-    """Give a variable that is a dimension of its own, such as an axis: its values ascend."""
-    dtype = {"i": "int32", "f": "float64"}[values.dtype.kind]
-    return Variable(name, (name,), dtype, units, long_name, symbol, flags=flags, values=values)
+def coordinate(name: str, units: str, long_name: str, symbol: str, values: Floats) -> Variable:
+    """Give a variable that is a dimension of its own, the axis of a parameter: values ascend."""
+    return Variable(name, (name,), "float64", units, long_name, symbol, values=values)
 
 
 def axis_name(parameter: str) -> str:
@@ -119,21 +105,9 @@ def axis_name(parameter: str) -> str:
     return parameter.replace(".", "_")
 
 
-def start_axis(count: int) -> Variable:
-    """Give the axis of several starts of each parameter value."""
-    text = "number of the start among those of one parameter value"
-    return coordinate(START, "1", text, "", np.arange(count))
-
-
-def pair_axis(numbers: Array) -> Variable:
-    """Give the axis of several drawn gear pairs, of these numbers."""
-    return coordinate(REALISATION, "1", "drawn gear pair", "", numbers)
-
-
-def direction_axis() -> Variable:
-    """Give the axis of both directions in which a sweep carries its states."""
-    text = "direction in which each value starts from the end state of its neighbour"
-    return coordinate(DIRECTION, "1", text, "", np.arange(len(WAYS)), WAYS)
+def unswept_axis(name: str, numbers: Array) -> Variable:
+    """Give the axis of several starts, drawn gear pairs or directions, of these numbers."""
+    return listed((), {f"{name} axis": [""]}, {name: numbers}, {DIRECTION: WAYS})[0]
 
 
 def coordinate_text(axis: str, value: float, digits: int = 12) -> str:

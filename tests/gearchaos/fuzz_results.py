@@ -16,7 +16,7 @@ from gearchaos.results.variables import (
     STATE_WORDING,
     Variable,
     coordinate,
-    start_axis,
+    unswept_axis,
 )
 
 from .commands import SMALL
@@ -28,7 +28,8 @@ CHECKSUM_LINE = 82
 LANES, POINTS = 20, 5
 LOAD = coordinate("load", "1", "static load", "$f_n$", np.linspace(0.0, 1.0, LANES))
 ERRORS = coordinate("pitch_error", "1", "pitch error", "$P$", np.linspace(0.0, 3.0, 4))
-GOOD_AXES = ((LOAD,), (ERRORS, LOAD, start_axis(2)), (ERRORS, LOAD), (LOAD, start_axis(3)))
+SEVERAL = [unswept_axis("start", np.arange(count)) for count in (2, 3)]
+GOOD_AXES = ((LOAD,), (ERRORS, LOAD, SEVERAL[0]), (ERRORS, LOAD), (LOAD, SEVERAL[1]))
 
 
 def good_result(path: Path, axes: tuple[Variable, ...] = GOOD_AXES[0]) -> None:

@@ -18,7 +18,7 @@ from gearchaos.errors import FileError
 from gearchaos.results.block_folder import StoreLock, read_manifest, require_same
 from gearchaos.results.block_store import BlockStore
 from gearchaos.results.result import Parameter, Result, open_result
-from gearchaos.results.variables import Variable, coordinate, listed, start_axis
+from gearchaos.results.variables import Variable, coordinate, listed, unswept_axis
 from gearchaos.version import Software
 
 LANES = 100
@@ -566,7 +566,7 @@ def test_several_axes_become_one_file_from_blocks_that_cut_them(output: Path) ->
     axes = [
         coordinate("load", "1", "load", "", np.arange(4.0)),
         coordinate("pitch_error", "1", "pitch error", "", np.arange(5.0)),
-        start_axis(5),
+        unswept_axis("start", np.arange(5)),
     ]
     several = of_a_sweep(axes)
     with BlockStore(output, several, CONFIGURATION, SOFTWARE) as store:

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 import gearchaos
-from gearchaos.engine.simulation import Simulation
 from gearchaos.export import main as export
 from gearchaos.figures.labels import unit_of
 from gearchaos.plot import main as plot

@@ -210,8 +210,6 @@ def test_a_file_that_is_no_result_is_named_and_nothing_is_written(result_file, k
     [
         (["--variable", "section_delta_9"], "it has section_delta_5, section_delta_1"),
         (["--variable", "section_delta5"], "did you mean section_delta_5?"),
-        (["--variable", "load_factor_largest"], "set outputs.loads = true and compute it again"),
-        (["--variable", "amplitude_delta_5"], "set outputs.orders = [1, 2] and compute it again"),
         (["--from", "5"], "the result has 0 to 1"),
         (["--from", "nan"], "not a finite number"),
         (["--width", "1"], "not between 60 and 1000"),

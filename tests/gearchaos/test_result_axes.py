@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from gearchaos.errors import ConfigurationError, FileError
 from gearchaos.results.result import Parameter, Result, open_result, section_variables
 from gearchaos.results.result_file import hyperslabs, write_result
-from gearchaos.results.variables import Variable, coordinate, start_axis
+from gearchaos.results.variables import Variable, coordinate, unswept_axis
 
 from .listed_variables import sweep_variables
 
@@ -24,9 +24,9 @@ LOADS = coordinate("load", "1", "static load", "$f_n$", np.linspace(0.1, 0.5, 3)
 ERRORS = coordinate("pitch_error", "1", "pitch error", "$P$", np.linspace(0.0, 3.0, 7))
 AXES = {
     "one start": (ERRORS,),
-    "several starts": (ERRORS, start_axis(4)),
+    "several starts": (ERRORS, unswept_axis("start", np.arange(4))),
     "two parameters": (LOADS, ERRORS),
-    "two parameters, several starts": (LOADS, ERRORS, start_axis(2)),
+    "two parameters, several starts": (LOADS, ERRORS, unswept_axis("start", np.arange(2))),
 }
 
 

@@ -21,9 +21,7 @@ from gearchaos.results.variables import (
     Variable,
     axis_name,
     coordinate,
-    direction_axis,
-    pair_axis,
-    start_axis,
+    unswept_axis,
 )
 
 from .listed_variables import sweep_variables
@@ -378,7 +376,7 @@ def test_the_documented_variables_are_those_that_are_written() -> None:
     lines = re.findall(r"^\| `\w+` \| \(.*$", page, re.M)
     rows = [[cell.strip(" `") for cell in line.split("|")[1:5]] for line in lines]
     documented = {name: (dims.strip("()"), dtype, fill) for name, dims, dtype, fill in rows}
-    repeats = pair_axis(np.arange(2)), start_axis(2), direction_axis()
+    repeats = [unswept_axis(name, np.arange(2)) for name in ("realisation", "start", "direction")]
     result = make_result(swept("load", 3), swept(count=4), *repeats)
     short = {"load": "B", "pitch_error": "A", "section_delta_5": "section_STATE"}
     ends = "delta_1_smallest", "delta_1_largest", "delta_1_peak_to_peak", "amplitude_delta_1"

@@ -17,7 +17,7 @@ from gearchaos.records.label import MEANINGS
 from gearchaos.records.wilson import wilson_interval
 from gearchaos.results.ensembles import motion_shares
 from gearchaos.results.result import Result
-from gearchaos.results.variables import coordinate, pair_axis, start_axis
+from gearchaos.results.variables import coordinate, unswept_axis
 
 from .listed_variables import sweep_variables
 
@@ -44,8 +44,8 @@ def known_motions(
     axes = [coordinate("pitch_error_grade", "1", "accuracy grade of both gears", "", values)]
     if second > 1:
         axes.insert(0, coordinate("load", "1", "load", "$f_n$", np.arange(1.0, 1.0 + second)))
-    axes += [pair_axis(np.arange(pairs))] if pairs > 1 else []
-    axes += [start_axis(starts)] if starts > 1 else []
+    axes += [unswept_axis("realisation", np.arange(pairs))] if pairs > 1 else []
+    axes += [unswept_axis("start", np.arange(starts))] if starts > 1 else []
     variables = sweep_variables(
         axes,
         states=("delta_5", "delta_5_rate"),
