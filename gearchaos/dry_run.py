@@ -83,22 +83,23 @@ def _seconds_per_lane(simulation: Simulation) -> float:
 
     A whole block: what is checked, or looked at again, is computed in vectors of lanes.
     """
-    lanes = simulation.block_lanes(numba.get_num_threads()) / (8 if simulation.carried else 1)
+    wanted = simulation.block_lanes(numba.get_num_threads()) / (8 if simulation.carried else 1)
     periods = simulation.plan.transient_periods + simulation.plan.recorded_periods
     with notice("computing some lanes, to tell how long all take"):
         # The first time, little is computed, and the kernels are loaded. It takes a step more, so
         # that flow maps are still to be made the second time: once, for however many periods.
         for more, length in (1, min(1.0, 8.0 / periods)), (0, min(1.0, SAMPLE_PERIODS / periods)):
-            sample = Simulation(_thinned(simulation, lanes / len(simulation.lanes), length))
-            plan, every = sample.plan, np.arange(len(sample.lanes))
+            sample = Simulation(_thinned(simulation, wanted / len(simulation.lanes), length))
+            plan, lanes = sample.plan, len(sample.lanes)
             steps, orders = plan.steps_per_period + more, simulation.plan.orders
             sample.plan = plan._replace(steps_per_period=steps, orders=orders)
             began = time.perf_counter()
-            sample.integrate(every, sample.plan._replace(transient_periods=0, recorded_periods=0))
+            none = sample.plan._replace(transient_periods=0, recorded_periods=0)
+            sample.integrate(0, lanes, none)
             made = time.perf_counter()
-            sample.compute(0, every.size)
+            sample.compute(0, lanes)
             scale = periods / (plan.transient_periods + plan.recorded_periods)
-            seconds = (made - began + scale * (time.perf_counter() - made)) / every.size
+            seconds = (made - began + scale * (time.perf_counter() - made)) / lanes
     return seconds
 
 

@@ -8,13 +8,10 @@ one. The loop neither knows nor cares whether a block is computed in this proces
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from contextlib import ExitStack, suppress
-from types import MappingProxyType
 from typing import TYPE_CHECKING, TypeAlias
 
 import numba
-import numpy as np
 
-from gearchaos.arrays import Floats
 from gearchaos.engine.error_check import Tally
 from gearchaos.engine.simulation import Arrays, Bounds, Simulation
 from gearchaos.errors import FileError, GearchaosError
@@ -40,26 +37,14 @@ class LocalExecutor(ExitStack):
     """Computes in this process, one block at a time: all threads work within a block.
 
     The thread of its own leaves the main one free to write what is finished, and an interrupt,
-    which the main thread receives, does not cost the block that is running. A carried sweep goes on
-    from ``finished``: blocks, with a way to read them.
+    which the main thread receives, does not cost the block that is running.
     """
 
     width = 2
 
-    def __init__(
-        self,
-        simulation: Simulation,
-        finished: Mapping[Bounds, Callable[[], Arrays]] = MappingProxyType({}),
-    ) -> None:
+    def __init__(self, simulation: Simulation) -> None:
         super().__init__()
         self._simulation = simulation
-        if simulation.carried:
-            # Of all lanes, and before them of as many, side by side, which there are not.
-            lanes = simulation.lanes
-            size = lanes.side_by_side + len(lanes), len(lanes.states)
-            self._ends = np.full(size, np.nan)
-            for block, read in finished.items():
-                self._end_states(*block)[:] = read()["end_state"]
         threads = (numba.get_num_threads(),)
         self._pool = ThreadPoolExecutor(1, initializer=numba.set_num_threads, initargs=threads)
         self.callback(self._pool.shutdown, cancel_futures=True)
@@ -69,20 +54,7 @@ class LocalExecutor(ExitStack):
 
         Its `cancel` succeeds until the block runs.
         """
-        return self._pool.submit(self._compute, block)
-
-    def _compute(self, block: Bounds) -> Arrays:
-        simulation, (first, _) = self._simulation, block
-        if not simulation.carried:
-            return simulation.compute(*block)
-        before = first - simulation.lanes.side_by_side
-        arrays = simulation.compute(*block, self._end_states(before, first))
-        self._end_states(*block)[:] = arrays["end_state"]
-        return arrays
-
-    def _end_states(self, first: int, last: int) -> Floats:
-        many = self._simulation.lanes.side_by_side
-        return self._ends[many + first : many + last]
+        return self._pool.submit(self._simulation.compute, *block)
 
 
 def compute_blocks(

@@ -67,7 +67,7 @@ def compute_response(simulation: Simulation, periods: int, text: str, fixed: str
     began = time.monotonic()
     lanes = simulation.lanes.computed_at(np.arange(len(simulation.lanes)))
     plan = simulation.recording._replace(history_periods=periods)
-    start, outcome = simulation.integrate(lanes, plan)
+    start, outcome = simulation.integrate(0, lanes.size, plan)
     system = simulation.lanes.system_of(lanes)
     arrays = {
         **simulation.arrays(lanes, start, outcome),

@@ -1,6 +1,7 @@
 """A configured sweep: what it yields, and the means to compute any block of its lanes."""
 
 from collections.abc import Mapping, Sequence
+from functools import cached_property
 from typing import Any
 
 import gearchaos_kernels as kernels
@@ -199,42 +200,51 @@ class Simulation:
         lanes = len(self.lanes)
         return [(n, min(n + size, lanes)) for n in range(0, lanes, size)]
 
-    def compute(self, first: int, last: int, carried: Floats | None = None) -> dict[str, Any]:
+    def compute(self, first: int, last: int) -> dict[str, Any]:
         """Compute the lanes at the places ``first`` to ``last - 1`` of the order of computation.
 
-        Gives every variable over lanes by its name; ``carried``: as for `integrate`.
+        Gives every variable over lanes by its name. A carried sweep goes on from the lanes that it
+        has computed before, or that `has_ended` has told of.
         """
         lanes = self.lanes.computed_at(np.arange(first, last))
-        return self.arrays(lanes, *self.integrate(lanes, self.recording, carried))
+        return self.arrays(lanes, *self.integrate(first, last, self.recording))
+
+    def has_ended(self, first: int, last: int, state: Floats) -> None:
+        """Keep the end states of lanes, from which those after them start in a carried sweep."""
+        if self.carried:
+            many = self.lanes.side_by_side
+            self._ends[many + first : many + last] = state
+
+    @cached_property
+    def _ends(self) -> Floats:
+        """End states in the order of computation, before them of as many lanes as there are not."""
+        lanes = self.lanes
+        return np.full((lanes.side_by_side + len(lanes), len(lanes.states)), np.nan)
 
     def integrate(
-        self, lanes: Integers, plan: kernels.Plan, carried: Floats | None = None
+        self, first: int, last: int, plan: kernels.Plan
     ) -> tuple[Floats, kernels.Outcome]:
-        """Integrate lanes by a plan, and return their start states as well.
-
-        The lanes are consecutive in the order of computation. ``carried`` (lanes side by side,
-        states): end states of those before them, from which a carried sweep goes on, not a number
-        where it begins.
-        """
+        """Integrate such lanes by a plan, and return their start states as well."""
         check()
-        many = self.lanes.side_by_side
-        start = np.full((lanes.size, len(self.lanes.states)), np.nan)
-        if carried is not None:
-            start[:many] = carried[: lanes.size]
-        outcomes: list[kernels.Outcome] = []
-        for at in range(0, lanes.size, many):
-            mine, begin = lanes[at : at + many], start[at : at + many]
-            if outcomes:
-                begin[:] = outcomes[-1].end_state[: mine.size]
+        many, starts, outcomes = self.lanes.side_by_side, [], []
+        for at in range(first, last, many):
+            to = min(at + many, last)
+            lanes = self.lanes.computed_at(np.arange(at, to))
+            if self.carried:
+                start = self._ends[at:to].copy()
+            else:
+                start = np.full((to - at, len(self.lanes.states)), np.nan)
             # A lane that diverged hands nothing on: its successor begins anew.
-            anew = ~np.isfinite(begin).all(axis=1)
+            anew = ~np.isfinite(start).all(axis=1)
             if anew.any():
-                begin[anew] = self.lanes.start_of(mine[anew])
-            outcomes.append(kernels.integrate(self.lanes.system_of(mine), begin, plan))
+                start[anew] = self.lanes.start_of(lanes[anew])
+            outcomes.append(kernels.integrate(self.lanes.system_of(lanes), start, plan))
+            self.has_ended(at, to, outcomes[-1].end_state)
+            starts.append(start)
         if len(outcomes) == 1:
-            return start, outcomes[0]
+            return starts[0], outcomes[0]
         every: Any = map(np.concatenate, zip(*outcomes, strict=True))
-        return start, kernels.Outcome(*every)
+        return np.concatenate(starts), kernels.Outcome(*every)
 
     def arrays(self, lanes: Integers, start: Floats, outcome: kernels.Outcome) -> dict[str, Any]:
         """Return what is kept of integrated lanes, by the name of the variable."""

@@ -1,7 +1,6 @@
 """The blocks of a sweep in its store: which of them are whose, and the missing ones computed."""
 
 import re
-from functools import partial
 from typing import NamedTuple, Self
 
 import numba
@@ -90,8 +89,9 @@ def fill(
     performed_by = {}
     if cluster is None:
         size = simulation.block_lanes(numba.get_num_threads())
-        readers = {block: partial(store.read, *block) for block in finished}
-        executor: BlockExecutor = LocalExecutor(simulation, readers)
+        for block in finished if simulation.carried else ():
+            simulation.has_ended(*block, store.read(*block)["end_state"])
+        executor: BlockExecutor = LocalExecutor(simulation)
     else:
         from gearchaos.engine.dask_executor import DaskExecutor
 

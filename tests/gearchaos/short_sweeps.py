@@ -52,10 +52,10 @@ def computed(sweep: Simulation, values: int = 13) -> dict[str, np.ndarray]:
     return joined(sweep, computed_blocks(sweep, blocks(sweep, values)))
 
 
-def computed_blocks(sweep: Simulation, bounds: list, finished: dict | None = None) -> dict:
-    """Compute some blocks, given those that are finished, by their bounds."""
+def computed_blocks(sweep: Simulation, bounds: list) -> dict:
+    """Compute some blocks."""
     kept: dict = {}
-    with LocalExecutor(sweep, finished or {}) as executor:
+    with LocalExecutor(sweep) as executor:
         compute_blocks(executor, bounds, kept.__setitem__)
     return kept
 

@@ -7,7 +7,6 @@ from .short_sweeps import (
     RANDOM,
     SHORT,
     assert_same,
-    blocks,
     computed,
     computed_blocks,
     joined,
@@ -69,16 +68,6 @@ def test_all_lines_of_a_carried_sweep_are_computed_side_by_side():
     assert np.array_equal(direction, way)
     assert np.array_equal(value, np.where(way == 0, step, 3 - step))
     assert np.array_equal([line, start], others)
-
-
-def test_finished_blocks_are_not_computed_again():
-    sweep = simulation()
-    bounds = blocks(sweep, 4)
-    everything = computed_blocks(sweep, bounds)
-    finished = {bounds[1]: lambda: everything[bounds[1]]}
-    rest = computed_blocks(sweep, [block for block in bounds if block != bounds[1]], finished)
-    for block, arrays in rest.items():
-        assert_same(arrays, everything[block])
 
 
 def test_every_array_of_a_block_is_a_variable_of_the_sweep():
