@@ -4,11 +4,10 @@ import time
 
 import numpy as np
 from gearchaos_kernels import Outcome, Plan, Status, System, mesh_motion
-from tqdm import tqdm
 
 from gearchaos.arrays import Array
 from gearchaos.configuration import Configuration, Given, configuration_of
-from gearchaos.engine.running import choose_threads, metadata, result_of
+from gearchaos.engine.running import choose_threads, metadata, require_memory, result_of
 from gearchaos.engine.simulation import Simulation
 from gearchaos.errors import ConfigurationError
 from gearchaos.results.response_variables import (
@@ -20,8 +19,6 @@ from gearchaos.results.response_variables import (
     response_variables,
 )
 from gearchaos.results.result import Result
-
-LARGEST_RESPONSE = 4 * 2**30  # Bytes that a response may take in memory.
 
 
 def respond(config: Given, periods: int = DEFAULT_PERIODS, threads: int | None = None) -> Result:
@@ -63,14 +60,17 @@ def compute_response(simulation: Simulation, periods: int, text: str, fixed: str
     ``text``: the configuration as it was written; ``fixed``: as in the metadata of the lane that
     goes on. Raises ConfigurationError if the motion does not fit into memory.
     """
-    _check_size(simulation, periods)
+    plan, states, lanes = simulation.recording, len(simulation.lanes.states), len(simulation.lanes)
+    plan = plan._replace(history_periods=periods)
+    size = 8 * lanes * states * (3 * periods * plan.steps_per_period + plan.section_points)
+    what = f"the response of {lanes} lanes over {periods} mesh periods of {plan.steps_per_period} "
+    require_memory(simulation, size, f"{what}steps", "ask for fewer periods or values")
     began = time.monotonic()
-    lanes = simulation.lanes.computed_at(np.arange(len(simulation.lanes)))
-    plan = simulation.recording._replace(history_periods=periods)
-    start, outcome = simulation.integrate(0, lanes.size, plan)
-    system = simulation.lanes.system_of(lanes)
+    places = simulation.lanes.computed_at(np.arange(lanes))
+    start, outcome = simulation.integrate(0, lanes, plan)
+    system = simulation.lanes.system_of(places)
     arrays = {
-        **simulation.arrays(lanes, start, outcome),
+        **simulation.arrays(places, start, outcome),
         MESH_PERIOD: system.mesh_period,
         **_motion(system, outcome, plan),
     }
@@ -88,19 +88,6 @@ def compute_response(simulation: Simulation, periods: int, text: str, fixed: str
         "fixed": fixed,
     }
     return result_of(simulation, [arrays], facts, variables)
-
-
-def _check_size(simulation: Simulation, periods: int) -> None:
-    plan, states, lanes = simulation.plan, len(simulation.lanes.states), len(simulation.lanes)
-    samples = periods * plan.steps_per_period + 1
-    size = 8 * lanes * states * (3 * samples + plan.section_points)
-    if size > LARGEST_RESPONSE:
-        most, wanted = (tqdm.format_sizeof(s, "B", 1024) for s in (LARGEST_RESPONSE, size))
-        raise ConfigurationError(
-            f"{simulation.config.source}: the response of {lanes} lanes over {periods} "
-            f"mesh periods of {plan.steps_per_period} steps takes {wanted}, more than "
-            f"{most}; ask for fewer periods or values"
-        )
 
 
 def _motion(system: System, outcome: Outcome, plan: Plan) -> dict[str, Array]:

@@ -101,7 +101,12 @@ def prepare(simulation: Simulation, *, compile_now: bool = True, history_periods
     """
     check()  # Imports take a while.
     if compile_now:
-        _check_memory(simulation)
+        plan, wanted = simulation.plan, simulation.block_memory(numba.get_num_threads())
+        what = f"integration.recorded_periods = {plan.recorded_periods}, outputs.section_points = "
+        what += f"{plan.section_points}: a block of lanes"
+        fewer = ", take fewer steps" if plan.method == "flow_map" else ""
+        remedy = f"record fewer periods, keep fewer points{fewer}"
+        require_memory(simulation, wanted, what, remedy)
         with compiling():
             simulation.rehearse(history_periods)
         check()
@@ -109,18 +114,15 @@ def prepare(simulation: Simulation, *, compile_now: bool = True, history_periods
     say(*simulation.notes)
 
 
-def _check_memory(simulation: Simulation) -> None:
-    wanted = simulation.block_memory(numba.get_num_threads())
+def require_memory(simulation: Simulation, wanted: int, what: str, remedy: str) -> None:
+    """Raise a ConfigurationError if what is computed takes more bytes than this machine has."""
     # Windows does not tell.
     known = hasattr(os, "sysconf")
     memory = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE") if known else math.inf
     if wanted > memory:
-        plan = simulation.plan
         raise ConfigurationError(
-            f"{simulation.config.source}: integration.recorded_periods = {plan.recorded_periods}, "
-            f"outputs.section_points = {plan.section_points}: a block of lanes takes {wanted:.3g} "
-            f"bytes, more than the {memory:.3g} of this machine; record fewer periods, keep fewer "
-            f"points{', take fewer steps' if plan.method == 'flow_map' else ''}"
+            f"{simulation.config.source}: {what} takes {wanted:.3g} bytes, more than the "
+            f"{memory:.3g} of this machine; {remedy}"
         )
 
 

@@ -19,7 +19,7 @@ from gearchaos.results import tables
 from gearchaos.results import variables as known
 from gearchaos.results.atomic_file import checksum_fits
 from gearchaos.results.result_file import Parameter, own_metadata, write_result
-from gearchaos.results.result_reader import fixed_coordinates, is_coordinate, read_result
+from gearchaos.results.result_reader import fixed_coordinates, read_result
 from gearchaos.results.scales import in_physical_units
 from gearchaos.results.variables import Variable, coordinate_text, diagram_axis
 
@@ -38,8 +38,6 @@ class Result:
     axes flattened into the first one; those that carry their own ``values`` may be left out;
     ``parameters``, ``metadata`` by name: dimensionless groups with their origin; title,
     formulation, configuration, provenance; ``fixed_axes`` by name: axes that `sel` has fixed.
-    Raises ValueError if an array is missing, its shape contradicts the dimensions, or an axis is no
-    ascending row of values.
     """
 
     def __init__(
@@ -55,28 +53,16 @@ class Result:
         self.parameters = dict(parameters)
         self.metadata = {**metadata, **own_metadata(self.axes)}
         self.fixed_axes = dict(fixed_axes)
+        arrays = {v.name: np.asarray(data.get(v.name, v.values), dtype=v.dtype) for v in variables}
+        shape = tuple(arrays[axis].size for axis in self.axes)
+        self.variables: dict[str, Variable] = {}
         self._data: dict[str, Array] = {}
         for variable in variables:
-            values = data.get(variable.name, variable.values)
-            if values is None:
-                raise ValueError(f"no values for the variable {variable.name}")
-            self._data[variable.name] = np.asarray(values, dtype=variable.dtype)
-        for axis in self.axes:
-            if axis not in self._data or not is_coordinate(self._data[axis]):
-                raise ValueError(f"{axis} is an axis, but there is no ascending row of its values")
-        self.variables: dict[str, Variable] = {}
-        shape = tuple(self._data[axis].size for axis in self.axes)
-        sizes = dict(zip(self.axes, shape, strict=True))
-        for variable in variables:
-            name, dims, array = variable.name, variable.dims, self._data[variable.name]
-            of_the_lanes = dims[: len(shape)] == self.axes and name not in self.axes
-            if of_the_lanes and array.ndim == len(dims) - len(shape) + 1 < len(dims):
-                array = self._data[name] = array.reshape(*shape, *array.shape[1:])
-            if array.ndim != len(dims) or any(
-                sizes.setdefault(dim, size) != size
-                for dim, size in zip(dims, array.shape, strict=True)
-            ):
-                raise ValueError(f"{name} has shape {array.shape}, but dimensions {dims}")
+            name, own, array = variable.name, len(variable.dims) - len(shape), arrays[variable.name]
+            of_the_lanes = variable.dims[: len(shape)] == self.axes and name not in self.axes
+            if of_the_lanes:
+                array = array.reshape((*shape, *array.shape[array.ndim - own :]))
+            self._data[name] = array
             self.variables[name] = replace(variable, values=None if of_the_lanes else array)
 
     @property

@@ -98,13 +98,6 @@ def fixed_coordinates(metadata: Mapping[str, Any]) -> dict[str, float]:
     return {name: float(value) for name, _, value in pairs}
 
 
-def is_coordinate(values: Array) -> bool:
-    """Tell whether values are those of an axis: numbers that ascend, none twice, none too large."""
-    numbers = values.ndim == 1 and values.size > 0 and values.dtype.kind in "if"
-    small = numbers and (np.abs(values) <= LARGEST_VALUE).all()
-    return bool(small and (np.diff(values) > 0).all())
-
-
 def printable(text: str) -> str:
     """Return a text of a file, if long its start, without what acts on a terminal."""
     text = text if len(text) <= MOST_PRINTED else f"{text[:MOST_PRINTED]}..."
@@ -196,7 +189,9 @@ def _check_variables(
                 f"{dtype} over ({', '.join(dims)})"
             )
     for name in axes:
-        if not is_coordinate(data[name]):
+        values = data[name]
+        within = values.size > 0 and (np.abs(values) <= LARGEST_VALUE).all()
+        if not (within and (np.diff(values) > 0).all()):
             rule = f"do not ascend, each once, between -{LARGEST_VALUE:g} and {LARGEST_VALUE:g}"
             raise UnfitError(f"holds values of {name} that {rule}")
     for name in {known.STATUS, STATE, known.DIRECTION, "motion"} & found.keys():

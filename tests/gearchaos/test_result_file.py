@@ -137,23 +137,6 @@ def test_a_name_that_is_not_there_is_told_with_those_that_are(result: Result) ->
         result["delta"]
 
 
-def test_arrays_that_contradict_their_dimensions_are_refused(result: Result) -> None:
-    data = {name: result[name] for name in result}
-    variables = list(result.variables.values())
-    for wrong in (result["status"][1:], result["end_state"]):
-        with pytest.raises(ValueError, match="status has shape"):
-            Result(result.axes, variables, data | {"status": wrong}, {}, {})
-    none = {name: v[:0] if result.axis in result.dims(name) else v for name, v in data.items()}
-    twice = np.repeat(data["pitch_error"][::2], 2)
-    for wrong in (
-        none,
-        data | {"pitch_error": twice},
-        data | {"pitch_error": -data["pitch_error"]},
-    ):
-        with pytest.raises(ValueError, match="no ascending row"):
-            Result(result.axes, variables, wrong, {}, {})
-
-
 def test_texts_that_hdf5_cannot_hold_lose_nothing_else(tmp_path: Path) -> None:
     odd = make_result(title="a\0b\udc80c", note="x" * 70_000)
     long_name = replace(odd.variables["status"], long_name="a\0b\udc80c")
