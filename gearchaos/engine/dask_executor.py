@@ -60,16 +60,11 @@ class DaskExecutor(ExitStack):
     @property
     def workers(self) -> int:
         """How many workers there are; waits for one where none is left."""
-        began = None
+        client, hours = self._client, _HOURS_WITHOUT_WORKERS
         try:
-            while not (workers := len(_answer(self._client.nthreads, _patience()))):
-                if began is None:
-                    began, hours = time.monotonic(), _HOURS_WITHOUT_WORKERS
-                    say(f"{self._address}: waits up to {hours:g} h for a worker to join")
-                if time.monotonic() - began > 3600 * hours:
-                    raise ExecutionError(f"{self._address}: no worker has joined; start some")
-                check()
-                time.sleep(_SECONDS_BETWEEN_LOOKS)
+            while not (workers := len(_answer(client.nthreads, _patience()))):
+                say(f"{self._address}: waits up to {hours:g} h for a worker to join")
+                _answer(lambda: client.wait_for_workers(1), 3600.0 * hours)
         except KeyboardInterrupt:
             # Nobody computes what has been handed out.
             self.close()

@@ -5,7 +5,6 @@ import os
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from contextvars import copy_context
 from typing import Any
 
 import numba
@@ -30,17 +29,15 @@ COMPILING = "preparing the kernel of this scene, once; this takes some seconds"
 
 
 class _Announcer(event.Listener):  # type: ignore[misc]
-    """Says once that a kernel is compiled, from whichever thread, to whom it was made for."""
+    """Says once that a kernel is compiled."""
 
-    def __init__(self) -> None:
-        """Remember who is spoken to."""
-        self._context, self._said = copy_context(), False
+    _said = False
 
     def on_start(self, _event: event.Event) -> None:
         """Say it the first time."""
         if not self._said:
             self._said = True
-            self._context.run(say, COMPILING)
+            say(COMPILING)
 
     on_end = on_start
 

@@ -51,10 +51,6 @@ class Parameter:
     symbol: str = ""
     dims: tuple[str, ...] = ()
 
-    def __post_init__(self) -> None:
-        if np.ndim(self.value) != len(self.dims):
-            raise ValueError(f"{np.ndim(self.value)} dimensions of a parameter over {self.dims}")
-
 
 def own_metadata(axes: Sequence[str]) -> dict[str, str]:
     """Give the root attributes that tell a reader what it has before it."""
