@@ -116,12 +116,8 @@ class Survival(NamedTuple):
     @property
     def text(self) -> str:
         """One line for a person."""
-        if not self.lanes:
-            return "chaotic: no lane, so that there is nothing to outlast"
-        share = 100.0 * self.outlasting / self.lanes
-        return (
-            f"chaotic: {share:.0f} % of lanes outlast {self.records} records ({self.lanes} tried)"
-        )
+        tried = f"{self.outlasting} of {self.lanes} lanes that were tried"
+        return f"chaotic: {tried} outlast {self.records} records"
 
 
 def survival(config: Configuration, result: Result, records: int) -> Survival:

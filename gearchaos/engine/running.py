@@ -21,10 +21,6 @@ from gearchaos.progress import say, speaking
 from gearchaos.results.result import Result
 from gearchaos.results.variables import Variable
 
-METHOD_TEXTS = {
-    "rk4": "classical Runge-Kutta of order 4 with fixed steps",
-    "flow_map": "flow maps: exact steps from crossing to crossing",
-}
 COMPILING = "preparing the kernel of this scene, once; this takes some seconds"
 
 
@@ -141,14 +137,12 @@ def metadata(simulation: Simulation, seconds: float) -> Mapping[str, Any]:
     pair = config.pair if repeats > 1 else None
     teeth = zip(("driving_teeth", "driven_teeth"), pair.teeth, strict=True) if pair else ()
     return {
-        "axes": " ".join(axis.name for axis in simulation.lanes.axes),
         "title": config.title,
         "formulation": config.formulation,
         "effects": " ".join(config.scene.effects),
         "start": config.start.kind,
         "carry": config.start.carry,
         **config.integration.model_dump(exclude_none=True),
-        "method": METHOD_TEXTS[config.integration.method],
         "steps_per_period": simulation.plan.steps_per_period,
         "transient_periods": simulation.plan.transient_periods,
         "recorded_periods": simulation.plan.recorded_periods,

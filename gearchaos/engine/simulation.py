@@ -115,26 +115,23 @@ class Simulation:
         of_teeth = f"periods of the excitation, {repeats} mesh periods each,"
         motions = [of_teeth if repeats > 1 else "mesh periods"]
         touched = self.plan.contact and self._splits_steps
-        subjects: dict[str, Sequence[str]] = {
+        subjects: dict[str, Sequence[str] | bool] = {
+            "section points": bool(outputs.section),
             "section": outputs.section,
-            "motion": motions if outputs.motion else (),
-            "contact": self._directions if touched else (),
-            "forces": self._directions if self.plan.loads else (),
-            "chosen": outputs.states,
-            "amplitudes": (*outputs.states, "transmission_error") if self.plan.orders else (),
-        }
-        once = {
-            "section points": outputs.section,
             "lyapunov": outputs.lyapunov,
+            "motion": motions if outputs.motion else (),
             "record": outputs.motion and outputs.lyapunov,
             "exponents": outputs.exponents,
             "crossings": self._splits_steps,
+            "contact": self._directions if touched else (),
+            "forces": self._directions if self.plan.loads else (),
             "loads": self.plan.loads,
-            "orders": self.plan.orders,
+            "chosen": outputs.states,
+            "orders": bool(self.plan.orders),
+            "amplitudes": (*outputs.states, "transmission_error") if self.plan.orders else (),
             "check": self.config.integration.error_check > 0.0,
             "every sweep": True,
         }
-        subjects |= {name: [""] for name, told in once.items() if told}
         values = {
             known.SECTION_POINT: np.arange(outputs.section_points),
             known.EXPONENT_NUMBER: np.arange(1, len(self.lanes.states) + 1),

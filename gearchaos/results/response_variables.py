@@ -23,10 +23,10 @@ def response_variables(
     Axes and states are those of the sweep.
     """
     kinds = ("", "_rate", acceleration_of(""))
-    subjects = {
-        "time": [""],
+    subjects: dict[str, Sequence[str] | bool] = {
+        "time": True,
         "coordinates": [f"{one}{kind}" for one in states[::2] for kind in kinds],
-        "mesh": [""],
+        "mesh": True,
         "mesh forces": DIRECTIONS if "delta_3" in states else DIRECTIONS[:1],
     }
     instants = np.arange(periods * steps_per_period + 1) / steps_per_period

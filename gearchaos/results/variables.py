@@ -107,7 +107,7 @@ def axis_name(parameter: str) -> str:
 
 def unswept_axis(name: str, numbers: Array) -> Variable:
     """Give the axis of several starts, drawn gear pairs or directions, of these numbers."""
-    return listed((), {f"{name} axis": [""]}, {name: numbers}, {DIRECTION: WAYS})[0]
+    return listed((), {f"{name} axis": True}, {name: numbers}, {DIRECTION: WAYS})[0]
 
 
 def coordinate_text(axis: str, value: float, digits: int = 12) -> str:
@@ -146,19 +146,20 @@ def due(axes: Sequence[str], found: Collection[str]) -> Iterator[tuple[str, tupl
 
 def listed(
     axes: Sequence[Variable],
-    subjects: Mapping[str, Sequence[str]],
+    subjects: Mapping[str, Sequence[str] | bool],
     values: Mapping[str, ArrayLike],
     meanings: Mapping[str, Sequence[str]] = MappingProxyType({}),
 ) -> list[Variable]:
     """List axes, and what of variables.csv is told with these subjects, in the order of the file.
 
-    Each is as often there as there are subjects. ``values`` of what is known beforehand, and
-    ``meanings`` of 0, 1, ..., are by the names in the table.
+    Each is as often there as there are subjects, and once where that is but true. ``values`` of
+    what is known beforehand, and ``meanings`` of 0, 1, ..., are by the names in the table.
     """
     lane, variables = tuple(axis.name for axis in axes), list(axes)
     words = {name: words for kind in _WORDING.values() for name, words in kind.items()}
     for told_with, rows in _ROWS.items():
-        for subject, row in product(subjects.get(told_with, ()), rows):
+        told = subjects.get(told_with, ())
+        for subject, row in product([""] if told is True else told or (), rows):
             wording, symbol = words.get(subject, (subject.replace("_", " "), ""))
             known = values.get(row["name"])
             variables.append(

@@ -50,26 +50,24 @@ def sweep_variables(
     """
     periods = f"periods of the excitation, {excitation_period} mesh periods each,"
     # What stands for @ in the rows that are told with each of these.
-    subjects: dict[str, Sequence[str]] = {
-        "section": section if section_points > 0 else (),
-        "motion": [periods if excitation_period > 1 else "mesh periods"] if motion_meanings else (),
-        "contact": contact,
-        "forces": loads,
-        "chosen": chosen,
-        "amplitudes": (*chosen, "transmission_error") if orders else (),
-    }
-    once = {
-        "section points": subjects["section"],
+    kept = section if section_points > 0 else ()
+    subjects: dict[str, Sequence[str] | bool] = {
+        "section points": bool(kept),
+        "section": kept,
         "lyapunov": lyapunov,
-        "record": record_meanings,
+        "motion": [periods if excitation_period > 1 else "mesh periods"] if motion_meanings else (),
+        "record": bool(record_meanings),
         "exponents": exponents,
         "crossings": crossings,
-        "loads": loads,
-        "orders": orders,
-        "check": check_meanings,
+        "contact": contact,
+        "forces": loads,
+        "loads": bool(loads),
+        "chosen": chosen,
+        "orders": bool(orders),
+        "amplitudes": (*chosen, "transmission_error") if orders else (),
+        "check": bool(check_meanings),
         "every sweep": True,
     }
-    subjects |= {name: [""] for name, told in once.items() if told}
     values: dict[str, ArrayLike] = {
         SECTION_POINT: np.arange(section_points),
         EXPONENT_NUMBER: np.arange(1, len(states) + 1),

@@ -81,7 +81,7 @@ def test_the_result_says_what_was_integrated_and_how(result):
     assert facts["formulation"] == "physical"
     assert facts["effects"] == "pitch_error stiffness_variation backlash transverse axial"
     assert (facts["start"], facts["carry"]) == ("rest", "none")
-    assert "Runge-Kutta" in facts["method"]
+    assert facts["method"] == "rk4"
     assert facts["steps_per_period"] == 40
     assert (facts["transient_periods"], facts["recorded_periods"]) == (5, 10)
 

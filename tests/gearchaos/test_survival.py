@@ -44,12 +44,12 @@ def test_the_share_of_chaotic_lanes_that_outlast_many_records_is_told(tmp_path):
 
 
 def test_the_share_is_worded_in_one_line():
-    assert Survival(10, 25, 22).text == "chaotic: 88 % of lanes outlast 10 records (25 tried)"
+    assert Survival(10, 25, 22).text == "chaotic: 22 of 25 lanes that were tried outlast 10 records"
 
 
 def test_without_chaos_there_is_nothing_to_outlast(tmp_path):
     assert saved(tmp_path, [5.86]) == 0
-    assert "nothing to outlast" in stages(tmp_path, "--survival", "2").out
+    assert "chaotic: 0 of 0 lanes that were tried" in stages(tmp_path, "--survival", "2").out
     assert json.loads(stages(tmp_path, "--json").out)["survival"] is None
 
 
