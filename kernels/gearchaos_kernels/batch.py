@@ -45,10 +45,11 @@ def integrate(
         tangent_start = np.full((lanes, states), 1.0 / np.sqrt(states))
     present = flags(system, plan)
     outcome = Outcome(
-        section=np.full((lanes, plan.section_points, states), np.nan),
-        growth=np.full((lanes, plan.recorded_periods if plan.tangent else 0), np.nan),
-        end_state=np.full((lanes, states), np.nan),
-        end_tangent=np.full((lanes, states), np.nan),
+        # Written by the threads to the last number: here it would take as long as many a period.
+        section=np.empty((lanes, plan.section_points, states)),
+        growth=np.empty((lanes, plan.recorded_periods if plan.tangent else 0)),
+        end_state=np.empty((lanes, states)),
+        end_tangent=np.empty((lanes, states)),
         status=np.full(lanes, Status.OK, dtype=np.uint8),
         diverged_period=np.full(lanes, -1, dtype=np.int32),
         crossings=np.zeros(lanes, dtype=np.int64),
@@ -58,7 +59,7 @@ def integrate(
         loads=np.full((lanes, SIGNALS if present.loads else 0, SIGNAL_ROWS), np.nan),
         extremes=np.full((lanes, len(plan.states), 2), np.nan),
         amplitudes=np.full((lanes, (len(plan.states) + 1) * len(plan.orders)), np.nan),
-        history=np.full((lanes, plan.history_periods * steps + 1, states), np.nan),
+        history=np.empty((lanes, plan.history_periods * steps + 1, states)),
     )
     if present.flow_map is not None and present.teeth is not None:
         raise ValueError("flow maps know pitch errors that are a sine, not those of teeth")

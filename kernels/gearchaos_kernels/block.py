@@ -278,6 +278,8 @@ def end_period(block, batch, period, steps, plan, outcome, present):
         if not sound:
             outcome.status[index] = _DIVERGED
             outcome.diverged_period[index] = period
+            outcome.section[index, max(point, 0) :] = math.nan
+            outcome.growth[index, max(recorded, 0) :] = math.nan
             for row in range(rows.COEFFICIENTS):
                 memory[row * STRIDE + slot] = math.nan
             continue
@@ -315,8 +317,7 @@ def end(block, batch, steps, plan, outcome, present):
                 value = memory[(rows.LOADS + row) * STRIDE + slot]
                 outcome.loads[index, row // rows.SIGNAL_ROWS, row % rows.SIGNAL_ROWS] = value
             end_chosen(memory, slot, index, batch, outcome)
-    if plan.history_periods > 0:
-        keep_state(block, batch, outcome.history, plan.history_periods * plan.steps_per_period)
+    keep_state(block, batch, outcome.history, plan.history_periods * plan.steps_per_period)
 
 
 @scalar
