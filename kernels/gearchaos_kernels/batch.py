@@ -43,7 +43,7 @@ def integrate(
     steps = plan.steps_per_period
     if tangent_start is None:
         tangent_start = np.full((lanes, states), 1.0 / np.sqrt(states))
-    present = flags(system, plan)
+    present, kept = flags(system, plan), plan.history_periods
     outcome = Outcome(
         # Written by the threads to the last number: here it would take as long as many a period.
         section=np.empty((lanes, plan.section_points, states)),
@@ -59,7 +59,7 @@ def integrate(
         loads=np.full((lanes, SIGNALS if present.loads else 0, SIGNAL_ROWS), np.nan),
         extremes=np.full((lanes, len(plan.states), 2), np.nan),
         amplitudes=np.full((lanes, (len(plan.states) + 1) * len(plan.orders)), np.nan),
-        history=np.empty((lanes, plan.history_periods * steps + 1, states)),
+        history=np.empty((lanes, kept and kept * steps + 1, states)),
     )
     if present.flow_map is not None and present.teeth is not None:
         raise ValueError("flow maps know pitch errors that are a sine, not those of teeth")

@@ -317,7 +317,8 @@ def end(block, batch, steps, plan, outcome, present):
                 value = memory[(rows.LOADS + row) * STRIDE + slot]
                 outcome.loads[index, row // rows.SIGNAL_ROWS, row % rows.SIGNAL_ROWS] = value
             end_chosen(memory, slot, index, batch, outcome)
-    keep_state(block, batch, outcome.history, plan.history_periods * plan.steps_per_period)
+    if plan.history_periods > 0:
+        keep_state(block, batch, outcome.history, plan.history_periods * plan.steps_per_period)
 
 
 @scalar

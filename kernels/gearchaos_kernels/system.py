@@ -225,7 +225,7 @@ class Outcome(NamedTuple):
     of approach, in the recorded periods; ``loads`` (lanes, 3, 4), or (lanes, 0, 4): largest and
     smallest value, mean and mean square of N_y, N_z and delta_5 + e there; ``extremes`` (lanes,
     states of the plan, 2): smallest and largest value, ``amplitudes`` (lanes, states + 1, orders);
-    ``history`` (lanes, history periods times steps + 1, states): the state at every step.
+    ``history`` (lanes, history periods times steps + 1, states): the state at every step, if kept.
     """
 
     section: Floats
