@@ -4,7 +4,7 @@ import sys
 from collections.abc import Sequence
 from importlib import import_module
 
-from gearchaos.command_line import COMMANDS, OK, USAGE, module_of, version_text
+from gearchaos.command_line import COMMANDS, OK, USAGE, version_text
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -12,12 +12,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     given = list(sys.argv[1:] if arguments is None else arguments)
     first = given[0] if given else ""
     if first in COMMANDS:
-        code: int = import_module(module_of(first)).main(given[1:])
+        code: int = import_module(f"gearchaos.{first}").main(given[1:])
         return code
     if given == ["--version"]:
         print(version_text())
         return OK
-    lines = [f"  {name:14} {text}" for name, text in COMMANDS.items()]
+    lines = [f"  {name:14} {one['summary']}" for name, one in COMMANDS.items()]
     usage = "\n".join(["usage: gearchaos COMMAND ...", "", *lines])
     if first in ("-h", "--help"):
         print(usage)

@@ -6,13 +6,12 @@ stdout, everything else to stderr; a figure (PNG and PDF) is written under the n
 """
 
 import time
-from argparse import ArgumentParser, Namespace
+from argparse import Namespace
 from collections.abc import Sequence
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
-from gearchaos.command_line import OK, Command, whole_number
+from gearchaos.command_line import OK, Command
 from gearchaos.errors import ConfigurationError
 from gearchaos.interrupts import check
 from gearchaos.progress import notice, say
@@ -23,7 +22,6 @@ if TYPE_CHECKING:
 MODES = {"plain": (False, "rk4"), "resolved": (True, "rk4"), "flow map": (True, "flow_map")}
 """Each with its setting of `Plan`: resolved, method."""
 FLOW_MAP_STEPS = (6, 12, 24, 48, 96, 192)
-MOST_STEPS = 1600
 TRUTH_STEPS = 384
 ROUNDS = 3
 WANTED = (1e-4, 1e-6, 1e-8)
@@ -43,15 +41,6 @@ class Setting(NamedTuple):
     def error(self) -> float:
         """The larger of the two errors."""
         return max(self.section_error, self.exponent_error)
-
-
-def _arguments(parser: ArgumentParser) -> None:
-    add = parser.add_argument
-    add("config", metavar="config.toml", help="the sweep whose lanes are tried")
-    add("--steps", type=_numbers_of_steps, default="50,100,200,400,800", metavar="N,N,...")
-    count = partial(whole_number, low=1)
-    add("--lanes", type=count, default=64, metavar="N", help="lanes to try (default: 64)")
-    add("-o", "--output", metavar="NAME", help="name of the figure, without its ending")
 
 
 def _accuracy(options: Namespace) -> int:
@@ -97,10 +86,6 @@ def _accuracy(options: Namespace) -> int:
         save_figure(page, target, overwrite=options.overwrite)
     say(f"written: {', '.join(targets)}")
     return OK
-
-
-def _numbers_of_steps(text: str) -> list[int]:
-    return sorted({whole_number(one, 1, MOST_STEPS) for one in text.split(",")})
 
 
 def measure(simulation: "Simulation", steps: Sequence[int], lanes: int) -> list[Setting]:
@@ -157,5 +142,5 @@ def recommendation(settings: Sequence[Setting], error: float) -> str:
     return f"For an error of {error:.0e}: {best.steps} {best.mode} steps per mesh period."
 
 
-main = Command("accuracy", __doc__, _arguments, _accuracy, common=("overwrite", "threads", "set"))
+main = Command("accuracy", __doc__, _accuracy)
 main.start(__name__)

@@ -3,37 +3,20 @@
 Attractors keep their numbers along the sweep. The table goes to stdout, everything else to stderr.
 """
 
-import argparse
 import json
 import math
 import textwrap
+from argparse import Namespace
 from collections.abc import Iterator
-from pathlib import Path
 from typing import TYPE_CHECKING
 
-from gearchaos.command_line import OK, Command, coordinates, place
+from gearchaos.command_line import OK, Command, coordinates
 
 if TYPE_CHECKING:
     from gearchaos.results.ensembles import Basins
 
 
-def _arguments(parser: argparse.ArgumentParser) -> None:
-    add = parser.add_argument
-    add("result", metavar="RESULT.h5", help="result file of a sweep from several starts")
-    text = (
-        "draw the basins of one value over the two states of a grid of starts, or the shares of "
-        "several values, into this file, such as basins.png or basins.pdf"
-    )
-    add("-o", "--output", type=Path, metavar="FIGURE", help=text)
-    text = (
-        "where to fix a parameter or another axis, at the nearest of its values; may be repeated "
-        "(default: the first value of each but the first swept parameter)"
-    )
-    add("--at", type=place, action="append", default=[], metavar="NAME=VALUE", help=text)
-    add("--json", action="store_true", help="print JSON, with sections and means of all variables")
-
-
-def _basins(options: argparse.Namespace) -> int:
+def _basins(options: Namespace) -> int:
     from gearchaos.engine.basins import find_basins
     from gearchaos.engine.running import compiling
     from gearchaos.figures import basins_page
@@ -90,5 +73,5 @@ def table(found: "Basins", where: list[str]) -> Iterator[str]:
             yield from textwrap.wrap(text, 80, subsequent_indent="   ")
 
 
-main = Command("basins", __doc__, _arguments, _basins, common=("overwrite", "threads"))
+main = Command("basins", __doc__, _basins)
 main.start(__name__)

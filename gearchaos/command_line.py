@@ -4,9 +4,11 @@ import math
 import os
 import re
 import sys
+import tomllib
 from argparse import ArgumentParser, ArgumentTypeError, Namespace
 from collections.abc import Callable, Sequence
 from contextlib import suppress
+from functools import partial
 from io import TextIOWrapper
 from pathlib import Path
 from typing import Any, NamedTuple, TextIO
@@ -30,41 +32,12 @@ EXIT_CODES = (
     "143 terminated."
 )
 
-COMMANDS = {
-    "sweep": "compute a sweep from a configuration file",
-    "plot": "draw a result file",
-    "explore": "open a local page to look into a result",
-    "stages": "list the stages of a sweep, and refine their boundaries",
-    "basins": "find the attractors of a sweep from many starts, and their basins",
-    "response": "compute a motion at every step of some mesh periods",
-    "reproduce": "compute, draw and compare everything that a paper shows",
-    "info": "tell what a result file holds, and verify it",
-    "identify": "fit parameters of a pair to what was observed of its diagram",
-    "accuracy": "measure what accuracy costs on some lanes of a sweep",
-    "merge": "join what several jobs have computed of one sweep",
-    "export": "write a result as CSV, Parquet or for MATLAB",
-    "example": "list the ready configurations, or copy one",
-    "configuration": "print the JSON Schema of a configuration file",
-    "completion": "print a script with which bash or zsh completes these commands",
-}
-
-COMMON_OPTIONS: dict[str, dict[str, Any]] = {
-    "output": {
-        "metavar": "PATH",
-        "help": "result file (default: named after the configuration, in the current folder)",
-    },
-    "overwrite": {"action": "store_true", "help": "replace what exists already"},
-    "threads": {"type": int, "metavar": "N", "help": "threads to use (default: all cores)"},
-    "set": {
-        "action": "append",
-        "default": [],
-        "metavar": "KEY=VALUE",
-        "help": "replace one key of the configuration, such as integration.steps_per_period=400",
-    },
-    "quiet": {"action": "store_true", "help": "say nothing on stderr unless something fails"},
-}
-
 _PACKAGE = Path(__file__).resolve().parent
+_TABLE = tomllib.loads((_PACKAGE / "commands.toml").read_text("utf-8"))
+
+COMMANDS: dict[str, dict[str, Any]] = _TABLE["command"]
+"""Summary and options of every command by its name, as commands.toml explains them."""
+
 _SWEEPS = (_PACKAGE / "sweeps", _PACKAGE.parent / "sweeps")
 
 
@@ -76,20 +49,15 @@ class Command(NamedTuple):
     system error that nobody has worded or a lack of memory and, as the shell says, 130 for an
     interrupt, 143 for SIGTERM, 141 when the reader of the output has gone.
 
-    ``name`` follows ``gearchaos``; ``text`` is what --help says before the options and, from the
-    first empty line on, after them, where the exit codes follow; ``arguments`` adds the command's
-    own to its parser, ``common`` names the `COMMON_OPTIONS` that it takes too. ``body`` does it,
-    with the options and, as their `arguments`, what was given; it imports what is heavy, so that
-    --help answers at once. Where the command ``writes``, it asks for interrupts at moments of its
-    own choice, see `interrupts`.
+    ``name`` is that of `COMMANDS`; ``text`` is what --help says before the options and, from the
+    first empty line on, after them, where the exit codes follow. ``body`` does it, with the options
+    and, as their `arguments`, what was given; it imports what is heavy, so that --help answers at
+    once.
     """
 
     name: str
     text: str
-    arguments: Callable[[ArgumentParser], None]
     body: Callable[[Namespace], int]
-    common: tuple[str, ...] = ()
-    writes: bool = True
 
     def __call__(self, arguments: Sequence[str] | None = None) -> int:
         """Run the command and return its exit code."""
@@ -98,7 +66,7 @@ class Command(NamedTuple):
             sys.stdout.reconfigure(errors="surrogateescape")
         with speaking(f"gearchaos {self.name}"):
             try:
-                with heeded(at_once=not self.writes):
+                with heeded(at_once=not COMMANDS[self.name].get("writes", True)):
                     code = self._code(list(sys.argv[1:] if arguments is None else arguments))
                     check()
                 if sys.stdout is not None:
@@ -144,12 +112,19 @@ class Command(NamedTuple):
             epilog=f"{epilog}\n{EXIT_CODES}".strip(),
             allow_abbrev=False,
         )
-        self.arguments(parser)
-        add = parser.add_argument
-        for name in (*self.common, "quiet"):
-            short = [f"-{name[0]}"] if name in ("output", "quiet") else []
-            add(*short, f"--{name}", **COMMON_OPTIONS[name])
-        add("--version", action="version", version=version_text())
+        own = COMMANDS[self.name]
+        common = (*own.get("common", ()), "-q --quiet")
+        for flags, rules in {
+            **own.get("options", {}),
+            **{flags: _TABLE["common"][flags] for flags in common},
+        }.items():
+            known = {key: rule for key, rule in rules.items() if key not in ("low", "high")}
+            if "type" in rules:
+                bounds = {key: rules[key] for key in ("low", "high") if key in rules}
+                reader = READERS[rules["type"]]
+                known["type"] = partial(reader, **bounds) if bounds else reader
+            parser.add_argument(*flags.split(), **known)
+        parser.add_argument("--version", action="version", version=version_text())
         return parser
 
 
@@ -174,6 +149,11 @@ def whole_number(text: str, low: float, high: float = math.inf) -> int:
     return int(value)
 
 
+def whole_numbers(text: str, low: float, high: float) -> list[int]:
+    """Read whole numbers within bounds, with commas between them, in ascending order."""
+    return sorted({whole_number(one, low, high) for one in text.split(",")})
+
+
 def place(text: str) -> tuple[str, float]:
     """Read NAME=VALUE off the command line, or a VALUE, which has an empty name.
 
@@ -185,6 +165,18 @@ def place(text: str) -> tuple[str, float]:
     if name.strip() in ("", DIRECTION) and value in WAYS:
         return DIRECTION, float(WAYS.index(value))
     return name.strip(), number(value)
+
+
+READERS: dict[str, Callable[..., Any]] = {
+    "int": int,
+    "path": Path,
+    "number": number,
+    "whole number": whole_number,
+    "whole numbers": whole_numbers,
+    "place": place,
+    "pitch error": lambda text: ("pitch_error", number(text)),
+}
+"""What an option may hold, by its name in commands.toml."""
 
 
 def coordinates(
@@ -207,11 +199,6 @@ def coordinates(
             )
         found[axis] = value
     return found
-
-
-def module_of(command: str) -> str:
-    """Return the module of a command; the package ``gearchaos.configuration`` is not one."""
-    return f"gearchaos.{'configure' if command == 'configuration' else command}"
 
 
 def version_text() -> str:

@@ -6,15 +6,16 @@ import os
 import sys
 import time
 from contextlib import suppress
+from copy import copy
 from datetime import timedelta
 from pathlib import Path
 
 import numba
 import numpy as np
-from gearchaos_kernels import LANES
+from gearchaos_kernels import LANES, Outcome, Plan, integrate
 from tqdm import tqdm
 
-from gearchaos.configuration import Configuration, swept_values
+from gearchaos.arrays import Floats, Integers
 from gearchaos.engine.simulation import Simulation
 from gearchaos.engine.store_filling import Shard
 from gearchaos.gear.derivation import FREQUENCY, LENGTH
@@ -83,57 +84,54 @@ def _seconds_per_lane(simulation: Simulation) -> float:
 
     A whole block: what is checked, or looked at again, is computed in vectors of lanes.
     """
-    wanted = simulation.block_lanes(numba.get_num_threads()) / (8 if simulation.carried else 1)
-    periods = simulation.plan.transient_periods + simulation.plan.recorded_periods
+    sample, plan = copy(simulation), simulation.plan
+    block = simulation.block_lanes(numba.get_num_threads())
+    places = some_places(simulation, block // 8 if simulation.carried else block)
+    periods, whole = plan.transient_periods + plan.recorded_periods, simulation.lanes.repeats_after
     with notice("computing some lanes, to tell how long all take"):
         # The first time, little is computed, and the kernels are loaded. It takes a step more, so
         # that flow maps are still to be made the second time: once, for however many periods.
         for more, length in (1, min(1.0, 8.0 / periods)), (0, min(1.0, SAMPLE_PERIODS / periods)):
-            sample = Simulation(_thinned(simulation, wanted / len(simulation.lanes), length))
-            plan, lanes = sample.plan, len(sample.lanes)
-            steps, orders = plan.steps_per_period + more, simulation.plan.orders
-            sample.plan = plan._replace(steps_per_period=steps, orders=orders)
+            transient, recorded = (
+                whole * math.ceil(length * every / whole)
+                for every in (plan.transient_periods, plan.recorded_periods)
+            )
+            sample.plan = plan._replace(
+                steps_per_period=plan.steps_per_period + more,
+                transient_periods=transient,
+                recorded_periods=recorded,
+                section_points=min(plan.section_points, recorded),
+            )
             began = time.perf_counter()
-            none = sample.plan._replace(transient_periods=0, recorded_periods=0)
-            sample.integrate(0, lanes, none)
+            _integrate(
+                sample, places, sample.plan._replace(transient_periods=0, recorded_periods=0)
+            )
             made = time.perf_counter()
-            sample.compute(0, lanes)
-            scale = periods / (plan.transient_periods + plan.recorded_periods)
-            seconds = (made - began + scale * (time.perf_counter() - made)) / lanes
+            found = _integrate(sample, places, sample.recording)
+            sample.arrays(sample.lanes.computed_at(places), *found)
+            scale = periods / (transient + recorded)
+            seconds = (made - began + scale * (time.perf_counter() - made)) / places.size
     return seconds
 
 
-def _thinned(simulation: Simulation, share: float, length: float) -> Configuration:
-    """Return a sweep with this share of the lanes, and of the mesh periods."""
-    config, plan, tables = simulation.config, simulation.plan, simulation.config.tables()
-    lanes, carried = simulation.lanes, simulation.carried
-    pairs = lanes.repeats // (lanes.starts * lanes.directions)
-    # Of every axis that is one the same, but lines that are carried side by side remain so.
-    axes = 1 if carried else sum(n > 1 for n in lanes.shape)
-    share = min(1.0, share) ** (1.0 / max(1, axes))
-    others = 1.0 if carried else share
-    for table, sweep in config.sweeps.items():
-        values, part = swept_values(sweep), share if table == "sweep" else others
-        # Neighbours behave alike, which a vector of lanes profits from.
-        beside = lanes.side_by_side if carried else lanes.repeats
-        run = min(values.size, -(-LANES // beside)) if table == "sweep" else 1
-        runs = math.ceil(part * values.size / run)
-        first = np.linspace(0, values.size - run, runs + 2)[1:-1].round().astype(int)
-        some = values[np.unique(np.add.outer(first, np.arange(run)))].tolist()
-        tables[table] = {"parameter": sweep.parameter, "values": some}
-    if pairs > 1:
-        tables["pitch_error"]["realisations"] = math.ceil(others * pairs)
-    tables["start"]["count"] = math.ceil((others * lanes.starts) ** (1.0 / config.start.counted))
-    tables["integration"] |= {
-        "steps_per_period": plan.steps_per_period,
-        "transient_periods": math.ceil(length * plan.transient_periods),
-        "recorded_periods": (recorded := math.ceil(length * plan.recorded_periods)),
-    }
-    tables["integration"].pop("tolerance", None)
-    tables["outputs"]["section_points"] = min(config.outputs.section_points, recorded)
-    # So short a record need not have whole cycles of them.
-    tables["outputs"]["orders"] = ()
-    return Configuration.from_tables(tables, config.source)
+def some_places(simulation: Simulation, count: int) -> Integers:
+    """Return about so many places in the order of computation, from all over the sweep.
+
+    Neighbours behave alike, which a vector of lanes profits from. Those of a carried sweep, where
+    one lane goes on from another, are all from its middle.
+    """
+    lanes = simulation.lanes
+    run = min(len(lanes), count if simulation.carried else LANES)
+    runs = -(-min(count, len(lanes)) // run)
+    first = np.linspace(0, len(lanes) // run - 1, runs + 2)[1:-1].round().astype(np.intp)
+    return np.add.outer(run * np.unique(first), np.arange(run)).ravel()
+
+
+def _integrate(simulation: Simulation, places: Integers, plan: Plan) -> tuple[Floats, Outcome]:
+    if simulation.carried:
+        return simulation.integrate(int(places[0]), int(places[-1]) + 1, plan)
+    start = simulation.lanes.start_of(places)
+    return start, integrate(simulation.lanes.system_of(places), start, plan)
 
 
 def _memory(simulation: Simulation) -> int:

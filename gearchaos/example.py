@@ -1,14 +1,10 @@
 """List the ready configurations, or copy one of them into the current folder."""
 
 import tomllib
-from argparse import ArgumentParser, Namespace
+from argparse import Namespace
 
 from gearchaos.command_line import OK, Command, sweep_file
 from gearchaos.errors import ConfigurationError
-
-
-def _arguments(parser: ArgumentParser) -> None:
-    parser.add_argument("name", nargs="?", help="which to copy, such as pan2021; default: list all")
 
 
 def _example(options: Namespace) -> int:
@@ -32,5 +28,5 @@ def _example(options: Namespace) -> int:
     return OK
 
 
-main = Command("example", __doc__, _arguments, _example, common=("overwrite",))
+main = Command("example", __doc__, _example)
 main.start(__name__)

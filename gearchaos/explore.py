@@ -4,28 +4,18 @@ The page is served to this machine alone, at the address that goes to stdout, un
 address in the browser is a link to what the page shows. Needs pip install gearchaos[explore].
 """
 
-from argparse import ArgumentParser, Namespace
+from argparse import Namespace
 from collections.abc import Sequence
 from contextlib import redirect_stderr, redirect_stdout
-from functools import partial
 from io import StringIO
 
 from gearchaos import plot
-from gearchaos.command_line import OK, Command, whole_number
+from gearchaos.command_line import OK, Command
 from gearchaos.errors import ConfigurationError, FigureError
 from gearchaos.progress import say
 
 HOST = "127.0.0.1"
 PACKAGES = ("panel", "holoviews", "datashader")
-
-
-def _arguments(parser: ArgumentParser) -> None:
-    add = parser.add_argument
-    add("result", metavar="RESULT.h5", help="result file of a sweep")
-    port = partial(whole_number, low=0, high=65535)
-    text = "port of the page (default: %(default)s; 0: any that is free)"
-    add("--port", type=port, default=5006, metavar="N", help=text)
-    add("--no-browser", action="store_true", help="only say the address")
 
 
 def _explore(options: Namespace) -> int:
@@ -86,5 +76,5 @@ def _draw(arguments: Sequence[str]) -> None:
         raise FigureError(said.getvalue())
 
 
-main = Command("explore", __doc__, _arguments, _explore, writes=False)
+main = Command("explore", __doc__, _explore)
 main.start(__name__)

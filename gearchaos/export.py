@@ -6,23 +6,13 @@ pandas reads. Needs pip install gearchaos[export].
 """
 
 import os
-from argparse import ArgumentParser, Namespace
+from argparse import Namespace
 from typing import Any
 
 from gearchaos.command_line import OK, Command
 from gearchaos.errors import ConfigurationError, FileError
 
 ENDINGS = (".csv", ".parquet", ".mat")
-
-
-def _arguments(parser: ArgumentParser) -> None:
-    add = parser.add_argument
-    add("result", metavar="RESULT.h5", help="result file of a sweep or a response")
-    add("output", metavar="PATH", help="file to write, ending in .csv, .parquet or .mat")
-    text = "rows also run along this dimension, such as section_point, state or time"
-    text = "dimensionless (default), or physical: um, m/s, N and 1/s instead of their scales"
-    add("--units", choices=("dimensionless", "physical"), help=text)
-    add("--along", action="append", default=[], metavar="NAME", help=text)
 
 
 def _export(options: Namespace) -> int:
@@ -59,5 +49,5 @@ def _export(options: Namespace) -> int:
     return OK
 
 
-main = Command("export", __doc__, _arguments, _export, common=("overwrite",))
+main = Command("export", __doc__, _export)
 main.start(__name__)

@@ -8,26 +8,18 @@ file. Interrupted or terminated, candidates are kept and --resume goes on from t
 
 import os
 import time
-from argparse import ArgumentParser, Namespace
-from typing import TYPE_CHECKING
+from argparse import Namespace
 
-from gearchaos.command_line import COMMON_OPTIONS, OK, Command
+from gearchaos.command_line import OK, Command
 from gearchaos.finishing import output_of
 from gearchaos.progress import Progress, say
 
-if TYPE_CHECKING:
-    from gearchaos.identification.tried import Tried
-
-
-def _arguments(parser: ArgumentParser) -> None:
-    add = parser.add_argument
-    add("config", metavar="TARGETS.toml", help="what was observed, and what is free")
-    add("--resume", action="store_true", help="go on with a search that was stopped")
-    replaced = "replace one key of the targets file, such as search.seed=2"
-    add("--set", **{**COMMON_OPTIONS["set"], "help": replaced})
+SECONDS_BETWEEN_SNAPSHOTS = 20.0
 
 
 def _identify(options: Namespace) -> int:
+    import numpy as np
+
     from gearchaos.engine.provenance import provenance
     from gearchaos.engine.running import choose_threads
     from gearchaos.identification.evaluation import require_stable
@@ -41,42 +33,47 @@ def _identify(options: Namespace) -> int:
 
     problem = load_targets(options.config, options.set)
     choose_threads(options.threads)
-    judge = Judge(problem)
     needed("cma", "identify")
-    require_stable(problem.config, judge.values, problem.targets.corners())
-    output, keys = output_of(options, ".csv"), [one.name for one in problem.targets.parameter]
-    known, kept, facts = None, False, decisive_facts(problem)
+    judge, targets = Judge(problem), problem.targets
+    require_stable(problem.config, problem.values, targets.corners())
+    output, facts = output_of(options, ".csv"), decisive_facts(problem)
+    known = np.empty(0, judge.fields)
     if options.resume and not options.overwrite and os.path.exists(output):
-        (known, earlier), kept = read_tried(output, keys), True
+        known, earlier = read_tried(output, judge.fields)
         require_same(f"{output}: is the result", earlier, facts, "replace it with --overwrite")
-        if earlier.get("complete"):
-            say(f"complete already: {output}, {len(known)} candidates")
-            print("\n".join(report(judge, known)), flush=True)
-            return OK
     else:
         check_output(output, options.overwrite)
-    began, texts = time.monotonic(), {"title": problem.targets.title, "targets": problem.text}
+    keys = [one.name for one in targets.parameter]
+    began = spoke = time.monotonic()
+    tried = known[:0]
 
-    def keep(tried: "Tried", complete: bool = False) -> None:
-        nonlocal kept
+    def keep() -> None:
         computed = provenance(time.monotonic() - began)
-        told = {"complete": int(complete), **computed, **facts, **texts}
-        write_tried(output, tried, keys, judge.observations, told)
-        kept = True
+        told = {**computed, **facts, "title": targets.title, "targets": problem.text}
+        write_tried(output, tried, keys, problem.observations, told)
 
-    most = problem.targets.search.candidates + MOST_CENTRES * (1 + 2 * RUNGS * len(keys))
+    most = targets.search.candidates + MOST_CENTRES * (1 + 2 * RUNGS * len(keys))
     try:
-        with Progress(most, 0 if known is None else len(known), unit="candidate") as bar:
-            tried = search(judge, known, keep, bar.advance, output)
+        with Progress(most, len(known), unit="candidate") as bar:
+            for found in search(judge, known, output):
+                tried = np.concatenate([tried, found])
+                if len(tried) > len(known):
+                    bar.advance(len(found))
+                    if time.monotonic() - spoke > SECONDS_BETWEEN_SNAPSHOTS:
+                        keep()
+                        spoke = time.monotonic()
     except KeyboardInterrupt as interrupt:
-        if kept:
+        if len(tried) > len(known):
+            keep()
+        if len(tried) + len(known) > 0:
             interrupt.add_note(f"the candidates in {output} are kept; go on with --resume")
         raise
-    keep(tried, complete=True)
+    if len(tried) > len(known):
+        keep()
     say(f"{output}: {len(tried)} candidates, {time.monotonic() - began:.1f} s")
     print("\n".join(report(judge, tried)), flush=True)
     return OK
 
 
-main = Command("identify", __doc__, _arguments, _identify, ("output", "overwrite", "threads"))
+main = Command("identify", __doc__, _identify)
 main.start(__name__)

@@ -6,18 +6,11 @@ what. Only the file is read.
 
 import json
 import sys
-from argparse import ArgumentParser, Namespace
+from argparse import Namespace
 from collections.abc import Mapping
 from typing import Any
 
 from gearchaos.command_line import OK, Command
-
-
-def _arguments(parser: ArgumentParser) -> None:
-    add = parser.add_argument
-    add("result", metavar="RESULT.h5", help="result file of a sweep")
-    add("--verify", action="store_true", help="read everything and try every checksum")
-    add("--json", action="store_true", help="write JSON for programs")
 
 
 def _info(options: Namespace) -> int:
@@ -62,5 +55,5 @@ def _settings(metadata: Mapping[str, Any]) -> list[str]:
     return [f"{key} = {shown(value)}{origins[key]}" for key, value in ran.items()]
 
 
-main = Command("info", __doc__, _arguments, _info, writes=False)
+main = Command("info", __doc__, _info)
 main.start(__name__)

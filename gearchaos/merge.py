@@ -5,7 +5,7 @@ They are verified, and removed once the result is there. The path of the result 
 everything else to stderr. Where shards are missing they are named, and everything stays as it is.
 """
 
-from argparse import ArgumentParser, Namespace
+from argparse import Namespace
 from typing import TYPE_CHECKING
 
 from gearchaos.command_line import OK, Command
@@ -15,12 +15,6 @@ if TYPE_CHECKING:
     from gearchaos.results.block_store import BlockStore, Finished
 
 MOST_NAMED = 10
-
-
-def _arguments(parser: ArgumentParser) -> None:
-    parser.add_argument(
-        "output", metavar="sweep.h5", help="the result file to be, as the sweeps were given it"
-    )
 
 
 def _merge(options: Namespace) -> int:
@@ -78,5 +72,5 @@ def _require_all(store: "BlockStore", found: "Finished", shards: object) -> None
     store.require_all(found, remedy)
 
 
-main = Command("merge", __doc__, _arguments, _merge, common=("overwrite",))
+main = Command("merge", __doc__, _merge)
 main.start(__name__)

@@ -7,13 +7,13 @@ other file of that name is kept unless --overwrite is given. The paths of the fi
 stdout.
 """
 
-import argparse
+from argparse import Namespace
 from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from gearchaos.command_line import OK, Command, coordinates, number, place, whole_number
+from gearchaos.command_line import OK, Command, coordinates
 from gearchaos.errors import FigureError
 from gearchaos.progress import Progress, say
 
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 RESULT_ENDINGS = (".h5", ".hdf5", ".nc")
 
 
-def _plot(options: argparse.Namespace) -> int:
+def _plot(options: Namespace) -> int:
     from gearchaos.figures.page import check_figures, save_figure
     from gearchaos.figures.response import is_response
     from gearchaos.gear.tooth_deviations import REALISATION
@@ -65,7 +65,7 @@ def _titles(results: "Sequence[Result]", paths: Sequence[Path]) -> list[str]:
     return titles if all(titles) and len({*titles}) == len(paths) else [one.stem for one in paths]
 
 
-def _sweep_sheets(results: "Sequence[Result]", options: argparse.Namespace) -> "list[Sheet]":
+def _sweep_sheets(results: "Sequence[Result]", options: Namespace) -> "list[Sheet]":
     from gearchaos.figures import bifurcation_page, map_page, shares_page
     from gearchaos.figures.labels import in_a_name, in_words
     from gearchaos.figures.lanes import swept_axes
@@ -110,7 +110,7 @@ def _sweep_sheets(results: "Sequence[Result]", options: argparse.Namespace) -> "
     return [(name, partial(bifurcation_page, results, options.variable, **shown, **size))]
 
 
-def _response_sheets(results: "Sequence[Result]", options: argparse.Namespace) -> "list[Sheet]":
+def _response_sheets(results: "Sequence[Result]", options: Namespace) -> "list[Sheet]":
     from gearchaos.figures import response_page
     from gearchaos.figures.labels import in_a_name, place_of
     from gearchaos.figures.lanes import select_lanes
@@ -156,50 +156,7 @@ def _opened(path: Path, at: Sequence[tuple[str, float]]) -> "Result":
     return result
 
 
-def _arguments(parser: argparse.ArgumentParser) -> None:
-    add, millimetres = parser.add_argument, partial(number, high=1000.0)
-    text = "result file of a sweep or a response; several sweeps are drawn over each other"
-    add("result", type=Path, nargs="+", metavar="RESULT.h5", help=text)
-    text = "folder for the figures, their name without its ending, or one file such as x.pdf"
-    add("-o", "--output", metavar="PATH", help=text)
-    add("--format", metavar="FORMATS", help="some of png, pdf, svg, eps, tiff (default: png,pdf)")
-    text = (
-        "section variable of a sweep (default: section_delta_5), any number of its lanes, or "
-        "amplitudes such as amplitude_transmission_error; coordinate of a response (default: "
-        "delta_5) or another of its variables over time, such as mesh_force_tangential; any number "
-        "of the lanes of a map (default: motion, exponent and contact)"
-    )
-    add("--variable", metavar="NAME", help=text)
-    add("--from", dest="low", type=number, metavar="VALUE", help="lowest parameter to show")
-    add("--to", dest="high", type=number, metavar="VALUE", help="highest parameter to show")
-    text = (
-        "draw the slice next to this value of a second parameter, or of start; may be "
-        "repeated; VALUE is enough where there is one of them"
-    )
-    add("--at", type=place, action="append", default=[], metavar="NAME=VALUE", help=text)
-    text = (
-        "draw a line across a map, or a tick into a diagram, at this value of a swept parameter; "
-        "may be repeated; VALUE is enough where there is one"
-    )
-    add("--mark", type=place, action="append", default=[], metavar="NAME=VALUE", help=text)
-    text = (
-        "shade the stages behind the diagram of a sweep; those narrower than a 150th of the "
-        "axis go into what surrounds them, or make it one of several motions"
-    )
-    add("--stages", action="store_true", help=text)
-    text = "draw which shares of the gear pairs and starts of each value move in which way instead"
-    add("--shares", action="store_true", help=text)
-    text = "dimensionless (default), or physical: um, m/s, N and 1/s instead of their scales"
-    add("--units", choices=("dimensionless", "physical"), help=text)
-    text = "width of the page (default: 85, one column of a journal; a response: 180, two)"
-    add("--width", type=partial(millimetres, low=60.0), metavar="MM", help=text)
-    text = "height of the page (default: by the width)"
-    add("--height", type=partial(millimetres, low=70.0), metavar="MM", help=text)
-    dots = partial(whole_number, low=50, high=1200)
-    add("--dpi", type=dots, default=300, help="pixels per inch (default: 300)")
-
-
-def _targets(options: argparse.Namespace, name: str, alone: bool) -> list[Path]:
+def _targets(options: Namespace, name: str, alone: bool) -> list[Path]:
     from matplotlib.backend_bases import FigureCanvasBase
 
     from gearchaos.figures.page import ENDINGS, FORMATS
@@ -245,5 +202,5 @@ def _lanes_in_words(result: "Result") -> str:
     return f"{words}, {diverged} of them diverged" if diverged else words
 
 
-main = Command("plot", __doc__, _arguments, _plot, common=("overwrite",))
+main = Command("plot", __doc__, _plot)
 main.start(__name__)

@@ -5,20 +5,11 @@ report.md. The path of report.md goes to stdout, everything else to stderr.
 """
 
 import time
-from argparse import ArgumentParser, Namespace
+from argparse import Namespace
 from pathlib import Path
 
 from gearchaos.command_line import OK, Command, sweep_file
 from gearchaos.progress import say
-
-PAPERS = {"pan2021": ("pan2021.toml", "pan2021_full.toml")}
-"""The configurations of each paper that can be reproduced."""
-
-
-def _arguments(parser: ArgumentParser) -> None:
-    add = parser.add_argument
-    add("paper", choices=PAPERS, help="what to reproduce")
-    add("-o", "--output", metavar="DIR", help="folder of the gallery (default: that of the name)")
 
 
 def _reproduce(options: Namespace) -> int:
@@ -30,7 +21,8 @@ def _reproduce(options: Namespace) -> int:
     began = time.monotonic()
     folder = Path(options.output or options.paper)
     check_folder(folder, options.overwrite)
-    configs = [load_config(sweep_file(name)) for name in PAPERS[options.paper]]
+    names = (f"{options.paper}.toml", f"{options.paper}_full.toml")
+    configs = [load_config(sweep_file(name)) for name in names]
     choose_threads(options.threads)
     found = compute(*configs, threads=options.threads)
     print(write_gallery(found, folder, overwrite=options.overwrite), flush=True)
@@ -38,5 +30,5 @@ def _reproduce(options: Namespace) -> int:
     return OK
 
 
-main = Command("reproduce", __doc__, _arguments, _reproduce, common=("overwrite", "threads"))
+main = Command("reproduce", __doc__, _reproduce)
 main.start(__name__)

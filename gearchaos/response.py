@@ -7,10 +7,10 @@ The path of the result goes to stdout, everything else to stderr; python -m gear
 it.
 """
 
-from argparse import ArgumentParser, Namespace
+from argparse import Namespace
 from typing import TYPE_CHECKING, Any
 
-from gearchaos.command_line import Command, coordinates, number, place
+from gearchaos.command_line import Command, coordinates
 from gearchaos.errors import ConfigurationError
 from gearchaos.finishing import ending, output_of
 
@@ -20,28 +20,6 @@ if TYPE_CHECKING:
     Asked = tuple[Configuration, str, list[str], Any]
     """What to compute, the configuration as it was written, what to say of it, and its place."""
 
-PITCH_ERROR = "pitch_error"
-
-
-def _arguments(parser: ArgumentParser) -> None:
-    from gearchaos.results.response_variables import DEFAULT_PERIODS
-
-    add = parser.add_argument
-    text = "the pair, its scene, start and integration; or a result, one lane of which goes on"
-    add("config", metavar="config.toml|RESULT.h5", help=text)
-    values = parser.add_mutually_exclusive_group(required=True)
-    text = "multiple of the pitch error, may be repeated"
-    values.add_argument("--pitch-error", type=number, action="append", metavar="P", help=text)
-    text = (
-        "value of the parameter that the configuration sweeps, may be repeated; of a result the "
-        "nearest lane, with NAME=VALUE for each axis where there are several"
-    )
-    values.add_argument("--at", type=place, action="append", metavar="VALUE", help=text)
-    text = "of the lane of a result: go on from its end (default), or repeat it from its start"
-    add("--begin", choices=("end", "start"), default="end", help=text)
-    text = "mesh periods kept (default: %(default)s)"
-    add("--periods", type=int, default=DEFAULT_PERIODS, metavar="N", help=text)
-
 
 def _respond(options: Namespace) -> int:
     from h5py import is_hdf5
@@ -50,19 +28,21 @@ def _respond(options: Namespace) -> int:
     from gearchaos.engine.response import compute_response, prepared
     from gearchaos.engine.running import choose_threads, prepare
     from gearchaos.results.atomic_file import check_output
+    from gearchaos.results.response_variables import DEFAULT_PERIODS
 
     choose_threads(options.threads)
-    simulation = prepared(config, options.periods)
+    periods = DEFAULT_PERIODS if options.periods is None else options.periods
+    simulation = prepared(config, periods)
     output = output_of(options, "_response.h5")
     check_output(output, options.overwrite)
     simulation.notes += note
     prepare(simulation, history_periods=1)
-    result = compute_response(simulation, options.periods, text, fixed)
+    result = compute_response(simulation, periods, text, fixed)
     result.save(output, overwrite=options.overwrite)
     diverged, lanes = int((result["status"] != 0).sum()), len(simulation.lanes)
     text = (
         f"{lanes} lane{'s' if lanes != 1 else ''} over {' by '.join(result.axes)}, "
-        f"{options.periods} mesh periods of {simulation.plan.steps_per_period} steps, "
+        f"{periods} mesh periods of {simulation.plan.steps_per_period} steps, "
         f"{diverged} diverged{' or too fast' if config.integration.method == 'flow_map' else ''}"
     )
     return ending(simulation, output, diverged, text)
@@ -73,9 +53,9 @@ def _lane(options: Namespace) -> "Asked":
     from gearchaos.engine.recomputing import continued
     from gearchaos.results.result import open_result
 
-    if options.set or options.at is None:
-        rule = "is a result, and goes on with its own configuration; name a lane with --at"
-        raise ConfigurationError(f"{options.config}: {rule}, without --set or --pitch-error")
+    if options.set:
+        rule = "is a result, and goes on with its own configuration; leave --set out"
+        raise ConfigurationError(f"{options.config}: {rule}")
     result = open_result(options.config)
     lane = result.sel("within", **coordinates(options.at, result.axes))
     if lane.axes:
@@ -96,25 +76,22 @@ def _configuration(options: Namespace) -> "Asked":
     def configured(*more: str) -> Configuration:
         return Configuration.from_toml(text, options.config, [*options.set, *more])
 
-    parameter, values = PITCH_ERROR, options.pitch_error
-    if values is None:
-        parameter = configured().sweep.parameter
-        values = [value for _, value in options.at]
-        for name in {name for name, _ in options.at} - {"", parameter}:
-            raise ConfigurationError(
-                f"--at {name}: {options.config} sweeps {parameter}; replace another key with --set"
-            )
+    names = {name or configured().sweep.parameter for name, _ in options.at}
+    if len(names) != 1:
+        rule = f"name one parameter, not {' and '.join(sorted(names)) or 'none'}"
+        raise ConfigurationError(f"--at: {rule}; replace other keys with --set")
     # Repeating a value is no mistake worth a message.
-    sweep = {"parameter": parameter, "values": sorted(set(values))}
+    values = sorted({value for _, value in options.at})
+    sweep = {"parameter": min(names), "values": values}
     try:
         config = configured(f"sweep={toml_literal(sweep)}")
     except ConfigurationError as error:
         swept = configured().sweep.parameter
-        if parameter == swept:
+        if swept in names:
             raise
         key = swept if "." in swept else f"groups.{swept}"
         hint = (
-            f"--pitch-error takes the place of the sweep over {swept}: give one value of it with "
+            f"values of {min(names)} take the place of the sweep over {swept}: give one of it with "
             f"--set {key}=VALUE, or several with --at"
         )
         raise ConfigurationError([hint, *error.problems]) from error
@@ -127,7 +104,5 @@ def _configuration(options: Namespace) -> "Asked":
     return config, config.text, [], ""
 
 
-main = Command(
-    "response", __doc__, _arguments, _respond, common=("output", "overwrite", "threads", "set")
-)
+main = Command("response", __doc__, _respond)
 main.start(__name__)

@@ -3,15 +3,14 @@
 The table goes to stdout, everything else to stderr.
 """
 
-import argparse
 import json
 import math
 import textwrap
+from argparse import Namespace
 from collections.abc import Iterator, Sequence
-from functools import partial
 from typing import TYPE_CHECKING
 
-from gearchaos.command_line import OK, Command, coordinates, number, place, whole_number
+from gearchaos.command_line import OK, Command, coordinates
 from gearchaos.errors import ConfigurationError
 
 if TYPE_CHECKING:
@@ -25,40 +24,7 @@ if TYPE_CHECKING:
 WIDTH = 80  # Columns of a terminal.
 
 
-def _arguments(parser: argparse.ArgumentParser) -> None:
-    add = parser.add_argument
-    add("result", metavar="RESULT.h5", help="result file of a sweep")
-    text = "put narrower stages into what surrounds them, and count them"
-    add("--narrowest", type=_width, default=0.0, metavar="WIDTH", help=text)
-    text = (
-        "bisect every boundary to this width, and tell how the orbit beside it is lost; lanes are "
-        "computed again with the configuration in the file. Of a sweep in both directions, follow "
-        "the orbits to where each direction jumps; of two parameters without --at, find those "
-        "along the first one in every row, also where only a row beside shows them"
-    )
-    add("--refine", type=_width, metavar="WIDTH", help=text)
-    text = (
-        "where to fix an axis of a result that has several, at the nearest of its values; may be "
-        "repeated (default: the first value of a second parameter, all starts and gear pairs)"
-    )
-    add("--at", type=place, action="append", default=[], metavar="NAME=VALUE", help=text)
-    text = (
-        "let up to 25 chaotic lanes go on for so many records of their own length, and tell which "
-        "share is still chaotic then"
-    )
-    records = partial(whole_number, low=1, high=1000)
-    add("--survival", type=records, metavar="RECORDS", help=text)
-    add("--json", action="store_true", help="print JSON instead of a table")
-
-
-def _width(text: str) -> float:
-    width = number(text)
-    if width <= 0.0:
-        raise argparse.ArgumentTypeError(f"{text!r} is not a positive number")
-    return width
-
-
-def _stages(options: argparse.Namespace) -> int:
+def _stages(options: Namespace) -> int:
     from gearchaos.results.jumps import apart, crises, jumps
     from gearchaos.results.overview import plain, slice_lines
     from gearchaos.results.result import open_result
@@ -112,7 +78,7 @@ def _stages(options: argparse.Namespace) -> int:
     return OK
 
 
-def _map_boundaries(result: "Result", options: argparse.Namespace) -> int:
+def _map_boundaries(result: "Result", options: Namespace) -> int:
     """Find the boundaries in all rows of a map, and tell what that saves."""
     from gearchaos.engine.recomputing import refinable
     from gearchaos.engine.refinement import refined_map
@@ -153,7 +119,7 @@ def _computed_again(
     result: "Result",
     stages: "list[Stage]",
     stretches: "list[Apart]",
-    options: argparse.Namespace,
+    options: Namespace,
 ) -> "tuple[list[Boundary] | None, Survival | None]":
     """Compute what --refine and --survival ask for, None where they do not."""
     if options.refine is None and options.survival is None:
@@ -235,5 +201,5 @@ def boundary_list(boundaries: "Sequence[Boundary]") -> Iterator[str]:
             yield f"    multiplier {real:.4f}{pair}"
 
 
-main = Command("stages", __doc__, _arguments, _stages, common=("threads",))
+main = Command("stages", __doc__, _stages)
 main.start(__name__)

@@ -6,7 +6,7 @@ finished blocks are kept and --resume goes on from them.
 
 import sys
 import time
-from argparse import ArgumentParser, Namespace
+from argparse import Namespace
 from contextlib import suppress
 from typing import TYPE_CHECKING
 
@@ -19,25 +19,6 @@ if TYPE_CHECKING:
     from gearchaos.configuration import Configuration
     from gearchaos.engine.simulation import Simulation
     from gearchaos.engine.store_filling import Shard
-
-
-def _arguments(parser: ArgumentParser) -> None:
-    add = parser.add_argument
-    add("config", metavar="config.toml", help="what to compute; - reads it from stdin")
-    add("--resume", action="store_true", help="go on from the finished blocks of a stopped sweep")
-    add(
-        "--dask",
-        metavar="ADDRESS",
-        help="compute on the dask cluster of this scheduler, or on local:N processes",
-    )
-    add(
-        "--shard",
-        metavar="i/N",
-        help="compute the i-th of N shards only; python -m gearchaos.merge joins them",
-    )
-    text = "say what would be computed, in how much time and memory, and stop"
-    add("--dry-run", action="store_true", help=text)
-    add("--json", action="store_true", help="with --dry-run: print that as JSON")
 
 
 def _sweep(options: Namespace) -> int:
@@ -131,7 +112,5 @@ def _command(name: str, *arguments: str) -> str:
     return join([sys.orig_argv[0], "-m", f"gearchaos.{name}", *arguments])
 
 
-main = Command(
-    "sweep", __doc__, _arguments, _sweep, common=("output", "overwrite", "threads", "set")
-)
+main = Command("sweep", __doc__, _sweep)
 main.start(__name__)

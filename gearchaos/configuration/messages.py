@@ -28,7 +28,8 @@ _RULES = {
     "literal_error": "must be one of {expected}",
     "union_tag_invalid": "must be one of {expected_tags}",
     "union_tag_not_found": "is missing",
-    "string_pattern_mismatch": "must be a positive whole number, or a fraction of two",
+    "string_pattern_mismatch": "has another form",
+    "value_error": "{error}",
 }
 _EXPECTED = {
     "float_type": "a number",
@@ -120,7 +121,7 @@ def _fault_of(error: ErrorDetails, keys: Mapping[str, Key]) -> Fault:
         names.append(error["ctx"]["discriminator"].strip("'"))
         value = value.get(names[-1])
     path = ".".join(name for name in names if isinstance(name, str))
-    remedy = keys[path].remedy if path in keys else ""
+    remedy = keys[path].remedy if path in keys and kind != "value_error" else ""
     if kind == "extra_forbidden":
         table = ".".join(map(str, names[:-1]))
         remedy = _elsewhere(str(names[-1]), table, keys)
@@ -133,7 +134,7 @@ def _fault_of(error: ErrorDetails, keys: Mapping[str, Key]) -> Fault:
         remedy = suggestion(value, re.findall(r"'([^']*)'", rule)) or remedy
     elif isinstance(value, str) and kind == "float_type" and NUMBER.fullmatch(value.strip()):
         remedy = f"write it without the quotes: {value.strip()}"
-    if kind == "missing" or error["loc"][-1] == "[key]":
+    if kind in ("missing", "value_error") or error["loc"][-1] == "[key]":
         value = None
     dotted = "".join(
         f"[{name}]" if isinstance(name, int) else f".{quoted_key(name)}" for name in names

@@ -56,7 +56,8 @@ def reach(tried: Tried) -> Reach:
 
 def report(judge: Judge, tried: Tried, most: int = 4) -> Iterator[str]:
     """Word the best sets, what they come to, and how well the targets determine them."""
-    free, apart = judge.targets.parameter, judge.targets.search.apart
+    targets = judge.problem.targets
+    free, apart = targets.parameter, targets.search.apart
     columns = zip(free, tried["values"].T, strict=True)
     points = np.stack([[one.share(v) for v in values.tolist()] for one, values in columns], axis=1)
     sets, keys = distinct(points, tried["misfit"], apart, most), [one.name for one in free]
@@ -68,7 +69,7 @@ def report(judge: Judge, tried: Tried, most: int = 4) -> Iterator[str]:
         yield _row(key, values)
     yield ""
     yield _row("observed", ["wanted", "width", *titles])
-    for one, row in zip(judge.observations, tried["computed"][sets].T, strict=True):
+    for one, row in zip(judge.problem.observations, tried["computed"][sets].T, strict=True):
         yield _row(one.name, [one.wanted, one.width, *row])
     yield ""
     found = reach(tried)

@@ -4,24 +4,22 @@ The candidates of a generation are yielded as points of the unit cube, and their
 the same misfits lead to the same candidates, which is how a search that was stopped goes on.
 """
 
-import time
 import warnings
-from collections.abc import Callable, Generator
+from collections.abc import Generator, Iterator
 from importlib.metadata import version
 from typing import Any, TypeAlias
 
 import numpy as np
 
 from gearchaos.arrays import Floats
-from gearchaos.configuration.run_tables import states_of
 from gearchaos.configuration.toml_text import toml_text
 from gearchaos.engine.provenance import SOFTWARE
 from gearchaos.errors import FileError
 from gearchaos.identification.evaluation import evaluate
 from gearchaos.identification.loading import Problem
-from gearchaos.identification.observations import misfit, observations_of
+from gearchaos.identification.observations import misfit
 from gearchaos.identification.targets import Search
-from gearchaos.identification.tried import Tried, tried_of
+from gearchaos.identification.tried import Tried, fields_of
 from gearchaos.interrupts import check
 
 DRAWN = 0  # Number of the run to which drawn candidates belong; those of CMA-ES count from 1.
@@ -33,7 +31,6 @@ STARTS = 4  # Drawn sets kept for each run to begin from: runs that end early ar
 MOST_CENTRES = 5
 """Where one of those steps is better than the best candidate, they begin again from it."""
 
-SECONDS_BETWEEN_SNAPSHOTS = 20.0
 LANES_AT_ONCE = 2**13  # Lanes of one batch: enough for all threads, and little memory.
 
 Proposals: TypeAlias = Generator[tuple[int, Floats], Floats, None]
@@ -41,35 +38,31 @@ Proposals: TypeAlias = Generator[tuple[int, Floats], Floats, None]
 
 
 class Judge:
-    """Computes candidates and compares them with the ``observations`` of a problem.
+    """Computes candidates and compares them with the observations of a problem.
 
-    ``values``: all of the swept parameter at which something is looked at, ascending, (values,).
+    ``fields``: those of the candidates.
     """
 
     def __init__(self, problem: Problem) -> None:
-        self.targets, self._config = problem.targets, problem.config
-        coordinates = states_of(self._config.needed_effects)[::2]
-        self.observations = observations_of(self.targets, coordinates)
-        self.values = np.unique(np.concatenate([one.values for one in self.observations]))
-        self._places = [np.searchsorted(self.values, one.values) for one in self.observations]
-        ends = [end for one in self.targets.increment for end in (one.from_, one.to)]
-        self._accelerated = np.isin(self.values, ends)
+        self.problem = problem
+        values, observed = problem.values, problem.observations
+        self.fields = fields_of(len(problem.targets.parameter), len(observed))
+        self._places = [np.searchsorted(values, one.values) for one in observed]
+        ends = [end for one in problem.targets.increment for end in (one.from_, one.to)]
+        self._accelerated = np.isin(values, ends)
 
     def judge(self, run: int, parameters: dict[str, Floats]) -> Tried:
         """Compute candidates given by their parameters, each of shape (candidates,)."""
-        records = evaluate(self._config, self.values, parameters, self._accelerated)
+        problem = self.problem
+        records = evaluate(problem.config, problem.values, parameters, self._accelerated)
         computed, residuals = [], []
-        for one, places in zip(self.observations, self._places, strict=True):
+        for one, places in zip(problem.observations, self._places, strict=True):
             computed.append(one.computed(records.at(places)))
             residuals.append(one.residual(computed[-1]))
         diverged = ~np.all(records.sound, axis=1)
-        return tried_of(
-            run=np.full(diverged.size, run, dtype=np.int32),
-            values=np.stack(list(parameters.values()), axis=1),
-            computed=np.stack(computed, axis=1),
-            misfit=misfit(np.stack(residuals, axis=1)),
-            status=diverged.astype(np.uint8),
-        )
+        runs, misfits = np.full(diverged.size, run), misfit(np.stack(residuals, axis=1))
+        rows = np.column_stack([runs, *parameters.values(), *computed, misfits, diverged])
+        return rows.view(self.fields)[:, 0]
 
 
 def decisive_facts(problem: Problem) -> dict[str, Any]:
@@ -79,52 +72,33 @@ def decisive_facts(problem: Problem) -> dict[str, Any]:
     return {**SOFTWARE._asdict(), "configuration": toml_text(tables)}
 
 
-def search(
-    judge: Judge,
-    known: Tried | None,
-    keep: Callable[[Tried], None],
-    advance: Callable[[int], None],
-    source: str,
-) -> Tried:
-    """Try all candidates of a search and return them.
+def search(judge: Judge, known: Tried, source: str) -> Iterator[Tried]:
+    """Yield all candidates of a search, some at a time.
 
     ``known`` are those of an earlier part of it, from the file ``source``, which are not computed
-    again; ``keep`` is called with all there are from time to time, and where the search is
-    interrupted, as soon as they are more than the known ones; ``advance`` with every number of
-    candidates done. Raises FileError if the known ones are not the first of this search.
+    again. Raises FileError if they are not the first of this search.
     """
-    parts: list[Tried] = []
-    done, before, spoke = 0, 0 if known is None else len(known), time.monotonic()
-    at_once = max(1, LANES_AT_ONCE // judge.values.size)
-    asking = proposals(judge.targets.search, len(judge.targets.parameter))
-    try:
-        run, points = next(asking)
-        while True:
-            misfits = []
-            for first in range(0, len(points), at_once):
-                check()
-                piece = points[first : first + at_once]
-                parameters = judge.targets.values(piece)
-                if known is not None and done < before:
-                    found = known[done : done + len(piece)]
-                    _require_these(parameters, found, source)
-                else:
-                    found = judge.judge(run, parameters)
-                    advance(len(found))
-                parts.append(found)
-                done += len(found)
-                misfits.append(found["misfit"])
-                if done > before and time.monotonic() - spoke > SECONDS_BETWEEN_SNAPSHOTS:
-                    spoke = time.monotonic()
-                    parts = [np.concatenate(parts)]
-                    keep(parts[0])
+    targets, done = judge.problem.targets, 0
+    at_once = max(1, LANES_AT_ONCE // judge.problem.values.size)
+    asking = proposals(targets.search, len(targets.parameter))
+    run, points = next(asking)
+    while True:
+        misfits = []
+        for first in range(0, len(points), at_once):
+            check()
+            parameters = targets.values(points[first : first + at_once])
+            found = known[done : done + len(points[first : first + at_once])]
+            if done < len(known):
+                _require_these(parameters, found, source)
+            else:
+                found = judge.judge(run, parameters)
+            done += len(found)
+            misfits.append(found["misfit"])
+            yield found
+        try:
             run, points = asking.send(np.concatenate(misfits))
-    except StopIteration:
-        return np.concatenate(parts)
-    except KeyboardInterrupt:
-        if done > before:
-            keep(np.concatenate(parts))
-        raise
+        except StopIteration:
+            return
 
 
 def proposals(search: Search, parameters: int) -> Proposals:

@@ -2,10 +2,10 @@
 
 import math
 from itertools import product
-from typing import Annotated, Literal, TypeAlias, TypeVar
+from typing import Annotated, Literal, Self, TypeAlias, TypeVar
 
 import numpy as np
-from pydantic import Field
+from pydantic import Field, field_validator, model_validator
 
 from gearchaos.arrays import Floats
 from gearchaos.configuration.keys import Table, key
@@ -26,6 +26,14 @@ class Parameter(Table):
     low: float = key("lower bound", example=0.1)
     high: float = key("upper bound", example=1.0)
     logarithmic: bool = key("whether steps are taken in its logarithm", default=False)
+
+    @model_validator(mode="after")
+    def _ascends(self) -> Self:
+        if self.high <= self.low:
+            raise ValueError(f"high = {self.high} must be greater than low = {self.low}")
+        if self.logarithmic and self.low <= 0.0:
+            raise ValueError(f"low = {self.low} has no logarithm; raise it, or drop logarithmic")
+        return self
 
     def value(self, share: Floats) -> Floats:
         """Return the values at shares of the way from the lower to the upper bound."""
@@ -49,9 +57,19 @@ class _Observed(Table):
 class Stage(_Observed):
     """A span of the swept parameter in which the motion is of one kind."""
 
-    motion: str = key('"period n", "bands n", "chaotic" or "aperiodic"', example="period 2")
+    motion: str = key(
+        '"period n" or "bands n" with n up to 16, "chaotic" or "aperiodic"',
+        example="period 2",
+        pattern="^((period|bands) ([1-9]|1[0-6])|chaotic|aperiodic)$",
+    )
     from_: float = key("where it begins", example=10.08, alias="from")
     to: float = key("where it ends", example=11.16)
+
+    @model_validator(mode="after")
+    def _ascends(self) -> Self:
+        if self.to <= self.from_:
+            raise ValueError(f"to = {self.to} must be greater than from = {self.from_}")
+        return self
 
 
 class Place(_Observed):
@@ -59,6 +77,12 @@ class Place(_Observed):
 
     at: float = key("where, on the axis of the sweep", example=1.12)
     within: Pair = key("the span in which it is looked for, and must be alone", example=[0.6, 2.0])
+
+    @model_validator(mode="after")
+    def _within(self) -> Self:
+        if not self.within[0] < self.at < self.within[1]:
+            raise ValueError(f"within must hold at = {self.at}, low end first")
+        return self
 
 
 class Exponent(_Observed):
@@ -89,6 +113,13 @@ class Search(Table):
     """largest difference, as a share of its bounds, that a parameter must have for two sets to
     differ"""
 
+    @model_validator(mode="after")
+    def _drawn_are_a_part(self) -> Self:
+        if not self.population <= self.drawn <= self.candidates:
+            within = f"population = {self.population} and at most candidates = {self.candidates}"
+            raise ValueError(f"drawn = {self.drawn} must be at least {within}")
+        return self
+
 
 class Targets(Table):
     """A targets file; one that exists is sound."""
@@ -103,6 +134,13 @@ class Targets(Table):
     crisis: Several[Place] = key("observed crises", default=())
     exponent: Several[Exponent] = key("observed exponents", default=())
     increment: Several[Increment] = key("observed increments", default=())
+
+    @field_validator("parameter")
+    @classmethod
+    def _named_once(cls, given: tuple[Parameter, ...]) -> tuple[Parameter, ...]:
+        if len({one.name for one in given}) < len(given):
+            raise ValueError("names a parameter twice; name it once")
+        return given
 
     def corners(self) -> dict[str, Floats]:
         """Return the free parameters at all corners of their bounds, each of shape (corners,)."""

@@ -13,7 +13,7 @@ import resource
 import sys
 import time
 import traceback
-from argparse import ArgumentParser, Namespace
+from argparse import Namespace
 from collections.abc import Callable
 from pathlib import Path
 
@@ -59,7 +59,7 @@ def _main(command: str) -> Callable[[list[str]], int]:
     if command not in ("load_config", "run"):
         return importlib.import_module(f"gearchaos.{command}").main
     import gearchaos
-    from gearchaos.command_line import OK, Command
+    from gearchaos.command_line import COMMANDS, OK, Command
 
     def body(options: Namespace) -> int:
         config = gearchaos.load_config(*options.paths)
@@ -67,10 +67,8 @@ def _main(command: str) -> Callable[[list[str]], int]:
             gearchaos.run(config)
         return OK
 
-    def paths(parser: ArgumentParser) -> None:
-        parser.add_argument("paths", nargs="*")
-
-    return Command(command, "Load a configuration.", paths, body)
+    COMMANDS[command] = {"options": {"paths": {"nargs": "*"}}}
+    return Command(command, "Load a configuration.", body)
 
 
 if __name__ == "__main__":

@@ -388,7 +388,7 @@ def test_every_group_is_a_key_of_the_groups_table():
 
 
 def test_the_command_prints_the_schema():
-    command = [sys.executable, "-m", "gearchaos.configuration"]
+    command = [sys.executable, "-m", "gearchaos.schema"]
     output = subprocess.run(command, check=True, capture_output=True, text=True, cwd=ROOT).stdout
     assert json.loads(output) == json_schema()
 

@@ -15,7 +15,7 @@ from gearchaos.identification import search as searching
 from gearchaos.identification.evaluation import require_stable
 from gearchaos.identification.loading import load_targets
 from gearchaos.identification.report import _row, reach
-from gearchaos.identification.search import Judge, decisive_facts, search
+from gearchaos.identification.search import Judge, decisive_facts
 from gearchaos.identification.tried import read_tried, write_tried
 from gearchaos.identify import main
 
@@ -133,8 +133,7 @@ def problem_of(identified):
 
 
 def tried_of(identified):
-    keys = [one.name for one in problem_of(identified).targets.parameter]
-    return read_tried(identified.file, keys)
+    return read_tried(identified.file, Judge(problem_of(identified)).fields)
 
 
 class TestALinearPair:
@@ -187,59 +186,41 @@ class TestALinearPair:
 class TestASearchThatWasStopped:
     def test_goes_on_to_the_same_candidates(self, identified, tmp_path):
         problem, (whole, _) = problem_of(identified), tried_of(identified)
-        keys, judge = [one.name for one in problem.targets.parameter], Judge(problem)
+        keys = [one.name for one in problem.targets.parameter]
         for name in ("pair.toml", "targets.toml"):
             (tmp_path / name).write_text((identified.folder / name).read_text())
         # As a killed process leaves it: whole pieces, in the middle of a run.
         first = whole[: 40 + 12 * 7]
         facts = decisive_facts(problem)
-        write_tried(tmp_path / "targets.csv", first, keys, judge.observations, facts)
+        write_tried(tmp_path / "targets.csv", first, keys, problem.observations, facts)
         ended = command(tmp_path, "--resume", "--quiet")
         assert (ended.code, ended.out) == (0, identified.out)
         assert numbers(tmp_path / "targets.csv") == numbers(identified.file)
 
-    def test_keeps_its_candidates_when_it_is_interrupted(self, identified):
-        whole, _ = tried_of(identified)
-        kept = []
-
-        def advance(_):
-            if len(kept) == 0 and next(done) == 9:
-                raise KeyboardInterrupt
-
-        done = iter(range(100))
-        judge = Judge(problem_of(identified))
-        with pytest.raises(KeyboardInterrupt):
-            search(judge, None, kept.append, advance, "-")
-        (part,) = kept
-        again = search(judge, part, kept.append, lambda _: None, "-")
-        assert np.array_equal(again["misfit"], whole["misfit"])
-        assert np.array_equal(again["values"], whole["values"])
-
-    def test_loses_no_candidate_while_it_is_taken_up_again(self, identified, monkeypatch):
+    def test_keeps_its_candidates_when_it_is_interrupted(self, identified, tmp_path, monkeypatch):
         def check():
-            if next(pieces) == 1:
+            if next(pieces) == 9:
                 raise KeyboardInterrupt
 
-        def advance(_):
-            raise KeyboardInterrupt
-
-        monkeypatch.setattr(searching, "SECONDS_BETWEEN_SNAPSHOTS", 0.0)
-        judge, kept = Judge(problem_of(identified)), []
-        known = tried_of(identified)[0][: 40 + 12 * 3]
-        with pytest.raises(KeyboardInterrupt):
-            search(judge, known, kept.append, advance, "-")
-        # Now before the known ones are all taken up.
-        pieces = iter(range(100))
-        monkeypatch.setattr(searching, "check", check)
-        with pytest.raises(KeyboardInterrupt):
-            search(judge, known, kept.append, advance, "-")
-        assert kept == []
+        for name in ("pair.toml", "targets.toml"):
+            (tmp_path / name).write_text((identified.folder / name).read_text())
+        with monkeypatch.context() as interrupted:
+            for _ in range(2):
+                # The second time before the known ones are all taken up.
+                pieces = iter(range(9 if (tmp_path / "targets.csv").exists() else 0, 100))
+                interrupted.setattr(searching, "check", check)
+                ended = command(tmp_path, "--resume")
+                assert ended.code == 130
+                assert "candidates in targets.csv are kept; go on with --resume" in ended.err
+                assert len(numbers(tmp_path / "targets.csv")) == 1 + 40 + 8 * 12
+        ended = command(tmp_path, "--resume")
+        assert (ended.code, ended.out) == (0, identified.out)
+        assert numbers(tmp_path / "targets.csv") == numbers(identified.file)
 
     def test_is_complete_where_nothing_is_left(self, identified):
         before = identified.file.stat().st_mtime_ns
         ended = command(identified.folder, "--resume")
         assert (ended.code, ended.out) == (0, identified.out)
-        assert "complete already" in ended.err
         assert identified.file.stat().st_mtime_ns == before
 
     def test_is_not_replaced_unasked(self, identified):
@@ -261,7 +242,7 @@ class TestASearchThatWasStopped:
         file.write_bytes({"cut": content[:-40], "other": b"notes"}.get(damage, content))
         before = file.read_bytes()
         with pytest.raises(FileError, match="damaged"):
-            read_tried(file, ["damping_ratio", "pitch_error_amplitude"])
+            read_tried(file, Judge(problem_of(identified)).fields)
         assert file.read_bytes() == before
 
 
@@ -272,22 +253,29 @@ FAULTS = {
     ),
     'name = "damping_ratio"': (
         'name = "dampng_ratio"',
-        'parameter[0].name = "dampng_ratio": is not a parameter that can be swept; did you mean',
+        'parameter[0]: second_sweep.parameter = "dampng_ratio": is not a parameter that can be '
+        "swept; did you mean",
     ),
-    "low = 0.01": ("low = 0.0", "parameter[0].low = 0.0: has no logarithm"),
-    "high = 0.5": ("high = 0.005", "parameter[0].high = 0.005: must be greater than"),
-    'name = "pitch_error_amplitude"': ('name = "damping_ratio"', "comes 2 times; name it once"),
-    'motion = "period 1"': ('motion = "period 0"', 'stage[0].motion = "period 0": must be'),
-    "to = 3.0\nwidth": ("to = 0.5\nwidth", "stage[0].to = 0.5: must be greater than"),
+    "low = 0.01": ("low = 0.0", "parameter[0]: low = 0.0 has no logarithm"),
+    "high = 0.5": ("high = 0.005", "parameter[0]: high = 0.005 must be greater than low"),
+    'name = "pitch_error_amplitude"': (
+        'name = "damping_ratio"',
+        "parameter: names a parameter twice; name it once",
+    ),
+    'motion = "period 1"': (
+        'motion = "period 0"',
+        'stage[0].motion = "period 0": has another form; expected: "period n"',
+    ),
+    "to = 3.0\nwidth": ("to = 0.5\nwidth", "stage[0]: to = 0.5 must be greater than"),
     f"width = {EXPONENT_WIDTH}": ("width = 0.0", "exponent[0].width = 0.0: must be greater than 0"),
-    "drawn = 40": ("drawn = 4", "search.drawn = 4: must be at least search.population = 12"),
+    "drawn = 40": ("drawn = 4", "search: drawn = 4 must be at least population = 12"),
     "[[increment]]": (
         '[[increment]]\ncoordinate = "delta_1"',
         'outputs.section = ["delta_5", "delta_1"]: the scene has no state `delta_1`',
     ),
     "[[exponent]]": (
         "[[jump]]\nat = 1.0\nwithin = [2.0, 3.0]\nwidth = 0.1\n[[exponent]]",
-        "jump[0].within = [2.0, 3.0]: must hold jump.at = 1.0",
+        "jump[0]: within must hold at = 1.0",
     ),
     "seed = 3": ("sed = 3", "search.sed = 3: unknown key; did you mean `seed`?"),
 }
@@ -335,11 +323,11 @@ def test_a_place_off_the_axis_is_refused(tmp_path):
     (tmp_path / "pair.toml").write_text(PAIR.replace("load", "pitch_error = 1.0\nload"))
     swept = 'sweep={parameter="mesh_frequency",values=[1.0]}'
     text = TARGETS.replace("[search]", f"set = ['{swept}']\n[search]", 1)
-    (tmp_path / "targets.toml").write_text(text.replace("from = 0.5", "from = 0.0"))
+    (tmp_path / "targets.toml").write_text(text.replace("from = 0.5", "from = -1.0"))
     with pytest.raises(ConfigurationError) as raised:
         load_targets(tmp_path / "targets.toml")
     (problem,) = raised.value.problems
-    assert "targets.toml: stage[0].from = 0.0: mesh_frequency must be finite and > 0" in problem
+    assert "targets.toml: observed places: sweep.values = -0.97" in problem
 
 
 def test_bounds_with_which_the_steps_are_unstable_are_refused(identified):

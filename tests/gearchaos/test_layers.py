@@ -51,8 +51,7 @@ def test_results_figures_and_configurations_need_no_engine(statement):
         "import gearchaos",
         "import gearchaos.__main__",
         "dir(gearchaos)",
-        *(f"import gearchaos.{name}" for name in COMMANDS if name != "configuration"),
-        "import gearchaos.configure",
+        *(f"import gearchaos.{name}" for name in COMMANDS),
     ],
 )
 def test_commands_start_light(statement):

@@ -18,7 +18,7 @@ def raising(fault: BaseException):
 
 
 def run(body) -> int:
-    return Command("turn", "Turn a gear.", lambda _parser: None, body)([])
+    return Command("schema", "Turn a gear.", body)([])
 
 
 @pytest.mark.parametrize(
@@ -27,11 +27,11 @@ def run(body) -> int:
         (
             ConfigurationError(["one", "two"]),
             2,
-            "gearchaos turn: error: one\ngearchaos turn: error: two\n",
+            "gearchaos schema: error: one\ngearchaos schema: error: two\n",
         ),
-        (FileError("a.h5: is not there"), 4, "gearchaos turn: error: a.h5: is not there\n"),
+        (FileError("a.h5: is not there"), 4, "gearchaos schema: error: a.h5: is not there\n"),
         (PermissionError(13, "Permission denied", "b"), 4, "denied: 'b'\n"),
-        (KeyboardInterrupt(), 130, "gearchaos turn: interrupted\n"),
+        (KeyboardInterrupt(), 130, "gearchaos schema: interrupted\n"),
     ],
 )
 def test_each_fault_has_its_code_and_its_lines(fault, code, lines, capsys):
@@ -60,7 +60,7 @@ def body(options):
     sys.stdin.read()
     print("a path")
     return 0
-sys.exit(Command("turn", "Turn a gear.", lambda parser: None, body)())
+sys.exit(Command("schema", "Turn a gear.", body)())
 """
     with subprocess.Popen(
         [sys.executable, "-c", code],

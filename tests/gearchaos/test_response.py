@@ -235,10 +235,10 @@ def test_diverged_lanes_are_kept_and_told(tmp_path, capsys):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ([], "one of the arguments --pitch-error --at is required"),
-        (["--at", "1", "--pitch-error", "1"], "not allowed with"),
+        ([], "--at: name one parameter, not none"),
+        (["--at", "load=1", "--pitch-error", "1"], "not load and pitch_error"),
         (["--at", "5,86"], "'5,86' is not a finite number"),
-        (["--at", "load=1"], f"--at load: {FULL} sweeps pitch_error; replace another key with"),
+        (["--at", "lode=1"], "did you mean `load`?"),
         (
             ["--at", "1", "--set", "start.carry=upwards"],
             f'{FULL}: start.carry = "upwards": a lane goes on from the one before it, and values '
@@ -264,8 +264,8 @@ def test_a_pitch_error_in_a_sweep_over_something_else_needs_a_value_of_that(tmp_
     asked = [str(FULL.with_name("spur_pair.toml")), "--pitch-error", "1", "-o", str(output)]
     assert main(asked) == 2
     assert capsys.readouterr().err.startswith(
-        "gearchaos response: error: --pitch-error takes the place of the sweep over "
-        "mesh_frequency: give one value of it with --set groups.mesh_frequency=VALUE, or several "
+        "gearchaos response: error: values of pitch_error take the place of the sweep over "
+        "mesh_frequency: give one of it with --set groups.mesh_frequency=VALUE, or several "
         "with --at\n"
     )
     assert not output.exists()

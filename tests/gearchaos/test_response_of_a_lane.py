@@ -84,8 +84,9 @@ def test_every_axis_of_a_result_names_its_lane(tmp_path, capsys):
         ("--at", "load=0.3"): "load = 0.3: lies beyond the values of the result, 0.1 to 0.2",
         ("--at", "upwards"): "direction: is no axis of the result",
         ("--at", "torque=0"): "torque: is no axis of the result; its axes: load, pitch_error",
-        ("--pitch-error", "7"): "is a result, and goes on with its own configuration; name a lane",
-        ("--at", "7", "--set", "sweep.count=3"): "with --at, without --set or --pitch-error",
+        (): "name one lane, with --at load=VALUE and --at pitch_error=VALUE and",
+        ("--pitch-error", "7"): "name one lane, with --at load=VALUE and --at start=VALUE as",
+        ("--at", "7", "--set", "sweep.count=3"): "with its own configuration; leave --set out",
     }.items():
         assert main([sweep, *arguments, "-o", output]) == 2
         assert message in capsys.readouterr().err

@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 import gearchaos
-from gearchaos.configuration import Configuration, load_config, swept_values
-from gearchaos.dry_run import _thinned
+from gearchaos.configuration import Configuration, load_config
+from gearchaos.dry_run import some_places
 from gearchaos.engine.simulation import Simulation
 
 from .commands import (
@@ -160,21 +160,17 @@ def test_a_dry_run_counts_the_memory_of_maps_of_every_lane(tmp_path):
     assert own - shared > own_block - shared_block > 1e7
 
 
-def test_what_a_dry_run_computes_is_the_sweep_with_fewer_lanes_and_periods():
-    asked = ("start.kind=random", "start.count=9", "integration.error_check=0.5")
+def test_what_a_dry_run_computes_are_lanes_from_all_over_the_sweep():
     second = 'second_sweep={parameter="load", from=0.2, to=0.3, count=30}'
-    config = load_config(PAN2021, [*asked, second, "sweep.count=300", "outputs.exponents=true"])
-    few = _thinned(Simulation(config), 0.01, 0.1)
-    for name, some in few.sweeps.items():
-        every = swept_values(config.sweeps[name])
-        assert set(swept_values(some)) < set(every)
-        # From all over the sweep, no end before the other.
-        assert min(some.values) - every[0] == pytest.approx(every[-1] - max(some.values), rel=0.1)
-    # The cube root of a hundredth of each axis: 64.6, 6.5 and 1.9, in runs of 32 / 9 neighbours.
-    assert (few.sweep.size, few.second_sweep.size, few.start.count) == (68, 7, 2)
-    assert (few.integration.transient_periods, few.integration.recorded_periods) == (50, 50)
-    assert few.outputs == config.replace("outputs.section_points", 50).outputs
-    assert few.integration.error_check == 0.5
+    every = Simulation(load_config(PAN2021, ["start.kind=random", "start.count=9", second]))
+    some = some_places(every, 256)
+    # In vectors of 32 neighbours, no end before the other.
+    assert some.size == np.unique(some).size == 256
+    assert set(np.diff(some.reshape(-1, 32)).ravel()) == {1}
+    assert some[0] == pytest.approx(len(every.lanes) - some[-1], rel=0.01)
+    # Of a carried one those of some neighbouring values, in the middle.
+    some = some_places(Simulation(load_config(PAN2021, ["start.carry=upwards"])), 100)
+    assert np.array_equal(some, np.arange(700, 800))
 
 
 def test_a_configuration_comes_from_standard_input(tmp_path):

@@ -1,0 +1,18 @@
+"""Print the JSON Schema of a configuration file, for completion in editors, or all of its keys."""
+
+from argparse import Namespace
+
+from gearchaos.command_line import OK, Command
+
+
+def _describe(options: Namespace) -> int:
+    import json
+
+    from gearchaos.configuration.schema import json_schema, key_tables
+
+    print(key_tables() if options.keys else json.dumps(json_schema(), indent=2))
+    return OK
+
+
+main = Command("schema", __doc__, _describe)
+main.start(__name__)
