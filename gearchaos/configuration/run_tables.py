@@ -199,8 +199,8 @@ class Outputs(Table):
     states: Annotated[tuple[State, ...], Field(strict=False)] = key(example=["delta_5"], default=())
     """states of which extremes, and amplitudes at the orders, are told"""
     orders: Annotated[tuple[Order, ...], Field(strict=False, max_length=1000)] = key(
-        "multiples of the mesh frequency at which amplitudes of the transmission error are told; "
-        "the record has whole cycles of them",
+        "multiples of the mesh frequency, whole or fractions of two whole numbers, at which "
+        "amplitudes of the transmission error are told; the record has whole cycles of them",
         example=["1/3", "1/2", 1, 2],
         default=(),
     )

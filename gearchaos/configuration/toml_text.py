@@ -74,15 +74,8 @@ def tables_from_toml(text: str, source: str) -> dict[str, Any]:
         ) from None
     # Not only TOMLDecodeError: endless integers and what is no Unicode are plain ValueErrors.
     except ValueError as error:
-        fault = f"not valid TOML: {error}"
-        remedy = "write `key = value`, text in double quotes, tables as [name]"
-        if re.search("twice|overwrite", str(error)):
-            # Its place is a line, or the end of the document.
-            lines = text.splitlines()
-            line = int((re.search(r"at line (\d+)", str(error)) or [0, len(lines)])[1])
-            fault = f"line {line}: {lines[line - 1].partition('=')[0].strip()} is there twice"
-            remedy = "keep one of them, and all keys of a table below its one [name]"
-        raise ConfigurationError(f"{source}: {fault}; {remedy}") from None
+        remedy = "write `key = value`, each key once, text in double quotes, tables as [name]"
+        raise ConfigurationError(f"{source}: not valid TOML: {error}; {remedy}") from None
 
 
 def with_overrides(
