@@ -161,34 +161,22 @@ def _targets(options: Namespace, name: str, alone: bool) -> list[Path]:
 
     from gearchaos.figures.page import ENDINGS, FORMATS
 
-    formats = FORMATS
-    if options.format is not None:
-        formats = tuple(dict.fromkeys(kind.strip().lower() for kind in options.format.split(",")))
-        unknown = [repr(kind) for kind in formats if kind not in ENDINGS]
-        if unknown:
-            raise FigureError(f"--format: {', '.join(unknown)} is none of {', '.join(ENDINGS)}")
     path: Path = options.result[0]
-    stem = "_and_".join(
-        path.stem if path.suffix.lower() in RESULT_ENDINGS else path.name for path in options.result
-    )
-    output = path.parent if options.output is None else Path(options.output)
-    ending = output.suffix.lower().removeprefix(".")
+    output, asked = path.parent if options.output is None else Path(options.output), FORMATS
     if options.output is None or output.is_dir() or options.output.endswith(("/", "\\")):
-        output /= f"{stem}{name}"
-    elif ending in ENDINGS:
-        if options.format is not None and formats != (ending,):
-            other = f"--format asks for {','.join(formats)}"
-        elif not alone:
-            other = "there are several pages to draw"
-        else:
-            return [output]
-        rule = f"is one {ending} file, but {other}; leave the ending off"
-        raise FigureError(f"--output {output} {rule}")
-    elif ending in FigureCanvasBase.filetypes:
-        rule = f"a figure is written as {' or '.join(ENDINGS)}"
-        raise FigureError(f"--output {options.output}: {rule}")
-    elif not alone:
-        output = output.with_name(f"{output.name}{name}")
+        stems = (
+            one.stem if one.suffix.lower() in RESULT_ENDINGS else one.name for one in options.result
+        )
+        output /= f"{'_and_'.join(stems)}{name}"
+    else:
+        ending = output.suffix.lower().removeprefix(".")
+        if ending in FigureCanvasBase.filetypes:
+            output, asked = output.with_suffix(""), (ending,)
+        output = output.with_name(f"{output.name}{'' if alone else name}")
+    asked = asked if options.format is None else options.format.split(",")
+    formats = dict.fromkeys(kind.strip().lower() for kind in asked)
+    if unknown := [repr(kind) for kind in formats if kind not in ENDINGS]:
+        raise FigureError(f"{', '.join(unknown)}: a figure is written as {', '.join(ENDINGS)}")
     return [output.with_name(f"{output.name}.{kind}") for kind in formats]
 
 

@@ -266,7 +266,7 @@ def test_what_is_no_coordinate_has_its_history_and_its_own_spectrum(path, result
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["--output", "all.png"], "is one png file, but there are several pages to draw"),
+        (["--output", "all.gif"], "'gif': a figure is written as png, pdf, svg, eps, tiff"),
         (["--stages"], "is a response; it belongs to the diagram of a sweep"),
         (["--variable", "delta_3"], "no variable 'delta_3' over time in the result; it has delta"),
         (["--from", "13"], "the result has 5.86 to 12.5"),
