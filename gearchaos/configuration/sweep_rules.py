@@ -1,7 +1,7 @@
 """Rules of the sweeps: parameter, values, and that groups of the lanes are known and moved."""
 
 import math
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 
@@ -53,39 +53,6 @@ def _parameters_differ(config: Tables) -> Iterator[Fault]:
         remedy = "sweep another parameter, or drop [second_sweep]"
         rule = "is what [sweep] sweeps already"
         yield Fault("second_sweep.parameter", rule, remedy, parameters[0])
-
-
-@reads()
-def _values_or_span(config: Tables) -> Iterator[Fault]:
-    for table, sweep in config.sweeps.items():
-        span = {"from": sweep.from_, "to": sweep.to, "count": sweep.count}
-        for name, value in span.items():
-            if sweep.values is not None and value is not None:
-                remedy = "keep either `values` or `from`, `to` and `count`"
-                yield Fault(f"{table}.{name}", f"{table}.values is given as well", remedy, value)
-            elif sweep.values is None and value is None and not (name == "to" and sweep.count == 1):
-                remedy = "give `from`, `to` and `count`, or `values`"
-                yield Fault(f"{table}.{name}", "is missing", remedy)
-
-
-@reads()
-def _values_are_distinct(config: Tables) -> Iterator[Fault]:
-    for table, sweep in config.sweeps.items():
-        first, last, count = sweep.from_, sweep.to, sweep.count or 0
-        if sweep.values is not None:
-            values = np.sort(sweep.values)
-            for value in np.unique(values[1:][values[1:] == values[:-1]]):
-                rule = f"lists {value:.12g} twice"
-                yield Fault(f"{table}.values", rule, "list it once", sweep.values)
-        elif first is not None and last is not None and count > 1:
-            if last <= first:
-                rule = f"must be greater than {table}.from = {first}"
-                remedy = "exchange the two; start.carry says in which direction a sweep runs"
-                yield Fault(f"{table}.to", rule, remedy, last)
-            elif (last - first) / count < 2 * np.spacing(abs(last)):
-                rule = f"so many values between {table}.from and {table}.to would coincide"
-                remedy = "lower the count or widen the sweep"
-                yield Fault(f"{table}.count", rule, remedy, count)
 
 
 @reads()
@@ -201,17 +168,11 @@ def _without_effect(config: Tables, table: str, values: Floats) -> Fault:
 def _missing(config: Tables, row: GroupRow) -> Fault:
     effects = [f'"{name}"' for name in config.scene.effects if name in row.effects]
     because = f" for {' and '.join(effects)}" if effects else ""
-    lacking = [path for path in _asked_for(config, row.name) if _is_unknown(config, path)]
+    lacking = [path for path in asked_for(row.name, config.physical()) if _is_unknown(config, path)]
     otherwise = f", or derive it by giving {', '.join(lacking)} as well" if lacking else ""
     name = f"the {row.long_name} ({row.symbol})"
     rule = f"{name} is needed{because} and neither given nor derivable"
     return Fault(f"groups.{row.name}", rule, f"give {row.name} in [groups]{otherwise}")
-
-
-def _asked_for(config: Tables, name: str) -> Collection[str]:
-    declared = {path: key.field for path, key in PHYSICAL_KEYS.items()}
-    examples = {path: field.examples[0] for path, field in declared.items() if field.examples}
-    return asked_for(name, config.physical(), examples)
 
 
 def _is_unknown(config: Tables, path: str) -> bool:
@@ -226,7 +187,8 @@ def _out_of_range(config: Tables, groups: Groups) -> Iterator[Fault]:
         row = GROUPS_BY_NAME[name]
         if groups.origin[name] == "derived" and not row.valid.admits(value):
             worst = next(entry for entry in np.ravel(value) if not row.valid.admits(entry))
-            rule = f"derived from {', '.join(_asked_for(config, name))}, must be {row.valid.rule}"
+            paths = ", ".join(asked_for(name, config.physical()))
+            rule = f"derived from {paths}, must be {row.valid.rule}"
             remedy = "check the magnitudes of those keys"
             yield Fault(f"groups.{name}", rule, remedy, float(worst))
 

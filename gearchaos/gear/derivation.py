@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from gearchaos.arrays import Floats
 from gearchaos.errors import ConfigurationError
 from gearchaos.gear.contact_lines import TrapezoidalStiffness
 from gearchaos.gear.geometry import HelicalPair, Value
@@ -54,18 +55,15 @@ def _derive(
     return found
 
 
-# Examples may not fit what is known.
+# Ones may not fit what is known.
 @np.errstate(all="ignore")
-def asked_for(
-    group: str, physical: Mapping[str, Any], examples: Mapping[str, Any]
-) -> Collection[str]:
+def asked_for(group: str, physical: Mapping[str, Any]) -> Collection[str]:
     """Return the paths of the physical data from which a group follows.
 
-    ``physical`` is as `derive_groups` takes it; where it does not know what the derivation asks
-    for, ``examples``, values by path, stand for it.
+    ``physical`` is as `derive_groups` takes it; a one stands for what it does not know.
     """
-    quantities = Quantities(physical, examples)
-    with suppress(_UnknownError, ArithmeticError, ValueError):
+    quantities = Quantities(physical, np.ones(2))
+    with suppress(ArithmeticError, ValueError):
         _DERIVATIONS[group](quantities)
     return quantities.asked_for
 
@@ -83,16 +81,14 @@ class _UnknownError(Exception):
 class Quantities:
     """Physical data in SI units, and what follows from them."""
 
-    def __init__(
-        self, physical: Mapping[str, Any], examples: Mapping[str, Any] | None = None
-    ) -> None:
-        self.physical, self._examples = physical, examples or {}
+    def __init__(self, physical: Mapping[str, Any], unknown: Floats | None = None) -> None:
+        self.physical, self._unknown = physical, unknown
         self.asked_for: dict[str, None] = {}
 
     def __getitem__(self, path: str) -> Any:
         self.asked_for[path] = None
         value = self.physical[path]
-        value = self._examples.get(path) if value is None else value
+        value = self._unknown if value is None else value
         if value is None:
             raise _UnknownError(path)
         return value
