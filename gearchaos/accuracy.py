@@ -58,19 +58,14 @@ def _accuracy(options: Namespace) -> int:
     for target in targets:
         check_output(target, options.overwrite)
     choose_threads(options.threads)
-    if not config.outputs.section:
-        raise ConfigurationError(
-            f"{config.source}: outputs.section: a section is needed to measure errors on; keep a "
-            'state, such as "delta_5"'
-        )
     if config.pitch_error is not None and config.pitch_error.kind != "sine":
         raise ConfigurationError(
             f'{config.source}: pitch_error.kind = "{config.pitch_error.kind}": the truth comes '
             "from flow maps, which know the sine alone; measure errors with integration.error_check"
         )
     config = config.replace("integration.method", "rk4")
-    # The fewest are refused as a sweep would refuse them.
-    fewest = {"unstable": "refuse", "steps_per_period": steps[0]}
+    # What a sweep could not measure is refused as it would refuse it, and too few steps, too.
+    fewest = {"unstable": "refuse", "steps_per_period": steps[0], "error_check": 1.0}
     Simulation(config.replace("integration", {**config.tables()["integration"], **fewest}))
     settings = measure(Simulation(config), steps, options.lanes)
     print("\n".join(table(settings)))

@@ -82,6 +82,7 @@ def test_the_cheapest_setting_that_is_good_enough_is_recommended():
     ("arguments", "cause"),
     [
         (("--steps", "10,50"), "RK4 is unstable below 16 steps per period"),
+        (("--set", "outputs.section=[]"), "needs a section to measure errors on"),
         (
             ("--steps", "50,100", "--set", "sweep.from=13.3", "--set", "sweep.to=13.5"),
             "none of the lanes that were tried moves periodically",
