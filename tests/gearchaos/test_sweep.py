@@ -237,7 +237,6 @@ def test_an_unstable_number_of_steps_is_refused_with_the_limit_and_the_way_out(t
     assert (ended.code, ended.out) == (2, "")
     (line,) = ended.err.splitlines()
     limit = int(re.search(r"RK4 is unstable below (\d+) steps per period for 40 of 40", line)[1])
-    assert "transverse bearing of the driving gear" in line
     assert names_in(tmp_path) == ["gears.toml"]
     raised = sweep(tmp_path, *stiff, "--set", "integration.unstable=raise")
     assert raised.code == 0
