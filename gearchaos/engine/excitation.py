@@ -36,13 +36,10 @@ def whole_lengths(lanes: Lanes) -> dict[str, int]:
     orders, record = lanes.config.outputs.mesh_orders, lengths["recorded_periods"]
     most = integration.steps_per_period / 2
     if unfit := [str(one) for one in orders if record % one.denominator or one >= most]:
-        raised = (
-            f", raised to whole periods of the excitation, {repeats} each," if repeats > 1 else ""
-        )
         whole = math.lcm(repeats, *(order.denominator for order in orders))
         raise ConfigurationError(
             f"{lanes.config.source}: outputs.orders: {', '.join(unfit)}: must have whole cycles in "
-            f"the record of {record} mesh periods{raised} and more than two steps in each; set "
+            f"the record of {record} mesh periods and more than two steps in each; set "
             f"integration.recorded_periods to a multiple of {whole}, such as "
             f"{whole * math.ceil(record / whole)}, and keep to orders below {most:g}"
         )

@@ -59,26 +59,16 @@ def refinable(result: Result, name: str) -> Configuration:
     As `computable`, and raises ConfigurationError if its lanes do not stand for themselves.
     """
     config = computable(result, name)
-    if config.sweep.parameter == "pitch_error.grade":
+    start = config.start
+    own = start.carry != "none" or start.kind == "random" or start.drawn
+    if own or config.sweep.parameter == "pitch_error.grade":
         raise ConfigurationError(
-            f"{name}: pitch_error.grade: nothing lies between two grades; refine a sweep of "
-            "another parameter, such as pitch_error"
+            f"{name}: nothing lies between two grades, nor between lanes whose starts are carried "
+            "on, random or drawn; refine a sweep of another parameter, or from another start"
         )
-    unfit = remedy = ""
-    if config.start.carry != "none":
-        unfit, remedy = f'carry = "{config.start.carry}"', 'with start.carry = "none"'
-    elif config.start.kind == "random":
-        unfit, remedy = 'kind = "random"', "that starts otherwise"
-    elif config.start.drawn:
-        unfit, remedy = "drawn", "whose starts are not drawn"
-    elif config.start.kind == "grid":
+    if start.kind == "grid":
         state = zip(result.variables["state"].flags, result["start_state"][0].tolist(), strict=True)
         config = config.replace("start", {"kind": "given", "state": dict(state)})
-    if unfit:
-        raise ConfigurationError(
-            f"{name}: start.{unfit}: a lane between two others has no start of its own; refine a "
-            f"sweep {remedy}"
-        )
     return config
 
 
@@ -91,10 +81,9 @@ def continued(lane: Result, name: str, begin: str = "end") -> Configuration:
     """
     config, ended = computable(lane, name), lane[f"{begin}_state"].tolist()
     if not np.isfinite(ended).all():
-        fast = lane["status"] == Status.TOO_FAST
-        fault = "was too fast for its flow maps" if fast else "diverged"
+        status = lane.variables["status"].flags[lane["status"]].replace("_", " ")
         raise ConfigurationError(
-            f"{name}: {lane.where}: this lane {fault}, choose another with --at"
+            f"{name}: {lane.where}: the status of this lane is {status}; choose another with --at"
         )
     state = dict(zip(lane.variables["state"].flags, ended, strict=True))
     for key, value in {

@@ -144,13 +144,11 @@ def overview_page(
     return "\n\n".join(pages)
 
 
-def slice_lines(facts: dict[str, dict[str, float]]) -> list[str]:
+def slice_lines(facts: Mapping[str, float]) -> list[str]:
     """Word what `slice_facts` tells, one line per axis."""
     return [
-        f"slice {name} = {known.coordinate_text(name, at['value'], 6)}, "
-        f"{'the first' if at['number'] == 1 else 'number {number}'.format(**at)} of {at['of']}; "
-        f"others with --at {name}=VALUE"
-        for name, at in facts.items()
+        f"slice {name} = {known.coordinate_text(name, value, 6)}; others with --at {name}=VALUE"
+        for name, value in facts.items()
     ]
 
 

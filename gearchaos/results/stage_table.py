@@ -113,14 +113,9 @@ def one_axis(result: Result, kept: Sequence[str] = (), /, **coordinates: float) 
     return part.sel(**{name: part[name][0] for name in part.axes if name not in kept})
 
 
-def slice_facts(result: Result, part: Result) -> dict[str, dict[str, float]]:
-    """Tell of each axis that a slice lacks at which value, which of how many, it was fixed."""
-    facts = {}
-    for name in (name for name in result.axes if name not in part.axes):
-        value, values = part.fixed[name], result[name]
-        number = int(np.searchsorted(values, value)) + 1
-        facts[name] = {"value": value, "number": number, "of": values.size}
-    return facts
+def slice_facts(result: Result, part: Result) -> dict[str, float]:
+    """Tell of each axis that a slice lacks at which value it was fixed."""
+    return {name: part.fixed[name] for name in result.axes if name not in part.axes}
 
 
 def label_text(meaning: str, period: int) -> str:

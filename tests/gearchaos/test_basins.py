@@ -168,7 +168,7 @@ def test_one_value_is_told_with_entropy_and_the_means_of_its_basins(folder):
     assert "2: contact_state_tangential held, crossings_per_period 0" in told
     assert "1: contact_state_tangential single_sided_impact" in told
     at = run(folder, "several.h5", "--at", "pitch_error=1.1").out.splitlines()
-    assert at[1] == "slice pitch_error = 1.2, number 3 of 5; others with --at pitch_error=VALUE"
+    assert at[1] == "slice pitch_error = 1.2; others with --at pitch_error=VALUE"
 
 
 def test_json_tells_all_of_it(folder, grid):

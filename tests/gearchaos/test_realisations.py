@@ -100,9 +100,9 @@ def test_commands_take_a_gear_pair_by_its_number(result, tmp_path):
         return ended.out
 
     where = ("--at", "realisation=1", "--at", "start=0")
-    assert "slice realisation = 1, number 2 of 3" in run("stages", "drawn.h5", *where)
+    assert "slice realisation = 1" in run("stages", "drawn.h5", *where)
     assert "all 3 values of realisation, of which --at" in run("stages", "drawn.h5")
-    assert "realisation (realisation: 3) int32" in run("info", "drawn.h5")
+    assert "realisation (realisation) int32" in run("info", "drawn.h5")
     assert "drawn_realisation_1" in run("plot", "drawn.h5", "--at", "realisation=1")
     run("plot", "drawn.h5", "--stages")
     lane = (*where, "--at", "pitch_error=5.0", "--periods", "2", "--output", "lane.h5")
@@ -122,7 +122,7 @@ def test_boundaries_are_refined_with_the_gear_pair_of_the_slice(tmp_path):
     gearchaos.run(configured(grades)).save(tmp_path / "drawn.h5", overwrite=True)
     ended = run_module("gearchaos.stages", *arguments, cwd=tmp_path)
     assert (ended.code, ended.out) == (2, "")
-    assert "drawn.h5: pitch_error.grade: nothing lies between two grades" in ended.err
+    assert "drawn.h5: nothing lies between two grades" in ended.err
 
 
 def test_the_truth_of_flow_maps_is_not_asked_for(tmp_path):

@@ -105,7 +105,10 @@ def test_what_the_file_does_not_hold_of_the_axial_pair_is_not_made_up(tmp_path):
 def test_no_motion_goes_on_from_a_lane_that_diverged(tmp_path, capsys):
     run(config("sweep.count=3", "groups.load=1e150")).save(tmp_path / "s.h5")
     assert main([str(tmp_path / "s.h5"), "--at", "15", "-o", str(tmp_path / "r.h5")]) == 2
-    assert "pitch_error = 15: this lane diverged, choose another" in capsys.readouterr().err
+    assert (
+        "pitch_error = 15: the status of this lane is diverged; choose another"
+        in capsys.readouterr().err
+    )
     assert not (tmp_path / "r.h5").exists()
 
 

@@ -187,12 +187,12 @@ def test_stages_lie_along_one_axis_only():
     np.testing.assert_array_equal(taken.period, result["period"][1, :, 0])
     facts = slice_facts(result, part)
     assert facts == {
-        "load": {"value": LOADS.values[1], "number": 2, "of": 3},
-        "start": {"value": 0.0, "number": 1, "of": 2},
+        "load": LOADS.values[1],
+        "start": 0.0,
     }
     assert slice_lines(facts) == [
-        "slice load = 0.3, number 2 of 3; others with --at load=VALUE",
-        "slice start = 0, the first of 2; others with --at start=VALUE",
+        "slice load = 0.3; others with --at load=VALUE",
+        "slice start = 0; others with --at start=VALUE",
     ]
 
 
