@@ -19,6 +19,7 @@ from gearchaos.results.response_variables import (
     response_variables,
 )
 from gearchaos.results.result import Result
+from gearchaos.results.variables import DIRECTIONS
 
 
 def respond(config: Given, periods: int = DEFAULT_PERIODS, threads: int | None = None) -> Result:
@@ -99,11 +100,9 @@ def _motion(system: System, outcome: Outcome, plan: Plan) -> dict[str, Array]:
     for column, name in enumerate(system.states[::2]):
         motion[acceleration_of(name)] = found.accelerations[..., column].copy()
     motion[MESH_ERROR] = found.pitch_error
-    motion["mesh_force_tangential"] = found.force_tangential
-    motion["contact_tangential"] = found.contact_tangential
-    if system.effects.axial:
-        motion["mesh_force_axial"] = found.force_axial
-        motion["contact_axial"] = found.contact_axial
+    for way in DIRECTIONS[: 1 + system.effects.axial]:
+        motion[f"mesh_force_{way}"] = getattr(found, f"force_{way}")
+        motion[f"contact_{way}"] = getattr(found, f"contact_{way}")
     for values in motion.values():
         nothing = NO_CONTACT_STATE if values.dtype == np.uint8 else np.nan
         values[outcome.status != Status.OK] = nothing

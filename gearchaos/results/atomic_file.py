@@ -126,22 +126,19 @@ def replacing(
 
 def _checked_target(path: str | os.PathLike[str], overwrite: bool) -> Path:
     name = os.fspath(path)
-    if not name or "\0" in name:
+    # realpath drops the slash that tells a folder from a file.
+    no_folder = name.endswith(os.sep) and not os.path.isdir(name)
+    if not name or "\0" in name or no_folder:
         raise FileError(f"{name!r}: is not a file name; give the name of a file")
     target = Path(os.path.realpath(name))
-    try:
+    with suppress(FileNotFoundError):
         mode = target.stat().st_mode
-    except FileNotFoundError:
-        # realpath drops the slash that tells a folder from a file.
-        if name.endswith(os.sep):
-            raise FileError(f"{name!r}: is not a file name; give the name of a file") from None
-        return target
-    if stat.S_ISDIR(mode):
-        raise FileError(f"{path}: is a directory; give the name of a file in it")
-    if not stat.S_ISREG(mode):
-        raise FileError(f"{path}: is not a regular file; give the name of a file")
-    if not overwrite:
-        raise _exists(path)
+        if stat.S_ISDIR(mode):
+            raise FileError(f"{path}: is a directory; give the name of a file in it")
+        if not stat.S_ISREG(mode):
+            raise FileError(f"{path}: is not a regular file; give the name of a file")
+        if not overwrite:
+            raise _exists(path)
     return target
 
 

@@ -31,7 +31,6 @@ AMPLITUDE = "amplitude_"  # What the names of amplitudes begin with.
 EXTREMES = ("smallest", "largest", "peak_to_peak")  # What the names of those of a state end with.
 
 LARGEST_EXPONENT = "lyapunov_exponent"
-ALL_EXPONENTS = "lyapunov_exponents"
 STANDARD_ERROR = "_standard_error"
 STEP_ERROR = "exponent_step_error"
 RECORD = "record"
