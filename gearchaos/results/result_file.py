@@ -16,7 +16,7 @@ import numpy as np
 from gearchaos.arrays import Array, Floats
 from gearchaos.interrupts import check
 from gearchaos.results.atomic_file import append_checksum, replacing
-from gearchaos.results.variables import HARMONIC, Variable, diagram_axis, lane_axes
+from gearchaos.results.variables import HARMONIC, Variable, diagram_axis, lane_axes, listed
 
 SCHEMA = "gearchaos-sweep"
 SCHEMA_VERSION = "3.2"
@@ -182,9 +182,7 @@ def _write_metadata(file: h5py.File, metadata: Metadata) -> None:
 def _harmonics(parameters: Mapping[str, Parameter]) -> list[Variable]:
     rows = (np.size(p.value) for p in parameters.values() if p.dims == (HARMONIC,))
     numbers = np.arange(1, next(rows, 0) + 1)
-    text = "harmonic of the mesh frequency in the mesh stiffness"
-    harmonic = Variable(HARMONIC, (HARMONIC,), "int32", "1", text, "$n$", values=numbers)
-    return [harmonic] if numbers.size else []
+    return listed((), {"harmonics": numbers.size > 0}, {HARMONIC: numbers})
 
 
 def _create(file: h5py.File, variable: Variable, shape: tuple[int, ...]) -> None:
