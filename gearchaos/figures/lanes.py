@@ -179,8 +179,6 @@ class DenseDots(Line2D):
     @allow_rasterization  # type: ignore[untyped-decorator]
     def draw(self, renderer: Any) -> None:
         """Draw the image of the dots."""
-        if not self.get_visible():
-            return
         assert isinstance(self.axes, Axes)
         dot = self._dot(renderer)
         ends = dot.shape[0] - 1

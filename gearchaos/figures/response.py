@@ -92,12 +92,13 @@ def phase_portrait(
     Parameters and errors as for `time_history`, but for a coordinate such as ``"delta_5"``; returns
     the curve and the points.
     """
-    displacement, velocity = (motion_of(result, lane, name) for name in _plane(coordinate))
+    plane = coordinate, f"{coordinate}_rate"
+    displacement, velocity = (motion_of(result, lane, name) for name in plane)
     (curve,) = axes.plot(displacement, velocity, color=BLACK, linewidth=0.4)
     steps = samples_per_period(result)
     strobe = displacement[::steps], velocity[::steps]
     points = _points(axes, *strobe, 2.4, once_an_excitation(result, strobe[0].size))
-    _label(axes, result, *_plane(coordinate))
+    _label(axes, result, *plane)
     return curve, points
 
 
@@ -107,8 +108,9 @@ def poincare_section(axes: Axes, result: Result, lane: int, coordinate: str = CO
     Parameters and errors as for `phase_portrait`. The axes reach over at least a fifth of the phase
     portrait, so that the points of a periodic motion coincide.
     """
-    curve = np.array([motion_of(result, lane, name) for name in _plane(coordinate)])
-    section = np.array([result.lanes(f"section_{name}")[lane] for name in _plane(coordinate)])
+    plane = coordinate, f"{coordinate}_rate"
+    curve = np.array([motion_of(result, lane, name) for name in plane])
+    section = np.array([result.lanes(f"section_{name}")[lane] for name in plane])
     reach = (0.5 + _MARGIN) * np.maximum(np.ptp(section, 1), _SMALLEST_SHARE * np.ptp(curve, 1))
     reach[reach == 0.0] = 1.0
     middle = (section.min(axis=1) + section.max(axis=1)) / 2.0
@@ -119,7 +121,7 @@ def poincare_section(axes: Axes, result: Result, lane: int, coordinate: str = CO
     markersize = float(np.clip(40.0 / len(np.unique(places, axis=0)), 1.5, 3.5))
     points = _points(axes, section[0], section[1], markersize, once)
     axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
-    _label(axes, result, *_plane(coordinate))
+    _label(axes, result, *plane)
     return points
 
 
@@ -235,10 +237,6 @@ def motion_of(result: Result, lane: int, variable: str) -> Floats:
         place = ", ".join(f"{axis} = {value:g}" for axis, value in place_of(result, lane).items())
         raise FigureError(f"{place}: the lane diverged, it has no motion")
     return values
-
-
-def _plane(coordinate: str) -> tuple[str, str]:
-    return coordinate, f"{coordinate}_rate"
 
 
 def _points(axes: Axes, x: Floats, y: Floats, markersize: float, once: slice) -> Line2D:

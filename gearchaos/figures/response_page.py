@@ -115,27 +115,24 @@ def response_page(
 def _pitch_error_above(
     top: Axes, history: Axes, result: Result, lane: int, excitation: Excitation
 ) -> None:
-    """Draw the pitch error over the time history, and let both count revolutions."""
+    """Draw the pitch error over the time history, and let both count revolutions.
+
+    Of the driving gear, with ticks for its teeth. A record ends where tooth 0 comes into mesh
+    again, at the last of the shown revolutions.
+    """
     response.time_history(top, result, lane, MESH_ERROR, between=history.get_xlim())
     top.sharex(history)
     few_ticks(top, None, 4)
+    teeth = excitation.driving_teeth
+    begin = float(history.get_xlim()[1]) - SHOWN_REVOLUTIONS * teeth
     for axes in (top, history):
-        _in_revolutions(axes, excitation.driving_teeth)
+        every = _ticks(axes.xaxis, teeth / 2, 1.0, begin)
+        axes.xaxis.set_major_formatter(lambda x, _: f"{(x - begin) / teeth:.3g}")
+    ticks = "a tick for each tooth" if every == 1 else f"a tick every {every} teeth"
+    history.set_xlabel(f"Revolutions of the driving gear, {ticks}")
     remark(history, f"excitation period: {excitation.excitation_period} mesh periods")
     top.set_xlabel("")
     top.tick_params(labelbottom=False)
-
-
-def _in_revolutions(axes: Axes, teeth: int) -> None:
-    """Let an axis of mesh periods count revolutions of the driving gear, with ticks for its teeth.
-
-    A record ends where tooth 0 comes into mesh again, at the last of the shown revolutions.
-    """
-    begin = float(axes.get_xlim()[1]) - SHOWN_REVOLUTIONS * teeth
-    every = _ticks(axes.xaxis, teeth / 2, 1.0, begin)
-    axes.xaxis.set_major_formatter(lambda x, _: f"{(x - begin) / teeth:.3g}")
-    ticks = "a tick for each tooth" if every == 1 else f"a tick every {every} teeth"
-    axes.set_xlabel(f"Revolutions of the driving gear, {ticks}")
 
 
 def _in_shaft_orders(
