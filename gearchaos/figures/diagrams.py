@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.colors import LogNorm, to_rgb
 
 from gearchaos.errors import FigureError
-from gearchaos.figures.labels import axis_label, instead_of
+from gearchaos.figures.labels import axis_label, check_variable
 from gearchaos.figures.lanes import (
     MOST_DOTS,
     Between,
@@ -60,9 +60,7 @@ def bifurcation(
     numbers = [v for v in result.variables.values() if v.dtype == "float64"]
     of_lanes = [v.name for v in numbers if v.dims == result.axes and v.name not in result.axes]
     variable = variable or next(iter(names), DEFAULT_VARIABLE)
-    if variable not in (*names, *of_lanes):
-        there = instead_of(variable, (*names, *of_lanes))
-        raise FigureError(f"no variable {variable!r} of the diagram in the result; {there}")
+    check_variable(variable, (*names, *of_lanes), "of the diagram")
     lanes = diagram_lanes(result, between)
     rows = result.lanes(variable).reshape(result.lanes(STATUS).size, -1)
     of_a_lane = max(1, rows.shape[1])
@@ -150,10 +148,7 @@ def waterfall(axes: Axes, result: Result, variable: str, *, between: Between = (
     several lanes for one value.
     """
     there = [name for name in result if result.dims(name) == (*result.axes, ORDER)]
-    if variable not in there:
-        raise FigureError(
-            f"no amplitudes {variable!r} in the result; {instead_of(variable, there)}"
-        )
+    check_variable(variable, there, "over mesh orders")
     lanes = diagram_lanes(result, between)
     values = np.unique(lanes.parameter)
     if axes.images or values.size < lanes.numbers.size:

@@ -8,6 +8,7 @@ from typing import Any
 
 from matplotlib.mathtext import MathTextParser
 
+from gearchaos.errors import FigureError
 from gearchaos.gear.tooth_deviations import REALISATION
 from gearchaos.results import scales
 from gearchaos.results.result import Result
@@ -81,10 +82,12 @@ def in_a_name(place: Mapping[str, float], digits: int = 12) -> str:
     return "".join(f"_{axis}_{coordinate_text(axis, at, digits)}" for axis, at in place.items())
 
 
-def instead_of(variable: str, there: Sequence[str]) -> str:
-    """Say what there is instead of a variable, and which is meant."""
-    hint = "".join(f"; did you mean {one}?" for one in get_close_matches(variable, there, 1))
-    return f"it has {', '.join(there)}{hint}"
+def check_variable(variable: str, there: Sequence[str], where: str) -> None:
+    """Raise a FigureError unless there is such a variable, which says what there is instead."""
+    if variable not in there:
+        hint = "".join(f"; did you mean {one}?" for one in get_close_matches(variable, there, 1))
+        rule = f"no variable {variable!r} {where} in the result"
+        raise FigureError(f"{rule}; it has {', '.join(there) or 'none'}{hint}")
 
 
 def short(value: float, digits: int = 4, sign: str = "-") -> str:

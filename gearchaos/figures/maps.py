@@ -16,7 +16,7 @@ from matplotlib.transforms import offset_copy
 
 from gearchaos.arrays import Array, Floats, Mask
 from gearchaos.errors import FigureError
-from gearchaos.figures.labels import axis_label, in_words, instead_of, legend_title
+from gearchaos.figures.labels import axis_label, check_variable, in_words, legend_title
 from gearchaos.figures.lanes import Between, cell_edges, map_axes, select_lanes
 from gearchaos.figures.page import Page, few_ticks, footnote, page
 from gearchaos.figures.panel import robust_limits
@@ -76,9 +76,8 @@ def parameter_map(
 
     image: ScalarMappable
     of_lanes = [one.name for one in result.variables.values() if one.dims == result.axes]
-    if variable not in (*of_lanes, *LABELS):
-        there = instead_of(variable, of_lanes)
-        raise FigureError(f"no number {variable!r} of each lane in the result; {there}")
+    if variable not in LABELS:
+        check_variable(variable, of_lanes, "of each lane")
     if variable in LABELS or result.variables[variable].flags:
         kinds, looks = _kinds(result, variable)
         numbers = cells(kinds)

@@ -10,7 +10,7 @@ from matplotlib.ticker import MaxNLocator, NullFormatter
 
 from gearchaos.arrays import Floats
 from gearchaos.errors import FigureError
-from gearchaos.figures.labels import axis_label, instead_of, place_of, plain, unit_of
+from gearchaos.figures.labels import axis_label, check_variable, place_of, plain, unit_of
 from gearchaos.figures.lanes import Between
 from gearchaos.figures.page import remark
 from gearchaos.figures.style import BLACK, BLUE, LEGEND, ORANGE, VERMILION
@@ -223,15 +223,7 @@ def motion_of(result: Result, lane: int, variable: str) -> Floats:
 
     Raises FigureError if the result is no response, has no such variable, or the lane diverged.
     """
-    names = response_variables_of(result)
-    if not names:
-        raise FigureError(
-            "the result holds no motion in time; compute one with python -m gearchaos.response"
-        )
-    if variable not in names:
-        raise FigureError(
-            f"no variable {variable!r} over time in the result; {instead_of(variable, names)}"
-        )
+    check_variable(variable, response_variables_of(result), "over time")
     values = np.asarray(result.lanes(variable)[lane], dtype=np.float64)
     if not np.isfinite(values).all():
         place = ", ".join(f"{axis} = {value:g}" for axis, value in place_of(result, lane).items())

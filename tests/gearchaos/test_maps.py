@@ -199,8 +199,8 @@ def test_a_pdf_has_its_cells_as_images_and_its_words_as_text(path):
     [
         (["--stages"], "without --stages; --at pitch_error=0 draws a diagram"),
         (["{}"], "a map is drawn alone"),
-        (["--variable", "section_delta_5"], "no number 'section_delta_5' of each lane"),
-        (["--variable", "end_state"], "no number 'end_state' of each lane"),
+        (["--variable", "section_delta_5"], "no variable 'section_delta_5' of each lane"),
+        (["--variable", "end_state"], "no variable 'end_state' of each lane"),
         (["--mark", "torque=3"], "--mark torque: is no swept parameter of the figure"),
         (["--mark", "3"], "--mark 3: must be NAME=VALUE, each of the axes pitch_error, operation"),
         (["--from", "5000"], "no lane with operation_speed_rpm from 5000.0"),
