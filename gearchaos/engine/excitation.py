@@ -6,8 +6,10 @@ from collections.abc import Mapping
 import numpy as np
 
 from gearchaos.engine.lanes import Lanes
+from gearchaos.engine.steps import PILOT_LANES
 from gearchaos.errors import ConfigurationError
 from gearchaos.gear.contact_lines import series_table
+from gearchaos.gear.derivation import LENGTH
 from gearchaos.records.period import LONGEST_PERIOD, RETURNS
 
 LONGEST_EXCITATION = 50_000
@@ -48,14 +50,13 @@ def whole_lengths(lanes: Lanes) -> dict[str, int]:
 
 def remarks(lanes: Lanes, lengths: Mapping[str, int]) -> list[str]:
     """Return what a user should know of the excitation; ``lengths`` from `whole_lengths`."""
-    return [_longer(lanes, lengths), _negative_stiffness(lanes)]
+    teeth = [_longer(lanes, lengths), _parting_pairs(lanes)] if lanes.repeats_after > 1 else []
+    return [*teeth, _negative_stiffness(lanes), _mistaken_units(lanes)]
 
 
 def _longer(lanes: Lanes, lengths: Mapping[str, int]) -> str:
     """Tell by how much the teeth make transient and record longer than they are configured."""
     repeats = lanes.repeats_after
-    if repeats == 1:
-        return ""
     changed = [
         f"integration.{name} raised from {asked} to {length}"
         for name, length in lengths.items()
@@ -67,6 +68,41 @@ def _longer(lanes: Lanes, lengths: Mapping[str, int]) -> str:
         f"record is long enough to tell period {told}{' and shorter ones' if told > 1 else ''}"
     )
     return f"{text}; {', '.join(changed)}, whole ones of it" if changed else text
+
+
+def _parting_pairs(lanes: Lanes) -> str:
+    """Tell where neighbouring tooth pairs differ by more than the load bends them."""
+    system = lanes.system_of(lanes.spread(PILOT_LANES))
+    if system.teeth is None:
+        return ""
+    gears = system.teeth.driving, system.teeth.driven
+    step = sum(np.abs(gear - np.roll(gear, 1, axis=1)).max(axis=1) for gear in gears)
+    groups = system.groups
+    apart = np.abs(groups.error_amplitude) * step[system.teeth.profile]
+    parting = np.mean(apart > np.abs(groups.load))
+    if parting == 0.0:
+        return ""
+    return (
+        f"in {parting:.0%} of the lanes neighbouring tooth pairs differ by up to "
+        f"{apart.max():.2g} b', more than the static deflection there; single pairs may then part "
+        "while their neighbours carry, which the model leaves out"
+    )
+
+
+def _mistaken_units(lanes: Lanes) -> str:
+    """Tell which lengths do not suit the module, as those in another unit do not."""
+    pair, groups, found = lanes.config.pair, lanes.parameters, []
+    if pair is None or not pair.normal_module_mm:
+        return ""
+    error = () if lanes.repeats_after > 1 else ("pitch_error", "pitch_error_amplitude", LENGTH)
+    for what, names in {"static deflection": ("load", LENGTH), "pitch error": error}.items():
+        if names and {*names} <= {*groups}:
+            um = math.prod(float(np.abs(groups[name].value).max()) for name in names)
+            found += [f"{what} {um:.4g} um"] if um > 100.0 * pair.normal_module_mm else []
+    if (pair.face_width_mm or math.inf) < pair.normal_module_mm:
+        found.append(f"face width {pair.face_width_mm:g} mm")
+    rule = f"unlikely at a normal module of {pair.normal_module_mm:g} mm; are the units those of"
+    return f"{', '.join(found)}: {rule} the keys?" if found else ""
 
 
 def _negative_stiffness(lanes: Lanes) -> str:

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import gearchaos
+from gearchaos.engine.simulation import Simulation
 from gearchaos.export import main as export
 from gearchaos.figures.labels import unit_of
 from gearchaos.plot import main as plot
@@ -30,6 +31,17 @@ def path(tmp_path_factory):
 @pytest.fixture(scope="module")
 def result(path):
     return gearchaos.open_result(path)
+
+
+def test_what_a_mistaken_unit_makes_of_a_pair_is_told(tmp_path):
+    def notes(*overrides: str) -> str:
+        given = (*ASKED, "integration.unstable=raise", *overrides)
+        return " ".join(Simulation(gearchaos.load_config(small_config(tmp_path), given)).notes)
+
+    assert "unlikely" not in notes()
+    told = notes("pair.face_width_mm=0.02", "pitch_error.amplitude_um=8000.0", "sweep.to=1.0")
+    assert "pitch error 8000 um, face width 0.02 mm: unlikely at a normal module of" in told
+    assert "static deflection" in notes("mesh.mean_stiffness_N_per_um_mm=0.01")
 
 
 def test_a_dry_run_tells_frequency_and_deflection_of_the_pair(path, result, capsys):
