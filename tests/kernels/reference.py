@@ -92,6 +92,19 @@ def system_of(
     return System(effects, groups, COSINE, SINE, physical, teeth)
 
 
+def swinging() -> tuple[System, float]:
+    """Return a pair that swings in contact without end, half a swing in every period, and how fast.
+
+    Without clearance, damping and load delta_5 = A cos(w tau), w^2 = cos(beta_b), and N_y too; what
+    moves in bearings is a billion times heavier.
+    """
+    absent = "load", "damping_ratio", "half_backlash", "stiffness_variation_scale"
+    heavy = {"mass_ratio_p": 1e-9, "mass_ratio_g": 1e-9}
+    frequency = float(np.sqrt(np.cos(BASE_HELIX_ANGLE)))
+    groups = pan2021(0.0, **dict.fromkeys(absent, 0.0), **heavy, mesh_frequency=2.0 * frequency)
+    return system_of(groups), frequency
+
+
 def drawn_teeth(driving: int, driven: int, lanes: int = 1, contact_ratio: float = 2.26) -> Teeth:
     """Return errors of so many teeth, other ones in every lane, shared as a trapezoid rises."""
     random = np.random.default_rng(driving + 1000 * driven)

@@ -4,15 +4,15 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from gearchaos_kernels import STATES, Effects, Plan, integrate, mesh_motion
+from gearchaos_kernels import STATES, Plan, integrate, mesh_motion
 
-from .reference import assert_same_bits, pan2021, system_of
+from .reference import assert_same_bits, pan2021, state, swinging, system_of
 
 SMALLEST, LARGEST = range(2)
 ORDERS = tuple(map(Fraction, ("1/3", "1/2", "1", "3/2", "2", "3")))
 CHOSEN = ("delta_5", "delta_5_rate", "delta_2", "delta_4", "delta_4_rate")
 """The displacements of the driven gear have the other sign within the kernels."""
-PLAN = Plan(200, 400, 12, 1, tangent=True, loads=True)
+PLAN = Plan(200, 400, 12, 1, tangent=True, contact=True, loads=True)
 TOLD = PLAN._replace(states=CHOSEN, orders=ORDERS)
 MODEL = pan2021([0.3, 2.0, 5.86, 10.75])
 """Held, on the driving flank once a period, and of period 2."""
@@ -25,7 +25,7 @@ def told():
 
 def motion_of(steps):
     """Return the recorded motion, from its beginning, and its transmission error at every step."""
-    plan = PLAN._replace(steps_per_period=steps, loads=False, history_periods=12)
+    plan = Plan(steps, 400, 12, 1, tangent=True, history_periods=12)
     history = integrate(system_of(MODEL), np.zeros((4, 10)), plan).history
     error = history[..., 0] + mesh_motion(system_of(MODEL), history, steps).pitch_error
     chosen = history[..., [STATES.index(name) for name in CHOSEN]]
@@ -44,23 +44,21 @@ def lines_of(motion):
 
 
 def test_a_swinging_mass_has_one_line_and_the_extremes_of_a_sine():
-    # Without clearance, damping and load delta_5 = A cos(w tau), w^2 = cos(beta_b).
-    scene, amplitude, steps = Effects(False, False, False, False, False), 0.7, 200
-    system = system_of(pan2021(0.0, load=0.0, damping_ratio=0.0), scene)
-    frequency = np.sqrt(np.cos(system.groups.base_helix_angle))
+    amplitude, steps = 0.7, 200
+    system, frequency = swinging()
     # Half a swing in every mesh period: delta_5 turns where a step ends, its rate in between.
-    groups = system.groups._replace(mesh_frequency=2.0 * frequency)
     plan = PLAN._replace(transient_periods=0, states=("delta_5", "delta_5_rate"), orders=ORDERS)
-    outcome = integrate(system._replace(groups=groups), np.array([[amplitude, 0.0]]), plan)
-    sizes = np.array([amplitude, amplitude * frequency[0]])
+    plan = plan._replace(resolved=False, contact=False)
+    outcome = integrate(system, state(delta_5=amplitude)[np.newaxis], plan)
+    sizes = np.array([amplitude, amplitude * frequency])
     assert outcome.extremes[0] == pytest.approx(np.outer(sizes, [-1.0, 1.0]), rel=1e-7)
     expected = np.outer([*sizes, amplitude], [order == Fraction(1, 2) for order in ORDERS])
     # The method loses a little of the swing, and of its phase.
     assert outcome.amplitudes[0] == pytest.approx(expected, abs=1e-7)
     # Begun where it turns within a step, it is the cubic that reaches the full height.
     angle = 0.4 * np.pi / steps
-    start = np.array([[amplitude * np.cos(angle), amplitude * frequency[0] * np.sin(angle)]])
-    between = integrate(system._replace(groups=groups), start, plan)
+    start = state(delta_5=amplitude * np.cos(angle), delta_5_rate=sizes[1] * np.sin(angle))
+    between = integrate(system, start[np.newaxis], plan)
     assert between.extremes[0, 0] == pytest.approx([-amplitude, amplitude], rel=1e-8)
 
 
@@ -102,7 +100,7 @@ def test_they_change_nothing_else(told):
 
 
 def test_flow_maps_tell_the_same_whatever_steps_are_asked_for(told):
-    plan = TOLD._replace(steps_per_period=24, method="flow_map", contact=True)
+    plan = TOLD._replace(steps_per_period=24, method="flow_map")
     exact = integrate(system_of(MODEL), np.zeros((4, 10)), plan)
     fine = integrate(system_of(MODEL), np.zeros((4, 10)), TOLD._replace(steps_per_period=800))
     for name in ("extremes", "amplitudes"):

@@ -19,6 +19,8 @@ SCENES = [
     Effects(pitch_error=False, backlash=False),
     Effects(stiffness_variation=False),
 ]
+FOLLOWED = [FULL, Effects(axial=False), Effects(pitch_error=False, backlash=False)]
+"""Scenes of motions, each of which is compiled; `test_twin` has the same formulas in more."""
 APART, DRIVING_FLANK, BACK_FLANK = 0, 1, 2
 
 
@@ -71,7 +73,7 @@ def test_the_jacobian_is_that_of_the_printed_equations_on_every_branch(scene):
             assert found == pytest.approx(wanted[np.ix_(kept, kept)], abs=1e-9 * scale)
 
 
-@pytest.mark.parametrize("scene", SCENES, ids=named)
+@pytest.mark.parametrize("scene", FOLLOWED, ids=named)
 def test_accelerations_are_those_of_the_twin(scene):
     groups = three_lanes()
     if scene != FULL:

@@ -148,7 +148,8 @@ def test_exponent_inside_the_clearance_is_that_of_the_mesh_damping_alone():
     # Without load and far from both flanks only 2 xi y' acts: the position does not decay.
     model = pan2021(0.0, load=0.0, half_backlash=1e6)
     start = state(delta_5=0.3)
-    found = exponent_of(model, CLEARANCE, start, steps=100, transient=100, periods=200)
+    how = {"steps": 100, "transient": 100, "periods": 200, "resolved": True}
+    found = exponent_of(model, CLEARANCE, start, **how)
     assert abs(found) < 1e-12
 
 

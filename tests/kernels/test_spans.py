@@ -124,7 +124,7 @@ def rattling(steps: int, resolved: bool) -> tuple[np.ndarray, np.ndarray]:
     starts = np.stack([state(delta_5_rate=speed) for speed in speeds])
     outcome = run(
         pan2021(np.zeros(32), **UNDAMPED),
-        CLEARANCE,
+        TORSION_ONLY,
         starts,
         steps=steps,
         periods=500,

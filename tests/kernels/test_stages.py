@@ -17,9 +17,8 @@ POINTS = 240
 def stages() -> dict[float, tuple[np.ndarray, float, float]]:
     """Section points, exponent and its standard error of each multiple, from rest."""
     # The slowest multiplier is near 0.95 a period: 0.95^800 is below 1e-17.
-    outcome = run(
-        pan2021(MULTIPLES), NO_AXIAL, steps=288, transient=800, periods=1200, points=POINTS
-    )
+    how = {"steps": 200, "transient": 800, "periods": 1200, "points": POINTS, "resolved": True}
+    outcome = run(pan2021(MULTIPLES), NO_AXIAL, **how)
     exponent, error = largest_exponent(outcome.growth, np.full(len(MULTIPLES), PERIOD))
     results = zip(outcome.section, exponent, error, strict=True)
     return dict(zip(MULTIPLES, results, strict=True))
@@ -60,8 +59,7 @@ def test_chaotic_stage_has_a_positive_exponent_far_beyond_its_standard_error(sta
 def test_the_start_decides_between_two_periodic_motions_at_the_hop():
     # Pan 2021 jumps at 1.12; here at 1.05 from rest and at 1.09 from the contact flank.
     starts = np.stack([state(), state(delta_5=1.1626540685832338)])
-    settled = run(
-        pan2021([1.07, 1.07]), NO_AXIAL, starts, steps=288, transient=800, periods=2, points=2
-    )
+    how = {"steps": 200, "transient": 800, "periods": 2, "resolved": True}
+    settled = run(pan2021([1.07, 1.07]), NO_AXIAL, starts, **how, points=2)
     assert settled.section[:, 0] == pytest.approx(settled.section[:, 1], rel=0, abs=1e-9)
     assert abs(settled.section[0, 0, 0] - settled.section[1, 0, 0]) > 0.01

@@ -10,21 +10,23 @@ LANES = 5
 BASE = pan2021(np.full(LANES, 5.86), error_mean=0.03, error_phase=0.5)
 START = np.tile(state(delta_5=1.1, delta_1_rate=0.02, delta_3=0.01), (LANES, 1))
 HOW = {"steps": 96, "transient": 4, "periods": 6}
-BOTH = pytest.mark.parametrize("resolved", [False, True], ids=["plain", "resolved"])
+SWEPT = [(group, True) for group in Groups._fields]
+SWEPT += [(group, False) for group in Groups._fields if group != "error_phase"]
+"""Groups, and whether steps are split: plain ones without phase, or they are compiled once more."""
 
 
-def swept(group: str) -> Groups:
-    return BASE._replace(**{group: getattr(BASE, group) * np.linspace(0.8, 1.2, LANES)})
+def swept(group: str, resolved: bool = True) -> Groups:
+    base = BASE if resolved else BASE._replace(error_phase=np.zeros(LANES))
+    return base._replace(**{group: getattr(BASE, group) * np.linspace(0.8, 1.2, LANES)})
 
 
 def alone(model: Groups, lane: int, resolved: bool):
     return run(lanes_of(model, [lane]), FULL, START[[lane]], **HOW, resolved=resolved)
 
 
-@BOTH
-@pytest.mark.parametrize("group", Groups._fields)
+@pytest.mark.parametrize(("group", "resolved"), SWEPT)
 def test_a_group_swept_over_the_lanes_gives_the_lanes_integrated_alone(group, resolved):
-    model = swept(group)
+    model = swept(group, resolved)
     batch = run(model, FULL, START, **HOW, resolved=resolved)
     for lane in range(LANES):
         assert_same_bits(lanes_out_of(batch, [lane]), alone(model, lane, resolved))
@@ -33,19 +35,18 @@ def test_a_group_swept_over_the_lanes_gives_the_lanes_integrated_alone(group, re
     assert (np.abs(ends[1:] - ends[:-1]).max(axis=1) > 1e-9).all()
 
 
-@BOTH
-def test_a_phase_swept_through_zero_gives_the_lanes_integrated_alone(resolved):
+def test_a_phase_swept_through_zero_gives_the_lanes_integrated_alone():
     # The lane of phase zero, alone, runs in a loop compiled without phase.
     model = BASE._replace(error_phase=np.linspace(-0.4, 0.4, LANES))
     assert model.error_phase[2] == 0.0
-    batch = run(model, FULL, START, **HOW, resolved=resolved)
+    batch = run(model, FULL, START, **HOW, resolved=True)
     for lane in range(LANES):
-        assert_same_bits(lanes_out_of(batch, [lane]), alone(model, lane, resolved))
+        assert_same_bits(lanes_out_of(batch, [lane]), alone(model, lane, True))
 
 
 def test_a_swept_mesh_frequency_keeps_the_number_of_steps_in_each_lanes_own_period():
     model = swept("mesh_frequency")
-    batch = run(model, FULL, START, **{**HOW, "steps": 1600})
-    fine = run(model, FULL, START, **{**HOW, "steps": 3200})
+    batch = run(model, FULL, START, **{**HOW, "steps": 1600}, resolved=True)
+    fine = run(model, FULL, START, **{**HOW, "steps": 3200}, resolved=True)
     assert batch.section == pytest.approx(fine.section, rel=0, abs=2e-4)
     assert np.unique(batch.section[:, -1, 0]).size == LANES
