@@ -80,7 +80,6 @@ LINEAR = (
     *("--set", 'scene.effects=["pitch_error"]'),
     *("--set", "pitch_error.phase_deg=0.0"),
     *("--set", 'outputs.section=["delta_5"]'),
-    *("--set", "outputs.lyapunov=false"),
 )
 """The smallest scene, two states of a linear pair, where it does not matter what is computed."""
 

@@ -5,9 +5,12 @@ import re
 from collections.abc import Callable
 from pathlib import Path
 
-from .commands import SMALL
+from . import commands
 
 Random = random.Random
+
+SMALL = commands.SMALL.replace("phase_deg = 30.0", "phase_deg = 0.0")
+"""Without a phase, for which loops are compiled once more."""
 
 PLACE = "[integration]"
 SECOND_SWEEPS = tuple(
@@ -17,7 +20,7 @@ SECOND_SWEEPS = tuple(
         ("operation.speed_rpm", "values = [7000.0, 8000.0, 9000.0]"),
     )
 )
-_SINE = "amplitude_um = 11.0\nmean_um = 2.0\nphase_deg = 30.0"
+_SINE = "amplitude_um = 11.0\nmean_um = 2.0\nphase_deg = 0.0"
 _TOOTH_BY_TOOTH = (
     'kind = "grade"\ngrade = 7\nrealisations = 2',
     f'kind = "teeth"\ndriving = {{ cumulative_um = {[0.0, 3.0, -1.0] * 7} }}',
@@ -108,8 +111,6 @@ def _values_moved(source: Random, text: str) -> bytes:
     # Whoever wants the steps of a pair ten million times as stiff waits for them.
     most = 4 if 'unstable = "raise"' in options.values() else len(FACTORS)
     text = _with_numbers(source, text, (0, 1, 2), lambda number: _moved(source, number, most))
-    # A phase of zero is a kernel of its own.
-    text = text.replace("phase_deg = 0.0", "phase_deg = 30.0")
     for table, option in options.items():
         text = text if table in text else f"{text}\n{table}"
         text = text.replace(table, f"{table}\n{option}")

@@ -13,8 +13,12 @@ from gearchaos.engine.steps import pilot
 from ..kernels.reference import SOLUTIONS
 from .commands import names_in, run_module
 from .short_sweeps import PAN2021
+from .test_contact_told import AXIAL
 
-SHORT = ("--set", "integration.transient_periods=150", "--steps", "50,100,200", "--lanes", "8")
+PLAIN = tuple(word for one in AXIAL for word in ("--set", one))
+"""The scene whose plain steps other tests have compiled."""
+SHORT = ("--set", "integration.transient_periods=150", "--steps", "50,100,200", "--lanes", "5")
+SHORT += PLAIN
 
 
 @pytest.fixture(scope="module")
@@ -56,9 +60,9 @@ def test_senseless_steps_are_refused(tmp_path, steps):
 
 
 def test_resolved_errors_fall_with_order_four_and_lie_below_plain_ones():
-    overrides = ["integration.transient_periods=150", "sweep.to=10.0"]
+    overrides = ["integration.transient_periods=150", "sweep.to=10.0", *AXIAL]
     simulation = Simulation(gearchaos.load_config(PAN2021, overrides))
-    found = {(s.mode, s.steps): s for s in measure(simulation, [100, 200, 400], 12)}
+    found = {(s.mode, s.steps): s for s in measure(simulation, [100, 200, 400], 6)}
     errors = [found["resolved", steps].section_error for steps in (100, 200, 400)]
     order = -np.polyfit(np.log([100, 200, 400]), np.log(errors), 1)[0]
     assert order == pytest.approx(4.0, abs=0.3)
@@ -90,7 +94,7 @@ def test_the_cheapest_setting_that_is_good_enough_is_recommended():
     ],
 )
 def test_settings_on_which_no_error_can_be_measured_are_named(tmp_path, arguments, cause):
-    few = ("--lanes", "8", *arguments)
+    few = ("--lanes", "5", *PLAIN, *arguments)
     ended = run_module("gearchaos.accuracy", str(PAN2021), *few, cwd=tmp_path)
     assert ended.code == 2
     assert cause in ended.err

@@ -32,6 +32,7 @@ from .short_sweeps import (
     listing,
     simulation,
 )
+from .test_contact_told import AXIAL
 
 LONG = (
     "integration.steps_per_period=200",
@@ -134,7 +135,7 @@ def test_the_exponent_of_a_periodic_lane_is_that_of_its_orbit():
     exact = np.log(np.abs(multipliers[:, 0])) / (arrays["period"] * PERIOD)
     assert arrays["lyapunov_exponent"] == pytest.approx(exact, abs=1e-9)
     assert (arrays["lyapunov_exponent_standard_error"] == 0.0).all()
-    plain = computed(lanes_at(5.86, overrides=("integration.crossings='plain'",)), 1)
+    plain = computed(lanes_at(5.86, overrides=("integration.crossings='plain'", *AXIAL)), 1)
     assert (plain["lyapunov_exponent_standard_error"] > 0.0).all()
 
 
@@ -149,7 +150,7 @@ def test_a_record_that_holds_chaos_before_its_orbit_is_mixed():
 
 
 PARAMETRIC = (
-    'scene.effects=["stiffness_variation"]',
+    'scene.effects=["stiffness_variation","transverse"]',
     "groups.stiffness_variation_scale=2.0",
     "groups.damping_ratio=0.001",
     "sweep={parameter='mesh_frequency', from=1.0, to=3.0, count=41}",
@@ -160,7 +161,7 @@ def test_a_linear_scene_grows_or_settles_and_is_never_chaotic():
     sweep = Simulation(load_config(SPEEDS, PARAMETRIC))
     arrays = computed(sweep, 41)
     system, once = sweep.lanes.system_of(np.arange(41)), Plan(200, 0, 1, 0, tangent=True)
-    multipliers = np.linalg.eigvals(period_jacobian(system, np.zeros((41, 2)), once))
+    multipliers = np.linalg.eigvals(period_jacobian(system, np.zeros((41, 6)), once))
     grows = np.max(np.abs(multipliers), axis=1) > 1.0
     # About Omega = 2 / n lie the tongues of the Mathieu equation.
     assert 3 < grows.sum() < 38

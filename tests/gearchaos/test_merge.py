@@ -49,7 +49,8 @@ def test_the_result_carries_the_configuration_as_it_was_written(tmp_path):
 
 def test_a_chosen_number_of_steps_is_chosen_again(tmp_path):
     flags = (
-        *LINEAR,
+        "--set",
+        "pitch_error.phase_deg=0.0",
         "--set",
         "integration.tolerance=1e-4",
         "--set",

@@ -15,6 +15,7 @@ from .short_sweeps import PAN2021, SHORT
 
 ASKED = (
     "outputs.loads=true",
+    "outputs.contact=true",
     "outputs.section=['delta_5', 'delta_5_rate']",
     "pitch_error.phase_deg=0.0",
 )

@@ -20,6 +20,7 @@ ASKED = (
     "outputs.states=['delta_5','delta_1_rate']",
     "outputs.orders=[1,'1/2','2/4','3/2',2]",
     "outputs.loads=true",
+    "outputs.contact=true",
     "integration.transient_periods=200",
     'sweep={parameter="pitch_error",values=[0.3,5.86,9.0,10.75]}',
 )

@@ -21,12 +21,12 @@ CAPTURED = {"capture_output": True, "text": True, "check": True}
 # 64 section points, but next to nothing to compute.
 WIDE = {
     "scene.effects": ["pitch_error"],
+    "pitch_error.phase_deg": 0.0,
     "integration.steps_per_period": 10,
     "integration.transient_periods": 0,
     "integration.recorded_periods": 64,
     "outputs.section": ["delta_5"],
     "outputs.section_points": 64,
-    "outputs.lyapunov": False,
     "outputs.motion": False,
 }
 
