@@ -1,6 +1,7 @@
 """A process that has imported what commands import, and forks to run each of them as a process.
 
-It reads one JSON list a line: module, arguments, folder, and the files for stdout and stderr. It
+It reads one JSON list a line: module, arguments, folder, the files for stdin, stdout and stderr,
+more variables of the environment, and the size of the largest file that may be written, or null. It
 answers with the number of the process, and then with its exit code, each on a line. Everything but
 the imports happens as in a process of its own.
 """
@@ -9,6 +10,7 @@ import atexit
 import gc
 import json
 import os
+import resource
 import runpy
 import signal
 import sys
@@ -47,14 +49,24 @@ def answer(number: int) -> None:
     sys.stdout.flush()
 
 
-def run(module: str, arguments: list[str], folder: str, out: str, err: str) -> None:
+def run(
+    module: str,
+    arguments: list[str],
+    folder: str,
+    files: list[str],
+    variables: dict[str, str],
+    largest_file: int | None,
+) -> None:
     """Become the process of one command, and end as it ends."""
     signal.alarm(LONGEST)
     # A test run in the background may have been told to ignore Ctrl-C, and hands that on.
     signal.signal(signal.SIGINT, signal.default_int_handler)
     os.chdir(folder)
-    for name, descriptor in ((os.devnull, 0), (out, 1), (err, 2)):
+    for descriptor, name in enumerate(files):
         os.dup2(os.open(name, os.O_RDWR), descriptor)
+    os.environ.update(variables)
+    if largest_file is not None:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (largest_file, largest_file))
     sys.argv[1:] = arguments
     sys.orig_argv[1:] = ["-m", module, *arguments]
     code = 1

@@ -102,23 +102,35 @@ def small_config(folder: Path) -> Path:
     return path
 
 
-def run_module(module: str, *arguments: str, cwd: Path, **options) -> Ended:
-    """Run ``python -m module`` in a folder."""
-    if not options:
-        return begin(module, arguments, cwd)[1]()
+def run_module(
+    module: str, *arguments: str, cwd: Path, preexec_fn: Callable | None = None, **options
+) -> Ended:
+    """Run ``python -m module`` in a folder; see `begin`, but ``env`` is a whole environment."""
+    if preexec_fn is None and "env" not in options:
+        return begin(module, arguments, cwd, **options)[1]()
+    options["preexec_fn"] = preexec_fn
     command = [sys.executable, "-m", module, *arguments]
     done = subprocess.run(command, cwd=cwd, capture_output=True, text=True, timeout=300, **options)
     assert "Traceback" not in done.stderr, done.stderr
     return Ended(done.returncode, done.stdout, done.stderr)
 
 
-def begin(module: str, arguments: Sequence[str], cwd: Path) -> tuple[int, Callable[[], Ended]]:
+def begin(
+    module: str,
+    arguments: Sequence[str],
+    cwd: Path,
+    *,
+    stdin: str = "",
+    variables: dict[str, str] | None = None,
+    largest_file: int | None = None,
+) -> tuple[int, Callable[[], Ended]]:
     """Begin a command that need not import what it needs; return its process, and how to wait."""
     server, folder = _server(), TemporaryDirectory()
-    out, err = Path(folder.name, "out"), Path(folder.name, "err")
-    for file in (out, err):
-        file.touch()
-    words = [module, arguments, str(cwd), str(out), str(err)]
+    files = [Path(folder.name, name) for name in ("in", "out", "err")]
+    for file, text in zip(files, (stdin, "", ""), strict=True):
+        file.write_text(text)
+    _, out, err = files
+    words = [module, arguments, str(cwd), [*map(str, files)], variables or {}, largest_file]
     server.stdin.write(json.dumps(words) + "\n")
     server.stdin.flush()
 

@@ -16,7 +16,7 @@ import pytest
 
 import gearchaos
 
-from .commands import LINEAR, names_in, same_data, small_config, sweep
+from .commands import LINEAR, begin, names_in, same_data, small_config, sweep
 
 pytest.importorskip("distributed")
 
@@ -69,22 +69,20 @@ def worker(address, folder, before=""):
     return python(f"{before}\n{WORKER}", address, *flags, cwd=folder, env=environment)
 
 
+def timeout(seconds):
+    """Return the variable that tells dask how long to wait for an answer."""
+    return {"DASK_DISTRIBUTED__COMM__TIMEOUTS__CONNECT": seconds}
+
+
 @contextmanager
 def begun(folder, *arguments):
-    """Start the long sweep and yield its process once a block is finished."""
+    """Start the long sweep and yield its process, and its end, once a block is finished."""
     small_config(folder)
-    with subprocess.Popen(
-        [sys.executable, "-m", "gearchaos.sweep", "gears.toml", *LONG, *arguments],
-        cwd=folder,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        env={**os.environ, "DASK_DISTRIBUTED__COMM__TIMEOUTS__CONNECT": "3s"},
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
-    ) as process:
-        while process.poll() is None and not list((folder / BLOCKS).glob("*.block")):
-            time.sleep(0.005)
-        yield process
+    words = ("gears.toml", *LONG, *arguments)
+    process, ended = begin("gearchaos.sweep", words, folder, variables=timeout("3s"))
+    while psutil.pid_exists(process) and not list((folder / BLOCKS).glob("*.block")):
+        time.sleep(0.005)
+    yield process, ended
 
 
 @pytest.mark.slow
@@ -95,12 +93,11 @@ def test_the_blocks_of_a_killed_worker_are_run_again(tmp_path, undisturbed):
         scheduler(cluster) as address,
         worker(address, cluster) as victim,
         worker(address, cluster),
-        begun(tmp_path, "--dask", address) as process,
+        begun(tmp_path, "--dask", address) as (_, ended),
     ):
         victim.kill()
-        out, err = process.communicate(timeout=60)
-    assert (process.returncode, out) == (0, "gears.h5\n"), err
-    assert "Traceback" not in err
+        code, out, err = ended()
+    assert (code, out) == (0, "gears.h5\n"), err
     assert "2000 of 2000 lanes" in err
     assert names_in(tmp_path) == ["cluster", "gears.h5", "gears.toml"]
     result = gearchaos.open_result(tmp_path / "gears.h5")
@@ -110,14 +107,13 @@ def test_the_blocks_of_a_killed_worker_are_run_again(tmp_path, undisturbed):
 
 @pytest.mark.slow
 def test_an_interrupt_keeps_what_local_workers_have_and_any_machine_goes_on(tmp_path, undisturbed):
-    with begun(tmp_path, "--dask", "local:2") as process:
+    with begun(tmp_path, "--dask", "local:2") as (process, ended):
         # Ctrl-C in a terminal reaches everybody.
-        workers = psutil.Process(process.pid).children(recursive=True)
-        for each in (process, *workers):
+        workers = psutil.Process(process).children(recursive=True)
+        for each in (psutil.Process(process), *workers):
             each.send_signal(signal.SIGINT)
-        out, err = process.communicate(timeout=60)
-    assert (process.returncode, out) == (130, ""), err
-    assert "Traceback" not in err
+        code, out, err = ended()
+    assert (code, out) == (130, ""), err
     assert 0 < int(re.search(r"(\d+) of 2000 lanes are kept", err)[1]) < 2000
     _, alive = psutil.wait_procs(workers, timeout=10)
     assert alive == []
@@ -129,7 +125,9 @@ def test_an_interrupt_keeps_what_local_workers_have_and_any_machine_goes_on(tmp_
 @pytest.mark.slow
 def test_flow_maps_that_workers_make_give_the_bits_of_those_made_here(tmp_path):
     own = (*LINEAR, "--set", "integration.method=flow_map", "--quiet")
-    own += ("--set", 'sweep={parameter="mesh_frequency", from=0.2, to=2.0, count=600}')
+    # Every value of the one parameter has maps of its own, which no value of the other changes.
+    own += ("--set", 'sweep={parameter="mesh_frequency", from=0.2, to=2.0, count=200}')
+    own += ("--set", 'second_sweep={parameter="load", values=[0.1, 0.2, 0.3]}')
     assert sweep(tmp_path, *own, "--dask", "local:2") == (0, "gears.h5\n", "")
     assert sweep(tmp_path, *own, "--output", "here.h5").code == 0
     one, other = (gearchaos.open_result(tmp_path / name) for name in ("gears.h5", "here.h5"))
@@ -161,10 +159,9 @@ def test_a_worker_with_other_software_is_refused(tmp_path, before, message):
 def test_a_scheduler_that_goes_away_costs_nothing_that_is_finished(tmp_path):
     cluster = tmp_path / "cluster"
     cluster.mkdir()
-    with begun_and_lost(cluster, tmp_path) as process:
-        out, err = process.communicate(timeout=60)
-    assert (process.returncode, out) == (4, ""), err
-    assert "Traceback" not in err
+    with begun_and_lost(cluster, tmp_path) as ended:
+        code, out, err = ended()
+    assert (code, out) == (4, ""), err
     # Who asks it just then waits for an answer; on a busy machine that comes first.
     assert re.search("the connection to the scheduler was lost|silent for .* alive[?]", err), err
     assert "lanes are kept" in err
@@ -175,12 +172,12 @@ def begun_and_lost(cluster, folder):
     with (
         scheduler(cluster) as address,
         worker(address, cluster),
-        begun(folder, "--dask", address) as process,
+        begun(folder, "--dask", address) as (_, ended),
     ):
         for each in psutil.Process().children():
             if "dask_scheduler" in " ".join(each.cmdline()):
                 each.kill()
-        yield process
+        yield ended
 
 
 @contextmanager
@@ -200,14 +197,13 @@ def port(answer):
 
 
 def test_a_scheduler_that_does_not_answer_is_code_4(tmp_path):
-    environment = {**os.environ, "DASK_DISTRIBUTED__COMM__TIMEOUTS__CONNECT": "1s"}
     with port(None) as silent, port(b"HTTP/1.0 400 Bad Request\r\n\r\n") as other:
         for address, reason in {
             "tcp://127.0.0.1:9": "Timed out",
             silent: "silent for 1 s",
             other: "",
         }.items():
-            ended = sweep(tmp_path, "--dask", address, env=environment)
+            ended = sweep(tmp_path, "--dask", address, variables=timeout("1s"))
             assert (ended.code, ended.out) == (4, "")
             assert f"error: {address}: no dask scheduler answers ({reason}" in ended.err
             assert names_in(tmp_path) == ["gears.toml"]
@@ -266,12 +262,12 @@ def test_an_interrupt_does_not_wait_for_workers_that_are_gone(tmp_path):
     with (
         scheduler(cluster) as address,
         worker(address, cluster) as only,
-        begun(tmp_path, "--dask", address) as process,
+        begun(tmp_path, "--dask", address) as (process, ended),
     ):
         only.kill()
-        process.send_signal(signal.SIGINT)
-        out, err = process.communicate(timeout=30)
-    assert (process.returncode, out) == (130, ""), err
+        os.kill(process, signal.SIGINT)
+        code, out, err = ended()
+    assert (code, out) == (130, ""), err
     assert "lanes are kept" in err
 
 

@@ -176,7 +176,7 @@ def test_what_a_dry_run_computes_are_lanes_from_all_over_the_sweep():
 
 def test_a_configuration_comes_from_standard_input(tmp_path):
     arguments = (*LINEAR, "--set", "sweep.count=3", "--output", "piped.h5", "--quiet")
-    ended = run_module("gearchaos.sweep", "-", *arguments, cwd=tmp_path, input=SMALL)
+    ended = run_module("gearchaos.sweep", "-", *arguments, cwd=tmp_path, stdin=SMALL)
     assert ended == (0, "piped.h5\n", "")
     piped = gearchaos.open_result(tmp_path / "piped.h5")
     config = Configuration.from_toml(SMALL, overrides=[*LINEAR[1::2], "sweep.count=3"])
@@ -186,7 +186,7 @@ def test_a_configuration_comes_from_standard_input(tmp_path):
 
 def test_what_standard_input_lacks_is_told_of_it(tmp_path):
     broken = SMALL.replace("count = 40", "count = 0")
-    ended = run_module("gearchaos.sweep", "-", cwd=tmp_path, input=broken)
+    ended = run_module("gearchaos.sweep", "-", cwd=tmp_path, stdin=broken)
     assert ended.code == 2
     assert "error: -: sweep.count = 0: must be at least 1" in ended.err
 
@@ -194,7 +194,7 @@ def test_what_standard_input_lacks_is_told_of_it(tmp_path):
 @pytest.mark.parametrize("arguments", [("gears.toml", "--output", "-"), ("-",)])
 def test_a_result_is_not_written_to_standard_output(tmp_path, arguments):
     small_config(tmp_path)
-    ended = run_module("gearchaos.sweep", *arguments, cwd=tmp_path, input=SMALL)
+    ended = run_module("gearchaos.sweep", *arguments, cwd=tmp_path, stdin=SMALL)
     said = "-: a result is a file, not a stream, and needs a name; give --output PATH"
     assert ended == (4, "", f"gearchaos sweep: error: {said}\n")
 

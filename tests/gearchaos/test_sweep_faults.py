@@ -167,7 +167,7 @@ def test_a_full_disk_costs_neither_the_old_result_nor_the_finished_lanes(tmp_pat
     arguments = ["--overwrite", "--set", "pitch_error.mean_um=1.0"]
     # Room for the block of lanes, which is some 12 kB, but not for the result with its texts.
     room = 14_000
-    ended = sweep(tmp_path, *arguments, preexec_fn=lambda: _limit_file_size(room))
+    ended = sweep(tmp_path, *arguments, largest_file=room)
     assert (ended.code, ended.out) == (4, "")
     assert "gears.h5: cannot be written: File too large" in ended.err
     assert "gearchaos sweep: 40 of 40 lanes are kept\n" in ended.err
@@ -183,7 +183,7 @@ def test_a_full_disk_costs_neither_the_old_result_nor_the_finished_lanes(tmp_pat
 def test_a_disk_that_fills_up_in_the_middle_costs_the_blocks_that_do_not_fit(tmp_path):
     several = ("--set", "sweep.count=1000", "--threads", "1")
     assert sweep(tmp_path, *several, "--shard", "1/2", "--quiet").code == 0
-    ended = sweep(tmp_path, *several, "--resume", preexec_fn=lambda: _limit_file_size(20_000))
+    ended = sweep(tmp_path, *several, "--resume", largest_file=20_000)
     assert (ended.code, ended.out) == (4, "")
     assert ".block: cannot be written: File too large" in ended.err
     assert "gearchaos sweep: 512 of 1000 lanes are kept\n" in ended.err
@@ -194,7 +194,12 @@ def test_a_disk_that_fills_up_in_the_middle_costs_the_blocks_that_do_not_fit(tmp
 @pytest.mark.skipif(sys.platform != "linux", reason="limits of file sizes differ elsewhere")
 def test_a_disk_that_was_full_from_the_start_leaves_nothing_behind(tmp_path):
     sweep(tmp_path, "--dry-run")
-    ended = sweep(tmp_path, preexec_fn=lambda: _limit_file_size(100))
+
+    # Less than what is written on stderr, which is a pipe therefore.
+    def limit():
+        resource.setrlimit(resource.RLIMIT_FSIZE, (100, 100))
+
+    ended = sweep(tmp_path, preexec_fn=limit)
     assert (ended.code, ended.out) == (4, "")
     assert "File too large; raise the limit on the size of files" in ended.err
     assert names_in(tmp_path) == ["gears.toml"]
@@ -209,7 +214,3 @@ def test_memory_that_does_not_suffice_is_code_4(tmp_path):
     )
     assert (ended.code, ended.out) == (4, "")
     assert "error: Unable to allocate" in ended.err
-
-
-def _limit_file_size(size):
-    resource.setrlimit(resource.RLIMIT_FSIZE, (size, size))

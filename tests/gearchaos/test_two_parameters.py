@@ -123,12 +123,6 @@ def test_computed_in_shards_and_merged_it_is_the_same(folder, result):
     assert differing <= {"created", "threads", "wall_time_seconds"}
 
 
-def test_computed_by_a_dask_worker_it_is_the_same(folder, result):
-    pytest.importorskip("distributed")
-    assert sweep(folder, "--dask", "local:1") == (0, "both.h5\n", "")
-    assert same_data(gearchaos.open_result(folder / "both.h5"), result)
-
-
 @pytest.mark.parametrize("engine", ["netcdf4", "h5netcdf"])
 def test_xarray_finds_the_nearest_lanes(engine, path, result):
     with xr.open_dataset(path, engine=engine) as whole:
