@@ -42,6 +42,11 @@ def simulation(*overrides: str) -> Simulation:
     return Simulation(load_config(PAN2021, (*SHORT, *overrides)))
 
 
+def unlabelled(*overrides: str) -> Simulation:
+    """Return a short sweep whose motions are not told, for which lanes are followed on and on."""
+    return simulation("outputs.motion=false", *overrides)
+
+
 def blocks(sweep: Simulation, values: int) -> list[tuple[int, int]]:
     """Return the bounds of blocks of as many lanes as so many swept values have."""
     return sweep.blocks(values * sweep.lanes.repeats)

@@ -13,8 +13,8 @@ from .short_sweeps import (
     joined,
     kernel,
     listing,
-    simulation,
     starts_of,
+    unlabelled,
     values_of,
 )
 
@@ -22,7 +22,7 @@ from .short_sweeps import (
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("direction", ["upwards", "downwards"])
 def test_carried_sweep_is_the_chain_of_its_lanes_made_by_hand(direction, method):
-    sweep = simulation(f"start.carry={direction}", f"integration.method={method}")
+    sweep = unlabelled(f"start.carry={direction}", f"integration.method={method}")
     arrays = computed(sweep, 5)
     state = np.zeros(6)
     for value in range(13) if direction == "upwards" else reversed(range(13)):
@@ -40,7 +40,7 @@ def test_carried_sweep_is_the_chain_of_its_lanes_made_by_hand(direction, method)
     ],
 )
 def test_carried_sweep_does_not_depend_on_the_size_of_its_blocks(direction, overrides):
-    sweep = simulation(f"start.carry={direction}", *overrides)
+    sweep = unlabelled(f"start.carry={direction}", *overrides)
     whole = computed(sweep)
     for values in (1, 4):
         assert_same(computed(sweep, values), whole)
@@ -53,18 +53,18 @@ def test_carried_sweep_does_not_depend_on_the_size_of_its_blocks(direction, over
 def test_both_directions_at_once_are_the_two_sweeps_bit_for_bit(overrides):
     second = 'second_sweep={parameter="mesh_frequency", values=[0.8, 0.9]}'
     more = ("sweep.count=5", second, *overrides)
-    both = computed(simulation("start.carry=both", *more))
+    both = computed(unlabelled("start.carry=both", *more))
     for number, direction in enumerate(("upwards", "downwards")):
         one = {name: array[number::2] for name, array in both.items()}
-        assert_same(one, computed(simulation(f"start.carry={direction}", *more)))
+        assert_same(one, computed(unlabelled(f"start.carry={direction}", *more)))
 
 
 @pytest.mark.parametrize("direction", ["upwards", "both"])
 def test_carried_sweep_goes_on_from_a_finished_block(direction):
-    sweep = simulation(f"start.carry={direction}", *RANDOM)
+    sweep = unlabelled(f"start.carry={direction}", *RANDOM)
     bounds = sweep.blocks(8)
     everything = computed_blocks(sweep, bounds)
-    resumed = simulation(f"start.carry={direction}", *RANDOM)
+    resumed = unlabelled(f"start.carry={direction}", *RANDOM)
     for block in bounds[:2]:
         resumed.has_ended(*block, everything[block]["end_state"])
     rest = computed_blocks(resumed, bounds[2:])
@@ -73,7 +73,7 @@ def test_carried_sweep_goes_on_from_a_finished_block(direction):
 
 
 def test_several_starts_are_carried_side_by_side():
-    sweep = simulation("start.carry=upwards", *RANDOM)
+    sweep = unlabelled("start.carry=upwards", *RANDOM)
     arrays = computed(sweep)
     states = list(starts_of(sweep, 0, 3))
     for value in range(13):
@@ -88,10 +88,10 @@ def test_several_starts_are_carried_side_by_side():
 def test_sweeping_up_and_down_differ_where_two_motions_coexist():
     where = ("sweep.from=0.4", "sweep.to=2.4", "sweep.count=41")
     long = ("integration.transient_periods=150", *where)
-    section = computed(simulation("start.carry=both", *long))["section_delta_5"]
+    section = computed(unlabelled("start.carry=both", *long))["section_delta_5"]
     up, down = section[0::2, -1], section[1::2, -1]
     apart = np.abs(up - down) > 1e-3
-    values = values_of(simulation(*long))
+    values = values_of(unlabelled(*long))
     assert apart[(values > 0.9) & (values < 1.5)].all()
     assert not apart[(values < 0.6) | (values > 2.0)].any()
 

@@ -22,7 +22,7 @@ pytest.importorskip("distributed")
 
 BLOCKS = "gears.h5.blocks"
 # Eight blocks of lanes that take a tenth of a second or more each.
-LONG = ("--set", "sweep.count=2000", "--set", "integration.transient_periods=400")
+LONG = ("--set", "sweep.count=2000", "--set", "integration.transient_periods=250")
 LONG += ("--set", "outputs.motion=false")
 SCHEDULER = "from distributed.cli.dask_scheduler import main; main()"
 WORKER = "from distributed.cli.dask_worker import main; main()"

@@ -11,6 +11,7 @@ from .short_sweeps import (
     computed_blocks,
     joined,
     simulation,
+    unlabelled,
 )
 
 
@@ -40,25 +41,25 @@ def test_two_parameters_of_which_one_changes_the_maps_are_those_of_fine_runge_ku
 
 
 def test_blocks_need_not_hold_whole_values_where_nothing_is_carried():
-    sweep = simulation(*RANDOM)
+    sweep = unlabelled(*RANDOM)
     odd = [(first, min(first + 7, 39)) for first in range(0, 39, 7)]
     assert_same(joined(sweep, computed_blocks(sweep, odd)), computed(sweep))
 
 
 @pytest.mark.parametrize("threads", [1, 3, 64])
 def test_blocks_feed_every_thread_and_carried_ones_hold_whole_steps(threads):
-    assert simulation(*RANDOM).block_lanes(threads) >= 32 * threads
-    carried = simulation(*RANDOM, "start.carry=both").block_lanes(threads)
+    assert unlabelled(*RANDOM).block_lanes(threads) >= 32 * threads
+    carried = unlabelled(*RANDOM, "start.carry=both").block_lanes(threads)
     assert carried >= 32 * threads
     assert carried % 6 == 0
     # Where more lanes are side by side than a block holds, a step is divided.
-    many = simulation(*RANDOM, "start.carry=both", "start.count=5000")
+    many = unlabelled(*RANDOM, "start.carry=both", "start.count=5000")
     assert many.lanes.side_by_side == 10_000
     assert many.block_lanes(1) < 5000
 
 
 def test_all_lines_of_a_carried_sweep_are_computed_side_by_side():
-    sweep = simulation(*TWO, *RANDOM, "start.carry=both")
+    sweep = unlabelled(*TWO, *RANDOM, "start.carry=both")
     assert sweep.lanes.shape == (3, 4, 3, 2)
     assert sweep.lanes.side_by_side == 18
     places = sweep.lanes.computed_at(np.arange(72))
@@ -76,12 +77,12 @@ def test_every_array_of_a_block_is_a_variable_of_the_sweep():
     assert {name: array.shape[0] for name, array in arrays.items()} == dict.fromkeys(arrays, 7)
     axes = tuple(axis.name for axis in sweep.lanes.axes)
     assert {*arrays} == {v.name for v in sweep.variables if v.dims[: len(axes)] == axes}
-    without = simulation("outputs.lyapunov=false").compute(0, 2)
+    without = unlabelled("outputs.lyapunov=false").compute(0, 2)
     assert not [name for name in without if "lyapunov" in name]
 
 
 def test_all_exponents_come_with_the_sum_that_the_damping_gives():
-    sweep = simulation("outputs.exponents=true", "integration.steps_per_period=800")
+    sweep = unlabelled("outputs.exponents=true", "integration.steps_per_period=800")
     arrays = sweep.compute(0, 3)
     assert arrays["lyapunov_exponents"].shape == (3, len(sweep.lanes.states))
     total = arrays["lyapunov_exponents"].sum(axis=1)
@@ -89,11 +90,11 @@ def test_all_exponents_come_with_the_sum_that_the_damping_gives():
 
 
 def test_a_mesh_stiffness_below_zero_is_noted():
-    assert simulation().notes == []
-    (note,) = simulation("groups.stiffness_variation_scale=9").notes
+    assert unlabelled().notes == []
+    (note,) = unlabelled("groups.stiffness_variation_scale=9").notes
     assert "the mesh stiffness falls to -0.034 of its mean" in note
     without = 'scene.effects=["pitch_error", "backlash"]'
-    assert simulation(without).notes == []
+    assert unlabelled(without).notes == []
 
 
 TWO = ('second_sweep={parameter="mesh_frequency", values=[0.8, 0.9, 1.0]}', "sweep.count=4")
@@ -101,12 +102,12 @@ TWO = ('second_sweep={parameter="mesh_frequency", values=[0.8, 0.9, 1.0]}', "swe
 
 @pytest.mark.parametrize("overrides", [(), RANDOM, ("start.carry=downwards", *RANDOM)])
 def test_a_line_of_two_parameters_is_the_sweep_of_that_line_bit_for_bit(overrides):
-    both = simulation(*TWO, *overrides)
+    both = unlabelled(*TWO, *overrides)
     assert both.lanes.shape[:2] == (3, 4)
     whole = computed(both, 5)
     line = len(both.lanes) // 3
     for number, frequency in enumerate((0.8, 0.9, 1.0)):
-        one = simulation(TWO[1], f"groups.mesh_frequency={frequency}", *overrides)
+        one = unlabelled(TWO[1], f"groups.mesh_frequency={frequency}", *overrides)
         if "random" in str(overrides):
             # The draws of a lane follow its number, which is another one here.
             starts = both.lanes.start_of(np.arange(number * line, (number + 1) * line))
@@ -116,7 +117,7 @@ def test_a_line_of_two_parameters_is_the_sweep_of_that_line_bit_for_bit(override
 
 
 def test_two_parameters_give_every_lane_its_own_pair_of_values():
-    sweep = simulation(*TWO, *RANDOM)
+    sweep = unlabelled(*TWO, *RANDOM)
     lanes = np.arange(len(sweep.lanes))
     values = sweep.lanes.values_of(lanes)
     assert sweep.lanes.shape == (3, 4, 3)
@@ -129,7 +130,7 @@ def test_two_parameters_give_every_lane_its_own_pair_of_values():
 
 def test_parameters_run_along_the_axes_on_which_they_depend():
     speeds = 'second_sweep={parameter="half_backlash", values=[0.8, 0.9]}'
-    parameters = simulation(speeds).lanes.parameters
+    parameters = unlabelled(speeds).lanes.parameters
     assert parameters["half_backlash"].dims == ("half_backlash",)
     assert parameters["pitch_error"].dims == ("pitch_error",)
     assert parameters["pitch_error"].value.shape == (13,)

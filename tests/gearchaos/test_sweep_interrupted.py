@@ -36,7 +36,7 @@ LONG = (
     *("--threads", "1"),
     *LINEAR,
     *("--set", "sweep.count=1000"),
-    *("--set", "integration.transient_periods=4000"),
+    *("--set", "integration.transient_periods=2500"),
 )
 BLOCKS = "gears.h5.blocks"
 
