@@ -154,7 +154,7 @@ def random_pairs(count: int, seed: int) -> dict:
 
 
 @pytest.mark.parametrize(
-    "count", [16, pytest.param(100, marks=pytest.mark.slow)], ids=["few", "many"]
+    "count", [16, pytest.param(250, marks=pytest.mark.slow)], ids=["few", "many"]
 )
 @pytest.mark.parametrize("physical", [False, True])
 def test_random_pairs_move_as_with_fine_runge_kutta_steps(count, physical):
