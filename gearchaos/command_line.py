@@ -46,8 +46,8 @@ class Command(NamedTuple):
 
     That is what the body returns or with which argparse exits. A fault a user can cause becomes
     lines on stderr, its notes after it, and a code: that of a GearchaosError, 4 for an operating
-    system error that nobody has worded or a lack of memory and, as the shell says, 130 for an
-    interrupt, 143 for SIGTERM, 141 when the reader of the output has gone.
+    system error that nobody has worded or a lack of memory or of a package and, as the shell says,
+    130 for an interrupt, 143 for SIGTERM, 141 when the reader of the output has gone.
 
     ``name`` is that of `COMMANDS`; ``text`` is what --help says before the options and, from the
     first empty line on, after them, where the exit codes follow. ``body`` does it, with the options
@@ -82,8 +82,10 @@ class Command(NamedTuple):
             except BrokenPipeError:
                 _discard(sys.stdout)
                 return CLOSED_PIPE
-            except (OSError, MemoryError) as error:
+            except (OSError, MemoryError, ImportError) as error:
                 text = str(error) or "out of memory"
+                if isinstance(error, ImportError):  # Such as Numba, of a newer NumPy.
+                    text += "; a package is missing or does not fit, install gearchaos again"
                 return _report(error, [f"error: {text}"], CANNOT_READ_OR_WRITE)
 
     def start(self, module: str) -> None:

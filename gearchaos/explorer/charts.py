@@ -7,7 +7,8 @@ from unicodedata import lookup
 import holoviews as hv
 import numpy as np
 from datashader.reductions import max as highest
-from holoviews.operation.datashader import dynspread, rasterize
+from holoviews.operation.datashader import rasterize
+from holoviews.operation.downsample import downsample1d
 from matplotlib.colors import ListedColormap, to_hex
 from matplotlib.figure import Figure
 
@@ -27,6 +28,12 @@ GREYS = [f"#{3 * f'{shade:02x}'}" for shade in range(176, -1, -1)]
 
 COLOURS = 256
 
+FILLED = 0.05
+"""Share of the pixels of a diagram below which dots take those beside them too."""
+
+DRAWN = 4000
+"""Points of a line, which follow its outline where there are more."""
+
 _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 _LOWERED = str.maketrans("0123456789aehikmnprstx", "₀₁₂₃₄₅₆₇₈₉ₐₑₕᵢₖₘₙₚᵣₛₜₓ")
 
@@ -44,12 +51,10 @@ def diagram(result: Result, variable: str) -> Charts:
         dimensions = _dimensions(result, result.axis, name)
         points = np.repeat(lanes.parameter, rows.shape[1]), rows.ravel()
         if charts:
-            drawn_line = rasterize(hv.Curve(points, *dimensions), aggregator="any")
-            chart = dynspread(drawn_line, max_px=1, threshold=0.9)
-            look = {"cmap": [BLACK], "height": 240, "show_grid": True}
+            chart = downsample1d(hv.Curve(points, *dimensions), width=DRAWN)
+            look = {"color": BLACK, "line_width": 1.0, "height": 240, "show_grid": True}
         else:
-            counted = rasterize(hv.Points(points, dimensions), aggregator="count")
-            chart = dynspread(counted, max_px=3, threshold=0.9)
+            chart = rasterize(hv.Points(points, dimensions), aggregator="count").apply(_thickened)
             look = {"cmap": GREYS, "cnorm": "eq_hist", "height": 340}
         if there.size:
             ends = np.nanmin(there, axis=1), np.nanmax(there, axis=1)
@@ -87,6 +92,24 @@ def _letter(name: str) -> str:
         return lookup(f"GREEK {case} LETTER {name.replace('lambda', 'lamda')}")
     except KeyError:
         return "\N{PRIME}" if name == "prime" else name
+
+
+def _thickened(image: hv.Image) -> hv.Image:
+    """Let pixels take the highest count beside them where they are too few to be seen.
+
+    Datashader's own way to do it is compiled whenever a page is begun, for seconds.
+    """
+    (count,) = image.vdims
+    counts = image.data[count.name]
+    thick = counts.to_numpy()
+    if np.count_nonzero(thick) < FILLED * thick.size:
+        wide = np.pad(thick, 1)
+        tall = np.maximum.reduce([wide[:-2], wide[1:-1], wide[2:]])
+        thick = np.maximum.reduce([tall[:, :-2], tall[:, 1:-1], tall[:, 2:]])
+    # As large as the picture is, half of it need not be sent.
+    shown = np.where(thick, thick, np.nan).astype(np.float32)
+    data = image.data.assign({count.name: (counts.dims, shown)})
+    return image.clone(data, vdims=[count.clone(nodata=None)])
 
 
 def _dimensions(result: Result, *names: str) -> list[Any]:

@@ -56,7 +56,8 @@ class Page:
         for name, switch in self._switches.items():
             switch.name, switch.width = name.replace("_", " ").capitalize(), 170
         self._window = pn.widgets.LiteralInput(value=[], visible=False)
-        texts = (pn.pane.HTML("", **WIDE) for _ in range(5))
+        # A line of its own from the beginning: what is below would move under the pointer.
+        texts = (pn.pane.HTML("&nbsp;", **WIDE) for _ in range(5))
         self._pointed, self._lane, self._fault, self._kinds, self._commands = texts
         self._charts, self._panels = pn.Column(**WIDE), [*map(empty_panel, SCALES)]
         ways = zip(("height", "width"), self._swept, strict=False)
@@ -68,6 +69,7 @@ class Page:
 
     def view(self) -> Any:
         """Compose what the link asks for; from then on the link follows what is changed."""
+        pn.config.exception_handler = lambda error: self._say(_reason(error))
         for name, switch in (*self._switches.items(), ("window", self._window)):
             wrong = partial(self._refuse, name)
             pn.state.location.sync(switch, {"value": name}, lambda _, wrong=wrong: wrong())
@@ -271,20 +273,21 @@ class Page:
 
     def _saved(self, name: str, kind: str) -> BytesIO:
         """Draw a figure as the command that is shown does, and return its file."""
+        # The result that is open: its file may have been removed or replaced.
+        drawn = self._result if name == "sweep" else self._motion
+        if drawn is None:
+            raise FigureError("there is no motion to draw")
         with TemporaryDirectory() as folder:
-            _, path, *words = self._arguments()[name]
-            target = Path(folder, f"figure.{kind}")
-            if name != "sweep":
-                if self._motion is None:
-                    raise FigureError("there is no motion to draw")
-                path = str(Path(folder, path))
-                self._motion.save(path)
-            self._draw([path, *words, "--output", str(target)])
+            path, target = Path(folder, "drawn.h5"), Path(folder, f"figure.{kind}")
+            drawn.save(path)
+            self._draw([str(path), *self._arguments()[name][2:], "--output", str(target)])
             return BytesIO(target.read_bytes())
 
 
 def _marked(marks: Sequence[Span], plot: Any, _element: Any) -> None:
-    """Draw marks into the panel of a chart, whenever it is drawn anew."""
+    """Draw marks into the panel of a chart, whenever it is drawn anew, and keep its frame."""
+    # Numbers of another length would move the frame, and all of it were drawn a second time.
+    plot.state.min_border_left = 130
     if marks[0] not in plot.state.center:
         plot.state.center = [*plot.state.center, *marks]
 

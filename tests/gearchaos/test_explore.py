@@ -15,8 +15,10 @@ from urllib.error import HTTPError
 from urllib.parse import parse_qs, urlsplit
 from urllib.request import Request, urlopen
 
+import h5py
 import numpy as np
 import pytest
+from gearchaos_kernels import Status
 
 import gearchaos
 from gearchaos.engine.recomputing import continued
@@ -48,22 +50,44 @@ PANELS = (
         .filter(data => !("image" in data))])"""
 )
 
+PICTURE = (
+    f"""() => {{ const first = ({FIGURES})()[0]"""
+    + """
+    const source = first.renderers.map(shown => shown.data_source)
+        .find(source => source.columns().includes("image"))
+    const [x, y, dw, dh, image] = ["x", "y", "dw", "dh", "image"]
+        .map(name => source.get_column(name)[0])
+    return {frame: [x, y, dw, dh], shape: image.shape,
+        counts: Array.from(image).map(one => one || 0),
+        size: [first.inner_height, first.inner_width],
+        seen: [first.x_range.start, first.y_range.start, first.x_range.end, first.y_range.end]}
+}"""
+)
+
 
 @pytest.fixture(scope="module")
 def path(tmp_path_factory) -> Path:
     folder = tmp_path_factory.mktemp("explore")
     config = gearchaos.load_config(small_config(folder), (*ASKED, f"title='{HOSTILE}'"))
     gearchaos.run(config).save(folder / "pair.h5")
+    with h5py.File(folder / "pair.h5", "a") as file:
+        # The first lane downwards has lost its end.
+        file["end_state"][0, 1], file["status"][0, 1] = np.nan, Status.DIVERGED
     return folder / "pair.h5"
 
 
 @pytest.fixture(scope="module")
 def address(path):
-    """Serve the file as a user does, for all tests."""
+    """Serve the file as a user does, for all tests, and remove it: what was opened stays."""
+    served = path.parent / "served" / path.name
+    served.parent.mkdir()
+    shutil.copy(path, served)
     command = [sys.executable, "-m", "gearchaos.explore", "pair.h5", "--no-browser", "--port", "0"]
     pipe = subprocess.PIPE
-    with subprocess.Popen(command, cwd=path.parent, stdout=pipe, text=True) as server:
-        yield server.stdout.readline().strip()
+    with subprocess.Popen(command, cwd=served.parent, stdout=pipe, text=True) as server:
+        address = server.stdout.readline().strip()
+        served.unlink()
+        yield address
         server.terminate()
 
 
@@ -154,6 +178,9 @@ def test_a_click_shows_the_motion_of_the_lane_with_the_values_of_the_file(page, 
     lane, motion = lane_of(path, pitch_error=value, direction="downwards")
     wait_for(page, "Relative torsional displacement, δ₅ (unit b′)", motion["delta_5"][0])
     shown = panels(page)
+    (exponents,) = shown["Largest Lyapunov exponent, λ₁ (per unit of τ)"]
+    downwards = gearchaos.open_result(path).sel(direction="downwards")["lyapunov_exponent"]
+    assert exponents["lyapunov_exponent"][1:] == downwards[1:].tolist()
     curve, strobe, section = shown["Relative torsional velocity, δ₅' (unit b′ωₕ)"]
     assert curve["y"] == motion["delta_5_rate"][0].tolist()
     assert strobe["x"] == motion["delta_5"][0, ::40].tolist()
@@ -175,6 +202,51 @@ def test_a_click_shows_the_motion_of_the_lane_with_the_values_of_the_file(page, 
     assert f"python -m gearchaos.{command} --periods 10" in text
 
 
+def zoom(page) -> None:
+    """Draw a box into the diagram, and wait for the link to what is in it."""
+    before, box = page.url, page.locator(".bk-Figure").first.bounding_box()
+    page.mouse.move(box["x"] + 0.3 * box["width"], box["y"] + 0.4 * box["height"])
+    page.mouse.down()
+    page.mouse.move(box["x"] + 0.6 * box["width"], box["y"] + 0.6 * box["height"], steps=4)
+    page.mouse.up()
+    page.wait_for_url(lambda url: url != before)
+
+
+@needs_browser
+def test_a_zoom_counts_the_points_in_view_anew_for_each_pixel_of_the_screen(page, path, address):
+    sizes: list[int] = []
+    page.on("websocket", lambda one: one.on("framereceived", lambda sent: sizes.append(len(sent))))
+    look(page, address)
+    page.wait_for_timeout(1000)
+    sizes.clear()
+    zoom(page)
+    for _ in range(50):
+        drawn = page.evaluate(PICTURE)
+        left, low, *_ = drawn["seen"]
+        if np.allclose(drawn["frame"][:2], (left, low)):
+            break
+        page.wait_for_timeout(100)
+    np.testing.assert_allclose(drawn["frame"][2:], np.subtract(drawn["seen"][2:], (left, low)))
+    assert drawn["shape"] == drawn["size"]
+    # What is sent is a picture, four bytes a pixel, however many points there are.
+    pixels = np.prod(drawn["shape"])
+    assert 4 * pixels < sum(sizes) < 4 * pixels + 100_000
+    result = gearchaos.open_result(path).sel(direction="upwards")
+    y = result["section_delta_5"]
+    x = np.repeat(result["pitch_error"], y.shape[1]).reshape(y.shape)
+    parts = [(x - left) / drawn["frame"][2], (y - low) / drawn["frame"][3]]
+    inside = np.all([(part >= 0.0) & (part < 1.0) for part in parts], axis=0)
+    column, row = (
+        (part[inside] * size).astype(int)
+        for part, size in zip(parts, drawn["shape"][::-1], strict=True)
+    )
+    counts = np.reshape(drawn["counts"], drawn["shape"])
+    assert 0 < inside.sum() < y.size
+    assert np.all(counts[row, column] > 0)
+    # Dots so few take the pixels beside them, too, and nothing else is there.
+    assert np.count_nonzero(counts) <= 9 * np.unique(row * pixels + column).size
+
+
 @needs_browser
 def test_a_link_brings_back_the_view_and_a_command_its_figure(
     page, path, address, monkeypatch, capsys
@@ -184,12 +256,7 @@ def test_a_link_brings_back_the_view_and_a_command_its_figure(
     page.locator("select").nth(3).select_option("start")
     page.wait_for_url(re.compile("units=physical.*motion_from=start"))
     value = float(click(page, 0.4))
-    before, box = page.url, page.locator(".bk-Figure").first.bounding_box()
-    page.mouse.move(box["x"] + 0.3 * box["width"], box["y"] + 0.4 * box["height"])
-    page.mouse.down()
-    page.mouse.move(box["x"] + 0.6 * box["width"], box["y"] + 0.6 * box["height"], steps=4)
-    page.mouse.up()
-    page.wait_for_url(lambda url: url != before)
+    zoom(page)
     link = page.url
     left, right, *_ = json.loads(parse_qs(urlsplit(link).query)["window"][0])
     assert 0.0 < left < value < right < 5.0
@@ -203,17 +270,30 @@ def test_a_link_brings_back_the_view_and_a_command_its_figure(
     for end, wanted in (("start", left), ("end", right)):
         seen = page.evaluate(f"({FIGURES})().slice(0, 2).map(one => one.x_range.{end})")
         np.testing.assert_allclose(seen, wanted, rtol=1e-5)
-    with page.expect_download() as saved:
-        page.get_by_text("Mesh force as PNG").click()
-    assert saved.value.suggested_filename == "pair_mesh_force.png"
+    saved = {}
+    for name in ("sweep", "mesh_force"):
+        with page.expect_download() as download:
+            page.get_by_text(f"{name.replace('_', ' ').capitalize()} as PNG").click()
+        assert download.value.suggested_filename == f"pair_{name}.png"
+        saved[name] = Path(download.value.path()).read_bytes()
     sweep, response, _, figure = page.locator("pre").inner_text().splitlines()
     assert f"--from {left} --to {right} --variable section_delta_5 --units physical" in sweep
     monkeypatch.chdir(path.parent)
-    for line in (response, figure):
+    for line in (sweep, response, figure):
         module, *arguments = shlex.split(line.removeprefix("python -m "))
         assert import_module(module).main(arguments) == 0
-    _, drawn, _ = capsys.readouterr().out.splitlines()
-    assert Path(saved.value.path()).read_bytes() == Path(drawn).read_bytes()
+    of_sweep, _, _, of_force, _ = map(Path, capsys.readouterr().out.splitlines())
+    assert saved == {"sweep": of_sweep.read_bytes(), "mesh_force": of_force.read_bytes()}
+
+
+@needs_browser
+def test_a_lane_that_cannot_be_computed_says_so_and_the_page_goes_on(page, address):
+    page.goto(f"{address}?direction=1.0&pitch_error=0.0")
+    page.get_by_text("this lane diverged").wait_for()
+    page.get_by_text("Motion as PNG").click()
+    page.get_by_text("there is no motion to draw").wait_for()
+    assert click(page, 0.5) > 0.0
+    assert "diverged" not in texts(page) and "there is no motion" not in texts(page)
 
 
 @needs_browser
@@ -256,6 +336,12 @@ def test_what_is_wrong_is_told_in_a_sentence(path, tmp_path, monkeypatch, capsys
     lane_of(path, pitch_error=1.0, direction="upwards")[1].save(tmp_path / "response.h5")
     code, text = said(str(tmp_path / "response.h5"))
     assert code == 2 and "is a response; python -m gearchaos.plot draws it" in text
+    # Numba that is not there or does not fit: no command can compute anything then.
+    without = "import sys; sys.modules['numba'] = None; import gearchaos.explore as command; "
+    command = [sys.executable, "-c", f"{without} sys.exit(command.main())", str(path)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 4 and "import of numba" in done.stderr
+    assert "does not fit, install gearchaos again" in done.stderr.splitlines()[0]
     monkeypatch.setitem(sys.modules, "panel", None)
     code, text = said(str(path), "--port", "0")
     assert code == 4 and "panel is not installed; pip install gearchaos[explore]" in text
