@@ -43,7 +43,7 @@ def unit_of(result: Result, name: str) -> str:
     if written in ("", "1"):
         return scales.unit_of(name).stands_for
     words = plain(re.sub(r"\bum\b", "\N{MICRO SIGN}m", written))
-    return re.sub(r"\b([a-z]+)-(\d)", r"\1$^{-\2}$", words)
+    return re.sub(r"\^(-?\d)", r"$^{\1}$", words)
 
 
 def place_of(result: Result, lane: int) -> dict[str, float]:

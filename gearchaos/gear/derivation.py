@@ -191,8 +191,8 @@ def _common_to_lanes(value: Any) -> float:
 LENGTH, FREQUENCY, STIFFNESS = "length_scale", "scaling_frequency", "mean_mesh_stiffness"
 SCALES = {
     LENGTH: ("um", "length scale", r"$b\prime$"),
-    FREQUENCY: ("s-1", "scaling frequency", r"$\omega_h$"),
-    STIFFNESS: ("N m-1", "mean mesh stiffness", "$k_m$"),
+    FREQUENCY: ("s^-1", "scaling frequency", r"$\omega_h$"),
+    STIFFNESS: ("N/m", "mean mesh stiffness", "$k_m$"),
     "equivalent_mass": ("kg", "equivalent mass", "$m_e$"),
     "mesh_period": ("s", "mesh period", ""),
     "static_load": ("N", "static load", ""),

@@ -29,10 +29,10 @@ class Unit(NamedTuple):
 
 # The prime is written out, since one in superscript stands apart from its letter.
 _LENGTH = Unit(r"unit $b\prime$", "um", 1.0, (LENGTH,))
-_SPEED = Unit(r"unit $b\prime\omega_h$", "m s-1", 1e-6, (LENGTH, FREQUENCY))
-_ACCELERATION = Unit(r"unit $b\prime\omega_h^2$", "m s-2", 1e-6, (LENGTH, FREQUENCY, FREQUENCY))
+_SPEED = Unit(r"unit $b\prime\omega_h$", "m/s", 1e-6, (LENGTH, FREQUENCY))
+_ACCELERATION = Unit(r"unit $b\prime\omega_h^2$", "m/s^2", 1e-6, (LENGTH, FREQUENCY, FREQUENCY))
 _FORCE = Unit(r"unit $k_mb\prime$", "N", 1e-6, (STIFFNESS, LENGTH))
-_GROWTH = Unit(r"per unit of $\tau$", "s-1", 1.0, (FREQUENCY,))
+_GROWTH = Unit(r"per unit of $\tau$", "s^-1", 1.0, (FREQUENCY,))
 _ORDINARY = {"long_name": "mesh frequency", "symbol": "$f$"}
 _HERTZ = Unit(r"unit $\omega_h$", "Hz", 0.5 / np.pi, (FREQUENCY,), _ORDINARY)
 _PURE = Unit("", "1", 1.0, ())

@@ -89,8 +89,8 @@ def test_a_lane_that_diverged_has_none():
 def test_they_are_in_physical_units():
     for name, units in (
         ("delta_5_peak_to_peak", "um"),
-        ("delta_1_rate_largest", "m s-1"),
-        ("amplitude_delta_1_rate", "m s-1"),
+        ("delta_1_rate_largest", "m/s"),
+        ("amplitude_delta_1_rate", "m/s"),
         ("amplitude_transmission_error", "um"),
     ):
         assert unit_of(name).units == units

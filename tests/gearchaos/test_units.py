@@ -1,4 +1,4 @@
-"""Every unit of a key or a group is one that other programs know, in the same sense."""
+"""Every unit of a key, a group or a result is one that other programs know, in the same sense."""
 
 import re
 import shutil
@@ -8,9 +8,14 @@ import pint
 import pytest
 
 from gearchaos.configuration.models import configuration_keys
+from gearchaos.gear.derivation import SCALES
 from gearchaos.gear.groups import GROUP_TABLE
+from gearchaos.results.scales import unit_of
 
+PHYSICAL = ("delta_5", "delta_5_rate", "delta_5_acceleration", "mesh_force_tangential")
+PHYSICAL += ("lyapunov_exponent", "mesh_frequency", "period")
 UNITS = {one.units for one in (*configuration_keys().values(), *GROUP_TABLE)} - {""}
+UNITS |= {units for units, *_ in SCALES.values()} | {unit_of(name).units for name in PHYSICAL}
 REGISTRY = pint.UnitRegistry()
 
 
