@@ -1,13 +1,9 @@
 """Settings of all tests."""
 
 import gc
-import os
 
 import pytest
 from hypothesis import settings
-
-# Several processes share the cores: a thread that waits shall leave its core to the others.
-os.environ.setdefault("OMP_WAIT_POLICY", "passive")
 
 # The same examples on every run: a failure is a failure of the change that was made.
 settings.register_profile("repeatable", derandomize=True, deadline=None)

@@ -12,6 +12,7 @@ Every flag is named here and nowhere else. Three facts about Numba shape this fi
 
 import gc
 import hashlib
+import os
 from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
@@ -31,6 +32,10 @@ from numba.core.untyped_passes import RewriteSemanticConstants
 from numba.extending import intrinsic
 
 from gearchaos_kernels.cache import KernelCache, cache_folder
+
+# OpenMP asks when it is loaded, with the first parallel loop: a thread that waits shall leave its
+# core to others, as calls may be short, a thousand of them, and other processes run beside.
+os.environ.setdefault("OMP_WAIT_POLICY", "passive")
 
 FASTMATH = {"contract", "nsz"}
 """Fused multiply-add and unsigned zeros only: NaN and infinity keep their meaning."""
