@@ -15,6 +15,8 @@ from gearchaos.records.period import coordinate_scale, return_distances
 LOOKS = (4, 16)
 """How many times the record doubtful lanes go on, and then those that are doubtful still."""
 
+LOOK_BYTES = 2**25  # Memory for longer records that is always there: lanes side by side are faster.
+
 WHOLE = 0.25  # Largest difference of the subsequences of a curve, see `subsequence_spread`.
 
 
@@ -52,7 +54,8 @@ def labels_of(system: System, outcome: Outcome, plan: Plan) -> Told:
             orders=(),
         )
         # In portions whose longer records take no more memory than those of all lanes.
-        size = max(1, system.lanes // longer)
+        record = 8 * (further.section_points * state.shape[1] + further.recorded_periods)
+        size = max(1, system.lanes // longer, LOOK_BYTES // record)
         for first in range(0, lanes.size, size):
             some = lanes[first : first + size]
             part = system.of(some)

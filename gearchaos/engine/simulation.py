@@ -10,7 +10,7 @@ import numpy as np
 from gearchaos.arrays import Array, Floats, Integers
 from gearchaos.configuration import Configuration
 from gearchaos.dynamics.exponents import exponents, sum_of_exponents
-from gearchaos.dynamics.labelling import LOOKS, Told, labels_of
+from gearchaos.dynamics.labelling import LOOK_BYTES, LOOKS, Told, labels_of
 from gearchaos.dynamics.largest_exponents import MEANINGS as RECORD_MEANINGS
 from gearchaos.dynamics.largest_exponents import largest_exponents
 from gearchaos.dynamics.stability import fewest_stable_steps
@@ -170,11 +170,13 @@ class Simulation:
     def block_memory(self, threads: int) -> int:
         """Return about how many bytes the arrays of one block take while it is computed."""
         states, lanes = len(self.lanes.states), min(len(self.lanes), self.block_lanes(threads))
-        numbers, records = (self.recording.section_points + 4) * states, lanes
+        numbers, looked = (self.recording.section_points + 4) * states, 0
         if self.plan.tangent:
             numbers += self.plan.recorded_periods
-            # Doubtful lanes are looked at again, a share at a time, but a whole lane at least.
-            records += max(lanes, LOOKS[-1]) if self.config.outputs.motion else 0
+            if self.config.outputs.motion:
+                # Doubtful lanes are looked at again, a share at a time, but a whole lane at least.
+                longest = 8 * numbers * LOOKS[-1]
+                looked = max(8 * numbers * lanes, longest, min(longest * lanes, LOOK_BYTES))
         if self.config.outputs.exponents:
             numbers += self.plan.recorded_periods * states
         maps = 0
@@ -184,7 +186,7 @@ class Simulation:
                 maps = max(
                     maps, kernels.maps_memory(system, self.plan, fewest_stable_steps(system))
                 )
-        return 8 * records * numbers + maps
+        return 8 * lanes * numbers + looked + maps
 
     def block_lanes(self, threads: int) -> int:
         """Return how many lanes make a block: work for every thread, and progress to be seen."""
