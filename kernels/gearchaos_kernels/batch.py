@@ -13,7 +13,6 @@ from gearchaos_kernels.block_memory import Present, flags
 from gearchaos_kernels.coefficients import lane_coefficients, state_scales, steps_between_scalings
 from gearchaos_kernels.compilation import driver
 from gearchaos_kernels.flow_map import fewest_steps, maps_of, sharing
-from gearchaos_kernels.forcing import phase_table
 from gearchaos_kernels.rows import CONTACT_ROWS, ERROR, LANES, SIGNAL_ROWS, SIGNALS
 from gearchaos_kernels.system import Floats, Outcome, Plan, Schedule, Status, System
 from gearchaos_kernels.teeth import tables_of
@@ -72,19 +71,18 @@ def integrate(
         steps_taken[order] = steps_of[order]
         phases = cycles / steps_of[:, np.newaxis]
         turns = np.stack([np.cos(phases), np.sin(phases)], axis=2)
-        chosen: tuple[Any, ...] = np.array([*columns, ERROR], dtype=np.intp), turns
         batch = Batch(
             lane_coefficients(system, step),
             state_scales(system, step),
             np.ascontiguousarray(start, dtype=np.float64),
             np.ascontiguousarray(tangent_start, dtype=np.float64),
             steps_between_scalings(system, steps_of),
-            phase_table(system.stiffness_cosine, system.stiffness_sine, steps),
             order,
             _scattered(blocks),
             maps,
+            np.array([*columns, ERROR], dtype=np.intp),
+            turns,
             *tables_of(system, present, steps),
-            *chosen,
         )
         _integrate_blocks(batch, schedule, outcome, present)
         if maps.size:
@@ -120,14 +118,13 @@ def _shares(system: System, plan: Plan, present: Present) -> Iterator[tuple[Any,
     _, first, counts = np.unique(group[every], return_index=True, return_counts=True)
     done = 0
     while done < first.size:
-        maps = maps_of(system.of(every[first[done:]]), steps, present)
-        some = slice(done, done + maps.steps.size)
-        lanes_of = counts[some]
+        maps, places = maps_of(system.of(every[first[done:]]), steps, present)
+        lanes_of = counts[done : done + places.shape[1]]
         order = every[first[done] : first[done] + lanes_of.sum()]
         steps_of = np.full(lanes, steps)
-        steps_of[order] = np.repeat(maps.steps, lanes_of)
-        yield order, _blocks(lanes_of, maps.steps, maps.starts), maps.table, steps_of
-        done += maps.steps.size
+        steps_of[order] = np.repeat(places[0], lanes_of)
+        yield order, _blocks(lanes_of, *places), maps, steps_of
+        done += lanes_of.size
 
 
 def _blocks(lanes: Integers, steps: Integers, maps_at: Integers) -> Integers:

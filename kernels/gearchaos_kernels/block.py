@@ -13,9 +13,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gearchaos_kernels import rows
+from gearchaos_kernels import rk4, rows
 from gearchaos_kernels.block_memory import (
-    Block,
     aligned_memory,
     fill,
     fill_lane,
@@ -36,10 +35,9 @@ from gearchaos_kernels.flow_crossings import cross
 from gearchaos_kernels.flow_layout import KNOWN, OWN, Work, layout
 from gearchaos_kernels.flow_steps import begin_forces, move_block
 from gearchaos_kernels.flow_vectors import VECTOR
-from gearchaos_kernels.forcing import During, Phase, forcing_at, phase_within
+from gearchaos_kernels.forcing import Phase, forcing_at, phase_within
 from gearchaos_kernels.loads import begin_loads, tell_loads
-from gearchaos_kernels.rk4 import step, tangent_step
-from gearchaos_kernels.rows import LANES, STRIDE
+from gearchaos_kernels.rows import ANYWHERE, LANES, STRIDE
 from gearchaos_kernels.splitting import split_step
 from gearchaos_kernels.system import Status
 from gearchaos_kernels.teeth import engage, on_grid, point_on_grid, with_teeth
@@ -58,9 +56,9 @@ class Batch(NamedTuple):
     """What the blocks read, lanes first; see `coefficients`, and `forcing` for the table.
 
     ``coefficients`` (lanes, fields of `Lane`), ``scales``, ``start`` and ``tangent_start`` (lanes,
-    states), ``steps_between_scalings`` (lanes,), ``table`` (rows, columns). ``blocks`` (blocks, 4):
-    place of the first lane of each in ``order`` (lanes,), number of lanes, steps per period and
-    where its maps begin in ``maps``, which only a method that has maps looks at. ``shares``: see
+    states), ``steps_between_scalings`` (lanes,). ``blocks`` (blocks, 4): place of the first lane of
+    each in ``order`` (lanes,), number of lanes, steps per period and where its maps begin in
+    ``maps``, which only a method that has maps looks at. ``table``: see `phase_table`; ``shares``:
     `share_table`; ``driving``, ``driven``, ``profile``: see `Teeth`. ``chosen`` (rows,): of states
     and the transmission error; ``turns`` (lanes, orders, 2): cosine and sine of the phase by
     which an order advances in a step.
@@ -71,16 +69,16 @@ class Batch(NamedTuple):
     start: NDArray[np.float64]
     tangent_start: NDArray[np.float64]
     steps_between_scalings: NDArray[np.intp]
-    table: NDArray[np.float64]
     order: NDArray[np.intp]
     blocks: NDArray[np.intp]
     maps: NDArray[np.float64]
+    chosen: NDArray[np.intp]
+    turns: NDArray[np.float64]
+    table: NDArray[np.float64]
     shares: NDArray[np.float64]
     driving: NDArray[np.float64]
     driven: NDArray[np.float64]
     profile: NDArray[np.intp]
-    chosen: NDArray[np.intp]
-    turns: NDArray[np.float64]
 
 
 @part
@@ -99,9 +97,8 @@ def integrate_block(number_of_block, batch, plan, outcome, present):
     work = Work(numbers, np.zeros(KNOWN * VECTOR), places[:LANES], places[LANES:])
     every = steps // plan.steps_per_period
     turns = batch.turns[batch.order[first]]
-    block = Block(memory, first, lanes)
-    turn(block, batch, plan.first_period, present)
-    interval = begin(block, batch, present)
+    turn(memory, first, lanes, batch, plan.first_period, present)
+    interval = begin(memory, first, lanes, batch, present)
     periods = plan.transient_periods + plan.recorded_periods
     for period in range(periods):
         if present.loads is not None:
@@ -111,16 +108,14 @@ def integrate_block(number_of_block, batch, plan, outcome, present):
         for number in range(steps):
             if period >= periods - plan.history_periods and number % every == 0:
                 sample = (period - periods + plan.history_periods) * plan.steps_per_period
-                keep_state(block, batch, outcome.history, sample + number // every)
+                keep_state(memory, first, lanes, batch, outcome.history, sample + number // every)
             row = maps_at + number * layout(present).step_size
             if present.flow_map is None:
                 # Not in the loop over slots: nobody tells the compiler that its stores spare it.
-                phases = During(
-                    on_grid(table, shares, 2 * number, present),
-                    on_grid(table, shares, 2 * number + 1, present),
-                    on_grid(table, shares, 2 * number + 2, present),
-                )
-                suspects = step_block(memory, phases, present)
+                start = on_grid(table, shares, 2 * number, present)
+                middle = on_grid(table, shares, 2 * number + 1, present)
+                final = on_grid(table, shares, 2 * number + 2, present)
+                suspects = step_block(memory, start, middle, final, present)
             else:
                 suspects = move_block(memory, maps, row, slots, numbers, present)
             if present.resolved is not None:
@@ -132,37 +127,33 @@ def integrate_block(number_of_block, batch, plan, outcome, present):
                         cross(memory, lanes, maps, row, work, number, recorded, present)
             if present.loads is not None:
                 if period >= plan.transient_periods:
-                    if present.flow_map is None:
-                        tell_loads(memory, phases.middle, phases.end, present)
-                    else:
+                    if present.flow_map is not None:
                         asked, of_it = number // every, number % every
-                        middle = phase_within(table, asked, (of_it + 0.5) / every)
-                        last = phase_within(table, asked, (of_it + 1.0) / every)
-                        tell_loads(memory, (middle, None), (last, None), present)
+                        middle = phase_within(table, asked, (of_it + 0.5) / every), None
+                        final = phase_within(table, asked, (of_it + 1.0) / every), None
+                    tell_loads(memory, middle, final, present)
                     tell_chosen(memory, batch, turns)
             if present.tangent is not None:
                 last = number == steps - 1
                 if (number + 1) % interval == 0 or last:
-                    scale_tangents(block, batch, number + 1, last)
-        end_period(block, batch, period, steps, plan, outcome, present)
-        turn(block, batch, plan.first_period + period + 1, present)
-    end(block, batch, steps, plan, outcome, present)
+                    scale_tangents(memory, first, lanes, batch, number + 1, last)
+        end_period(memory, first, lanes, batch, period, steps, plan, outcome, present)
+        turn(memory, first, lanes, batch, plan.first_period + period + 1, present)
+    end(memory, first, lanes, batch, steps, plan, outcome, present)
 
 
 @scalar
-def turn(block, batch, period, present):
+def turn(memory, first, lanes, batch, period, present):
     """Bring the tooth pairs of a mesh period into mesh."""
     if present.teeth is not None:
-        memory, first, lanes = block
         for slot in range(LANES):
             profile = batch.profile[batch.order[first + min(slot, lanes - 1)]]
             engage(memory, slot, batch.driving[profile], batch.driven[profile], period)
 
 
 @scalar
-def begin(block, batch, present):
+def begin(memory, first, lanes, batch, present):
     """Fill the memory of a block; return the shortest interval between scalings of a tangent."""
-    memory, first, lanes = block
     # A scaling interval belongs to a lane, whatever its neighbours need.
     interval = batch.steps_between_scalings[batch.order[first]]
     for slot in range(LANES):
@@ -190,33 +181,32 @@ def begin(block, batch, present):
 
 
 @scalar
-def step_block(memory, phases, present):
+def step_block(memory, start, middle, final, present):
     """Take one step in every slot; return how many may have left a contact branch."""
     # A sum of integers, which the compiler knows how to vectorise; it does not know a flag.
     suspects = 0
     for slot in range(LANES):
         lane = read_lane(memory, slot)
         state = read_state(memory, rows.STATE, slot, present)
-        begin, _ = phases.begin
+        point, _ = start
         if present.teeth is not None:
             # What ended the last step begins this one.
-            begin = load(memory, rows.SHARED, slot, Phase)
-        middle = with_teeth(memory, slot, phases.middle, present)
-        end = with_teeth(memory, slot, phases.end, present)
+            point = load(memory, rows.SHARED, slot, Phase)
+        begin = forcing_at(lane, point, present)
+        point = with_teeth(memory, slot, middle, present)
+        halfway = forcing_at(lane, point, present)
+        point = with_teeth(memory, slot, final, present)
+        end = forcing_at(lane, point, present)
         if present.teeth is not None:
-            store(memory, rows.SHARED, slot, end)
-        during = During(
-            forcing_at(lane, begin, present),
-            forcing_at(lane, middle, present),
-            forcing_at(lane, end, present),
-        )
-        if present.resolved is None:
-            after, slopes = step(state, 1.0, lane, during, None, present)
-        else:
+            store(memory, rows.SHARED, slot, point)
+        during = begin, halfway, halfway, end
+        branches = ANYWHERE
+        if present.resolved is not None:
             branches = read_branches(memory, slot)
-            after, slopes = step(state, 1.0, lane, during, branches, present)
-            gaps = gaps_at(state, lane, during.begin, present)
-            gaps_after = gaps_at(after, lane, during.end, present)
+        after, slopes = rk4.advance(rk4.motion, state, 1.0, lane, during, branches, present)
+        if present.resolved is not None:
+            gaps = gaps_at(state, lane, begin, present)
+            gaps_after = gaps_at(after, lane, end, present)
             ways = ways_that_may_leave(gaps, gaps_after, branches, (0.0, 0.0), present)
             suspects += 1 if ways != 0.0 else 0
             memory[rows.SUSPECT * STRIDE + slot] = ways
@@ -227,7 +217,7 @@ def step_block(memory, phases, present):
             tangent = read_state(memory, rows.TANGENT, slot, present)
             if present.resolved is not None:
                 write_state(memory, rows.TANGENT_BEFORE, slot, tangent, present)
-            tangent = tangent_step(tangent, 1.0, lane, slopes, present)
+            tangent, _ = rk4.advance(rk4.tangent, tangent, 1.0, lane, slopes, None, present)
             write_state(memory, rows.TANGENT, slot, tangent, present)
     return suspects
 
@@ -242,9 +232,8 @@ def split(memory, lanes, table, shares, number, recorded, present):
 
 
 @scalar
-def scale_tangents(block, batch, steps_done, last):
+def scale_tangents(memory, first, lanes, batch, steps_done, last):
     """Scale tangent vectors whose turn it is to length 1; keep the logarithm of their growth."""
-    memory, first, lanes = block
     # Those of repeated lanes, too: they would become denormal, and cost all others their speed.
     for slot in range(LANES):
         index = batch.order[first + min(slot, lanes - 1)]
@@ -263,9 +252,8 @@ def scale_tangents(block, batch, steps_done, last):
 
 
 @scalar
-def end_period(block, batch, period, steps, plan, outcome, present):
+def end_period(memory, first, lanes, batch, period, steps, plan, outcome, present):
     """Write section and growth of every lane, and stop those that have diverged."""
-    memory, first, lanes = block
     recorded = period - plan.transient_periods
     point = recorded - plan.recorded_periods + plan.section_points
     for slot in range(lanes):
@@ -297,9 +285,8 @@ def end_period(block, batch, period, steps, plan, outcome, present):
 
 
 @scalar
-def end(block, batch, steps, plan, outcome, present):
+def end(memory, first, lanes, batch, steps, plan, outcome, present):
     """Write the last state and tangent vector of every lane, and what it has crossed."""
-    memory, first, lanes = block
     for slot in range(lanes):
         index = batch.order[first + slot]
         scale = batch.scales[index]
@@ -318,13 +305,13 @@ def end(block, batch, steps, plan, outcome, present):
                 outcome.loads[index, row // rows.SIGNAL_ROWS, row % rows.SIGNAL_ROWS] = value
             end_chosen(memory, slot, index, batch, outcome)
     if plan.history_periods > 0:
-        keep_state(block, batch, outcome.history, plan.history_periods * plan.steps_per_period)
+        sample = plan.history_periods * plan.steps_per_period
+        keep_state(memory, first, lanes, batch, outcome.history, sample)
 
 
 @scalar
-def keep_state(block, batch, history, sample):
+def keep_state(memory, first, lanes, batch, history, sample):
     """Write the state of every lane into one sample of its history."""
-    memory, first, lanes = block
     for slot in range(lanes):
         index = batch.order[first + slot]
         take(memory, rows.STATE, slot, batch.scales[index], history[index, sample])

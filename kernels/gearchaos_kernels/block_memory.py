@@ -1,18 +1,17 @@
 """A block of lanes in memory, and how compiled code reads and writes it; see `rows`."""
 
 from collections import namedtuple
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from llvmlite import ir
 from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic
-from numpy.typing import NDArray
 
 from gearchaos_kernels import rows
 from gearchaos_kernels.compilation import CACHE_LINE, part, scalar
-from gearchaos_kernels.rows import STRIDE, Branch, Branches, Coordinates, Lane, State
+from gearchaos_kernels.rows import STRIDE, Branch, Coordinates, Directions, Lane, State
 from gearchaos_kernels.system import Plan, System
 
 Present = namedtuple(
@@ -43,14 +42,6 @@ def flags(system: System, plan: Plan) -> Present:
 
 
 _ITEM = np.dtype(np.float64).itemsize
-
-
-class Block(NamedTuple):
-    """The memory of a block, its first lane in the batch, and how many of its slots are used."""
-
-    memory: NDArray[np.float64]
-    first: int
-    lanes: int
 
 
 @part
@@ -176,7 +167,7 @@ def write_coordinates(memory, first, slot, values, present):
 @scalar
 def read_branches(memory, slot):
     """Return the active pieces of a lane; without axial pair the second one repeats the first."""
-    return Branches(
+    return Directions(
         load(memory, rows.TANGENTIAL_BRANCH, slot, Branch),
         load(memory, rows.AXIAL_BRANCH, slot, Branch),
     )

@@ -9,7 +9,8 @@ import math
 
 from gearchaos_kernels import rows
 from gearchaos_kernels.compilation import scalar
-from gearchaos_kernels.rows import STRIDE, Branch, Branches
+from gearchaos_kernels.loads import tell_kink
+from gearchaos_kernels.rows import STRIDE, Branch, Directions
 
 NEVER = 2.0  # Fraction of a step returned where the step does not leave its branch: beyond its end.
 
@@ -36,8 +37,8 @@ def branches_at(gaps, half_backlash, present):
     """Return the pieces on which both gaps of a lane lie."""
     tangential = branch_at(gaps.tangential.value, half_backlash)
     if present.axial is None:
-        return Branches(tangential, tangential)
-    return Branches(tangential, branch_at(gaps.axial.value, half_backlash))
+        return Directions(tangential, tangential)
+    return Directions(tangential, branch_at(gaps.axial.value, half_backlash))
 
 
 @scalar
@@ -65,14 +66,16 @@ def leave(memory, slot, axially, gap, branches, lane, moment, recorded, present)
     branch = branches.axial if axially else branches.tangential
     following = next_branch(branch, gap.value, lane.half_backlash)
     if axially:
-        branches = Branches(branches.tangential, following)
+        branches = Directions(branches.tangential, following)
     else:
-        branches = Branches(following, branches.axial)
+        branches = Directions(following, branches.axial)
     if recorded:
         speed = (lane.axial_speed if axially else lane.tangential_speed) * abs(gap.rate)
         at = rows.CROSSINGS * STRIDE + slot
         memory[at] += 1.0
         memory[at + STRIDE] = min(memory[at + STRIDE], speed)
+        if present.loads is not None:
+            tell_kink(memory, slot, axially, lane, gap)
         if present.contact is not None:
             first = rows.CONTACT + (rows.CONTACT_ROWS if axially else 0)
             meets = following.engaged

@@ -13,7 +13,7 @@ leaves the second line as it is. The clearance of both directions is then the sa
 from typing import NamedTuple
 
 from gearchaos_kernels.compilation import scalar
-from gearchaos_kernels.rows import Coordinates
+from gearchaos_kernels.rows import Coordinates, Directions
 
 
 class Gap(NamedTuple):
@@ -21,20 +21,6 @@ class Gap(NamedTuple):
 
     value: float
     rate: float
-
-
-class Gaps(NamedTuple):
-    """y_1 over cos(beta_b) and y_2 over sin(beta_b); the latter 0 without axial pair."""
-
-    tangential: Gap
-    axial: Gap
-
-
-class Directions(NamedTuple):
-    """A force or a stiffness of the mesh in its two directions."""
-
-    tangential: float
-    axial: float
 
 
 @scalar
@@ -57,7 +43,7 @@ def axial_approach(values, lane):
 
 @scalar
 def gaps_at(state, lane, forcing, present):
-    """Return the gaps of eqs 6 and 7 and their rates."""
+    """Return y_1 over cos(beta_b) and y_2 over sin(beta_b) (eqs 6, 7), 0 without axial pair."""
     gap = approach(state.position, lane, present) - forcing.error
     rate = approach(state.rate, lane, present) - forcing.error_rate
     axial_gap = 0.0
@@ -65,43 +51,33 @@ def gaps_at(state, lane, forcing, present):
     if present.axial is not None:
         axial_gap = axial_approach(state.position, lane) - gap - forcing.axial_error
         axial_rate = axial_approach(state.rate, lane) - forcing.axial_error_rate - rate
-    return Gaps(Gap(gap, rate), Gap(axial_gap, axial_rate))
+    return Directions(Gap(gap, rate), Gap(axial_gap, axial_rate))
 
 
 @scalar
-def clearance_force(gap, stiffness, damping, half_backlash, present):
-    """Return the mesh force (eqs 2, 4) and the stiffness of its active branch (eqs 22, 23)."""
-    if present.backlash is None:
-        return stiffness * gap.value + damping * gap.rate, stiffness
-    deflection = gap.value - min(max(gap.value, -half_backlash), half_backlash)
-    slope = stiffness if deflection != 0.0 else 0.0
+def mesh_force(gap, stiffness, damping, half_backlash, branch, present):
+    """Return a mesh force (eqs 2, 4) and its slope (eqs 22, 23), on a branch if one is given."""
+    deflection, slope = gap.value, stiffness
+    if branch is not None:
+        deflection = branch.engaged * gap.value - branch.offset
+        slope = stiffness * branch.engaged
+    elif present.backlash is not None:
+        deflection = gap.value - min(max(gap.value, -half_backlash), half_backlash)
+        slope = stiffness if deflection != 0.0 else 0.0
     return stiffness * deflection + damping * gap.rate, slope
 
 
 @scalar
-def branch_force(gap, stiffness, damping, branch):
-    """Return the mesh force and its stiffness on one linear piece of the clearance function."""
-    deflection = branch.engaged * gap.value - branch.offset
-    return stiffness * deflection + damping * gap.rate, stiffness * branch.engaged
-
-
-@scalar
 def mesh_forces(gaps, lane, stiffness, branches, present):
-    """Return N_y and N_z of eq. 13 and their slopes d(force)/d(gap), on branches if given."""
-    damping = lane.mesh_damping
-    stiffness_z = lane.axial_share * stiffness
-    damping_z = lane.axial_share * damping
+    """Return N_y and N_z of eq. 13 and their slopes d(force)/d(gap), on branches or `ANYWHERE`."""
+    damping, b = lane.mesh_damping, lane.half_backlash
+    stiffness_z, damping_z = lane.axial_share * stiffness, lane.axial_share * damping
+    on_y, on_z = branches
+    force_y, slope_y = mesh_force(gaps.tangential, stiffness, damping, b, on_y, present)
     force_z = 0.0
     slope_z = 0.0
-    if branches is None:
-        b = lane.half_backlash
-        force_y, slope_y = clearance_force(gaps.tangential, stiffness, damping, b, present)
-        if present.axial is not None:
-            force_z, slope_z = clearance_force(gaps.axial, stiffness_z, damping_z, b, present)
-    else:
-        force_y, slope_y = branch_force(gaps.tangential, stiffness, damping, branches.tangential)
-        if present.axial is not None:
-            force_z, slope_z = branch_force(gaps.axial, stiffness_z, damping_z, branches.axial)
+    if present.axial is not None:
+        force_z, slope_z = mesh_force(gaps.axial, stiffness_z, damping_z, b, on_z, present)
     return Directions(force_y, force_z), Directions(slope_y, slope_z)
 
 

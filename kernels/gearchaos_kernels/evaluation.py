@@ -18,15 +18,9 @@ from gearchaos_kernels.block_memory import (
 from gearchaos_kernels.coefficients import lane_coefficients, state_scales
 from gearchaos_kernels.compilation import evaluator
 from gearchaos_kernels.contact import flank_at
-from gearchaos_kernels.equations import (
-    Directions,
-    accelerations,
-    gaps_at,
-    mesh_forces,
-    tangent_forces,
-)
-from gearchaos_kernels.forcing import forcing_at, phase_table, pitch_error_at
-from gearchaos_kernels.rows import State
+from gearchaos_kernels.equations import accelerations, gaps_at, mesh_forces, tangent_forces
+from gearchaos_kernels.forcing import forcing_at, pitch_error_at
+from gearchaos_kernels.rows import ANYWHERE, Directions, State
 from gearchaos_kernels.system import Effects, Floats, MeshMotion, Plan, System
 from gearchaos_kernels.teeth import engage, point_on_grid, tables_of
 
@@ -99,7 +93,6 @@ def mesh_motion(
         lane_coefficients(system, step),
         state_scales(system, step),
         step,
-        phase_table(system.stiffness_cosine, system.stiffness_sine, steps_per_period),
         tables_of(system, present, steps_per_period),
         first_period,
         np.ascontiguousarray(states, dtype=np.float64),
@@ -110,11 +103,11 @@ def mesh_motion(
 
 
 @evaluator
-def _follow(coefficients, scales, steps, table, teeth, first, states, motion, present):
+def _follow(coefficients, scales, steps, tables, first, states, motion, present):
     """Evaluate eq. 13 at every sample, lane by lane."""
     memory = aligned_memory()
     change = np.empty(scales.shape[1])
-    shares, driving, driven, profile = teeth
+    table, shares, driving, driven, profile = tables
     for index in range(states.shape[0]):
         step = steps[index]
         lane = fill_lane(memory, 0, coefficients[index])
@@ -132,7 +125,7 @@ def _follow(coefficients, scales, steps, table, teeth, first, states, motion, pr
             if present.pitch_error is not None:
                 motion.pitch_error[index, sample] = pitch_error_at(lane, point, present)
             gaps = gaps_at(state, lane, forcing, present)
-            forces, _ = mesh_forces(gaps, lane, forcing.stiffness, None, present)
+            forces, _ = mesh_forces(gaps, lane, forcing.stiffness, ANYWHERE, present)
             # Scaled, N_y and N_z enter eq. 13 with coefficient -1, and per step squared.
             motion.force_tangential[index, sample] = forces.tangential / step**2
             flank = flank_at(gaps.tangential.value, half_backlash)

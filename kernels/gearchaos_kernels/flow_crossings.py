@@ -30,6 +30,7 @@ from gearchaos_kernels.flow_layout import (
     SIDE,
     TANGENT_GAP,
     TANGENT_INPUTS,
+    TERMS,
     layout,
 )
 from gearchaos_kernels.flow_moments import UNKNOWN, find_moments
@@ -42,7 +43,6 @@ from gearchaos_kernels.flow_steps import (
     store_offsets,
 )
 from gearchaos_kernels.forcing import forcing_at
-from gearchaos_kernels.loads import tell_kink
 from gearchaos_kernels.rows import STRIDE
 from gearchaos_kernels.splitting import MOST_SPLITS
 
@@ -95,7 +95,7 @@ def look_along(memory, slot, numbers, own, way, table, row, present):
     lane = read_lane(memory, slot)
     branches = read_branches(memory, slot)
     gap = own + GAPS + way * GAP
-    at = maps_on(branches, row, present) + place.gaps[way]
+    at = maps_on(branches, row, present) + place.gap + way * place.columns * TERMS
     error = mean_errors(lane, present)[way]
     vectors.look_along(numbers, gap, own + INPUTS, error, table, at, present)
     branch = branches[way]
@@ -138,16 +138,13 @@ def cross_over(memory, slot, numbers, own, table, row, number, recorded, present
     way = 1 if axially else 0
     gap = own + GAPS + way * GAP
     crossed = crossed_at(numbers, gap)
-    columns = maps_on(branches, row, present) + place.gaps[way]
+    columns = maps_on(branches, row, present) + place.gap + way * place.columns * TERMS
     at_step = number + 0.5 * (1.0 + moment)
     branches, branch, following = contact.leave(
         memory, slot, axially, crossed, branches, lane, at_step, recorded, present
     )
     write_branches(memory, slot, branches)
     store_offsets(memory, slot, lane, branches, present)
-    if present.loads is not None:
-        if recorded:
-            tell_kink(memory, slot, axially, lane, crossed)
 
     if present.tangent is not None:
         given, target = own + TANGENT_INPUTS, own + TANGENT_GAP
@@ -155,7 +152,7 @@ def cross_over(memory, slot, numbers, own, table, row, number, recorded, present
     # One of the two offsets is that of the flank, the other one 0.
     numbers[gap] -= branch.offset + following.offset
     sign = branch.engaged - following.engaged
-    switch = maps_on(branches, row, present) + place.switches[way]
+    switch = maps_on(branches, row, present) + place.switch + way * TERMS * place.width
     vectors.add_switch(numbers, own, gap, moment, sign, table, switch, present)
     offset = memory[(rows.FORCES + 1 + way) * STRIDE + slot]
     numbers[own + INPUTS + place.states + 1 + way] = offset

@@ -50,16 +50,17 @@ class Layout(NamedTuple):
 
     ``columns``: those of x and then those of c: load, offset of the tangential and of the axial
     flank, sine and cosine part of the pitch error, as far as the scene has them; ``width``: of a
-    state, so that it fills vector registers; ``size``: of a pair of branches, whose map of the
-    state stands first; ``pairs``: of branches; ``ways``: directions of the mesh;
-    ``step_size``: of all maps of a step.
+    state, so that it fills vector registers; ``gap``, ``switch``: where those of both directions
+    begin, tangential and then axial; ``size``: of a pair of branches, whose map of the state stands
+    first; ``pairs``: of branches; ``ways``: directions of the mesh; ``step_size``: of all maps of a
+    step.
     """
 
     states: int
     columns: int
     width: int
-    gaps: tuple[int, int]
-    switches: tuple[int, int]
+    gap: int
+    switch: int
     size: int
     pairs: int
     ways: int
@@ -77,11 +78,9 @@ def layout(present):
     states = 2 + 4 * transverse + 4 * axial
     columns = states + 2 + axial + error + phase
     width = 2 if states == 2 else 8 if states == 6 else 16
-    gap_y = columns * width
-    gap_z = gap_y + columns * TERMS
-    switch_y = gap_z + axial * columns * TERMS
-    switch_z = switch_y + TERMS * width
-    size = switch_z + axial * TERMS * width
+    ways = 1 + axial
+    gap = columns * width
+    switch = gap + ways * columns * TERMS
+    size = switch + ways * TERMS * width
     pairs = (1 + resolved) * (1 + resolved * axial)
-    places = (gap_y, gap_z), (switch_y, switch_z), size, pairs
-    return Layout(states, columns, width, *places, 1 + axial, HEADER + pairs * size)
+    return Layout(states, columns, width, gap, switch, size, pairs, ways, HEADER + pairs * size)

@@ -22,7 +22,6 @@ as Chebyshev series are. Where the series do not converge to rounding, the step 
 """
 
 from collections.abc import Hashable
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,7 +29,7 @@ from numpy.typing import NDArray
 from gearchaos_kernels.block_memory import Present, flags
 from gearchaos_kernels.coefficients import lane_coefficients
 from gearchaos_kernels.flow_layout import Layout, layout
-from gearchaos_kernels.flow_series import TAIL, make_maps, right_sides, series_of_forcing
+from gearchaos_kernels.flow_series import TAIL, differentiate, make_maps, series_of_forcing
 from gearchaos_kernels.rows import LANES
 from gearchaos_kernels.system import Floats, Groups, Plan, System
 
@@ -53,18 +52,6 @@ _UNIT = {
 
 OWN = [name for name in Groups._fields if name not in _UNIT]
 """Groups on which the maps depend."""
-
-
-class Maps(NamedTuple):
-    """Maps of several groups of lanes in one array.
-
-    ``table``: all of them; ``steps``, ``starts`` (groups,): steps per period of each, a multiple of
-    those asked for, and where its maps begin.
-    """
-
-    table: Floats
-    steps: NDArray[np.intp]
-    starts: NDArray[np.intp]
 
 
 def fewest_steps(plan: Plan) -> int:
@@ -120,10 +107,11 @@ class _Kept:
 _kept = _Kept(0)
 
 
-def maps_of(system: System, steps: int, present: Present) -> Maps:
+def maps_of(system: System, steps: int, present: Present) -> tuple[Floats, NDArray[np.intp]]:
     """Return the maps of the first lanes of a system, as many as fit into memory.
 
-    They are kept: the same lanes may be integrated again and again.
+    And, shape (2, lanes): steps per period of each, a multiple of those asked for, and where its
+    maps begin. They are kept: the same lanes may be integrated again and again.
     """
     global _kept
     present = present._replace(tangent=None, contact=None, loads=None)
@@ -149,8 +137,7 @@ def maps_of(system: System, steps: int, present: Present) -> Maps:
         steps_made, _ = _kept.places[names[done - 1]]
         size = 8 * steps_made * layout.py_func(present).step_size
         together = max(1, min(LANES, MOST_MAP_BYTES // (4 * size)))
-    places = np.array([_kept.places[name] for name in names[:done]], dtype=np.intp)
-    return Maps(_kept.table, places[:, 0], places[:, 1])
+    return _kept.table, np.array([_kept.places[name] for name in names[:done]], dtype=np.intp).T
 
 
 def _own_groups(system: System) -> Floats:
@@ -164,8 +151,6 @@ def _make(system: System, steps: int, present: Present) -> list[Floats]:
     A motion so fast that no steps resolve it has maps that are not a number.
     """
     place: Layout = layout.py_func(present)
-    # In one line: a parallel loop takes no tuple within a tuple.
-    places = tuple(int(number) for number in np.hstack(place))
     unit = {name: np.full(system.lanes, value) for name, value in _UNIT.items()}
     system = system._replace(groups=system.groups._replace(**unit))
     made = [np.full((steps, place.step_size), np.nan)] * system.lanes
@@ -176,8 +161,10 @@ def _make(system: System, steps: int, present: Present) -> list[Floats]:
         edges = 2.0 * np.pi / count * np.arange(count + 1)
         for column, values in enumerate((np.sin(edges), np.cos(edges))):
             tables[:, :, column], tables[:, :, column + 2] = values[:-1], values[1:]
-        right_side = right_sides(coefficients, present)
-        make_maps(right_side, series_of_forcing(system, count), tables, tails, places)
+        matrices = np.zeros((left.size, place.states + 2, place.states + 5))
+        differentiate(coefficients, matrices, present)
+        forcing = series_of_forcing(system, count)
+        make_maps(matrices, coefficients, forcing, tables, tails, place)
         for number in np.flatnonzero(tails < TAIL):
             made[left[number]] = tables[number].copy()
         left = left[~(tails < TAIL) & np.isfinite(coefficients).all(axis=1)]

@@ -4,25 +4,17 @@ Two things enter: the formulas of `equations`, applied to unit vectors, and the 
 mesh phase (eqs 14 and 19). `flow_map` has the equations that are solved here.
 """
 
-from typing import NamedTuple
-
 import numpy as np
 from numba import prange
 from numpy.polynomial import chebyshev
 
 from gearchaos_kernels import rows
-from gearchaos_kernels.block_memory import (
-    Present,
-    aligned_memory,
-    fill_lane,
-    read_state,
-    write_state,
-)
+from gearchaos_kernels.block_memory import aligned_memory, fill_lane, read_state, write_state
 from gearchaos_kernels.compilation import driver, evaluator, part
-from gearchaos_kernels.equations import Directions, accelerations, gaps_at
-from gearchaos_kernels.flow_layout import BOUNDS, HEADER, TERMS, Layout, fourth_derivative, layout
+from gearchaos_kernels.equations import accelerations, gaps_at
+from gearchaos_kernels.flow_layout import BOUNDS, HEADER, TERMS, fourth_derivative
 from gearchaos_kernels.forcing import Phase, forcing_at
-from gearchaos_kernels.rows import STRIDE, Coordinates, State
+from gearchaos_kernels.rows import STRIDE, Directions, Lane, State
 from gearchaos_kernels.system import Floats, System
 
 ORDER = 22
@@ -59,81 +51,41 @@ _ENDS = np.stack([(-1.0) ** np.arange(ORDER + 1), np.ones(ORDER + 1)])
 """What makes the values at both ends of a step of a series."""
 
 
-class RightSide(NamedTuple):
-    """Eq. 13 as matrices: what every state and every forcing adds to rates and gaps.
-
-    ``rates`` (states, states + 3): without mesh stiffness, by state and by drive, sine and cosine
-    of the error; ``gaps`` (2, states + 3): both gaps, by the same; ``mobility`` (states, 2): what a
-    force of one in the mesh takes away, the axial one with its share of the stiffness;
-    ``stiffness`` (2,): mean and scale of the variation. Of all lanes in front of that, or of one.
-    """
-
-    rates: Floats
-    gaps: Floats
-    mobility: Floats
-    stiffness: Floats
-
-
-def right_sides(coefficients: Floats, present: Present) -> RightSide:
-    """Return eq. 13 of lanes as matrices."""
-    lanes, states = len(coefficients), layout.py_func(present).states
-    shapes = (states, states + 3), (2, states + 3), (states, 2), (2,)
-    result = RightSide(*(np.zeros((lanes, *shape)) for shape in shapes))
-    differentiate(coefficients, result, present)
-    return result
+_MEAN, _VARIATION = map(Lane._fields.index, ("mean_stiffness", "stiffness_variation"))
 
 
 @evaluator
-def differentiate(coefficients, result, present):
-    """Apply the formulas of eq. 13 to one unit after the other, lane by lane."""
-    for lane in range(coefficients.shape[0]):
-        differentiate_lane(coefficients[lane], of_lane(result, lane), present)
+def differentiate(coefficients, matrices, present):
+    """Apply the formulas of eq. 13 to one unit after the other, lane by lane.
 
-
-@part
-def of_lane(right_side, lane):
-    """Return the matrices of one lane."""
-    rates, gaps, mobility, stiffness = right_side
-    return RightSide(rates[lane], gaps[lane], mobility[lane], stiffness[lane])
-
-
-@part
-def differentiate_lane(coefficients, right_side, present):
-    """Apply the formulas of eq. 13 of a lane to one unit after the other."""
-    states = right_side.rates.shape[0]
+    ``matrices`` (lanes, states + 2, states + 5): rates of the states without mesh stiffness, and
+    both gaps, by state, drive, sine and cosine of the error, and by a force of one in either
+    direction of the mesh, the axial one with its share of the stiffness.
+    """
     memory = aligned_memory()
-    lane = fill_lane(memory, 0, coefficients)
-    right_side.stiffness[0] = lane.mean_stiffness
-    right_side.stiffness[1] = lane.stiffness_variation
-    zero = Coordinates(0.0, 0.0, 0.0, 0.0, 0.0)
-    rest = State(zero, zero)
-    for column in range(states + 3):
-        for line in range(states):
-            memory[(rows.STATE + line) * STRIDE] = 1.0 if line == column else 0.0
-        drive = 1.0 if column == states else 0.0
-        sine = 1.0 if column == states + 1 else 0.0
-        cosine = 1.0 if column == states + 2 else 0.0
-        state = read_state(memory, rows.STATE, 0, present)
-        acting = forcing_at(lane, Phase(0.0, sine, cosine, -sine), present)
-        both = gaps_at(state, lane, acting, present)
-        right_side.gaps[0, column] = both.tangential.value
-        right_side.gaps[1, column] = both.axial.value
-        forces = Directions(
-            lane.mesh_damping * both.tangential.rate,
-            lane.axial_share * lane.mesh_damping * both.axial.rate,
-        )
-        result = State(
-            state.rate, accelerations(state, forces, drive + acting.drive, lane, present)
-        )
-        write_state(memory, rows.STATE, 0, result, present)
-        for line in range(states):
-            right_side.rates[line, column] = memory[(rows.STATE + line) * STRIDE]
-    for way in range(2):
-        forces = Directions(1.0 - way, lane.axial_share * way)
-        result = State(zero, accelerations(rest, forces, 0.0, lane, present))
-        write_state(memory, rows.STATE, 0, result, present)
-        for line in range(states):
-            right_side.mobility[line, way] = memory[(rows.STATE + line) * STRIDE]
+    states = matrices.shape[1] - 2
+    for number in range(matrices.shape[0]):
+        lane, matrix = fill_lane(memory, 0, coefficients[number]), matrices[number]
+        for column in range(states + 5):
+            unit = np.zeros(states + 5)
+            unit[column] = 1.0
+            for line in range(states):
+                memory[(rows.STATE + line) * STRIDE] = unit[line]
+            drive, sine, cosine = unit[states], unit[states + 1], unit[states + 2]
+            state = read_state(memory, rows.STATE, 0, present)
+            acting = forcing_at(lane, Phase(0.0, sine, cosine, -sine), present)
+            gaps = gaps_at(state, lane, acting, present)
+            forces = Directions(
+                lane.mesh_damping * gaps.tangential.rate + unit[states + 3],
+                lane.axial_share * lane.mesh_damping * gaps.axial.rate
+                + lane.axial_share * unit[states + 4],
+            )
+            change = accelerations(state, forces, drive + acting.drive, lane, present)
+            write_state(memory, rows.STATE, 0, State(state.rate, change), present)
+            for line in range(states):
+                matrix[line, column] = memory[(rows.STATE + line) * STRIDE]
+            matrix[states, column] = gaps.tangential.value
+            matrix[states + 1, column] = gaps.axial.value
 
 
 def series_of_forcing(system: System, steps: int) -> Floats:
@@ -155,24 +107,20 @@ def series_of_forcing(system: System, steps: int) -> Floats:
 
 
 @driver
-def make_maps(right_side, forcing, tables, tails, places):
+def make_maps(matrices, coefficients, forcing, tables, tails, place):
     """Fill the maps of lanes, shape (lanes, steps, size of a step), and tell what series leave.
 
-    Compiled once for all scenes: ``places`` are the numbers of their layout.
+    Compiled once for all scenes; ``matrices``: see `differentiate`.
     """
     for number in prange(tables.shape[0]):
         # One type of number inside and outside of the parallel loop: else two are compiled.
         lane = np.int64(number)
-        tails[lane] = fill_maps(of_lane(right_side, lane), forcing, tables[lane], places)
+        tails[lane] = fill_maps(matrices[lane], coefficients[lane], forcing, tables[lane], place)
 
 
 @part
-def fill_maps(right_side, forcing, table, places):
+def fill_maps(matrix, coefficients, forcing, table, place):
     """Fill the maps of a lane, shape (steps, size of a step); return what series leave."""
-    states, columns, width, gap_y, gap_z, switch_y, switch_z, size, pairs, ways, step = places
-    gaps, switches = (gap_y, gap_z), (switch_y, switch_z)
-    place = Layout(states, columns, width, gaps, switches, size, pairs, ways, step)
-    mean, variation = right_side.stiffness[0], right_side.stiffness[1]
     tail = 0.0
     for first in range(0, table.shape[0], TOGETHER):
         some = table[first : first + TOGETHER]
@@ -185,24 +133,25 @@ def fill_maps(right_side, forcing, table, places):
             engaged[0, at] = 1.0 - pair % 2
             engaged[1, at] = 1.0 - pair // 2
             for term in range(ORDER):
-                acting[0, term, at] = variation * near[0, term, step]
+                acting[0, term, at] = coefficients[_VARIATION] * near[0, term, step]
                 acting[1, term, at] = near[1, term, step]
                 acting[2, term, at] = near[2, term, step]
-            acting[0, 0, at] += mean
-        tail = np.maximum(tail, fill_steps(right_side, engaged, acting, some, place))
+            acting[0, 0, at] += coefficients[_MEAN]
+        tail = np.maximum(tail, fill_steps(matrix, engaged, acting, some, place))
         if not tail < TAIL:
             break
     return tail
 
 
 @part
-def fill_steps(right_side, engaged, forcing, table, place):
+def fill_steps(matrix, engaged, forcing, table, place):
     """Fill the maps of some steps on all pairs of branches; return what is left of the series.
 
     In every array the last numbers are those of these steps, pair by pair.
     """
     states, columns, ways = place.states, place.columns, place.ways
-    rates, gaps, mobility, _ = right_side
+    rates, gaps = matrix[:states, : states + 3].copy(), matrix[states:, : states + 3].copy()
+    mobility = matrix[:states, states + 3 :].copy()
     width = engaged.shape[1]
     error = states + 1 + ways
 
@@ -269,13 +218,13 @@ def fill_steps(right_side, engaged, forcing, table, place):
                 bend = 0.0
                 for term in range(TERMS):
                     value = along[term * ways + way, column, at]
-                    piece[place.gaps[way] + column * TERMS + term] = value
+                    piece[place.gap + (way * columns + column) * TERMS + term] = value
                     bend += _BENDS[term] * abs(value)
                 row[BOUNDS[way] + column] = max(row[BOUNDS[way] + column], bend)
             for term in range(TERMS):
                 for line in range(states):
                     value = traced[term * ways + way, line, at]
-                    piece[place.switches[way] + term * place.width + line] = value
+                    piece[place.switch + (way * TERMS + term) * place.width + line] = value
     return tail
 
 

@@ -14,7 +14,7 @@ from gearchaos_kernels.equations import gaps_at
 from gearchaos_kernels.flow_layout import HEADER, INPUTS, RESULT, TANGENT_INPUTS, layout
 from gearchaos_kernels.flow_vectors import VECTOR
 from gearchaos_kernels.forcing import Phase, forcing_at
-from gearchaos_kernels.rows import LANES, STRIDE, Branch, Branches
+from gearchaos_kernels.rows import LANES, STRIDE, Branch, Directions
 
 ALWAYS = Branch(1.0, 0.0, -math.inf, math.inf)
 """The branch of a mesh without clearance."""
@@ -35,7 +35,7 @@ def begin_forces(memory, slot, lane, present):
     memory[rows.FORCES * STRIDE + slot] = lane.load
     memory[error * STRIDE + slot] = amplitude * lane.cos_phase
     memory[(error + 1) * STRIDE + slot] = amplitude * lane.sin_phase
-    branches = Branches(ALWAYS, ALWAYS)
+    branches = Directions(ALWAYS, ALWAYS)
     if present.resolved is not None:
         branches = read_branches(memory, slot)
     store_offsets(memory, slot, lane, branches, present)
@@ -45,15 +45,10 @@ def begin_forces(memory, slot, lane, present):
 def store_offsets(memory, slot, lane, branches, present):
     """Store by how much each gap exceeds the deflection on its branch."""
     for way in range(layout(present).ways):
-        offset = offset_of(way, lane, branches, present)
+        branch = branches[way]
+        # With the mean error, which no column of a map has.
+        offset = branch.offset + branch.engaged * mean_errors(lane, present)[way]
         memory[(rows.FORCES + 1 + way) * STRIDE + slot] = offset
-
-
-@scalar
-def offset_of(way, lane, branches, present):
-    """Return the offset of a branch, with the mean error, which no column of a map has."""
-    branch = branches[way]
-    return branch.offset + branch.engaged * mean_errors(lane, present)[way]
 
 
 @scalar
@@ -65,18 +60,12 @@ def mean_errors(lane, present):
 
 
 @scalar
-def pair_of(branches, present):
-    """Return the number of a pair of branches among the maps of a step."""
+def maps_on(branches, row, present):
+    """Return where in their table the maps of a step on a pair of branches begin."""
     pair = 0 if branches.tangential.engaged != 0.0 else 1
     if present.axial is not None:
         pair += 0 if branches.axial.engaged != 0.0 else 2
-    return pair
-
-
-@scalar
-def maps_on(branches, row, present):
-    """Return where in their table the maps of a step on a pair of branches begin."""
-    return row + HEADER + pair_of(branches, present) * layout(present).size
+    return row + HEADER + pair * layout(present).size
 
 
 @scalar

@@ -45,35 +45,21 @@ class Forcing(NamedTuple):
     axial_error_rate: float
 
 
-class During(NamedTuple):
-    """What acts on a lane at the beginning, in the middle and at the end of a step or a piece."""
-
-    begin: Forcing
-    middle: Forcing
-    end: Forcing
-
-
+@lru_cache(maxsize=8)  # Made anew it would be half of what a call costs beforehand.
 def phase_table(
-    cosine: NDArray[np.float64], sine: NDArray[np.float64], steps_per_period: int
+    cosine: tuple[float, ...], sine: tuple[float, ...], steps_per_period: int
 ) -> NDArray[np.float64]:
     """Return sine, cosine and stiffness variation at every half step of a mesh period.
 
-    From the Fourier coefficients (harmonics,) of the mesh stiffness relative to its mean (eq. 19),
-    as an array of shape (2 steps + 1, 2 + terms). The last row repeats the first: the phase begins
-    anew with every period. The terms are the variation and its further Taylor coefficients in the
-    mesh phase, as many as it takes to reach halfway to the next row.
+    From the Fourier coefficients of the mesh stiffness relative to its mean (eq. 19), as an array
+    of shape (2 steps + 1, 2 + terms). The last row repeats the first: the phase begins anew with
+    every period. The terms are the variation and its further Taylor coefficients in the mesh phase,
+    as many as it takes to reach halfway to the next row.
     """
-    return _table(cosine.tobytes(), sine.tobytes(), steps_per_period)
-
-
-@lru_cache(maxsize=8)
-def _table(cosine_bytes: bytes, sine_bytes: bytes, steps_per_period: int) -> NDArray[np.float64]:
-    """Make a table once, for all who read it: else it is half of what a call costs beforehand."""
-    cosine, sine = np.frombuffer(cosine_bytes), np.frombuffer(sine_bytes)
     half_steps = np.arange(2 * steps_per_period + 1) % (2 * steps_per_period)
     angle = np.pi * half_steps / steps_per_period
-    order = np.arange(1, cosine.size + 1)
-    amplitude = cosine - 1j * sine
+    order = np.arange(1, len(cosine) + 1)
+    amplitude = np.array(cosine) - 1j * np.array(sine)
     reach = order * np.pi / (2 * steps_per_period)
     waves = amplitude * np.exp(1j * np.outer(angle, order))
     coefficients = [np.sum(waves.real, axis=1)]

@@ -14,7 +14,7 @@ from gearchaos_kernels.compilation import scalar
 from gearchaos_kernels.equations import gaps_at, mesh_forces
 from gearchaos_kernels.forcing import forcing_at, pitch_error_at
 from gearchaos_kernels.rk4 import along, plus
-from gearchaos_kernels.rows import LANES, STRIDE, Carried, State
+from gearchaos_kernels.rows import ANYWHERE, LANES, STRIDE, Carried, State
 from gearchaos_kernels.teeth import point_on_grid, with_teeth
 
 
@@ -23,7 +23,7 @@ def carried_at(state, lane, point, present):
     """Return what a state carries at a mesh phase, forces per step squared."""
     forcing = forcing_at(lane, point, present)
     gaps = gaps_at(state, lane, forcing, present)
-    forces, slopes = mesh_forces(gaps, lane, forcing.stiffness, None, present)
+    forces, slopes = mesh_forces(gaps, lane, forcing.stiffness, ANYWHERE, present)
     error = lane.cosine * state.position.torsion
     if present.pitch_error is not None:
         # delta_5 is measured from e.

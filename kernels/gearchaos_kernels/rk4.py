@@ -19,22 +19,12 @@ from gearchaos_kernels.rows import Coordinates, State
 
 
 @scalar
-def step(state, s, lane, during, branches, present):
-    """Advance a state by a fraction of a step; return it and the mesh slopes of the four stages."""
-    begin, middle, end = during
-    return advance(stage, state, s, lane, (begin, middle, middle, end), branches, present)
-
-
-@scalar
-def tangent_step(tangent, s, lane, slopes, present):
-    """Advance a tangent vector by the derivative of `step` at the same stages."""
-    after, _ = advance(tangent_stage, tangent, s, lane, slopes, None, present)
-    return after
-
-
-@scalar
 def advance(stage, state, s, lane, given, branches, present):
-    """Return the end of a fraction of a step, and the slopes of its four stages."""
+    """Advance a state by a fraction of a step; return it and the mesh slopes of its four stages.
+
+    ``stage``: `motion`, with the forcing of each as ``given``, or `tangent` for a tangent vector,
+    with the slopes of the motion.
+    """
     y, w = state
     a1, slopes1 = stage(state, lane, given[0], branches, present)
     second = State(along(y, 0.5 * s, w), along(w, 0.5 * s, a1))
@@ -53,7 +43,7 @@ def advance(stage, state, s, lane, given, branches, present):
 
 
 @scalar
-def stage(state, lane, forcing, branches, present):
+def motion(state, lane, forcing, branches, present):
     """Return the accelerations of a state, per step squared, and the slopes of the mesh forces."""
     gaps = gaps_at(state, lane, forcing, present)
     forces, slopes = mesh_forces(gaps, lane, forcing.stiffness, branches, present)
@@ -61,10 +51,10 @@ def stage(state, lane, forcing, branches, present):
 
 
 @scalar
-def tangent_stage(tangent, lane, slopes, _branches, present):
+def tangent(vector, lane, slopes, _branches, present):
     """Return the accelerations of a tangent vector, per step squared, and the slopes."""
-    forces = tangent_forces(tangent, lane, slopes, present)
-    return accelerations(tangent, forces, 0.0, lane, present), slopes
+    forces = tangent_forces(vector, lane, slopes, present)
+    return accelerations(vector, forces, 0.0, lane, present), slopes
 
 
 @scalar

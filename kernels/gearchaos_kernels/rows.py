@@ -16,7 +16,7 @@ states; the last rows of a system with fewer than ten are unused.
 """
 
 from collections import namedtuple
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from gearchaos_kernels.system import STATES
 
@@ -65,11 +65,15 @@ class Branch(NamedTuple):
     ceiling: float
 
 
-class Branches(NamedTuple):
-    """The active pieces of the tangential and of the axial clearance."""
+class Directions(NamedTuple):
+    """Both gaps, clearances, forces or stiffnesses of the mesh."""
 
-    tangential: Branch
-    axial: Branch
+    tangential: Any
+    axial: Any
+
+
+ANYWHERE = Directions(None, None)
+"""In place of branches: each force is that of the branch on which its gap lies."""
 
 
 class Carried(NamedTuple):

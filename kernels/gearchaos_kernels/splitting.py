@@ -7,7 +7,7 @@ is repeated up to the crossing, then on the next branch, as often as it crosses.
 
 import math
 
-from gearchaos_kernels import rows
+from gearchaos_kernels import rk4, rows
 from gearchaos_kernels.block_memory import (
     read_branches,
     read_lane,
@@ -18,9 +18,7 @@ from gearchaos_kernels.block_memory import (
 from gearchaos_kernels.compilation import scalar
 from gearchaos_kernels.contact import NEVER, branches_at, leave, leaving_fraction
 from gearchaos_kernels.equations import gaps_at
-from gearchaos_kernels.forcing import During, forcing_at, phase_within
-from gearchaos_kernels.loads import tell_kink
-from gearchaos_kernels.rk4 import step, tangent_step
+from gearchaos_kernels.forcing import forcing_at, phase_within
 from gearchaos_kernels.rows import STRIDE
 from gearchaos_kernels.teeth import between, point_on_grid
 
@@ -59,10 +57,10 @@ def split_step(memory, slot, table, shares, number, recorded, present):
         )
         done += piece
         crossing = forcing_within(memory, slot, lane, table, shares, number, done, present)
-        during = During(begin, middle, crossing)
-        state, slopes = step(state, piece, lane, during, branches, present)
+        during = begin, middle, middle, crossing
+        state, slopes = rk4.advance(rk4.motion, state, piece, lane, during, branches, present)
         if present.tangent is not None:
-            tangent = tangent_step(tangent, piece, lane, slopes, present)
+            tangent, _ = rk4.advance(rk4.tangent, tangent, piece, lane, slopes, None, present)
         begin = crossing
         crossings += 1
         gaps = gaps_at(state, lane, begin, present)
@@ -70,18 +68,16 @@ def split_step(memory, slot, table, shares, number, recorded, present):
         branches, _, _ = leave(
             memory, slot, axially, gap, branches, lane, number + done, recorded, present
         )
-        if present.loads is not None:
-            if recorded:
-                tell_kink(memory, slot, axially, lane, gap)
 
         left = 1.0 - done
         middle = forcing_within(
             memory, slot, lane, table, shares, number, done + 0.5 * left, present
         )
-        after, slopes = step(state, left, lane, During(begin, middle, end), branches, present)
+        during = begin, middle, middle, end
+        after, slopes = rk4.advance(rk4.motion, state, left, lane, during, branches, present)
         write_state(memory, rows.STATE, slot, after, present)
         if present.tangent is not None:
-            tangent_after = tangent_step(tangent, left, lane, slopes, present)
+            tangent_after, _ = rk4.advance(rk4.tangent, tangent, left, lane, slopes, None, present)
             write_state(memory, rows.TANGENT, slot, tangent_after, present)
     if crossings > 0:
         write_branches(memory, slot, branches_at(gaps_after, lane.half_backlash, present))

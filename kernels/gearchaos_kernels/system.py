@@ -1,6 +1,7 @@
 """What is integrated, how long, and what comes of it: the records that go in and out."""
 
 import math
+from collections import namedtuple
 from enum import IntEnum
 from fractions import Fraction
 from typing import NamedTuple, Self
@@ -183,15 +184,12 @@ class Plan(NamedTuple):
         return bool(self.loads or self.states or self.orders)
 
 
-class Schedule(NamedTuple):
-    """What the compiled loop over the periods has to know of a plan."""
-
-    steps_per_period: int
-    transient_periods: int
-    recorded_periods: int
-    section_points: int
-    history_periods: int
-    first_period: int
+Schedule = namedtuple(
+    "Schedule",
+    "steps_per_period transient_periods recorded_periods section_points history_periods "
+    "first_period",
+)
+"""What the compiled loop over the periods has to know of a plan."""
 
 
 class Status(IntEnum):

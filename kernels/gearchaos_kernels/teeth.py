@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from gearchaos_kernels.block_memory import Present
 from gearchaos_kernels.compilation import scalar
-from gearchaos_kernels.forcing import Phase, phase_on_grid
+from gearchaos_kernels.forcing import Phase, phase_on_grid, phase_table
 from gearchaos_kernels.rows import MOST_PAIRS, NARROW, PAIRS, STRIDE
 from gearchaos_kernels.system import SPLINE_DEGREE, Floats, System, Teeth
 
@@ -26,11 +26,16 @@ NO_TEETH = Teeth(np.zeros((1, 1)), np.zeros((1, 1)), np.zeros(1, np.intp), np.ze
 
 
 def tables_of(system: System, present: Present, steps_per_period: int) -> tuple[Any, ...]:
-    """Return the table of shares of a system, its errors and profile: see `Teeth`."""
+    """Return the phase table of a system, that of the shares, its errors and profile: see `Teeth`.
+
+    Raises ValueError with too many pairs in mesh.
+    """
+    waves = tuple(system.stiffness_cosine), tuple(system.stiffness_sine)
+    phases = phase_table(*waves, steps_per_period)
     teeth = NO_TEETH if present.teeth is None or system.teeth is None else system.teeth
     errors = (np.ascontiguousarray(gear, np.float64) for gear in (teeth.driving, teeth.driven))
     profile = np.ascontiguousarray(teeth.profile, dtype=np.intp)
-    return share_table(teeth, steps_per_period), *errors, profile
+    return phases, share_table(teeth, steps_per_period), *errors, profile
 
 
 def share_table(teeth: Teeth, steps_per_period: int) -> Floats:

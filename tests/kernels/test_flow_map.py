@@ -122,7 +122,8 @@ def test_the_memory_of_maps_is_foretold_within_a_factor_of_two(scene, steps):
         pair = system_of(pan2021(1.0, mesh_frequency=frequency), scene)
         plan = Plan(steps, 0, 1, 0, method=FLOW_MAP)
         present = flags(pair, plan)
-        made = 8 * maps_of(pair, steps, present).steps[0] * layout.py_func(present).step_size
+        _, places = maps_of(pair, steps, present)
+        made = 8 * places[0, 0] * layout.py_func(present).step_size
         # Those kept and those being made.
         told = maps_memory(pair, plan, fewest_stable_steps(pair))
         assert 1 <= told / (2 * made) <= 2

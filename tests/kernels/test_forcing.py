@@ -21,16 +21,16 @@ STEPS = [*FEW_STEPS, 31, 100, 288, 1600, 20_000]
 FRACTIONS = np.concatenate([[0.0, 0.25, 0.5, 0.75, 1.0], np.linspace(0.0, 1.0, 37)[1:-1]])
 
 
-def series(harmonics: int) -> tuple[np.ndarray, np.ndarray]:
+def series(harmonics: int) -> list[tuple[float, ...]]:
     """Return coefficients that fall off no faster than those of a wave with jumps."""
     rng = np.random.default_rng(harmonics)
     order = np.arange(1, harmonics + 1)
-    return rng.uniform(-1.0, 1.0, harmonics) / order, rng.uniform(-1.0, 1.0, harmonics) / order
+    return [tuple(rng.uniform(-1.0, 1.0, harmonics) / order) for _ in range(2)]
 
 
 def variation(cosine, sine, angle) -> float:
     """eq. 19, as printed."""
-    order = np.arange(1, cosine.size + 1)
+    order = np.arange(1, len(cosine) + 1)
     return math.fsum(cosine * np.cos(order * angle) + sine * np.sin(order * angle))
 
 
