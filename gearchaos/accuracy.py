@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
-from gearchaos.command_line import OK, Command
+from gearchaos.command_line import Command
 from gearchaos.errors import ConfigurationError
 from gearchaos.interrupts import check
 from gearchaos.progress import notice, say
@@ -43,7 +43,7 @@ class Setting(NamedTuple):
         return max(self.section_error, self.exponent_error)
 
 
-def _accuracy(options: Namespace) -> int:
+def _accuracy(options: Namespace) -> None:
     from gearchaos.configuration import load_config
     from gearchaos.engine.running import choose_threads
     from gearchaos.engine.simulation import Simulation
@@ -80,7 +80,6 @@ def _accuracy(options: Namespace) -> int:
     for target in targets:
         save_figure(page, target, overwrite=options.overwrite)
     say(f"written: {', '.join(targets)}")
-    return OK
 
 
 def measure(simulation: "Simulation", steps: Sequence[int], lanes: int) -> list[Setting]:
@@ -137,5 +136,4 @@ def recommendation(settings: Sequence[Setting], error: float) -> str:
     return f"For an error of {error:.0e}: {best.steps} {best.mode} steps per mesh period."
 
 
-main = Command("accuracy", __doc__, _accuracy)
-main.start(__name__)
+main = Command("accuracy", __doc__, _accuracy).start(__name__)

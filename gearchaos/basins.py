@@ -10,13 +10,13 @@ from argparse import Namespace
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
-from gearchaos.command_line import OK, Command, coordinates
+from gearchaos.command_line import Command, coordinates
 
 if TYPE_CHECKING:
     from gearchaos.results.ensembles import Basins
 
 
-def _basins(options: Namespace) -> int:
+def _basins(options: Namespace) -> None:
     from gearchaos.engine.basins import find_basins
     from gearchaos.engine.running import compiling
     from gearchaos.figures import basins_page
@@ -48,7 +48,6 @@ def _basins(options: Namespace) -> int:
         print("\n".join([*table(found, slice_lines(where))]))
     if options.output:
         save_figure(basins_page(found), options.output)
-    return OK
 
 
 def table(found: "Basins", where: list[str]) -> Iterator[str]:
@@ -73,5 +72,4 @@ def table(found: "Basins", where: list[str]) -> Iterator[str]:
             yield from textwrap.wrap(text, 80, subsequent_indent="   ")
 
 
-main = Command("basins", __doc__, _basins)
-main.start(__name__)
+main = Command("basins", __doc__, _basins).start(__name__)

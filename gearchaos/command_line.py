@@ -11,7 +11,7 @@ from contextlib import suppress
 from functools import partial
 from io import TextIOWrapper
 from pathlib import Path
-from typing import Any, NamedTuple, TextIO
+from typing import Any, NamedTuple, Self, TextIO
 
 from gearchaos.errors import ConfigurationError, FileError, GearchaosError
 from gearchaos.interrupts import Termination, check, heeded
@@ -44,10 +44,10 @@ _SWEEPS = (_PACKAGE / "sweeps", _PACKAGE.parent / "sweeps")
 class Command(NamedTuple):
     """A command: called with arguments, by default those of this process, it returns its exit code.
 
-    That is what the body returns or with which argparse exits. A fault a user can cause becomes
-    lines on stderr, its notes after it, and a code: that of a GearchaosError, 4 for an operating
-    system error that nobody has worded or a lack of memory or of a package and, as the shell says,
-    130 for an interrupt, 143 for SIGTERM, 141 when the reader of the output has gone.
+    That is what the body returns, 0 for nothing, or with which argparse exits. A fault a user can
+    cause becomes lines on stderr, its notes after it, and a code: that of a GearchaosError, 4 for
+    an operating system error that nobody has worded or a lack of memory or of a package and, as the
+    shell says, 130 for an interrupt, 143 for SIGTERM, 141 when the reader of the output has gone.
 
     ``name`` is that of `COMMANDS`; ``text`` is what --help says before the options and, from the
     first empty line on, after them, where the exit codes follow. ``body`` does it, with the options
@@ -57,7 +57,7 @@ class Command(NamedTuple):
 
     name: str
     text: str
-    body: Callable[[Namespace], int]
+    body: Callable[[Namespace], int | None]
 
     def __call__(self, arguments: Sequence[str] | None = None) -> int:
         """Run the command and return its exit code."""
@@ -88,10 +88,11 @@ class Command(NamedTuple):
                     text += "; a package is missing or does not fit, install gearchaos again"
                 return _report(error, [f"error: {text}"], CANNOT_READ_OR_WRITE)
 
-    def start(self, module: str) -> None:
-        """Run the command as a process where its module, by ``__name__``, is what was started."""
+    def start(self, module: str) -> Self:
+        """Run it as a process where its module, by ``__name__``, is what was started."""
         if module == "__main__":
             sys.exit(self())
+        return self
 
     def _code(self, arguments: list[str]) -> int:
         try:
@@ -101,7 +102,7 @@ class Command(NamedTuple):
             # Matplotlib would refuse to be imported where the environment names an unknown backend.
             os.environ["MPLBACKEND"] = "agg"
             with speaking(quiet=options.quiet):
-                return self.body(options)
+                return self.body(options) or OK
         except SystemExit as leaving:
             return leaving.code if isinstance(leaving.code, int) else OK
 

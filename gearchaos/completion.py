@@ -8,10 +8,10 @@ gearchaos[completion].
 from argparse import ArgumentParser, Namespace
 from importlib import import_module
 
-from gearchaos.command_line import COMMANDS, OK, Command
+from gearchaos.command_line import COMMANDS, Command
 
 
-def _complete(options: Namespace) -> int:
+def _complete(options: Namespace) -> None:
     from gearchaos.results.tables import needed
 
     shtab = needed("shtab", "completion")
@@ -26,8 +26,6 @@ def _complete(options: Namespace) -> int:
                 action.complete = shtab.FILE
         parsers.add_parser(name, help=about["summary"], parents=[own], add_help=False)
     print(shtab.complete(whole, options.shell))
-    return OK
 
 
-main = Command("completion", __doc__, _complete)
-main.start(__name__)
+main = Command("completion", __doc__, _complete).start(__name__)

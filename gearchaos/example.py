@@ -3,18 +3,18 @@
 import tomllib
 from argparse import Namespace
 
-from gearchaos.command_line import OK, Command, sweep_file
+from gearchaos.command_line import Command, sweep_file
 from gearchaos.errors import ConfigurationError
 
 
-def _example(options: Namespace) -> int:
+def _example(options: Namespace) -> None:
     from gearchaos.results.atomic_file import check_output, replacing
 
     ready = {path.stem: path for path in sorted(sweep_file("pan2021.toml").parent.glob("*.toml"))}
     if options.name is None:
         for name, path in ready.items():
             print(f"{name:24} {tomllib.loads(path.read_text(encoding='utf-8'))['title']}")
-        return OK
+        return
     if (source := ready.get(options.name.removesuffix(".toml"))) is None:
         raise ConfigurationError(f"{options.name}: is no example; there are {', '.join(ready)}")
     # Measured deviations lie beside the configuration that names them.
@@ -25,8 +25,6 @@ def _example(options: Namespace) -> int:
         with replacing(file.name, overwrite=options.overwrite) as partial:
             partial.write_bytes(file.read_bytes())
         print(file.name, flush=True)
-    return OK
 
 
-main = Command("example", __doc__, _example)
-main.start(__name__)
+main = Command("example", __doc__, _example).start(__name__)

@@ -10,7 +10,7 @@ from contextlib import redirect_stderr, redirect_stdout
 from io import StringIO
 
 from gearchaos import plot
-from gearchaos.command_line import OK, Command
+from gearchaos.command_line import Command
 from gearchaos.errors import ConfigurationError, FigureError
 from gearchaos.progress import say
 
@@ -18,7 +18,7 @@ HOST = "127.0.0.1"
 PACKAGES = ("panel", "holoviews", "datashader")
 
 
-def _explore(options: Namespace) -> int:
+def _explore(options: Namespace) -> None:
     import webbrowser
     from socket import create_server
 
@@ -65,7 +65,6 @@ def _explore(options: Namespace) -> int:
     if not options.no_browser:
         webbrowser.open(address)
     server.io_loop.start()
-    return OK
 
 
 def _draw(arguments: Sequence[str]) -> None:
@@ -76,5 +75,4 @@ def _draw(arguments: Sequence[str]) -> None:
         raise FigureError(said.getvalue())
 
 
-main = Command("explore", __doc__, _explore)
-main.start(__name__)
+main = Command("explore", __doc__, _explore).start(__name__)

@@ -9,13 +9,13 @@ import os
 from argparse import Namespace
 from typing import Any
 
-from gearchaos.command_line import OK, Command
+from gearchaos.command_line import Command
 from gearchaos.errors import ConfigurationError, FileError
 
 ENDINGS = (".csv", ".parquet", ".mat")
 
 
-def _export(options: Namespace) -> int:
+def _export(options: Namespace) -> None:
     import numpy as np
 
     from gearchaos.results.atomic_file import check_output, replacing
@@ -46,8 +46,6 @@ def _export(options: Namespace) -> int:
             needed("pyarrow")
             result.to_dataframe(*options.along).to_parquet(partial, engine="pyarrow")
     print(options.output, flush=True)
-    return OK
 
 
-main = Command("export", __doc__, _export)
-main.start(__name__)
+main = Command("export", __doc__, _export).start(__name__)

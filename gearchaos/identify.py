@@ -10,14 +10,14 @@ import os
 import time
 from argparse import Namespace
 
-from gearchaos.command_line import OK, Command
+from gearchaos.command_line import Command
 from gearchaos.finishing import output_of
-from gearchaos.progress import Progress, say
+from gearchaos.progress import progress, say
 
 SECONDS_BETWEEN_SNAPSHOTS = 20.0
 
 
-def _identify(options: Namespace) -> int:
+def _identify(options: Namespace) -> None:
     import numpy as np
 
     from gearchaos.engine.provenance import provenance
@@ -54,11 +54,11 @@ def _identify(options: Namespace) -> int:
 
     most = targets.search.candidates + MOST_CENTRES * (1 + 2 * RUNGS * len(keys))
     try:
-        with Progress(most, len(known), unit="candidate") as bar:
+        with progress(most, len(known), "candidates") as bar:
             for found in search(judge, known, output):
                 tried = np.concatenate([tried, found])
                 if len(tried) > len(known):
-                    bar.advance(len(found))
+                    bar.update(len(found))
                     if time.monotonic() - spoke > SECONDS_BETWEEN_SNAPSHOTS:
                         keep()
                         spoke = time.monotonic()
@@ -72,8 +72,6 @@ def _identify(options: Namespace) -> int:
         keep()
     say(f"{output}: {len(tried)} candidates, {time.monotonic() - began:.1f} s")
     print("\n".join(report(judge, tried)), flush=True)
-    return OK
 
 
-main = Command("identify", __doc__, _identify)
-main.start(__name__)
+main = Command("identify", __doc__, _identify).start(__name__)

@@ -10,10 +10,10 @@ from argparse import Namespace
 from collections.abc import Mapping
 from typing import Any
 
-from gearchaos.command_line import OK, Command
+from gearchaos.command_line import Command
 
 
-def _info(options: Namespace) -> int:
+def _info(options: Namespace) -> None:
     # Imported only now: --help and --version answer at once, and an interrupt is caught.
     from gearchaos.progress import notice
     from gearchaos.results.overview import overview, overview_page
@@ -31,7 +31,6 @@ def _info(options: Namespace) -> int:
     # Where the terminal knows few characters, a title must not become a traceback.
     encoding = getattr(sys.stdout, "encoding", None) or "utf-8"
     print(text.encode(encoding, "replace").decode(encoding))
-    return OK
 
 
 def _settings(metadata: Mapping[str, Any]) -> list[str]:
@@ -55,5 +54,4 @@ def _settings(metadata: Mapping[str, Any]) -> list[str]:
     return [f"{key} = {shown(value)}{origins[key]}" for key, value in ran.items()]
 
 
-main = Command("info", __doc__, _info)
-main.start(__name__)
+main = Command("info", __doc__, _info).start(__name__)

@@ -72,5 +72,4 @@ def _require_all(store: "BlockStore", found: "Finished", shards: object) -> None
     store.require_all(found, remedy)
 
 
-main = Command("merge", __doc__, _merge)
-main.start(__name__)
+main = Command("merge", __doc__, _merge).start(__name__)

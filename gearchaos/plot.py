@@ -13,9 +13,9 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from gearchaos.command_line import OK, Command, coordinates
+from gearchaos.command_line import Command, coordinates
 from gearchaos.errors import FigureError
-from gearchaos.progress import Progress, say
+from gearchaos.progress import progress, say
 
 if TYPE_CHECKING:
     from gearchaos.figures.page import Page
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 RESULT_ENDINGS = (".h5", ".hdf5", ".nc")
 
 
-def _plot(options: Namespace) -> int:
+def _plot(options: Namespace) -> None:
     from gearchaos.figures.page import check_figures, save_figure
     from gearchaos.figures.response import is_response
     from gearchaos.gear.tooth_deviations import REALISATION
@@ -44,19 +44,18 @@ def _plot(options: Namespace) -> int:
         sheets = [(f"{name}_physical", draw) for name, draw in sheets]
     targets = [_targets(options, name, len(sheets) == 1) for name, _ in sheets]
     check_figures([path for paths in targets for path in paths], options.result, options.overwrite)
-    with Progress(len(sheets), unit="page") as bar:
+    with progress(len(sheets), unit="pages") as bar:
         for (_, draw), paths in zip(sheets, targets, strict=True):
             figure = draw()
             for path in paths:
                 save_figure(figure, path, dpi=options.dpi)
                 bar.write(str(path))
-            bar.advance(1)
+            bar.update()
     width, height = (25.4 * inches for inches in figure.get_size_inches())
     size = f"{width:.0f} mm x {height:.0f} mm at {options.dpi} dpi"
     hint = "; --shares draws how many of the gear pairs move in which way"
     drawn_pairs = not options.shares and any(REALISATION in one.axes for one in results)
     say(f"{'; '.join(map(_lanes_in_words, results))}, {size}{hint if drawn_pairs else ''}")
-    return OK
 
 
 def _titles(results: "Sequence[Result]", paths: Sequence[Path]) -> list[str]:
@@ -190,5 +189,4 @@ def _lanes_in_words(result: "Result") -> str:
     return f"{words}, {diverged} of them diverged" if diverged else words
 
 
-main = Command("plot", __doc__, _plot)
-main.start(__name__)
+main = Command("plot", __doc__, _plot).start(__name__)

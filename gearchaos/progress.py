@@ -2,11 +2,11 @@
 
 import sys
 import threading
-import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar, copy_context
-from typing import Self
+from io import StringIO
+from typing import Any
 
 SECONDS_BETWEEN_LINES = 30.0
 SECONDS_BEFORE_NOTICE = 0.5
@@ -50,39 +50,23 @@ def notice(text: str) -> Iterator[None]:
         timer.cancel()
 
 
-class Progress:
-    """Lanes or pages done of so many: a bar on a terminal, a plain line now and then elsewhere."""
+def progress(total: int, done: int = 0, unit: str = "lanes") -> Any:
+    """Tell of so many lanes or pages how many are done.
 
-    def __init__(self, lanes: int, done: int = 0, unit: str = "lane") -> None:
-        from tqdm import tqdm
+    On a terminal that is a bar, elsewhere a plain line now and then, and one at the end.
+    """
+    from tqdm import tqdm
 
-        self._unit = unit
-        self._lanes, self._done, self._began_with = lanes, done, done
-        # Of one there is nothing to tell but that it is done.
-        self._lines = lanes > 1 and not sys.stderr.isatty()
-        self._began = self._spoke = time.monotonic()
-        hidden = _quiet.get() or self._lines or lanes < 2
-        self._bar = tqdm(total=lanes, initial=done, unit=unit, disable=hidden, dynamic_ncols=True)
+    class Lines(tqdm):  # type: ignore[misc]
+        def display(self, **_: object) -> None:
+            if self.n > self.last_print_n:
+                say(str(self))
 
-    def advance(self, lanes: int) -> None:
-        """Tell that more lanes are done."""
-        self._done += lanes
-        self._bar.update(lanes)
-        now = time.monotonic()
-        if self._lines and (now - self._spoke > SECONDS_BETWEEN_LINES or self._done == self._lanes):
-            self._spoke = now
-            rate = (self._done - self._began_with) / max(now - self._began, 1e-9)
-            left = (self._lanes - self._done) / rate
-            done = f"{self._done} of {self._lanes} {self._unit}s"
-            say(f"{done}, {rate:.{int(rate < 10)}f} {self._unit}s/s, {left:.0f} s left")
-
-    def write(self, text: str) -> None:
-        """Print a line on stdout, above the bar where both are on one terminal."""
-        self._bar.write(text)
-        sys.stdout.flush()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._bar.close()
+    # Of one there is nothing to tell but that it is done.
+    told: dict[str, Any] = {"total": total, "initial": done, "unit": f" {unit}"}
+    told["disable"] = _quiet.get() or total < 2
+    if sys.stderr.isatty():
+        return tqdm(**told, dynamic_ncols=True)
+    text = "{n} of {total}{unit}, {rate_noinv_fmt}, {remaining} left"
+    seldom = {"mininterval": SECONDS_BETWEEN_LINES, "miniters": 1}
+    return Lines(**told, **seldom, bar_format=text, file=StringIO())

@@ -8,11 +8,11 @@ import time
 from argparse import Namespace
 from pathlib import Path
 
-from gearchaos.command_line import OK, Command, sweep_file
+from gearchaos.command_line import Command, sweep_file
 from gearchaos.progress import say
 
 
-def _reproduce(options: Namespace) -> int:
+def _reproduce(options: Namespace) -> None:
     from gearchaos.configuration import load_config
     from gearchaos.engine.running import choose_threads
     from gearchaos.paper.computation import compute
@@ -27,8 +27,6 @@ def _reproduce(options: Namespace) -> int:
     found = compute(*configs, threads=options.threads)
     print(write_gallery(found, folder, overwrite=options.overwrite), flush=True)
     say(f"done in {time.monotonic() - began:.0f} s")
-    return OK
 
 
-main = Command("reproduce", __doc__, _reproduce)
-main.start(__name__)
+main = Command("reproduce", __doc__, _reproduce).start(__name__)

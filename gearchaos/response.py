@@ -104,5 +104,4 @@ def _configuration(options: Namespace) -> "Asked":
     return config, config.text, [], ""
 
 
-main = Command("response", __doc__, _respond)
-main.start(__name__)
+main = Command("response", __doc__, _respond).start(__name__)

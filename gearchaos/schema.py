@@ -2,17 +2,15 @@
 
 from argparse import Namespace
 
-from gearchaos.command_line import OK, Command
+from gearchaos.command_line import Command
 
 
-def _describe(options: Namespace) -> int:
+def _describe(options: Namespace) -> None:
     import json
 
     from gearchaos.configuration.schema import json_schema, key_tables
 
     print(key_tables() if options.keys else json.dumps(json_schema(), indent=2))
-    return OK
 
 
-main = Command("schema", __doc__, _describe)
-main.start(__name__)
+main = Command("schema", __doc__, _describe).start(__name__)

@@ -10,7 +10,7 @@ from argparse import Namespace
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
-from gearchaos.command_line import OK, Command, coordinates
+from gearchaos.command_line import Command, coordinates
 from gearchaos.errors import ConfigurationError
 
 if TYPE_CHECKING:
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 WIDTH = 80  # Columns of a terminal.
 
 
-def _stages(options: Namespace) -> int:
+def _stages(options: Namespace) -> None:
     from gearchaos.results.jumps import apart, crises, jumps
     from gearchaos.results.overview import plain, slice_lines
     from gearchaos.results.result import open_result
@@ -41,7 +41,8 @@ def _stages(options: Namespace) -> int:
     where = slice_facts(whole, result)
     lanes = labelled_lanes(result, name=options.result, repeats=True)
     if options.refine is not None and not options.at and {*whole.axes} - {whole.axis, *UNSWEPT}:
-        return _map_boundaries(whole, options)
+        _map_boundaries(whole, options)
+        return
     stages = stage_table(lanes, options.narrowest)
     stretches = apart(part, options.narrowest)
     boundaries, outlasting = _computed_again(part, result, stages, stretches, options)
@@ -63,7 +64,7 @@ def _stages(options: Namespace) -> int:
             "survival": outlasting,
         }
         print(json.dumps(plain(facts), indent=1))
-        return OK
+        return
     mixed = int((result[RECORD] == 1).sum()) if RECORD in result else 0
     told = [*band_lines(stages), *remarks(jumping, bursting, mixed), *directions_apart(stretches)]
     told += [outlasting.text] if outlasting else []
@@ -75,10 +76,9 @@ def _stages(options: Namespace) -> int:
     first = table(result.axis, stages, [*filter(None, head)])
     parts = map("\n".join, (first, told, boundary_list(boundaries or ())))
     print("\n\n".join(filter(None, parts)))
-    return OK
 
 
-def _map_boundaries(result: "Result", options: Namespace) -> int:
+def _map_boundaries(result: "Result", options: Namespace) -> None:
     """Find the boundaries in all rows of a map, and tell what that saves."""
     from gearchaos.engine.recomputing import refinable
     from gearchaos.engine.refinement import refined_map
@@ -107,11 +107,10 @@ def _map_boundaries(result: "Result", options: Namespace) -> int:
             "lanes_of_a_map_as_fine": fine,
         }
         print(json.dumps(plain(facts), indent=1))
-        return OK
+        return
     for value, found in rows.items():
         print(f"{second} = {value:.6g}", *boundary_list(found), sep="\n")
     print(f"{lanes} lanes were computed; a map as fine everywhere would have {fine}")
-    return OK
 
 
 def _computed_again(
@@ -201,5 +200,4 @@ def boundary_list(boundaries: "Sequence[Boundary]") -> Iterator[str]:
             yield f"    multiplier {real:.4f}{pair}"
 
 
-main = Command("stages", __doc__, _stages)
-main.start(__name__)
+main = Command("stages", __doc__, _stages).start(__name__)

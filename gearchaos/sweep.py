@@ -112,5 +112,4 @@ def _command(name: str, *arguments: str) -> str:
     return join([sys.orig_argv[0], "-m", f"gearchaos.{name}", *arguments])
 
 
-main = Command("sweep", __doc__, _sweep)
-main.start(__name__)
+main = Command("sweep", __doc__, _sweep).start(__name__)

@@ -16,7 +16,7 @@ from gearchaos.engine.error_check import Tally
 from gearchaos.engine.simulation import Arrays, Bounds, Simulation
 from gearchaos.errors import FileError, GearchaosError
 from gearchaos.interrupts import check
-from gearchaos.progress import Progress
+from gearchaos.progress import progress
 
 if TYPE_CHECKING:
     from gearchaos.engine.dask_executor import DaskExecutor
@@ -73,13 +73,13 @@ def compute_blocks(
     tally, waiting = tally or Tally(), list(reversed(blocks))
     lanes = done + sum(last - first for first, last in blocks)
     futures: dict[Future[Arrays], Bounds] = {}
-    with Progress(lanes, done) as progress:
+    with progress(lanes, done) as bar:
 
         def collect(future: Future[Arrays], block: Bounds) -> None:
             arrays = future.result()
             keep(block, arrays)
             tally.add(arrays)
-            progress.advance(block[1] - block[0])
+            bar.update(block[1] - block[0])
 
         try:
             while waiting or futures:

@@ -231,7 +231,7 @@ def test_the_command_draws_a_page_for_each_lane(path, arguments, names, capsys):
         assert not progress
     else:
         (line,) = progress
-        assert re.fullmatch(r"gearchaos plot: 2 of 2 pages, [\d.]+ pages/s, 0 s left", line)
+        assert re.fullmatch(r"gearchaos plot: 2 of 2 pages, *[\d.]+ pages/s, 00:00 left", line)
 
 
 def test_the_strip_below_a_force_covers_the_record_with_the_states_of_contact():
