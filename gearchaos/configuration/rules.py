@@ -1,6 +1,5 @@
 """Rules that tie several keys of a configuration together, but for those of the sweeps."""
 
-from collections import Counter
 from collections.abc import Callable, Iterator
 from functools import partial
 from typing import TypeAlias
@@ -54,13 +53,6 @@ def _contact_ratio_is_known(config: Tables) -> Iterator[Fault]:
         yield Fault("mesh.stiffness", rule, 'give [pair], or shape = "fourier"')
 
 
-def _named_once(table: str, key: str, config: Tables) -> Iterator[Fault]:
-    names = getattr(getattr(config, table), key)
-    for name, times in Counter(names).items():
-        if times > 1:
-            yield Fault(f"{table}.{key}", f"names `{name}` {times} times", "name it once", names)
-
-
 def _states_exist(table: str, key: str, config: Tables) -> Iterator[Fault]:
     names, states = getattr(getattr(config, table), key), config.scene.states
     for name in dict.fromkeys(names):
@@ -71,13 +63,9 @@ def _states_exist(table: str, key: str, config: Tables) -> Iterator[Fault]:
             yield Fault(f"{table}.{key}", rule, remedy, tuple(names))
 
 
-reads("scene")(partial(_named_once, "scene", "effects"))
-for _key in ("section", "states"):
-    reads("outputs")(partial(_named_once, "outputs", _key))
-    reads("scene", "outputs")(partial(_states_exist, "outputs", _key))
-reads("scene", "start")(partial(_states_exist, "start", "state"))
-reads("scene", "start")(partial(_states_exist, "start", "box"))
-reads("scene", "start")(partial(_states_exist, "start", "drawn"))
+for _table, _keys in (("outputs", ("section", "states")), ("start", ("state", "box", "drawn"))):
+    for _key in _keys:
+        reads("scene", _table)(partial(_states_exist, _table, _key))
 
 
 @reads("start")

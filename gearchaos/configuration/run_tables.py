@@ -6,7 +6,7 @@ from collections.abc import Collection
 from fractions import Fraction
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Self, TypeAlias, get_args
 
-from pydantic import BeforeValidator, Field, create_model, model_validator
+from pydantic import AfterValidator, BeforeValidator, Field, create_model, model_validator
 
 from gearchaos.configuration.keys import Harmonics, Numbers, Table, key
 from gearchaos.gear.groups import GROUP_TABLE, GroupRow
@@ -34,6 +34,10 @@ State: TypeAlias = Literal[
     "delta_4_rate",
 ]
 STATES: tuple[str, ...] = get_args(State)
+_ONCE = AfterValidator(lambda names: tuple(dict.fromkeys(names)))
+"""Repeating a name is no mistake worth a message."""
+
+States: TypeAlias = Annotated[tuple[State, ...], Field(strict=False), _ONCE]
 Order: TypeAlias = Annotated[
     str,
     BeforeValidator(str, json_schema_input_type=int | str),
@@ -81,7 +85,7 @@ else:
 class Scene(Table):
     """Which effects exist; what is not listed is not computed."""
 
-    effects: Annotated[tuple[Effect, ...], Field(strict=False)] = key(
+    effects: Annotated[tuple[Effect, ...], Field(strict=False), _ONCE] = key(
         "the effects that exist beside torsion and mesh damping",
         example=["pitch_error", "stiffness_variation", "backlash", "transverse"],
     )
@@ -204,7 +208,7 @@ class Integration(Table):
 class Outputs(Table):
     """What is kept of every lane."""
 
-    section: Annotated[tuple[State, ...], Field(strict=False)] = key(
+    section: States = key(
         "states recorded once per mesh period", example=["delta_5"], default=("delta_5",)
     )
     section_points: int = key("last mesh periods of the section that are kept", default=100, ge=1)
@@ -215,7 +219,7 @@ class Outputs(Table):
     """whether the shares of time on either flank and the impacts on it are told"""
     loads: bool = key(default=False)
     """whether mesh forces, load factors and the transmission error are told"""
-    states: Annotated[tuple[State, ...], Field(strict=False)] = key(example=["delta_5"], default=())
+    states: States = key(example=["delta_5"], default=())
     """states of which extremes, and amplitudes at the orders, are told"""
     orders: Annotated[tuple[Order, ...], Field(strict=False, max_length=1000)] = key(
         "multiples of the mesh frequency, whole or fractions of two whole numbers, at which "

@@ -31,12 +31,8 @@ def unknown_parameter(key: str, parameter: str) -> Iterator[Fault]:
     remedy = suggestion(parameter, [*SWEEPABLE_GROUPS, *SWEEPABLE_KEYS]) or (
         f"groups: {', '.join(SWEEPABLE_GROUPS)}; physical keys: {', '.join(SWEEPABLE_KEYS)}"
     )
-    if parameter in GROUPS_BY_NAME:
-        rule, remedy = "a list of harmonics cannot be swept", "sweep stiffness_variation_scale"
-    elif parameter.startswith("bearings."):
-        group = "_".join(parameter.removeprefix("bearings.").split("_")[:2])
-        rule = "holds two values, so it cannot be swept"
-        remedy = f"sweep {group}_p or {group}_g"
+    if parameter.startswith("bearings."):
+        remedy = "sweep the group of one gear, such as axial_damping_p"
     yield Fault(key, rule, remedy, parameter)
 
 
@@ -143,16 +139,13 @@ def _without_effect(config: Tables, table: str, values: Floats) -> Fault:
     parameter, swept = config.sweeps[table].parameter, config.swept
     derived = derive_groups({**config.physical(), parameter: values}, without=HARMONICS)
     names = [name for name, value in derived.items() if np.ndim(value) > 0]
-    winners = [name for name in names if name in swept]
-    given = [name for name in names if name in config.groups.given()]
+    stronger = [name for name in names if name in swept or name in config.groups.given()]
     rows = [GROUPS_BY_NAME[name] for name in names or [parameter] if name in GROUPS_BY_NAME]
     off = [row for row in rows if not row.needed_by(config.scene.effects)]
     rule = "changes nothing in this scene"
-    if winners:
-        rule += f": {swept[winners[0]]} sweeps {winners[0]}, and a group wins over a derived one"
-        remedy = f"sweep one of the two, {parameter} or {winners[0]}, beside another parameter"
-    elif given:
-        remedy = f"remove {', '.join(given)} from [groups], where a group wins over a derived one"
+    if stronger:
+        rule += ", where a group that is given or swept wins over a derived one"
+        remedy = f"leave out {', '.join(stronger)}, or sweep another parameter"
     elif off:
         effects = [f'"{name}"' for name in sorted(set().union(*(row.effects for row in off)))]
         rule += ", for it acts on an effect that is off"
