@@ -24,23 +24,22 @@ NEAR_FOLD = 0.1  # An orbit that ends with a real multiplier this close to +1 en
 
 
 class StabilityLoss(IntEnum):
-    """How an orbit loses stability."""
+    """How an orbit loses stability; of two sides of a boundary, the earlier one here tells more."""
 
-    STAYS_STABLE = 0
-    PERIOD_DOUBLING = 1
+    PERIOD_DOUBLING = 0
+    NEIMARK_SACKER = 1
     FOLD = 2
-    NEIMARK_SACKER = 3
+    STAYS_STABLE = 3
     NOT_FOLLOWED = 4
 
 
-STABILITY_LOSS_TEXTS = {
-    StabilityLoss.STAYS_STABLE: "the orbit stays stable: the motion went to one that coexists",
-    StabilityLoss.PERIOD_DOUBLING: "period doubling: a real multiplier passes -1",
-    StabilityLoss.FOLD: "fold, or where the orbit goes on symmetry breaking: a real multiplier "
-    "reaches +1",
-    StabilityLoss.NEIMARK_SACKER: "Neimark-Sacker: a complex pair leaves the unit circle",
-    StabilityLoss.NOT_FOLLOWED: "the orbit could not be followed, with no multiplier near +1",
-}
+STABILITY_LOSS_TEXTS = (
+    "period doubling: a real multiplier passes -1",
+    "Neimark-Sacker: a complex pair leaves the unit circle",
+    "fold, or where the orbit goes on symmetry breaking: a real multiplier reaches +1",
+    "the orbit stays stable: the motion went to one that coexists",
+    "the orbit could not be followed, with no multiplier near +1",
+)
 
 
 class Orbit(NamedTuple):

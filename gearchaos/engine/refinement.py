@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
+from operator import itemgetter
 from typing import NamedTuple
 
 import numba
@@ -10,12 +11,7 @@ from gearchaos_kernels import System, integrate
 
 from gearchaos.arrays import Array, Floats
 from gearchaos.configuration import Configuration, swept_values
-from gearchaos.dynamics.following import (
-    STABILITY_LOSS_TEXTS,
-    Followed,
-    StabilityLoss,
-    follow,
-)
+from gearchaos.dynamics.following import STABILITY_LOSS_TEXTS, Followed, StabilityLoss, follow
 from gearchaos.dynamics.labelling import LOOKS, labels_of
 from gearchaos.dynamics.systems import plan_of, system_of
 from gearchaos.engine.lanes import start_states
@@ -31,15 +27,6 @@ from gearchaos.results.variables import LABELS, WAYS
 FOLLOWED_WIDTH = 2.0**-16
 """Share of its way to which the end of an orbit is located: next to a fold a multiplier nears +1
 like the root of the distance, so that a coarse end tells nothing."""
-
-_TELLING = (
-    StabilityLoss.PERIOD_DOUBLING,
-    StabilityLoss.NEIMARK_SACKER,
-    StabilityLoss.FOLD,
-    StabilityLoss.STAYS_STABLE,
-    StabilityLoss.NOT_FOLLOWED,
-)
-"""Of what an orbit below and one above a boundary do, the earlier one here tells more."""
 
 
 class Boundary(NamedTuple):
@@ -162,7 +149,7 @@ def refined_jumps(
         stable = np.where(goes_on, last["value"], followed.stable_value)
         lost = np.where(goes_on, beyond["value"], followed.beyond_value)
         for n, kind in enumerate(followed.loss):
-            told = STABILITY_LOSS_TEXTS[StabilityLoss(kind)] if last["period"][n] else ""
+            told = STABILITY_LOSS_TEXTS[kind] if last["period"][n] else ""
             sides = (float(stable[n]), last["label"][n]), (float(lost[n]), beyond["label"][n])
             (below, one), (above, other) = sides[::step]
             multiplier = complex(followed.multiplier[n])
@@ -217,14 +204,12 @@ def _losses(
     told = []
     for number in range(spacing.size):
         sides = [
-            (StabilityLoss(followed.loss[number]), complex(followed.multiplier[number]))
+            (followed.loss[number], complex(followed.multiplier[number]))
             for followed, edge in ((upwards, below), (downwards, above))
             if edge["period"][number] > 0
         ]
-        tells, multiplier = min(
-            sides, key=lambda side: _TELLING.index(side[0]), default=(None, complex("nan"))
-        )
-        told.append((STABILITY_LOSS_TEXTS[tells] if tells is not None else "", multiplier))
+        loss, multiplier = min(sides, key=itemgetter(0), default=(None, complex("nan")))
+        told.append(("" if loss is None else STABILITY_LOSS_TEXTS[loss], multiplier))
     return told
 
 
