@@ -9,7 +9,7 @@ import time
 from argparse import Namespace
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 from gearchaos.command_line import Command
 from gearchaos.errors import ConfigurationError
@@ -18,6 +18,7 @@ from gearchaos.progress import notice, say
 
 if TYPE_CHECKING:
     from gearchaos.engine.simulation import Simulation
+    from gearchaos.engine.steps import Candidate
 
 MODES = {"plain": (False, "rk4"), "resolved": (True, "rk4"), "flow map": (True, "flow_map")}
 """Each with its setting of `Plan`: resolved, method."""
@@ -25,22 +26,6 @@ FLOW_MAP_STEPS = (6, 12, 24, 48, 96, 192)
 TRUTH_STEPS = 384
 ROUNDS = 3
 WANTED = (1e-4, 1e-6, 1e-8)
-
-
-class Setting(NamedTuple):
-    """What one step size gives, beside its cost."""
-
-    steps: int
-    mode: str
-    section_error: float
-    exponent_error: float
-    changed_share: float
-    seconds: float
-
-    @property
-    def error(self) -> float:
-        """The larger of the two errors."""
-        return max(self.section_error, self.exponent_error)
 
 
 def _accuracy(options: Namespace) -> None:
@@ -82,16 +67,16 @@ def _accuracy(options: Namespace) -> None:
     say(f"written: {', '.join(targets)}")
 
 
-def measure(simulation: "Simulation", steps: Sequence[int], lanes: int) -> list[Setting]:
+def measure(simulation: "Simulation", steps: Sequence[int], lanes: int) -> "list[Candidate]":
     """Measure error and time of every number of steps per mesh period, plain and resolved.
 
     Beside them those of `FLOW_MAP_STEPS`. So many lanes are tried, spread evenly over the sweep.
     """
-    from statistics import fmean, median
+    from statistics import median
 
     from gearchaos.engine.running import compiling
-    from gearchaos.engine.steps import pilot
-    from gearchaos.records.difference import bound, difference
+    from gearchaos.engine.steps import candidate, pilot
+    from gearchaos.records.difference import difference
 
     with compiling():
         _, solution = pilot(simulation.lanes, simulation.plan, lanes, TRUTH_STEPS)
@@ -109,12 +94,12 @@ def measure(simulation: "Simulation", steps: Sequence[int], lanes: int) -> list[
             found = solution(count, *MODES[mode])
             seconds.append(time.perf_counter() - began)
         apart = difference(found, truth)
-        errors = bound(apart.section_error), bound(apart.exponent_error[apart.period > 0])
-        settings.append(Setting(count, mode, *errors, fmean(apart.changed), median(seconds)))
+        one = candidate(count, apart, apart.period > 0)
+        settings.append(one._replace(mode=mode, seconds=median(seconds)))
     return settings
 
 
-def table(settings: Sequence[Setting]) -> list[str]:
+def table(settings: "Sequence[Candidate]") -> list[str]:
     """Word the measurement as lines of a table."""
     cheapest = min(setting.seconds for setting in settings)
     return [
@@ -127,7 +112,7 @@ def table(settings: Sequence[Setting]) -> list[str]:
     ]
 
 
-def recommendation(settings: Sequence[Setting], error: float) -> str:
+def recommendation(settings: "Sequence[Candidate]", error: float) -> str:
     """Name the cheapest setting that reaches an error."""
     enough = [setting for setting in settings if setting.error <= error]
     if not enough:

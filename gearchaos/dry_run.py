@@ -61,8 +61,8 @@ def describe(simulation: Simulation, output: str, shard: Shard | None, as_json: 
     unused = f" (nothing that is kept needs {unused})" if unused else ""
     pair, groups = {}, lanes.parameters
     if config.pair is not None and {FREQUENCY, LENGTH} <= {*groups}:
-        length, load = (np.mean(groups[name].value) for name in (LENGTH, "load"))
-        hertz = np.mean(groups[FREQUENCY].value) / (2.0 * math.pi)
+        length, load = (np.mean(groups[name].values) for name in (LENGTH, "load"))
+        hertz = np.mean(groups[FREQUENCY].values) / (2.0 * math.pi)
         text = f"{hertz:.4g} Hz, that of the mesh at {60.0 * hertz / config.pair.teeth[0]:.0f} rpm"
         pair = {"pair": f"natural frequency {text}; static deflection {load * length:.4g} um"}
     for key, value in {

@@ -30,15 +30,13 @@ RESULT_ENDINGS = (".h5", ".hdf5", ".nc")
 def _plot(options: Namespace) -> None:
     from gearchaos.figures.page import check_figures, save_figure
     from gearchaos.figures.response import is_response
-    from gearchaos.gear.tooth_deviations import REALISATION
 
     results = [_opened(path, options.at) for path in options.result]
     if options.units == "physical":
         results = [one.physical() for one in results]
     responses = [is_response(one) for one in results]
-    if any(responses) and len(results) > 1:
-        path = options.result[responses.index(True)]
-        raise FigureError(f"{path}: is a response; draw it alone, only sweeps share a page")
+    if any(responses):
+        _draws_alone("a response", options, "stages", "shares", "mark")
     sheets = (_response_sheets if responses[0] else _sweep_sheets)(results, options)
     if options.units == "physical":
         sheets = [(f"{name}_physical", draw) for name, draw in sheets]
@@ -53,9 +51,15 @@ def _plot(options: Namespace) -> None:
             bar.update()
     width, height = (25.4 * inches for inches in figure.get_size_inches())
     size = f"{width:.0f} mm x {height:.0f} mm at {options.dpi} dpi"
-    hint = "; --shares draws how many of the gear pairs move in which way"
-    drawn_pairs = not options.shares and any(REALISATION in one.axes for one in results)
-    say(f"{'; '.join(map(_lanes_in_words, results))}, {size}{hint if drawn_pairs else ''}")
+    say(f"{'; '.join(map(_lanes_in_words, results))}, {size}")
+
+
+def _draws_alone(page: str, options: Namespace, *others: str) -> None:
+    """Refuse several results on a page other than a diagram, and the options that it lacks."""
+    asked = [f"--{name}" for name in others if getattr(options, name)]
+    for fault in (*asked, *map(str, options.result[1:])):
+        rule = f"only diagrams of sweeps are drawn with it, and this is {page}; leave it out"
+        raise FigureError(f"{fault}: {rule}")
 
 
 def _titles(results: "Sequence[Result]", paths: Sequence[Path]) -> list[str]:
@@ -83,23 +87,15 @@ def _sweep_sheets(results: "Sequence[Result]", options: Namespace) -> "list[Shee
         rule = f"no swept parameter of the figure, which are {', '.join(swept)}"
         raise FigureError(f"--mark {unknown[0]}: is {rule}")
     if options.shares:
-        if len(results) > 1 or options.variable or options.stages:
-            rule = "draws one result, and no diagram: leave --variable and --stages out"
-            raise FigureError(f"--shares: {rule}")
+        _draws_alone("a figure of shares", options, "variable", "stages")
         width = options.width or SINGLE_COLUMN_MM
         drawn = (options.low, options.high), width, options.height
         return [(f"{name}_shares", partial(shares_page, results[0], *drawn))]
     size = {"width_mm": options.width or SINGLE_COLUMN_MM, "height_mm": options.height}
     shown: dict[str, Any] = {"between": (options.low, options.high)}
-    maps = [number for number, one in enumerate(results) if len(swept_axes(one)) > 1]
+    maps = [axes for axes in map(swept_axes, results) if len(axes) > 1]
     if maps:
-        if len(results) > 1 or options.stages:
-            one = results[maps[0]]
-            axis, other = swept_axes(one)
-            raise FigureError(
-                f"{options.result[maps[0]]}: runs over {axis} and {other}: a map is drawn alone "
-                f"and without --stages; --at {axis}={one[axis][0]:g} draws a diagram"
-            )
+        _draws_alone(f"a map, of which --at {maps[0][0]}=VALUE makes a diagram", options, "stages")
         draw = partial(map_page, results[0], options.variable, marked=marked, **shown, **size)
         return [(name, draw)]
     name += "_stages" if options.stages else ""
@@ -116,12 +112,6 @@ def _response_sheets(results: "Sequence[Result]", options: Namespace) -> "list[S
     from gearchaos.figures.response import COORDINATE
     from gearchaos.figures.style import DOUBLE_COLUMN_MM
 
-    for option in ("stages", "shares", "mark"):
-        if getattr(options, option):
-            raise FigureError(
-                f"--{option}: {options.result[0]} is a response; it belongs to "
-                "the diagram of a sweep"
-            )
     (result,) = results
     lanes = select_lanes(result, (options.low, options.high))
     if lanes.diverged.all():

@@ -97,7 +97,7 @@ def _mistaken_units(lanes: Lanes) -> str:
     error = () if lanes.repeats_after > 1 else ("pitch_error", "pitch_error_amplitude", LENGTH)
     for what, names in {"static deflection": ("load", LENGTH), "pitch error": error}.items():
         if names and {*names} <= {*groups}:
-            um = math.prod(float(np.abs(groups[name].value).max()) for name in names)
+            um = math.prod(float(np.abs(groups[name].values).max()) for name in names)
             found += [f"{what} {um:.4g} um"] if um > 100.0 * pair.normal_module_mm else []
     if (pair.face_width_mm or math.inf) < pair.normal_module_mm:
         found.append(f"face width {pair.face_width_mm:g} mm")
@@ -110,10 +110,10 @@ def _negative_stiffness(lanes: Lanes) -> str:
     if "stiffness_variation" not in lanes.effects:
         return ""
     parameters = lanes.parameters
-    waves = (parameters[f"stiffness_{part}"].value for part in ("cosine", "sine"))
+    waves = (parameters[f"stiffness_{part}"].values for part in ("cosine", "sine"))
     cosine, sine = map(np.atleast_1d, waves)
     variation = series_table(cosine - 1j * sine, PHASES) - 1.0
-    scale = np.asarray(parameters["stiffness_variation_scale"].value)
+    scale = np.asarray(parameters["stiffness_variation_scale"].values)
     lowest = 1.0 + np.min(np.outer([scale.min(), scale.max()], variation))
     if lowest >= 0.0:
         return ""

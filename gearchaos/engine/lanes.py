@@ -13,12 +13,10 @@ from gearchaos.configuration.run_tables import states_of
 from gearchaos.configuration.tables import SWEEPABLE_GROUPS, SWEEPABLE_KEYS, groups_at, physical_at
 from gearchaos.dynamics.systems import system_of
 from gearchaos.gear.derivation import SCALES, derive_scales
-from gearchaos.gear.groups import GROUP_TABLE
+from gearchaos.gear.groups import GROUP_TABLE, HARMONICS
 from gearchaos.gear.tooth_deviations import REALISATION
 from gearchaos.results import variables as known
-from gearchaos.results.result_file import Parameter
-
-Texts = tuple[str, str, str]
+from gearchaos.results.variables import Variable
 
 _DRAWS_PER_LANE = 12
 """Random numbers set aside per lane: a multiple of the four that one Philox counter yields."""
@@ -116,7 +114,7 @@ class Lanes:
         return np.unique(chosen.round().astype(np.intp))
 
     @property
-    def parameters(self) -> dict[str, Parameter]:
+    def parameters(self) -> dict[str, Variable]:
         """The groups of the model with their origin; those that no effect needs are left out."""
         names = [known.axis_name(parameter) for parameter in self._values]
         sizes = [values.size for values in self._values.values()]
@@ -125,26 +123,26 @@ class Lanes:
         values = {p: np.expand_dims(v, axes) for (p, v), axes in swept}
         groups = groups_at(self.config, values)
 
-        def entry(value: Any, origin: str, texts: Texts, is_list: bool = False) -> Parameter:
-            dims: tuple[str, ...] = (known.HARMONIC,) if is_list else ()
-            if np.ndim(value) > 0 and not is_list:
+        def entry(name: str, value: Any, origin: str, texts: tuple[str, str, str]) -> Variable:
+            dims: tuple[str, ...] = (known.HARMONIC,) if name in HARMONICS else ()
+            if np.ndim(value) > 0 and not dims:
                 origin = "swept"
                 along = [n for n, size in enumerate(np.shape(value)) if size > 1]
                 # Of an axis with one value nothing tells whether the group depends on it.
                 along = along or list(range(len(names)))
                 dims = tuple(names[n] for n in along)
                 value = np.broadcast_to(np.squeeze(value), [sizes[n] for n in along])
-            return Parameter(value, origin, *texts, dims)
+            return Variable(name, dims, "float64", *texts, values=value, origin=origin)
 
         parameters = {}
         for row in GROUP_TABLE:
             value, texts = getattr(groups, row.name), (row.units, row.long_name, row.mathtext)
             if value is not None and row.needed_by(self.effects):
                 origin = groups.origin[row.name]
-                parameters[row.name] = entry(value, origin, texts, row.is_list)
+                parameters[row.name] = entry(row.name, value, origin, texts)
         physical = physical_at(self.config, values)
         for name, value in derive_scales(physical, groups.load, groups.mesh_frequency).items():
-            parameters[name] = entry(value, "derived", SCALES[name])
+            parameters[name] = entry(name, value, "derived", SCALES[name])
         return parameters
 
 

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from gearchaos_kernels import MOST_MAP_BYTES, Outcome, Plan, Status, System, integrate, maps_memory
 
-from gearchaos.arrays import Integers
+from gearchaos.arrays import Integers, Mask
 from gearchaos.configuration.messages import Fault
 from gearchaos.configuration.run_tables import FLOW_MAP_STEPS, MOST_STEPS_PER_PERIOD
 from gearchaos.dynamics import stability
@@ -18,7 +18,7 @@ from gearchaos.engine.lanes import Lanes
 from gearchaos.errors import ConfigurationError
 from gearchaos.gear.tooth_deviations import REALISATION
 from gearchaos.interrupts import check
-from gearchaos.records.difference import Solution, bound, difference
+from gearchaos.records.difference import Difference, Solution, bound, difference
 from gearchaos.records.label import PERIODIC, UNRESOLVED
 from gearchaos.records.period import POINTS_NEEDED, RETURNS, motion_period
 
@@ -37,11 +37,11 @@ MOST_STEPS = 25_600  # Finest grid of the search, where the method needs one.
 
 
 class Candidate(NamedTuple):
-    """A number of steps per period and what was measured for it against a grid four times finer.
+    """A number of steps per period and what was measured for it against a finer grid.
 
     ``section_error``, ``exponent_error``: not exceeded by 95 % of the lanes that move periodically
-    on all three grids, the ``periodic_share`` of them; ``changed_share``: share of the lanes that
-    move in another way.
+    on all grids, the ``periodic_share`` of them; ``changed_share``: share of the lanes that move in
+    another way; ``mode``, ``seconds``: how they were integrated and how long that took, if told.
     """
 
     steps: int
@@ -49,11 +49,13 @@ class Candidate(NamedTuple):
     exponent_error: float
     changed_share: float
     periodic_share: float
+    mode: str = ""
+    seconds: float = math.nan
 
     @property
     def error(self) -> float:
-        """The larger of the two errors; NaN counts as no error only where nothing is periodic."""
-        return float(np.nanmax([self.section_error, self.exponent_error, 0.0]))
+        """The larger of the two errors; not a number where nothing is periodic."""
+        return float(np.fmax(self.section_error, self.exponent_error))
 
 
 def stable_steps(lanes: Lanes, steps: int) -> tuple[int, str]:
@@ -222,7 +224,8 @@ def choose_steps(
         for grid in (steps, 2 * steps, 4 * steps):
             if grid not in found:
                 found[grid] = solution(grid)
-        candidates.append(_candidate(steps, found))
+        coarse, middle = (difference(found[n * steps], found[4 * steps]) for n in (1, 2))
+        candidates.append(candidate(steps, coarse, (coarse.period > 0) & (middle.period > 0)))
         if np.isnan(candidates[-1].section_error):
             raise ConfigurationError(
                 f"{source}: integration.tolerance = {tolerance:g}: none of the lanes that were "
@@ -238,14 +241,12 @@ def choose_steps(
     )
 
 
-def _candidate(steps: int, found: dict[int, Solution]) -> Candidate:
-    coarse = difference(found[steps], found[4 * steps])
-    middle = difference(found[2 * steps], found[4 * steps])
-    periodic = (coarse.period > 0) & (middle.period > 0)
+def candidate(steps: int, found: Difference, periodic: Mask) -> Candidate:
+    """Return what a difference from a finer grid, of which some lanes are periodic, tells."""
     return Candidate(
         steps,
-        bound(coarse.section_error[periodic]),
-        bound(coarse.exponent_error[periodic]),
-        float(np.mean(coarse.changed)),
+        bound(found.section_error[periodic]),
+        bound(found.exponent_error[periodic]),
+        float(np.mean(found.changed)),
         float(np.mean(periodic)),
     )

@@ -4,7 +4,6 @@ import re
 from collections.abc import Mapping, Sequence
 from difflib import get_close_matches
 from functools import cache
-from typing import Any
 
 from matplotlib.mathtext import MathTextParser
 
@@ -38,7 +37,7 @@ def axis_label(result: Result, name: str, line_length: int = 60) -> str:
 
 def unit_of(result: Result, name: str) -> str:
     """Word the unit of a variable, or what its numbers are multiples of; "" of a pure number."""
-    known: Any = result.parameters | result.fixed_axes | result.variables
+    known = result.parameters | result.fixed_axes | result.variables
     written = known[name].units
     if written in ("", "1"):
         return scales.unit_of(name).stands_for
@@ -67,7 +66,7 @@ def in_words(result: Result, place: Mapping[str, float]) -> str:
     """Word a place on the axes of a result, such as ``$P$ = 5.86, start 0``."""
     texts = []
     for axis, value in place.items():
-        known: Any = (result.parameters | result.fixed_axes | result.variables).get(axis)
+        known = (result.parameters | result.fixed_axes | result.variables).get(axis)
         wording = (known and known.long_name) or axis.replace("_", " ")
         name = (known and _formula(known.symbol)) or plain(wording)
         unit = f" {unit_of(result, axis).removeprefix('unit ')}".rstrip() if known else ""

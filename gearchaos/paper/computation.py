@@ -92,7 +92,7 @@ class Reproduction:
 
     def group(self, name: str) -> float:
         """Return a group that all lanes of the sweep share."""
-        return float(self.sweep.parameters[name].value)
+        return float(self.sweep.parameters[name].values)
 
     @cached_property
     def pair(self) -> HelicalPair:

@@ -17,7 +17,7 @@ from gearchaos.arrays import Array, Integers
 from gearchaos.errors import FileError
 from gearchaos.results.atomic_file import PARTIAL, reason, replacing, unlinked_content
 from gearchaos.results.block_folder import LOCK, MANIFEST, StoreLock, folder_of, settle_manifest
-from gearchaos.results.result_file import Metadata, Parameter, write_result
+from gearchaos.results.result_file import Metadata, write_result
 from gearchaos.results.variables import Variable, lane_axes
 from gearchaos.version import Software
 
@@ -177,7 +177,7 @@ class BlockStore(AbstractContextManager["BlockStore"]):
     def merge(
         self,
         variables: Sequence[Variable],
-        parameters: Mapping[str, Parameter],
+        parameters: Mapping[str, Variable],
         metadata: Metadata,
         *,
         overwrite: bool = False,

@@ -12,7 +12,6 @@ import numpy as np
 from gearchaos.arrays import Array
 from gearchaos.results import variables as known
 from gearchaos.results.result import Result
-from gearchaos.results.result_file import Parameter
 from gearchaos.results.result_reader import printable, read_result
 from gearchaos.results.scales import excitation_of
 from gearchaos.results.stage_table import labelled_lanes, one_axis, slice_facts, stage_table
@@ -92,15 +91,15 @@ def plain(value: Any) -> Any:
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
-def _parameter(parameter: Parameter) -> dict[str, Any]:
-    value = np.asarray(parameter.value)
+def _parameter(parameter: known.Variable) -> dict[str, Any]:
+    value = np.asarray(parameter.values)
     # What differs from lane to lane may be a million numbers.
     along_axes = parameter.dims not in ((), (known.HARMONIC,))
     content = _spread(value) if along_axes else {"value": value.tolist()}
     return {"origin": parameter.origin, **content, **_wording(parameter)}
 
 
-def _wording(entry: known.Variable | Parameter) -> dict[str, str]:
+def _wording(entry: known.Variable) -> dict[str, str]:
     return {"units": entry.units, "long_name": entry.long_name}
 
 

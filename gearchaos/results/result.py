@@ -18,12 +18,12 @@ from gearchaos.errors import ConfigurationError, FileError
 from gearchaos.results import tables
 from gearchaos.results import variables as known
 from gearchaos.results.atomic_file import checksum_fits
-from gearchaos.results.result_file import Parameter, own_metadata, write_result
+from gearchaos.results.result_file import own_metadata, write_result
 from gearchaos.results.result_reader import fixed_coordinates, read_result
 from gearchaos.results.scales import in_physical_units
 from gearchaos.results.variables import Variable, coordinate_text, diagram_axis
 
-__all__ = ["Parameter", "Result", "open_result", "section_variables"]
+__all__ = ["Result", "open_result", "section_variables"]
 
 Method = Literal["nearest", "within"] | None
 DEFAULT_VARIABLE = "section_delta_5"
@@ -45,7 +45,7 @@ class Result:
         axes: Sequence[str],
         variables: Sequence[Variable],
         data: Mapping[str, Any],
-        parameters: Mapping[str, Parameter],
+        parameters: Mapping[str, Variable],
         metadata: Mapping[str, str | int | float],
         fixed_axes: Mapping[str, Variable] = {},
     ) -> None:
@@ -176,7 +176,7 @@ class Result:
             [replace(variable, dims=rest(variable.dims)) for variable in left],
             {variable.name: part(self[variable.name], variable.dims) for variable in left},
             {
-                name: replace(entry, value=part(entry.value, entry.dims), dims=rest(entry.dims))
+                name: replace(entry, values=part(entry.values, entry.dims), dims=rest(entry.dims))
                 for name, entry in self.parameters.items()
             },
             {**self.metadata, "fixed": fixed},

@@ -4,7 +4,6 @@ import math
 import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
 from io import FileIO
 from itertools import pairwise
 from pathlib import Path
@@ -13,7 +12,7 @@ from typing import Any, TypeAlias
 import h5py
 import numpy as np
 
-from gearchaos.arrays import Array, Floats
+from gearchaos.arrays import Array
 from gearchaos.interrupts import check
 from gearchaos.results.atomic_file import append_checksum, replacing
 from gearchaos.results.variables import HARMONIC, Variable, diagram_axis, lane_axes, listed
@@ -25,7 +24,6 @@ PARAMETERS = "parameters"
 DIMS = "dims"
 """Attribute with the names of dimensions: HDF5 keeps its own list of them in the global heap."""
 
-ORIGINS = ("given", "derived", "default", "swept")
 Block: TypeAlias = tuple[int, int, Mapping[str, Array]]
 Metadata: TypeAlias = Mapping[str, str | int | float]
 
@@ -33,23 +31,6 @@ _CHUNK_BYTES = 1 << 19
 _LONGEST_ATTRIBUTE = 32_000
 CACHE_BYTES = 4 << 20  # Of each variable, while it is written.
 _PACKED = {"compression": "gzip", "compression_opts": 4, "shuffle": True, "fletcher32": True}
-
-
-@dataclass(frozen=True, eq=False)
-class Parameter:
-    """One dimensionless group of the model.
-
-    The origin is one of `ORIGINS`, of which ``"swept"`` differs from lane to lane; the dimensions
-    of the value are none, ``harmonic``, or the axes along which it differs; the rest is as of a
-    variable.
-    """
-
-    value: float | Floats
-    origin: str
-    units: str = "1"
-    long_name: str = ""
-    symbol: str = ""
-    dims: tuple[str, ...] = ()
 
 
 def own_metadata(axes: Sequence[str]) -> dict[str, str]:
@@ -62,7 +43,7 @@ def write_result(
     path: str | os.PathLike[str],
     variables: Sequence[Variable],
     blocks: Iterable[Block],
-    parameters: Mapping[str, Parameter],
+    parameters: Mapping[str, Variable],
     metadata: Metadata,
     *,
     overwrite: bool = False,
@@ -179,8 +160,8 @@ def _write_metadata(file: h5py.File, metadata: Metadata) -> None:
             _describe(file, {name: value})
 
 
-def _harmonics(parameters: Mapping[str, Parameter]) -> list[Variable]:
-    rows = (np.size(p.value) for p in parameters.values() if p.dims == (HARMONIC,))
+def _harmonics(parameters: Mapping[str, Variable]) -> list[Variable]:
+    rows = (np.size(p.values) for p in parameters.values() if p.dims == (HARMONIC,))
     numbers = np.arange(1, next(rows, 0) + 1)
     return listed((), {"harmonics": numbers.size > 0}, {HARMONIC: numbers})
 
@@ -212,14 +193,13 @@ def _attach_scales(file: h5py.File, name: str, dims: tuple[str, ...]) -> None:
             file[name].dims[index].attach_scale(file[dim])
 
 
-def _write_parameters(file: h5py.File, parameters: Mapping[str, Parameter]) -> None:
+def _write_parameters(file: h5py.File, parameters: Mapping[str, Variable]) -> None:
     file.create_group(PARAMETERS, track_order=True)
     for name, parameter in parameters.items():
-        path, values = f"{PARAMETERS}/{name}", np.asarray(parameter.value, dtype=np.float64)
+        path, values = f"{PARAMETERS}/{name}", np.asarray(parameter.values, dtype=np.float64)
         dataset = file.create_dataset(path, data=values, track_order=True)
         _attach_scales(file, path, parameter.dims)
-        wording = {"units": parameter.units, "long_name": parameter.long_name or name}
-        _describe(dataset, {**wording, "symbol": parameter.symbol, "origin": parameter.origin})
+        _describe(dataset, parameter.attributes)
 
 
 def _describe(item: h5py.HLObject, notes: Mapping[str, Any]) -> None:

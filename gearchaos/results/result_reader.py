@@ -16,12 +16,12 @@ from gearchaos.gear.groups import LARGEST_VALUE
 from gearchaos.results import stored_dataset as stored
 from gearchaos.results import variables as known
 from gearchaos.results.atomic_file import checksum_fits, reason
-from gearchaos.results.result_file import ORIGINS, PARAMETERS, SCHEMA, SCHEMA_VERSION, Parameter
+from gearchaos.results.result_file import PARAMETERS, SCHEMA, SCHEMA_VERSION
 from gearchaos.results.stored_dataset import UnfitError
-from gearchaos.results.variables import HARMONIC, STATE, Variable
+from gearchaos.results.variables import HARMONIC, ORIGINS, STATE, Variable
 
 Contents = tuple[
-    list[Variable], dict[str, Array], dict[str, Parameter], dict[str, str | int | float]
+    list[Variable], dict[str, Array], dict[str, Variable], dict[str, str | int | float]
 ]
 """Variables, data, parameters and metadata, as for `Result`."""
 
@@ -143,7 +143,8 @@ def _read(file: h5py.File, rows: bool) -> Contents:
             raise UnfitError(f"holds a parameter {name} that is none")
         values = stored.values_of(name, dataset)
         value = values if dims else float(values)
-        parameters[name] = Parameter(value, origin, **_wording(notes), dims=dims)
+        wording = _wording(notes)
+        parameters[name] = Variable(name, dims, "float64", **wording, values=value, origin=origin)
     return list(variables.values()), data, parameters, metadata
 
 

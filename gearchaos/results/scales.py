@@ -10,7 +10,6 @@ import numpy as np
 from gearchaos.arrays import Array
 from gearchaos.errors import ConfigurationError
 from gearchaos.gear.derivation import FREQUENCY, LENGTH, STIFFNESS
-from gearchaos.results.result_file import Parameter
 from gearchaos.results.variables import Variable
 
 
@@ -54,7 +53,7 @@ def unit_of(name: str) -> Unit:
 
 
 def in_physical_units(
-    variable: Variable, values: Array, parameters: Mapping[str, Parameter]
+    variable: Variable, values: Array, parameters: Mapping[str, Variable]
 ) -> tuple[Variable, Array]:
     """Return a variable and its values in physical units; pure numbers come as they are.
 
@@ -76,7 +75,7 @@ def in_physical_units(
             varied = f"{name} varies along {', '.join(scale.dims)}"
             raise ConfigurationError(f"{variable.name}: {varied}: select one value there first")
         sizes = zip(variable.dims, values.shape, strict=True)
-        values = values * np.reshape(scale.value, [n if d in scale.dims else 1 for d, n in sizes])
+        values = values * np.reshape(scale.values, [n if d in scale.dims else 1 for d, n in sizes])
     return replace(variable, units=unit.units, **unit.renamed), unit.factor * values
 
 

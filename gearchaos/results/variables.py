@@ -57,6 +57,9 @@ STATE_WORDING = _WORDING["state"]
 """Long name and mathtext symbol of each state (all dimensionless), in the one order of states."""
 
 
+ORIGINS = ("given", "derived", "default", "swept")
+
+
 @dataclass(frozen=True, eq=False)
 class Variable:
     """One named array of a result.
@@ -67,6 +70,9 @@ class Variable:
     are the meanings of 0, 1, 2, ... of an enumeration, one word each, errors the variables that
     tell how exact this one is. Values, of the shape of the
     dimensions, are there where they are known before the sweep, as those of coordinates are.
+
+    Parameters of the model are variables with an origin, one of `ORIGINS`, and with values; their
+    dimensions are none, ``harmonic``, or the axes along which they are swept.
     """
 
     name: str
@@ -79,19 +85,18 @@ class Variable:
     flags: tuple[str, ...] = ()
     errors: tuple[str, ...] = ()
     values: Any = None
+    origin: str = ""
 
     @property
     def attributes(self) -> dict[str, Any]:
         """Everything a file says about the variable beside its values."""
-        attributes: dict[str, Any] = {"units": self.units, "long_name": self.long_name}
-        if self.symbol:
-            attributes["symbol"] = self.symbol
+        texts = {name: getattr(self, name) for name in ("units", "long_name", "symbol", "origin")}
+        texts["flag_meanings"] = " ".join(self.flags)
+        texts["ancillary_variables"] = " ".join(self.errors)
+        told: dict[str, Any] = {name: text for name, text in texts.items() if text}
         if self.flags:
-            attributes["flag_values"] = np.arange(len(self.flags), dtype=self.dtype)
-            attributes["flag_meanings"] = " ".join(self.flags)
-        if self.errors:
-            attributes["ancillary_variables"] = " ".join(self.errors)
-        return attributes
+            told["flag_values"] = np.arange(len(self.flags), dtype=self.dtype)
+        return told
 
 
 def coordinate(name: str, units: str, long_name: str, symbol: str, values: Floats) -> Variable:

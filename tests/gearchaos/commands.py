@@ -169,7 +169,7 @@ def same_data(one: gearchaos.Result, other: gearchaos.Result) -> bool:
     assert one.parameters.keys() == other.parameters.keys()
     arrays = [(one[name], other[name]) for name in one]
     arrays += [
-        (np.asarray(parameter.value), np.asarray(other.parameters[name].value))
+        (np.asarray(parameter.values), np.asarray(other.parameters[name].values))
         for name, parameter in one.parameters.items()
     ]
     return all(a.dtype == b.dtype and a.tobytes() == b.tobytes() for a, b in arrays)

@@ -11,7 +11,7 @@ import h5py
 import numpy as np
 
 from gearchaos.results.atomic_file import append_checksum
-from gearchaos.results.result import Parameter, Result
+from gearchaos.results.result import Result
 from gearchaos.results.variables import (
     STATE_WORDING,
     Variable,
@@ -20,7 +20,7 @@ from gearchaos.results.variables import (
 )
 
 from .commands import SMALL
-from .listed_variables import sweep_variables
+from .listed_variables import parameter, sweep_variables
 
 Random = random.Random
 
@@ -61,9 +61,11 @@ def good_result(path: Path, axes: tuple[Variable, ...] = GOOD_AXES[0]) -> None:
                 else numbers.integers(0, max(1, len(variable.flags)), size=shape)
             )
     parameters = {
-        "load": Parameter(LOAD.values, "swept", dims=("load",)),
-        "damping_ratio": Parameter(0.1, "given"),
-        "stiffness_cosine": Parameter(np.array([0.1, 0.2]), "derived", dims=("harmonic",)),
+        "load": parameter("load", LOAD.values, "swept", dims=("load",)),
+        "damping_ratio": parameter("damping_ratio", 0.1, "given"),
+        "stiffness_cosine": parameter(
+            "stiffness_cosine", np.array([0.1, 0.2]), "derived", dims=("harmonic",)
+        ),
     }
     metadata: dict[str, str | int | float] = {
         "title": "a small result",

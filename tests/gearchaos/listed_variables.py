@@ -19,6 +19,21 @@ from gearchaos.results.variables import (
 )
 
 
+def parameter(
+    name: str,
+    values: ArrayLike,
+    origin: str,
+    units: str = "1",
+    long_name: str = "",
+    symbol: str = "",
+    dims: tuple[str, ...] = (),
+) -> Variable:
+    """Give a parameter of the model."""
+    return Variable(
+        name, dims, "float64", units, long_name or name, symbol, values=values, origin=origin
+    )
+
+
 def sweep_variables(
     axes: Sequence[Variable],
     *,

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import gearchaos
-from gearchaos.accuracy import FLOW_MAP_STEPS, TRUTH_STEPS, Setting, measure, recommendation
+from gearchaos.accuracy import FLOW_MAP_STEPS, TRUTH_STEPS, measure, recommendation
 from gearchaos.engine.simulation import Simulation
-from gearchaos.engine.steps import pilot
+from gearchaos.engine.steps import Candidate, pilot
 
 from ..kernels.reference import SOLUTIONS
 from .commands import names_in, run_module
@@ -73,9 +73,9 @@ def test_resolved_errors_fall_with_order_four_and_lie_below_plain_ones():
 
 def test_the_cheapest_setting_that_is_good_enough_is_recommended():
     settings = [
-        Setting(100, "plain", 1e-5, 1e-5, 0.0, 1.0),
-        Setting(100, "resolved", 1e-7, 1e-7, 0.0, 2.0),
-        Setting(400, "plain", 1e-7, 1e-7, 0.0, 3.0),
+        Candidate(100, 1e-5, 1e-5, 0.0, 1.0, "plain", 1.0),
+        Candidate(100, 1e-7, 1e-7, 0.0, 1.0, "resolved", 2.0),
+        Candidate(400, 1e-7, 1e-7, 0.0, 1.0, "plain", 3.0),
     ]
     assert "100 plain" in recommendation(settings, 1e-4)
     assert "100 resolved" in recommendation(settings, 1e-6)

@@ -17,7 +17,7 @@ import pytest
 from gearchaos.errors import FileError
 from gearchaos.results.block_folder import StoreLock, read_manifest, require_same
 from gearchaos.results.block_store import BlockStore
-from gearchaos.results.result import Parameter, Result, open_result
+from gearchaos.results.result import Result, open_result
 from gearchaos.results.variables import Variable, coordinate, listed, unswept_axis
 from gearchaos.version import Software
 
@@ -47,7 +47,10 @@ def variables(lanes: int = LANES) -> list[Variable]:
 
 VARIABLES = variables()
 SOFTWARE = Software("gearchaos 1.2.3", "0123456789abcdef")
-PARAMETERS = {"damping_ratio": Parameter(0.1, "given", "1", "damping", "$d$")}
+DAMPING = Variable(
+    "damping_ratio", (), "float64", "1", "damping", "$d$", values=0.1, origin="given"
+)
+PARAMETERS = {"damping_ratio": DAMPING}
 BLOCKS = [(0, 30), (30, 60), (60, 90), (90, 100)]
 
 

@@ -197,8 +197,8 @@ def test_a_pdf_has_its_cells_as_images_and_its_words_as_text(path):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["--stages"], "without --stages; --at pitch_error=0 draws a diagram"),
-        (["{}"], "a map is drawn alone"),
+        (["--stages"], "a map, of which --at pitch_error=VALUE makes a diagram"),
+        (["{}"], "map.h5: only diagrams of sweeps are drawn with it"),
         (["--variable", "section_delta_5"], "no variable 'section_delta_5' of each lane"),
         (["--variable", "end_state"], "no variable 'end_state' of each lane"),
         (["--mark", "torque=3"], "--mark torque: is no swept parameter of the figure"),

@@ -65,14 +65,14 @@ def test_accelerations_are_the_derivative_of_the_velocities(result, coordinate):
     windows = np.lib.stride_tricks.sliding_window_view(contact, 5, axis=1)
     steady = np.all(windows == windows[:, :, :1], axis=2)
     assert 0.7 < np.mean(steady) < 1.0
-    fastest = np.sqrt(result.parameters["transverse_stiffness_p"].value) * step[0, 0]
+    fastest = np.sqrt(result.parameters["transverse_stiffness_p"].values) * step[0, 0]
     assert np.max(off[steady]) < 2.0 * fastest**4 / 30.0 * np.max(np.abs(acceleration))
 
 
 def test_over_a_period_the_mesh_force_carries_the_load(result):
     """The mean of eq. 13, row delta_5: cos(beta_b) N_y = f_n, for a motion of period 1."""
-    load = result.parameters["load"].value
-    angle = np.radians(result.parameters["base_helix_angle_deg"].value)
+    load = result.parameters["load"].values
+    angle = np.radians(result.parameters["base_helix_angle_deg"].values)
     force = result["mesh_force_tangential"][0, :STEPS]
     assert np.mean(force) == pytest.approx(load / np.cos(angle), rel=1e-7)
     assert np.ptp(force) > 0.01
@@ -91,8 +91,8 @@ def test_a_response_of_flow_maps_is_as_exact_with_few_steps_as_with_many(tmp_pat
         section = result["section_delta_5"][:, -PERIODS - 1 :]
         np.testing.assert_array_equal(result["delta_5"][:, ::steps], section)
         force = result["mesh_force_tangential"][0, :steps].mean()
-        angle = np.radians(result.parameters["base_helix_angle_deg"].value)
-        carried = result.parameters["load"].value / np.cos(angle)
+        angle = np.radians(result.parameters["base_helix_angle_deg"].values)
+        carried = result.parameters["load"].values / np.cos(angle)
         assert force == pytest.approx(carried, abs=1e-13)
         found.append(result)
     few, many = found

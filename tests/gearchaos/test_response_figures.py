@@ -267,7 +267,10 @@ def test_what_is_no_coordinate_has_its_history_and_its_own_spectrum(path, result
     ("arguments", "message"),
     [
         (["--output", "all.gif"], "'gif': a figure is written as png, pdf, svg, eps, tiff"),
-        (["--stages"], "is a response; it belongs to the diagram of a sweep"),
+        (
+            ["--stages"],
+            "--stages: only diagrams of sweeps are drawn with it, and this is a response",
+        ),
         (["--variable", "delta_3"], "no variable 'delta_3' over time in the result; it has delta"),
         (["--from", "13"], "the result has 5.86 to 12.5"),
     ],

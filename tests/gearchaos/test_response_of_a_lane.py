@@ -74,7 +74,7 @@ def test_every_axis_of_a_result_names_its_lane(tmp_path, capsys):
     found = going_on(tmp_path, result, "load=0.19", "pitch_error=8", "start=1")
     np.testing.assert_array_equal(found["start_state"][0], result["end_state"][1, 1, 1])
     assert found.axes == ("pitch_error",)
-    assert found.parameters["load"].value == 0.2
+    assert found.parameters["load"].values == 0.2
     assert found.fixed == {"load": 0.2, "start": 1.0}
     assert in_words(found, place_of(found, 0)) == "$f_n$ = 0.2, start 1, $P$ = 7.5"
     sweep, output = str(tmp_path / "sweep.h5"), str(tmp_path / "none.h5")

@@ -13,11 +13,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gearchaos.errors import ConfigurationError, FileError
-from gearchaos.results.result import Parameter, Result, open_result, section_variables
+from gearchaos.results.result import Result, open_result, section_variables
 from gearchaos.results.result_file import hyperslabs, write_result
 from gearchaos.results.variables import Variable, coordinate, unswept_axis
 
-from .listed_variables import sweep_variables
+from .listed_variables import parameter, sweep_variables
 
 POINTS = 6
 LOADS = coordinate("load", "1", "static load", "$f_n$", np.linspace(0.1, 0.5, 3))
@@ -58,14 +58,17 @@ def variables_over(axes: tuple[Variable, ...]) -> list:
 
 def result_over(axes: tuple[Variable, ...]) -> Result:
     variables = variables_over(axes)
-    cosine = Parameter(np.array([0.3, 0.2]), "given", dims=("harmonic",))
-    parameters = {"damping_ratio": Parameter(0.1, "given"), "stiffness_cosine": cosine}
+    cosine = parameter("stiffness_cosine", np.array([0.3, 0.2]), "given", dims=("harmonic",))
+    parameters = {
+        "damping_ratio": parameter("damping_ratio", 0.1, "given"),
+        "stiffness_cosine": cosine,
+    }
     for axis in axes:
         if axis.name != "start":
-            parameters[axis.name] = Parameter(axis.values, "swept", dims=(axis.name,))
+            parameters[axis.name] = parameter(axis.name, axis.values, "swept", dims=(axis.name,))
     if len(axes) > 1 and axes[1].name == "pitch_error":
         both = np.outer(LOADS.values, ERRORS.values)
-        parameters["both"] = Parameter(both, "swept", dims=("load", "pitch_error"))
+        parameters["both"] = parameter("both", both, "swept", dims=("load", "pitch_error"))
     names = [axis.name for axis in axes]
     data = flat_arrays(variables, axes)
     return Result(names, variables, data, parameters, {"title": "t", "configuration": "x"})
@@ -102,10 +105,10 @@ def test_a_file_gives_back_what_was_saved(result, tmp_path) -> None:
     for name in result:
         np.testing.assert_array_equal(read[name], result[name], strict=True)
         assert read.dims(name) == result.dims(name)
-    for name, parameter in result.parameters.items():
+    for name, entry in result.parameters.items():
         again = read.parameters[name]
-        np.testing.assert_array_equal(again.value, parameter.value)
-        assert (again.dims, again.origin) == (parameter.dims, parameter.origin)
+        np.testing.assert_array_equal(again.values, entry.values)
+        assert (again.dims, again.origin) == (entry.dims, entry.origin)
     without = open_result(tmp_path / "r.h5", rows=False)
     assert set(result) - set(without) == {"section_delta_5", "start_state", "end_state"}
     assert without["status"].shape == result["status"].shape
@@ -131,14 +134,14 @@ def test_a_slice_is_that_of_xarray(engine, result, tmp_path) -> None:
             for name in part:
                 assert part.dims(name) == there[name].dims
                 np.testing.assert_array_equal(part[name], there[name].values, strict=True)
-            for name, parameter in part.parameters.items():
+            for name, entry in part.parameters.items():
                 rest = groups[name].assign_coords(
                     {a: result[a] for a in groups[name].dims if a in result}
                 )
                 mine = {a: v for a, v in place.items() if a in rest.dims}
                 there_too = rest.sel(mine, method="nearest") if mine else rest
-                np.testing.assert_array_equal(parameter.value, there_too.values)
-                assert parameter.dims == there_too.dims
+                np.testing.assert_array_equal(entry.values, there_too.values)
+                assert entry.dims == there_too.dims
 
 
 def test_a_value_that_is_not_there_names_the_nearest(result) -> None:
@@ -159,7 +162,7 @@ def test_all_axes_fixed_leave_the_rest_of_the_shape(result, tmp_path) -> None:
     assert lane["section_delta_5"].shape == (POINTS,)
     assert lane.lanes("end_state").shape == (1, 2)
     assert lane.parameters["stiffness_cosine"].dims == ("harmonic",)
-    assert np.ndim(lane.parameters["pitch_error"].value) == 0
+    assert np.ndim(lane.parameters["pitch_error"].values) == 0
     with pytest.raises(FileError, match="a single lane is no result file"):
         lane.save(tmp_path / "lane.h5")
 

@@ -12,10 +12,10 @@ import numpy as np
 import pytest
 
 from gearchaos.errors import FileError
-from gearchaos.results.result import Parameter, Result, open_result
+from gearchaos.results.result import Result, open_result
 from gearchaos.results.variables import coordinate
 
-from .listed_variables import sweep_variables
+from .listed_variables import parameter, sweep_variables
 
 CHECKSUM_LINE = 82
 
@@ -39,9 +39,11 @@ def good(tmp_path_factory: pytest.TempPathFactory) -> Path:
     }
     data["section_delta_5"] = random.normal(size=(20, 5))
     parameters = {
-        "load": Parameter(np.linspace(0.0, 1.0, 20), "swept", dims=("load",)),
-        "damping_ratio": Parameter(0.1, "given"),
-        "stiffness_cosine": Parameter(np.array([0.1, 0.2]), "given", dims=("harmonic",)),
+        "load": parameter("load", np.linspace(0.0, 1.0, 20), "swept", dims=("load",)),
+        "damping_ratio": parameter("damping_ratio", 0.1, "given"),
+        "stiffness_cosine": parameter(
+            "stiffness_cosine", np.array([0.1, 0.2]), "given", dims=("harmonic",)
+        ),
     }
     path = tmp_path_factory.mktemp("good") / "good.h5"
     Result(["load"], variables, data, parameters, {"title": "t"}).save(path)

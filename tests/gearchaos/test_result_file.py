@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from gearchaos.results.result import Parameter, Result, open_result
+from gearchaos.results.result import Result, open_result
 from gearchaos.results.variables import (
     STATE_WORDING,
     Variable,
@@ -24,7 +24,7 @@ from gearchaos.results.variables import (
     unswept_axis,
 )
 
-from .listed_variables import sweep_variables
+from .listed_variables import parameter, sweep_variables
 
 LANES = 300
 POINTS = 1000
@@ -71,12 +71,18 @@ def make_result(*axes: Variable, **metadata: Any) -> Result:
     data["diverged_period"] = np.where(data["status"], 12, -1)
     data["section_delta_5"][7] = data["lyapunov_exponent"][7] = np.nan
     parameters = {
-        "load": Parameter(0.1, "given", "1", "static load", "$f_n$"),
-        "pitch_error": Parameter(
-            axes[-1].values, "swept", "1", "pitch error", "$P$", (axes[-1].name,)
+        "load": parameter("load", 0.1, "given", "1", "static load", "$f_n$"),
+        "pitch_error": parameter(
+            "pitch_error", axes[-1].values, "swept", "1", "pitch error", "$P$", (axes[-1].name,)
         ),
-        "stiffness_cosine": Parameter(
-            np.array([0.3, 0.2, 0.1]), "derived", "1", "cosine", "$a$", ("harmonic",)
+        "stiffness_cosine": parameter(
+            "stiffness_cosine",
+            np.array([0.3, 0.2, 0.1]),
+            "derived",
+            "1",
+            "cosine",
+            "$a$",
+            ("harmonic",),
         ),
     }
     texts = {
@@ -111,8 +117,8 @@ def assert_same(one: Result, other: Result) -> None:
         assert one.dims(name) == other.dims(name)
         np.testing.assert_equal(one.attributes(name), other.attributes(name))
     assert list(one.parameters) == list(other.parameters)
-    for name, parameter in one.parameters.items():
-        np.testing.assert_equal(vars(parameter), vars(other.parameters[name]))
+    for name, entry in one.parameters.items():
+        np.testing.assert_equal(vars(entry), vars(other.parameters[name]))
 
 
 def test_what_is_read_is_what_was_saved(result: Result, path: Path) -> None:
@@ -302,7 +308,7 @@ def test_another_program_may_change_the_file(path: Path, tmp_path: Path) -> None
     shutil.copy(path, changed)
     with h5py.File(changed, "r+") as file:
         file["parameters/load"][()] = 0.2
-    assert open_result(changed).parameters["load"].value == 0.2
+    assert open_result(changed).parameters["load"].values == 0.2
     with h5py.File(changed, "r+") as file:
         file.attrs["note"] = "seen by a referee"
         file.create_dataset("reference", data=np.arange(3.0))

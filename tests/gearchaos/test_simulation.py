@@ -133,6 +133,6 @@ def test_parameters_run_along_the_axes_on_which_they_depend():
     parameters = unlabelled(speeds).lanes.parameters
     assert parameters["half_backlash"].dims == ("half_backlash",)
     assert parameters["pitch_error"].dims == ("pitch_error",)
-    assert parameters["pitch_error"].value.shape == (13,)
+    assert parameters["pitch_error"].values.shape == (13,)
     assert parameters["load"].dims == ()
     assert parameters["stiffness_sine"].dims == ("harmonic",)

@@ -65,7 +65,7 @@ def simulation(*overrides):
 
 
 def oscillator(sweep):
-    groups = {name: found.value for name, found in sweep.lanes.parameters.items()}
+    groups = {name: found.values for name, found in sweep.lanes.parameters.items()}
     return Oscillator(
         zeta=groups["damping_ratio"],
         load=groups["load"],
@@ -234,7 +234,7 @@ def test_at_twice_the_resonance_the_stiffness_drives_a_motion_of_two_periods():
     )
     arrays = computed(sweep)
     # To first order, the principal parametric resonance grows at k_1/4 - zeta.
-    growth = 0.1 * values_of(sweep) / 4.0 - sweep.lanes.parameters["damping_ratio"].value
+    growth = 0.1 * values_of(sweep) / 4.0 - sweep.lanes.parameters["damping_ratio"].values
     assert arrays["lyapunov_exponent"][:3] == pytest.approx(growth[:3], abs=1e-4)
     assert not arrays["crossings_per_period"][:3].any()
     assert growth[3] > 0.0 > arrays["lyapunov_exponent"][3]

@@ -85,7 +85,7 @@ def test_a_swept_speed_is_the_sweep_of_the_mesh_frequency_that_it_gives():
     by_speed = gearchaos.run(configured("operation.speed_rpm", 7000.0, 9000.0))
     frequency = by_speed.parameters["mesh_frequency"]
     assert frequency.origin == "swept"
-    assert frequency.value == pytest.approx(frequency.value[1] * np.array([7, 8, 9]) / 8)
-    low, high = frequency.value[[0, 2]].tolist()
+    assert frequency.values == pytest.approx(frequency.values[1] * np.array([7, 8, 9]) / 8)
+    low, high = frequency.values[[0, 2]].tolist()
     by_frequency = gearchaos.run(configured("mesh_frequency", low, high))
     assert by_frequency["end_state"] == pytest.approx(by_speed["end_state"], rel=1e-8, abs=1e-10)

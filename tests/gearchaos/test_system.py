@@ -161,7 +161,7 @@ def test_the_system_of_a_lane_starts_where_the_lane_ended(overrides):
     system = gearchaos.System.of_lane(result, pitch_error=7.4, **last)
     lane = result.sel(pitch_error=7.5, **last)
     assert np.array_equal(system.state, lane["end_state"])
-    amplitude = result.parameters["pitch_error_amplitude"].value
+    amplitude = result.parameters["pitch_error_amplitude"].values
     assert system.groups["error_amplitude"] == 7.5 * amplitude
     with pytest.raises(gearchaos.ConfigurationError, match="give a value of pitch_error"):
         gearchaos.System.of_lane(result)

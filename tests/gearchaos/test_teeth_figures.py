@@ -16,13 +16,13 @@ from gearchaos.figures.style import BLACK, BLUE, VERMILION
 from gearchaos.info import main as info
 from gearchaos.plot import main as plot
 from gearchaos.results.response_variables import response_variables
-from gearchaos.results.result import Parameter, Result
+from gearchaos.results.result import Result
 from gearchaos.results.scales import Excitation, excitation_of
 from gearchaos.results.variables import coordinate
 from gearchaos.stages import main as stages
 
 from .commands import small_config
-from .listed_variables import sweep_variables
+from .listed_variables import parameter, sweep_variables
 
 STEPS, DRIVING, DRIVEN = 8, 4, 6
 MEET = 12
@@ -86,7 +86,8 @@ def known_teeth(
         "mesh_force_tangential": record["delta_5"],
         "contact_tangential": np.ones((1, kept * STEPS + 1)),
     }
-    scales = {"length_scale": Parameter(SCALE_UM, "derived", "um")} if scaled else {}
+    scale = parameter("length_scale", SCALE_UM, "derived", "um")
+    scales = {"length_scale": scale} if scaled else {}
     return Result([axis.name], variables, data, scales, {"title": "teeth", **known})
 
 
