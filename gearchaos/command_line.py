@@ -38,7 +38,8 @@ _TABLE = tomllib.loads((_PACKAGE / "commands.toml").read_text("utf-8"))
 COMMANDS: dict[str, dict[str, Any]] = _TABLE["command"]
 """Summary and options of every command by its name, as commands.toml explains them."""
 
-_SWEEPS = (_PACKAGE / "sweeps", _PACKAGE.parent / "sweeps")
+SWEEPS, *_ = filter(Path.is_dir, (_PACKAGE / "sweeps", _PACKAGE.parent / "sweeps", _PACKAGE))
+"""Folder of the configurations that come with gearchaos: of the installed package, or the clone."""
 
 
 class Command(NamedTuple):
@@ -225,15 +226,3 @@ def _discard(stream: TextIO) -> None:
         sink = os.open(os.devnull, os.O_WRONLY)
         os.dup2(sink, stream.fileno())
         os.close(sink)
-
-
-def sweep_file(name: str) -> Path:
-    """Return the path of a configuration that comes with gearchaos, such as ``pan2021.toml``.
-
-    Raises FileError if neither the installed package nor the clone has it.
-    """
-    for folder in _SWEEPS:
-        if (folder / name).is_file():
-            return folder / name
-    places = " nor ".join(str(folder) for folder in _SWEEPS)
-    raise FileError(f"{name}: is neither in {places}; install gearchaos again")

@@ -3,14 +3,14 @@
 import tomllib
 from argparse import Namespace
 
-from gearchaos.command_line import Command, sweep_file
+from gearchaos.command_line import SWEEPS, Command
 from gearchaos.errors import ConfigurationError
 
 
 def _example(options: Namespace) -> None:
     from gearchaos.results.atomic_file import check_output, replacing
 
-    ready = {path.stem: path for path in sorted(sweep_file("pan2021.toml").parent.glob("*.toml"))}
+    ready = {path.stem: path for path in sorted(SWEEPS.glob("*.toml"))}
     if options.name is None:
         for name, path in ready.items():
             print(f"{name:24} {tomllib.loads(path.read_text(encoding='utf-8'))['title']}")

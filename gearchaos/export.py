@@ -5,12 +5,11 @@ per section point. CSV has units in brackets behind the headings, Parquet in the
 pandas reads. Needs pip install gearchaos[export].
 """
 
-import os
 from argparse import Namespace
 from typing import Any
 
 from gearchaos.command_line import Command
-from gearchaos.errors import ConfigurationError, FileError
+from gearchaos.errors import ConfigurationError
 
 ENDINGS = (".csv", ".parquet", ".mat")
 
@@ -27,8 +26,6 @@ def _export(options: Namespace) -> None:
         raise ConfigurationError(f"{options.output}: must end in {', '.join(ENDINGS)}")
     result = open_result(options.result)
     result = result.physical() if options.units == "physical" else result
-    if os.path.exists(options.output) and os.path.samefile(options.output, options.result):
-        raise FileError(f"{options.output}: is the result file itself; choose another name")
     check_output(options.output, options.overwrite)
     with replacing(options.output, overwrite=options.overwrite) as partial:
         if kind == "mat":

@@ -14,8 +14,6 @@ from gearchaos.finishing import complete_already, ending
 if TYPE_CHECKING:
     from gearchaos.results.block_store import BlockStore, Finished
 
-MOST_NAMED = 10
-
 
 def _merge(options: Namespace) -> int:
     output: str = options.output
@@ -66,9 +64,8 @@ def _require_all(store: "BlockStore", found: "Finished", shards: object) -> None
     if isinstance(shards, int) and shards > 0:
         blocks = enumerate(shared_blocks(store.lanes, shards))
         lacking = {n % shards + 1 for n, block in blocks if any(uncovered(block, found.bounds))}
-        flags = ", ".join(f"--shard {number}/{shards}" for number in sorted(lacking)[:MOST_NAMED])
-        more = f" and {len(lacking) - MOST_NAMED} more" if len(lacking) > MOST_NAMED else ""
-        remedy = f"run the sweep with {flags}{more} and --resume"
+        flags = ", ".join(f"--shard {number}/{shards}" for number in sorted(lacking))
+        remedy = f"run the sweep with {flags} and --resume"
     store.require_all(found, remedy)
 
 

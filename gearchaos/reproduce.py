@@ -8,7 +8,7 @@ import time
 from argparse import Namespace
 from pathlib import Path
 
-from gearchaos.command_line import Command, sweep_file
+from gearchaos.command_line import SWEEPS, Command
 from gearchaos.progress import say
 
 
@@ -22,7 +22,7 @@ def _reproduce(options: Namespace) -> None:
     folder = Path(options.output or options.paper)
     check_folder(folder, options.overwrite)
     names = (f"{options.paper}.toml", f"{options.paper}_full.toml")
-    configs = [load_config(sweep_file(name)) for name in names]
+    configs = [load_config(SWEEPS / name) for name in names]
     choose_threads(options.threads)
     found = compute(*configs, threads=options.threads)
     print(write_gallery(found, folder, overwrite=options.overwrite), flush=True)

@@ -1,7 +1,6 @@
 """The tables that say what is computed: groups given directly, scene, start, sweeps, outputs."""
 
 import math
-from collections import Counter
 from collections.abc import Collection
 from fractions import Fraction
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Self, TypeAlias, get_args
@@ -34,8 +33,8 @@ State: TypeAlias = Literal[
     "delta_4_rate",
 ]
 STATES: tuple[str, ...] = get_args(State)
-_ONCE = AfterValidator(lambda names: tuple(dict.fromkeys(names)))
-"""Repeating a name is no mistake worth a message."""
+_ONCE = AfterValidator(lambda given: tuple(dict.fromkeys(given)))
+"""Repeating a name or value is no mistake worth a message."""
 
 States: TypeAlias = Annotated[tuple[State, ...], Field(strict=False), _ONCE]
 Order: TypeAlias = Annotated[
@@ -141,22 +140,20 @@ class Sweep(Table):
     to: float | None = key("last value", example=15.0, default=None)
     count: int | None = key(example=1501, default=None, ge=1, le=_MOST_VALUES)
     """number of values, evenly spaced"""
-    values: Numbers | None = key(example=[1.0, 2.0], default=None, min_length=1)
+    values: Annotated[Numbers, _ONCE] | None = key(example=[1.0, 2.0], default=None, min_length=1)
     """the values themselves, instead of from, to and count"""
 
     @model_validator(mode="after")
-    def _has_distinct_values(self) -> Self:
+    def _has_values(self) -> Self:
         first, last, count = self.from_, self.from_ if self.count == 1 else self.to, self.count
         if self.values is not None and (first, self.to, count) == (None, None, None):
-            if len({*self.values}) < len(self.values):
-                (twice, _), *_ = Counter(self.values).most_common(1)
-                raise ValueError(f"values lists {twice:.12g} twice; list it once")
-        elif self.values is not None or first is None or last is None or count is None:
+            return self
+        if self.values is not None or first is None or last is None or count is None:
             raise ValueError("give either `values`, or `from`, `to` and `count`")
-        elif count > 1 and last <= first:
+        if count > 1 and last <= first:
             rule = f"to = {last} must be greater than from = {first}; exchange the two"
             raise ValueError(f"{rule}; start.carry says in which direction a sweep runs")
-        elif count > 1 and (last - first) / count < 2 * math.ulp(last):
+        if count > 1 and (last - first) / count < 2 * math.ulp(last):
             rule = f"{count} values between from and to would coincide"
             raise ValueError(f"{rule}; lower the count or widen the sweep")
         return self

@@ -175,6 +175,14 @@ def test_swept_values_come_in_ascending_order():
     assert groups.mesh_frequency == 0.9
 
 
+def test_what_is_listed_twice_counts_once():
+    twice = ["sweep.values=[0.3, 0.1, 0.3]", "scene.effects=['backlash', 'backlash']"]
+    config = Configuration.from_toml(SMALLEST, overrides=[*twice, "groups.half_backlash=1.0"])
+    assert swept_values(config.sweep).tolist() == [0.1, 0.3]
+    assert config.sweep.size == 2
+    assert config.scene.effects == ("backlash",)
+
+
 def test_a_span_has_its_ends_and_one_rounding_per_value():
     config = load_config(PAN2021, ["sweep.from=0.1", "sweep.to=0.7", "sweep.count=7"])
     assert swept_values(config.sweep).tolist() == [0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7]

@@ -158,7 +158,6 @@ ONE_FAULT = [
     ("sweep.to=1e-320", "sweep: 1501 values", "would coincide", "lower the count"),
     ('sweep={parameter="load"}', "sweep: give either", "`values`, or"),
     ('sweep={parameter="load", values=[]}', "sweep.values = []", "at least 1 value", "values"),
-    ('sweep={parameter="load", values=[1, 1]}', "sweep: values", "lists 1 twice", "once"),
     ('sweep={parameter="load", values=[1, 2], count=2}', "sweep: give either", "`values`, or"),
     (
         'sweep={parameter="damping_ratio", values=[-0.5, 1]}',
@@ -204,12 +203,6 @@ ONE_FAULT = [
         "second_sweep: to = 0",
         "greater than from = 1",
         "exchange",
-    ),
-    (
-        'second_sweep={parameter="load", values=[1, 1]}',
-        "second_sweep: values",
-        "lists 1 twice",
-        "list it once",
     ),
     (
         'second_sweep={parameter="damping_ratio", values=[-0.5, 1]}',

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from gearchaos import FileError, load_config, open_result
-from gearchaos.command_line import sweep_file
+from gearchaos.command_line import SWEEPS
 from gearchaos.figures.response import coordinates_of
 from gearchaos.gear.contact_lines import series_table
 from gearchaos.paper.comparison import (
@@ -121,7 +121,7 @@ def test_the_configuration_and_the_printed_numbers_say_the_same():
     printed = published()
     numbers = {key: number.value for key, number in vars(printed.numbers).items()}
     for name in ("pan2021.toml", "pan2021_full.toml", "pan2021_first.toml"):
-        config = load_config(sweep_file(name))
+        config = load_config(SWEEPS / name)
         assert config.mesh.mean_stiffness_N_per_um_mm == numbers["mean_stiffness"]
         assert config.mesh.stiffness.cosine_N_per_um_mm == (*printed.harmonics.cosine,)
         assert config.mesh.stiffness.sine_N_per_um_mm == (*printed.harmonics.sine,)
@@ -196,8 +196,8 @@ def found():
     """A gallery of few lanes and periods: all that depends on neither."""
     coarse = ["sweep.count=76", *COARSE]
     # Of the soft axial bearings the transient is a long one.
-    full = load_config(sweep_file("pan2021_full.toml"), ["sweep.count=1", *COARSE[1:]])
-    return compute(load_config(sweep_file("pan2021.toml"), coarse), full, hop_step=0.1, periods=8)
+    full = load_config(SWEEPS / "pan2021_full.toml", ["sweep.count=1", *COARSE[1:]])
+    return compute(load_config(SWEEPS / "pan2021.toml", coarse), full, hop_step=0.1, periods=8)
 
 
 @pytest.fixture(scope="module")
