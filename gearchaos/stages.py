@@ -195,9 +195,8 @@ def boundary_list(boundaries: "Sequence[Boundary]") -> Iterator[str]:
         if boundary.loss:
             yield f"    {boundary.loss}"
         if not math.isnan(abs(boundary.multiplier)):
-            real, imaginary = boundary.multiplier.real, abs(boundary.multiplier.imag)
-            pair = f" +- {imaginary:.4f}i" if imaginary else ""
-            yield f"    multiplier {real:.4f}{pair}"
+            pair = boundary.multiplier.imag != 0.0
+            yield f"    multiplier {boundary.multiplier if pair else boundary.multiplier.real:.4f}"
 
 
 main = Command("stages", __doc__, _stages).start(__name__)

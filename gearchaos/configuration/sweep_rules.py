@@ -1,7 +1,7 @@
 """Rules of the sweeps: parameter, values, and that groups of the lanes are known and moved."""
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 
 import numpy as np
 
@@ -89,8 +89,8 @@ def lane_faults(config: Tables) -> Iterator[Fault]:
     some = dict(zip(by_parameter, np.ix_(*by_parameter.values()), strict=True))
     try:
         groups = groups_at(config, some)
-    except ConfigurationError:
-        yield from _refused(config, some)
+    except ConfigurationError as error:
+        yield Fault(" or ".join(config.swept.values()), str(error), "", " or ".join(config.swept))
         return
     except (ArithmeticError, ValueError) as error:
         remedy = "check the magnitudes in [pair], [mesh], [operation], [pitch_error], [bearings]"
@@ -113,15 +113,6 @@ def _some_values(sweep: Sweep) -> Floats:
     values = swept_values(sweep)
     some = values[[0, values.size // 2, -1]]
     return np.unique(some) if values.size > 1 else some[:2]
-
-
-def _refused(config: Tables, some: Mapping[str, Floats]) -> Iterator[Fault]:
-    """Yield the sweeps that make the stiffness differ between lanes; each does so alone."""
-    for table, sweep in config.sweeps.items():
-        try:
-            groups_at(config, {sweep.parameter: some[sweep.parameter]})
-        except ConfigurationError as error:
-            yield Fault(f"{table}.parameter", str(error), "", sweep.parameter)
 
 
 def _moved(config: Tables, groups: Groups, axis: int, count: int) -> bool:
