@@ -43,8 +43,8 @@ def _stages(options: Namespace) -> None:
     if options.refine is not None and not options.at and {*whole.axes} - {whole.axis, *UNSWEPT}:
         _map_boundaries(whole, options)
         return
-    stages = stage_table(lanes, options.narrowest)
-    stretches = apart(part, options.narrowest)
+    stages = stage_table(lanes)
+    stretches = apart(part)
     boundaries, outlasting = _computed_again(part, result, stages, stretches, options)
     for at, boundary in enumerate([] if both else boundaries or []):
         stages[at] = stages[at]._replace(end=boundary.below)
@@ -87,11 +87,11 @@ def _map_boundaries(result: "Result", options: Namespace) -> None:
 
     choose_threads(options.threads)
     config = refinable(result, options.result)
-    if len(result.axes) > 2 or options.narrowest or options.survival is not None:
+    if len(result.axes) > 2 or options.survival is not None:
         raise ConfigurationError(
             f"--refine: {options.result} runs over {', '.join(result.axes)}; only two swept "
-            "parameters are refined as a whole, without --narrowest and --survival: choose a slice "
-            "with --at NAME=VALUE"
+            "parameters are refined as a whole, without --survival: choose a slice with --at "
+            "NAME=VALUE"
         )
     with compiling():
         rows, lanes = refined_map(config, result, options.refine)
@@ -146,13 +146,12 @@ def table(axis: str, stages: "Sequence[Stage]", where: Sequence[str]) -> Iterato
     """Word the stages of a slice as lines of a table, no longer than 80 characters."""
     yield f"stages over {axis}"
     yield from where
-    yield f"{'from':>10}  {'to':>10}  {'motion':15}{'lanes':>6}  {'exponent':>20}  narrower"
+    yield f"{'from':>10}  {'to':>10}  {'motion':15}{'lanes':>6}  {'exponent':>20}"
     for stage in stages:
         exponent = f"{stage.lowest_exponent:.4f} to {stage.highest_exponent:.4f}"
         yield (
             f"{stage.start:10.6g}  {stage.end:10.6g}  {stage.label:15}{stage.lanes:6d}"
-            f"  {'' if math.isnan(stage.lowest_exponent) else exponent:>20}"
-            f"  {f'with {stage.narrower}' if stage.narrower else ''}".rstrip()
+            f"  {'' if math.isnan(stage.lowest_exponent) else exponent:>20}".rstrip()
         )
 
 

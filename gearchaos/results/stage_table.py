@@ -33,9 +33,8 @@ class Stage(NamedTuple):
     """A stretch of the swept parameter with one kind of motion.
 
     ``first``, ``last``: the numbers of its outermost lanes; ``start``, ``end``: their values;
-    ``narrower``: stages between them that are too narrow to be told apart; ``lanes``: their number,
-    those of narrower stages among them; the exponents, and ``bands``, which counts lanes by the
-    number of their bands, are those of the lanes with its own label.
+    ``lanes``: their number, those of narrower stages among them; the exponents, and ``bands``,
+    which counts lanes by the number of their bands, are those of the lanes with its own label.
     """
 
     first: int
@@ -44,7 +43,6 @@ class Stage(NamedTuple):
     end: float
     label: str
     period: int
-    narrower: int
     lowest_exponent: float
     highest_exponent: float
     lanes: int
@@ -52,12 +50,11 @@ class Stage(NamedTuple):
 
 
 class _Stretch(NamedTuple):
-    """First lane, the lane after its last one, a lane that has its label, narrower stages."""
+    """First lane, the lane after its last one, a lane that has its label."""
 
     first: int
     after: int
     own: int
-    narrower: int
 
 
 def require_labels(result: Result, name: str = "the result") -> None:
@@ -138,7 +135,7 @@ def stage_table(lanes: LabelledLanes, narrowest: float = 0.0) -> list[Stage]:
     def width(stretch: _Stretch) -> float:
         return float(borders[stretch.after] - borders[stretch.first])
 
-    by_first = {a: _Stretch(a, b, a, 0) for a, b in pairwise(edges)}
+    by_first = {a: _Stretch(a, b, a) for a, b in pairwise(edges)}
     by_after = {stretch.after: stretch for stretch in by_first.values()}
     heap = [(width(stretch), stretch) for stretch in by_first.values()]
     heapify(heap)
@@ -151,8 +148,7 @@ def stage_table(lanes: LabelledLanes, narrowest: float = 0.0) -> list[Stage]:
         label = lanes.labels[max(there, key=width).own]
         merged = [near for near in there if lanes.labels[near.own] == label] + [stretch]
         first, after = min(old.first for old in merged), max(old.after for old in merged)
-        narrower = 1 + sum(old.narrower for old in merged)
-        whole = _Stretch(first, after, merged[0].own, narrower)
+        whole = _Stretch(first, after, merged[0].own)
         for old in merged:
             del by_first[old.first], by_after[old.after]
         by_first[whole.first] = by_after[whole.after] = whole
@@ -160,7 +156,7 @@ def stage_table(lanes: LabelledLanes, narrowest: float = 0.0) -> list[Stage]:
     return [_stage(lanes, *by_first[first]) for first in sorted(by_first)]
 
 
-def _stage(lanes: LabelledLanes, first: int, after: int, own: int, narrower: int) -> Stage:
+def _stage(lanes: LabelledLanes, first: int, after: int, own: int) -> Stage:
     label, period = str(lanes.labels[own]), int(lanes.period[own])
     start, end = lanes.values[[first, after - 1]].tolist()
     alike = first + np.flatnonzero(lanes.labels[first:after] == label)
@@ -169,6 +165,4 @@ def _stage(lanes: LabelledLanes, first: int, after: int, own: int, narrower: int
     low, high = (float(extreme.reduce(known, initial=np.nan)) for extreme in (np.fmin, np.fmax))
     numbers, counts = np.unique(bands[bands > 0], return_counts=True)
     by_bands = dict(zip(numbers.tolist(), counts.tolist(), strict=True))
-    return Stage(
-        first, after - 1, start, end, label, period, narrower, low, high, after - first, by_bands
-    )
+    return Stage(first, after - 1, start, end, label, period, low, high, after - first, by_bands)

@@ -37,16 +37,16 @@ def lanes(labels: str, values: list[float] | None = None) -> LabelledLanes:
     )
 
 
-def shown(stages: list[Stage]) -> list[tuple[str, float, float, int]]:
-    return [(stage.label, stage.start, stage.end, stage.narrower) for stage in stages]
+def shown(stages: list[Stage]) -> list[tuple[str, float, float]]:
+    return [(stage.label, stage.start, stage.end) for stage in stages]
 
 
 def test_equal_neighbours_form_a_stage():
     stages = stage_table(lanes("111ccc22"))
     assert shown(stages) == [
-        ("period 1", 0.0, 2.0, 0),
-        ("chaotic", 3.0, 5.0, 0),
-        ("period 2", 6.0, 7.0, 0),
+        ("period 1", 0.0, 2.0),
+        ("chaotic", 3.0, 5.0),
+        ("period 2", 6.0, 7.0),
     ]
     assert [stage.lanes for stage in stages] == [3, 3, 2]
     assert [stage.period for stage in stages] == [1, 0, 2]
@@ -58,9 +58,9 @@ def test_one_lane_is_one_stage():
     assert (stage.label, stage.lanes, stage.start, stage.end) == ("period 3", 1, 0.0, 0.0)
 
 
-def test_a_window_goes_into_the_chaos_on_both_sides_and_is_counted():
+def test_a_window_goes_into_the_chaos_on_both_sides():
     (before, chaos) = stage_table(lanes("1111ccc3ccc6cccc"), narrowest=1.5)
-    assert shown([before, chaos]) == [("period 1", 0.0, 3.0, 0), ("chaotic", 4.0, 15.0, 2)]
+    assert shown([before, chaos]) == [("period 1", 0.0, 3.0), ("chaotic", 4.0, 15.0)]
     # The windows at 4 and 8 lanes after the first do not count as exponents of the chaos.
     assert chaos.lowest_exponent == 1.0
     assert chaos.lanes == 12
@@ -68,8 +68,8 @@ def test_a_window_goes_into_the_chaos_on_both_sides_and_is_counted():
 
 def test_a_stage_between_two_others_goes_into_the_wider_one():
     assert shown(stage_table(lanes("111122cc"), narrowest=2.0)) == [
-        ("period 1", 0.0, 3.0, 0),
-        ("period 2", 4.0, 7.0, 1),
+        ("period 1", 0.0, 3.0),
+        ("period 2", 4.0, 7.0),
     ]
     assert shown(stage_table(lanes("11112cccc"), narrowest=1.5))[0][2] == 4.0
 
@@ -77,7 +77,6 @@ def test_a_stage_between_two_others_goes_into_the_wider_one():
 def test_a_cascade_of_narrow_stages_ends_where_it_belongs():
     stages = stage_table(lanes("1111111122224888cccccc3c6ccccc"), narrowest=6.5)
     assert [stage.label for stage in stages] == ["period 1", "chaotic"]
-    assert sum(stage.narrower for stage in stages) == 5
     assert sum(stage.lanes for stage in stages) == 30
 
 
@@ -105,10 +104,10 @@ def test_labels_are_worded(meaning, period, text):
 
 
 def slow_twin(lanes: LabelledLanes, narrowest: float) -> list[list[int]]:
-    """First lane, lane after the last, lane with the label, narrower stages: rule by rule."""
+    """First lane, lane after the last, lane with the label: rule by rule."""
     changes = np.flatnonzero(lanes.labels[1:] != lanes.labels[:-1]) + 1
     edges = [0, *changes.tolist(), lanes.values.size]
-    parts = [[a, b, a, 0] for a, b in pairwise(edges)]
+    parts = [[a, b, a] for a, b in pairwise(edges)]
     middles = (lanes.values[1:] + lanes.values[:-1]) / 2.0
     borders = np.concatenate([lanes.values[:1], middles, lanes.values[-1:]])
 
@@ -126,7 +125,6 @@ def slow_twin(lanes: LabelledLanes, narrowest: float) -> list[list[int]]:
             min(part[0] for part in merged),
             max(part[1] for part in merged),
             merged[0][2],
-            1 + sum(part[3] for part in merged),
         ]
         here = parts.index(min(merged))
         parts[here : here + len(merged)] = [whole]
@@ -140,13 +138,9 @@ def slow_twin(lanes: LabelledLanes, narrowest: float) -> list[list[int]]:
 )
 def test_the_stages_are_those_of_the_rule_taken_step_by_step(labels, steps, narrowest):
     some = lanes(labels, np.cumsum(steps[: len(labels)]).astype(float).tolist())
-    told = [
-        (stage.first, stage.last + 1, stage.label, stage.narrower)
-        for stage in stage_table(some, narrowest)
-    ]
+    told = [(stage.first, stage.last + 1, stage.label) for stage in stage_table(some, narrowest)]
     assert told == [
-        (first, after, some.labels[own], narrower)
-        for first, after, own, narrower in slow_twin(some, narrowest)
+        (first, after, some.labels[own]) for first, after, own in slow_twin(some, narrowest)
     ]
 
 

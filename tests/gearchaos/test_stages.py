@@ -51,15 +51,6 @@ def test_the_table_lists_every_stage_within_80_columns(folder, result):
     assert sum(int(row[39:46]) for row in rows) == result["motion"].size
 
 
-def test_narrow_stages_are_counted_in_their_surroundings(folder):
-    facts = json.loads(stages(folder, "pan.h5", "--narrowest", "0.35", "--json").out)
-    assert [stage["label"] for stage in facts["stages"]] == ["period 1", "period 2", "chaotic"]
-    chaos = facts["stages"][-1]
-    assert chaos["narrower"] >= 2
-    assert chaos["lowest_exponent"] > 0.0
-    assert sum(stage["lanes"] for stage in facts["stages"]) == 33
-
-
 def test_the_table_needs_no_engine(folder):
     program = (
         "import sys; from gearchaos.stages import main; code = main(['pan.h5']); "
@@ -71,7 +62,7 @@ def test_the_table_needs_no_engine(folder):
 
 @pytest.mark.slow
 def test_boundaries_are_refined_and_the_period_doubling_is_told(folder):
-    ended = stages(folder, "pan.h5", "--narrowest", "0.35", "--refine", "0.002", "--json")
+    ended = stages(folder, "pan.h5", "--refine", "0.002", "--json")
     assert ended.code == 0
     facts = json.loads(ended.out)
     doubling = facts["boundaries"][0]
@@ -164,7 +155,6 @@ def test_what_is_no_result_or_no_width_is_refused(folder):
         (["broken.h5"], 4),
         (["missing.h5"], 4),
         (["pan.h5", "--refine", "0"], 2),
-        (["pan.h5", "--narrowest", "nan"], 2),
         (["pan.h5", "--at", "start=3"], 2),
     ):
         ended = stages(folder, *arguments)
