@@ -118,9 +118,7 @@ class Lanes:
         """The groups of the model with their origin; those that no effect needs are left out."""
         names = [known.axis_name(parameter) for parameter in self._values]
         sizes = [values.size for values in self._values.values()]
-        others = [[n for n in range(len(names)) if n != own] for own in range(len(names))]
-        swept = zip(self._values.items(), others, strict=True)
-        values = {p: np.expand_dims(v, axes) for (p, v), axes in swept}
+        values = dict(zip(self._values, np.ix_(*self._values.values()), strict=True))
         groups = groups_at(self.config, values)
 
         def entry(name: str, value: Any, origin: str, texts: tuple[str, str, str]) -> Variable:
