@@ -257,9 +257,9 @@ def test_increments_of_separated_teeth_are_those_of_the_forcing(found):
     """While teeth are apart, delta_5'' = f_n + Omega^2 P e_r sin - cos(beta_b) 2 xi y_1'."""
     response = found.response
     group = {
-        name: float(parameter.value)
+        name: float(parameter.values)
         for name, parameter in response.parameters.items()
-        if np.ndim(parameter.value) == 0
+        if np.ndim(parameter.values) == 0
     }
     omega, cosine = group["mesh_frequency"], np.cos(np.radians(group["base_helix_angle_deg"]))
     for p in (3.0, 5.0, 7.0, 9.0, 11.0):
@@ -552,7 +552,7 @@ def test_the_groups_in_the_report_are_those_of_the_sweep(report, found):
         ["mass_ratio_p", "mass_ratio_g", "base_helix_angle_deg"],
     ]
     assert [numbers(cell) for cell in cells] == [
-        pytest.approx([float(shared[name].value) for name in row], rel=1e-4) for row in names
+        pytest.approx([float(shared[name].values) for name in row], rel=1e-4) for row in names
     ]
 
 
