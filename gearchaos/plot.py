@@ -56,9 +56,10 @@ def _plot(options: Namespace) -> None:
 
 def _draws_alone(page: str, options: Namespace, *others: str) -> None:
     """Refuse several results on a page other than a diagram, and the options that it lacks."""
-    asked = [f"--{name}" for name in others if getattr(options, name)]
-    for fault in (*asked, *map(str, options.result[1:])):
-        rule = f"only diagrams of sweeps are drawn with it, and this is {page}; leave it out"
+    faults = {f"--{name}": "have it" for name in others if getattr(options, name)}
+    faults |= {str(path): "are drawn over each other" for path in options.result[1:]}
+    for fault, rule in faults.items():
+        rule = f"only diagrams of sweeps {rule}, and here is {page}; leave it out"
         raise FigureError(f"{fault}: {rule}")
 
 

@@ -135,4 +135,7 @@ def test_of_several_files_the_map_is_the_one_that_is_refused(tmp_path, capsys):
     result_over(AXES["one start"]).save(tmp_path / "one.h5")
     BOTH.save(tmp_path / "both.h5")
     assert main([str(tmp_path / "one.h5"), str(tmp_path / "both.h5")]) == 2
-    assert "both.h5: runs over load and pitch_error: a map is drawn" in capsys.readouterr().err
+    assert (
+        "both.h5: only diagrams of sweeps are drawn over each other, and here is a map"
+        in capsys.readouterr().err
+    )

@@ -198,7 +198,7 @@ def test_a_pdf_has_its_cells_as_images_and_its_words_as_text(path):
     ("arguments", "message"),
     [
         (["--stages"], "a map, of which --at pitch_error=VALUE makes a diagram"),
-        (["{}"], "map.h5: only diagrams of sweeps are drawn with it"),
+        (["{}"], "map.h5: only diagrams of sweeps are drawn over each other"),
         (["--variable", "section_delta_5"], "no variable 'section_delta_5' of each lane"),
         (["--variable", "end_state"], "no variable 'end_state' of each lane"),
         (["--mark", "torque=3"], "--mark torque: is no swept parameter of the figure"),

@@ -269,7 +269,7 @@ def test_what_is_no_coordinate_has_its_history_and_its_own_spectrum(path, result
         (["--output", "all.gif"], "'gif': a figure is written as png, pdf, svg, eps, tiff"),
         (
             ["--stages"],
-            "--stages: only diagrams of sweeps are drawn with it, and this is a response",
+            "--stages: only diagrams of sweeps have it, and here is a response",
         ),
         (["--variable", "delta_3"], "no variable 'delta_3' over time in the result; it has delta"),
         (["--from", "13"], "the result has 5.86 to 12.5"),

@@ -231,10 +231,10 @@ def test_the_command_draws_a_slice(path, capsys):
     ("arguments", "message"),
     [
         ([], "the axes load, pitch_error_grade, realisation, start"),
-        (["--at", "load=1", "--stages"], "this is a figure of shares; leave it out"),
+        (["--at", "load=1", "--stages"], "here is a figure of shares; leave it out"),
         (
             ["--at", "load=1", "--variable", "section_delta_5"],
-            "this is a figure of shares; leave it out",
+            "here is a figure of shares; leave it out",
         ),
         (["--at", "load=1", "--from", "10"], "the result has 5 to 9"),
     ],
@@ -249,4 +249,4 @@ def test_what_the_command_cannot_draw_is_a_usage_error(path, arguments, message,
 
 def test_two_results_have_no_common_shares(path, capsys):
     assert main([str(path), str(path), "--shares"]) == 2
-    assert "and this is a figure of shares" in capsys.readouterr().err
+    assert "and here is a figure of shares" in capsys.readouterr().err
