@@ -266,10 +266,14 @@ def end_period(memory, first, lanes, batch, period, steps, plan, outcome, presen
         if not sound:
             outcome.status[index] = _DIVERGED
             outcome.diverged_period[index] = period
-            outcome.section[index, max(point, 0) :] = math.nan
-            outcome.growth[index, max(recorded, 0) :] = math.nan
             for row in range(rows.COEFFICIENTS):
                 memory[row * STRIDE + slot] = math.nan
+            # One by one: a slice takes longer to compile.
+            for later in range(max(point, 0), outcome.section.shape[1]):
+                scale = batch.scales[index]
+                take(memory, rows.STATE, slot, scale, outcome.section[index, later])
+            for later in range(max(recorded, 0), outcome.growth.shape[1]):
+                outcome.growth[index, later] = math.nan
             continue
         if present.contact is not None:
             if recorded >= 0:
