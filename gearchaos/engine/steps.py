@@ -5,7 +5,7 @@ from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
-from gearchaos_kernels import MOST_MAP_BYTES, Outcome, Plan, Status, System, integrate, maps_memory
+from gearchaos_kernels import Outcome, Plan, Status, System, integrate, maps_are_kept
 
 from gearchaos.arrays import Integers, Mask
 from gearchaos.configuration.messages import Fault
@@ -111,8 +111,7 @@ def needless_maps(lanes: Lanes, plan: Plan) -> str:
     """Tell where flow maps are too many to be kept and fewer would do; empty where they are not."""
     if plan.method != "flow_map" or plan.told_by_steps or plan.steps_per_period <= FLOW_MAP_STEPS:
         return ""
-    system = lanes.system_of(np.arange(min(len(lanes), LANES_AT_ONCE)))
-    if maps_memory(system, plan, np.ones(system.lanes, dtype=np.int64)) <= 2 * MOST_MAP_BYTES:
+    if maps_are_kept(lanes.system_of(np.arange(min(len(lanes), LANES_AT_ONCE))), plan):
         return ""
     return (
         f"integration.steps_per_period = {plan.steps_per_period}: lanes that differ in more than "

@@ -3,7 +3,7 @@
 from gearchaos_kernels.batch import integrate
 from gearchaos_kernels.compilation import CACHE_FOLDER, source_hash
 from gearchaos_kernels.evaluation import jacobian, mesh_motion
-from gearchaos_kernels.flow_map import MOST_MAP_BYTES, maps_memory
+from gearchaos_kernels.flow_map import maps_are_kept, maps_memory
 from gearchaos_kernels.rows import LANES
 from gearchaos_kernels.system import (
     STATES,

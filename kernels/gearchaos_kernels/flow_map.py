@@ -72,8 +72,24 @@ def sharing(system: System) -> NDArray[np.intp]:
 def maps_memory(system: System, plan: Plan, stable: NDArray[np.int64]) -> int:
     """Return about how many bytes the maps of lanes that are integrated together take.
 
-    ``stable`` (lanes,): steps per period with which RK4 is stable. Series need about as many, and
-    two for every harmonic of the stiffness; fewer are divided, see `_make`.
+    ``stable`` (lanes,): steps per period with which RK4 is stable.
+    """
+    sizes = _sizes(system, plan, stable)
+    # Those that are kept, and those that are being made.
+    return 2 * int(min(sizes.sum(), MOST_MAP_BYTES + sizes.max()))
+
+
+def maps_are_kept(system: System, plan: Plan) -> bool:
+    """Whether the maps of all lanes are kept, were no step of the plan divided."""
+    sizes = _sizes(system, plan, np.zeros(system.lanes))
+    return bool(sizes.sum() <= max(MOST_MAP_BYTES, sizes.max()))
+
+
+def _sizes(system: System, plan: Plan, stable: Floats | NDArray[np.int64]) -> Floats:
+    """Return about how many bytes the maps of each group of lanes that share them take.
+
+    Series need about as many steps as RK4 to be stable, and two for every harmonic of the
+    stiffness; fewer are divided, see `_make`.
     """
     place: Layout = layout.py_func(flags(system, plan))
     harmonics = system.stiffness_cosine.size if system.effects.stiffness_variation else 0
@@ -81,9 +97,8 @@ def maps_memory(system: System, plan: Plan, stable: NDArray[np.int64]) -> int:
     needed = stable[first] + 2.0 * harmonics
     steps = fewest_steps(plan)
     divided = steps * 2.0 ** np.ceil(np.log2(np.maximum(needed / steps, 1.0)))
-    sizes = 8 * place.step_size * np.minimum(divided, max(steps, MOST_STEPS))
-    # Those that are kept, and those that are being made.
-    return 2 * int(min(sizes.sum(), MOST_MAP_BYTES + sizes.max()))
+    sizes: Floats = 8 * place.step_size * np.minimum(divided, max(steps, MOST_STEPS))
+    return sizes
 
 
 class _Kept:

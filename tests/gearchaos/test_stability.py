@@ -229,6 +229,8 @@ def test_more_flow_maps_than_are_kept_are_told():
         ([swept, finer], True),
         ([swept, "integration.steps_per_period=24"], False),
         ([finer], False),
+        # Not even where those of one lane are more: all lanes share them.
+        (["integration.steps_per_period=25000"], False),
         ([swept, finer, "outputs.loads=true"], False),  # They need so many steps.
         ([swept, finer, "integration.method=rk4"], False),
     ):
