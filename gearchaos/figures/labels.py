@@ -12,7 +12,7 @@ from gearchaos.gear.tooth_deviations import REALISATION
 from gearchaos.results import scales
 from gearchaos.results.result import Result
 from gearchaos.results.scales import excitation_of
-from gearchaos.results.variables import DIRECTION, START, coordinate_text
+from gearchaos.results.variables import DIRECTION, START, Variable, coordinate_text
 
 
 def axis_label(result: Result, name: str, line_length: int = 60) -> str:
@@ -37,8 +37,7 @@ def axis_label(result: Result, name: str, line_length: int = 60) -> str:
 
 def unit_of(result: Result, name: str) -> str:
     """Word the unit of a variable, or what its numbers are multiples of; "" of a pure number."""
-    known = result.parameters | result.fixed_axes | result.variables
-    written = known[name].units
+    written = _known(result)[name].units
     if written in ("", "1"):
         return scales.unit_of(name).stands_for
     words = plain(re.sub(r"\bum\b", "\N{MICRO SIGN}m", written))
@@ -66,7 +65,7 @@ def in_words(result: Result, place: Mapping[str, float]) -> str:
     """Word a place on the axes of a result, such as ``$P$ = 5.86, start 0``."""
     texts = []
     for axis, value in place.items():
-        known = (result.parameters | result.fixed_axes | result.variables).get(axis)
+        known = _known(result).get(axis)
         wording = (known and known.long_name) or axis.replace("_", " ")
         name = (known and _formula(known.symbol)) or plain(wording)
         unit = f" {unit_of(result, axis).removeprefix('unit ')}".rstrip() if known else ""
@@ -98,6 +97,11 @@ def short(value: float, digits: int = 4, sign: str = "-") -> str:
 def plain(text: str) -> str:
     """Return a text in which a dollar sign is a dollar sign, not the start of a formula."""
     return text.replace("$", r"\$")
+
+
+def _known(result: Result) -> Mapping[str, Variable]:
+    """Return all that a result tells of, also what it was fixed at."""
+    return result.parameters | result.fixed_axes | result.variables
 
 
 def _broken(words: list[str], line_length: int) -> list[str]:
