@@ -1,17 +1,16 @@
 """The batch driver: splits lanes into blocks, runs them side by side, returns arrays."""
 
-import math
 from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
-from numba import prange
+from numba import get_num_threads, prange
 from numpy.typing import NDArray
 
 from gearchaos_kernels.block import Batch, integrate_block
 from gearchaos_kernels.block_memory import Present, flags
 from gearchaos_kernels.coefficients import lane_coefficients, state_scales, steps_between_scalings
-from gearchaos_kernels.compilation import driver
+from gearchaos_kernels.compilation import count_up, driver
 from gearchaos_kernels.flow_map import fewest_steps, maps_of, sharing
 from gearchaos_kernels.rows import CONTACT_ROWS, ERROR, LANES, SIGNAL_ROWS, SIGNALS
 from gearchaos_kernels.system import Floats, Outcome, Plan, Schedule, Status, System
@@ -21,10 +20,14 @@ Integers = NDArray[np.intp]
 
 
 @driver
-def _integrate_blocks(batch, plan, outcome, present):
-    for number in prange(batch.blocks.shape[0]):
-        # One type of number inside and outside of the parallel loop: else two are compiled.
-        integrate_block(np.int64(number), batch, plan, outcome, present)
+def _integrate_blocks(taken, batch, plan, outcome, present):
+    # Every thread takes the next block when it has done one: some blocks cross boundaries far more
+    # often than others, and another program may be using a core.
+    for _ in prange(get_num_threads()):
+        number = count_up(taken)
+        while number < batch.blocks.shape[0]:
+            integrate_block(number, batch, plan, outcome, present)
+            number = count_up(taken)
 
 
 def integrate(
@@ -78,13 +81,13 @@ def integrate(
             np.ascontiguousarray(tangent_start, dtype=np.float64),
             steps_between_scalings(system, steps_of),
             order,
-            _scattered(blocks),
+            blocks,
             maps,
             np.array([*columns, ERROR], dtype=np.intp),
             turns,
             *tables_of(system, present, steps),
         )
-        _integrate_blocks(batch, schedule, outcome, present)
+        _integrate_blocks(np.zeros(1, dtype=np.intp), batch, schedule, outcome, present)
         if maps.size:
             unmapped = np.repeat(np.isnan(maps[blocks[:, 3]]), blocks[:, 1])
             outcome.status[order[unmapped]] = Status.TOO_FAST
@@ -137,10 +140,3 @@ def _blocks(lanes: Integers, steps: Integers, maps_at: Integers) -> Integers:
     ]
     return np.array(blocks, dtype=np.intp).reshape(-1, 4)
 
-
-def _scattered(blocks: Integers) -> Integers:
-    """Order blocks so that every stretch of them has some from everywhere, a golden section apart.
-
-    Each thread takes one stretch, and neighbours cross boundaries about as often as each other.
-    """
-    return blocks[np.argsort(np.arange(len(blocks)) * (math.sqrt(5.0) - 1.0) / 2.0 % 1.0)]

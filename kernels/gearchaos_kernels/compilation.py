@@ -196,3 +196,14 @@ def align_stack(_typing_context: Any) -> Any:
         return context.get_dummy_value()
 
     return types.void(), generate
+
+
+@intrinsic
+def count_up(_typing_context: Any, counter: Any) -> Any:
+    """Add one to a number that threads share, shape (1,), and return what it was."""
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        address = context.make_array(signature.args[0])(context, builder, arguments[0]).data
+        return builder.atomic_rmw("add", address, address.type.pointee(1), "monotonic")
+
+    return types.intp(counter), generate
