@@ -147,7 +147,8 @@ def fill_maps(matrix, coefficients, forcing, table, place):
 def fill_steps(matrix, engaged, forcing, table, place):
     """Fill the maps of some steps on all pairs of branches; return what is left of the series.
 
-    In every array the last numbers are those of these steps, pair by pair.
+    In every array the last numbers are those of these steps, pair by pair. They are written one by
+    one: with an array for a part of another one Numba compiles a text for where they do not fit.
     """
     states, columns, ways = place.states, place.columns, place.ways
     rates, gaps = matrix[:states, : states + 3].copy(), matrix[states:, : states + 3].copy()
@@ -162,18 +163,21 @@ def fill_steps(matrix, engaged, forcing, table, place):
     for column in range(states + 1):
         psi[0, column, column * width : (column + 1) * width] = 1.0
     for k in range(ORDER):
-        if columns > error:
-            psi[k, states + 1, error * width : (error + 1) * width] = forcing[1, k]
-            psi[k, states + 2, error * width : (error + 1) * width] = forcing[2, k]
-        if columns > error + 1:
-            psi[k, states + 1, (error + 1) * width :] = forcing[2, k]
-            psi[k, states + 2, (error + 1) * width :] = -forcing[1, k]
+        for at in range(width):
+            sine, cosine = forcing[1, k, at], forcing[2, k, at]
+            if columns > error:
+                psi[k, states + 1, error * width + at] = sine
+                psi[k, states + 2, error * width + at] = cosine
+            if columns > error + 1:
+                psi[k, states + 1, (error + 1) * width + at] = cosine
+                psi[k, states + 2, (error + 1) * width + at] = -sine
     # An offset is no part of the gap, but less deflection.
     for way in range(ways):
         gap[0, way, (states + 1 + way) * width : (states + 2 + way) * width] = -1.0
     solve(0.5, (rates, mobility, gaps), forcing[0], engaged, psi, gap, force)
     for way in range(ways):
-        gap[0, way, (states + 1 + way) * width : (states + 2 + way) * width] += 1.0
+        for at in range((states + 1 + way) * width, (states + 2 + way) * width):
+            gap[0, way, at] += 1.0
 
     # The inverse flow, transposed, and what it makes of the mobilities, with K.
     inverse = np.zeros((ORDER + 1, states, states * width))
@@ -189,21 +193,23 @@ def fill_steps(matrix, engaged, forcing, table, place):
     back = combined(_ENDS, inverse).reshape((2, states, states, width))[0]
     from_beginning = np.zeros((columns, columns, width))
     first = np.zeros((states, states, width))
-    for line in range(states):
-        for source in range(states):
-            from_beginning[line, source] = back[source, line]
-            first[source, line] = 0.5 * ends[0, line, source]
-    for column in range(states, columns):
-        from_beginning[column, column] = 1.0
+    for at in range(width):
         for line in range(states):
             for source in range(states):
-                from_beginning[line, column] -= back[source, line] * ends[0, source, column]
+                from_beginning[line, source, at] = back[source, line, at]
+                first[source, line, at] = 0.5 * ends[0, line, source, at]
+        for column in range(states, columns):
+            from_beginning[column, column, at] = 1.0
+            for line in range(states):
+                for source in range(states):
+                    begin = ends[0, source, column, at]
+                    from_beginning[line, column, at] -= back[source, line, at] * begin
     end = multiplied(ends[1, :states], from_beginning)
     along, tail = economised(gap)
     along = multiplied(along.reshape((TERMS * ways, columns, width)), from_beginning)
     traced, lost = economised(switch)
     traced = multiplied(traced.reshape((TERMS * ways, states, width)), first)
-    for left in (lost, np.abs(psi[ORDER, :states]).max(), np.abs(inverse[ORDER]).max()):
+    for left in (lost, largest(psi[ORDER, :states]), largest(inverse[ORDER])):
         tail = np.maximum(tail, left)
 
     for at in range(width):
@@ -289,5 +295,18 @@ def economised(series):
     kept, lost = combined(_KEPT, series), combined(_DROPPED, series)
     most = 0.0
     for column in range(lost.shape[1]):
-        most = np.maximum(most, np.abs(lost[:, column]).sum())
-    return kept, most / np.maximum(np.abs(kept).max(), 1e-300)
+        together = 0.0
+        for term in range(lost.shape[0]):
+            together += abs(lost[term, column])
+        most = np.maximum(most, together)
+    return kept, most / np.maximum(largest(kept), 1e-300)
+
+
+@part
+def largest(matrix):
+    """Return the size of the largest element; what is not a number is larger than any."""
+    most = 0.0
+    for row in matrix:
+        for number in row:
+            most = np.maximum(most, abs(number))
+    return most
