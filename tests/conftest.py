@@ -1,6 +1,7 @@
 """Settings of all tests."""
 
 import gc
+import os
 
 import pytest
 from hypothesis import settings
@@ -9,24 +10,27 @@ from hypothesis import settings
 settings.register_profile("repeatable", derandomize=True, deadline=None)
 settings.load_profile("repeatable")
 
-FIRST = ("vectorisation", "plot", "oracle", "shard_option", "hard_groups", "flow_map", "loads")
-FIRST += ("swept_parameters", "sweep_interrupted", "dask")
-"""Files of which none shall be the last that runs, while other processes have nothing left to do.
+FIRST = ("vectorisation", "flow_map", "explore", "oracle", "shard_option", "dask", "loads")
+FIRST += ("hard_groups", "swept_parameters", "sweep_interrupted", "teeth_linear")
+"""Files that run first, in this order, of which none shall be the last while others have ended.
 
-The first one compiles scenes whatever is in the cache: so early, others find them there. In the
-last one several workers would compile the same scene at once, had not a file before done it.
+Two of them, or two workers of one, would otherwise compile the same scene at once. The first one
+compiles scenes whatever is in the cache: so early, others find them there.
 """
 
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_cmdline_main(config):
-    """Use all cores unless -n says how many, or somebody wants to look into this process."""
+    """Use all cores unless -n says how many, or somebody wants to look into this process.
+
+    With one process more than there are: some tests wait for a browser, a scheduler or a disk.
+    """
     option = config.option
     looked_into = option.usepdb or option.trace or option.capture == "no"
     if hasattr(config, "workerinput") or looked_into:  # A worker starts none of its own.
         return
     if getattr(option, "numprocesses", 0) is None:
-        option.numprocesses = "logical"
+        option.numprocesses = 1 + (os.cpu_count() or 1)
         # A file in one process: what its tests compile is compiled once.
         option.dist = "loadfile"
         option.loadscopereorder = False

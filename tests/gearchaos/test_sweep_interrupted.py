@@ -133,7 +133,7 @@ def test_a_carried_sweep_goes_on_from_the_end_states_of_the_finished_blocks(
 
 def test_lanes_with_flow_maps_of_their_own_go_on_with_the_same_bits(tmp_path):
     own = ("--set", "integration.method=flow_map", "--set", 'sweep.parameter="mesh_frequency"')
-    own += ("--set", "sweep.from=0.2", "--set", "integration.transient_periods=2000")
+    own += ("--set", "sweep.from=0.2", "--set", "integration.transient_periods=500")
     ended, _ = stop_half_way(tmp_path, signal.SIGINT, *own)
     assert ended == 130
     assert sweep(tmp_path, *LONG, *own, "--resume", "--quiet") == (0, "gears.h5\n", "")

@@ -59,7 +59,8 @@ anything = st.sampled_from([0.0, 1e-300, 1e-9, 1.0, 1e3, 1e9, 1e30, 1e150, np.in
 
 def pair_of(scene: Effects, given: dict[str, float]) -> Groups:
     """Return the pair of an example; a loop with a phase of the error is compiled apart."""
-    return pan2021(0.0, **{**given, **({"error_phase": 0.0} if scene == NO_AXIAL else {})})
+    without = {} if scene.backlash and scene != NO_AXIAL else {"error_phase": 0.0}
+    return pan2021(0.0, **{**given, **without})
 
 
 def value(model: Groups, name: str) -> float:
