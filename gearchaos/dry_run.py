@@ -12,10 +12,10 @@ from pathlib import Path
 
 import numba
 import numpy as np
-from gearchaos_kernels import LANES, Outcome, Plan, integrate
+from gearchaos_kernels import LANES
 from tqdm import tqdm
 
-from gearchaos.arrays import Floats, Integers
+from gearchaos.arrays import Integers
 from gearchaos.engine.simulation import Simulation
 from gearchaos.engine.store_filling import Shard
 from gearchaos.gear.derivation import FREQUENCY, LENGTH
@@ -103,11 +103,9 @@ def _seconds_per_lane(simulation: Simulation) -> float:
                 section_points=min(plan.section_points, recorded),
             )
             began = time.perf_counter()
-            _integrate(
-                sample, places, sample.plan._replace(transient_periods=0, recorded_periods=0)
-            )
+            sample.integrate(places, sample.plan._replace(transient_periods=0, recorded_periods=0))
             made = time.perf_counter()
-            found = _integrate(sample, places, sample.recording)
+            found = sample.integrate(places, sample.recording)
             sample.arrays(sample.lanes.computed_at(places), *found)
             scale = periods / (transient + recorded)
             seconds = (made - began + scale * (time.perf_counter() - made)) / places.size
@@ -125,13 +123,6 @@ def some_places(simulation: Simulation, count: int) -> Integers:
     runs = -(-min(count, len(lanes)) // run)
     first = np.linspace(0, len(lanes) // run - 1, runs + 2)[1:-1].round().astype(np.intp)
     return np.add.outer(run * np.unique(first), np.arange(run)).ravel()
-
-
-def _integrate(simulation: Simulation, places: Integers, plan: Plan) -> tuple[Floats, Outcome]:
-    if simulation.carried:
-        return simulation.integrate(int(places[0]), int(places[-1]) + 1, plan)
-    start = simulation.lanes.start_of(places)
-    return start, integrate(simulation.lanes.system_of(places), start, plan)
 
 
 def _memory(simulation: Simulation) -> int:

@@ -36,7 +36,7 @@ def fewest_stable_steps(system: System) -> Integers:
     clipped = (np.clip(group, -_BEYOND_MEASURE, _BEYOND_MEASURE) for group in system.groups)
     system = system._replace(groups=Groups(*clipped))
     # The axial motion acts on nothing else: both directions in contact or apart are all there is.
-    held = (jacobian(system, stiffness, stiffness) for stiffness in _stiffnesses(system))
+    held = (jacobian(system, stiffness, stiffness) for stiffness in mesh_stiffnesses(system))
     demand = np.max([_demand(matrix) for matrix in held], axis=0)
     with np.errstate(over="ignore"):
         steps: Floats = np.ceil(demand * (1.0 - ROUNDING) * system.mesh_period)
@@ -88,8 +88,8 @@ def steps_per_time(eigenvalues: Complex) -> Floats:
     return np.where(eigenvalues.real <= ROUNDING * size, size / ray, 0.0)
 
 
-def _stiffnesses(system: System) -> Floats:
-    """kappa f' on the branches, shape (stiffnesses, lanes): no contact and the extremes of it."""
+def mesh_stiffnesses(system: System) -> Floats:
+    """Return kappa f' on the branches, (stiffnesses, lanes): its extremes, and 0 out of contact."""
     values = [np.ones(system.lanes)]
     if system.effects.stiffness_variation:
         waves = system.stiffness_cosine + 1j * system.stiffness_sine

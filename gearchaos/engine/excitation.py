@@ -5,17 +5,15 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from gearchaos.dynamics.stability import mesh_stiffnesses
 from gearchaos.engine.lanes import Lanes
 from gearchaos.engine.steps import PILOT_LANES
 from gearchaos.errors import ConfigurationError
-from gearchaos.gear.contact_lines import series_table
 from gearchaos.gear.derivation import LENGTH
 from gearchaos.records.period import LONGEST_PERIOD, RETURNS
 
 LONGEST_EXCITATION = 50_000
 """Mesh periods after which pitch errors repeat, at most: a record holds some of them."""
-
-PHASES = 1001  # Mesh phases at which the sign of the mesh stiffness is looked at.
 
 
 def whole_lengths(lanes: Lanes) -> dict[str, int]:
@@ -107,14 +105,8 @@ def _mistaken_units(lanes: Lanes) -> str:
 
 def _negative_stiffness(lanes: Lanes) -> str:
     """Tell where the variation of the mesh stiffness exceeds its mean."""
-    if "stiffness_variation" not in lanes.effects:
-        return ""
-    parameters = lanes.parameters
-    waves = (parameters[f"stiffness_{part}"].values for part in ("cosine", "sine"))
-    cosine, sine = map(np.atleast_1d, waves)
-    variation = series_table(cosine - 1j * sine, PHASES) - 1.0
-    scale = np.asarray(parameters["stiffness_variation_scale"].values)
-    lowest = 1.0 + np.min(np.outer([scale.min(), scale.max()], variation))
+    # The first lane and the last one are those of the ends of its scale, if that is swept.
+    lowest = np.min(mesh_stiffnesses(lanes.system_of(lanes.spread(PILOT_LANES))))
     if lowest >= 0.0:
         return ""
     return (

@@ -68,7 +68,7 @@ def compute_response(simulation: Simulation, periods: int, text: str, fixed: str
     require_memory(simulation, size, f"{what}steps", "ask for fewer periods or values")
     began = time.monotonic()
     places = simulation.lanes.computed_at(np.arange(lanes))
-    start, outcome = simulation.integrate(0, lanes, plan)
+    start, outcome = simulation.integrate(np.arange(lanes), plan)
     system = simulation.lanes.system_of(places)
     arrays = {
         **simulation.arrays(places, start, outcome),

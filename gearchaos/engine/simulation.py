@@ -203,43 +203,32 @@ class Simulation:
         """Compute the lanes at the places ``first`` to ``last - 1`` of the order of computation.
 
         Gives every variable over lanes by its name. A carried sweep goes on from the lanes that it
-        has computed before, or that `has_ended` has told of.
+        has computed before, or whose ends `ended` holds.
         """
-        lanes = self.lanes.computed_at(np.arange(first, last))
-        return self.arrays(lanes, *self.integrate(first, last, self.recording))
-
-    def has_ended(self, first: int, last: int, state: Floats) -> None:
-        """Keep the end states of lanes, from which those after them start in a carried sweep."""
-        if self.carried:
-            many = self.lanes.side_by_side
-            self._ends[many + first : many + last] = state
+        places = np.arange(first, last)
+        found = self.integrate(places, self.recording)
+        return self.arrays(self.lanes.computed_at(places), *found)
 
     @cached_property
-    def _ends(self) -> Floats:
-        """End states in the order of computation, before them of as many lanes as there are not."""
-        lanes = self.lanes
-        return np.full((lanes.side_by_side + len(lanes), len(lanes.states)), np.nan)
+    def ended(self) -> Floats:
+        """End states of a carried sweep in the order of computation, not a number where unknown."""
+        return np.full((len(self.lanes), len(self.lanes.states)), np.nan)
 
-    def integrate(
-        self, first: int, last: int, plan: kernels.Plan
-    ) -> tuple[Floats, kernels.Outcome]:
-        """Integrate such lanes by a plan, and return their start states as well."""
+    def integrate(self, places: Integers, plan: kernels.Plan) -> tuple[Floats, kernels.Outcome]:
+        """Integrate the lanes at such places by a plan, and return their start states as well."""
         check()
         many, starts, outcomes = self.lanes.side_by_side, [], []
-        for at in range(first, last, many):
-            to = min(at + many, last)
-            lanes = self.lanes.computed_at(np.arange(at, to))
+        for some in np.split(places, range(many, places.size, many)):
+            lanes = self.lanes.computed_at(some)
+            starts.append(self.lanes.start_of(lanes))
             if self.carried:
-                start = self._ends[at:to].copy()
-            else:
-                start = np.full((to - at, len(self.lanes.states)), np.nan)
-            # A lane that diverged hands nothing on: its successor begins anew.
-            anew = ~np.isfinite(start).all(axis=1)
-            if anew.any():
-                start[anew] = self.lanes.start_of(lanes[anew])
-            outcomes.append(kernels.integrate(self.lanes.system_of(lanes), start, plan))
-            self.has_ended(at, to, outcomes[-1].end_state)
-            starts.append(start)
+                before = self.ended[np.maximum(some - many, 0)]
+                # A lane that diverged hands nothing on: its successor begins anew.
+                on = (some >= many) & np.isfinite(before).all(axis=1)
+                starts[-1][on] = before[on]
+            outcomes.append(kernels.integrate(self.lanes.system_of(lanes), starts[-1], plan))
+            if self.carried:
+                self.ended[some] = outcomes[-1].end_state
         if len(outcomes) == 1:
             return starts[0], outcomes[0]
         every: Any = map(np.concatenate, zip(*outcomes, strict=True))

@@ -90,7 +90,7 @@ def fill(
     if cluster is None:
         size = simulation.block_lanes(numba.get_num_threads())
         for block in finished if simulation.carried else ():
-            simulation.has_ended(*block, store.read(*block)["end_state"])
+            simulation.ended[slice(*block)] = store.read(*block)["end_state"]
         executor: BlockExecutor = LocalExecutor(simulation)
     else:
         from gearchaos.engine.dask_executor import DaskExecutor

@@ -66,7 +66,7 @@ def test_carried_sweep_goes_on_from_a_finished_block(direction):
     everything = computed_blocks(sweep, bounds)
     resumed = unlabelled(f"start.carry={direction}", *RANDOM)
     for block in bounds[:2]:
-        resumed.has_ended(*block, everything[block]["end_state"])
+        resumed.ended[slice(*block)] = everything[block]["end_state"]
     rest = computed_blocks(resumed, bounds[2:])
     for block, arrays in rest.items():
         assert_same(arrays, everything[block])

@@ -82,7 +82,7 @@ def test_an_orbit_that_hardly_attracts_is_found_by_a_longer_record(multiplier, m
         "outputs.section_points=60",
     )
     lanes = np.arange(2)
-    _, outcome = sweep.integrate(0, lanes.size, sweep.recording)
+    _, outcome = sweep.integrate(lanes, sweep.recording)
     record = Record(outcome.section, outcome.growth, lanes < 0, lanes < 0)
     assert label(record).motion.tolist() == [UNRESOLVED] * 2
     arrays = computed(sweep, 2)
@@ -97,7 +97,7 @@ SLOW_TORI = "sweep={parameter='mesh_frequency', values=[1.121, 1.15, 1.424]}"
 def test_a_rotation_slower_than_its_record_is_resolved_by_a_longer_one():
     sweep = Simulation(load_config(SPEEDS, (SLOW_TORI, *SOFT_BEARINGS)))
     lanes = np.arange(3)
-    _, outcome = sweep.integrate(0, lanes.size, sweep.recording)
+    _, outcome = sweep.integrate(lanes, sweep.recording)
     record = Record(outcome.section, outcome.growth, lanes < 0, lanes >= 0)
     assert label(record).motion.tolist() == [UNRESOLVED, QUASI_PERIODIC, UNRESOLVED]
     arrays = computed(sweep, 3)
