@@ -25,8 +25,8 @@ def _identify(options: Namespace) -> None:
     from gearchaos.identification.evaluation import require_stable
     from gearchaos.identification.loading import load_targets
     from gearchaos.identification.report import report
-    from gearchaos.identification.search import MOST_CENTRES, RUNGS, Judge, decisive_facts, search
-    from gearchaos.identification.tried import read_tried, write_tried
+    from gearchaos.identification.search import MOST_CENTRES, RUNGS, decisive_facts, search
+    from gearchaos.identification.tried import fields_of, read_tried, write_tried
     from gearchaos.results.atomic_file import check_output
     from gearchaos.results.block_folder import require_same
     from gearchaos.results.tables import needed
@@ -34,28 +34,25 @@ def _identify(options: Namespace) -> None:
     problem = load_targets(options.config, options.set)
     choose_threads(options.threads)
     needed("cma", "identify")
-    judge, targets = Judge(problem), problem.targets
+    targets = problem.targets
     require_stable(problem.config, problem.values, targets.corners())
     output, facts = output_of(options, ".csv"), decisive_facts(problem)
-    known = np.empty(0, judge.fields)
+    known = np.empty(0, fields_of(problem))
     if options.resume and not options.overwrite and os.path.exists(output):
-        known, earlier = read_tried(output, judge.fields)
+        known, earlier = read_tried(output, problem)
         require_same(f"{output}: is the result", earlier, facts, "replace it with --overwrite")
     else:
         check_output(output, options.overwrite)
-    keys = [one.name for one in targets.parameter]
     began = spoke = time.monotonic()
     tried = known[:0]
 
     def keep() -> None:
-        computed = provenance(time.monotonic() - began)
-        told = {**computed, **facts, "title": targets.title, "targets": problem.text}
-        write_tried(output, tried, keys, problem.observations, told)
+        write_tried(output, tried, problem, {**provenance(time.monotonic() - began), **facts})
 
-    most = targets.search.candidates + MOST_CENTRES * (1 + 2 * RUNGS * len(keys))
+    most = targets.search.candidates + MOST_CENTRES * (1 + 2 * RUNGS * len(targets.parameter))
     try:
         with progress(most, len(known), "candidates") as bar:
-            for found in search(judge, known, output):
+            for found in search(problem, known, output):
                 tried = np.concatenate([tried, found])
                 if len(tried) > len(known):
                     bar.update(len(found))
@@ -71,7 +68,7 @@ def _identify(options: Namespace) -> None:
     if len(tried) > len(known):
         keep()
     say(f"{output}: {len(tried)} candidates, {time.monotonic() - began:.1f} s")
-    print("\n".join(report(judge, tried)), flush=True)
+    print("\n".join(report(problem, tried)), flush=True)
 
 
 main = Command("identify", __doc__, _identify).start(__name__)

@@ -69,19 +69,16 @@ def load_targets(file: str | os.PathLike[str], overrides: Iterable[str] = ()) ->
 
 
 def _unfit(config: Configuration, targets: Targets, source: str, values: Floats) -> Iterator[str]:
-    for key, several in {
+    kind = getattr(config.pitch_error, "kind", "sine")
+    for key, unfit in {
         "second_sweep": config.second_sweep is not None,
         "start.count": config.start.count > 1,
         'start.carry = "both"': config.start.carry == "both",
+        f'pitch_error.kind = "{kind}"': kind != "sine",
     }.items():
-        if several:
-            yield f"{source}: configuration: {config.source} has {key}; observations have one axis"
-    if config.pitch_error is not None and config.pitch_error.kind != "sine":
-        yield (
-            f"{source}: configuration: {config.source} has pitch_error.kind = "
-            f'"{config.pitch_error.kind}"; candidates are compared once a mesh period, as a sine '
-            'at mesh frequency repeats; give kind = "sine"'
-        )
+        if unfit:
+            rule = "observations have one axis, and a sine as pitch error; replace it in `set`"
+            yield f"{source}: configuration: {config.source} has {key}; {rule}"
     if config.integration.recorded_periods < POINTS_NEEDED:
         yield (
             f"{source}: integration.recorded_periods = {config.integration.recorded_periods}: must "

@@ -8,7 +8,8 @@ from numpy.lib.stride_tricks import sliding_window_view
 
 from gearchaos.arrays import Floats
 from gearchaos.configuration.tables import SWEEPABLE_GROUPS
-from gearchaos.identification.search import RUNGS, STEPS_ALONE, Judge, distinct
+from gearchaos.identification.loading import Problem
+from gearchaos.identification.search import RUNGS, STEPS_ALONE, distinct
 from gearchaos.identification.tried import Tried
 
 ONE_UNIT = 1.0  # By how much the misfit grows where a parameter counts as moved too far.
@@ -54,10 +55,9 @@ def reach(tried: Tried) -> Reach:
     return Reach(alone, among, surroundings)
 
 
-def report(judge: Judge, tried: Tried, most: int = 4) -> Iterator[str]:
+def report(problem: Problem, tried: Tried, most: int = 4) -> Iterator[str]:
     """Word the best sets, what they come to, and how well the targets determine them."""
-    targets = judge.problem.targets
-    free, apart = targets.parameter, targets.search.apart
+    free, apart = problem.targets.parameter, problem.targets.search.apart
     columns = zip(free, tried["values"].T, strict=True)
     points = np.stack([[one.share(v) for v in values.tolist()] for one, values in columns], axis=1)
     sets, keys = distinct(points, tried["misfit"], apart, most), [one.name for one in free]
@@ -69,7 +69,7 @@ def report(judge: Judge, tried: Tried, most: int = 4) -> Iterator[str]:
         yield _row(key, values)
     yield ""
     yield _row("observed", ["wanted", "width", *titles])
-    for one, row in zip(judge.problem.observations, tried["computed"][sets].T, strict=True):
+    for one, row in zip(problem.observations, tried["computed"][sets].T, strict=True):
         yield _row(one.name, [one.wanted, one.width, *row])
     yield ""
     found = reach(tried)

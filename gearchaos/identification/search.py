@@ -37,32 +37,20 @@ Proposals: TypeAlias = Generator[tuple[int, Floats], Floats, None]
 """Candidates that are tried together: the number of their run, and their points."""
 
 
-class Judge:
-    """Computes candidates and compares them with the observations of a problem.
-
-    ``fields``: those of the candidates.
-    """
-
-    def __init__(self, problem: Problem) -> None:
-        self.problem = problem
-        values, observed = problem.values, problem.observations
-        self.fields = fields_of(len(problem.targets.parameter), len(observed))
-        self._places = [np.searchsorted(values, one.values) for one in observed]
-        ends = [end for one in problem.targets.increment for end in (one.from_, one.to)]
-        self._accelerated = np.isin(values, ends)
-
-    def judge(self, run: int, parameters: dict[str, Floats]) -> Tried:
-        """Compute candidates given by their parameters, each of shape (candidates,)."""
-        problem = self.problem
-        records = evaluate(problem.config, problem.values, parameters, self._accelerated)
-        computed, residuals = [], []
-        for one, places in zip(problem.observations, self._places, strict=True):
-            computed.append(one.computed(records.at(places)))
-            residuals.append(one.residual(computed[-1]))
-        diverged = ~np.all(records.sound, axis=1)
-        runs, misfits = np.full(diverged.size, run), misfit(np.stack(residuals, axis=1))
-        rows = np.column_stack([runs, *parameters.values(), *computed, misfits, diverged])
-        return rows.view(self.fields)[:, 0]
+def judge(problem: Problem, run: int, parameters: dict[str, Floats]) -> Tried:
+    """Compute candidates, and how far off they are; each of their parameters is (candidates,)."""
+    ends = [end for one in problem.targets.increment for end in (one.from_, one.to)]
+    accelerated = np.isin(problem.values, ends)
+    records = evaluate(problem.config, problem.values, parameters, accelerated)
+    computed, residuals = [], []
+    for one in problem.observations:
+        places = np.searchsorted(problem.values, one.values)
+        computed.append(one.computed(records.at(places)))
+        residuals.append(one.residual(computed[-1]))
+    diverged = ~np.all(records.sound, axis=1)
+    runs, misfits = np.full(diverged.size, run), misfit(np.stack(residuals, axis=1))
+    rows = np.column_stack([runs, *parameters.values(), *computed, misfits, diverged])
+    return rows.view(fields_of(problem))[:, 0]
 
 
 def decisive_facts(problem: Problem) -> dict[str, Any]:
@@ -72,14 +60,14 @@ def decisive_facts(problem: Problem) -> dict[str, Any]:
     return {**SOFTWARE._asdict(), "configuration": toml_text(tables)}
 
 
-def search(judge: Judge, known: Tried, source: str) -> Iterator[Tried]:
+def search(problem: Problem, known: Tried, source: str) -> Iterator[Tried]:
     """Yield all candidates of a search, some at a time.
 
     ``known`` are those of an earlier part of it, from the file ``source``, which are not computed
     again. Raises FileError if they are not the first of this search.
     """
-    targets, done = judge.problem.targets, 0
-    at_once = max(1, LANES_AT_ONCE // judge.problem.values.size)
+    targets, done = problem.targets, 0
+    at_once = max(1, LANES_AT_ONCE // problem.values.size)
     asking = proposals(targets.search, len(targets.parameter))
     run, points = next(asking)
     while True:
@@ -91,7 +79,7 @@ def search(judge: Judge, known: Tried, source: str) -> Iterator[Tried]:
             if done < len(known):
                 _require_these(parameters, found, source)
             else:
-                found = judge.judge(run, parameters)
+                found = judge(problem, run, parameters)
             done += len(found)
             misfits.append(found["misfit"])
             yield found

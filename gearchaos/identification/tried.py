@@ -3,7 +3,7 @@
 import hashlib
 import json
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from io import StringIO
 from pathlib import Path
 from typing import Any, TypeAlias
@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gearchaos.errors import FileError
-from gearchaos.identification.observations import Observation
+from gearchaos.identification.loading import Problem
 from gearchaos.results.atomic_file import reason, replacing
 from gearchaos.results.variables import STATUS
 
@@ -20,43 +20,41 @@ Tried: TypeAlias = NDArray[np.void]
 """Candidates, in the order in which they were tried: an array with the fields of `fields_of`."""
 
 
-def fields_of(parameters: int, observations: int) -> np.dtype[np.void]:
+def fields_of(problem: Problem) -> np.dtype[np.void]:
     """Return the fields of a candidate, all of which are numbers.
 
     ``run``: see `search`; ``values`` (parameters,), in their units; ``computed`` (observations,):
     what was observed of it, NaN where there is no such thing; ``misfit``; ``status``: 1 where one
     of the lanes was not integrated to the end.
     """
-    columns = {"run": (), "values": (parameters,), "computed": (observations,), "misfit": ()}
-    return np.dtype([(name, np.float64, shape) for name, shape in {**columns, STATUS: ()}.items()])
+    counts = {"values": len(problem.targets.parameter), "computed": len(problem.observations)}
+    names = ("run", "values", "computed", "misfit", STATUS)
+    return np.dtype([(n, np.float64, (counts[n],) if n in counts else ()) for n in names])
 
 
 def write_tried(
-    path: str | os.PathLike[str],
-    tried: Tried,
-    keys: Sequence[str],
-    observations: Sequence[Observation],
-    facts: Mapping[str, Any],
+    path: str | os.PathLike[str], tried: Tried, problem: Problem, facts: Mapping[str, Any]
 ) -> None:
     """Write all candidates as CSV; the file appears complete or not at all, and replaces another.
 
-    A row per candidate: its run, the parameters by their ``keys``, what was observed, misfit and
-    status. The first line is a comment: the facts, as JSON. Raises FileError if it cannot be
-    written.
+    A row per candidate: its run, the parameters by their keys, what was observed, misfit and
+    status. The first line is a comment: the facts and the targets, as JSON. Raises FileError if it
+    cannot be written.
     """
+    targets, observations = problem.targets, problem.observations
+    keys = [one.name for one in targets.parameter]
     names = ["run", *keys, *(one.name for one in observations), "misfit", STATUS]
     rows, body = tried.view(np.float64).reshape(len(tried), -1), StringIO()
     np.savetxt(body, rows, "%.17g", ",", header=",".join(names), comments="")
     wanted = {one.name: {"wanted": one.wanted, "width": one.width} for one in observations}
-    told = {**facts, "observations": wanted, "sha256": _checksum(body.getvalue())}
+    told = {**facts, "title": targets.title, "targets": problem.text, "observations": wanted}
+    told["sha256"] = _checksum(body.getvalue())
     with replacing(path, overwrite=True) as partial:
         partial.write_text(f"# {json.dumps(told)}\n{body.getvalue()}", encoding="utf-8")
 
 
-def read_tried(
-    path: str | os.PathLike[str], fields: np.dtype[np.void]
-) -> tuple[Tried, dict[str, Any]]:
-    """Read the candidates of a file, with these fields, and the facts in its first line.
+def read_tried(path: str | os.PathLike[str], problem: Problem) -> tuple[Tried, dict[str, Any]]:
+    """Read the candidates of a file, and the facts in its first line.
 
     Raises FileError if it is missing, damaged or no file of a search.
     """
@@ -66,7 +64,7 @@ def read_tried(
         if facts["sha256"] != _checksum(body):
             raise ValueError("its checksum does not fit")
         rows = np.loadtxt(StringIO(body), delimiter=",", skiprows=1, ndmin=2)
-        return rows.view(fields)[:, 0], facts
+        return rows.view(fields_of(problem))[:, 0], facts
     except (OSError, ValueError, LookupError, TypeError) as error:
         raise FileError(
             f"{os.fspath(path)}: is damaged or no file of a search ({reason(error)}); choose "

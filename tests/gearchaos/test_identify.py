@@ -15,7 +15,7 @@ from gearchaos.identification import search as searching
 from gearchaos.identification.evaluation import require_stable
 from gearchaos.identification.loading import load_targets
 from gearchaos.identification.report import _row, reach
-from gearchaos.identification.search import Judge, decisive_facts
+from gearchaos.identification.search import decisive_facts, judge
 from gearchaos.identification.tried import read_tried, write_tried
 from gearchaos.identify import main
 
@@ -133,7 +133,7 @@ def problem_of(identified):
 
 
 def tried_of(identified):
-    return read_tried(identified.file, Judge(problem_of(identified)).fields)
+    return read_tried(identified.file, problem_of(identified))
 
 
 class TestALinearPair:
@@ -159,12 +159,11 @@ class TestALinearPair:
         # However many motions are looked at together.
         monkeypatch.setattr(evaluation, "MOTIONS_AT_ONCE", 3)
         tried, facts = tried_of(identified)
-        judge = Judge(problem_of(identified))
         some = {
             "damping_ratio": tried["values"][:5, 0],
             "pitch_error_amplitude": tried["values"][:5, 1],
         }
-        again = judge.judge(0, some)
+        again = judge(problem_of(identified), 0, some)
         assert np.array_equal(again["misfit"], tried["misfit"][:5])
         assert np.array_equal(again["computed"], tried["computed"][:5])
         assert (tried["run"] == 0).sum() == 40
@@ -186,13 +185,12 @@ class TestALinearPair:
 class TestASearchThatWasStopped:
     def test_goes_on_to_the_same_candidates(self, identified, tmp_path):
         problem, (whole, _) = problem_of(identified), tried_of(identified)
-        keys = [one.name for one in problem.targets.parameter]
         for name in ("pair.toml", "targets.toml"):
             (tmp_path / name).write_text((identified.folder / name).read_text())
         # As a killed process leaves it: whole pieces, in the middle of a run.
         first = whole[: 40 + 12 * 7]
         facts = decisive_facts(problem)
-        write_tried(tmp_path / "targets.csv", first, keys, problem.observations, facts)
+        write_tried(tmp_path / "targets.csv", first, problem, facts)
         ended = command(tmp_path, "--resume", "--quiet")
         assert (ended.code, ended.out) == (0, identified.out)
         assert numbers(tmp_path / "targets.csv") == numbers(identified.file)
@@ -242,7 +240,7 @@ class TestASearchThatWasStopped:
         file.write_bytes({"cut": content[:-40], "other": b"notes"}.get(damage, content))
         before = file.read_bytes()
         with pytest.raises(FileError, match="damaged"):
-            read_tried(file, Judge(problem_of(identified)).fields)
+            read_tried(file, problem_of(identified))
         assert file.read_bytes() == before
 
 
@@ -316,7 +314,7 @@ grade = 7
     with pytest.raises(ConfigurationError) as raised:
         load_targets(tmp_path / "targets.toml")
     (problem,) = raised.value.problems
-    assert 'has pitch_error.kind = "grade"; candidates are compared once a mesh' in problem
+    assert 'has pitch_error.kind = "grade"; observations have one axis, and a sine' in problem
 
 
 def test_a_place_off_the_axis_is_refused(tmp_path):
@@ -356,4 +354,4 @@ def test_targets_without_observations_are_refused(tmp_path):
 
 @pytest.mark.parametrize("name", ["pan2021_targets.toml", "pan2021_axial_targets.toml"])
 def test_the_targets_of_the_paper_are_sound(name):
-    Judge(load_targets(Path(__file__).resolve().parents[2] / "sweeps" / name))
+    load_targets(Path(__file__).resolve().parents[2] / "sweeps" / name)
