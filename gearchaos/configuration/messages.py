@@ -9,9 +9,10 @@ from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
 from gearchaos.configuration.keys import Key
-from gearchaos.configuration.toml_text import quoted_key
+from gearchaos.configuration.toml_text import quoted_key, toml_literal
 
 MOST_SHOWN = 100  # Faults that are worded; a file with more of them is hardly a configuration.
+LONGEST = 80  # Characters of a value.
 
 _RULES = {
     "missing": "is missing",
@@ -63,20 +64,13 @@ def texts(faults: Iterable[Fault], source: str, more: int = 0) -> list[str]:
 
 
 def shown(value: object) -> str:
-    """Return a value as TOML writes it, cut to a readable length."""
-    if isinstance(value, bool):
-        return "true" if value else "false"
-    if isinstance(value, Mapping):
-        return "{...}" if value else "{}"
-    if isinstance(value, (list, tuple)):
-        entries = ["[...]" if isinstance(one, (list, tuple)) else shown(one) for one in value[:5]]
-        return f"[{', '.join([*entries, '...'] if len(value) > len(entries) else entries)}]"
-    if isinstance(value, str):
-        text = repr(value[:60])[1:-1]
-        return f'"{text}..."' if len(value) > 60 else f'"{text}"'
-    if isinstance(value, int) and value.bit_length() > 200:
-        return "an integer of hundreds of digits"
-    return str(value)
+    """Return a value as TOML writes it, cut to a readable length, and nothing but printable."""
+    try:
+        text = toml_literal(value)
+    except (TypeError, ValueError):  # A date, or no finite number.
+        text = str(value)
+    text = text if len(text) <= LONGEST else f"{text[:LONGEST]}..."
+    return "".join(c if c.isprintable() else repr(c)[1:-1] for c in text)
 
 
 def suggestion(word: str, words: Iterable[str]) -> str:

@@ -147,9 +147,10 @@ def toml_text(tables: Mapping[str, Any]) -> str:
 
 
 def toml_literal(value: Any) -> str:
-    """Write one value as TOML; a mapping as an inline table."""
+    """Write one value as TOML, a mapping as an inline table; ValueError for no finite number."""
     # JSON is TOML but for the colon, and for DEL, which TOML wants escaped.
-    text = json.dumps(value, ensure_ascii=False, separators=(", ", " = "))
+    separators = (", ", " = ")
+    text = json.dumps(value, ensure_ascii=False, allow_nan=False, separators=separators)
     return text.replace("\x7f", "\\u007f")
 
 

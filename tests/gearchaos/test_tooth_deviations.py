@@ -223,7 +223,7 @@ def test_a_faulty_file_is_refused_with_its_line(content, message, tmp_path):
         ("none.csv", 'driving.file = "none.csv": cannot be read: No such file or directory; check'),
         (".", "cannot be read: Is a directory; check the path of the file of pitch deviations"),
         ("a\\u0000b", "cannot be read: embedded null byte"),
-        ("\\u001b[31m", r'driving.file = "\x1b[31m": cannot be read: No such file'),
+        ("\\u001b[31m", r'driving.file = "\u001b[31m": cannot be read: No such file'),
     ],
 )
 def test_a_missing_file_is_refused_with_its_key(name, message, tmp_path):
