@@ -96,9 +96,9 @@ class Configuration(Tables):
     def at(self, values: Mapping[str, float]) -> Self:
         """Return a copy in which parameters, by name, are fixed at values in their units.
 
-        Where [sweep] swept one, that becomes a sweep of this one value; where [second_sweep] did,
-        that goes. ``realisation`` is the number of a drawn gear pair, then the only one. Raises
-        ConfigurationError if a parameter cannot be swept, or if a rule is broken.
+        What swept one of them goes, and [second_sweep] then is [sweep]; where nothing is left,
+        [sweep] has the one value. ``realisation`` is the number of a drawn gear pair, then the only
+        one. Raises ConfigurationError if a parameter cannot be swept, or if a rule is broken.
         """
         drawn = isinstance(self.pitch_error, GradeError)
         names = [name for name in values if not (drawn and name == REALISATION)]
@@ -113,10 +113,11 @@ class Configuration(Tables):
                 continue
             path = f"groups.{parameter}" if parameter in SWEEPABLE_GROUPS else parameter
             tables = with_value(tables, path.split("."), float(value))
-            if parameter == self.sweep.parameter:
-                tables["sweep"] = {"parameter": parameter, "values": [float(value)]}
-            elif self.second_sweep is not None and parameter == self.second_sweep.parameter:
-                del tables["second_sweep"]
+        left = [one for one in map(tables.pop, self.sweeps) if one["parameter"] not in values]
+        if not left:
+            swept = self.sweep.parameter
+            left = [{"parameter": swept, "values": [float(values[swept])]}]
+        tables |= dict(zip(self.sweeps, left, strict=False))
         return type(self).from_tables(tables, self.source)
 
     def tables(self) -> dict[str, Any]:

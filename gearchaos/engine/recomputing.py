@@ -32,11 +32,6 @@ def computable(result: Result, name: str) -> Configuration:
     fixed = {p: result.fixed[axis_name(p)] for p in parameters if axis_name(p) in result.fixed}
     if fixed:
         config = config.at(fixed)
-    if config.second_sweep is not None and config.sweep.parameter in fixed:
-        # What is left runs along the second parameter alone.
-        tables = config.tables()
-        tables["sweep"] = tables.pop("second_sweep")
-        config = Configuration.from_tables(tables, config.source)
     # The steps and periods that were taken, not those from which they were chosen or raised.
     taken = {
         f"integration.{name}": int(result.metadata.get(name, getattr(config.integration, name)))
