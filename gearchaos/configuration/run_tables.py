@@ -120,14 +120,9 @@ class Start(Table):
     direction; both are two sweeps side by side, the axis `direction` of one result"""
 
     @property
-    def counted(self) -> int:
-        """Number of states along each of which `count` starts lie; 1 but on a grid."""
-        return len(self.box) if self.kind == "grid" else 1
-
-    @property
     def size(self) -> int:
         """Number of starts per parameter value."""
-        starts: int = self.count**self.counted
+        starts: int = self.count ** (len(self.box) if self.kind == "grid" else 1)
         return starts
 
 

@@ -43,16 +43,9 @@ def labels_of(system: System, outcome: Outcome, plan: Plan) -> Told:
     lanes = np.flatnonzero(label.doubtful(outcome.growth, labels))
     state, tangent = outcome.end_state.copy(), outcome.end_tangent.copy()
     for longer in LOOKS:
-        further = plan._replace(
-            transient_periods=0,
-            recorded_periods=longer * plan.recorded_periods,
-            section_points=longer * min(label.MOST_POINTS * repeats, plan.recorded_periods),
-            history_periods=0,
-            contact=False,
-            loads=False,
-            states=(),
-            orders=(),
-        )
+        points = longer * min(label.MOST_POINTS * repeats, plan.recorded_periods)
+        lengths = plan.steps_per_period, 0, longer * plan.recorded_periods, points
+        further = Plan(*lengths, plan.tangent, plan.resolved, method=plan.method)
         # In portions whose longer records take no more memory than those of all lanes.
         record = 8 * (further.section_points * state.shape[1] + further.recorded_periods)
         size = max(1, system.lanes // longer, LOOK_BYTES // record)

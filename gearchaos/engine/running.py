@@ -62,8 +62,7 @@ def run(config: Given, threads: int | None = None, progress: bool = False) -> Re
         every = simulation.blocks(simulation.block_lanes(numba.get_num_threads()))
         with LocalExecutor(simulation) as executor:
             tally = compute_blocks(executor, every, blocks.__setitem__)
-        if tally.errors:
-            say(tally.errors)
+        say(*tally.remarks)
         in_order = [blocks[block] for block in sorted(blocks)]
         return result_of(simulation, in_order, metadata(simulation, time.monotonic() - began))
 

@@ -68,12 +68,6 @@ def asked_for(group: str, physical: Mapping[str, Any]) -> Collection[str]:
     return quantities.asked_for
 
 
-def length_key(physical: Mapping[str, Any]) -> str:
-    """Return the path of the length that b' is: the scale if it is known, else half backlash."""
-    scale = "mesh.length_scale_um"
-    return "mesh.half_backlash_um" if physical[scale] is None else scale
-
-
 class _UnknownError(Exception):
     """A physical quantity that a derivation needs is not known."""
 
@@ -120,7 +114,9 @@ class Quantities:
     @cached_property
     def length_scale(self) -> Any:
         """Length scale b' in m: the one given, else the half backlash."""
-        return self[length_key(self.physical)] * _MICROMETRE
+        scale = "mesh.length_scale_um"
+        scale = "mesh.half_backlash_um" if self.physical[scale] is None else scale
+        return self[scale] * _MICROMETRE
 
     def over_length_scale(self, path: str) -> Any:
         """Length given in um, over b'."""
