@@ -20,10 +20,11 @@ Integers = NDArray[np.intp]
 
 
 @driver
-def _integrate_blocks(taken, batch, plan, outcome, present):
+def _integrate_blocks(threads, taken, batch, plan, outcome, present):
     # Every thread takes the next block when it has done one: some blocks cross boundaries far more
-    # often than others, and another program may be using a core.
-    for _ in prange(get_num_threads()):
+    # often than others, and another program may be using a core. The number of threads is told, as
+    # code that asks for it has an address of this process in it, and cannot be kept.
+    for _ in prange(threads):
         number = count_up(taken)
         while number < batch.blocks.shape[0]:
             integrate_block(number, batch, plan, outcome, present)
@@ -87,7 +88,8 @@ def integrate(
             turns,
             *tables_of(system, present, steps),
         )
-        _integrate_blocks(np.zeros(1, dtype=np.intp), batch, schedule, outcome, present)
+        taken = np.zeros(1, dtype=np.intp)
+        _integrate_blocks(get_num_threads(), taken, batch, schedule, outcome, present)
         if maps.size:
             unmapped = np.repeat(np.isnan(maps[blocks[:, 3]]), blocks[:, 1])
             outcome.status[order[unmapped]] = Status.TOO_FAST
@@ -139,4 +141,3 @@ def _blocks(lanes: Integers, steps: Integers, maps_at: Integers) -> Integers:
         for at in range(0, count, LANES)
     ]
     return np.array(blocks, dtype=np.intp).reshape(-1, 4)
-
