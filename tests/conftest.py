@@ -12,6 +12,7 @@ settings.load_profile("repeatable")
 
 FIRST = ("vectorisation", "flow_map", "explore", "oracle", "shard_option", "dask", "loads")
 FIRST += ("hard_groups", "swept_parameters", "sweep_interrupted", "teeth_linear")
+FIRST += ("accuracy", "teeth")
 """Files that run first, in this order, of which none shall be the last while others have ended.
 
 Two of them, or two workers of one, would otherwise compile the same scene at once. The first one

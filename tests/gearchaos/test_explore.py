@@ -215,14 +215,8 @@ def zoom(page) -> None:
     page.wait_for_url(lambda url: url != before)
 
 
-@needs_browser
-def test_a_zoom_counts_the_points_in_view_anew_for_each_pixel_of_the_screen(page, path, address):
-    sizes: list[int] = []
-    page.on("websocket", lambda one: one.on("framereceived", lambda sent: sizes.append(len(sent))))
-    look(page, address)
-    page.wait_for_timeout(1000)
-    sizes.clear()
-    zoom(page)
+def assert_counted_anew(page, path: Path, sizes: list[int]) -> None:
+    """See that the picture after a zoom counts the points in view, for each pixel of the screen."""
     for _ in range(50):
         drawn = page.evaluate(PICTURE)
         left, low, *_ = drawn["seen"]
@@ -251,10 +245,16 @@ def test_a_zoom_counts_the_points_in_view_anew_for_each_pixel_of_the_screen(page
 
 
 @needs_browser
-def test_a_link_brings_back_the_view_and_a_command_its_figure(
+def test_a_zoom_is_drawn_anew_a_link_brings_it_back_and_a_command_its_figure(
     page, path, address, monkeypatch, capsys
 ):
+    sizes: list[int] = []
+    page.on("websocket", lambda one: one.on("framereceived", lambda sent: sizes.append(len(sent))))
     look(page, address)
+    page.wait_for_timeout(1000)
+    sizes.clear()
+    zoom(page)
+    assert_counted_anew(page, path, sizes)
     page.locator("select").nth(2).select_option("physical")
     page.locator("select").nth(3).select_option("start")
     page.wait_for_url(re.compile("units=physical.*motion_from=start"))

@@ -91,16 +91,13 @@ def test_every_format_says_whose_it_is_and_gives_the_same_bits(result_file, endi
         drawn.append(result_file.with_suffix(f".{ending}").read_bytes())
     assert drawn[0] == drawn[1] and drawn[0].startswith(begins)
     assert b"gearchaos " in drawn[0] and b"Date" not in drawn[0]
-
-
-def test_what_an_eps_shows_is_not_black_where_dots_are_translucent(result_file):
-    """The format has no transparency: a picture of translucent dots alone would be a black box."""
-    assert main([str(result_file), "-o", str(result_file.parent / "x.eps"), "--dpi", "60"]) == 0
-    text = (result_file.parent / "x.eps").read_text()
-    pictures = re.findall(r"false 3 colorimage\n([0-9a-f\n]+)", text)
-    assert len(pictures) == 2
-    for picture in pictures:
-        assert np.mean(np.frombuffer(bytes.fromhex(picture), np.uint8) > 250) > 0.8
+    if ending == "eps":
+        # It has no transparency: a picture of translucent dots alone would be a black box.
+        pictures = re.findall(rb"false 3 colorimage\n([0-9a-f\n]+)", drawn[0])
+        assert len(pictures) == 2
+        for picture in pictures:
+            shades = np.frombuffer(bytes.fromhex(picture.decode()), np.uint8)
+            assert np.mean(shades > 250) > 0.8
 
 
 @pytest.mark.parametrize("ending", [".png", ".pdf", ".svg", ".tiff"])

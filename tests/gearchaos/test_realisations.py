@@ -99,12 +99,12 @@ def test_commands_take_a_gear_pair_by_its_number(result, tmp_path):
         assert ended.code == 0, ended.err
         return ended.out
 
-    where = ("--at", "realisation=1", "--at", "start=0")
+    where, small = ("--at", "realisation=1", "--at", "start=0"), ("--format", "png", "--dpi", "50")
     assert "slice realisation = 1" in run("stages", "drawn.h5", *where)
     assert "all 3 values of realisation, of which --at" in run("stages", "drawn.h5")
     assert "realisation (realisation) int32" in run("info", "drawn.h5")
-    assert "drawn_realisation_1" in run("plot", "drawn.h5", "--at", "realisation=1")
-    run("plot", "drawn.h5", "--stages")
+    assert "drawn_realisation_1" in run("plot", "drawn.h5", "--at", "realisation=1", *small)
+    run("plot", "drawn.h5", "--stages", *small)
     lane = (*where, "--at", "pitch_error=5.0", "--periods", "2", "--output", "lane.h5")
     run("response", "drawn.h5", *lane)
     lane = gearchaos.open_result(tmp_path / "lane.h5")
