@@ -13,10 +13,10 @@ settings.load_profile("repeatable")
 FIRST = ("vectorisation", "flow_map", "explore", "oracle", "shard_option", "dask", "loads")
 FIRST += ("hard_groups", "swept_parameters", "sweep_interrupted", "teeth_linear")
 FIRST += ("accuracy", "teeth")
-"""Files that run first, in this order, of which none shall be the last while others have ended.
+"""Files that run first, in this order: none of them shall be the last that runs, and what they
+compile shall be in the cache before another process asks for it.
 
-Two of them, or two workers of one, would otherwise compile the same scene at once. The first one
-compiles scenes whatever is in the cache: so early, others find them there.
+The first one compiles its scenes whatever is in the cache.
 """
 
 

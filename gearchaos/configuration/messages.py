@@ -68,7 +68,10 @@ def shown(value: object) -> str:
     try:
         text = toml_literal(value)
     except (TypeError, ValueError):  # A date, or no finite number.
-        text = str(value)
+        try:
+            text = str(value)
+        except ValueError:  # Python writes no integer as long as that.
+            text = "an integer of thousands of digits"
     text = text if len(text) <= LONGEST else f"{text[:LONGEST]}..."
     return "".join(c if c.isprintable() else repr(c)[1:-1] for c in text)
 

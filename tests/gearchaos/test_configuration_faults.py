@@ -406,6 +406,11 @@ def test_hostile_toml_is_refused_in_words(text):
     assert all(len(problem) < 1400 for problem in caught.value.problems)
 
 
+def test_an_integer_that_python_does_not_write_is_refused_in_words():
+    with pytest.raises(ConfigurationError, match="count = an integer of thousands of digits: must"):
+        load_config(PAN2021).replace("sweep.count", 10**5000)
+
+
 def test_a_thousand_faults_are_cut_to_a_hundred():
     with pytest.raises(ConfigurationError) as caught:
         Configuration.from_toml("".join(f"key{i} = 1\n" for i in range(1000)), "many.toml")

@@ -21,8 +21,8 @@ def endings(tmp_path_factory):
 
 
 def _some_cases(folder: Path, watch: Watch):
-    yield from watch.run(configuration_cases(range(100_000, 100_048), folder))
-    yield from watch.run(result_cases(range(100_000, 100_066), folder))
+    yield from watch.run(configuration_cases(range(100_000, 100_072), folder))
+    yield from watch.run(result_cases(range(100_000, 100_099), folder))
     readers = "info --verify", "plot --stages --output stages.png --dpi 50 --overwrite"
     forged = forged_cases(folder, readers)
     yield from watch.run(case for case in forged if case.command == "info" or case.kind in DRAWN)
@@ -36,9 +36,9 @@ def test_bad_input_ends_in_a_message_and_code_2_or_4(endings):
 @pytest.mark.slow
 def test_most_of_the_bad_input_is_noticed(endings):
     codes = Counter((case.command, ending.code) for case, ending in endings)
-    assert codes["load_config", 2] > 12
-    assert codes["info", 4] > 16
-    assert codes["plot", 4] > 6
+    assert codes["load_config", 2] > 18
+    assert codes["info", 4] > 25
+    assert codes["plot", 4] > 10
 
 
 @pytest.mark.slow
