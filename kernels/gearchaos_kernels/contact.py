@@ -52,9 +52,13 @@ def flank_at(gap, half_backlash):
 @scalar
 def next_branch(branch, gap, half_backlash):
     """Return the piece that follows where a gap leaves one."""
-    if branch.engaged != 0.0:
-        return branch_at(0.0, half_backlash)
-    return branch_at(math.copysign(half_backlash, gap), half_backlash)
+    # Without a jump: which way it goes, no processor foretells.
+    meets = 1.0 - branch.engaged
+    offset = meets * math.copysign(half_backlash, gap)
+    end = offset if meets != 0.0 else half_backlash
+    floor = -math.inf if offset < 0.0 else -end if meets == 0.0 else end
+    ceiling = math.inf if offset > 0.0 else end
+    return Branch(meets, offset, floor, ceiling)
 
 
 @scalar

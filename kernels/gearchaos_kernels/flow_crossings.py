@@ -21,7 +21,6 @@ from gearchaos_kernels.flow_layout import (
     CROSSED,
     DISTANCE,
     DONE,
-    END,
     GAP,
     GAPS,
     INPUTS,
@@ -54,35 +53,38 @@ def cross(memory, lanes, table, row, work, number, recorded, present):
     All of them go on together, stage by stage, and hardly anything branches: while the numbers of
     one lane are on their way, the processor is at the next.
     """
-    numbers, _, slots, gaps = work
+    numbers, slots = work.numbers, work.slots
     suspects = 0
     for slot in range(lanes):
         slots[suspects] = slot
         suspects += 1 if memory[rows.SUSPECT * STRIDE + slot] != 0.0 else 0
-    for one in range(suspects):
-        gather(memory, slots[one], numbers, one * OWN, present)
-        numbers[one * OWN + DONE] = -1.0
-    for _ in range(MOST_SPLITS):
+    for crossings in range(MOST_SPLITS):
         looks = 0
         for one in range(suspects):
-            ways = int(memory[rows.SUSPECT * STRIDE + slots[one]])
+            slot, own = slots[one], one * OWN
+            if crossings == 0:
+                gather(memory, slot, numbers, own, present)
+                numbers[own + DONE] = -1.0
+            ways = int(memory[rows.SUSPECT * STRIDE + slot])
             for way in range(layout(present).ways):
-                gap = one * OWN + GAPS + way * GAP
+                gap = own + GAPS + way * GAP
                 numbers[gap + MOMENT] = contact.NEVER
                 if ways >> way & 1 != 0:
-                    look_along(memory, slots[one], numbers, one * OWN, way, table, row, present)
-                    gaps[looks] = gap
+                    look_along(memory, slot, numbers, own, way, table, row, present)
+                    work.gaps[looks] = gap
                     looks += 1
-        if looks == 0:
-            return
         find_moments(work, looks)
         for one in range(suspects):
             cross_over(
                 memory, slots[one], numbers, one * OWN, table, row, number, recorded, present
             )
+        left = 0.0
         for one in range(suspects):
             if memory[rows.SUSPECT * STRIDE + slots[one]] != 0.0:
                 arrive(memory, slots[one], numbers, one * OWN, table, row, present)
+                left += memory[rows.SUSPECT * STRIDE + slots[one]]
+        if left == 0.0:
+            return
     for one in range(suspects):
         if memory[rows.SUSPECT * STRIDE + slots[one]] != 0.0:
             give_up(memory, slots[one], table, row, present)
@@ -90,18 +92,17 @@ def cross(memory, lanes, table, row, work, number, recorded, present):
 
 @scalar
 def look_along(memory, slot, numbers, own, way, table, row, present):
-    """Compute a gap of a lane along the step, and tell from which side it is to be seen."""
+    """Compute a gap of a lane along the step, and tell what it leaves, if it is a flank."""
     place = layout(present)
     lane = read_lane(memory, slot)
     branches = read_branches(memory, slot)
     gap = own + GAPS + way * GAP
     at = maps_on(branches, row, present) + place.gap + way * place.columns * TERMS
-    error = mean_errors(lane, present)[way]
-    vectors.look_along(numbers, gap, own + INPUTS, error, table, at, present)
+    vectors.gap_along(numbers, gap, own + INPUTS, table, at, present)
+    numbers[gap] -= mean_errors(lane, present)[way]
     branch = branches[way]
-    # A flank is left towards the middle; between the flanks, most likely to where the step ends.
-    side = branch.offset if branch.engaged != 0.0 else -numbers[gap + END]
-    numbers[gap + SIDE] = math.copysign(1.0, side)
+    # A flank is left towards the middle.
+    numbers[gap + SIDE] = math.copysign(branch.engaged, branch.offset)
     numbers[gap + DISTANCE] = lane.half_backlash * (1.0 - 2.0 * branch.engaged)
     numbers[gap + MOMENT] = UNKNOWN if numbers[own + DONE] > -1.0 else contact.NEVER
 

@@ -21,10 +21,10 @@ INPUTS, TANGENT_INPUTS, GAPS, GAP, TANGENT_GAP, RESULT, DONE, OWN = 0, 16, 32, 3
 so long, what the tangent vector adds to one of them, state or tangent vector at the end of the
 step, the moment of the last crossing; and how many numbers that are."""
 
-BEGIN, END, BEND, SIDE, DISTANCE, MOMENT, CROSSED, KNOWN = 16, 18, 20, 21, 22, 23, 24, 26
-"""What is known of a gap, behind its terms along the step: value and slope at the beginning and at
-the end, more than its fourth derivative, the side from which it is seen and by what it is raised,
-the next crossing, value and slope there; and how many numbers that are."""
+DISTANCE, SIDE, MOMENT, BEND, CROSSED, KNOWN = 16, 17, 18, 19, 20, 22
+"""What is known of a gap, behind its terms along the step: by what it is raised, the side from
+which it is seen, the next crossing, more than its fourth derivative, value and slope where it
+crosses; and how many numbers that are."""
 
 
 def fourth_derivative(power: Floats) -> Floats:
@@ -36,13 +36,14 @@ class Work(NamedTuple):
     """Memory of the lanes of a block that cross.
 
     ``numbers``: of one lane after the other; ``columns``: what is known of gaps, side by side;
-    ``slots``: of the lanes; ``gaps``: where in the numbers those begin that are looked at.
+    ``slots``: of the lanes; ``gaps``: where in the numbers those begin that are looked at. Places
+    have no sign: else a place is tested for one wherever it is used.
     """
 
     numbers: Floats
     columns: Floats
-    slots: NDArray[np.intp]
-    gaps: NDArray[np.intp]
+    slots: NDArray[np.uint32]
+    gaps: NDArray[np.uint32]
 
 
 class Layout(NamedTuple):

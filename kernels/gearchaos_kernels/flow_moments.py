@@ -2,32 +2,34 @@
 
 The gap is a polynomial along the step, from -1 to 1; seen from one side and raised by a distance it
 falls below zero where it leaves. Nearly every one that may leave falls all the way, and is solved
-side by side with others (`find_side_by_side`), with as many steps of Newton's method for each, so
-that none depends on its neighbours. What is left is searched piece by piece (`find_in_pieces`).
+side by side with others (`find_side_by_side`), in the same steps for each, so that none depends on
+its neighbours. What is left is searched piece by piece (`find_in_pieces`).
 """
+
+import math
 
 from gearchaos_kernels import contact
 from gearchaos_kernels.compilation import part, scalar
 from gearchaos_kernels.flow_layout import (
-    BEGIN,
     BEND,
     CROSSED,
     DISTANCE,
     DONE,
-    END,
     KNOWN,
     MOMENT,
     OWN,
     SIDE,
     TERMS,
+    fourth_derivative,
 )
 from gearchaos_kernels.flow_vectors import VECTOR
+
+largest_bend = scalar(fourth_derivative)
 
 _THIRD = 1.0 / 3.0
 UNKNOWN = -2.0
 """In place of a moment that has to be searched."""
 
-_ITERATIONS = 3
 _LOOKS = 300
 _NARROW = 1e-9
 """In so short a piece of a step a gap that turns around goes as far as rounding does."""
@@ -40,45 +42,61 @@ def find_moments(work, looks):
     for first in range(0, looks, VECTOR):
         count = min(looks - first, VECTOR)
         for n in range(count):
-            for row in range(MOMENT + 1):
-                columns[row * VECTOR + n] = numbers[gaps[first + n] + row]
+            gap = gaps[first + n]
+            for row in range(BEND):
+                columns[row * VECTOR + n] = numbers[gap + row]
         find_side_by_side(columns)
         for n in range(count):
             gap = gaps[first + n]
-            for row in range(MOMENT, KNOWN):
+            for row in range(SIDE, KNOWN):
                 numbers[gap + row] = columns[row * VECTOR + n]
-    for look in range(looks):
-        if numbers[gaps[look] + MOMENT] == UNKNOWN:
-            find_in_pieces(numbers, gaps[look])
+            if numbers[gap + MOMENT] == UNKNOWN:
+                find_in_pieces(numbers, gap)
 
 
 @scalar
 def find_side_by_side(columns):
     """Find the crossings of gaps that fall all the way from the beginning of the step."""
     for n in range(VECTOR):
+        even, odd, even_slope, odd_slope, bend = 0.0, 0.0, 0.0, 0.0, 0.0
+        for term in range(0, TERMS, 2):
+            a, b = columns[term * VECTOR + n], columns[(term + 1) * VECTOR + n]
+            even += a
+            odd += b
+            even_slope += term * a
+            odd_slope += (term + 1) * b
+            bend += largest_bend(term) * abs(a) + largest_bend(term + 1) * abs(b)
         side, distance = columns[SIDE * VECTOR + n], columns[DISTANCE * VECTOR + n]
+        if side == 0.0:
+            # Between the flanks: most likely it meets the one where the step ends.
+            side = math.copysign(1.0, -even - odd)
         # What begins where the last step ended, at the boundary, begins on the right side of it.
-        value_left = max(side * columns[BEGIN * VECTOR + n] + distance, 0.0)
-        slope_left = side * columns[(BEGIN + 1) * VECTOR + n]
-        value_right = side * columns[END * VECTOR + n] + distance
-        slope_right = side * columns[(END + 1) * VECTOR + n]
+        value_left = max(side * (even - odd) + distance, 0.0)
+        slope_left = side * (odd_slope - even_slope)
+        value_right = side * (even + odd) + distance
+        slope_right = side * (odd_slope + even_slope)
         ends = value_left, slope_left, value_right, slope_right
-        lowest, highest, steepest = bounds_of(ends, 2.0, columns[BEND * VECTOR + n])
+        lowest, highest, steepest = bounds_of(ends, 2.0, bend)
         stays = lowest >= 0.0 and value_right >= 0.0
         # From the other side: a lane between the flanks may meet either.
         one_way = distance < 0.0 or max(highest, value_right) <= 2.0 * distance
         falls = steepest < 0.0 and value_right < 0.0
         guess = guess_fall(ends, 2.0)
         at = min(max(guess - 1.0, -1.0), 1.0)
-        value, slope, correction = 0.0, 0.0, 0.0
-        for _ in range(_ITERATIONS):
-            value, slope = polynomial(columns, n, VECTOR, at)
-            correction = (side * value + distance) / (side * slope)
-            at -= correction
+        # From a cubic's guess by Chebyshev's method to nearly all of the place, by Newton's to it.
+        value, slope, curvature = polynomial(columns, n, VECTOR, at)
+        inverse = 1.0 / slope
+        shift = (value + side * distance) * inverse
+        at -= shift + shift * shift * curvature * inverse
+        value, slope, _ = polynomial(columns, n, VECTOR, at)
+        correction = (value + side * distance) / slope
+        at -= correction
         found = falls and abs(correction) < contact.LAST_CORRECTION and -1.0 <= at <= 1.0
         moment = contact.NEVER if stays else at
         known = one_way and (stays or found) and columns[MOMENT * VECTOR + n] != UNKNOWN
+        columns[SIDE * VECTOR + n] = side
         columns[MOMENT * VECTOR + n] = moment if known else UNKNOWN
+        columns[BEND * VECTOR + n] = bend
         columns[CROSSED * VECTOR + n] = value
         columns[(CROSSED + 1) * VECTOR + n] = slope
 
@@ -113,17 +131,21 @@ def guess_fall(ends, width):
 
 @scalar
 def polynomial(numbers, first, stride, at):
-    """Return the value of a polynomial, and its slope; its terms stand so far apart."""
+    """Return value, slope and half the curvature of a polynomial; its terms stand so far apart."""
     # Even and odd terms, which do not wait for each other.
     square = at * at
     even, odd = numbers[first + (TERMS - 2) * stride], numbers[first + (TERMS - 1) * stride]
-    even_slope, odd_slope = 0.0, 0.0
+    even_slope, odd_slope, even_bend, odd_bend = 0.0, 0.0, 0.0, 0.0
     for term in range(TERMS - 4, -1, -2):
+        even_bend = even_bend * square + even_slope
+        odd_bend = odd_bend * square + odd_slope
         even_slope = even_slope * square + even
         odd_slope = odd_slope * square + odd
         even = even * square + numbers[first + term * stride]
         odd = odd * square + numbers[first + (term + 1) * stride]
-    return even + at * odd, odd + 2.0 * at * (even_slope + at * odd_slope)
+    bends = even_slope + 4.0 * square * even_bend, 3.0 * odd_slope + 4.0 * square * odd_bend
+    slope = odd + 2.0 * at * (even_slope + at * odd_slope)
+    return even + at * odd, slope, bends[0] + at * bends[1]
 
 
 @part
@@ -136,7 +158,8 @@ def find_in_pieces(numbers, gap):
         # A lane between the flanks may meet either.
         moment = min(moment, first_below(numbers, gap, -side, distance, done))
     numbers[gap + MOMENT] = moment
-    numbers[gap + CROSSED], numbers[gap + CROSSED + 1] = polynomial(numbers, gap, 1, moment)
+    value, slope, _ = polynomial(numbers, gap, 1, moment)
+    numbers[gap + CROSSED], numbers[gap + CROSSED + 1] = value, slope
 
 
 @part
@@ -182,5 +205,5 @@ def first_below(numbers, gap, side, distance, left):
 def gap_at(given, at):
     """Return a gap, seen from one side and raised by a distance, and its slope."""
     numbers, gap, side, distance = given
-    value, slope = polynomial(numbers, gap, 1, at)
+    value, slope, _ = polynomial(numbers, gap, 1, at)
     return side * value + distance, side * slope

@@ -2,7 +2,7 @@
 
 A map is applied to eight lanes at once, its numbers the same for all of them (`move`). What a lane
 that crosses needs alone are sums of columns, each a vector along a state or along the terms of a
-polynomial (`combine`, `look_along`, `add_switch`). The compiler finds neither by itself.
+polynomial (`combine`, `add_switch`). The compiler finds neither by itself.
 """
 
 import itertools
@@ -18,14 +18,12 @@ from numba.extending import intrinsic
 from gearchaos_kernels import rows
 from gearchaos_kernels.compilation import FASTMATH
 from gearchaos_kernels.flow_layout import (
-    BEGIN,
     BOUNDS,
     INPUTS,
     TANGENT_GAP,
     TANGENT_INPUTS,
     TERMS,
     Layout,
-    fourth_derivative,
     layout,
 )
 from gearchaos_kernels.rows import STRIDE
@@ -227,6 +225,8 @@ end_of = _combination(of_state=True, forced=True)
 """State at the end of the step: work, target, inputs, table, at, present."""
 tangent_end_of = _combination(of_state=True, forced=False)
 """The same of a tangent vector."""
+gap_along = _combination(of_state=False, forced=True)
+"""Terms of a gap without the mean pitch error."""
 tangent_gap_along = _combination(of_state=False, forced=False)
 """Terms of what a tangent vector adds to a gap."""
 
@@ -263,8 +263,7 @@ def add_switch(_typing, work, own, gap, moment, factor, table, at, present):
     def generate(context, builder, signature, arguments):
         w = _Writer(context, builder, signature, arguments)
         columns = w.element(5, arguments[6])
-        factor = w.splat(arguments[4])
-        integrals = [builder.fmul(some, factor) for some in _integrals(w, arguments[3])]
+        integrals = _integrals(w, arguments[3])
         # Eight integrals from every order on.
         windows = [
             w.pick(one, following, range(first, first + VECTOR))
@@ -280,15 +279,26 @@ def add_switch(_typing, work, own, gap, moment, factor, table, at, present):
             factors = [(term, w.spread(numbers, term)) for term in range(TERMS)]
             sums[target] = [w.sum(factors, windows[k:]) for k in range(0, TERMS, VECTOR)]
         for first, size in _pieces(scene.width):
-            terms = [w.load(columns, k * scene.width + first, size) for k in range(TERMS)]
+            # Of a narrow state several columns stand in a vector, one behind the other.
+            beside = VECTOR // size
+            places, order = range(0, TERMS, beside), np.repeat(np.arange(beside), size)
+            terms = [w.load(columns, k * scene.width + first) for k in places]
             for target, given in sums.items():
                 pointer = w.element(0, builder.add(arguments[1], _INTEGER(target + first)))
                 factors = [
-                    (k, w.repeat(given[k // VECTOR], k % VECTOR, size)) for k in range(TERMS)
+                    w.pick(given[k // VECTOR], given[k // VECTOR], k % VECTOR + order)
+                    for k in places
                 ]
-                change = w.sum(factors, terms)
-                moved = builder.fadd(w.load(pointer, 0, size), change, flags=_FLAGS)
-                w.store(moved, pointer, 0)
+                change = w.sum(enumerate(factors), terms)
+                while change.type.count > size:
+                    half = change.type.count // 2
+                    ends = (
+                        w.pick(change, change, range(half)),
+                        w.pick(change, change, range(half, 2 * half)),
+                    )
+                    change = builder.fadd(*ends, flags=_FLAGS)
+                factor = w.splat(arguments[4], size)
+                w.store(w.multiply_add(factor, change, w.load(pointer, 0, size)), pointer, 0)
         return context.get_dummy_value()
 
     numbers = work, types.intp, types.intp, types.float64, types.float64, table, types.intp
@@ -305,40 +315,6 @@ def _sums(w: _Writer, vectors: list[Any]) -> Any:
             for pair in zip(vectors[::2], vectors[1::2], strict=True)
         ]
     return vectors[0]
-
-
-@intrinsic
-def look_along(_typing, work, gap, inputs, mean_error, table, at, present):
-    """Write a gap along the step, and what is known of it at both ends; see `flow_layout`."""
-    place = _scene(present)[1]
-
-    def generate(context, builder, signature, arguments):
-        w = _Writer(context, builder, signature, arguments)
-        result, given = w.element(0, arguments[1]), w.element(0, arguments[2])
-        numbers = w.element(4, arguments[5])
-        factors = [w.spread(given, column) for column in range(place.columns)]
-        parts: list[Any] = [None] * 5
-        for first in range(0, TERMS, VECTOR):
-            columns = [w.load(numbers, column * TERMS + first) for column in range(place.columns)]
-            terms = w.sum(enumerate(factors), columns)
-            if first == 0:
-                none = w.constant(np.zeros(VECTOR))
-                constant = builder.insert_element(none, arguments[3], _INDEX(0))
-                terms = builder.fsub(terms, constant, flags=_FLAGS)
-            w.store(terms, result, first)
-            order = np.arange(first, first + VECTOR, dtype=float)
-            sign, size = (-1.0) ** order, w.size(terms)
-            weights = sign, -sign * order, np.ones(VECTOR), order, fourth_derivative(order)
-            sources = terms, terms, terms, terms, size
-            parts = [
-                w.multiply_add(source, w.constant(weight), part)
-                for source, weight, part in zip(sources, weights, parts, strict=True)
-            ]
-        w.store(_sums(w, parts), result, BEGIN)
-        return context.get_dummy_value()
-
-    numbers = work, types.intp, types.intp, types.float64, table, types.intp
-    return types.void(*numbers, present), generate
 
 
 @intrinsic
