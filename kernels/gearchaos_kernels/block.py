@@ -92,9 +92,9 @@ def integrate_block(number_of_block, batch, plan, outcome, present):
     maps = batch.maps
     # A few lanes need no more than one vector, and one lane with maps of its own not even that.
     slots = 1 if lanes == 1 else VECTOR if lanes <= VECTOR else LANES
-    places = np.zeros(3 * LANES, dtype=np.uint32)
     numbers = np.zeros(OWN * slots)
-    work = Work(numbers, np.zeros(KNOWN * VECTOR), places[:LANES], places[LANES:])
+    beside = np.zeros((2 * LANES // VECTOR, KNOWN * VECTOR))
+    work = Work(numbers, beside, np.zeros(LANES, dtype=np.uint32))
     every = steps // plan.steps_per_period
     turns = batch.turns[batch.order[first]]
     turn(memory, first, lanes, batch, plan.first_period, present)

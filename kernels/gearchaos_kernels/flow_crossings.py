@@ -32,7 +32,7 @@ from gearchaos_kernels.flow_layout import (
     TERMS,
     layout,
 )
-from gearchaos_kernels.flow_moments import UNKNOWN, find_moments
+from gearchaos_kernels.flow_moments import UNKNOWN, find_moments, put_beside, take_back
 from gearchaos_kernels.flow_steps import (
     gather,
     maps_on,
@@ -71,13 +71,18 @@ def cross(memory, lanes, table, row, work, number, recorded, present):
                 numbers[gap + MOMENT] = contact.NEVER
                 if ways >> way & 1 != 0:
                     look_along(memory, slot, numbers, own, way, table, row, present)
-                    work.gaps[looks] = gap
+                    put_beside(work, gap, looks)
                     looks += 1
         find_moments(work, looks)
+        looks = 0
         for one in range(suspects):
-            cross_over(
-                memory, slots[one], numbers, one * OWN, table, row, number, recorded, present
-            )
+            slot, own = slots[one], one * OWN
+            ways = int(memory[rows.SUSPECT * STRIDE + slot])
+            for way in range(layout(present).ways):
+                if ways >> way & 1 != 0:
+                    take_back(work, own + GAPS + way * GAP, looks)
+                    looks += 1
+            cross_over(memory, slot, numbers, own, table, row, number, recorded, present)
         left = 0.0
         for one in range(suspects):
             if memory[rows.SUSPECT * STRIDE + slots[one]] != 0.0:

@@ -36,14 +36,12 @@ class Work(NamedTuple):
     """Memory of the lanes of a block that cross.
 
     ``numbers``: of one lane after the other; ``columns``: what is known of gaps, side by side;
-    ``slots``: of the lanes; ``gaps``: where in the numbers those begin that are looked at. Places
-    have no sign: else a place is tested for one wherever it is used.
+    ``slots``: of the lanes, without a sign: else a place is tested for one wherever it is used.
     """
 
     numbers: Floats
     columns: Floats
     slots: NDArray[np.uint32]
-    gaps: NDArray[np.uint32]
 
 
 class Layout(NamedTuple):

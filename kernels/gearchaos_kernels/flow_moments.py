@@ -36,22 +36,28 @@ _NARROW = 1e-9
 
 
 @scalar
+def put_beside(work, gap, look):
+    """Put what is known of a gap beside that of others, as number so and so that is looked at."""
+    columns = work.columns[look // VECTOR]
+    for row in range(BEND):
+        columns[row * VECTOR + look % VECTOR] = work.numbers[gap + row]
+
+
+@scalar
 def find_moments(work, looks):
-    """Find the next crossing of so many gaps of a work, or `NEVER`; see `flow_layout`."""
-    numbers, columns, gaps = work.numbers, work.columns, work.gaps
-    for first in range(0, looks, VECTOR):
-        count = min(looks - first, VECTOR)
-        for n in range(count):
-            gap = gaps[first + n]
-            for row in range(BEND):
-                columns[row * VECTOR + n] = numbers[gap + row]
-        find_side_by_side(columns)
-        for n in range(count):
-            gap = gaps[first + n]
-            for row in range(SIDE, KNOWN):
-                numbers[gap + row] = columns[row * VECTOR + n]
-            if numbers[gap + MOMENT] == UNKNOWN:
-                find_in_pieces(numbers, gap)
+    """Find the next crossing of so many gaps that stand side by side, or `NEVER`, or `UNKNOWN`."""
+    for some in range((looks + VECTOR - 1) // VECTOR):
+        find_side_by_side(work.columns[some])
+
+
+@scalar
+def take_back(work, gap, look):
+    """Take back what was found of a gap, and find what is still unknown."""
+    columns = work.columns[look // VECTOR]
+    for row in range(SIDE, KNOWN):
+        work.numbers[gap + row] = columns[row * VECTOR + look % VECTOR]
+    if work.numbers[gap + MOMENT] == UNKNOWN:
+        find_in_pieces(work.numbers, gap)
 
 
 @scalar

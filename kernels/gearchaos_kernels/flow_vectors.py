@@ -239,12 +239,11 @@ def _integrals(w: _Writer, place: Any) -> list[Any]:
     for bit in (1, 2, 4, 8):
         has = ir.Constant(ir.VectorType(ir.IntType(1), VECTOR), [int(n & bit > 0) for n in order])
         powers = w.builder.fmul(powers, w.builder.select(has, power, ones))
-        power = w.builder.fmul(power, power)
-    last = w.repeat(powers, VECTOR - 1, VECTOR)
+        last, power = power, w.builder.fmul(power, power)
     results = []
     for _ in range(2 * TERMS // VECTOR):
-        less = w.builder.fsub(powers, w.constant((-1.0) ** order))
-        results.append(w.builder.fmul(less, w.constant(1.0 / order)))
+        begin = w.constant(-((-1.0) ** order) / order)
+        results.append(w.multiply_add(powers, w.constant(1.0 / order), begin))
         powers = w.builder.fmul(powers, last)
         order = order + VECTOR
     return results
