@@ -45,8 +45,8 @@ def main() -> None:
     numba.set_num_threads(1)
     config = load_config(SWEEP, ["sweep.from=3.0", "sweep.to=11.0", f"sweep.count={LANES}"])
     lanes = Lanes(config).system_of(np.arange(LANES))
-    for axial in (True, False):
-        _compare(lanes._replace(effects=Effects(axial=axial)), options.rounds, options.periods)
+    for effects in Effects(), Effects(axial=False), Effects(axial=False, transverse=False):
+        _compare(lanes._replace(effects=effects), options.rounds, options.periods)
 
 
 def _compare(system, rounds: int, timed_periods: int) -> None:

@@ -32,7 +32,7 @@ from gearchaos_kernels.compilation import align_stack, part, scalar
 from gearchaos_kernels.contact import branches_at, end_contact, ways_that_may_leave
 from gearchaos_kernels.equations import gaps_at
 from gearchaos_kernels.flow_crossings import cross
-from gearchaos_kernels.flow_layout import KNOWN, OWN, Work, layout
+from gearchaos_kernels.flow_layout import ASIDE, OWN, Work, layout
 from gearchaos_kernels.flow_steps import begin_forces, move_block
 from gearchaos_kernels.flow_vectors import VECTOR
 from gearchaos_kernels.forcing import Phase, forcing_at, phase_within
@@ -92,9 +92,12 @@ def integrate_block(number_of_block, batch, plan, outcome, present):
     maps = batch.maps
     # A few lanes need no more than one vector, and one lane with maps of its own not even that.
     slots = 1 if lanes == 1 else VECTOR if lanes <= VECTOR else LANES
-    numbers = np.zeros(OWN * slots)
-    beside = np.zeros((2 * LANES // VECTOR, KNOWN * VECTOR))
-    work = Work(numbers, beside, np.zeros(LANES, dtype=np.uint32))
+    aside = memory
+    if present.flow_map is not None:
+        aside = aligned_memory(ASIDE)
+        for number in range(aside.shape[0]):
+            aside[number] = 0.0
+    work = Work(aside, np.zeros(LANES, dtype=np.uint32), np.zeros(OWN))
     every = steps // plan.steps_per_period
     turns = batch.turns[batch.order[first]]
     turn(memory, first, lanes, batch, plan.first_period, present)
@@ -117,7 +120,7 @@ def integrate_block(number_of_block, batch, plan, outcome, present):
                 final = on_grid(table, shares, 2 * number + 2, present)
                 suspects = step_block(memory, start, middle, final, present)
             else:
-                suspects = move_block(memory, maps, row, slots, numbers, present)
+                suspects = move_block(memory, maps, row, slots, work.numbers, present)
             if present.resolved is not None:
                 if suspects > 0:
                     recorded = period >= plan.transient_periods

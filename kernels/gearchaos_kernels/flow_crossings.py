@@ -10,190 +10,200 @@ the map of b. The tangent vector goes the same way, its moments of crossing thos
 field is continuous, so that no other term comes from them.
 """
 
-import math
-
 from gearchaos_kernels import contact, rows
 from gearchaos_kernels import flow_vectors as vectors
-from gearchaos_kernels.block_memory import read_branches, read_lane, read_state, write_branches
+from gearchaos_kernels.block_memory import (
+    read_branches,
+    read_lane,
+    read_state,
+    store,
+    write_branches,
+)
 from gearchaos_kernels.compilation import scalar
 from gearchaos_kernels.equations import Gap, gaps_at
 from gearchaos_kernels.flow_layout import (
+    AFTER,
+    AXIALLY,
     CROSSED,
-    DISTANCE,
-    DONE,
+    EDGE,
+    FACTOR,
     GAP,
     GAPS,
-    INPUTS,
+    HEADER,
     MOMENT,
-    OWN,
-    SIDE,
-    TANGENT_GAP,
-    TANGENT_INPUTS,
-    TERMS,
     layout,
 )
-from gearchaos_kernels.flow_moments import UNKNOWN, find_moments, put_beside, take_back
-from gearchaos_kernels.flow_steps import (
-    gather,
-    maps_on,
-    mean_errors,
-    phases_of,
-    scatter,
-    store_offsets,
-)
+from gearchaos_kernels.flow_moments import find_moments
+from gearchaos_kernels.flow_steps import phases_of, store_offsets
+from gearchaos_kernels.flow_vectors import VECTOR
 from gearchaos_kernels.forcing import forcing_at
-from gearchaos_kernels.rows import STRIDE
+from gearchaos_kernels.rows import STRIDE, Branch, Lane
 from gearchaos_kernels.splitting import MOST_SPLITS
+
+_HALF_BACKLASH, _ERROR, _PHASE = (
+    rows.COEFFICIENTS + Lane._fields.index(name)
+    for name in ("half_backlash", "error_mean", "cos_phase")
+)
+_BRANCH = len(Branch._fields)
 
 
 @scalar
 def cross(memory, lanes, table, row, work, number, recorded, present):
-    """Take the step of the lanes that may have left a branch, from crossing to crossing.
-
-    All of them go on together, stage by stage, and hardly anything branches: while the numbers of
-    one lane are on their way, the processor is at the next.
-    """
-    numbers, slots = work.numbers, work.slots
+    """Take the step of the lanes that may have left a branch, eight at a time."""
+    slots = work.slots
     suspects = 0
     for slot in range(lanes):
         slots[suspects] = slot
         suspects += 1 if memory[rows.SUSPECT * STRIDE + slot] != 0.0 else 0
-    for crossings in range(MOST_SPLITS):
-        looks = 0
-        for one in range(suspects):
-            slot, own = slots[one], one * OWN
-            if crossings == 0:
-                gather(memory, slot, numbers, own, present)
-                numbers[own + DONE] = -1.0
-            ways = int(memory[rows.SUSPECT * STRIDE + slot])
-            for way in range(layout(present).ways):
-                gap = own + GAPS + way * GAP
-                numbers[gap + MOMENT] = contact.NEVER
-                if ways >> way & 1 != 0:
-                    look_along(memory, slot, numbers, own, way, table, row, present)
-                    put_beside(work, gap, looks)
-                    looks += 1
-        find_moments(work, looks)
-        looks = 0
-        for one in range(suspects):
-            slot, own = slots[one], one * OWN
-            ways = int(memory[rows.SUSPECT * STRIDE + slot])
-            for way in range(layout(present).ways):
-                if ways >> way & 1 != 0:
-                    take_back(work, own + GAPS + way * GAP, looks)
-                    looks += 1
-            cross_over(memory, slot, numbers, own, table, row, number, recorded, present)
-        left = 0.0
-        for one in range(suspects):
-            if memory[rows.SUSPECT * STRIDE + slots[one]] != 0.0:
-                arrive(memory, slots[one], numbers, one * OWN, table, row, present)
-                left += memory[rows.SUSPECT * STRIDE + slots[one]]
-        if left == 0.0:
-            return
-    for one in range(suspects):
-        if memory[rows.SUSPECT * STRIDE + slots[one]] != 0.0:
-            give_up(memory, slots[one], table, row, present)
+    for first in range(0, suspects, VECTOR):
+        some = slots[first : first + min(VECTOR, suspects - first)]
+        cross_together(memory, some, work.aside, table, row, number, recorded, present)
 
 
 @scalar
-def look_along(memory, slot, numbers, own, way, table, row, present):
-    """Compute a gap of a lane along the step, and tell what it leaves, if it is a flank."""
+def cross_together(memory, slots, aside, table, row, number, recorded, present):
+    """Take the step of up to eight lanes from crossing to crossing."""
+    place, lanes = layout(present), slots.shape[0]
+    for n in range(lanes):
+        take_aside(memory, slots[n], aside, n, present)
+    crossings, left = 0, lanes
+    while left > 0 and crossings < MOST_SPLITS:
+        crossings += 1
+        for pair in range(place.pairs):
+            at = row + HEADER + pair * place.size
+            vectors.look_along(aside, 0, table, at, 1.0 - pair % 2, 1.0 - pair // 2, present)
+        for way in range(place.ways):
+            find_moments(aside, way, lanes, present)
+        for n in range(lanes):
+            cross_over(memory, slots[n], aside, n, number, recorded, present)
+        vectors.sum_along(aside, present)
+        for pair in range(place.pairs):
+            at = row + HEADER + pair * place.size
+            vectors.add_switch(aside, 0, table, at, 1.0 - pair % 2, 1.0 - pair // 2, present)
+        vectors.bound_bends(aside, 0, table, row, present)
+        for pair in range(place.pairs):
+            at = row + HEADER + pair * place.size
+            vectors.move(aside, 0, table, at, 1.0 - pair % 2, 1.0 - pair // 2, present)
+        left = count_left(aside, lanes, table, row, present)
+    for n in range(lanes):
+        slot = slots[n]
+        for line in range(place.states):
+            memory[(rows.STATE + line) * STRIDE + slot] = aside[(rows.STATE + line) * STRIDE + n]
+            if present.tangent is not None:
+                after = aside[(rows.TANGENT + line) * STRIDE + n]
+                memory[(rows.TANGENT + line) * STRIDE + slot] = after
+        if aside[rows.SUSPECT * STRIDE + n] != 0.0:
+            give_up(memory, slot, table, row, present)
+
+
+@scalar
+def take_aside(memory, slot, aside, n, present):
+    """Copy what a lane that crosses needs of itself."""
     place = layout(present)
-    lane = read_lane(memory, slot)
-    branches = read_branches(memory, slot)
-    gap = own + GAPS + way * GAP
-    at = maps_on(branches, row, present) + place.gap + way * place.columns * TERMS
-    vectors.gap_along(numbers, gap, own + INPUTS, table, at, present)
-    numbers[gap] -= mean_errors(lane, present)[way]
-    branch = branches[way]
-    # A flank is left towards the middle.
-    numbers[gap + SIDE] = math.copysign(branch.engaged, branch.offset)
-    numbers[gap + DISTANCE] = lane.half_backlash * (1.0 - 2.0 * branch.engaged)
-    numbers[gap + MOMENT] = UNKNOWN if numbers[own + DONE] > -1.0 else contact.NEVER
+    axial = 0 if present.axial is None else 1
+    copy_rows(memory, slot, aside, n, rows.STATE_BEFORE, place.states)
+    if present.tangent is not None:
+        copy_rows(memory, slot, aside, n, rows.TANGENT_BEFORE, place.states)
+    if place.states > 2:
+        copy_rows(memory, slot, aside, n, rows.COEFFICIENTS, 2)
+    copy_rows(memory, slot, aside, n, _HALF_BACKLASH, 1)
+    if present.pitch_error is not None:
+        copy_rows(memory, slot, aside, n, _ERROR, 3 + 3 * axial)
+    if present.phase is not None:
+        copy_rows(memory, slot, aside, n, _PHASE, 2)
+    copy_rows(memory, slot, aside, n, rows.TANGENTIAL_BRANCH, _BRANCH * place.ways)
+    copy_rows(memory, slot, aside, n, rows.SUSPECT, 1)
+    copy_rows(memory, slot, aside, n, rows.FORCES, place.columns - place.states)
+    aside[AFTER * STRIDE + n] = -1.0
 
 
 @scalar
-def next_crossing(numbers, own, present):
-    """Return the moment of the next crossing of a lane, or `NEVER`, and if it is an axial one."""
-    moment = numbers[own + GAPS + MOMENT]
-    if present.axial is None:
-        return moment, False
-    moment_z = numbers[own + GAPS + GAP + MOMENT]
-    return min(moment, moment_z), not moment <= moment_z
+def copy_rows(memory, slot, aside, n, first, count):
+    """Copy so many rows of a lane."""
+    for row in range(first, first + count):
+        aside[row * STRIDE + n] = memory[row * STRIDE + slot]
 
 
 @scalar
-def crossed_at(numbers, gap):
-    """Return a gap where it crosses, with its rate per step."""
-    # The step is 2 long in s.
-    return Gap(numbers[gap + CROSSED], 2.0 * numbers[gap + CROSSED + 1])
-
-
-@scalar
-def cross_over(memory, slot, numbers, own, table, row, number, recorded, present):
-    """Carry a lane over its next boundary; without one it is no suspect any more."""
-    place = layout(present)
-    moment, axially = next_crossing(numbers, own, present)
+def cross_over(memory, slot, aside, n, number, recorded, present):
+    """Tell of the next crossing of a lane, and what is needed to carry it over."""
+    first = GAPS * STRIDE + n
+    moment, axially = aside[first + MOMENT * STRIDE], False
+    if present.axial is not None:
+        moment_z = aside[first + (GAP + MOMENT) * STRIDE]
+        moment, axially = min(moment, moment_z), not moment <= moment_z
+    aside[FACTOR * STRIDE + n] = 0.0
     # Also where the lane has left the range of numbers.
     if not moment <= 1.0:
-        memory[rows.SUSPECT * STRIDE + slot] = 0.0
         return
 
-    lane = read_lane(memory, slot)
-    branches = read_branches(memory, slot)
     way = 1 if axially else 0
-    gap = own + GAPS + way * GAP
-    crossed = crossed_at(numbers, gap)
-    columns = maps_on(branches, row, present) + place.gap + way * place.columns * TERMS
+    lane = read_lane(memory, slot)
     at_step = number + 0.5 * (1.0 + moment)
     branches, branch, following = contact.leave(
-        memory, slot, axially, crossed, branches, lane, at_step, recorded, present
+        memory,
+        slot,
+        axially,
+        crossed_at(aside, n, way),
+        read_branches(memory, slot),
+        lane,
+        at_step,
+        recorded,
+        present,
     )
     write_branches(memory, slot, branches)
     store_offsets(memory, slot, lane, branches, present)
-
-    if present.tangent is not None:
-        given, target = own + TANGENT_INPUTS, own + TANGENT_GAP
-        vectors.tangent_gap_along(numbers, target, given, table, columns, present)
+    store(aside, rows.TANGENTIAL_BRANCH + _BRANCH * way, n, following)
+    copy_rows(memory, slot, aside, n, rows.FORCES + 1 + way, 1)
+    aside[AFTER * STRIDE + n] = moment
+    aside[FACTOR * STRIDE + n] = branch.engaged - following.engaged
     # One of the two offsets is that of the flank, the other one 0.
-    numbers[gap] -= branch.offset + following.offset
-    sign = branch.engaged - following.engaged
-    switch = maps_on(branches, row, present) + place.switch + way * TERMS * place.width
-    vectors.add_switch(numbers, own, gap, moment, sign, table, switch, present)
-    offset = memory[(rows.FORCES + 1 + way) * STRIDE + slot]
-    numbers[own + INPUTS + place.states + 1 + way] = offset
-    numbers[own + DONE] = moment
+    aside[EDGE * STRIDE + n] = branch.offset + following.offset
+    aside[AXIALLY * STRIDE + n] = way
 
 
 @scalar
-def arrive(memory, slot, numbers, own, table, row, present):
-    """Take a lane that has crossed to the end of the step; what may cross on the way is suspect."""
+def crossed_at(aside, n, way):
+    """Return a gap where it crosses, with its rate per step."""
+    at = (GAPS + way * GAP + CROSSED) * STRIDE + n
+    # The step is 2 long in s.
+    return Gap(aside[at], 2.0 * aside[at + STRIDE])
+
+
+@scalar
+def count_left(aside, lanes, table, row, present):
+    """Tell which gaps may cross once more on the rest of the step; return of how many lanes."""
     place = layout(present)
-    lane = read_lane(memory, slot)
-    branches = read_branches(memory, slot)
-    for line in range(place.states):
-        memory[(rows.STATE + line) * STRIDE + slot] = numbers[own + INPUTS + line]
-    elsewhere = read_state(memory, rows.STATE, slot, present)
-    at = maps_on(branches, row, present)
-    scatter(memory, slot, table, at, numbers, own, present)
-    after = read_state(memory, rows.STATE, slot, present)
     begin, end = phases_of(table, row)
-    gaps = gaps_at(elsewhere, lane, forcing_at(lane, begin, present), present)
-    gaps_after = gaps_at(after, lane, forcing_at(lane, end, present), present)
-    margins = vectors.margins_of(numbers, own + INPUTS, table, row)
-    _, axially = next_crossing(numbers, own, present)
-    ways = 0.0
-    for way in range(place.ways):
-        first, last, rest = gaps[way], gaps_after[way], 1.0
-        if axially == (way == 1):
+    left = 0
+    for n in range(VECTOR):
+        lane = read_lane(aside, n)
+        branches = read_branches(aside, n)
+        before = read_state(aside, rows.STATE_BEFORE, n, present)
+        after = read_state(aside, rows.STATE, n, present)
+        gaps = gaps_at(before, lane, forcing_at(lane, begin, present), present)
+        gaps_after = gaps_at(after, lane, forcing_at(lane, end, present), present)
+        ways = 0.0
+        for way in range(place.ways):
+            first, last = gaps[way], gaps_after[way]
+            crosses = aside[AXIALLY * STRIDE + n] == way if place.ways > 1 else True
             # Of the gap that has crossed only the rest counts.
-            rest = 0.5 * (1.0 - numbers[own + DONE])
-            crossed = crossed_at(numbers, own + GAPS + way * GAP)
-            first = Gap(crossed.value, rest * crossed.rate)
-        last = Gap(last.value, rest * last.rate)
-        if contact.may_leave(first, last, branches[way], margins[way] * rest**4):
-            ways += 1.0 + way
-    memory[rows.SUSPECT * STRIDE + slot] = ways
+            rest = 0.5 * (1.0 - aside[AFTER * STRIDE + n]) if crosses else 1.0
+            crossed = crossed_at(aside, n, way)
+            first_value = crossed.value if crosses else first.value
+            first_rate = rest * crossed.rate if crosses else first.rate
+            margin = aside[(rows.MARGINS + way) * STRIDE + n] * rest**4
+            may = contact.may_leave(
+                Gap(first_value, first_rate),
+                Gap(last.value, rest * last.rate),
+                branches[way],
+                margin,
+            )
+            ways += 1.0 + way if may else 0.0
+        ways = ways if aside[FACTOR * STRIDE + n] != 0.0 else 0.0
+        aside[rows.SUSPECT * STRIDE + n] = ways
+        left += 1 if (ways != 0.0) & (n < lanes) else 0
+    return left
 
 
 @scalar

@@ -5,6 +5,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from gearchaos_kernels import rows
 from gearchaos_kernels.compilation import scalar
 from gearchaos_kernels.system import Floats
 
@@ -16,15 +17,23 @@ BOUNDS, HEADER = (8, 24), 40
 its end; by how much each column may bend either gap beyond a cubic, on any branch."""
 
 
-INPUTS, TANGENT_INPUTS, GAPS, GAP, TANGENT_GAP, RESULT, DONE, OWN = 0, 16, 32, 32, 96, 112, 128, 136
-"""Where the numbers of a lane that crosses stand: state and forces, tangent vector, both gaps, each
-so long, what the tangent vector adds to one of them, state or tangent vector at the end of the
-step, the moment of the last crossing; and how many numbers that are."""
+INPUTS, TANGENT_INPUTS, RESULT, OWN = 0, 16, 32, 48
+"""Where the numbers of a block's only lane stand: state and forces, tangent vector, either of them
+at the end of the step; and how many numbers that are."""
 
-DISTANCE, SIDE, MOMENT, BEND, CROSSED, KNOWN = 16, 17, 18, 19, 20, 22
-"""What is known of a gap, behind its terms along the step: by what it is raised, the side from
-which it is seen, the next crossing, more than its fourth derivative, value and slope where it
-crosses; and how many numbers that are."""
+GAPS = rows.ROWS
+TANGENT_TERMS, MOMENT, CROSSED, SIDE, DISTANCE, BEND, GAP = 16, 32, 33, 35, 36, 37, 40
+"""Rows of a lane that has been taken aside, as it crosses: first those of the tangential and of the
+axial gap, with the terms along the step, those of what the tangent vector adds, the next crossing,
+value and slope there, the side from which the gap is seen, by what it is raised, and more than its
+fourth derivative; and how many rows that are."""
+
+AFTER, FACTOR, EDGE, AXIALLY, SUMS = range(GAPS + 2 * GAP, GAPS + 2 * GAP + 5)
+TANGENT_SUMS = SUMS + TERMS
+ASIDE = TANGENT_SUMS + TERMS - rows.ROWS
+"""Behind them: the moment of the last crossing, by what and from which gap on the deflection acts
+that begins or ends there, and if it was an axial one; what carries state and tangent vector over it
+(see `flow_vectors.sum_along`); and how many rows more than in a block that are."""
 
 
 def fourth_derivative(power: Floats) -> Floats:
@@ -33,15 +42,15 @@ def fourth_derivative(power: Floats) -> Floats:
 
 
 class Work(NamedTuple):
-    """Memory of the lanes of a block that cross.
+    """Memory of the lanes of a block that cross, eight at a time.
 
-    ``numbers``: of one lane after the other; ``columns``: what is known of gaps, side by side;
-    ``slots``: of the lanes, without a sign: else a place is tested for one wherever it is used.
+    ``aside``: as that of a block; ``slots``: of all that cross, without a sign: else a place is
+    tested for one wherever it is used; ``numbers``: of a block's only lane.
     """
 
-    numbers: Floats
-    columns: Floats
+    aside: Floats
     slots: NDArray[np.uint32]
+    numbers: Floats
 
 
 class Layout(NamedTuple):

@@ -8,21 +8,24 @@ its neighbours. What is left is searched piece by piece (`find_in_pieces`).
 
 import math
 
-from gearchaos_kernels import contact
+from gearchaos_kernels import contact, rows
+from gearchaos_kernels.block_memory import read_branches, read_lane
 from gearchaos_kernels.compilation import part, scalar
 from gearchaos_kernels.flow_layout import (
+    AFTER,
     BEND,
     CROSSED,
     DISTANCE,
-    DONE,
-    KNOWN,
+    GAP,
+    GAPS,
     MOMENT,
-    OWN,
     SIDE,
     TERMS,
     fourth_derivative,
 )
+from gearchaos_kernels.flow_steps import mean_errors
 from gearchaos_kernels.flow_vectors import VECTOR
+from gearchaos_kernels.rows import STRIDE
 
 largest_bend = scalar(fourth_derivative)
 
@@ -36,46 +39,37 @@ _NARROW = 1e-9
 
 
 @scalar
-def put_beside(work, gap, look):
-    """Put what is known of a gap beside that of others, as number so and so that is looked at."""
-    columns = work.columns[look // VECTOR]
-    for row in range(BEND):
-        columns[row * VECTOR + look % VECTOR] = work.numbers[gap + row]
+def find_moments(aside, way, lanes, present):
+    """Find the next crossing of a gap of so many lanes side by side, or `NEVER`."""
+    if find_side_by_side(aside, way, present) > 0:
+        for n in range(lanes):
+            if aside[(GAPS + way * GAP + MOMENT) * STRIDE + n] == UNKNOWN:
+                find_in_pieces(aside, way, n)
 
 
 @scalar
-def find_moments(work, looks):
-    """Find the next crossing of so many gaps that stand side by side, or `NEVER`, or `UNKNOWN`."""
-    for some in range((looks + VECTOR - 1) // VECTOR):
-        find_side_by_side(work.columns[some])
+def find_side_by_side(aside, way, present):
+    """Find the crossings of gaps that fall all the way from the beginning of the step.
 
-
-@scalar
-def take_back(work, gap, look):
-    """Take back what was found of a gap, and find what is still unknown."""
-    columns = work.columns[look // VECTOR]
-    for row in range(SIDE, KNOWN):
-        work.numbers[gap + row] = columns[row * VECTOR + look % VECTOR]
-    if work.numbers[gap + MOMENT] == UNKNOWN:
-        find_in_pieces(work.numbers, gap)
-
-
-@scalar
-def find_side_by_side(columns):
-    """Find the crossings of gaps that fall all the way from the beginning of the step."""
+    Returns of how many lanes it is still unknown.
+    """
+    unknown = 0
     for n in range(VECTOR):
+        first = (GAPS + way * GAP) * STRIDE + n
+        lane = read_lane(aside, n)
+        branch = read_branches(aside, n)[way]
+        aside[first] -= mean_errors(lane, present)[way]
         even, odd, even_slope, odd_slope, bend = 0.0, 0.0, 0.0, 0.0, 0.0
         for term in range(0, TERMS, 2):
-            a, b = columns[term * VECTOR + n], columns[(term + 1) * VECTOR + n]
+            a, b = aside[first + term * STRIDE], aside[first + (term + 1) * STRIDE]
             even += a
             odd += b
             even_slope += term * a
             odd_slope += (term + 1) * b
             bend += largest_bend(term) * abs(a) + largest_bend(term + 1) * abs(b)
-        side, distance = columns[SIDE * VECTOR + n], columns[DISTANCE * VECTOR + n]
-        if side == 0.0:
-            # Between the flanks: most likely it meets the one where the step ends.
-            side = math.copysign(1.0, -even - odd)
+        # A flank is left to the middle; between the flanks, most likely to where the step ends.
+        side = math.copysign(1.0, branch.offset if branch.engaged != 0.0 else -even - odd)
+        distance = lane.half_backlash * (1.0 - 2.0 * branch.engaged)
         # What begins where the last step ended, at the boundary, begins on the right side of it.
         value_left = max(side * (even - odd) + distance, 0.0)
         slope_left = side * (odd_slope - even_slope)
@@ -90,21 +84,28 @@ def find_side_by_side(columns):
         guess = guess_fall(ends, 2.0)
         at = min(max(guess - 1.0, -1.0), 1.0)
         # From a cubic's guess by Chebyshev's method to nearly all of the place, by Newton's to it.
-        value, slope, curvature = polynomial(columns, n, VECTOR, at)
+        value, slope, curvature = gap_along(aside, first, at)
         inverse = 1.0 / slope
         shift = (value + side * distance) * inverse
         at -= shift + shift * shift * curvature * inverse
-        value, slope, _ = polynomial(columns, n, VECTOR, at)
+        value, slope, _ = gap_along(aside, first, at)
         correction = (value + side * distance) / slope
         at -= correction
         found = falls and abs(correction) < contact.LAST_CORRECTION and -1.0 <= at <= 1.0
         moment = contact.NEVER if stays else at
-        known = one_way and (stays or found) and columns[MOMENT * VECTOR + n] != UNKNOWN
-        columns[SIDE * VECTOR + n] = side
-        columns[MOMENT * VECTOR + n] = moment if known else UNKNOWN
-        columns[BEND * VECTOR + n] = bend
-        columns[CROSSED * VECTOR + n] = value
-        columns[(CROSSED + 1) * VECTOR + n] = slope
+        known = one_way and (stays or found) and aside[AFTER * STRIDE + n] == -1.0
+        ways = aside[rows.SUSPECT * STRIDE + n]
+        looked_at = ways >= 2.0 if way == 1 else (ways == 1.0) | (ways == 3.0)
+        unknown += 1 if looked_at and not known else 0
+        if not known:
+            moment = UNKNOWN
+        aside[first + MOMENT * STRIDE] = moment if looked_at else contact.NEVER
+        aside[first + CROSSED * STRIDE] = value
+        aside[first + (CROSSED + 1) * STRIDE] = slope
+        aside[first + SIDE * STRIDE] = side
+        aside[first + DISTANCE * STRIDE] = distance
+        aside[first + BEND * STRIDE] = bend
+    return unknown
 
 
 @scalar
@@ -136,46 +137,47 @@ def guess_fall(ends, width):
 
 
 @scalar
-def polynomial(numbers, first, stride, at):
-    """Return value, slope and half the curvature of a polynomial; its terms stand so far apart."""
+def gap_along(aside, first, at):
+    """Return value, slope and half the curvature of a gap whose terms stand from a place on."""
     # Even and odd terms, which do not wait for each other.
     square = at * at
-    even, odd = numbers[first + (TERMS - 2) * stride], numbers[first + (TERMS - 1) * stride]
+    even, odd = aside[first + (TERMS - 2) * STRIDE], aside[first + (TERMS - 1) * STRIDE]
     even_slope, odd_slope, even_bend, odd_bend = 0.0, 0.0, 0.0, 0.0
     for term in range(TERMS - 4, -1, -2):
         even_bend = even_bend * square + even_slope
         odd_bend = odd_bend * square + odd_slope
         even_slope = even_slope * square + even
         odd_slope = odd_slope * square + odd
-        even = even * square + numbers[first + term * stride]
-        odd = odd * square + numbers[first + (term + 1) * stride]
+        even = even * square + aside[first + term * STRIDE]
+        odd = odd * square + aside[first + (term + 1) * STRIDE]
     bends = even_slope + 4.0 * square * even_bend, 3.0 * odd_slope + 4.0 * square * odd_bend
     slope = odd + 2.0 * at * (even_slope + at * odd_slope)
     return even + at * odd, slope, bends[0] + at * bends[1]
 
 
 @part
-def find_in_pieces(numbers, gap):
+def find_in_pieces(aside, way, n):
     """Find the crossing of a gap after the last one of its lane, or `NEVER`, whatever it does."""
-    done = numbers[gap - gap % OWN + DONE]
-    side, distance = numbers[gap + SIDE], numbers[gap + DISTANCE]
-    moment = first_below(numbers, gap, side, distance, done)
+    first = (GAPS + way * GAP) * STRIDE + n
+    side, distance = aside[first + SIDE * STRIDE], aside[first + DISTANCE * STRIDE]
+    after, bend = aside[AFTER * STRIDE + n], aside[first + BEND * STRIDE]
+    moment = first_below((aside, first, side, distance), bend, after)
     if distance > 0.0:
         # A lane between the flanks may meet either.
-        moment = min(moment, first_below(numbers, gap, -side, distance, done))
-    numbers[gap + MOMENT] = moment
-    value, slope, _ = polynomial(numbers, gap, 1, moment)
-    numbers[gap + CROSSED], numbers[gap + CROSSED + 1] = value, slope
+        moment = min(moment, first_below((aside, first, -side, distance), bend, after))
+    value, slope, _ = gap_along(aside, first, moment)
+    aside[first + MOMENT * STRIDE] = moment
+    aside[first + CROSSED * STRIDE] = value
+    aside[first + (CROSSED + 1) * STRIDE] = slope
 
 
 @part
-def first_below(numbers, gap, side, distance, left):
+def first_below(given, bend, left):
     """Return where a gap, seen from a side and raised, first falls below zero after a moment.
 
     Piece by piece: one whose Bezier points with their margins are not below zero has no such place,
     in one that only falls it is found by Newton's method, others are halved.
     """
-    given = numbers, gap, side, distance
     value_left, slope_left = gap_at(given, left)
     value_left = max(value_left, 0.0)
     right = 1.0
@@ -183,7 +185,7 @@ def first_below(numbers, gap, side, distance, left):
     for _ in range(_LOOKS):
         width = right - left
         ends = value_left, slope_left, value_right, slope_right
-        lowest, _, steepest = bounds_of(ends, width, numbers[gap + BEND])
+        lowest, _, steepest = bounds_of(ends, width, bend)
         clear = lowest >= 0.0 and value_right >= 0.0
         if not clear:
             if steepest < 0.0 and value_right < 0.0:
@@ -210,6 +212,6 @@ def first_below(numbers, gap, side, distance, left):
 @scalar
 def gap_at(given, at):
     """Return a gap, seen from one side and raised by a distance, and its slope."""
-    numbers, gap, side, distance = given
-    value, slope, _ = polynomial(numbers, gap, 1, at)
+    aside, first, side, distance = given
+    value, slope, _ = gap_along(aside, first, at)
     return side * value + distance, side * slope

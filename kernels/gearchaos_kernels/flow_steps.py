@@ -75,7 +75,8 @@ def move_block(memory, table, row, slots, numbers, present):
     if slots == 1:
         return move_lane(memory, table, row, numbers, present)
     for slot in range(0, slots, VECTOR):
-        vectors.keep_before(memory, slot, table, row, present)
+        vectors.keep_before(memory, slot, present)
+        vectors.bound_bends(memory, slot, table, row, present)
     for pair in range(place.pairs):
         at = row + HEADER + pair * place.size
         for slot in range(0, slots, VECTOR):
@@ -95,46 +96,38 @@ def move_lane(memory, table, row, numbers, present):
         memory[(rows.STATE_BEFORE + line) * STRIDE] = memory[(rows.STATE + line) * STRIDE]
         if present.tangent is not None:
             memory[(rows.TANGENT_BEFORE + line) * STRIDE] = memory[(rows.TANGENT + line) * STRIDE]
-    gather(memory, 0, numbers, 0, present)
-    if present.resolved is not None:
-        margins = vectors.margins_of(numbers, INPUTS, table, row)
-        memory[rows.MARGINS * STRIDE] = margins[0]
-        memory[(rows.MARGINS + 1) * STRIDE] = margins[1]
+    gather(memory, numbers, present)
+    vectors.bound_bends(memory, 0, table, row, present)
     at = row + HEADER
     if present.resolved is not None:
         at = maps_on(read_branches(memory, 0), row, present)
-    scatter(memory, 0, table, at, numbers, 0, present)
+    scatter(memory, table, at, numbers, present)
     return count_suspects(memory, 1, table, row, present)
 
 
 @scalar
-def gather(memory, slot, numbers, own, present):
+def gather(memory, numbers, present):
     """Read what is to be multiplied with a map: state before the step, forces, tangent vector."""
     place = layout(present)
     for line in range(place.states):
-        numbers[own + INPUTS + line] = memory[(rows.STATE_BEFORE + line) * STRIDE + slot]
+        numbers[INPUTS + line] = memory[(rows.STATE_BEFORE + line) * STRIDE]
         if present.tangent is not None:
-            numbers[own + TANGENT_INPUTS + line] = memory[
-                (rows.TANGENT_BEFORE + line) * STRIDE + slot
-            ]
+            numbers[TANGENT_INPUTS + line] = memory[(rows.TANGENT_BEFORE + line) * STRIDE]
     for number in range(place.columns - place.states):
-        numbers[own + INPUTS + place.states + number] = memory[
-            (rows.FORCES + number) * STRIDE + slot
-        ]
+        numbers[INPUTS + place.states + number] = memory[(rows.FORCES + number) * STRIDE]
 
 
 @scalar
-def scatter(memory, slot, table, at, numbers, own, present):
+def scatter(memory, table, at, numbers, present):
     """Write where a map leads what was read, state and tangent vector."""
     place = layout(present)
-    result = own + RESULT
-    vectors.end_of(numbers, result, own + INPUTS, table, at, present)
+    vectors.end_of(numbers, RESULT, INPUTS, table, at, present)
     for line in range(place.states):
-        memory[(rows.STATE + line) * STRIDE + slot] = numbers[result + line]
+        memory[(rows.STATE + line) * STRIDE] = numbers[RESULT + line]
     if present.tangent is not None:
-        vectors.tangent_end_of(numbers, result, own + TANGENT_INPUTS, table, at, present)
+        vectors.tangent_end_of(numbers, RESULT, TANGENT_INPUTS, table, at, present)
         for line in range(place.states):
-            memory[(rows.TANGENT + line) * STRIDE + slot] = numbers[result + line]
+            memory[(rows.TANGENT + line) * STRIDE] = numbers[RESULT + line]
 
 
 @scalar

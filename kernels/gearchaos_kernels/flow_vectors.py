@@ -1,15 +1,13 @@
 """The arithmetic of flow maps, written as vectors of eight: lanes, or rows of a state.
 
-A map is applied to eight lanes at once, its numbers the same for all of them (`move`). What a lane
-that crosses needs alone are sums of columns, each a vector along a state or along the terms of a
-polynomial (`combine`, `add_switch`). The compiler finds neither by itself.
+A map is applied to eight lanes at once, its numbers the same for all of them (`move`), and so is
+what carries lanes over a crossing. What a lane with maps of its own needs are sums of columns, each
+a vector along a state (`combine`). The compiler finds neither by itself.
 """
 
-import itertools
 from collections.abc import Iterable, Sequence
 from typing import Any
 
-import numpy as np
 from llvmlite import ir
 from numba import types
 from numba.core import cgutils
@@ -18,10 +16,16 @@ from numba.extending import intrinsic
 from gearchaos_kernels import rows
 from gearchaos_kernels.compilation import FASTMATH
 from gearchaos_kernels.flow_layout import (
+    AFTER,
+    AXIALLY,
     BOUNDS,
-    INPUTS,
-    TANGENT_GAP,
-    TANGENT_INPUTS,
+    EDGE,
+    FACTOR,
+    GAP,
+    GAPS,
+    SUMS,
+    TANGENT_SUMS,
+    TANGENT_TERMS,
     TERMS,
     Layout,
     layout,
@@ -41,11 +45,16 @@ def _scene(kind: Any) -> tuple[Any, Layout]:
     return present, layout.py_func(present)
 
 
-def _inputs(first: int, place: Layout) -> list[int]:
-    """Return the rows of what is multiplied with a map: a state, and what forces a lane."""
-    return [first + n for n in range(place.states)] + [
+def _inputs(place: Layout) -> list[int]:
+    """Return the rows of what is multiplied with a map: state before the step, and the forces."""
+    return [rows.STATE_BEFORE + n for n in range(place.states)] + [
         rows.FORCES + n for n in range(place.columns - place.states)
     ]
+
+
+def _tangent_inputs(place: Layout) -> range:
+    """Return the rows of the tangent vector before the step."""
+    return range(rows.TANGENT_BEFORE, rows.TANGENT_BEFORE + place.states)
 
 
 class _Writer:
@@ -72,6 +81,21 @@ class _Writer:
         place = self.builder.gep(pointer, [_INTEGER(at)])
         self.builder.store(value, self.builder.bitcast(place, value.type.as_pointer()), align=8)
 
+    def rows(self, lanes: Any, numbers: Iterable[int]) -> list[Any]:
+        """Load rows of eight lanes."""
+        return [self.load(lanes, row * STRIDE) for row in numbers]
+
+    def put(self, value: Any, lanes: Any, row: int, mask: Any) -> None:
+        """Store a row of eight lanes, or of those of a mask."""
+        if mask is not None:
+            value = self.builder.select(mask, value, self.load(lanes, row * STRIDE))
+        self.store(value, lanes, row * STRIDE)
+
+    def equal(self, lanes: Any, row: int, number: Any) -> Any:
+        """Return of which of eight lanes a row is a number."""
+        given = self.load(lanes, row * STRIDE)
+        return self.builder.fcmp_ordered("==", given, self.splat(number))
+
     def spread(self, pointer: Any, at: int, width: int = VECTOR) -> Any:
         """Load a number, and return a vector of it."""
         return self.splat(self.builder.load(self.builder.gep(pointer, [_INTEGER(at)])), width)
@@ -79,22 +103,13 @@ class _Writer:
     def splat(self, number: Any, width: int = VECTOR) -> Any:
         """Return a vector of one number."""
         nothing = ir.Constant(ir.VectorType(_DOUBLE, width), ir.Undefined)
-        return self.repeat(self.builder.insert_element(nothing, number, _INDEX(0)), 0, width)
+        first = self.builder.insert_element(nothing, number, _INDEX(0))
+        order = ir.Constant(ir.VectorType(_INDEX, width), [_INDEX(0)] * width)
+        return self.builder.shuffle_vector(first, nothing, order)
 
-    def repeat(self, vector: Any, number: int, width: int) -> Any:
-        """Return a vector of one number of another vector."""
-        return self.pick(vector, vector, [number] * width)
-
-    def pick(self, vector: Any, following: Any, places: Iterable[int]) -> Any:
-        """Return numbers of a vector and the one behind it, by their places."""
-        order = [_INDEX(place) for place in places]
-        chosen = ir.Constant(ir.VectorType(_INDEX, len(order)), order)
-        return self.builder.shuffle_vector(vector, following, chosen)
-
-    def constant(self, numbers: Iterable[float]) -> Any:
-        """Return a vector of known numbers."""
-        values = [float(number) for number in numbers]
-        return ir.Constant(ir.VectorType(_DOUBLE, len(values)), values)
+    def constant(self, number: float) -> Any:
+        """Return a vector of one known number."""
+        return ir.Constant(ir.VectorType(_DOUBLE, VECTOR), [number] * VECTOR)
 
     def size(self, vector: Any) -> Any:
         """Return the sizes of the numbers of a vector."""
@@ -120,25 +135,32 @@ class _Writer:
         return self.builder.fadd(*parts, flags=_FLAGS)
 
 
-def _pieces(width: int) -> list[tuple[int, int]]:
-    """Cut a width into vectors: where each begins and how wide it is."""
-    return [(at, min(VECTOR, width - at)) for at in range(0, width, VECTOR)]
+@intrinsic
+def keep_before(_typing, memory, slot, present):
+    """Copy eight lanes as they are before a step."""
+    there, place = _scene(present)
+
+    def generate(context, builder, signature, arguments):
+        w = _Writer(context, builder, signature, arguments)
+        lanes = w.element(0, arguments[1])
+        for first in (rows.STATE,) if there.tangent is None else (rows.STATE, rows.TANGENT):
+            for line in range(first, first + place.states):
+                w.store(w.load(lanes, line * STRIDE), lanes, (rows.BEFORE + line) * STRIDE)
+        return context.get_dummy_value()
+
+    return types.void(memory, types.intp, present), generate
 
 
 @intrinsic
-def keep_before(_typing, memory, slot, table, row, present):
-    """Copy eight lanes as they are before a step, and bound how their gaps bend in it."""
+def bound_bends(_typing, memory, slot, table, row, present):
+    """Bound how the gaps of eight lanes bend in a step."""
     there, place = _scene(present)
 
     def generate(context, builder, signature, arguments):
         w = _Writer(context, builder, signature, arguments)
         lanes, numbers = w.element(0, arguments[1]), w.element(2, arguments[3])
-        for first in (rows.STATE,) if there.tangent is None else (rows.STATE, rows.TANGENT):
-            for line in range(first, first + place.states):
-                w.store(w.load(lanes, line * STRIDE), lanes, (rows.BEFORE + line) * STRIDE)
         if there.resolved is not None:
-            inputs = _inputs(rows.STATE, place)
-            sizes = [w.size(w.load(lanes, row * STRIDE)) for row in inputs]
+            sizes = [w.size(given) for given in w.rows(lanes, _inputs(place))]
             for number, bound in enumerate(BOUNDS[: place.ways]):
                 bends = [w.spread(numbers, bound + column) for column in range(len(sizes))]
                 w.store(w.sum(enumerate(bends), sizes), lanes, (rows.MARGINS + number) * STRIDE)
@@ -147,189 +169,173 @@ def keep_before(_typing, memory, slot, table, row, present):
     return types.void(memory, types.intp, table, types.intp, present), generate
 
 
+def _on_branches(present: Any, apply: Any) -> Any:
+    """Make the body of an intrinsic that acts on those of eight lanes that are on two branches.
+
+    ``apply(writer, lanes, numbers, mask)``: with the addresses of the lanes and of what is read,
+    and which of the lanes these are, or None for all.
+    """
+    place = _scene(present)[1]
+
+    def generate(context, builder, signature, arguments):
+        w = _Writer(context, builder, signature, arguments)
+        lanes, numbers = w.element(0, arguments[1]), w.element(2, arguments[3])
+        if place.pairs == 1:
+            apply(w, lanes, numbers, None)
+            return context.get_dummy_value()
+        engaged = {rows.TANGENTIAL_BRANCH: arguments[4], rows.AXIAL_BRANCH: arguments[5]}
+        same = [w.equal(lanes, row, number) for row, number in engaged.items()]
+        mask = same[0] if place.ways == 1 else builder.and_(*same)
+        bits = builder.bitcast(mask, ir.IntType(VECTOR))
+        with builder.if_then(builder.icmp_unsigned("!=", bits, bits.type(0))):
+            apply(w, lanes, numbers, mask)
+        return context.get_dummy_value()
+
+    return generate
+
+
 @intrinsic
 def move(_typing, memory, slot, table, at, engaged_y, engaged_z, present):
     """Apply a map to those of eight lanes that are on its branches, state and tangent vector."""
     there, place = _scene(present)
 
-    def generate(context, builder, signature, arguments):
-        w = _Writer(context, builder, signature, arguments)
-        lanes, numbers = w.element(0, arguments[1]), w.element(2, arguments[3])
-
-        def apply(mask):
-            read = {rows.STATE: _inputs(rows.STATE_BEFORE, place)}
-            if there.tangent is not None:
-                read[rows.TANGENT] = [rows.TANGENT_BEFORE + line for line in range(place.states)]
-            given = {
-                target: [w.load(lanes, row * STRIDE) for row in sources]
-                for target, sources in read.items()
-            }
-            # The axial pair and the offset of its flank act on nothing else.
-            axial = place.states - 4 * (place.ways - 1)
-            apart = {*range(axial, place.states), place.states + 2} if place.ways > 1 else set()
-            for line in range(place.states):
-                factors = [
-                    (column, w.spread(numbers, column * place.width + line))
-                    for column in range(place.columns)
-                    if line >= axial or column not in apart
-                ]
-                for target, inputs in given.items():
-                    value = w.sum([one for one in factors if one[0] < len(inputs)], inputs)
-                    if mask is not None:
-                        value = builder.select(mask, value, w.load(lanes, (target + line) * STRIDE))
-                    w.store(value, lanes, (target + line) * STRIDE)
-
-        if place.pairs == 1:
-            apply(None)
-        else:
-            engaged = {rows.TANGENTIAL_BRANCH: arguments[4], rows.AXIAL_BRANCH: arguments[5]}
-            same = [
-                builder.fcmp_ordered("==", w.load(lanes, row * STRIDE), w.splat(number))
-                for row, number in engaged.items()
+    def apply(w, lanes, numbers, mask):
+        given = {rows.STATE: w.rows(lanes, _inputs(place))}
+        if there.tangent is not None:
+            given[rows.TANGENT] = w.rows(lanes, _tangent_inputs(place))
+        # The axial pair and the offset of its flank act on nothing else.
+        axial = place.states - 4 * (place.ways - 1)
+        apart = {*range(axial, place.states), place.states + 2} if place.ways > 1 else set()
+        for line in range(place.states):
+            factors = [
+                (column, w.spread(numbers, column * place.width + line))
+                for column in range(place.columns)
+                if line >= axial or column not in apart
             ]
-            mask = same[0] if place.ways == 1 else builder.and_(*same)
-            bits = builder.bitcast(mask, ir.IntType(VECTOR))
-            with builder.if_then(builder.icmp_unsigned("!=", bits, bits.type(0))):
-                apply(mask)
-        return context.get_dummy_value()
+            for target, inputs in given.items():
+                value = w.sum([one for one in factors if one[0] < len(inputs)], inputs)
+                w.put(value, lanes, target + line, mask)
 
     numbers = memory, types.intp, table, types.intp, types.float64, types.float64
-    return types.void(*numbers, present), generate
+    return types.void(*numbers, present), _on_branches(present, apply)
 
 
-def _combination(of_state: bool, forced: bool) -> Any:
+@intrinsic
+def look_along(_typing, aside, slot, table, at, engaged_y, engaged_z, present):
+    """Compute the terms of all gaps along the step, without the mean error, as `move` does."""
+    there, place = _scene(present)
+
+    def apply(w, lanes, numbers, mask):
+        given = {0: w.rows(lanes, _inputs(place))}
+        if there.tangent is not None:
+            given[TANGENT_TERMS] = w.rows(lanes, _tangent_inputs(place))
+        for way in range(place.ways):
+            first = place.gap + way * place.columns * TERMS
+            for term in range(TERMS):
+                factors = [
+                    (column, w.spread(numbers, first + column * TERMS + term))
+                    for column in range(place.columns)
+                ]
+                for target, inputs in given.items():
+                    value = w.sum(factors[: len(inputs)], inputs)
+                    w.put(value, lanes, GAPS + way * GAP + target + term, mask)
+
+    numbers = aside, types.intp, table, types.intp, types.float64, types.float64
+    return types.void(*numbers, present), _on_branches(present, apply)
+
+
+@intrinsic
+def add_switch(_typing, aside, slot, table, at, engaged_y, engaged_z, present):
+    """Carry eight lanes to these branches: move state and tangent vector at the step's beginning.
+
+    To them is added the integral from -1 to the moment of crossing of the `SWITCH` of the new
+    branch, sum_k s^k p_k, times the gap: each p_k times what `sum_along` has made of it.
+    """
+    there, place = _scene(present)
+
+    def apply(w, lanes, numbers, mask):
+        given = {rows.STATE_BEFORE: w.rows(lanes, range(SUMS, SUMS + TERMS))}
+        if there.tangent is not None:
+            given[rows.TANGENT_BEFORE] = w.rows(lanes, range(TANGENT_SUMS, TANGENT_SUMS + TERMS))
+        for way in range(place.ways):
+            those = mask
+            if place.ways > 1:
+                axially = w.equal(lanes, AXIALLY, ir.Constant(_DOUBLE, float(way)))
+                those = w.builder.and_(mask, axially)
+            first = place.switch + way * TERMS * place.width
+            for line in range(place.states):
+                factors = [
+                    (k, w.spread(numbers, first + k * place.width + line)) for k in range(TERMS)
+                ]
+                for target, sums in given.items():
+                    before = w.load(lanes, (target + line) * STRIDE)
+                    value = w.builder.fadd(before, w.sum(factors, sums), flags=_FLAGS)
+                    w.put(value, lanes, target + line, those)
+
+    numbers = aside, types.intp, table, types.intp, types.float64, types.float64
+    return types.void(*numbers, present), _on_branches(present, apply)
+
+
+@intrinsic
+def sum_along(_typing, aside, present):
+    """Integrate what pushes eight lanes that cross, times s^k, from -1 to the moment of that.
+
+    That is, for every k, the sum of the terms j, each times the integral of s^(j + k).
+    """
+    there, place = _scene(present)
+
+    def generate(context, builder, signature, arguments):
+        w = _Writer(context, builder, signature, arguments)
+        lanes = w.element(0, _INTEGER(0))
+        after, factor, edge = w.rows(lanes, (AFTER, FACTOR, EDGE))
+        powers, integrals = {1: after}, []
+        for n in range(1, 2 * TERMS):
+            if n > 1:
+                powers[n] = builder.fmul(powers[n // 2], powers[n - n // 2])
+            begin = w.constant(-((-1.0) ** n) / n)
+            integrals.append(w.multiply_add(powers[n], w.constant(1.0 / n), begin))
+        given = {0: SUMS} if there.tangent is None else {0: SUMS, TANGENT_TERMS: TANGENT_SUMS}
+        for source, target in given.items():
+            terms = w.rows(lanes, range(GAPS + source, GAPS + source + TERMS))
+            if place.ways > 1:
+                axial = w.rows(lanes, range(GAPS + GAP + source, GAPS + GAP + source + TERMS))
+                those = w.equal(lanes, AXIALLY, ir.Constant(_DOUBLE, 1.0))
+                terms = [builder.select(those, *pair) for pair in zip(axial, terms, strict=True)]
+            if source == 0:
+                terms[0] = builder.fsub(terms[0], edge, flags=_FLAGS)
+            for k in range(TERMS):
+                value = w.sum(enumerate(terms), integrals[k:])
+                w.put(builder.fmul(value, factor, flags=_FLAGS), lanes, target + k, None)
+        return context.get_dummy_value()
+
+    return types.void(aside, present), generate
+
+
+def _combination(forced: bool) -> Any:
     """Make a function that sums the columns of a map, each times an input of a lane."""
 
     @intrinsic
-    def combine(_typing, work, target, inputs, table, at, present):
+    def combine(_typing, numbers, target, inputs, table, at, present):
         place = _scene(present)[1]
-        width = place.width if of_state else TERMS
         columns = range(place.columns if forced else place.states)
 
         def generate(context, builder, signature, arguments):
             w = _Writer(context, builder, signature, arguments)
             result, given = w.element(0, arguments[1]), w.element(0, arguments[2])
-            numbers = w.element(3, arguments[4])
-            for first, size in _pieces(width):
+            map_ = w.element(3, arguments[4])
+            for first in range(0, place.width, VECTOR):
+                size = min(VECTOR, place.width)
                 factors = [w.spread(given, column, size) for column in columns]
-                terms = [w.load(numbers, column * width + first, size) for column in columns]
+                terms = [w.load(map_, column * place.width + first, size) for column in columns]
                 w.store(w.sum(enumerate(factors), terms), result, first)
             return context.get_dummy_value()
 
-        return types.void(work, types.intp, types.intp, table, types.intp, present), generate
+        return types.void(numbers, types.intp, types.intp, table, types.intp, present), generate
 
     return combine
 
 
-end_of = _combination(of_state=True, forced=True)
-"""State at the end of the step: work, target, inputs, table, at, present."""
-tangent_end_of = _combination(of_state=True, forced=False)
+end_of = _combination(forced=True)
+"""State at the end of the step: numbers, target, inputs, table, at, present."""
+tangent_end_of = _combination(forced=False)
 """The same of a tangent vector."""
-gap_along = _combination(of_state=False, forced=True)
-"""Terms of a gap without the mean pitch error."""
-tangent_gap_along = _combination(of_state=False, forced=False)
-"""Terms of what a tangent vector adds to a gap."""
-
-
-def _integrals(w: _Writer, place: Any) -> list[Any]:
-    """Return the integrals from -1 to a place of s^0 to s^(2 TERMS - 1), in vectors."""
-    order = np.arange(1, VECTOR + 1)
-    ones = w.constant(np.ones(VECTOR))
-    powers, power = ones, w.splat(place)
-    for bit in (1, 2, 4, 8):
-        has = ir.Constant(ir.VectorType(ir.IntType(1), VECTOR), [int(n & bit > 0) for n in order])
-        powers = w.builder.fmul(powers, w.builder.select(has, power, ones))
-        last, power = power, w.builder.fmul(power, power)
-    results = []
-    for _ in range(2 * TERMS // VECTOR):
-        begin = w.constant(-((-1.0) ** order) / order)
-        results.append(w.multiply_add(powers, w.constant(1.0 / order), begin))
-        powers = w.builder.fmul(powers, last)
-        order = order + VECTOR
-    return results
-
-
-@intrinsic
-def add_switch(_typing, work, own, gap, moment, factor, table, at, present):
-    """Carry a lane to another branch: move its state, and tangent vector, at the step's beginning.
-
-    To the state is added the factor times the integral from -1 to the moment of the `SWITCH` of the
-    new branch, sum_k s^k p_k, times the gap: p_k times the sum of the terms j of the gap, each
-    times the integral of s^(j + k).
-    """
-    there, scene = _scene(present)
-
-    def generate(context, builder, signature, arguments):
-        w = _Writer(context, builder, signature, arguments)
-        columns = w.element(5, arguments[6])
-        integrals = _integrals(w, arguments[3])
-        # Eight integrals from every order on.
-        windows = [
-            w.pick(one, following, range(first, first + VECTOR))
-            for one, following in itertools.pairwise(integrals)
-            for first in range(VECTOR)
-        ]
-        sources = {INPUTS: arguments[2]}
-        if there.tangent is not None:
-            sources[TANGENT_INPUTS] = builder.add(arguments[1], _INTEGER(TANGENT_GAP))
-        sums = {}
-        for target, source in sources.items():
-            numbers = w.element(0, source)
-            factors = [(term, w.spread(numbers, term)) for term in range(TERMS)]
-            sums[target] = [w.sum(factors, windows[k:]) for k in range(0, TERMS, VECTOR)]
-        for first, size in _pieces(scene.width):
-            # Of a narrow state several columns stand in a vector, one behind the other.
-            beside = VECTOR // size
-            places, order = range(0, TERMS, beside), np.repeat(np.arange(beside), size)
-            terms = [w.load(columns, k * scene.width + first) for k in places]
-            for target, given in sums.items():
-                pointer = w.element(0, builder.add(arguments[1], _INTEGER(target + first)))
-                factors = [
-                    w.pick(given[k // VECTOR], given[k // VECTOR], k % VECTOR + order)
-                    for k in places
-                ]
-                change = w.sum(enumerate(factors), terms)
-                while change.type.count > size:
-                    half = change.type.count // 2
-                    ends = (
-                        w.pick(change, change, range(half)),
-                        w.pick(change, change, range(half, 2 * half)),
-                    )
-                    change = builder.fadd(*ends, flags=_FLAGS)
-                factor = w.splat(arguments[4], size)
-                w.store(w.multiply_add(factor, change, w.load(pointer, 0, size)), pointer, 0)
-        return context.get_dummy_value()
-
-    numbers = work, types.intp, types.intp, types.float64, types.float64, table, types.intp
-    return types.void(*numbers, present), generate
-
-
-def _sums(w: _Writer, vectors: list[Any]) -> Any:
-    """Return the sum of the numbers of every vector, as one vector."""
-    vectors = vectors + [w.constant(np.zeros(VECTOR))] * (VECTOR - len(vectors))
-    while len(vectors) > 1:
-        # Numbers that belong to the same sum stay side by side.
-        vectors = [
-            w.builder.fadd(*(w.pick(*pair, range(side, 2 * VECTOR, 2)) for side in (0, 1)))
-            for pair in zip(vectors[::2], vectors[1::2], strict=True)
-        ]
-    return vectors[0]
-
-
-@intrinsic
-def margins_of(_typing, work, inputs, table, row):
-    """Bound by how much either gap of a lane bends in a step, as `keep_before` does."""
-
-    def generate(context, builder, signature, arguments):
-        w = _Writer(context, builder, signature, arguments)
-        given, numbers = w.element(0, arguments[1]), w.element(2, arguments[3])
-        parts: list[Any] = [None] * len(BOUNDS)
-        for first in range(0, TERMS, VECTOR):
-            size = w.size(w.load(given, first))
-            bounds = [w.load(numbers, bound + first) for bound in BOUNDS]
-            parts = [w.multiply_add(size, *pair) for pair in zip(bounds, parts, strict=True)]
-        sums = _sums(w, parts)
-        results = [builder.extract_element(sums, _INDEX(number)) for number in range(len(BOUNDS))]
-        return context.make_tuple(builder, signature.return_type, results)
-
-    return types.UniTuple(types.float64, 2)(work, types.intp, table, types.intp), generate
