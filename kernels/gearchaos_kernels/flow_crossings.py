@@ -29,7 +29,6 @@ from gearchaos_kernels.flow_layout import (
     FACTOR,
     GAP,
     GAPS,
-    HEADER,
     MOMENT,
     layout,
 )
@@ -69,31 +68,22 @@ def cross_together(memory, slots, aside, table, row, number, recorded, present):
     crossings, left = 0, lanes
     while left > 0 and crossings < MOST_SPLITS:
         crossings += 1
-        for pair in range(place.pairs):
-            at = row + HEADER + pair * place.size
-            vectors.look_along(aside, 0, table, at, 1.0 - pair % 2, 1.0 - pair // 2, present)
+        vectors.look_along(aside, 0, table, row, present)
         for way in range(place.ways):
             find_moments(aside, way, lanes, present)
         for n in range(lanes):
             cross_over(memory, slots[n], aside, n, number, recorded, present)
         vectors.sum_along(aside, present)
-        for pair in range(place.pairs):
-            at = row + HEADER + pair * place.size
-            vectors.add_switch(aside, 0, table, at, 1.0 - pair % 2, 1.0 - pair // 2, present)
+        vectors.add_switch(aside, 0, table, row, present)
         vectors.bound_bends(aside, 0, table, row, present)
-        for pair in range(place.pairs):
-            at = row + HEADER + pair * place.size
-            vectors.move(aside, 0, table, at, 1.0 - pair % 2, 1.0 - pair // 2, present)
+        vectors.move(aside, 0, table, row, present)
         left = count_left(aside, lanes, table, row, present)
     for n in range(lanes):
-        slot = slots[n]
-        for line in range(place.states):
-            memory[(rows.STATE + line) * STRIDE + slot] = aside[(rows.STATE + line) * STRIDE + n]
-            if present.tangent is not None:
-                after = aside[(rows.TANGENT + line) * STRIDE + n]
-                memory[(rows.TANGENT + line) * STRIDE + slot] = after
+        copy_rows(aside, n, memory, slots[n], rows.STATE, place.states)
+        if present.tangent is not None:
+            copy_rows(aside, n, memory, slots[n], rows.TANGENT, place.states)
         if aside[rows.SUSPECT * STRIDE + n] != 0.0:
-            give_up(memory, slot, table, row, present)
+            give_up(memory, slots[n], table, row, present)
 
 
 @scalar
@@ -118,10 +108,10 @@ def take_aside(memory, slot, aside, n, present):
 
 
 @scalar
-def copy_rows(memory, slot, aside, n, first, count):
-    """Copy so many rows of a lane."""
+def copy_rows(memory, slot, other, place, first, count):
+    """Copy so many rows of a lane to a place in another memory."""
     for row in range(first, first + count):
-        aside[row * STRIDE + n] = memory[row * STRIDE + slot]
+        other[row * STRIDE + place] = memory[row * STRIDE + slot]
 
 
 @scalar

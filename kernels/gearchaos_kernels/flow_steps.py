@@ -71,16 +71,12 @@ def maps_on(branches, row, present):
 @scalar
 def move_block(memory, table, row, slots, numbers, present):
     """Take one step in so many slots; return how many may have left a contact branch."""
-    place = layout(present)
     if slots == 1:
         return move_lane(memory, table, row, numbers, present)
     for slot in range(0, slots, VECTOR):
         vectors.keep_before(memory, slot, present)
         vectors.bound_bends(memory, slot, table, row, present)
-    for pair in range(place.pairs):
-        at = row + HEADER + pair * place.size
-        for slot in range(0, slots, VECTOR):
-            vectors.move(memory, slot, table, at, 1.0 - pair % 2, 1.0 - pair // 2, present)
+        vectors.move(memory, slot, table, row, present)
     # A known number of slots is what the compiler makes vector instructions of.
     if slots == VECTOR:
         return count_suspects(memory, VECTOR, table, row, present)

@@ -23,6 +23,7 @@ from gearchaos_kernels.flow_layout import (
     FACTOR,
     GAP,
     GAPS,
+    HEADER,
     SUMS,
     TANGENT_SUMS,
     TANGENT_TERMS,
@@ -91,10 +92,10 @@ class _Writer:
             value = self.builder.select(mask, value, self.load(lanes, row * STRIDE))
         self.store(value, lanes, row * STRIDE)
 
-    def equal(self, lanes: Any, row: int, number: Any) -> Any:
+    def equal(self, lanes: Any, row: int, number: float) -> Any:
         """Return of which of eight lanes a row is a number."""
         given = self.load(lanes, row * STRIDE)
-        return self.builder.fcmp_ordered("==", given, self.splat(number))
+        return self.builder.fcmp_ordered("==", given, self.constant(number))
 
     def spread(self, pointer: Any, at: int, width: int = VECTOR) -> Any:
         """Load a number, and return a vector of it."""
@@ -170,36 +171,39 @@ def bound_bends(_typing, memory, slot, table, row, present):
 
 
 def _on_branches(present: Any, apply: Any) -> Any:
-    """Make the body of an intrinsic that acts on those of eight lanes that are on two branches.
+    """Make the body of an intrinsic that acts on eight lanes by the maps of their branches.
 
-    ``apply(writer, lanes, numbers, mask)``: with the addresses of the lanes and of what is read,
-    and which of the lanes these are, or None for all.
+    ``apply(writer, lanes, maps, mask)``: for each pair of branches on which some lanes are, with
+    the addresses of the lanes and of the maps, and which of the lanes these are, None for all.
     """
     place = _scene(present)[1]
 
     def generate(context, builder, signature, arguments):
         w = _Writer(context, builder, signature, arguments)
-        lanes, numbers = w.element(0, arguments[1]), w.element(2, arguments[3])
-        if place.pairs == 1:
-            apply(w, lanes, numbers, None)
-            return context.get_dummy_value()
-        engaged = {rows.TANGENTIAL_BRANCH: arguments[4], rows.AXIAL_BRANCH: arguments[5]}
-        same = [w.equal(lanes, row, number) for row, number in engaged.items()]
-        mask = same[0] if place.ways == 1 else builder.and_(*same)
-        bits = builder.bitcast(mask, ir.IntType(VECTOR))
-        with builder.if_then(builder.icmp_unsigned("!=", bits, bits.type(0))):
-            apply(w, lanes, numbers, mask)
+        lanes = w.element(0, arguments[1])
+        for pair in range(place.pairs):
+            at = builder.add(arguments[3], _INTEGER(HEADER + pair * place.size))
+            maps = w.element(2, at)
+            if place.pairs == 1:
+                apply(w, lanes, maps, None)
+                break
+            mask = w.equal(lanes, rows.TANGENTIAL_BRANCH, 1.0 - pair % 2)
+            if place.ways > 1:
+                mask = builder.and_(mask, w.equal(lanes, rows.AXIAL_BRANCH, 1.0 - pair // 2))
+            bits = builder.bitcast(mask, ir.IntType(VECTOR))
+            with builder.if_then(builder.icmp_unsigned("!=", bits, bits.type(0))):
+                apply(w, lanes, maps, mask)
         return context.get_dummy_value()
 
     return generate
 
 
 @intrinsic
-def move(_typing, memory, slot, table, at, engaged_y, engaged_z, present):
-    """Apply a map to those of eight lanes that are on its branches, state and tangent vector."""
+def move(_typing, memory, slot, table, row, present):
+    """Apply the map of its branches to each of eight lanes, state and tangent vector."""
     there, place = _scene(present)
 
-    def apply(w, lanes, numbers, mask):
+    def apply(w, lanes, maps, mask):
         given = {rows.STATE: w.rows(lanes, _inputs(place))}
         if there.tangent is not None:
             given[rows.TANGENT] = w.rows(lanes, _tangent_inputs(place))
@@ -208,7 +212,7 @@ def move(_typing, memory, slot, table, at, engaged_y, engaged_z, present):
         apart = {*range(axial, place.states), place.states + 2} if place.ways > 1 else set()
         for line in range(place.states):
             factors = [
-                (column, w.spread(numbers, column * place.width + line))
+                (column, w.spread(maps, column * place.width + line))
                 for column in range(place.columns)
                 if line >= axial or column not in apart
             ]
@@ -216,16 +220,16 @@ def move(_typing, memory, slot, table, at, engaged_y, engaged_z, present):
                 value = w.sum([one for one in factors if one[0] < len(inputs)], inputs)
                 w.put(value, lanes, target + line, mask)
 
-    numbers = memory, types.intp, table, types.intp, types.float64, types.float64
-    return types.void(*numbers, present), _on_branches(present, apply)
+    given = memory, types.intp, table, types.intp, present
+    return types.void(*given), _on_branches(present, apply)
 
 
 @intrinsic
-def look_along(_typing, aside, slot, table, at, engaged_y, engaged_z, present):
+def look_along(_typing, aside, slot, table, row, present):
     """Compute the terms of all gaps along the step, without the mean error, as `move` does."""
     there, place = _scene(present)
 
-    def apply(w, lanes, numbers, mask):
+    def apply(w, lanes, maps, mask):
         given = {0: w.rows(lanes, _inputs(place))}
         if there.tangent is not None:
             given[TANGENT_TERMS] = w.rows(lanes, _tangent_inputs(place))
@@ -233,47 +237,47 @@ def look_along(_typing, aside, slot, table, at, engaged_y, engaged_z, present):
             first = place.gap + way * place.columns * TERMS
             for term in range(TERMS):
                 factors = [
-                    (column, w.spread(numbers, first + column * TERMS + term))
+                    (column, w.spread(maps, first + column * TERMS + term))
                     for column in range(place.columns)
                 ]
                 for target, inputs in given.items():
                     value = w.sum(factors[: len(inputs)], inputs)
                     w.put(value, lanes, GAPS + way * GAP + target + term, mask)
 
-    numbers = aside, types.intp, table, types.intp, types.float64, types.float64
-    return types.void(*numbers, present), _on_branches(present, apply)
+    given = aside, types.intp, table, types.intp, present
+    return types.void(*given), _on_branches(present, apply)
 
 
 @intrinsic
-def add_switch(_typing, aside, slot, table, at, engaged_y, engaged_z, present):
-    """Carry eight lanes to these branches: move state and tangent vector at the step's beginning.
+def add_switch(_typing, aside, slot, table, row, present):
+    """Carry eight lanes to their branches: move state and tangent vector at the step's beginning.
 
     To them is added the integral from -1 to the moment of crossing of the `SWITCH` of the new
     branch, sum_k s^k p_k, times the gap: each p_k times what `sum_along` has made of it.
     """
     there, place = _scene(present)
 
-    def apply(w, lanes, numbers, mask):
+    def apply(w, lanes, maps, mask):
         given = {rows.STATE_BEFORE: w.rows(lanes, range(SUMS, SUMS + TERMS))}
         if there.tangent is not None:
             given[rows.TANGENT_BEFORE] = w.rows(lanes, range(TANGENT_SUMS, TANGENT_SUMS + TERMS))
         for way in range(place.ways):
             those = mask
             if place.ways > 1:
-                axially = w.equal(lanes, AXIALLY, ir.Constant(_DOUBLE, float(way)))
+                axially = w.equal(lanes, AXIALLY, float(way))
                 those = w.builder.and_(mask, axially)
             first = place.switch + way * TERMS * place.width
             for line in range(place.states):
                 factors = [
-                    (k, w.spread(numbers, first + k * place.width + line)) for k in range(TERMS)
+                    (k, w.spread(maps, first + k * place.width + line)) for k in range(TERMS)
                 ]
                 for target, sums in given.items():
                     before = w.load(lanes, (target + line) * STRIDE)
                     value = w.builder.fadd(before, w.sum(factors, sums), flags=_FLAGS)
                     w.put(value, lanes, target + line, those)
 
-    numbers = aside, types.intp, table, types.intp, types.float64, types.float64
-    return types.void(*numbers, present), _on_branches(present, apply)
+    given = aside, types.intp, table, types.intp, present
+    return types.void(*given), _on_branches(present, apply)
 
 
 @intrinsic
@@ -299,7 +303,7 @@ def sum_along(_typing, aside, present):
             terms = w.rows(lanes, range(GAPS + source, GAPS + source + TERMS))
             if place.ways > 1:
                 axial = w.rows(lanes, range(GAPS + GAP + source, GAPS + GAP + source + TERMS))
-                those = w.equal(lanes, AXIALLY, ir.Constant(_DOUBLE, 1.0))
+                those = w.equal(lanes, AXIALLY, 1.0)
                 terms = [builder.select(those, *pair) for pair in zip(axial, terms, strict=True)]
             if source == 0:
                 terms[0] = builder.fsub(terms[0], edge, flags=_FLAGS)
