@@ -63,10 +63,7 @@ def next_branch(branch, gap, half_backlash):
 
 @scalar
 def leave(memory, slot, axially, gap, branches, lane, moment, recorded, present):
-    """Return branches, the one that a gap leaves and the one that follows; tell of the crossing.
-
-    The moment is in steps of the mesh period.
-    """
+    """Return the branches after a gap leaves one at a moment in steps; tell of the crossing."""
     branch = branches.axial if axially else branches.tangential
     following = next_branch(branch, gap.value, lane.half_backlash)
     if axially:
@@ -91,7 +88,7 @@ def leave(memory, slot, axially, gap, branches, lane, moment, recorded, present)
             at = (first + rows.SPEEDS) * STRIDE + slot
             memory[at] += meets * speed
             memory[at + STRIDE] = max(memory[at + STRIDE], meets * speed)
-    return branches, branch, following
+    return branches
 
 
 @scalar

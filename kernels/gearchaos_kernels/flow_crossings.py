@@ -25,11 +25,11 @@ from gearchaos_kernels.flow_layout import (
     AFTER,
     AXIALLY,
     CROSSED,
-    EDGE,
     FACTOR,
     GAP,
     GAPS,
     MOMENT,
+    Crossing,
     layout,
 )
 from gearchaos_kernels.flow_moments import find_moments
@@ -71,8 +71,9 @@ def cross_together(memory, slots, aside, table, row, number, recorded, present):
         vectors.look_along(aside, 0, table, row, present)
         for way in range(place.ways):
             find_moments(aside, way, lanes, present)
+        cross_over(aside, present)
         for n in range(lanes):
-            cross_over(memory, slots[n], aside, n, number, recorded, present)
+            tell_crossing(memory, slots[n], aside, n, number, recorded, present)
         vectors.sum_along(aside, present)
         vectors.add_switch(aside, 0, table, row, present)
         vectors.bound_bends(aside, 0, table, row, present)
@@ -115,41 +116,54 @@ def copy_rows(memory, slot, other, place, first, count):
 
 
 @scalar
-def cross_over(memory, slot, aside, n, number, recorded, present):
-    """Tell of the next crossing of a lane, and what is needed to carry it over."""
-    first = GAPS * STRIDE + n
-    moment, axially = aside[first + MOMENT * STRIDE], False
-    if present.axial is not None:
-        moment_z = aside[first + (GAP + MOMENT) * STRIDE]
-        moment, axially = min(moment, moment_z), not moment <= moment_z
-    aside[FACTOR * STRIDE + n] = 0.0
-    # Also where the lane has left the range of numbers.
-    if not moment <= 1.0:
-        return
+def cross_over(aside, present):
+    """Choose the next crossing of lanes side by side, and put them on the branches that follow."""
+    place = layout(present)
+    for n in range(VECTOR):
+        lane = read_lane(aside, n)
+        moment, axially = aside[(GAPS + MOMENT) * STRIDE + n], 0.0
+        if present.axial is not None:
+            moment_z = aside[(GAPS + GAP + MOMENT) * STRIDE + n]
+            axially = 0.0 if moment <= moment_z else 1.0
+            moment = min(moment, moment_z)
+        # None also where the lane has left the range of numbers.
+        crosses = moment <= 1.0
+        factor, edge = 0.0, 0.0
+        for way in range(place.ways):
+            branch = read_branches(aside, n)[way]
+            gap = crossed_at(aside, n, way)
+            following = contact.next_branch(branch, gap.value, lane.half_backlash)
+            here = crosses & (axially == way)
+            factor = branch.engaged - following.engaged if here else factor
+            # One of the two offsets is that of the flank, the other one 0.
+            edge = branch.offset + following.offset if here else edge
+            after = Branch(
+                following.engaged if here else branch.engaged,
+                following.offset if here else branch.offset,
+                following.floor if here else branch.floor,
+                following.ceiling if here else branch.ceiling,
+            )
+            store(aside, rows.TANGENTIAL_BRANCH + _BRANCH * way, n, after)
+        store_offsets(aside, n, lane, read_branches(aside, n), present)
+        moment = moment if crosses else aside[AFTER * STRIDE + n]
+        store(aside, AFTER, n, Crossing(moment, factor, edge, axially))
 
-    way = 1 if axially else 0
+
+@scalar
+def tell_crossing(memory, slot, aside, n, number, recorded, present):
+    """Tell of the crossing of a lane, if there is one, where it came from."""
+    if aside[FACTOR * STRIDE + n] == 0.0:
+        return
+    axially = aside[AXIALLY * STRIDE + n] != 0.0
     lane = read_lane(memory, slot)
-    at_step = number + 0.5 * (1.0 + moment)
-    branches, branch, following = contact.leave(
-        memory,
-        slot,
-        axially,
-        crossed_at(aside, n, way),
-        read_branches(memory, slot),
-        lane,
-        at_step,
-        recorded,
-        present,
+    at_step = number + 0.5 * (1.0 + aside[AFTER * STRIDE + n])
+    crossed = crossed_at(aside, n, 1 if axially else 0)
+    branches = read_branches(memory, slot)
+    branches = contact.leave(
+        memory, slot, axially, crossed, branches, lane, at_step, recorded, present
     )
     write_branches(memory, slot, branches)
     store_offsets(memory, slot, lane, branches, present)
-    store(aside, rows.TANGENTIAL_BRANCH + _BRANCH * way, n, following)
-    copy_rows(memory, slot, aside, n, rows.FORCES + 1 + way, 1)
-    aside[AFTER * STRIDE + n] = moment
-    aside[FACTOR * STRIDE + n] = branch.engaged - following.engaged
-    # One of the two offsets is that of the flank, the other one 0.
-    aside[EDGE * STRIDE + n] = branch.offset + following.offset
-    aside[AXIALLY * STRIDE + n] = way
 
 
 @scalar
@@ -175,21 +189,17 @@ def count_left(aside, lanes, table, row, present):
         gaps_after = gaps_at(after, lane, forcing_at(lane, end, present), present)
         ways = 0.0
         for way in range(place.ways):
-            first, last = gaps[way], gaps_after[way]
             crosses = aside[AXIALLY * STRIDE + n] == way if place.ways > 1 else True
+            crossed = crossed_at(aside, n, way)
             # Of the gap that has crossed only the rest counts.
             rest = 0.5 * (1.0 - aside[AFTER * STRIDE + n]) if crosses else 1.0
-            crossed = crossed_at(aside, n, way)
-            first_value = crossed.value if crosses else first.value
-            first_rate = rest * crossed.rate if crosses else first.rate
-            margin = aside[(rows.MARGINS + way) * STRIDE + n] * rest**4
-            may = contact.may_leave(
-                Gap(first_value, first_rate),
-                Gap(last.value, rest * last.rate),
-                branches[way],
-                margin,
+            first = Gap(
+                crossed.value if crosses else gaps[way].value,
+                rest * crossed.rate if crosses else gaps[way].rate,
             )
-            ways += 1.0 + way if may else 0.0
+            last = Gap(gaps_after[way].value, rest * gaps_after[way].rate)
+            margin = aside[(rows.MARGINS + way) * STRIDE + n] * rest**4
+            ways += 1.0 + way if contact.may_leave(first, last, branches[way], margin) else 0.0
         ways = ways if aside[FACTOR * STRIDE + n] != 0.0 else 0.0
         aside[rows.SUSPECT * STRIDE + n] = ways
         left += 1 if (ways != 0.0) & (n < lanes) else 0

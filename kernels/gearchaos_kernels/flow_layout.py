@@ -28,12 +28,25 @@ axial gap, with the terms along the step, those of what the tangent vector adds,
 value and slope there, the side from which the gap is seen, by what it is raised, and more than its
 fourth derivative; and how many rows that are."""
 
+
+class Crossing(NamedTuple):
+    """The last crossing of a lane that has been taken aside, in rows behind those of its gaps.
+
+    ``after``: its moment; ``factor``, ``edge``: by what and from which gap on the deflection acts
+    that begins or ends there; ``axially``: 1 for that of the axial gap, else 0.
+    """
+
+    after: float
+    factor: float
+    edge: float
+    axially: float
+
+
 AFTER, FACTOR, EDGE, AXIALLY, SUMS = range(GAPS + 2 * GAP, GAPS + 2 * GAP + 5)
 TANGENT_SUMS = SUMS + TERMS
 ASIDE = TANGENT_SUMS + TERMS - rows.ROWS
-"""Behind them: the moment of the last crossing, by what and from which gap on the deflection acts
-that begins or ends there, and if it was an axial one; what carries state and tangent vector over it
-(see `flow_vectors.sum_along`); and how many rows more than in a block that are."""
+"""Behind them: what carries state and tangent vector over it (see `flow_vectors.sum_along`); and
+how many rows more than in a block that are."""
 
 
 def fourth_derivative(power: Floats) -> Floats:

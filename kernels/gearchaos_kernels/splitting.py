@@ -65,7 +65,7 @@ def split_step(memory, slot, table, shares, number, recorded, present):
         crossings += 1
         gaps = gaps_at(state, lane, begin, present)
         gap = gaps.axial if axially else gaps.tangential
-        branches, _, _ = leave(
+        branches = leave(
             memory, slot, axially, gap, branches, lane, number + done, recorded, present
         )
 
