@@ -165,6 +165,8 @@ def begin(memory, first, lanes, batch, present):
         interval = min(interval, batch.steps_between_scalings[index])
         lane = fill_lane(memory, slot, batch.coefficients[index])
         fill(memory, rows.STATE, slot, batch.scales[index], batch.start[index])
+        # Of a lone lane's neighbours nobody writes this, and what is no proper number takes long.
+        fill(memory, rows.STATE_BEFORE, slot, batch.scales[index], batch.start[index])
         fill(memory, rows.TANGENT, slot, batch.scales[index], batch.tangent_start[index])
         memory[rows.GROWTH * STRIDE + slot] = 0.0
         store(memory, rows.CROSSINGS, slot, (0.0, math.inf, 0.0))
