@@ -12,15 +12,9 @@ field is continuous, so that no other term comes from them.
 
 from gearchaos_kernels import contact, rows
 from gearchaos_kernels import flow_vectors as vectors
-from gearchaos_kernels.block_memory import (
-    read_branches,
-    read_lane,
-    read_state,
-    store,
-    write_branches,
-)
+from gearchaos_kernels.block_memory import read_branches, read_lane, store, write_branches
 from gearchaos_kernels.compilation import scalar
-from gearchaos_kernels.equations import Gap, gaps_at
+from gearchaos_kernels.equations import Gap
 from gearchaos_kernels.flow_layout import (
     AFTER,
     AXIALLY,
@@ -33,9 +27,8 @@ from gearchaos_kernels.flow_layout import (
     layout,
 )
 from gearchaos_kernels.flow_moments import find_moments
-from gearchaos_kernels.flow_steps import phases_of, store_offsets
+from gearchaos_kernels.flow_steps import gaps_at_ends, store_offsets
 from gearchaos_kernels.flow_vectors import VECTOR
-from gearchaos_kernels.forcing import forcing_at
 from gearchaos_kernels.rows import STRIDE, Branch, Lane
 from gearchaos_kernels.splitting import MOST_SPLITS
 
@@ -55,7 +48,7 @@ def cross(memory, lanes, table, row, work, number, recorded, present):
         slots[suspects] = slot
         suspects += 1 if memory[rows.SUSPECT * STRIDE + slot] != 0.0 else 0
     for first in range(0, suspects, VECTOR):
-        some = slots[first : first + min(VECTOR, suspects - first)]
+        some = slots[first : min(first + VECTOR, suspects)]
         cross_together(memory, some, work.aside, table, row, number, recorded, present)
 
 
@@ -178,15 +171,11 @@ def crossed_at(aside, n, way):
 def count_left(aside, lanes, table, row, present):
     """Tell which gaps may cross once more on the rest of the step; return of how many lanes."""
     place = layout(present)
-    begin, end = phases_of(table, row)
     left = 0
     for n in range(VECTOR):
         lane = read_lane(aside, n)
         branches = read_branches(aside, n)
-        before = read_state(aside, rows.STATE_BEFORE, n, present)
-        after = read_state(aside, rows.STATE, n, present)
-        gaps = gaps_at(before, lane, forcing_at(lane, begin, present), present)
-        gaps_after = gaps_at(after, lane, forcing_at(lane, end, present), present)
+        gaps, gaps_after = gaps_at_ends(aside, n, lane, table, row, present)
         ways = 0.0
         for way in range(place.ways):
             crosses = aside[AXIALLY * STRIDE + n] == way if place.ways > 1 else True
@@ -210,9 +199,7 @@ def count_left(aside, lanes, table, row, present):
 def give_up(memory, slot, table, row, present):
     """Go on from the end of a step that is not split any more, and count it."""
     lane = read_lane(memory, slot)
-    _, end = phases_of(table, row)
-    state = read_state(memory, rows.STATE, slot, present)
-    gaps = gaps_at(state, lane, forcing_at(lane, end, present), present)
+    _, gaps = gaps_at_ends(memory, slot, lane, table, row, present)
     branches = contact.branches_at(gaps, lane.half_backlash, present)
     write_branches(memory, slot, branches)
     store_offsets(memory, slot, lane, branches, present)

@@ -131,18 +131,24 @@ def count_suspects(memory, slots, table, row, present):
     """Mark the lanes whose gaps may have left their branches since the step began."""
     if present.resolved is None:
         return 0
-    begin, end = phases_of(table, row)
     suspects = 0
     for slot in range(slots):
         lane = read_lane(memory, slot)
         branches = read_branches(memory, slot)
-        before = read_state(memory, rows.STATE_BEFORE, slot, present)
-        after = read_state(memory, rows.STATE, slot, present)
-        gaps = gaps_at(before, lane, forcing_at(lane, begin, present), present)
-        gaps_after = gaps_at(after, lane, forcing_at(lane, end, present), present)
+        gaps, gaps_after = gaps_at_ends(memory, slot, lane, table, row, present)
         at = rows.MARGINS * STRIDE + slot
         margins = memory[at], memory[at + STRIDE]
         ways = contact.ways_that_may_leave(gaps, gaps_after, branches, margins, present)
         suspects += 1 if ways != 0.0 else 0
         memory[rows.SUSPECT * STRIDE + slot] = ways
     return suspects
+
+
+@scalar
+def gaps_at_ends(memory, slot, lane, table, row, present):
+    """Return both gaps of a lane at the beginning and at the end of a step."""
+    begin, end = phases_of(table, row)
+    before = read_state(memory, rows.STATE_BEFORE, slot, present)
+    after = read_state(memory, rows.STATE, slot, present)
+    gaps = gaps_at(before, lane, forcing_at(lane, begin, present), present)
+    return gaps, gaps_at(after, lane, forcing_at(lane, end, present), present)
