@@ -89,7 +89,21 @@ class Mesh(Table):
     length_scale_um: float | None = _optional(
         "length that one unit of displacement stands for, else the half backlash", "um", 50.0, gt=0
     )
-    half_backlash_um: float | None = _optional("half the backlash", "um", 50.0, ge=0)
+    half_backlash_um: float | None = _optional(
+        "half the backlash, b_n of Pan 2021: b_n cos(beta_b) along the transverse line of action",
+        "um",
+        50.0,
+        ge=0,
+    )
+    circumferential_backlash_um: float | None = _optional(
+        "circumferential backlash j_t at the reference circle, instead of half_backlash_um",
+        "um",
+        100.0,
+        ge=0,
+    )
+    normal_backlash_um: float | None = _optional(
+        "normal backlash j_bn, instead of half_backlash_um", "um", 90.0, ge=0
+    )
     damping_ratio: float | None = _optional("mesh damping ratio", "1", 0.1, ge=0)
     damping_N_s_per_m: float | None = _optional(
         "mesh damping, instead of damping_ratio", "N s/m", 247.0, ge=0

@@ -7,8 +7,12 @@ from typing import TypeAlias
 from gearchaos.configuration.messages import Fault
 from gearchaos.configuration.run_tables import Start
 from gearchaos.configuration.tables import Tables
+from gearchaos.gear.derivation import BACKLASHES
 
 Rule: TypeAlias = Callable[[Tables], Iterator[Fault]]
+
+ANGLES = {"pair.normal_pressure_angle_deg", "pair.helix_angle_deg"}
+"""Paths of the angles by which a backlash is converted from one plane to another."""
 
 RULES: list[tuple[frozenset[str], Rule]] = []
 """Each rule with the tables that it needs free of faults of their own."""
@@ -35,15 +39,38 @@ def _one_damping(config: Tables) -> Iterator[Fault]:
 
 @reads("mesh")
 def _length_scale_is_known(config: Tables) -> Iterator[Fault]:
-    scale, backlash = "mesh.length_scale_um", "mesh.half_backlash_um"
-    swept, given = config.swept, config.physical()
+    scale, swept, given = "mesh.length_scale_um", config.swept, config.physical()
     if given[scale] is not None or scale in swept:
         return
-    if given[backlash] == 0:
-        yield Fault(backlash, "cannot be the length scale when it is 0", f"give {scale}", 0.0)
-    if config.mesh and backlash in swept:
-        rule = "is also the length scale, so that sweeping it would change the unit of every length"
-        yield Fault(swept[backlash], rule, f"give {scale}", backlash)
+    rule = "is also the length scale, so that sweeping it would change the unit of every length"
+    for backlash in BACKLASHES:
+        if given[backlash] == 0:
+            yield Fault(backlash, "cannot be the length scale when it is 0", f"give {scale}", 0.0)
+        if config.mesh and backlash in swept:
+            yield Fault(swept[backlash], rule, f"give {scale}", backlash)
+    rule = "changes the half backlash, which is also the length scale, the unit of every length"
+    for path in ANGLES & swept.keys():
+        if any(given[backlash] is not None for backlash in BACKLASHES[1:]):
+            yield Fault(swept[path], rule, f"give {scale}", path)
+
+
+@reads("mesh")
+def _one_backlash(config: Tables) -> Iterator[Fault]:
+    swept, given = config.swept, config.physical()
+    first, *others = [path for path in BACKLASHES if path in swept or given[path] is not None] or [
+        ""
+    ]
+    for path in others:
+        rule = f"{first} is swept" if first in swept else f"{first} = {given[first]} is given"
+        yield Fault(path, f"{rule} as well", "keep one of them", given[path])
+
+
+@reads("mesh", "pair")
+def _backlash_can_be_converted(config: Tables) -> Iterator[Fault]:
+    for path in BACKLASHES[1:]:
+        if config.pair is None and (path in config.swept or config.physical()[path] is not None):
+            rule = "is converted by the angles of [pair], which is missing"
+            yield Fault(path, rule, f"give [pair], or {BACKLASHES[0]}", config.physical()[path])
 
 
 @reads("mesh", "pair")

@@ -17,6 +17,13 @@ from gearchaos.gear.geometry import HelicalPair, Value
 
 _MICROMETRE = 1e-6
 _MILLIMETRE = 1e-3
+BACKLASHES = (
+    "mesh.half_backlash_um",
+    "mesh.circumferential_backlash_um",
+    "mesh.normal_backlash_um",
+)
+"""Paths of the backlash, of which a configuration gives one."""
+
 _N_PER_UM_MM = 1e9  # stiffness per unit face width: 1 N/(um mm) = 1e9 N/m^2
 
 
@@ -112,10 +119,28 @@ class Quantities:
         return np.sqrt(self.mean_stiffness / self.pair.equivalent_mass)
 
     @cached_property
+    def half_backlash(self) -> Any:
+        """b_n of eq. 22 in m, of which y_1 along the transverse line of action has b_n cos(beta_b).
+
+        As given, or from a backlash j_t along the reference circle, j_t cos(alpha_t) along that
+        line, or a normal one, j_bn = j_t cos(alpha_t) cos(beta_b).
+        """
+        half, circumferential, normal = BACKLASHES
+        if self.physical[circumferential] is not None:
+            backlash = self[circumferential] * _MICROMETRE
+            along = backlash * np.cos(self.pair.transverse_pressure_angle)
+            return along / (2.0 * np.cos(self.pair.base_helix_angle))
+        if self.physical[normal] is not None:
+            cosine = np.cos(self.pair.base_helix_angle)
+            return self[normal] * _MICROMETRE / (2.0 * cosine**2)
+        return self[half] * _MICROMETRE
+
+    @cached_property
     def length_scale(self) -> Any:
         """Length scale b' in m: the one given, else the half backlash."""
         scale = "mesh.length_scale_um"
-        scale = "mesh.half_backlash_um" if self.physical[scale] is None else scale
+        if self.physical[scale] is None:
+            return self.half_backlash
         return self[scale] * _MICROMETRE
 
     def over_length_scale(self, path: str) -> Any:
@@ -207,7 +232,7 @@ _DERIVATIONS: dict[str, Callable[[Quantities], Any]] = {
     "load": Quantities.load,
     "damping_ratio": Quantities.damping_ratio,
     "base_helix_angle_deg": lambda q: np.degrees(q.pair.base_helix_angle),
-    "half_backlash": lambda q: q.over_length_scale("mesh.half_backlash_um"),
+    "half_backlash": lambda q: q.half_backlash / q.length_scale,
     "pitch_error_amplitude": Quantities.pitch_error_amplitude,
     "pitch_error_mean": lambda q: q.over_length_scale("pitch_error.mean_um"),
     "pitch_error_phase_deg": lambda q: q["pitch_error.phase_deg"],

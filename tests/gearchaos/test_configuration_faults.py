@@ -83,6 +83,18 @@ ONE_FAULT = [
         "keep one of the two",
     ),
     (
+        "mesh={half_backlash_um=20.0, normal_backlash_um=36.0}",
+        "mesh.normal_backlash_um = 36.0",
+        "mesh.half_backlash_um = 20.0 is given as well",
+        "keep one of them",
+    ),
+    (
+        "mesh.circumferential_backlash_um=0.0",
+        "mesh.circumferential_backlash_um = 0.0",
+        "cannot be the length scale",
+        "give mesh.length_scale_um",
+    ),
+    (
         "mesh.half_backlash_um=0.0",
         "mesh.half_backlash_um = 0.0",
         "cannot be the length scale",
@@ -349,6 +361,38 @@ def test_a_half_backlash_can_be_swept_where_the_length_scale_is_swept_as_well():
     assert "is also the length scale" in problems_of(*unscaled, PHYSICAL_MESH[3], backlash)[0]
     scale = "second_sweep={parameter='mesh.length_scale_um', values=[25, 50]}"
     Configuration.from_toml(TEXT, overrides=[*unscaled, PHYSICAL_MESH[3], backlash, scale])
+
+
+def test_the_three_backlashes_are_one_whether_given_or_swept():
+    for name in ("circumferential_backlash_um", "normal_backlash_um"):
+        sweep = f"={{parameter='mesh.{name}', values=[30, 40]}}"
+        (given,) = problems_of(*PHYSICAL_MESH, f"sweep{sweep}")
+        assert f"mesh.{name}: mesh.half_backlash_um = 20.0 is given as well; keep one" in given
+        other = "second_sweep={parameter='mesh.half_backlash_um', values=[10, 20]}"
+        (swept,) = problems_of(*PHYSICAL_MESH, f"sweep{sweep}", other)
+        assert f"mesh.{name}: mesh.half_backlash_um is swept as well; keep one" in swept
+
+
+def test_an_angle_that_would_change_the_length_scale_is_not_swept():
+    mesh = "mesh={mean_stiffness_N_per_um_mm=13.0, normal_backlash_um=40.0, damping_ratio=0.1}"
+    scene, angles = PHYSICAL_MESH[3], "sweep={parameter='pair.helix_angle_deg', values=[10, 20]}"
+    (problem,) = problems_of(*PHYSICAL_MESH[:2], mesh, scene, angles)
+    assert "changes the half backlash, which is also the length scale" in problem
+    assert "give mesh.length_scale_um" in problem
+    scaled = mesh.replace("damping_ratio", "length_scale_um=25.0, damping_ratio")
+    Configuration.from_toml(TEXT, overrides=[*PHYSICAL_MESH[:2], scaled, scene, angles])
+
+
+def test_a_backlash_is_converted_by_the_angles_of_a_pair():
+    without = re.sub(
+        r"(?s)\[pair\].*?(?=\n\[)", "[mesh]\ncircumferential_backlash_um = 40.0\n", TEXT
+    )
+    angle = "groups.base_helix_angle_deg=18.0"
+    with pytest.raises(ConfigurationError) as caught:
+        Configuration.from_toml(without.replace("[mesh]\nmean", "mean"), "pan.toml", [angle])
+    found = caught.value.problems[0]
+    assert "mesh.circumferential_backlash_um = 40.0: is converted by the angles of [pair]" in found
+    assert "give [pair], or mesh.half_backlash_um" in found
 
 
 @pytest.mark.parametrize("table", ["sweep", "second_sweep"])

@@ -29,6 +29,8 @@ PHYSICAL = {
     "mesh.mean_stiffness_N_per_um_mm": 13.3548,
     "mesh.length_scale_um": None,
     "mesh.half_backlash_um": 25.0,
+    "mesh.circumferential_backlash_um": None,
+    "mesh.normal_backlash_um": None,
     "mesh.damping_ratio": 0.1,
     "mesh.damping_N_s_per_m": None,
     "mesh.stiffness.shape": "fourier",
@@ -190,6 +192,37 @@ def test_a_missing_quantity_loses_exactly_the_groups_that_need_it(absent, lost):
     assert (
         derive_groups(physical()).keys() - derive_groups(physical(**{absent: None})).keys() == lost
     )
+
+
+@pytest.mark.parametrize("helix_angle", [0.0, 15.0, 20.0, 30.0])
+def test_a_backlash_is_the_same_in_whatever_plane_it_is_measured(helix_angle):
+    alpha_n, beta = np.radians(20.0), np.radians(helix_angle)
+    # Base helix angle of the basic rack; and j_bn = j_t cos(alpha_n) cos(beta) of ISO 21771.
+    cosine = np.sqrt(1.0 - (np.sin(beta) * np.cos(alpha_n)) ** 2)
+    circumferential = 100.0
+    normal = circumferential * np.cos(alpha_n) * np.cos(beta)
+    # Along the transverse line of action a gear turns through j_t cos(alpha_t) = j_bn / cosine.
+    half = 0.5 * normal / cosine / cosine
+    given = {"mesh__length_scale_um": 40.0, "pair__helix_angle_deg": helix_angle}
+    for name, value in {
+        "mesh__half_backlash_um": half,
+        "mesh__circumferential_backlash_um": circumferential,
+        "mesh__normal_backlash_um": normal,
+    }.items():
+        groups = resolve_groups(
+            physical(**given, **{"mesh__half_backlash_um": None, name: value}), {}
+        )
+        assert groups.half_backlash == pytest.approx(half / 40.0, rel=1e-14), name
+        assert groups.origin["half_backlash"] == "derived"
+
+
+def test_a_spur_pair_has_the_backlash_of_its_base_circle():
+    spur = {"pair__helix_angle_deg": 0.0, "mesh__half_backlash_um": None}
+    groups = resolve_groups(physical(**spur, mesh__normal_backlash_um=50.0), {})
+    # Half of it is the length scale, and the load is counted in that.
+    assert groups.half_backlash == 1.0
+    half = resolve_groups(physical(pair__helix_angle_deg=0.0, mesh__half_backlash_um=25.0), {})
+    assert groups.load == pytest.approx(half.load, rel=1e-15)
 
 
 def test_a_trapezoid_comes_from_the_contact_ratios_of_the_pair():

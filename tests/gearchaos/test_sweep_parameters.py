@@ -25,6 +25,8 @@ SPANS = {
     "mesh.mean_stiffness_N_per_um_mm": (12.0, 14.0),
     "mesh.length_scale_um": (20.0, 30.0),
     "mesh.half_backlash_um": (15.0, 25.0),
+    "mesh.circumferential_backlash_um": (30.0, 50.0),
+    "mesh.normal_backlash_um": (30.0, 50.0),
     "mesh.damping_N_s_per_m": (100.0, 500.0),
 }
 
@@ -36,6 +38,10 @@ CHANGES = {
     "mesh.damping_N_s_per_m": {
         "[groups]\ndamping_ratio = 0.05": "",
         "damping_ratio = 0.1": "damping_N_s_per_m = 300.0",
+    },
+    **{
+        f"mesh.{name}": {"half_backlash_um = 20.0": f"{name} = 40.0"}
+        for name in ("circumferential_backlash_um", "normal_backlash_um")
     },
     "mesh.mean_stiffness_N_per_um_mm": {"[groups]": "[groups]\nstiffness_cosine = [-0.09]"},
     "pitch_error.grade": {SINE: 'kind = "grade"\ngrade = 7'},
