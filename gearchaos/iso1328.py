@@ -22,6 +22,28 @@ _RANGES = {
 """Grades, and ends of the ranges of module and diameter, the upper one of which belongs to it."""
 
 
+_GEARS_OF_2013 = {
+    "number of teeth": (5, 1000, ""),
+    "helix angle": (0, 45, " degree"),
+    "face width": (4, 1200, " mm"),
+}
+"""What else the scope of the edition of 2013 limits: lowest and highest value, and unit."""
+
+
+def require_gear(teeth: int, helix_angle_deg: float, face_width_mm: float, edition: int) -> None:
+    """Raise ValueError if a gear is outside the ranges of the edition, whatever its deviations.
+
+    The edition of 2013 is for 5 to 1000 teeth, helix angles up to 45 degrees and face widths of 4
+    to 1200 mm; that of 1995 states limits of module and diameter alone for pitch deviations, which
+    `single_pitch_um` checks.
+    """
+    values = (teeth, abs(helix_angle_deg), face_width_mm)
+    for (name, (low, high, unit)), value in zip(_GEARS_OF_2013.items(), values, strict=True):
+        if edition == 2013 and not low <= value <= high:
+            within = f"{low} to {high}{unit}"
+            raise ValueError(f"{name} {value:.6g}{unit}: ISO 1328-1:2013 goes from {within}")
+
+
 def single_pitch_um(
     grade: float, normal_module_mm: float, reference_diameter_mm: float, edition: int = 1995
 ) -> float:

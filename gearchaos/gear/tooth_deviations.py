@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from gearchaos.arrays import Floats, Integers
-from gearchaos.iso1328 import cumulative_pitch_um, single_pitch_um
+from gearchaos.iso1328 import cumulative_pitch_um, require_gear, single_pitch_um
 
 REALISATION = "realisation"
 """Name under which the values of lanes hold the number of the drawn gear pair."""
@@ -36,7 +36,7 @@ def tooth_deviations(error: Any, pair: Any, values: Mapping[str, npt.ArrayLike])
     ``error``, ``pair``: the tables ``[pitch_error]`` and ``[pair]`` of a configuration; ``values``:
     those of swept parameters in every lane, which broadcast against each other, and the numbers of
     drawn gear pairs as `REALISATION`. Only profiles that occur are made. Raises ValueError if a
-    grade, module or diameter is outside the ranges of ISO 1328-1.
+    grade or gear is outside the ranges of ISO 1328-1.
     """
     lanes = np.broadcast_shapes(*map(np.shape, values.values()))
     if error.kind == "teeth":
@@ -48,6 +48,7 @@ def tooth_deviations(error: Any, pair: Any, values: Mapping[str, npt.ArrayLike])
         "pitch_error.eccentricity": error.eccentricity,
         "pair.normal_module_mm": pair.normal_module_mm,
         "pair.helix_angle_deg": pair.helix_angle_deg,
+        "pair.face_width_mm": pair.face_width_mm,
     }
     rows = [np.broadcast_to(values.get(name, value), lanes).ravel() for name, value in own.items()]
     found, profile = np.unique(np.stack(rows, axis=1), axis=0, return_inverse=True)
@@ -56,7 +57,9 @@ def tooth_deviations(error: Any, pair: Any, values: Mapping[str, npt.ArrayLike])
 
 
 def _drawn(error: Any, gear: int, teeth: int, rows: Floats) -> Floats:
-    numbers, grades, shares, modules, helix_angles = rows.T
+    numbers, grades, shares, modules, helix_angles, face_widths = rows.T
+    for helix_angle, face_width in zip(helix_angles, face_widths, strict=True):
+        require_gear(teeth, helix_angle, face_width, error.edition)
     diameters = teeth * modules / np.cos(np.radians(helix_angles))
     sizes = list(zip(grades, modules, diameters, strict=True))
     single = [single_pitch_um(*one, error.edition) for one in sizes]

@@ -3,7 +3,7 @@
 import pytest
 
 import gearchaos
-from gearchaos.iso1328 import cumulative_pitch_um, single_pitch_um
+from gearchaos.iso1328 import cumulative_pitch_um, require_gear, single_pitch_um
 
 
 def test_grade_7_of_1995_has_the_limits_that_pan_2021_takes_from_it():
@@ -54,3 +54,25 @@ def test_other_grades_are_refused(grade):
 def test_what_lies_outside_the_standard_is_refused(arguments, message):
     with pytest.raises(ValueError, match=message):
         cumulative_pitch_um(*arguments)
+
+
+@pytest.mark.parametrize(
+    ("gear", "message"),
+    [
+        ((4, 20.0, 15.0), "number of teeth 4: ISO 1328-1:2013 goes from 5 to 1000"),
+        ((1001, 20.0, 15.0), "number of teeth 1001: ISO 1328-1:2013 goes from 5 to 1000"),
+        ((21, 45.1, 15.0), "helix angle 45.1 degree: ISO 1328-1:2013 goes from 0 to 45 degree"),
+        ((21, float("nan"), 15.0), "helix angle nan degree"),
+        ((21, 20.0, 3.9), "face width 3.9 mm: ISO 1328-1:2013 goes from 4 to 1200 mm"),
+        ((21, 20.0, 1201.0), "face width 1201 mm"),
+    ],
+)
+def test_a_gear_outside_the_scope_of_2013_is_refused(gear, message):
+    with pytest.raises(ValueError, match=message):
+        require_gear(*gear, 2013)
+    require_gear(*gear, 1995)
+
+
+@pytest.mark.parametrize("gear", [(5, 45.0, 4.0), (1000, -45.0, 1200.0)])
+def test_the_ends_of_the_scope_of_2013_belong_to_it(gear):
+    require_gear(*gear, 2013)

@@ -300,6 +300,21 @@ FAULTS = {
         ["pitch_error.edition=2013", "pitch_error.grade=12"],
         "pitch_error: grade 12: ISO 1328-1:2013 has grades 1 to 11; choose within",
     ),
+    "many teeth in 2013": (
+        GRADE,
+        ["pitch_error.edition=2013", "pair.teeth=[21, 1001]"],
+        "pitch_error: number of teeth 1001: ISO 1328-1:2013 goes from 5 to 1000; choose within",
+    ),
+    "steep teeth in 2013": (
+        GRADE,
+        ["pitch_error.edition=2013", "pair.helix_angle_deg=46.0"],
+        "pitch_error: helix angle 46 degree: ISO 1328-1:2013 goes from 0 to 45 degree; choose",
+    ),
+    "narrow gear in 2013": (
+        GRADE,
+        ["pitch_error.edition=2013", "pair.face_width_mm=3.0"],
+        "pitch_error: face width 3 mm: ISO 1328-1:2013 goes from 4 to 1200 mm; choose within",
+    ),
     "small gear": (GRADE, ["pair.normal_module_mm=0.4"], "normal module 0.4 mm: ISO 1328-1:1995 g"),
     "swept half grades": (
         GRADE,
