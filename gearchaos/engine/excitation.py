@@ -4,7 +4,9 @@ import math
 from collections.abc import Mapping
 
 import numpy as np
+from gearchaos_kernels import Teeth
 
+from gearchaos.arrays import Floats
 from gearchaos.dynamics.stability import mesh_stiffnesses
 from gearchaos.engine.lanes import Lanes
 from gearchaos.engine.steps import PILOT_LANES
@@ -48,7 +50,9 @@ def whole_lengths(lanes: Lanes) -> dict[str, int]:
 
 def remarks(lanes: Lanes, lengths: Mapping[str, int]) -> list[str]:
     """Return what a user should know of the excitation; ``lengths`` from `whole_lengths`."""
-    teeth = [_longer(lanes, lengths), _parting_pairs(lanes)] if lanes.repeats_after > 1 else []
+    teeth = []
+    if lanes.repeats_after > 1:
+        teeth = [_longer(lanes, lengths), _parting_pairs(lanes), _printed_gaps(lanes)]
     return [*teeth, _negative_stiffness(lanes), _mistaken_units(lanes)]
 
 
@@ -68,23 +72,48 @@ def _longer(lanes: Lanes, lengths: Mapping[str, int]) -> str:
     return f"{text}; {', '.join(changed)}, whole ones of it" if changed else text
 
 
+def _printed_gaps(lanes: Lanes) -> str:
+    """Tell what the equations as printed make of errors that differ from tooth to tooth."""
+    if lanes.config.formulation != "published":
+        return ""
+    return (
+        'formulation = "published" enters the mean of the errors of teeth into the equations as '
+        "they are printed: in the gaps it counts cos(beta_b) times, and the mesh damping acts on "
+        'its rate, so that forces grow as pitch_error.smoothing is made smaller; "physical" is '
+        "free of both"
+    )
+
+
 def _parting_pairs(lanes: Lanes) -> str:
-    """Tell where neighbouring tooth pairs differ by more than the load bends them."""
+    """Tell where tooth pairs in mesh together differ by more than the load bends them."""
     system = lanes.system_of(lanes.spread(PILOT_LANES))
     if system.teeth is None:
         return ""
-    gears = system.teeth.driving, system.teeth.driven
-    step = sum(np.abs(gear - np.roll(gear, 1, axis=1)).max(axis=1) for gear in gears)
-    groups = system.groups
-    apart = np.abs(groups.error_amplitude) * step[system.teeth.profile]
-    parting = np.mean(apart > np.abs(groups.load))
+    groups, cosine = system.groups, np.cos(system.groups.base_helix_angle)
+    # Along the transverse line of action, in which gaps of the published form have cos(beta_b) e.
+    projection = 1.0 if system.physical else cosine
+    spread = _largest_spread(system.teeth)[system.teeth.profile]
+    apart = np.abs(groups.error_amplitude) * projection * spread
+    parting = np.mean(apart > np.abs(groups.load) / cosine)
     if parting == 0.0:
         return ""
     return (
-        f"in {parting:.0%} of the lanes neighbouring tooth pairs differ by up to "
+        f"in {parting:.0%} of the lanes tooth pairs that share the load differ by up to "
         f"{apart.max():.2g} b', more than the static deflection there; single pairs may then part "
-        "while their neighbours carry, which the model leaves out"
+        "while the others carry, which the model leaves out"
     )
+
+
+def _largest_spread(teeth: Teeth) -> Floats:
+    """Return by how much errors of pairs in mesh together differ at most, shape (profiles,)."""
+    gears = teeth.driving, teeth.driven
+    pairs = np.arange(math.lcm(*(gear.shape[1] for gear in gears)))
+    driving, driven = (gear[:, pairs % gear.shape[1]] for gear in gears)
+    errors = driven - driving
+    later = range(1, teeth.most_at_once)
+    apart = [np.abs(errors - np.roll(errors, -n, axis=1)).max(axis=1) for n in later]
+    spread: Floats = np.max([np.zeros(len(errors)), *apart], axis=0)
+    return spread
 
 
 def _mistaken_units(lanes: Lanes) -> str:

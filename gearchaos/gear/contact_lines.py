@@ -18,6 +18,9 @@ from gearchaos.errors import ConfigurationError
 MOST_CONTACT = 5.0
 """Largest total contact ratio: the kernels have room for seven pairs in mesh or next to it."""
 
+_ROUNDING = 1e-9
+"""Harmonics and phases, relative, that are zero but for rounding."""
+
 _SAMPLES = 64  # Places within a cell over which a share is averaged.
 
 
@@ -128,8 +131,9 @@ def contact_shares(
     # The phase of the total length, were it to begin at phase 0.
     own = complex(np.mean(lines.sum(axis=0) * np.exp(-2j * np.pi * samples)))
     turned = fundamental * own.conjugate()
-    entry = -np.angle(turned) / (2.0 * np.pi) % 1.0 if abs(turned) > 1e-9 else 0.0
-    return shares, per_period, float(entry)
+    entry = -np.angle(turned) / (2.0 * np.pi) % 1.0 if abs(turned) > _ROUNDING else 0.0
+    # What rounding puts just before the end of a period is its beginning.
+    return shares, per_period, 0.0 if 1.0 - entry < _ROUNDING else float(entry)
 
 
 def _contact_line(place: Floats, transverse: float, overlap: float) -> Floats:

@@ -14,7 +14,7 @@ from gearchaos_kernels.compilation import count_up, driver
 from gearchaos_kernels.flow_map import fewest_steps, maps_of, sharing
 from gearchaos_kernels.rows import CONTACT_ROWS, ERROR, LANES, SIGNAL_ROWS, SIGNALS
 from gearchaos_kernels.system import Floats, Outcome, Plan, Schedule, Status, System
-from gearchaos_kernels.teeth import tables_of
+from gearchaos_kernels.teeth import last_pair, tables_of
 
 Integers = NDArray[np.intp]
 
@@ -70,6 +70,8 @@ def integrate(
     cycles = 2.0 * np.pi * np.array([float(order) for order in plan.orders])
     steps_taken = np.full(lanes, steps)
     schedule = Schedule(*(getattr(plan, name) for name in Schedule._fields))
+    # A pair that begins before its mesh period does is the last one of the period before.
+    schedule = schedule._replace(first_period=last_pair(system, plan.first_period))
     for order, blocks, maps, steps_of in _shares(system, plan, present):
         step = system.mesh_period / steps_of
         steps_taken[order] = steps_of[order]

@@ -30,7 +30,7 @@ from gearchaos_kernels.block_memory import (
 from gearchaos_kernels.chosen import begin_chosen, end_chosen, half_of, tell_chosen
 from gearchaos_kernels.compilation import align_stack, part, scalar
 from gearchaos_kernels.contact import branches_at, end_contact, ways_that_may_leave
-from gearchaos_kernels.equations import gaps_at
+from gearchaos_kernels.equations import from_error, from_rest, gaps_at
 from gearchaos_kernels.flow_crossings import cross
 from gearchaos_kernels.flow_layout import ASIDE, OWN, Work, layout
 from gearchaos_kernels.flow_steps import begin_forces, move_block
@@ -133,8 +133,9 @@ def integrate_block(number_of_block, batch, plan, outcome, present):
                     if present.flow_map is not None:
                         asked, of_it = number // every, number % every
                         middle = phase_within(table, asked, (of_it + 0.5) / every), None
+                        start = middle  # Errors of teeth alone need it, and have no maps.
                         final = phase_within(table, asked, (of_it + 1.0) / every), None
-                    tell_loads(memory, middle, final, present)
+                    tell_loads(memory, start, middle, final, present)
                     tell_chosen(memory, batch, turns)
             if present.tangent is not None:
                 last = number == steps - 1
@@ -177,7 +178,7 @@ def begin(memory, first, lanes, batch, present):
             store(memory, rows.SHARED, slot, point)
         if present.resolved is not None:
             forcing = forcing_at(lane, point, present)
-            state = read_state(memory, rows.STATE, slot, present)
+            state = from_rest(read_state(memory, rows.STATE, slot, present), forcing, present)
             gaps = gaps_at(state, lane, forcing, present)
             write_branches(memory, slot, branches_at(gaps, lane.half_backlash, present))
         if present.flow_map is not None:
@@ -208,16 +209,17 @@ def step_block(memory, start, middle, final, present):
         branches = ANYWHERE
         if present.resolved is not None:
             branches = read_branches(memory, slot)
-        after, slopes = rk4.advance(rk4.motion, state, 1.0, lane, during, branches, present)
+        moving = from_rest(state, begin, present)
+        after, slopes = rk4.advance(rk4.motion, moving, 1.0, lane, during, branches, present)
         if present.resolved is not None:
-            gaps = gaps_at(state, lane, begin, present)
+            gaps = gaps_at(moving, lane, begin, present)
             gaps_after = gaps_at(after, lane, end, present)
             ways = ways_that_may_leave(gaps, gaps_after, branches, (0.0, 0.0), present)
             suspects += 1 if ways != 0.0 else 0
             memory[rows.SUSPECT * STRIDE + slot] = ways
         if present.resolved is not None or present.loads is not None:
             write_state(memory, rows.STATE_BEFORE, slot, state, present)
-        write_state(memory, rows.STATE, slot, after, present)
+        write_state(memory, rows.STATE, slot, from_error(after, end, present), present)
         if present.tangent is not None:
             tangent = read_state(memory, rows.TANGENT, slot, present)
             if present.resolved is not None:

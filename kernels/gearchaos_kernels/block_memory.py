@@ -16,7 +16,7 @@ from gearchaos_kernels.system import Plan, System
 
 Present = namedtuple(
     "Present",
-    "pitch_error phase teeth wide stiffness_variation backlash transverse axial "
+    "pitch_error phase teeth undamped wide stiffness_variation backlash transverse axial "
     "resolved contact loads tangent flow_map",
 )
 """What a compiled loop has: True where it is there, None where the compiler removes it."""
@@ -31,6 +31,7 @@ def flags(system: System, plan: Plan) -> Present:
         **effects._asdict(),
         "phase": effects.pitch_error and teeth is None and bool(np.any(system.groups.error_phase)),
         "teeth": teeth is not None,
+        "undamped": teeth is not None and system.physical,
         "wide": teeth is not None and teeth.pairs_in_mesh > rows.NARROW,
         "resolved": resolved,
         "contact": resolved and plan.contact,

@@ -42,6 +42,10 @@ def lane_coefficients(system: System, step: Floats) -> Floats:
     cosine, sine = np.cos(groups.base_helix_angle), np.sin(groups.base_helix_angle)
     # y_1 = q - e cos(beta_b) as printed in eq. 6, or q + e - e cos(beta_b) as eq. 1 gives.
     share = 1.0 - 1.0 / cosine if system.physical else np.ones_like(cosine)
+    share_z = 2.0 * np.ones_like(cosine)
+    if system.physical and system.teeth is not None:
+        # Deviations of teeth lie in the transverse plane: y_1 = q - e, with q itself.
+        share, share_z = 1.0 / cosine, 2.0 / cosine
     phase_step = groups.mesh_frequency * step
     lane = Lane(
         mass_ratio_p=groups.mass_ratio_p,
@@ -58,9 +62,9 @@ def lane_coefficients(system: System, step: Floats) -> Floats:
         error_mean=share * groups.error_mean,
         error_amplitude=share * groups.error_amplitude,
         error_rate=share * groups.error_amplitude * phase_step,
-        axial_error_mean=2.0 * groups.error_mean,
-        axial_error_amplitude=2.0 * groups.error_amplitude,
-        axial_error_rate=2.0 * groups.error_amplitude * phase_step,
+        axial_error_mean=share_z * groups.error_mean,
+        axial_error_amplitude=share_z * groups.error_amplitude,
+        axial_error_rate=share_z * groups.error_amplitude * phase_step,
         cos_phase=np.cos(groups.error_phase),
         sin_phase=np.sin(groups.error_phase),
         cosine=cosine,

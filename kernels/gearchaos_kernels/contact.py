@@ -62,8 +62,11 @@ def next_branch(branch, gap, half_backlash):
 
 
 @scalar
-def leave(memory, slot, axially, gap, branches, lane, moment, recorded, present):
-    """Return the branches after a gap leaves one at a moment in steps; tell of the crossing."""
+def leave(memory, slot, axially, gap, flank_rate, branches, lane, moment, recorded, present):
+    """Return the branches after a gap leaves one at a moment in steps; tell of the crossing.
+
+    ``flank_rate``: at which the flanks approach, see `equations`.
+    """
     branch = branches.axial if axially else branches.tangential
     following = next_branch(branch, gap.value, lane.half_backlash)
     if axially:
@@ -71,12 +74,12 @@ def leave(memory, slot, axially, gap, branches, lane, moment, recorded, present)
     else:
         branches = Directions(following, branches.axial)
     if recorded:
-        speed = (lane.axial_speed if axially else lane.tangential_speed) * abs(gap.rate)
+        scale = lane.axial_speed if axially else lane.tangential_speed
         at = rows.CROSSINGS * STRIDE + slot
         memory[at] += 1.0
-        memory[at + STRIDE] = min(memory[at + STRIDE], speed)
+        memory[at + STRIDE] = min(memory[at + STRIDE], scale * abs(gap.rate))
         if present.loads is not None:
-            tell_kink(memory, slot, axially, lane, gap)
+            tell_kink(memory, slot, axially, lane, flank_rate)
         if present.contact is not None:
             first = rows.CONTACT + (rows.CONTACT_ROWS if axially else 0)
             meets = following.engaged
@@ -85,6 +88,7 @@ def leave(memory, slot, axially, gap, branches, lane, moment, recorded, present)
             # Time on a flank is the sum of all moments of leaving it less those of meeting it.
             memory[at] += moment * (1.0 - 2.0 * meets)
             memory[at + STRIDE] += meets
+            speed = scale * abs(flank_rate)
             at = (first + rows.SPEEDS) * STRIDE + slot
             memory[at] += meets * speed
             memory[at + STRIDE] = max(memory[at + STRIDE], meets * speed)

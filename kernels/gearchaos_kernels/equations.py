@@ -8,12 +8,16 @@ accelerations and forces per step and per step squared. There (with q = approach
 
 for the published formulation; the physical one multiplies the first e by 1 - 1/cos(beta_b) and
 leaves the second line as it is. The clearance of both directions is then the same half backlash.
+
+Deviations of teeth in the physical formulation lie along the transverse line of action: both e
+become e / cos(beta_b), and torsion is that of a state measured from rest, without -e (`from_rest`).
+The error of a tooth is constant, so that the damper sees the rates of q and of p - q.
 """
 
 from typing import NamedTuple
 
 from gearchaos_kernels.compilation import scalar
-from gearchaos_kernels.rows import Coordinates, Directions
+from gearchaos_kernels.rows import Coordinates, Directions, State
 
 
 class Gap(NamedTuple):
@@ -55,7 +59,53 @@ def gaps_at(state, lane, forcing, present):
 
 
 @scalar
-def mesh_force(gap, stiffness, damping, half_backlash, branch, present):
+def from_rest(state, forcing, present):
+    """Return a state with a torsion that is measured from rest, where e is that of teeth.
+
+    In this coordinate the error acts on the mesh springs alone. In that of eq. 13 e'' drives the
+    pair as well, of which a step sees nothing where teeth take their load in less than a step.
+    """
+    if present.undamped is None:
+        return state
+    return State(
+        _with_torsion(state.position, forcing.error), _with_torsion(state.rate, forcing.error_rate)
+    )
+
+
+@scalar
+def from_error(state, forcing, present):
+    """Return a state with a torsion that is measured from e again, as delta_5 is."""
+    if present.undamped is None:
+        return state
+    return State(
+        _with_torsion(state.position, -forcing.error),
+        _with_torsion(state.rate, -forcing.error_rate),
+    )
+
+
+@scalar
+def _with_torsion(values, more):
+    """Return coordinates with more torsion."""
+    return Coordinates(
+        values.torsion + more,
+        values.transverse_p,
+        values.transverse_g,
+        values.axial_p,
+        values.axial_g,
+    )
+
+
+@scalar
+def flank_rate(gap, forcing, present):
+    """Return the rate at which flanks approach each other: that of the gap, or with teeth of q."""
+    if present.undamped is None:
+        return gap.rate
+    # The same in both directions: e' and 2 e' of the axial gap less e' of the tangential one.
+    return gap.rate + forcing.error_rate
+
+
+@scalar
+def mesh_force(gap, rate, stiffness, damping, half_backlash, branch, present):
     """Return a mesh force (eqs 2, 4) and its slope (eqs 22, 23), on a branch if one is given."""
     deflection, slope = gap.value, stiffness
     if branch is not None:
@@ -64,20 +114,22 @@ def mesh_force(gap, stiffness, damping, half_backlash, branch, present):
     elif present.backlash is not None:
         deflection = gap.value - min(max(gap.value, -half_backlash), half_backlash)
         slope = stiffness if deflection != 0.0 else 0.0
-    return stiffness * deflection + damping * gap.rate, slope
+    return stiffness * deflection + damping * rate, slope
 
 
 @scalar
-def mesh_forces(gaps, lane, stiffness, branches, present):
+def mesh_forces(gaps, lane, forcing, branches, present):
     """Return N_y and N_z of eq. 13 and their slopes d(force)/d(gap), on branches or `ANYWHERE`."""
-    damping, b = lane.mesh_damping, lane.half_backlash
+    stiffness, damping, b = forcing.stiffness, lane.mesh_damping, lane.half_backlash
     stiffness_z, damping_z = lane.axial_share * stiffness, lane.axial_share * damping
     on_y, on_z = branches
-    force_y, slope_y = mesh_force(gaps.tangential, stiffness, damping, b, on_y, present)
+    rate = flank_rate(gaps.tangential, forcing, present)
+    force_y, slope_y = mesh_force(gaps.tangential, rate, stiffness, damping, b, on_y, present)
     force_z = 0.0
     slope_z = 0.0
     if present.axial is not None:
-        force_z, slope_z = mesh_force(gaps.axial, stiffness_z, damping_z, b, on_z, present)
+        rate = flank_rate(gaps.axial, forcing, present)
+        force_z, slope_z = mesh_force(gaps.axial, rate, stiffness_z, damping_z, b, on_z, present)
     return Directions(force_y, force_z), Directions(slope_y, slope_z)
 
 

@@ -18,11 +18,17 @@ from gearchaos_kernels.block_memory import (
 from gearchaos_kernels.coefficients import lane_coefficients, state_scales
 from gearchaos_kernels.compilation import evaluator
 from gearchaos_kernels.contact import flank_at
-from gearchaos_kernels.equations import accelerations, gaps_at, mesh_forces, tangent_forces
+from gearchaos_kernels.equations import (
+    accelerations,
+    from_rest,
+    gaps_at,
+    mesh_forces,
+    tangent_forces,
+)
 from gearchaos_kernels.forcing import forcing_at, pitch_error_at
 from gearchaos_kernels.rows import ANYWHERE, Directions, State
 from gearchaos_kernels.system import Effects, Floats, MeshMotion, Plan, System
-from gearchaos_kernels.teeth import engage, point_on_grid, tables_of
+from gearchaos_kernels.teeth import engage, last_pair, point_on_grid, tables_of
 
 _ALONE = Plan(1, 0, 0, 0, resolved=False)
 """No loop: nothing is split and no tangent vector carried along."""
@@ -94,7 +100,7 @@ def mesh_motion(
         state_scales(system, step),
         step,
         tables_of(system, present, steps_per_period),
-        first_period,
+        last_pair(system, first_period),
         np.ascontiguousarray(states, dtype=np.float64),
         motion,
         present,
@@ -124,8 +130,9 @@ def _follow(coefficients, scales, steps, tables, first, states, motion, present)
             forcing = forcing_at(lane, point, present)
             if present.pitch_error is not None:
                 motion.pitch_error[index, sample] = pitch_error_at(lane, point, present)
+            state = from_rest(state, forcing, present)
             gaps = gaps_at(state, lane, forcing, present)
-            forces, _ = mesh_forces(gaps, lane, forcing.stiffness, ANYWHERE, present)
+            forces, _ = mesh_forces(gaps, lane, forcing, ANYWHERE, present)
             # Scaled, N_y and N_z enter eq. 13 with coefficient -1, and per step squared.
             motion.force_tangential[index, sample] = forces.tangential / step**2
             flank = flank_at(gaps.tangential.value, half_backlash)
@@ -135,5 +142,8 @@ def _follow(coefficients, scales, steps, tables, first, states, motion, present)
                 motion.contact_axial[index, sample] = flank_at(gaps.axial.value, half_backlash)
             acceleration = accelerations(state, forces, forcing.drive, lane, present)
             write_state(memory, rows.STATE, 0, State(state.rate, acceleration), present)
+            if present.undamped is not None:
+                # That of a state measured from rest: delta_5 is measured from e (eq. 13).
+                memory[(rows.STATE + 1) * rows.STRIDE] -= lane.error_inertia * point.curvature
             take(memory, rows.STATE, 0, scales[index], change)
             motion.accelerations[index, sample] = change[1::2] / step

@@ -153,7 +153,7 @@ def tell_crossing(memory, slot, aside, n, number, recorded, present):
     crossed = crossed_at(aside, n, 1 if axially else 0)
     branches = read_branches(memory, slot)
     branches = contact.leave(
-        memory, slot, axially, crossed, branches, lane, at_step, recorded, present
+        memory, slot, axially, crossed, crossed.rate, branches, lane, at_step, recorded, present
     )
     write_branches(memory, slot, branches)
     store_offsets(memory, slot, lane, branches, present)

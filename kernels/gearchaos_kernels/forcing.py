@@ -115,8 +115,9 @@ def forcing_at(lane, point, present):
     axial_error_rate = 0.0
     if present.pitch_error is not None:
         point = shifted(lane, point, present)
-        # -e'' drives delta_5, which is measured from e (eq. 13).
-        drive = lane.load - lane.error_inertia * point.curvature
+        if present.undamped is None:
+            # -e'' drives delta_5, which is measured from e (eq. 13).
+            drive = lane.load - lane.error_inertia * point.curvature
         error = lane.error_mean + lane.error_amplitude * point.value
         error_rate = lane.error_rate * point.slope
         if present.axial is not None:
@@ -129,6 +130,8 @@ def forcing_at(lane, point, present):
 def pitch_error_at(lane, point, present):
     """Return e at a mesh phase: half of what the axial gap has, whatever the form of the gaps."""
     value = lane.axial_error_amplitude * shifted(lane, point, present).value
+    if present.undamped is not None:
+        return 0.5 * lane.cosine * (lane.axial_error_mean + value)
     return 0.5 * (lane.axial_error_mean + value)
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from gearchaos_kernels import rows
 from gearchaos_kernels.block_memory import load, read_lane, read_state, store
 from gearchaos_kernels.compilation import scalar
-from gearchaos_kernels.equations import gaps_at, mesh_forces
+from gearchaos_kernels.equations import from_rest, gaps_at, mesh_forces
 from gearchaos_kernels.forcing import forcing_at, pitch_error_at
 from gearchaos_kernels.rk4 import along, plus
 from gearchaos_kernels.rows import ANYWHERE, LANES, STRIDE, Carried, State
@@ -19,13 +19,12 @@ from gearchaos_kernels.teeth import point_on_grid, with_teeth
 
 
 @scalar
-def carried_at(state, lane, point, present):
-    """Return what a state carries at a mesh phase, forces per step squared."""
-    forcing = forcing_at(lane, point, present)
+def carried_at(state, lane, point, forcing, present):
+    """Return what a state `from_rest` carries at a mesh phase, forces per step squared."""
     gaps = gaps_at(state, lane, forcing, present)
-    forces, slopes = mesh_forces(gaps, lane, forcing.stiffness, ANYWHERE, present)
+    forces, slopes = mesh_forces(gaps, lane, forcing, ANYWHERE, present)
     error = lane.cosine * state.position.torsion
-    if present.pitch_error is not None:
+    if present.pitch_error is not None and present.undamped is None:
         # delta_5 is measured from e.
         error += pitch_error_at(lane, point, present)
     return Carried(forces.tangential, forces.axial, error, slopes.tangential, slopes.axial)
@@ -38,7 +37,9 @@ def begin_loads(memory, table, shares, present):
         lane = read_lane(memory, slot)
         state = read_state(memory, rows.STATE, slot, present)
         point = point_on_grid(memory, slot, table, shares, 0, present)
-        carried = carried_at(state, lane, point, present)
+        forcing = forcing_at(lane, point, present)
+        state = from_rest(state, forcing, present)
+        carried = carried_at(state, lane, point, forcing, present)
         store(memory, rows.CARRIED, slot, carried)
         signals = carried.tangential, carried.axial, carried.error
         for number, value in enumerate(signals):
@@ -47,16 +48,22 @@ def begin_loads(memory, table, shares, present):
 
 
 @scalar
-def tell_loads(memory, middle, end, present):
-    """Add a step to the record of every slot, from the mesh phases in its middle and at its end."""
+def tell_loads(memory, begin, middle, end, present):
+    """Add a step to the record of every slot, from the mesh phases of its ends and its middle."""
     for slot in range(LANES):
         lane = read_lane(memory, slot)
         before = read_state(memory, rows.STATE_BEFORE, slot, present)
         after = read_state(memory, rows.STATE, slot, present)
-        point = with_teeth(memory, slot, middle, present)
-        half = carried_at(halfway(before, after), lane, point, present)
+        if present.undamped is not None:
+            point = with_teeth(memory, slot, begin, present)
+            before = from_rest(before, forcing_at(lane, point, present), present)
         point = with_teeth(memory, slot, end, present)
-        last = carried_at(after, lane, point, present)
+        forcing = forcing_at(lane, point, present)
+        after = from_rest(after, forcing, present)
+        last = carried_at(after, lane, point, forcing, present)
+        point = with_teeth(memory, slot, middle, present)
+        forcing = forcing_at(lane, point, present)
+        half = carried_at(halfway(before, after), lane, point, forcing, present)
         first = load(memory, rows.CARRIED, slot, Carried)
         store(memory, rows.CARRIED, slot, last)
         smooth = (first.tangential_slope == 0.0) == (last.tangential_slope == 0.0)
@@ -94,9 +101,9 @@ def tell_signal(memory, slot, signal, first, half, last, smooth):
 
 
 @scalar
-def tell_kink(memory, slot, axially, lane, gap):
+def tell_kink(memory, slot, axially, lane, rate):
     """Enter the force of a direction at a crossing, where there is no deflection, only damping."""
-    force = lane.mesh_damping * gap.rate
+    force = lane.mesh_damping * rate
     row = rows.LOADS * STRIDE + slot
     if axially:
         force *= lane.axial_share

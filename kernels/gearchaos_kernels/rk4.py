@@ -46,7 +46,7 @@ def advance(stage, state, s, lane, given, branches, present):
 def motion(state, lane, forcing, branches, present):
     """Return the accelerations of a state, per step squared, and the slopes of the mesh forces."""
     gaps = gaps_at(state, lane, forcing, present)
-    forces, slopes = mesh_forces(gaps, lane, forcing.stiffness, branches, present)
+    forces, slopes = mesh_forces(gaps, lane, forcing, branches, present)
     return accelerations(state, forces, forcing.drive, lane, present), slopes
 
 

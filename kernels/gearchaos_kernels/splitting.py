@@ -17,7 +17,7 @@ from gearchaos_kernels.block_memory import (
 )
 from gearchaos_kernels.compilation import scalar
 from gearchaos_kernels.contact import NEVER, branches_at, leave, leaving_fraction
-from gearchaos_kernels.equations import gaps_at
+from gearchaos_kernels.equations import flank_rate, from_error, from_rest, gaps_at
 from gearchaos_kernels.forcing import forcing_at, phase_within
 from gearchaos_kernels.rows import STRIDE
 from gearchaos_kernels.teeth import between, point_on_grid
@@ -39,6 +39,7 @@ def split_step(memory, slot, table, shares, number, recorded, present):
     begin = forcing_at(lane, point, present)
     point = point_on_grid(memory, slot, table, shares, 2 * number + 2, present)
     end = forcing_at(lane, point, present)
+    state, after = from_rest(state, begin, present), from_rest(after, end, present)
     gaps = gaps_at(state, lane, begin, present)
     branches = read_branches(memory, slot)
     done = 0.0
@@ -65,8 +66,9 @@ def split_step(memory, slot, table, shares, number, recorded, present):
         crossings += 1
         gaps = gaps_at(state, lane, begin, present)
         gap = gaps.axial if axially else gaps.tangential
+        speed = flank_rate(gap, begin, present)
         branches = leave(
-            memory, slot, axially, gap, branches, lane, number + done, recorded, present
+            memory, slot, axially, gap, speed, branches, lane, number + done, recorded, present
         )
 
         left = 1.0 - done
@@ -75,7 +77,7 @@ def split_step(memory, slot, table, shares, number, recorded, present):
         )
         during = begin, middle, middle, end
         after, slopes = rk4.advance(rk4.motion, state, left, lane, during, branches, present)
-        write_state(memory, rows.STATE, slot, after, present)
+        write_state(memory, rows.STATE, slot, from_error(after, end, present), present)
         if present.tangent is not None:
             tangent_after, _ = rk4.advance(rk4.tangent, tangent, left, lane, slopes, None, present)
             write_state(memory, rows.TANGENT, slot, tangent_after, present)

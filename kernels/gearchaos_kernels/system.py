@@ -70,8 +70,8 @@ class Teeth(NamedTuple):
     one): the errors in the order in which teeth come into mesh, positive where the flank lies
     ahead in the direction of rotation, in units of `Groups.error_amplitude`; ``profile`` (lanes,):
     which of these a lane has. ``share`` (cells,): mean share of one tooth pair in the mesh force
-    over each cell, of which a mesh period has ``cells_per_period``, from its coming into mesh at
-    mesh phase ``entry``, in periods, on.
+    over each cell, of which a mesh period has ``cells_per_period``, from its coming into mesh on:
+    pair j, of the teeth j of both gears, comes into mesh at mesh phase j + ``entry``, in periods.
     """
 
     driving: Floats
@@ -83,18 +83,31 @@ class Teeth(NamedTuple):
 
     @property
     def begins(self) -> float:
-        """Mesh phase, in periods, at which the first pair of a period begins to take load.
+        """Mesh phase, in periods, at which pair 0 begins to take load.
 
-        The spline of a cell is centred on it and reaches beyond; what then begins before the period
-        does is the next pair.
+        The spline of a cell is centred on it and reaches beyond, so that this may lie before 0.
         """
-        return (self.entry - SPLINE_DEGREE / (2.0 * self.cells_per_period)) % 1.0
+        return self.entry - SPLINE_DEGREE / (2.0 * self.cells_per_period)
+
+    @property
+    def ahead(self) -> int:
+        """How many pairs beyond the one of its number begin to take load in a mesh period."""
+        return -math.floor(self.begins)
+
+    @property
+    def most_at_once(self) -> int:
+        """Most tooth pairs that share the load at the same time."""
+        return math.ceil(self._reach)
+
+    @property
+    def _reach(self) -> float:
+        """Mesh periods in which a pair has a share."""
+        return (self.share.size + SPLINE_DEGREE) / self.cells_per_period
 
     @property
     def pairs_in_mesh(self) -> int:
         """Most tooth pairs that have a share in the same mesh period."""
-        reach = (self.share.size + SPLINE_DEGREE) / self.cells_per_period
-        return math.ceil(reach + self.begins)
+        return math.ceil(self._reach + self.begins + self.ahead)
 
 
 class System(NamedTuple):

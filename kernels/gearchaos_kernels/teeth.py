@@ -52,7 +52,8 @@ def share_table(teeth: Teeth, steps_per_period: int) -> Floats:
         raise ValueError(f"{most} tooth pairs in mesh at once, more than {MOST_PAIRS}")
     share = np.ascontiguousarray(teeth.share, dtype=np.float64).tobytes()
     pairs = NARROW if most <= NARROW else MOST_PAIRS
-    return _table(share, teeth.cells_per_period, teeth.begins, pairs, steps_per_period)
+    begins = teeth.begins + teeth.ahead
+    return _table(share, teeth.cells_per_period, begins, pairs, steps_per_period)
 
 
 @lru_cache(maxsize=8)
@@ -84,12 +85,17 @@ def _basis(x: Floats, derivative: int, degree: int = SPLINE_DEGREE) -> Floats:
     return spline
 
 
+def last_pair(system: System, period: int) -> int:
+    """Return the number of the pair that is the last one to come into mesh in a mesh period."""
+    return period if system.teeth is None else period + system.teeth.ahead
+
+
 @scalar
-def engage(memory, slot, driving, driven, period):
+def engage(memory, slot, driving, driven, last):
     """Store the errors of the pairs in mesh: that of the last one to come, the rest less that."""
     newest = 0.0
     for place in range(MOST_PAIRS):
-        pair = period - place
+        pair = last - place
         error = driven[pair % driven.shape[0]] - driving[pair % driving.shape[0]] - newest
         memory[(PAIRS + place) * STRIDE + slot] = error
         if place == 0:

@@ -76,7 +76,7 @@ def test_neighbours_an_excitation_period_apart_have_not_jumped():
     gear = "pitch_error={kind='teeth', driving={file='inspection.csv', column='driving'}}"
     starts = "start={kind='random', spread=1.0}"
     lengths = ("integration.transient_periods=2100", "integration.recorded_periods=126")
-    values = "sweep={parameter='pitch_error', from=115.9, to=116.3, count=9}"
+    values = "sweep={parameter='pitch_error', from=107.8, to=108.2, count=9}"
     scene = "scene.effects=['pitch_error', 'stiffness_variation', 'backlash']"
     overrides = [gear, starts, *lengths, values, scene, "outputs.section_points=42"]
     result = gearchaos.run(gearchaos.load_config("sweeps/inspection.toml", overrides))

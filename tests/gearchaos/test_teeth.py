@@ -7,7 +7,10 @@ from gearchaos_kernels import integrate
 import gearchaos
 from gearchaos.configuration import Configuration
 from gearchaos.dynamics.systems import plan_of, system_of
+from gearchaos.engine.excitation import remarks, whole_lengths
+from gearchaos.engine.lanes import Lanes
 from gearchaos.engine.recomputing import computable
+from gearchaos.gear.contact_lines import TrapezoidalStiffness, contact_shares
 
 DEVIATIONS = np.round(12.0 * np.sin(2.0 * np.pi * np.arange(21) / 21), 2) + [0, 5, -4] * 7
 
@@ -118,6 +121,67 @@ def test_forces_after_a_transient_are_those_of_the_teeth_that_it_has_come_to():
     steps = whole.pitch_error.size // 6
     assert np.array_equal(later.pitch_error, whole.pitch_error[4 * steps :])
     assert later.force_tangential == pytest.approx(whole.force_tangential[4 * steps :], abs=1e-11)
+
+
+@pytest.mark.parametrize("helix_angle", [0.0, 15.0, 20.0, 30.0])
+def test_rigid_slow_teeth_transmit_what_an_eccentric_pinion_does(helix_angle):
+    teeth, range_um = 63, 40.0
+    pair = {**TABLES["pair"], "teeth": [teeth, 38], "helix_angle_deg": helix_angle}
+    around = 2.0 * np.pi * np.arange(teeth) / teeth
+    deviations = (0.5 * range_um * np.sin(around)).tolist()
+    # The load bends the teeth by a thousandth of the range, as the stiffness varies by less.
+    rigid = {"mesh_frequency": 0.1, "load": 0.001 * range_um / 50.0, "damping_ratio": 0.3}
+    config = configured(
+        pair=pair,
+        groups=rigid,
+        pitch_error={"kind": "teeth", "driving": {"cumulative_um": deviations}},
+        start={"kind": "contact"},
+        sweep={"parameter": "pitch_error", "values": [1.0]},
+        integration={"transient_periods": 63, "recorded_periods": 189},
+    )
+    response = gearchaos.System(config).response(periods=teeth)
+    error_um = 50.0 * (response["delta_5"] + response["mesh_error"])[0]
+    # Along the line of action, which in the transverse plane has the angle alpha_t.
+    alpha_t = np.arctan(np.tan(np.radians(20.0)) / np.cos(np.radians(helix_angle)))
+    assert np.ptp(error_um) == pytest.approx(range_um * np.cos(alpha_t), rel=0.01)
+
+
+def noted(**changes) -> str:
+    """Return the remarks before a sweep of one lane."""
+    lanes = Lanes(configured(sweep={"parameter": "pitch_error", "values": [1.0]}, **changes))
+    return " ".join(remarks(lanes, whole_lengths(lanes)))
+
+
+def with_errors(deviations, load: float) -> dict:
+    """Return the tables of a pinion with these deviations of its first teeth, and of a load."""
+    listed = [*deviations, *[0.0] * (21 - len(deviations))]
+    return {
+        "pitch_error": {"kind": "teeth", "driving": {"cumulative_um": listed}},
+        "groups": {**TABLES["groups"], "load": load},
+    }
+
+
+def test_pairs_that_share_the_load_part_where_they_differ_by_more_than_it_bends_them():
+    # Three pairs share at once; neighbours differ by 10 um, the first and the third by 20.
+    slope = with_errors([0.0, 10.0, 20.0, 10.0], load=0.3)
+    along, cosine = np.cos(np.radians(21.1728)) / 50.0, np.cos(np.radians(18.7472))
+    told = "of the lanes tooth pairs that share the load differ by up to"
+    for times, parts in ((19.9, True), (20.1, False)):
+        slope["groups"] = {**slope["groups"], "load": times * along * cosine}
+        assert (told in noted(**slope)) == parts
+
+
+def test_the_printed_form_says_what_it_makes_of_errors_of_teeth():
+    assert 'formulation = "published" enters the mean' in noted(formulation="published")
+    assert "published" not in noted()
+
+
+@pytest.mark.parametrize("turned", [-1e-12, 0.0, 1e-12])
+def test_a_pair_that_comes_into_mesh_with_the_period_does_so_but_for_rounding(turned):
+    for ratio in (1.3, 1.5, 1.7):
+        stiffness = TrapezoidalStiffness.from_contact_ratios(ratio, 0.0).coefficients(1)[0]
+        _, _, entry = contact_shares(ratio, 0.0, 0.1, complex(stiffness * np.exp(1j * turned)))
+        assert entry < 1e-9
 
 
 def test_a_contact_ratio_that_no_pair_of_gears_can_have_is_refused():

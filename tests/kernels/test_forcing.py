@@ -93,7 +93,9 @@ def test_the_table_is_no_wider_than_its_series_needs():
     assert widths == sorted(widths, reverse=True)
 
 
-EVERYTHING, NOTHING = (Present(*[flag] * len(Present._fields)) for flag in (True, None))
+ALL, NOTHING = (Present(*[flag] * len(Present._fields)) for flag in (True, None))
+EVERYTHING = ALL._replace(undamped=None)
+"""With the sine of eq. 14: what teeth have of their own does not drive delta_5."""
 
 
 def lane(**values: float) -> Lane:
@@ -131,6 +133,14 @@ def test_load_and_pitch_error_follow_the_shifted_phase(fraction, phi):
         0.5 * slope,
     )
     assert found == pytest.approx(wanted, rel=0, abs=10.0 * ROUNDING)
+
+
+def test_an_error_of_teeth_drives_the_springs_and_not_the_load():
+    groups = lane(load=0.3, error_inertia=0.7, error_mean=0.05, error_amplitude=1.3, cos_phase=1.0)
+    point = phase_within(phase_table(*series(6), 40), 3, 0.3)
+    found = forcing_at(groups, point, ALL)
+    assert found.drive == 0.3
+    assert found.error == pytest.approx(0.05 + 1.3 * point.value, abs=ROUNDING)
 
 
 def test_what_a_scene_leaves_out_is_zero_or_constant():

@@ -11,7 +11,7 @@ from .reference import FULL, assert_same_bits, drawn_teeth, lanes_out_of, pan202
 from .test_determinism import joined
 from .test_evaluation import accelerations, lane
 from .test_teeth_order import spur_teeth
-from .twin import Twin
+from .twin import Twin, shared_error
 
 STEPS = 60
 TOTAL = 2 * LANES + 5
@@ -42,7 +42,7 @@ def whole():
 def test_the_shares_are_splines_that_add_up_to_one(teeth):
     table = share_table(teeth, STEPS)
     cells = teeth.cells_per_period
-    knots = teeth.begins + np.arange(-5, teeth.share.size + 11) / cells
+    knots = teeth.begins + teeth.ahead + np.arange(-5, teeth.share.size + 11) / cells
     spline = BSpline(knots, np.pad(teeth.share, 5), 5, extrapolate=False)
     phase = np.arange(2 * STEPS + 1) / (2 * STEPS)
     pairs = 1 + table.shape[2]
@@ -55,6 +55,27 @@ def test_the_shares_are_splines_that_add_up_to_one(teeth):
         assert shares.sum(axis=1) == pytest.approx(float(order == 0), rel=0, abs=tolerance)
     # A mesh period ends where the next one begins, each pair one place further on.
     assert np.array_equal(table[-1, :, :-1], table[0, :, 1:])
+
+
+@pytest.mark.parametrize("entry", [0.0, 0.05, 0.125, 0.3, 0.99])
+@pytest.mark.parametrize("first", [0, 7])
+def test_a_pair_comes_into_mesh_at_its_own_phase(entry, first):
+    # Pair 0 alone is wrong, once in five periods; a cell is a twentieth of one.
+    teeth = spur_teeth(1, 5, 1)._replace(entry=entry, profile=np.zeros(3, np.intp))
+    teeth = teeth._replace(driving=np.zeros((1, 1)), driven=np.eye(5)[:1])
+    model = MODEL._replace(error_mean=np.zeros(TOTAL), error_amplitude=np.ones(TOTAL))
+    system = system_of(model, teeth=teeth)._replace(physical=True).of([0, 1, 2])
+    states = np.zeros((3, 5 * STEPS + 1, 10))
+    error = mesh_motion(system, states, STEPS, first).pitch_error[0]
+    phase = first + np.arange(error.size) / STEPS
+    wanted = [shared_error(teeth, 0, at)[0] for at in phase]
+    assert error == pytest.approx(np.array(wanted), rel=0, abs=1e-12)
+    since = (phase - entry + 1.0) % 5.0 - 1.0
+    margin = 3.0 / teeth.cells_per_period
+    apart = (since < -margin) | (since > 1.5 + margin)
+    assert np.abs(error[apart]).max() < 1e-14 and apart.sum() > STEPS
+    assert error[(since > margin) & (since < 0.5 - margin)] == pytest.approx(0.5)
+    assert error[(since > 0.5 + margin) & (since < 1.0 - margin)] == pytest.approx(1.0)
 
 
 def test_more_than_seven_pairs_in_mesh_are_refused():
@@ -177,7 +198,8 @@ def mesh_forces(twin: Twin, tau: float, state: np.ndarray) -> list[float]:
     error, error_rate, _ = twin.error(tau)
     beta, damping = twin.groups.base_helix_angle, 2.0 * twin.groups.damping_ratio
     limits = twin.groups.half_backlash * np.array([np.cos(beta), np.sin(beta)])
-    gaps, rates = twin.relative(state[0::2], error), twin.relative(state[1::2], error_rate)
+    gaps = twin.relative(state[0::2], error)
+    rates = twin.damped_rates(state[1::2], error_rate)
     return [
         twin.stiffness(tau) * twin.clearance(gap, limit)[0] + damping * rate
         for gap, rate, limit in zip(gaps, rates, limits, strict=True)

@@ -39,7 +39,7 @@ def shared_error(teeth: Teeth, profile: int, phase: float) -> np.ndarray:
     With its first and second derivative by the phase in radians.
     """
     driving, driven = teeth.driving[profile], teeth.driven[profile]
-    begin = (teeth.entry - 2.5 / teeth.cells_per_period) % 1.0
+    begin = teeth.entry - 2.5 / teeth.cells_per_period
     pairs = np.arange(math.floor(phase) - 10, math.floor(phase) + 2)
     places = teeth.cells_per_period * (phase - pairs - begin)
     in_mesh = (places > 0.0) & (places < teeth.share.size + 5)
@@ -92,9 +92,25 @@ class Twin:
         along_mesh = delta[DELTA_1] - delta[DELTA_2] + delta[DELTA_5]
         if self.physical:
             along_mesh = along_mesh + error
-        y_1 = along_mesh - error * np.cos(beta)
-        y_2 = delta[DELTA_3] - delta[DELTA_4] - np.tan(beta) * along_mesh - error * np.sin(beta)
+        # What both gaps lose: the projections of eqs 2 to 5, of a length e in the normal direction.
+        normal = error / np.cos(beta) if self.of_flanks else error
+        y_1 = along_mesh - normal * np.cos(beta)
+        y_2 = delta[DELTA_3] - delta[DELTA_4] - np.tan(beta) * along_mesh - normal * np.sin(beta)
         return y_1, y_2
+
+    @property
+    def of_flanks(self):
+        """Whether each pair in mesh has a constant error in the transverse plane."""
+        return self.physical and self.teeth is not None and self.scene.pitch_error
+
+    def damped_rates(self, rate, error_rate):
+        """The rates that the mesh damper sees: of y_1 and y_2, or of what the gears approach."""
+        if not self.of_flanks:
+            return self.relative(rate, error_rate)
+        # delta_5 is measured from e, and the approach of the gears is not.
+        approach = rate[DELTA_1] - rate[DELTA_2] + (rate[DELTA_5] + error_rate)
+        axial = rate[DELTA_3] - rate[DELTA_4]
+        return approach, axial - np.tan(self.groups.base_helix_angle) * approach
 
     def clearance(self, y, half_backlash):
         """f(y; b) and its slope, eqs 22 and 23."""
@@ -134,7 +150,7 @@ class Twin:
         kappa = self.stiffness(tau)
         error, error_rate, inertia = self.error(tau)
         y_1, y_2 = self.relative(delta, error)
-        y_1_rate, y_2_rate = self.relative(rate, error_rate)
+        y_1_rate, y_2_rate = self.damped_rates(rate, error_rate)
         elastic_y, active_y = self.clearance(y_1, g.half_backlash * np.cos(g.base_helix_angle))
         elastic_z, active_z = self.clearance(y_2, g.half_backlash * np.sin(g.base_helix_angle))
         acceleration = self.accelerations(
@@ -155,23 +171,41 @@ class Twin:
         )
         return np.concatenate([rate, acceleration, tangent_rate, tangent_acceleration])
 
+    def from_rest(self, tau, sign=1.0):
+        """What measuring delta_5 from rest adds to state and tangent vector, shape (20,)."""
+        added = np.zeros(20)
+        if self.of_flanks:
+            added[DELTA_5], added[5 + DELTA_5], _ = np.multiply(sign, self.error(tau))
+        return added
+
+    def slope_from_rest(self, tau, joint):
+        """The time derivative where an error of teeth moves delta_5 along with itself."""
+        slope = self.slope(tau, joint + self.from_rest(tau, -1.0))
+        if self.of_flanks:
+            _, rate, inertia = self.error(tau)
+            slope[DELTA_5] += rate
+            slope[5 + DELTA_5] -= inertia
+        return slope
+
     def integrate(self, start, steps: int, periods: int) -> Motion:
-        """Take ``steps`` Runge-Kutta steps in each mesh period."""
+        """Take ``steps`` Runge-Kutta steps in each mesh period, in coordinates at rest."""
         # Here displacements come first, then rates.
         start = np.where(self.present, np.concatenate([start[0::2], start[1::2]]), 0.0)
         joint = np.concatenate([start, self.present / np.sqrt(np.sum(self.present))])
         h = 2.0 * np.pi / self.groups.mesh_frequency / steps
+        joint = joint + self.from_rest(0.0)
         states, growth = [], []
         for period in range(periods):
             for number in range(steps):
                 tau = (period * steps + number) * h
-                k_1 = self.slope(tau, joint)
-                k_2 = self.slope(tau + h / 2.0, joint + h / 2.0 * k_1)
-                k_3 = self.slope(tau + h / 2.0, joint + h / 2.0 * k_2)
-                k_4 = self.slope(tau + h, joint + h * k_3)
+                k_1 = self.slope_from_rest(tau, joint)
+                k_2 = self.slope_from_rest(tau + h / 2.0, joint + h / 2.0 * k_1)
+                k_3 = self.slope_from_rest(tau + h / 2.0, joint + h / 2.0 * k_2)
+                k_4 = self.slope_from_rest(tau + h, joint + h * k_3)
                 joint = joint + h / 6.0 * (k_1 + 2.0 * k_2 + 2.0 * k_3 + k_4)
             length = np.linalg.norm(joint[10:])
             joint[10:] /= length
-            states.append(joint[:10].reshape(2, 5).T.ravel())
+            seen = joint + self.from_rest((period + 1) * steps * h, -1.0)
+            states.append(seen[:10].reshape(2, 5).T.ravel())
             growth.append(np.log(length))
         return Motion(np.array(states), np.array(growth))

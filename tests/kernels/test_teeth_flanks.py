@@ -1,0 +1,146 @@
+"""Errors of single teeth in the physical form: which plane they lie in, and what damps their mean.
+
+Each pair in mesh has a constant error, so that the mean of the pairs in mesh acts on the mesh
+springs and not on the dampers. In the limit of a spur pair whose teeth take their load at once the
+mean is a row of steps, and the motion between them one of constant coefficients.
+"""
+
+import numpy as np
+import pytest
+from gearchaos_kernels import Groups, Plan, System, Teeth, integrate, mesh_motion
+from scipy.linalg import expm
+
+from .reference import TORSION, TORSION_ONLY, drawn_teeth, pan2021, system_of
+from .test_evaluation import lane
+from .test_order import measured_order
+from .twin import Twin
+
+ERRORS_ONLY = TORSION._replace(pitch_error=True)
+FORCE, ERROR = 0, 2
+LARGEST, SMALLEST = range(2)
+FREQUENCY, DAMPING, LOAD = 0.2, 0.15, 1.0
+PERIOD = 2.0 * np.pi / FREQUENCY
+TEETH = np.array([0.0, 0.9, -0.7, 0.4, -0.2])
+"""Errors of the driven teeth; neighbours differ by more than the static deflection."""
+
+
+def spur_system(smoothing: float, physical: bool = True) -> System:
+    """Return a spur pair of contact ratio 1.5 whose teeth take their load in so short a time."""
+    cells = round(6.0 / smoothing)
+    assert cells % 2 == 0
+    share = np.repeat([0.5, 1.0, 0.5], cells // 2)
+    teeth = Teeth(np.zeros((1, 1)), TEETH[np.newaxis], np.zeros(1, np.intp), share, cells, 0.25)
+    values = {
+        "mesh_frequency": FREQUENCY,
+        "load": LOAD,
+        "damping_ratio": DAMPING,
+        "error_amplitude": 1.0,
+        "mass_ratio_p": 1.0,
+        "mass_ratio_g": 1.0,
+    }
+    groups = Groups(*(np.full(1, values.get(name, 0.0)) for name in Groups._fields))
+    return System(ERRORS_ONLY, groups, np.zeros(0), np.zeros(0), physical, teeth)
+
+
+def extremes(smoothing: float, physical: bool = True) -> np.ndarray:
+    """Return the largest and the smallest mesh force once the motion repeats."""
+    steps = round(12.0 / smoothing)
+    plan = Plan(max(steps, 400), 5 * TEETH.size, TEETH.size, 1, loads=True)
+    loads = integrate(spur_system(smoothing, physical), np.zeros((1, 2)), plan).loads
+    return loads[0, FORCE, [LARGEST, SMALLEST]]
+
+
+def extremes_of_steps() -> np.ndarray:
+    """Return the extremes of x'' + F = load, F = x - e + 2 xi x', with e a row of steps.
+
+    Half of each period one pair carries, the other half two that share. The state is followed by
+    matrix exponentials until it repeats.
+    """
+    parts = 0.5 * (TEETH + np.roll(TEETH, 1)), TEETH
+    levels = np.stack(parts, axis=1).ravel()
+    matrix = np.array([[0.0, 1.0], [-1.0, -2.0 * DAMPING]])
+    fine = 2000
+    part = expm(matrix * PERIOD / 2.0 / fine)
+    state, forces = np.zeros(2), []
+    for turn in range(6):
+        for level in levels:
+            rest = np.array([LOAD + level, 0.0])
+            for _ in range(fine):
+                if turn == 5:
+                    forces.append(state[0] - level + 2.0 * DAMPING * state[1])
+                state = rest + part @ (state - rest)
+    return np.array([max(forces), min(forces)])
+
+
+def test_forces_of_a_spur_pair_tend_to_those_of_teeth_that_take_their_load_at_once():
+    limit = extremes_of_steps()
+    smoothings = np.array([0.12, 0.06, 0.03, 0.015, 0.01])
+    missing = np.array([np.abs(extremes(smoothing) - limit).max() for smoothing in smoothings])
+    # In the share of a period in which teeth take their load the pair moves in proportion to it.
+    assert measured_order(missing, 1.0 / smoothings) > 0.9
+    assert missing[-1] < smoothings[-1] * PERIOD
+
+
+def test_the_printed_form_damps_the_rate_of_the_mean_which_has_no_limit():
+    printed = [extremes(smoothing, physical=False)[0] for smoothing in (0.06, 0.03, 0.015)]
+    first, second = np.diff(printed)
+    assert second > 1.5 * first > 0.0
+
+
+LANES = 3
+MODEL = pan2021(
+    np.linspace(40.0, 60.0, LANES), error_mean=0.2, load=0.1, half_backlash=0.3, mesh_frequency=2.0
+)
+MESH = drawn_teeth(3, 2, LANES)
+PLAN = Plan(400, 6, 18, 1, contact=True, loads=True)
+
+
+@pytest.fixture(scope="module")
+def recorded():
+    system = system_of(MODEL, TORSION_ONLY, physical=True, teeth=MESH)
+    start = np.tile([0.5, 0.0], (LANES, 1))
+    told = integrate(system, start, PLAN)
+    fine = integrate(system, start, PLAN._replace(steps_per_period=6400, history_periods=18))
+    return told, fine, mesh_motion(system, fine.history, 6400, 6)
+
+
+def rates_of_the_error(number: int, phases: np.ndarray) -> np.ndarray:
+    """Return the rate of the error that the teeth of a lane share, per unit of tau."""
+    twin = Twin(lane(MODEL, number), TORSION_ONLY, True, MESH)
+    twin.groups.profile = MESH.profile[number]
+    period = 2.0 * np.pi / twin.groups.mesh_frequency
+    return np.array([twin.error(phase * period)[1] for phase in phases])
+
+
+def test_loads_of_teeth_are_those_of_their_motion_at_sixteen_times_the_steps(recorded):
+    told, fine, motion = recorded
+    signals = motion.force_tangential, fine.history[..., 0] + motion.pitch_error
+    for number, values in zip((FORCE, ERROR), signals, strict=True):
+        # The samples of the motion may miss a kink by half their distance.
+        missed = np.abs(np.diff(values, axis=1)).max(axis=1)
+        found = told.loads[:, number, [LARGEST, SMALLEST]].T
+        difference = np.abs(found - [values.max(axis=1), values.min(axis=1)])
+        assert (difference <= missed + 1e-4 * np.abs(values).max(axis=1)).all()
+
+
+def test_teeth_meet_with_the_speed_of_the_gears_and_graze_with_that_of_the_gap(recorded):
+    _, told, motion = recorded
+    phases = 6.0 + np.arange(told.history.shape[1]) / 6400
+    for number in range(LANES):
+        # Measured from the error of the teeth, delta_5 is the gap of rigid bearings.
+        gap, gap_rate = told.history[number].T
+        flank = motion.contact_tangential[number]
+        before = np.flatnonzero(np.diff(flank))
+        edge = np.where(gap[before] > 0.0, 1.0, -1.0) * MODEL.half_backlash[number]
+        edge *= np.cos(MODEL.base_helix_angle[number])
+        share = (edge - gap[before]) / (gap[before + 1] - gap[before])
+        speeds = gap_rate[before] + share * (gap_rate[before + 1] - gap_rate[before])
+        of_gears = speeds + rates_of_the_error(number, phases[before] + share / 6400)
+        meets = flank[before] == 0
+        assert meets.sum() > 2 and told.crossings[number] == before.size
+        assert told.slowest_crossing[number] == pytest.approx(np.abs(speeds).min(), abs=1e-4)
+        _, on_driving, _, on_back, total, largest = told.contact[number, :6]
+        assert on_driving + on_back == meets.sum()
+        assert largest == pytest.approx(np.abs(of_gears[meets]).max(), abs=1e-4)
+        assert total == pytest.approx(np.abs(of_gears[meets]).sum(), abs=1e-4 * meets.sum())
+        assert np.abs(of_gears - speeds).max() > 0.01
