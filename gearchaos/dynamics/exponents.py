@@ -11,6 +11,7 @@ import numpy as np
 from gearchaos_kernels import Plan, System, integrate, jacobian
 
 from gearchaos.arrays import Floats
+from gearchaos.dynamics.modes import memory
 from gearchaos.records.lyapunov import largest_exponent
 
 SMALLEST_RESOLVED = 1e-8
@@ -62,7 +63,9 @@ def exponents(system: System, start: Floats, plan: Plan) -> Exponents:
         if period >= 0:
             logarithms[:, :, period] = growth[:, :, 0] + np.log(np.where(resolved, left, np.nan))
     mean, error = largest_exponent(
-        logarithms.reshape(lanes * states, -1), np.repeat(system.mesh_period, states)
+        logarithms.reshape(lanes * states, -1),
+        np.repeat(system.mesh_period, states),
+        np.repeat(memory(system), states),
     )
     mean, error = mean.reshape(lanes, states), error.reshape(lanes, states)
     descending = np.argsort(-mean, axis=1, kind="stable")

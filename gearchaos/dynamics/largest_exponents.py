@@ -7,6 +7,7 @@ from gearchaos_kernels import Outcome, Plan, System
 
 from gearchaos.arrays import Codes, Counts, Floats
 from gearchaos.dynamics.exponents import SMALLEST_RESOLVED
+from gearchaos.dynamics.modes import memory
 from gearchaos.dynamics.orbits import polish
 from gearchaos.records.label import CHAOTIC_GROWTH
 from gearchaos.records.lyapunov import largest_exponent
@@ -42,7 +43,7 @@ def largest_exponents(
     does not count. ``outcome``: with growth, integrated by ``plan``; ``period`` (lanes,) in
     excitation periods, 0 where a lane is not periodic.
     """
-    values, errors = largest_exponent(outcome.growth, system.mesh_period)
+    values, errors = largest_exponent(outcome.growth, system.mesh_period, memory(system))
     record = np.full(period.shape, NOT_TOLD, dtype=np.uint8)
     of_orbit = np.full((period.size, len(system.states)), np.nan)
     found = LargestExponents(values, errors, record, of_orbit)

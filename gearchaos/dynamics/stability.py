@@ -32,15 +32,19 @@ def fewest_stable_steps(system: System) -> Integers:
     time only may survive with fewer steps. Eigenvalues whose real part is positive grow by
     themselves and set no limit. Every larger number of steps, shape (lanes,), is stable too.
     """
-    # Groups that no computation could hold are cut short of overflow.
-    clipped = (np.clip(group, -_BEYOND_MEASURE, _BEYOND_MEASURE) for group in system.groups)
-    system = system._replace(groups=Groups(*clipped))
+    system = measurable(system)
     # The axial motion acts on nothing else: both directions in contact or apart are all there is.
     held = (jacobian(system, stiffness, stiffness) for stiffness in mesh_stiffnesses(system))
     demand = np.max([_demand(matrix) for matrix in held], axis=0)
     with np.errstate(over="ignore"):
         steps: Floats = np.ceil(demand * (1.0 - ROUNDING) * system.mesh_period)
     return np.clip(steps, 1.0, MOST_STEPS).astype(np.intp)
+
+
+def measurable(system: System) -> System:
+    """Return a system whose groups that no computation could hold are cut short of overflow."""
+    clipped = (np.clip(group, -_BEYOND_MEASURE, _BEYOND_MEASURE) for group in system.groups)
+    return system._replace(groups=Groups(*clipped))
 
 
 def exponent_bias(system: System, steps: int) -> tuple[Floats, Floats]:

@@ -3,13 +3,17 @@
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
-from gearchaos.arrays import Floats
+from gearchaos.arrays import Counts, Floats
 
 BLOCKS = 8
 """Blocks side by side whose estimates give the standard error; half-way blocks lie between them."""
 
+FEWEST_WAVES = 2  # Slow waves that a standard error is taken from at least.
 
-def largest_exponent(growth: Floats, period: Floats) -> tuple[Floats, Floats]:
+
+def largest_exponent(
+    growth: Floats, period: Floats, memory: Floats | None = None
+) -> tuple[Floats, Floats]:
     """Estimate the largest Lyapunov exponent of every lane, per unit of tau, with its error.
 
     The growth rates of the single periods are averaged with weights sin^2 that fall off smoothly at
@@ -20,9 +24,24 @@ def largest_exponent(growth: Floats, period: Floats) -> tuple[Floats, Floats]:
     1967: nearly independent under these weights), widened such that two of it cover as much as two
     of a normal distribution; it is not a number where fewer than two periods were recorded.
 
-    ``growth`` (lanes, periods): logarithm of the tangent vector's growth over each recorded mesh
-    period; ``period`` (lanes,): its duration. Returned are two arrays (lanes,), both not a number
-    where the lane diverged.
+    Blocks shorter than the memory of the motion depend on each other, and their spread understates
+    the error. There the slow waves of the block estimates count as well, see `_slow_errors`, and
+    the larger error is returned.
+
+    Parameters
+    ----------
+    growth : array, shape (lanes, periods)
+        Logarithm of the tangent vector's growth over each recorded mesh period.
+    period : array, shape (lanes,)
+        Duration of a mesh period in units of tau.
+    memory : array, shape (lanes,), optional
+        Mesh periods in which the slowest mode of a lane falls by a factor e; left out, the blocks
+        count as independent.
+
+    Returns
+    -------
+    tuple of two arrays, shape (lanes,)
+        Exponents and standard errors per unit of tau, both not a number where the lane diverged.
     """
     periods = growth.shape[1]
     exponent = _weighted_mean(growth) / period
@@ -34,12 +53,53 @@ def largest_exponent(growth: Floats, period: Floats) -> tuple[Floats, Floats]:
     spread = np.std(means, axis=1, ddof=1) / period
     # The quantile of Student's t at two standard errors, to first order in 1/freedom.
     few = 1.0 + 1.25 / (means.shape[1] - 1)
-    return exponent, few * spread * np.sqrt(length / periods)
+    error = few * spread * np.sqrt(length / periods)
+    if memory is None:
+        return exponent, error
+    slow = memory * BLOCKS > periods
+    # As many waves as pass within the record while the slowest mode remembers.
+    most = min(BLOCKS, means.shape[1] - 1)
+    waves = np.clip(periods / memory[slow], min(FEWEST_WAVES, most), most).astype(np.int32)
+    error[slow] = np.fmax(error[slow], _slow_errors(means[slow], periods, waves) / period[slow])
+    return exponent, error
+
+
+def _slow_errors(means: Floats, periods: int, waves: Counts) -> Floats:
+    """Return the standard error of the weighted mean of a record that remembers for long.
+
+    Its variance is that of the slowest movements there are in the record, and these are told by the
+    first cosines of the block means: the variance of white growth with the same cosines, averaged
+    over so many ``waves`` (lanes,) (Mueller 2007; Lazarus, Lewis, Stock, Watson 2018), widened by
+    the quantile of Student's t with as many degrees of freedom. ``means`` (lanes, blocks): of
+    blocks of a record of so many periods.
+    """
+    blocks, most = means.shape[1], int(waves.max(initial=1))
+    numbers = np.arange(1, most + 1)
+    cosines = np.cos(np.pi * numbers[:, np.newaxis] * (np.arange(blocks) + 0.5) / blocks)
+    length = max(1, periods // BLOCKS)
+    hop, kernel = max(1, length // 2), _weights(length)
+    # What a cosine of the block means is, as weights of the single periods.
+    over_record = np.zeros((most, periods))
+    for block, column in enumerate(cosines.T):
+        over_record[:, block * hop : block * hop + length] += np.outer(column, kernel)
+    # Elementwise sums: a matrix product would depend on the number of lanes.
+    found = np.stack([np.sum(means * cosine, axis=1) for cosine in cosines], axis=1)
+    variance = np.cumsum(found**2 / np.sum(over_record**2, axis=1), axis=1) / numbers
+    own = variance[np.arange(waves.size), waves - 1] * np.sum(_weights(periods) ** 2)
+    # The quantile of Student's t at two standard errors, to second order in 1/freedom.
+    few = 1.0 + 1.25 / waves + 1.53 / waves**2
+    errors: Floats = few * np.sqrt(own)
+    return errors
 
 
 def _weighted_mean(growth: Floats) -> Floats:
-    periods = growth.shape[-1]
-    weights = np.sin(np.pi * (np.arange(periods) + 0.5) / periods) ** 2
     # A matrix product would sum in an order that depends on the number of lanes.
-    means: Floats = np.sum(growth * (weights / np.sum(weights)), axis=-1)
+    means: Floats = np.sum(growth * _weights(growth.shape[-1]), axis=-1)
     return means
+
+
+def _weights(periods: int) -> Floats:
+    """Return the weights sin^2 of an average over so many periods, of sum 1."""
+    weights = np.sin(np.pi * (np.arange(periods) + 0.5) / periods) ** 2
+    normalised: Floats = weights / np.sum(weights)
+    return normalised

@@ -5,6 +5,7 @@ import pytest
 from gearchaos_kernels import Effects, Groups, Plan, integrate, jacobian
 
 from gearchaos.dynamics.exponents import exponents, period_jacobian, sum_of_exponents
+from gearchaos.dynamics.largest_exponents import largest_exponents
 from gearchaos.dynamics.stability import amplification
 from gearchaos.records.lyapunov import largest_exponent
 
@@ -180,3 +181,69 @@ def test_one_period_gives_exponents_without_standard_errors():
     assert np.isfinite(found.values).all()
     assert np.isnan(found.standard_errors).all()
     assert found.values.shape == (2, 2)
+
+
+@pytest.mark.parametrize(("exponent_gap", "resolved"), [(16.0, True), (20.0, False), (30.0, False)])
+def test_an_exponent_is_given_as_long_as_rounding_leaves_half_of_its_digits(exponent_gap, resolved):
+    # Overdamped and linear: decays xi -+ sqrt(xi^2 - 1) that part by the gap in a mesh period.
+    damping_ratio = 1.5
+    root = np.sqrt(damping_ratio**2 - 1.0)
+    model = pan2021(
+        0.0,
+        base_helix_angle=0.0,
+        damping_ratio=damping_ratio,
+        mesh_frequency=2.0 * np.pi * 2.0 * root / exponent_gap,
+    )
+    found = exponents_of(Effects(*[False] * 5), model, 2000, 30, 5).values[0]
+    assert found[0] == pytest.approx(root - damping_ratio, abs=1e-9)
+    assert np.isfinite(found[1]) == resolved
+    if resolved:
+        # Eps over exp(-16) of a vector is 2e-9, and the mean of 30 periods is no worse.
+        assert found[1] == pytest.approx(-root - damping_ratio, abs=1e-7)
+
+
+@pytest.mark.parametrize(("multiplier_gap", "resolved"), [(16.0, True), (20.0, False)])
+def test_multipliers_that_rounding_hides_give_no_exponents(multiplier_gap, resolved):
+    system = system_of(
+        pan2021(
+            1.0,
+            base_helix_angle=0.0,
+            damping_ratio=1.5,
+            mesh_frequency=2.0 * np.pi * 2.0 * np.sqrt(1.25) / multiplier_gap,
+        ),
+        Effects(True, False, False, False, False),
+    )
+    recorded = plan(500, 48, 20)._replace(tangent=True, section_points=48)
+    outcome = integrate(system, np.zeros((1, 2)), recorded)
+    period = np.ones(1, dtype=np.int32)
+    found = largest_exponents(system, outcome, recorded, period, outcome.end_state)
+    assert found.values[0] == pytest.approx(np.sqrt(1.25) - 1.5, abs=1e-7)
+    assert np.isfinite(found.of_orbit[0]).tolist() == [True, resolved]
+
+
+def test_two_standard_errors_cover_the_exponent_of_a_weakly_damped_pair():
+    weak = pan2021(
+        7.0,
+        load=0.183,
+        half_backlash=0.7215324,
+        damping_ratio=0.003,
+        error_amplitude=np.full(200, 7.0 * 0.02125545),
+        stiffness_variation_scale=1.0,
+        transverse_stiffness_p=1.9,
+        transverse_damping_p=0.003,
+        transverse_stiffness_g=0.9,
+        transverse_damping_g=0.002,
+    )
+    system = system_of(weak, NO_AXIAL)
+    start = 0.05 * np.random.default_rng(5).uniform(-1.0, 1.0, (200, 6))
+    record = Plan(100, 500, 200, 0, tangent=True)
+    outcome = integrate(system, start, record)
+    period = np.zeros(200, dtype=np.int32)
+    found = largest_exponents(system, outcome, record, period, outcome.end_state)
+    mean = np.mean(found.values)
+    # The mean of 200 lanes is known fourteen times better than one of them.
+    assert mean > 0.01
+    assert np.mean(np.abs(found.values - mean) <= 2.0 * found.standard_errors) >= 0.92
+    _, blind = largest_exponent(outcome.growth, system.mesh_period)
+    assert np.mean(np.abs(found.values - mean) <= 2.0 * blind) < 0.9
+    assert np.median(found.standard_errors / blind) < 2.2

@@ -108,3 +108,74 @@ def test_exponent_of_a_lane_does_not_depend_on_the_lanes_beside_it():
         part = estimate(growth[first : first + 13])
         assert np.array_equal(part[0], exponent[first : first + 13])
         assert np.array_equal(part[1], error[first : first + 13])
+
+
+def wandering(lanes: int, periods: int, memory: float) -> np.ndarray:
+    """Growth that is nearly white, with a slow part too small to see but half as important."""
+    rng = np.random.default_rng(11)
+    noise = rng.standard_normal((2, lanes, periods + 1000))
+    keeps = np.exp(-1.0 / memory)
+    slow = np.zeros((lanes, periods + 1000))
+    for period in range(1, slow.shape[1]):
+        slow[:, period] = keeps * slow[:, period - 1] + np.sqrt(1 - keeps**2) * noise[0, :, period]
+    # Its variance times twice its memory is that of the white part: together they count double.
+    return 0.3 + noise[1, :, 1000:] + slow[:, 1000:] / np.sqrt(2.0 * memory)
+
+
+@pytest.mark.parametrize("periods", [200, 500])
+def test_two_standard_errors_cover_an_exponent_whose_growth_remembers(periods):
+    memory = 80.0
+    growth, one = wandering(3000, periods, memory), np.ones(3000)
+    exponent, blind = largest_exponent(growth, one)
+    told = largest_exponent(growth, one, np.full(3000, memory))
+    assert np.array_equal(told[0], exponent)
+    covered = [np.mean(np.abs(exponent - 0.3) <= 2.0 * error) for error in (blind, told[1])]
+    assert covered[0] < 0.91
+    assert covered[1] > 0.92
+    # As wide as Student's t with two waves asks for, and no wider.
+    assert np.median(told[1]) < 2.2 * np.std(exponent)
+
+
+@pytest.mark.parametrize(("periods", "widest"), [(100, 2.1), (300, 1.7), (700, 1.3)])
+def test_white_growth_has_errors_that_are_wider_by_the_few_waves_of_a_long_memory(periods, widest):
+    growth = np.random.default_rng(periods).standard_normal((4000, periods))
+    one, memory = np.ones(4000), np.full(4000, 99.0)
+    exponent, blind = largest_exponent(growth, one)
+    error = largest_exponent(growth, one, memory)[1]
+    assert (error >= blind).all()
+    assert np.mean(np.abs(exponent) <= 2.0 * error) > 0.954
+    assert np.median(error / blind) < widest
+
+
+def test_blocks_longer_than_the_memory_are_left_alone():
+    growth = np.random.default_rng(4).standard_normal((50, 400))
+    one = np.ones(50)
+    alone = largest_exponent(growth, one)[1]
+    memory = np.linspace(40.0, 60.0, 50)
+    error = largest_exponent(growth, one, memory)[1]
+    # An eighth of the record: 50 periods.
+    assert np.array_equal(error[memory <= 50.0], alone[memory <= 50.0])
+    assert (error > alone)[memory > 50.0].mean() > 0.5
+
+
+def test_errors_with_a_memory_do_not_depend_on_the_lanes_beside_it():
+    growth = np.random.default_rng(1).standard_normal((97, 487))
+    growth[13, 400:] = np.nan
+    period, memory = np.full(97, PERIOD), np.geomspace(10.0, 1e4, 97)
+    memory[-1] = np.inf
+    error = largest_exponent(growth, period, memory)[1]
+    assert np.isfinite(np.delete(error, 13)).all()
+    assert np.isnan(error[13])
+    for first in range(0, 97, 13):
+        some = slice(first, first + 13)
+        part = largest_exponent(growth[some], period[some], memory[some])[1]
+        assert np.array_equal(part, error[some], equal_nan=True)
+
+
+@pytest.mark.parametrize("periods", [2, 3, 9, 16])
+def test_short_records_have_errors_with_a_memory_too(periods):
+    growth = np.random.default_rng(periods).standard_normal((5, periods))
+    alone = estimate(growth)[1]
+    error = largest_exponent(growth, np.full(5, PERIOD), np.full(5, 1e3))[1]
+    assert (error >= alone).all()
+    assert np.isfinite(error).all()
