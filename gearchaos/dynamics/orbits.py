@@ -24,13 +24,15 @@ class Orbits(NamedTuple):
     """Periodic orbits of some lanes.
 
     ``points`` (lanes, states): the state at tau = 0; ``multipliers`` (lanes, states), complex: the
-    Floquet multipliers, largest modulus first; both are not a number where no orbit was found.
-    ``residual`` (lanes,): largest distance after one period of the orbit, relative to the scale of
-    each coordinate; ``converged`` (lanes,).
+    Floquet multipliers, largest modulus first; ``monodromy`` (lanes, states, states): the Jacobian
+    of the map over one period of the orbit, whose eigenvalues they are; all three are not a number
+    where no orbit was found. ``residual`` (lanes,): largest distance after one period of the orbit,
+    relative to the scale of each coordinate; ``converged`` (lanes,).
     """
 
     points: Floats
     multipliers: Complex
+    monodromy: Floats
     residual: Floats
     converged: Mask
 
@@ -58,6 +60,7 @@ def polish(system: System, guess: Floats, period: Counts, plan: Plan) -> Orbits:
     found = Orbits(
         points=np.full(guess.shape, np.nan),
         multipliers=np.full(guess.shape, np.nan, dtype=np.complex128),
+        monodromy=np.full((*guess.shape, guess.shape[1]), np.nan),
         residual=np.full(guess.shape[0], np.nan),
         converged=np.zeros(guess.shape[0], dtype=np.bool_),
     )
@@ -108,11 +111,13 @@ def _polish(system: System, guess: Floats, plan: Plan) -> Orbits:
     closed = lanes[converged]
     points[~converged] = np.nan
     multipliers = np.full(points.shape, np.nan, dtype=np.complex128)
+    monodromy = np.full((*points.shape, points.shape[1]), np.nan)
     if closed.size:
-        found = np.linalg.eigvals(period_jacobian(system.of(closed), points[closed], plan))
+        monodromy[closed] = period_jacobian(system.of(closed), points[closed], plan)
+        found = np.linalg.eigvals(monodromy[closed])
         order = np.argsort(-np.abs(found), axis=1, kind="stable")
         multipliers[closed] = np.take_along_axis(found, order, axis=1)
-    return Orbits(points, multipliers, residual, converged)
+    return Orbits(points, multipliers, monodromy, residual, converged)
 
 
 def _newton_step(jacobian: Floats, returned: Floats) -> Floats:

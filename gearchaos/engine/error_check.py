@@ -14,6 +14,9 @@ MEANINGS = ("not_checked", "same", "changed")  # Meanings of the values of ``mot
 CHECKED = ("section_error", "exponent_step_error", "motion_changed")
 """Variables that the check yields."""
 
+OF_KEPT = "transient_left"
+"""One more: the largest distance of the kept section from the periodic orbit."""
+
 _OF_THE_RECORD = "lyapunov_exponent_standard_error"
 
 
@@ -31,7 +34,7 @@ class Tally:
     def __init__(self) -> None:
         self.diverged = self._too_fast = self._mixed = 0
         self._unsplit_lanes = self._unsplit_steps = 0
-        self._checked = {name: [np.zeros(0)] for name in (*CHECKED, _OF_THE_RECORD)}
+        self._checked = {name: [np.zeros(0)] for name in (*CHECKED, OF_KEPT, _OF_THE_RECORD)}
 
     def add(self, arrays: Mapping[str, Array]) -> None:
         """Count the lanes of one block."""
@@ -74,13 +77,17 @@ class Tally:
     @property
     def errors(self) -> str:
         """The errors in one line; empty where no lane was checked."""
-        section, exponent, motion, of_record = map(np.concatenate, self._checked.values())
+        found = map(np.concatenate, self._checked.values())
+        section, exponent, motion, of_kept, of_record = found
         if motion.size == 0:
             return ""
         text = f"{motion.size} lanes computed again with half the step: "
         periodic = np.isfinite(section)
         if periodic.any():
             text += f"section of {periodic.sum()} periodic ones off by {_spread(section[periodic])}"
+            farthest = np.fmax.reduce(of_kept[periodic])
+            if farthest > 2.0 * np.max(section[periodic]):
+                text += f" in the end (up to {farthest:.1e} where the kept section begins)"
             if np.isfinite(exponent[periodic]).any():
                 text += f", their exponent by {_spread(exponent[periodic])}"
             text += "; "

@@ -16,6 +16,7 @@ from gearchaos.dynamics.largest_exponents import largest_exponents
 from gearchaos.dynamics.stability import fewest_stable_steps
 from gearchaos.dynamics.systems import plan_of
 from gearchaos.engine import error_check
+from gearchaos.engine.claims import completed, points_of
 from gearchaos.engine.excitation import remarks, whole_lengths
 from gearchaos.engine.lanes import Lanes
 from gearchaos.engine.steps import (
@@ -28,6 +29,7 @@ from gearchaos.engine.steps import (
     solution_of,
     stable_steps,
 )
+from gearchaos.engine.transient import settled
 from gearchaos.interrupts import check
 from gearchaos.records.difference import difference
 from gearchaos.records.label import MEANINGS as MOTION_MEANINGS
@@ -71,19 +73,24 @@ class Simulation:
         self.notes = [text for text in notes if text]
 
     def choose_steps(self) -> None:
-        """Measure which number of steps the configured tolerance needs, and take it."""
+        """Measure which transient and which number of steps the tolerance needs, and take them."""
         tolerance = self.config.integration.tolerance
         if tolerance is None:
             return
+        kept = self.plan.section_points
+        transient, left, note = settled(self.lanes, self.recording, kept, tolerance, PILOT_LANES)
+        self.plan = self.plan._replace(transient_periods=transient)
+        self.notes += [note] if note else []
         coarsest = self.plan.steps_per_period
         lanes, solution = pilot(self.lanes, self.plan, PILOT_LANES, 4 * coarsest)
         candidates = choose_steps(
-            lambda steps: solution(steps, self.plan.resolved, self.plan.method),
+            lambda steps: solution(steps, self.plan.resolved, self.plan.method, hidden=True),
             coarsest,
             tolerance,
             self.config.source,
             # Finer flow maps are no more exact.
             4 * coarsest if self.plan.method == "flow_map" else MOST_STEPS,
+            left,
         )
         self.plan = self.plan._replace(steps_per_period=candidates[-1].steps)
         exponent = ", their exponent by {:.1e}" if self.plan.tangent else ""
@@ -301,12 +308,13 @@ class Simulation:
     ) -> dict[str, Array]:
         """Integrate and label the checked lanes of a block again with half the step, and compare.
 
-        Compared is what the labels know: the file may keep fewer section points.
+        Compared is what the labels know: the file may keep fewer section points. Added is what half
+        the step does not show.
         """
         plan, kept = self.recording, self.config.outputs.section
         share = self.config.integration.error_check
         checked = error_check.checked_lanes(lanes // self.lanes.directions, share)
-        section, exponent = np.full((2, lanes.size), np.nan)
+        section, of_kept, exponent = np.full((3, lanes.size), np.nan)
         motion = np.full(lanes.size, error_check.NOT_CHECKED, dtype=np.uint8)
         if checked.size:
             half = plan._replace(steps_per_period=2 * plan.steps_per_period)
@@ -316,11 +324,15 @@ class Simulation:
             fine = solution_of(system, finer, half, kept, some)
             some = told and Told(told.labels.of(checked), told.state[checked])
             theirs: Any = (array[checked] for array in outcome)
-            coarse = solution_of(system, kernels.Outcome(*theirs), plan, kept, some)
+            ended = kernels.Outcome(*theirs)
+            coarse = solution_of(system, ended, plan, kept, some)
+            points = points_of(self.plan, system)
+            coarse, of_kept[checked] = completed(coarse, system, ended, plan, (points, kept), some)
             found = difference(coarse, fine)
             section[checked], exponent[checked] = found.section_error, found.exponent_error
             motion[checked] = np.where(found.changed, error_check.CHANGED, error_check.SAME)
-        return dict(zip(error_check.CHECKED, (section, exponent, motion), strict=True))
+        found_errors = dict(zip(error_check.CHECKED, (section, exponent, motion), strict=True))
+        return {**found_errors, error_check.OF_KEPT: of_kept}
 
 
 def states_told(outcome: kernels.Outcome, plan: kernels.Plan) -> dict[str, Floats]:

@@ -11,9 +11,12 @@ from gearchaos.arrays import Integers, Mask
 from gearchaos.configuration.messages import Fault
 from gearchaos.configuration.run_tables import FLOW_MAP_STEPS, MOST_STEPS_PER_PERIOD
 from gearchaos.dynamics import stability
+from gearchaos.dynamics.hidden_modes import hidden_error
 from gearchaos.dynamics.labelling import Told
 from gearchaos.dynamics.largest_exponents import largest_exponents
+from gearchaos.dynamics.remainders import EPSILON
 from gearchaos.dynamics.systems import plan_of
+from gearchaos.engine.claims import columns_of
 from gearchaos.engine.lanes import Lanes
 from gearchaos.errors import ConfigurationError
 from gearchaos.gear.tooth_deviations import REALISATION
@@ -147,7 +150,8 @@ def solution_of(
     """Return of integrated lanes what tells two grids apart.
 
     Compared is the section of the kept states, or of all where none is kept. Without labels the
-    period is read off the section, and other motions are not told from each other.
+    period is read off the section, and other motions are not told from each other. No error is
+    smaller than a rounding in each step of a mesh period.
     """
     outcome = outcome.every(system.repeats_after)
     if told is None:
@@ -158,20 +162,28 @@ def solution_of(
     exponent = np.full(period.shape, np.nan)
     if plan.tangent:
         exponent = largest_exponents(system, outcome, plan, period, state).values
-    columns = [system.states.index(name) for name in kept or system.states]
-    diverged = outcome.status != Status.OK
-    return Solution(outcome.section[..., columns], exponent, diverged, motion, period)
+    section = outcome.section[..., columns_of(system, kept)]
+    size = np.max(np.abs(outcome.section), axis=(1, 2), initial=0.0)
+    rounding = EPSILON * plan.steps_per_period
+    return Solution(
+        section,
+        exponent,
+        outcome.status != Status.OK,
+        motion,
+        period,
+        section_rounding=rounding * size,
+        exponent_rounding=rounding / system.mesh_period,
+    )
 
 
-def pilot(
-    lanes: Lanes, plan: Plan, count: int, finest: int
-) -> tuple[int, Callable[[int, bool, str], Solution]]:
+def pilot(lanes: Lanes, plan: Plan, count: int, finest: int) -> tuple[int, Callable[..., Solution]]:
     """Prepare to integrate some lanes of a sweep on several grids, to compare them.
 
     ``count``: lanes wanted, spread evenly over the sweep; ``finest``: steps per period of the
     transient that all grids go on from, so that a lane comes to the same one of several coexisting
     motions on each of them. Returned are the number of lanes that there are, and a function that
-    settles with ``(steps, resolved, method)`` and gives the `Solution`.
+    settles with ``(steps, resolved, method)`` and gives the `Solution`; with ``hidden=True`` it
+    also has the errors that comparing grids does not show.
     """
     numbers = lanes.spread(count)
     system = lanes.system_of(numbers)
@@ -182,7 +194,7 @@ def pilot(
     repeats = system.repeats_after
     periods = repeats * max(RETURNS, math.ceil(PILOT_PERIODS / repeats))
 
-    def solution(steps: int, resolved: bool, method: str) -> Solution:
+    def solution(steps: int, resolved: bool, method: str, hidden: bool = False) -> Solution:
         check()
         # Loads and states are not compared.
         grid = plan_of(
@@ -196,7 +208,12 @@ def pilot(
             tangent=plan.tangent,
         )
         outcome = integrate(system, common, grid)
-        return solution_of(system, outcome, grid, lanes.config.outputs.section)
+        found = solution_of(system, outcome, grid, lanes.config.outputs.section)
+        if not hidden:
+            return found
+        ended = outcome.end_state
+        error = hidden_error(system, grid, found.period, ended, found.exponent)
+        return found._replace(hidden=error)
 
     return numbers.size, solution
 
@@ -207,12 +224,14 @@ def choose_steps(
     tolerance: float,
     source: str,
     finest: int = MOST_STEPS,
+    left: float = 0.0,
 ) -> list[Candidate]:
     """Double the steps until the error is small enough; the last candidate is the one to take.
 
     ``solution`` integrates the pilot lanes with so many steps per period, from one common state;
     ``tolerance``: of section and exponent; ``source``: what a message calls the configuration;
-    ``finest``: steps per period beyond which only the first number is compared. Raises
+    ``finest``: steps per period beyond which only the first number is compared; ``left``: what the
+    transient of the sweep leaves of the section's error whatever the steps. Raises
     ConfigurationError if the tolerance is not reached, with what was reached, or if no lane moves
     periodically.
     """
@@ -224,7 +243,9 @@ def choose_steps(
             if grid not in found:
                 found[grid] = solution(grid)
         coarse, middle = (difference(found[n * steps], found[4 * steps]) for n in (1, 2))
-        candidates.append(candidate(steps, coarse, (coarse.period > 0) & (middle.period > 0)))
+        periodic = (coarse.period > 0) & (middle.period > 0)
+        tried = candidate(steps, coarse, periodic)
+        candidates.append(tried._replace(section_error=tried.section_error + left))
         if np.isnan(candidates[-1].section_error):
             raise ConfigurationError(
                 f"{source}: integration.tolerance = {tolerance:g}: none of the lanes that were "

@@ -19,6 +19,11 @@ class Solution(NamedTuple):
     ``section`` (lanes, points, states), ``exponent`` (lanes,), not a number where there is none,
     ``diverged`` (lanes,), ``motion`` (lanes,) as `records.label` has it, ``period`` (lanes,) in
     mesh periods, 0 where the motion is not periodic.
+
+    What another grid does not show, (lanes,) or one number for all: ``transient``, how far the
+    section is from the periodic orbit that it approaches; ``hidden``, the error of the exponent
+    from modes that both grids damp away; ``section_rounding`` and ``exponent_rounding``, what
+    rounding makes of both.
     """
 
     section: Floats
@@ -26,16 +31,21 @@ class Solution(NamedTuple):
     diverged: Mask
     motion: Codes
     period: Counts
+    transient: Floats | float = 0.0
+    hidden: Floats | float = 0.0
+    section_rounding: Floats | float = 0.0
+    exponent_rounding: Floats | float = 0.0
 
 
 class Difference(NamedTuple):
     """How far two grids lie apart, by lane.
 
     ``period`` (lanes,): common period in mesh periods, 0 where the two have none in common;
-    ``section_error`` (lanes,): largest difference of the sections, NaN where the period is 0;
-    ``exponent_error`` (lanes,): difference of the largest Lyapunov exponents, NaN where a lane
-    diverged or no exponent was computed; ``changed`` (lanes,): whether the lane moves in another
-    way.
+    ``section_error`` (lanes,): largest difference of the sections, not below rounding, and the
+    transient of the first one added, NaN where the period is 0 or the transient unknown;
+    ``exponent_error`` (lanes,): difference of the largest Lyapunov exponents, not below what is
+    hidden nor below rounding, NaN where a lane diverged or no exponent was computed; ``changed``
+    (lanes,): whether the lane moves in another way.
     """
 
     period: Counts
@@ -45,7 +55,7 @@ class Difference(NamedTuple):
 
 
 def difference(one: Solution, other: Solution) -> Difference:
-    """Compare two solutions lane by lane.
+    """Compare two solutions lane by lane; the errors are those of the first one.
 
     A lane moves in another way if its period is another one, if its motion is of another kind where
     both are known, if it diverged in one of the two only, or if the orbits of equal period lie
@@ -59,10 +69,11 @@ def difference(one: Solution, other: Solution) -> Difference:
     apart = distance > _ANOTHER_ORBIT * size
     period[apart] = 0
     told = (one.motion != UNRESOLVED) & (other.motion != UNRESOLVED)
+    exponent = np.abs(one.exponent - other.exponent)
     return Difference(
         period,
-        np.where(period > 0, distance, np.nan),
-        np.abs(one.exponent - other.exponent),
+        np.where(period > 0, np.maximum(distance, one.section_rounding) + one.transient, np.nan),
+        np.maximum(np.maximum(exponent, one.hidden), one.exponent_rounding),
         (first != second)
         | apart
         | (told & (one.motion != other.motion))

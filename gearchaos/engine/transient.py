@@ -1,0 +1,111 @@
+"""A transient long enough for a tolerance: what is left of it is part of a section's error."""
+
+import math
+
+import numpy as np
+from gearchaos_kernels import Plan, integrate
+
+from gearchaos.arrays import Integers
+from gearchaos.dynamics.labelling import labels_of
+from gearchaos.dynamics.remainders import remainders
+from gearchaos.engine.claims import columns_of, points_of
+from gearchaos.engine.lanes import Lanes
+from gearchaos.errors import ConfigurationError
+from gearchaos.interrupts import check
+from gearchaos.records.difference import bound
+
+LONGEST = 16  # Times the configured periods up to which a transient is raised.
+
+ROUNDS = 4  # Transients tried: the approach to an orbit is geometric only in the end.
+
+
+def settled(
+    lanes: Lanes, recording: Plan, kept_points: int, tolerance: float, count: int
+) -> tuple[int, float, str]:
+    """Return a transient after which the kept section is close enough to the periodic orbits.
+
+    Some lanes of the sweep are integrated as it would integrate them, and their sections compared
+    with their orbits. Where 95 % of the periodic ones are not within half the tolerance, the
+    transient is raised.
+
+    Parameters
+    ----------
+    lanes : Lanes
+        Lanes of the sweep.
+    recording : Plan
+        Plan of the sweep with all section points that labels are read off.
+    kept_points : int
+        Points of the section that the file keeps.
+    tolerance : float
+        Largest error of the section.
+    count : int
+        Lanes that are tried, spread evenly over the sweep.
+
+    Returns
+    -------
+    tuple of int, float and str
+        Transient in mesh periods; distance from their orbits that 95 % of the periodic lanes do not
+        exceed behind it, 0 where none is periodic; a note, empty where nothing was raised.
+
+    Raises
+    ------
+    ConfigurationError
+        If the transient would be `LONGEST` times as long as what is configured.
+    """
+    numbers, repeats = lanes.spread(count), lanes.repeats_after
+    configured = transient = recording.transient_periods
+    most = LONGEST * (configured + recording.recorded_periods)
+    distances = []
+    for _ in range(ROUNDS):
+        plan = recording._replace(transient_periods=transient)
+        distance, missing = _left(lanes, numbers, plan, kept_points, tolerance)
+        distances.append(distance)
+        if missing == 0.0:
+            break
+        if transient + missing > most:
+            raise ConfigurationError(_out_of_reach(lanes, tolerance, distance, transient, missing))
+        transient += repeats * math.ceil(missing / repeats)
+    note = (
+        f"integration.transient_periods raised from {configured} to {transient} for "
+        f"integration.tolerance = {tolerance:g}: the section was up to {distances[0]:.1e} away "
+        "from the periodic orbits, which no number of steps changes"
+    )
+    return transient, distances[-1], note if transient > configured else ""
+
+
+def _left(
+    lanes: Lanes, numbers: Integers, plan: Plan, kept_points: int, tolerance: float
+) -> tuple[float, float]:
+    """Return how far some lanes are from their orbits, and what their transient is short of.
+
+    Neither is exceeded by 95 % of the periodic lanes; the second, in mesh periods, is 0 where the
+    distance is within half the tolerance, or rounding.
+    """
+    check()
+    system = lanes.system_of(numbers)
+    outcome = integrate(system, lanes.start_of(numbers), plan)
+    told = labels_of(system, outcome, plan)
+    points = points_of(plan._replace(section_points=kept_points), system)
+    kept = points, columns_of(system, lanes.config.outputs.section)
+    section = outcome.every(system.repeats_after).section
+    left = remainders(system, section, kept, told.labels.period, told.state, plan)
+    distance = float(np.nan_to_num(bound(left.of_kept)))
+    if distance <= tolerance / 2.0:
+        return distance, 0.0
+    # Rounding does not fall with time.
+    far = left.of_kept > np.maximum(tolerance / 4.0, 8.0 * left.section_rounding)
+    further = np.where(np.isfinite(left.of_kept), 0.0, np.nan)
+    further[far] = np.log(4.0 * left.of_kept[far] / tolerance) / left.decay[far]
+    return distance, bound(further)
+
+
+def _out_of_reach(
+    lanes: Lanes, tolerance: float, distance: float, transient: int, missing: float
+) -> str:
+    return (
+        f"{lanes.config.source}: integration.tolerance = {tolerance:g}: after "
+        f"integration.transient_periods = {transient} the section is still {distance:.1e} away "
+        "from the periodic orbits, which no number of steps changes; set "
+        f"integration.transient_periods to {transient + math.ceil(missing)} or more, or a larger "
+        "tolerance"
+    )
