@@ -43,7 +43,7 @@ def _merge(options: Namespace) -> int:
     check_output(output, options.overwrite)
     with open_store(simulation, output, resume=True) as store:
         prepare(simulation, compile_now=False)
-        tally = Tally()
+        tally = Tally(simulation.lanes.repeats_after)
         found = store.finished(tally.add)
         _require_all(store, found, manifest.get("shards"))
         facts = {**metadata(simulation, 0.0), "configuration": manifest["text"] or config.text}

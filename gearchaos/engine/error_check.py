@@ -7,6 +7,7 @@ from gearchaos_kernels import Status
 
 from gearchaos.arrays import Array, Floats, Integers
 from gearchaos.dynamics.largest_exponents import MIXED, UNIFORM
+from gearchaos.results.variables import SECTION
 
 NOT_CHECKED, SAME, CHANGED = 0, 1, 2
 MEANINGS = ("not_checked", "same", "changed")  # Meanings of the values of ``motion_changed``.
@@ -14,10 +15,8 @@ MEANINGS = ("not_checked", "same", "changed")  # Meanings of the values of ``mot
 CHECKED = ("section_error", "exponent_step_error", "motion_changed")
 """Variables that the check yields."""
 
-OF_KEPT = "transient_left"
-"""One more: the largest distance of the kept section from the periodic orbit."""
-
 _OF_THE_RECORD = "lyapunov_exponent_standard_error"
+_OF_KEPT = "spread of the kept section"
 
 
 def checked_lanes(numbers: Integers, share: float) -> Integers:
@@ -28,13 +27,37 @@ def checked_lanes(numbers: Integers, share: float) -> Integers:
     return np.flatnonzero(np.floor((numbers + 1) * share) > np.floor(numbers * share))
 
 
-class Tally:
-    """What the blocks of a sweep add up to: diverged lanes, and the errors of the checked ones."""
+def spread_of_kept(arrays: Mapping[str, Array], repeats: int) -> Floats:
+    """Return how far the kept section points of periodic lanes are from those of the last period.
 
-    def __init__(self) -> None:
+    Shape (lanes,); not a number where a lane is not periodic or the file keeps less than a period.
+    The arrays of a block: sections (lanes, points) and ``period`` (lanes,) in excitation periods of
+    so many mesh periods.
+    """
+    status = arrays["status"]
+    spread = np.full(status.shape, np.nan)
+    periods = repeats * arrays.get("period", np.zeros(status.shape, dtype=np.int32))
+    kept = [array for name, array in arrays.items() if name.startswith(SECTION) and array.ndim > 1]
+    for period in np.unique(periods[periods > 0]) if kept else ():
+        lanes, points = np.flatnonzero(periods == period), np.arange(kept[0].shape[1])
+        if points.size >= period:
+            phases = (points - points.size) % period - period
+            apart = [np.abs(one[lanes] - one[lanes][:, phases]) for one in kept]
+            spread[lanes] = np.max(apart, axis=(0, 2))
+    return spread
+
+
+class Tally:
+    """What the blocks of a sweep add up to: diverged lanes, and the errors of the checked ones.
+
+    ``repeats``: mesh periods in an excitation period.
+    """
+
+    def __init__(self, repeats: int = 1) -> None:
+        self._repeats = repeats
         self.diverged = self._too_fast = self._mixed = 0
         self._unsplit_lanes = self._unsplit_steps = 0
-        self._checked = {name: [np.zeros(0)] for name in (*CHECKED, OF_KEPT, _OF_THE_RECORD)}
+        self._checked = {name: [np.zeros(0)] for name in (*CHECKED, _OF_THE_RECORD, _OF_KEPT)}
 
     def add(self, arrays: Mapping[str, Array]) -> None:
         """Count the lanes of one block."""
@@ -45,6 +68,7 @@ class Tally:
         self._mixed += int(np.count_nonzero(arrays.get("record", UNIFORM) == MIXED))
         if "motion_changed" in arrays:
             checked = arrays["motion_changed"] != NOT_CHECKED
+            arrays = {**arrays, _OF_KEPT: spread_of_kept(arrays, self._repeats)}
             for name, blocks in self._checked.items():
                 known = arrays.get(name, np.full(checked.shape, np.nan))
                 blocks.append(known[checked])
@@ -78,14 +102,14 @@ class Tally:
     def errors(self) -> str:
         """The errors in one line; empty where no lane was checked."""
         found = map(np.concatenate, self._checked.values())
-        section, exponent, motion, of_kept, of_record = found
+        section, exponent, motion, of_record, of_kept = found
         if motion.size == 0:
             return ""
         text = f"{motion.size} lanes computed again with half the step: "
         periodic = np.isfinite(section)
         if periodic.any():
             text += f"section of {periodic.sum()} periodic ones off by {_spread(section[periodic])}"
-            farthest = np.fmax.reduce(of_kept[periodic])
+            farthest = np.fmax.reduce(section[periodic] + of_kept[periodic])
             if farthest > 2.0 * np.max(section[periodic]):
                 text += f" in the end (up to {farthest:.1e} where the kept section begins)"
             if np.isfinite(exponent[periodic]).any():

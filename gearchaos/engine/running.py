@@ -12,6 +12,7 @@ import numpy as np
 from numba.core import event
 
 from gearchaos.configuration import Given, configuration_of
+from gearchaos.engine.error_check import Tally
 from gearchaos.engine.executors import LocalExecutor, compute_blocks
 from gearchaos.engine.provenance import provenance
 from gearchaos.engine.simulation import Arrays, Bounds, Simulation
@@ -61,7 +62,8 @@ def run(config: Given, threads: int | None = None, progress: bool = False) -> Re
         blocks: dict[Bounds, Arrays] = {}
         every = simulation.blocks(simulation.block_lanes(numba.get_num_threads()))
         with LocalExecutor(simulation) as executor:
-            tally = compute_blocks(executor, every, blocks.__setitem__)
+            tally = Tally(simulation.lanes.repeats_after)
+            compute_blocks(executor, every, blocks.__setitem__, tally)
         say(*tally.remarks)
         in_order = [blocks[block] for block in sorted(blocks)]
         return result_of(simulation, in_order, metadata(simulation, time.monotonic() - began))

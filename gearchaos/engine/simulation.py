@@ -16,7 +16,7 @@ from gearchaos.dynamics.largest_exponents import largest_exponents
 from gearchaos.dynamics.stability import fewest_stable_steps
 from gearchaos.dynamics.systems import plan_of
 from gearchaos.engine import error_check
-from gearchaos.engine.claims import completed, points_of
+from gearchaos.engine.claims import completed
 from gearchaos.engine.excitation import remarks, whole_lengths
 from gearchaos.engine.lanes import Lanes
 from gearchaos.engine.steps import (
@@ -314,7 +314,7 @@ class Simulation:
         plan, kept = self.recording, self.config.outputs.section
         share = self.config.integration.error_check
         checked = error_check.checked_lanes(lanes // self.lanes.directions, share)
-        section, of_kept, exponent = np.full((3, lanes.size), np.nan)
+        section, exponent = np.full((2, lanes.size), np.nan)
         motion = np.full(lanes.size, error_check.NOT_CHECKED, dtype=np.uint8)
         if checked.size:
             half = plan._replace(steps_per_period=2 * plan.steps_per_period)
@@ -326,13 +326,11 @@ class Simulation:
             theirs: Any = (array[checked] for array in outcome)
             ended = kernels.Outcome(*theirs)
             coarse = solution_of(system, ended, plan, kept, some)
-            points = points_of(self.plan, system)
-            coarse, of_kept[checked] = completed(coarse, system, ended, plan, (points, kept), some)
+            coarse = completed(coarse, system, ended, plan, kept, some)
             found = difference(coarse, fine)
             section[checked], exponent[checked] = found.section_error, found.exponent_error
             motion[checked] = np.where(found.changed, error_check.CHANGED, error_check.SAME)
-        found_errors = dict(zip(error_check.CHECKED, (section, exponent, motion), strict=True))
-        return {**found_errors, error_check.OF_KEPT: of_kept}
+        return dict(zip(error_check.CHECKED, (section, exponent, motion), strict=True))
 
 
 def states_told(outcome: kernels.Outcome, plan: kernels.Plan) -> dict[str, Floats]:

@@ -81,7 +81,7 @@ def fill(
     are, see `DaskExecutor`, and None computes in this process. Returns the tally of all own blocks,
     the finished ones too, and what the result file says about who has computed.
     """
-    tally = Tally()
+    tally = Tally(simulation.lanes.repeats_after)
     finished, problems = store.finished(tally.add)
     for problem in problems:
         complain(f"{problem}; it is computed again")

@@ -8,7 +8,7 @@ from gearchaos_kernels import Plan, integrate
 from gearchaos.arrays import Integers
 from gearchaos.dynamics.labelling import labels_of
 from gearchaos.dynamics.remainders import remainders
-from gearchaos.engine.claims import columns_of, points_of
+from gearchaos.engine.claims import columns_of
 from gearchaos.engine.lanes import Lanes
 from gearchaos.errors import ConfigurationError
 from gearchaos.interrupts import check
@@ -85,7 +85,7 @@ def _left(
     system = lanes.system_of(numbers)
     outcome = integrate(system, lanes.start_of(numbers), plan)
     told = labels_of(system, outcome, plan)
-    points = points_of(plan._replace(section_points=kept_points), system)
+    points = -(-kept_points // system.repeats_after)
     kept = points, columns_of(system, lanes.config.outputs.section)
     section = outcome.every(system.repeats_after).section
     left = remainders(system, section, kept, told.labels.period, told.state, plan)
