@@ -17,8 +17,8 @@ from gearchaos.results.scales import excitation_of
 from gearchaos.results.stage_table import labelled_lanes, one_axis, slice_facts, stage_table
 
 ERRORS = {
-    "section_error": ("section error", "when the step is halved"),
-    known.STEP_ERROR: ("exponent error", "when the step is halved"),
+    "section_error": ("section error", "from the step and from what the transient has left"),
+    known.STEP_ERROR: ("exponent error", "from the step"),
     known.LARGEST_EXPONENT + known.STANDARD_ERROR: (
         "exponent error",
         "one standard error of the finite record; orbits of periodic lanes have none",

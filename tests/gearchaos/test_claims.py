@@ -112,7 +112,20 @@ def test_a_tolerance_is_kept_behind_a_longer_transient():
     raised = sweep.plan.transient_periods
     assert note.startswith(f"integration.transient_periods raised from 200 to {raised} for ")
     assert 300 < raised < 1500
-    assert (true_section_error(sweep, computed(sweep)) < 1e-8).all()
+    true = true_section_error(sweep, computed(sweep))
+    assert (true < 1e-8).all()
+    claimed = float(sweep.notes[-1].split("section is off by ")[1].split(",")[0])
+    # Printed with two digits.
+    assert 0.9 * true.max() < claimed < 1e-8
+
+
+def test_a_tolerance_is_kept_where_both_grids_damp_the_mode_that_decides(exact_exponents):
+    limit = fewest_stable_steps(simulation(*STIFF, *MAPS).lanes.system_of(np.arange(2))).max()
+    first = f"integration.steps_per_period={limit}", "integration.tolerance=1e-4"
+    sweep = simulation(*STIFF, *first)
+    sweep.choose_steps()
+    found = computed(sweep)["lyapunov_exponent"]
+    assert (np.abs(found - exact_exponents) < 1.1e-4).all()
 
 
 def test_a_tolerance_that_no_transient_within_reach_keeps_is_refused_with_the_remedy():
@@ -182,6 +195,11 @@ def test_a_section_ends_in_any_phase_of_its_orbit():
         kept, period = (6, range(6)), np.array([2], dtype=np.int32)
         found = remainders(system, section, kept, period, outcome.end_state, plan)
         assert found.of_kept[0] < 1e-10
+    # Both points of the last period count.
+    shifted = outcome.section.copy()
+    shifted[0, -2, 0] += 1e-3
+    found = remainders(system, shifted, kept, period, outcome.end_state, plan)
+    assert found.distance == pytest.approx(1e-3, rel=1e-6)
     # The orbit has two points that are far from each other.
     assert np.max(np.abs(np.diff(outcome.section[0, -2:], axis=0))) > 0.01
 
