@@ -15,15 +15,10 @@ from gearchaos_kernels import Plan, Status
 from gearchaos.arrays import Floats
 from gearchaos.configuration import Given, axis_values, configuration_of, swept_values
 from gearchaos.dynamics.exponents import Exponents, exponents, sum_of_exponents
-from gearchaos.dynamics.following import (
-    STABILITY_LOSS_TEXTS,
-    Branch,
-    Orbit,
-    StabilityLoss,
-    follow,
-)
+from gearchaos.dynamics.following import Branch, Orbit, follow
 from gearchaos.dynamics.orbits import Orbits, polish
 from gearchaos.dynamics.stability import fewest_stable_steps
+from gearchaos.dynamics.stability_loss import STABILITY_LOSS_TEXTS, StabilityLoss
 from gearchaos.dynamics.systems import plan_of, system_of
 from gearchaos.engine.lanes import Lanes, start_states
 from gearchaos.engine.recomputing import computable

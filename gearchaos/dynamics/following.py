@@ -6,40 +6,22 @@ force is continuous, so that the map over a period has a continuous derivative.
 """
 
 from collections.abc import Callable
-from enum import IntEnum
 from typing import NamedTuple
 
 import numpy as np
 from gearchaos_kernels import Plan, System
 
 from gearchaos.arrays import Codes, Complex, Counts, Floats, Mask
+from gearchaos.dynamics.arclength import Curve, End, end_of_curve
 from gearchaos.dynamics.orbits import Orbits, polish
+from gearchaos.dynamics.stability_loss import CONFIRMED, StabilityLoss, loss_of_stability
 
 LONGEST_STEP = 1.0 / 16.0  # Share of the way along which an orbit is followed.
 
 MOST_ORBITS = 200
 """Orbits tried along the way; where they do not suffice nothing is known of what lies beyond."""
 
-NEAR_FOLD = 0.1  # An orbit that ends with a real multiplier this close to +1 ends in a fold.
-
-
-class StabilityLoss(IntEnum):
-    """How an orbit loses stability; of two sides of a boundary, the earlier one here tells more."""
-
-    PERIOD_DOUBLING = 0
-    NEIMARK_SACKER = 1
-    FOLD = 2
-    STAYS_STABLE = 3
-    NOT_FOLLOWED = 4
-
-
-STABILITY_LOSS_TEXTS = (
-    "period doubling: a real multiplier passes -1",
-    "Neimark-Sacker: a complex pair leaves the unit circle",
-    "fold, or where the orbit goes on symmetry breaking: a real multiplier reaches +1",
-    "the orbit stays stable: the motion went to one that coexists",
-    "the orbit could not be followed, with no multiplier near +1",
-)
+MOST_CURVES = 8  # Places at which an orbit that Newton's method misses is followed along its curve.
 
 
 class Orbit(NamedTuple):
@@ -96,45 +78,6 @@ class Followed(NamedTuple):
     multiplier: Complex
 
 
-def loss_of_stability(stable: Complex, beyond: Complex) -> tuple[Codes, Complex]:
-    """Tell from the multipliers on either side of a boundary how the orbit loses stability.
-
-    Returned are the `StabilityLoss` and the multiplier that tells, of a pair that with the positive
-    imaginary part, both (lanes,).
-
-    ``stable``, ``beyond`` (lanes, states): those of the same orbit, largest modulus first, where it
-    is stable and as near as possible beyond; not a number where there is no such orbit. An orbit
-    that ends by itself meets an unstable one, so that only a real multiplier near +1 explains its
-    end. The multiplier that tells is the largest one beyond, or where there is no orbit the largest
-    positive one before; not a number where the orbit was not followed.
-    """
-    positive = np.where((stable.imag == 0.0) & (stable.real > 0.0), stable.real, 0.0).max(axis=1)
-    leading = beyond[:, 0]
-    ended = np.isnan(leading)
-    folded = ended & (positive > 1.0 - NEAR_FOLD)
-    multiplier = np.where(folded, positive, leading.real + 1j * np.abs(leading.imag))
-    real = multiplier.imag == 0.0
-    kind = np.select(
-        [
-            folded,
-            ended | np.isnan(stable[:, 0]),
-            np.abs(multiplier) < 1.0,
-            real & (multiplier.real < 0.0),
-            real,
-        ],
-        [
-            StabilityLoss.FOLD,
-            StabilityLoss.NOT_FOLLOWED,
-            StabilityLoss.STAYS_STABLE,
-            StabilityLoss.PERIOD_DOUBLING,
-            StabilityLoss.FOLD,
-        ],
-        StabilityLoss.NEIMARK_SACKER,
-    ).astype(np.uint8)
-    multiplier[kind == StabilityLoss.NOT_FOLLOWED] = np.nan
-    return kind, multiplier
-
-
 def follow(
     system_at: Callable[[Floats], System],
     guess: Floats,
@@ -148,54 +91,149 @@ def follow(
 
     Every orbit is polished from the straight line through the two before it. Steps begin with a
     sixteenth of the way, are halved where no orbit is found, and end in a bisection where one is
-    unstable. All lanes are followed side by side.
+    unstable. All lanes are followed side by side. Where an orbit ends, or the unstable one does not
+    explain the loss of stability (`loss_of_stability`) and so belongs to another branch, it is
+    followed along its curve, see `arclength`, and where this goes on it is followed on from there.
 
-    ``system_at`` gives the system of all lanes for a value of the parameter in each, (lanes,);
+    ``system_at`` gives the systems at values of the parameter, (lanes,), of any number;
     ``first``, ``last`` (lanes,): the values at both ends of the way, in either order; ``guess``,
     ``period`` and ``plan`` as for `polish` at the first values; ``width``: wanted distance of the
-    stable value and the one beyond. Towards a fold a multiplier nears +1 like the root of the
-    distance: with too large a width it is not yet `NEAR_FOLD`.
+    stable value and the one beyond.
     """
-
-    def orbits(share: Floats, guess: Floats, followed: Mask) -> Orbits:
-        system = system_at(first + share * (last - first))
-        sought = np.where(followed, period, np.int32(0))
-        return polish(system, guess, sought, plan)
-
-    share = np.zeros_like(first)
-    step = np.full_like(first, LONGEST_STEP)
-    smallest = width / np.maximum(np.abs(last - first), width)
-    stable = orbits(share, guess, period > 0)
-    slope = np.zeros_like(stable.points)
-    going = stable.stable
-    beyond, end = stable, np.zeros_like(first)
-    unstable_from = np.full_like(first, np.inf)
-    for _ in range(MOST_ORBITS):
+    lanes = _Lanes(system_at, guess, period, (first, last), width, plan)
+    going = lanes.stable.stable
+    for _ in range(1 + MOST_CURVES):
+        lanes.march(going)
+        going = np.zeros_like(going)
+        for lane in np.flatnonzero(lanes.unexplained).tolist():
+            going[lane] = lanes.follow_curve(lane)
         if not going.any():
             break
-        trial = np.minimum(share + step, 1.0)
-        ahead = np.where(going, trial - share, 1.0)[:, np.newaxis]
-        found = orbits(trial, stable.points + ahead * slope, going)
-        kept = going & found.stable
-        unstable, missing = going & found.converged & ~kept, going & ~found.converged
-        unstable_from[unstable] = trial[unstable]
-        # Newton's method may fail for a step too long; a smaller one then goes on past the place.
-        reached = unstable | (missing & np.isinf(unstable_from)) | (kept & (trial == 1.0))
-        beyond, end = _chosen(reached, found, beyond), np.where(reached, trial, end)
-        slope[kept] = ((found.points - stable.points) / ahead)[kept]
-        stable, share = _chosen(kept, found, stable), np.where(kept, trial, share)
-        step = np.where(kept, np.minimum(2.0 * step, LONGEST_STEP), step / 2.0)
-        step = np.minimum(step, (unstable_from - share) / 2.0)
-        going &= (step > smallest / 2.0) & (share < 1.0)
-    beyond.multipliers[going] = np.nan
-    exists = stable.converged
-    return Followed(
-        np.where(exists, first + share * (last - first), np.nan),
-        stable,
-        np.where(exists, first + end * (last - first), np.nan),
-        beyond,
-        *loss_of_stability(stable.multipliers, beyond.multipliers),
-    )
+    return lanes.followed
+
+
+class _Lanes:
+    """Where orbits that are followed side by side stand: arguments as of `follow`."""
+
+    def __init__(
+        self,
+        system_at: Callable[[Floats], System],
+        guess: Floats,
+        period: Counts,
+        ends: tuple[Floats, Floats],
+        width: float,
+        plan: Plan,
+    ) -> None:
+        self._system_at, self._period, self._plan = system_at, period, plan
+        self._first, self._way = ends[0], ends[1] - ends[0]
+        # Whatever the width: an orbit is never lost sight of within the first step.
+        share = width / np.maximum(np.abs(self._way), width)
+        self._smallest = np.minimum(share, LONGEST_STEP)
+        self._share = np.zeros_like(self._first)
+        self.stable = self._orbits(self._share, guess, period > 0)
+        self._slope = np.zeros_like(self.stable.points)
+        self._beyond, self._end = self.stable, np.zeros_like(self._first)
+        # Those whose curve was followed to an end, and those that end in an orbit of half.
+        self._located = np.zeros(self._first.shape, np.bool_)
+        self._halved = np.zeros(self._first.shape, np.bool_)
+
+    def _orbits(self, share: Floats, guess: Floats, followed: Mask) -> Orbits:
+        system = self._system_at(self._first + share * self._way)
+        sought = np.where(followed, self._period, np.int32(0))
+        return polish(system, guess, sought, self._plan)
+
+    @property
+    def _loss(self) -> tuple[Codes, Complex]:
+        kind, multiplier = loss_of_stability(self.stable.multipliers, self._beyond.multipliers)
+        kind[self._halved] = StabilityLoss.PERIOD_HALVING
+        return kind, multiplier
+
+    @property
+    def unexplained(self) -> Mask:
+        """Which stable orbits have ended, or lie beside an unstable one of another branch."""
+        other = self._loss[0] == StabilityLoss.UNCONFIRMED
+        ended: Mask = np.isnan(self._beyond.multipliers[:, 0]) | other
+        return ended & self.stable.stable & ~self._located
+
+    @property
+    def followed(self) -> Followed:
+        """What was found."""
+        exists = self.stable.converged
+        return Followed(
+            np.where(exists, self._first + self._share * self._way, np.nan),
+            self.stable,
+            np.where(exists, self._first + self._end * self._way, np.nan),
+            self._beyond,
+            *self._loss,
+        )
+
+    def march(self, going: Mask) -> None:
+        """Follow the orbits of some lanes, value by value, until they end or are unstable."""
+        step = np.full_like(self._share, LONGEST_STEP)
+        unstable_from = np.full_like(self._share, np.inf)
+        for _ in range(MOST_ORBITS):
+            if not going.any():
+                break
+            trial = np.minimum(self._share + step, 1.0)
+            ahead = np.where(going, trial - self._share, 1.0)[:, np.newaxis]
+            found = self._orbits(trial, self.stable.points + ahead * self._slope, going)
+            kept = going & found.stable
+            unstable, missing = going & found.converged & ~kept, going & ~found.converged
+            unstable_from[unstable] = trial[unstable]
+            # Newton's method may fail for a step too long; a smaller one goes on past the place.
+            reached = unstable | (missing & np.isinf(unstable_from)) | (kept & (trial == 1.0))
+            self._beyond = _chosen(reached, found, self._beyond)
+            self._end = np.where(reached, trial, self._end)
+            self._slope[kept] = ((found.points - self.stable.points) / ahead)[kept]
+            self.stable = _chosen(kept, found, self.stable)
+            self._share = np.where(kept, trial, self._share)
+            step = np.where(kept, np.minimum(2.0 * step, LONGEST_STEP), step / 2.0)
+            step = np.minimum(step, (unstable_from - self._share) / 2.0)
+            going = going & (step > self._smallest / 2.0) & (self._share < 1.0)
+        self._beyond.multipliers[going] = np.nan
+
+    def follow_curve(self, lane: int) -> bool:
+        """Follow the curve of one lane to its end, and return whether it goes on from there.
+
+        At most a long step further than where the orbit was missed.
+        """
+        first, way, share = self._first[lane], self._way[lane], float(self._share[lane])
+        point, periods = self.stable.points[lane], int(self._period[lane])
+        limit = min(max(share, float(self._end[lane])) + LONGEST_STEP, 1.0)
+        width = float(self._smallest[lane])
+
+        def system_at(shares: Floats) -> System:
+            return self._system_at(first + shares * way)
+
+        curve = Curve.through(system_at, self._plan, periods, point, share)
+        end = end_of_curve(curve, point, share, limit, width)
+        if end.inner is None or (end.beyond is None and end.inner.share < limit):
+            return False
+        self._put(lane, end, curve.scale, width)
+        goes_on = end.beyond is None and limit < 1.0
+        if goes_on:
+            self._beyond.multipliers[lane] = np.nan
+        return goes_on
+
+    def _put(self, lane: int, end: End, scale: Floats, width: float) -> None:
+        """Put a lane where its curve was followed to."""
+        inner, beyond = end.inner, end.beyond or end.inner
+        assert inner is not None
+        assert beyond is not None
+        for orbits, place in ((self.stable, inner), (self._beyond, beyond)):
+            orbits.points[lane], orbits.multipliers[lane] = (
+                place.place[:-1] * scale,
+                place.multipliers,
+            )
+            orbits.residual[lane], orbits.converged[lane] = place.residual, True
+        self._slope[lane] = inner.tangent[:-1] * scale / inner.tangent[-1]
+        self._share[lane] = inner.share
+        # Where the curve turns back there is no orbit behind the turn.
+        behind = 0.0 if beyond.onward else width / 2.0
+        self._end[lane] = max(inner.share, beyond.share) + behind
+        self._located[lane] = end.beyond is not None
+        near_one = abs(beyond.multipliers[0] - 1.0) <= CONFIRMED
+        self._halved[lane] = beyond.halved and near_one
 
 
 def _chosen(lanes: Mask, one: Orbits, other: Orbits) -> Orbits:

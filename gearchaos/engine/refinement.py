@@ -11,8 +11,9 @@ from gearchaos_kernels import System, integrate
 
 from gearchaos.arrays import Array, Floats
 from gearchaos.configuration import Configuration, swept_values
-from gearchaos.dynamics.following import STABILITY_LOSS_TEXTS, Followed, StabilityLoss, follow
+from gearchaos.dynamics.following import Followed, follow
 from gearchaos.dynamics.labelling import LOOKS, labels_of
+from gearchaos.dynamics.stability_loss import STABILITY_LOSS_TEXTS, StabilityLoss
 from gearchaos.dynamics.systems import plan_of, system_of
 from gearchaos.engine.lanes import start_states
 from gearchaos.engine.simulation import Simulation
@@ -27,6 +28,8 @@ from gearchaos.results.variables import LABELS, WAYS
 FOLLOWED_WIDTH = 2.0**-16
 """Share of its way to which the end of an orbit is located: next to a fold a multiplier nears +1
 like the root of the distance, so that a coarse end tells nothing."""
+
+NO_LOSS = (StabilityLoss.STAYS_STABLE, StabilityLoss.UNCONFIRMED, StabilityLoss.NOT_FOLLOWED)
 
 
 class Boundary(NamedTuple):
@@ -145,7 +148,7 @@ def refined_jumps(
             continue
         further = 2.0 * beyond["value"] - last["value"]
         followed = _followed(config, edges[inner[there]], further, width)
-        goes_on = np.isin(followed.loss, (StabilityLoss.STAYS_STABLE, StabilityLoss.NOT_FOLLOWED))
+        goes_on = np.isin(followed.loss, NO_LOSS)
         stable = np.where(goes_on, last["value"], followed.stable_value)
         lost = np.where(goes_on, beyond["value"], followed.beyond_value)
         for n, kind in enumerate(followed.loss):

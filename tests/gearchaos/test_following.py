@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from gearchaos_kernels import Plan, integrate
 
-from gearchaos.dynamics.following import (
+from gearchaos.dynamics.following import Followed, follow
+from gearchaos.dynamics.stability_loss import (
+    CONFIRMED,
     STABILITY_LOSS_TEXTS,
-    Followed,
     StabilityLoss,
-    follow,
     loss_of_stability,
 )
 from gearchaos.records.period import motion_period
@@ -26,6 +26,7 @@ WAYS = {
     "upper period 1 ends downwards": (1.07, 0.7, 1, StabilityLoss.FOLD),
     "period 3 ends": (12.97, 13.1, 3, StabilityLoss.FOLD),
     "upper period 1 goes on": (1.07, 3.0, 1, StabilityLoss.STAYS_STABLE),
+    "period 2 ends in period 1": (10.6, 10.2, 2, StabilityLoss.PERIOD_HALVING),
 }
 NAMES = list(WAYS)
 FIRST, LAST, PERIODS, KINDS = (np.array(column) for column in zip(*WAYS.values(), strict=True))
@@ -74,6 +75,14 @@ def followed(begin) -> Followed:
         ([-0.98, 0.97], [np.nan, np.nan], StabilityLoss.FOLD, 0.97),
         ([np.nan, np.nan], [np.nan, np.nan], StabilityLoss.NOT_FOLLOWED, np.nan),
         ([np.nan, np.nan], [-1.01, 0.5], StabilityLoss.NOT_FOLLOWED, np.nan),
+        # An unstable orbit of another branch, and such that are unstable in a way of their own.
+        ([0.2, 0.1], [2.69, 0.0], StabilityLoss.UNCONFIRMED, 2.69),
+        ([-0.8, 0.5], [-1.01, 0.5], StabilityLoss.UNCONFIRMED, -1.01),
+        ([-0.99, 0.5], [-1.2, 0.5], StabilityLoss.UNCONFIRMED, -1.2),
+        ([-0.99, 0.5], [1.01, 0.5], StabilityLoss.UNCONFIRMED, 1.01),
+        ([0.99, 0.5], [0.8 + 0.7j, 0.8 - 0.7j], StabilityLoss.UNCONFIRMED, 0.8 + 0.7j),
+        # The multiplier that leaves need not be the largest before.
+        ([-0.99, 0.98], [1.01, -0.99], StabilityLoss.FOLD, 1.01),
     ],
 )
 def test_the_multiplier_that_leaves_the_unit_circle_tells_the_kind(
@@ -101,6 +110,30 @@ def test_the_brackets_are_as_narrow_as_wanted_and_stable_on_one_side(followed):
     assert np.all(np.abs(followed.stable.multipliers) < 1.0)
     stays = NAMES.index("upper period 1 goes on")
     assert followed.stable_value[stays] == followed.beyond_value[stays] == LAST[stays]
+
+
+def test_every_loss_has_a_multiplier_on_the_unit_circle_on_both_sides(followed):
+    lost = ~np.isin(KINDS, (StabilityLoss.STAYS_STABLE, StabilityLoss.PERIOD_HALVING))
+    inside, outside = (side.multipliers[lost, 0] for side in (followed.stable, followed.beyond))
+    assert np.all(np.abs(inside) < 1.0)
+    assert np.all(np.abs(outside) >= 1.0)
+    # The steepest doubling moves by 1 over 0.01.
+    assert np.abs(inside - outside).max() < 100.0 * WIDTH < CONFIRMED
+    assert followed.multiplier[FOLDS] == pytest.approx(1.0, rel=0, abs=2e-6)
+
+
+def test_an_orbit_born_in_a_period_doubling_is_followed_back_to_it(followed):
+    (halving,) = np.flatnonzero(KINDS == StabilityLoss.PERIOD_HALVING)
+    doubling = NAMES.index("period 1 doubles")
+    born = followed.stable_value[halving], followed.beyond_value[halving]
+    assert born == pytest.approx(2 * (followed.stable_value[doubling],), rel=0, abs=2 * WIDTH)
+    assert followed.multiplier[halving] == pytest.approx(1.0, rel=0, abs=1e-3)
+
+
+def test_a_fold_is_located_alike_whatever_the_width(followed, begin):
+    coarse = followed_from(begin[FOLDS], PERIODS[FOLDS], FIRST[FOLDS], LAST[FOLDS], 1e-2)
+    assert np.all(coarse.loss == StabilityLoss.FOLD)
+    assert coarse.stable_value == pytest.approx(followed.stable_value[FOLDS], rel=0, abs=1e-7)
 
 
 def test_a_multiplier_passes_minus_one_where_the_period_doubles(followed):

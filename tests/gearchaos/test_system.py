@@ -8,7 +8,7 @@ import pytest
 
 import gearchaos
 from gearchaos.configuration import STATES
-from gearchaos.dynamics.following import StabilityLoss
+from gearchaos.dynamics.stability_loss import StabilityLoss
 
 from ..kernels.reference import SOLUTIONS
 from .short_sweeps import METHODS
