@@ -73,6 +73,16 @@ def test_starts_on_one_chaotic_attractor_are_told_by_where_it_goes():
     assert np.isnan(found[0].multipliers).all()
 
 
+def test_averages_that_differ_by_an_extent_are_those_of_two_attractors():
+    """Lanes of two pitch errors, as if both were of one: their averages differ by 0.9 extents."""
+    multiples = [13.0, 12.5]
+    states = np.concatenate([ends(multiple, 1, 300) for multiple in multiples])
+    found, number = found_from(multiples, states, CHAOTIC, 0)
+    one, other = (attractor.averages for attractor in found)
+    assert 0.6 < np.max(np.abs(one - other) / one[1]) < 1.2
+    assert number.tolist() == [0, 1]
+
+
 @pytest.mark.parametrize("motion", [UNRESOLVED, DIVERGED])
 def test_what_has_no_motion_has_no_attractor(motion):
     found, number = found_from(DOUBLED["pitch_error"], DOUBLED["section_points"], motion, 0)

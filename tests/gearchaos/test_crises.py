@@ -48,6 +48,8 @@ def test_the_two_sets_of_the_cubic_map_merge_where_they_are_known_to():
         np.where(np.arange(41) == 20, 1.5, 1.0),  # A single burst.
         np.where(np.arange(41) >= 20, 1.1, 1.0),  # Too small.
         np.where(np.arange(41) >= 39, 1.5, 1.0),  # Too few lanes.
+        # Not level before: a lane of the eight has burst out nearly as far.
+        np.select([np.arange(41) == 14, np.arange(41) >= 20], [2.0, 2.5], 1.0),
     ],
 )
 def test_what_grows_steadily_or_not_for_good_is_no_crisis(extent):

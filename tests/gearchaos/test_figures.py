@@ -239,6 +239,15 @@ def test_limits_hold_everything_where_nothing_lies_far_out():
     assert 2.0 < top < 2.2
 
 
+def test_limits_reach_half_of_the_inner_height_beyond_it():
+    values = np.linspace(0.0, 1.0, 400)
+    # The inner 94 % end near 1, so that what lies below 1.5 is shown and what lies above is not.
+    values[[10, 11, 12]] = 1.4, 1.7, 10.0
+    bottom, top = robust_limits(values, values)
+    assert -0.2 < bottom < 0.0
+    assert 1.4 < top < 1.6
+
+
 def test_a_narrow_peak_on_a_level_line_is_no_outlier():
     exponent = np.full(400, -0.01) + 1e-6 * np.arange(400)
     exponent[200:206] = -0.003

@@ -5,13 +5,14 @@ import pytest
 from gearchaos_kernels import Plan, integrate
 
 from gearchaos.dynamics.following import Followed, follow
+from gearchaos.dynamics.orbits import polish
 from gearchaos.dynamics.stability_loss import (
     CONFIRMED,
     STABILITY_LOSS_TEXTS,
     StabilityLoss,
     loss_of_stability,
 )
-from gearchaos.records.period import motion_period
+from gearchaos.records.period import coordinate_scale, motion_period
 
 from ..kernels.reference import NO_AXIAL, pan2021, system_of
 
@@ -190,6 +191,26 @@ def test_a_multiplier_nears_one_like_the_root_of_the_distance_from_a_fold(follow
     limit = (exponents[:, 1] - ratio * exponents[:, 0]) / (1.0 - ratio)
     assert np.all(np.abs(exponents[:, 1] - 0.5) < np.abs(exponents[:, 0] - 0.5))
     assert limit == pytest.approx(0.5, abs=0.01)
+
+
+@pytest.mark.parametrize("name", ["lower period 1 ends", "period 3 ends"])
+def test_beyond_a_fold_newton_takes_no_step_that_hardly_helps(followed, begin, name):
+    """A quarter of a step must take an eighth off the return distance, a longer one more."""
+    lane = NAMES.index(name)
+    there, period = followed.stable_value[lane], int(PERIODS[lane])
+    before = followed_from(begin[[lane]], [period], [FIRST[lane]], [there - 1e-3])
+    beyond = np.geomspace(1e-5, 1e-2, 16)
+    guess = np.repeat(before.stable.points, beyond.size, axis=0)
+    system, plan = system_at(there + beyond), Plan(STEPS, 0, period, period, tangent=True)
+    found = polish(system, guess, np.full(beyond.size, period, np.int32), plan)
+    section = integrate(system, guess, plan).section
+    distance = np.abs(section[:, -1] - guess) / coordinate_scale(section)
+    left = found.residual / np.max(distance, axis=1)
+    assert not found.converged.any()
+    unmoved = np.isclose(left, 1.0, rtol=0, atol=1e-12)
+    assert np.all((left < 0.875) | unmoved)
+    # Some do move, and those far beyond the fold do not.
+    assert unmoved[-1] and not unmoved.all()
 
 
 def test_the_boundary_is_the_same_from_wherever_the_orbit_is_followed(followed, begin):

@@ -43,6 +43,14 @@ def test_a_branch_that_bends_does_not_jump(branch):
     assert not jump_sizes(np.full(41, 1), section(branch)).any()
 
 
+@pytest.mark.parametrize(("times", "found"), [(4.5, []), (5.5, [20])])
+def test_a_step_five_times_those_beside_it_is_a_jump(times, found):
+    steps = np.full(40, 0.01)
+    steps[20] *= times
+    branch = np.concatenate([[0.0], np.cumsum(steps)])
+    assert np.flatnonzero(jump_sizes(np.full(41, 1), section(branch))).tolist() == found
+
+
 def test_only_motions_of_the_same_period_are_compared():
     branch = np.where(VALUES > 0.5, 1.0, 0.0)
     period = np.where(VALUES > 0.5, 2, 1)

@@ -99,6 +99,17 @@ def test_a_mesh_frequency_is_in_hertz_and_no_longer_angular(tmp_path):
     assert (told["units"], told["long_name"]) == ("Hz", "mesh frequency")
 
 
+def test_accelerations_are_the_rates_of_the_speeds(path):
+    motion = gearchaos.respond(gearchaos.load_config(small_config(path.parent), ASKED), 1)
+    found = motion.physical("delta_5_acceleration", "delta_5_rate")
+    acceleration, speed = (found[name][0] for name in ("delta_5_acceleration", "delta_5_rate"))
+    assert found.attributes("delta_5_acceleration")["units"] == "m/s^2"
+    step = motion.parameters["mesh_period"].values / (speed.size - 1)
+    # By the trapezoidal rule, whose error is of second order in the forty steps.
+    gained = np.cumsum(acceleration[1:] + acceleration[:-1]) * step / 2.0
+    assert gained == pytest.approx(speed[1:] - speed[0], abs=0.02 * np.ptp(speed))
+
+
 def test_one_variable_is_enough_and_twice_is_once(result):
     one = result.physical("section_delta_5")
     assert one.attributes("lyapunov_exponent")["units"] == "1"

@@ -161,6 +161,8 @@ def test_a_motion_that_does_not_repeat_is_transformed_as_a_whole(axes, result):
     assert axes.get_title("right") == "Hann window, 8 mesh periods"
     assert max(lines) <= 2.0
     assert lines[1.0] == pytest.approx(FAST, rel=0.05)
+    # Half of a line on each of those beside it is what the window of Hann makes of a wave.
+    assert [lines[0.875], lines[1.125]] == pytest.approx([FAST / 2.0] * 2, rel=0.2)
 
 
 @pytest.mark.parametrize(
