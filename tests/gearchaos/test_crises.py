@@ -70,8 +70,8 @@ def result(backwards: bool) -> Result:
     axes = [coordinate("growth", "1", "growth", "", GROWTH)]
     variables = sweep_variables(
         axes,
-        states=["delta_5"],
-        section=["delta_5"],
+        states=["delta_5", "delta_5_rate"],
+        section=["delta_5", "delta_5_rate"],
         section_points=100,
         lyapunov=False,
         motion_meanings=MEANINGS,
@@ -81,14 +81,16 @@ def result(backwards: bool) -> Result:
     lanes = (GROWTH.size,)
     arrays |= {
         "section_delta_5": section,
+        # Grows at the same place, but less.
+        "section_delta_5_rate": np.maximum(section, -0.5),
         "motion": np.where(chaotic, CHAOTIC, PERIODIC).astype(np.uint8),
         "period": np.where(chaotic, 0, 1).astype(np.int32),
         "return_distance": np.ones(lanes),
         "bands": np.ones(lanes, dtype=np.int32),
         "status": np.zeros(lanes, dtype=np.uint8),
         "diverged_period": np.full(lanes, -1, dtype=np.int32),
-        "start_state": np.zeros((*lanes, 1)),
-        "end_state": np.zeros((*lanes, 1)),
+        "start_state": np.zeros((*lanes, 2)),
+        "end_state": np.zeros((*lanes, 2)),
     }
     return Result(("growth",), variables, arrays, {}, {})
 

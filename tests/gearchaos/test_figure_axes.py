@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 
 from gearchaos.errors import ConfigurationError, FigureError
 from gearchaos.figures import bifurcation, bifurcation_page, lyapunov, shade_stages
-from gearchaos.figures.labels import in_words
+from gearchaos.figures.labels import axis_label, in_words
 from gearchaos.figures.stages import HATCHES
 from gearchaos.figures.style import OVERLAID
 from gearchaos.plot import main
@@ -35,6 +35,16 @@ def test_a_slice_of_two_parameters_is_drawn_and_named():
     points = bifurcation(axes, one).points
     well = one["status"] == 0
     np.testing.assert_array_equal(points.get_ydata(), one["section_delta_5"][well].ravel())
+
+
+def test_a_label_has_the_fewest_lines_and_of_those_the_shortest():
+    """Filled up to 24 characters, the first line would leave a single word for the second."""
+    words = "one two three four five six"
+    renamed = replace(BOTH.variables["lyapunov_exponent"], long_name=words, symbol="", units="m")
+    variables = [renamed if v.name == renamed.name else v for v in BOTH.variables.values()]
+    result = Result(BOTH.axes, variables, {name: BOTH[name] for name in BOTH}, {}, {})
+    lines = axis_label(result, "lyapunov_exponent", 24).splitlines()
+    assert lines == ["One two three", "four five six (m)"]
 
 
 def test_a_slice_is_named_as_its_axis_was():

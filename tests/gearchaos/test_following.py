@@ -123,6 +123,14 @@ def test_every_loss_has_a_multiplier_on_the_unit_circle_on_both_sides(followed):
     assert followed.multiplier[FOLDS] == pytest.approx(1.0, rel=0, abs=2e-6)
 
 
+def test_half_the_width_behind_a_fold_there_is_no_orbit(followed):
+    behind, points = followed.beyond_value[FOLDS], followed.stable.points[FOLDS]
+    width = np.abs(behind - followed.stable_value[FOLDS])
+    assert width == pytest.approx(WIDTH / 2.0, rel=1e-3)
+    found = polish(system_at(behind), points, PERIODS[FOLDS].astype(np.int32), Plan(STEPS, 0, 0, 0))
+    assert not found.converged.any()
+
+
 def test_an_orbit_born_in_a_period_doubling_is_followed_back_to_it(followed):
     (halving,) = np.flatnonzero(KINDS == StabilityLoss.PERIOD_HALVING)
     doubling = NAMES.index("period 1 doubles")

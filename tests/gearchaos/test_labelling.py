@@ -172,6 +172,19 @@ def test_a_linear_scene_grows_or_settles_and_is_never_chaotic():
     assert (arrays["period"][grows] == 0).all()
 
 
+def test_slow_growth_of_a_linear_scene_is_growth():
+    """At the edge of a tongue, where the largest multipliers are 0.9987 to 1.0027."""
+    near = "sweep={parameter='mesh_frequency', values=[1.708, 1.709, 1.710, 1.711]}"
+    file = PAN2021.with_name("pan2021_full.toml")
+    sweep = Simulation(load_config(file, [*PARAMETRIC, near]))
+    system, once = sweep.lanes.system_of(np.arange(4)), Plan(200, 0, 1, 0, tangent=True)
+    multipliers = np.linalg.eigvals(period_jacobian(system, np.zeros((4, 10)), once))
+    size = np.max(np.abs(multipliers), axis=1)
+    assert np.abs(size - 1.0).max() < 3e-3
+    assert (computed(sweep, 4)["motion"] == GROWS).tolist() == (size > 1.0).tolist()
+    assert (size > 1.0).tolist() == [False, False, True, True]
+
+
 def test_a_diverged_lane_is_labelled_as_diverged(tmp_path):
     arrays = computed(listing(tmp_path, "load", [-1e150, 0.2, 0.3]))
     assert arrays["motion"].tolist()[0] == DIVERGED
