@@ -61,6 +61,15 @@ def changed(result: Result, data: dict | None = None, without: str = "", **metad
     )
 
 
+def test_the_exponent_of_a_basin_is_that_of_all_periods_of_its_orbit():
+    result = computed([10.9], "start.kind=random", "start.count=8", "start.seed=2")
+    doubled = [basin for basin in find_basins(result).basins if basin.period == 2]
+    assert doubled
+    duration = 2 * 2.0 * np.pi / 0.8758760318208343
+    for basin in doubled:
+        assert basin.exponent == pytest.approx(np.log(basin.multiplier) / duration)
+
+
 def test_two_motions_share_the_starts_as_a_plain_count_does(grid):
     found = find_basins(grid)
     high = grid["end_state"][0, :, 0] > BETWEEN_THEM

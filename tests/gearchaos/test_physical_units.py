@@ -42,6 +42,9 @@ def test_what_a_mistaken_unit_makes_of_a_pair_is_told(tmp_path):
     assert "unlikely" not in notes()
     told = notes("pair.face_width_mm=0.02", "pitch_error.amplitude_um=8000.0", "sweep.to=1.0")
     assert "pitch error 8000 um, face width 0.02 mm: unlikely at a normal module of" in told
+    # From a tenth of the module on, 216.6 um.
+    assert "pitch error 225 um" in notes("pitch_error.amplitude_um=45.0")
+    assert "unlikely" not in notes("pitch_error.amplitude_um=43.0")
     assert "static deflection" in notes("mesh.mean_stiffness_N_per_um_mm=0.01")
 
 
