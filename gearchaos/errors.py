@@ -30,6 +30,12 @@ class ConfigurationError(GearchaosError):
     exit_code = 2
 
 
+class ExecutionError(GearchaosError):
+    """Lanes cannot be computed where they should be."""
+
+    exit_code = 4
+
+
 class FigureError(GearchaosError):
     """What is asked of a figure cannot be drawn from the result."""
 

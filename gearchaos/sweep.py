@@ -11,7 +11,7 @@ from contextlib import suppress
 from typing import TYPE_CHECKING
 
 from gearchaos.command_line import OK, Command
-from gearchaos.errors import ConfigurationError, FileError
+from gearchaos.errors import ConfigurationError, ExecutionError, FileError
 from gearchaos.finishing import complete_already, ending, output_of
 from gearchaos.progress import say
 
@@ -71,7 +71,6 @@ def _check_sharing(options: Namespace, config: "Configuration") -> None:
 def _compute(
     simulation: "Simulation", output: str, shard: "Shard | None", options: Namespace
 ) -> int:
-    from gearchaos.engine.executors import ExecutionError
     from gearchaos.engine.running import metadata, prepare
     from gearchaos.engine.store_filling import fill, open_store
     from gearchaos.results.atomic_file import check_output

@@ -4,19 +4,34 @@ from collections.abc import Collection, Mapping
 from typing import Any
 
 import numpy as np
-from gearchaos_kernels import Effects, Groups, Plan, System, Teeth
+from gearchaos_kernels import (
+    Effects,
+    ForkedProcessError,
+    Groups,
+    Plan,
+    System,
+    Teeth,
+    require_threads,
+)
 
 from gearchaos.arrays import Floats
 from gearchaos.configuration import Configuration
 from gearchaos.configuration.tables import groups_at, physical_at
-from gearchaos.errors import ConfigurationError
+from gearchaos.errors import ConfigurationError, ExecutionError
 from gearchaos.gear.contact_lines import contact_shares
 from gearchaos.gear.derivation import Quantities
 from gearchaos.gear.tooth_deviations import tooth_deviations
 
 
 def plan_of(config: Configuration, **others: Any) -> Plan:
-    """Return the configured plan of an integration that keeps no section, but for some fields."""
+    """Return the configured plan of an integration that keeps no section, but for some fields.
+
+    Raises ExecutionError in a process that cannot integrate, as it was forked from one that has.
+    """
+    try:
+        require_threads()
+    except ForkedProcessError as error:
+        raise ExecutionError(str(error)) from None
     integration = config.integration
     configured = Plan(
         integration.steps_per_period,

@@ -17,10 +17,9 @@ import numba
 from dask.utils import parse_timedelta
 
 from gearchaos.configuration import Configuration
-from gearchaos.engine.executors import ExecutionError
 from gearchaos.engine.provenance import SOFTWARE
 from gearchaos.engine.simulation import Arrays, Bounds, Simulation
-from gearchaos.errors import ConfigurationError
+from gearchaos.errors import ConfigurationError, ExecutionError
 from gearchaos.interrupts import check
 from gearchaos.progress import notice, say
 from gearchaos.version import Software, software_version

@@ -14,7 +14,7 @@ import numba
 
 from gearchaos.engine.error_check import Tally
 from gearchaos.engine.simulation import Arrays, Bounds, Simulation
-from gearchaos.errors import FileError, GearchaosError
+from gearchaos.errors import GearchaosError
 from gearchaos.interrupts import check
 from gearchaos.progress import progress
 
@@ -25,12 +25,6 @@ BlockExecutor: TypeAlias = "LocalExecutor | DaskExecutor"
 
 SECONDS_BETWEEN_LOOKS = 1.0
 """How often it is looked whether somebody is there to compute, while no block ends."""
-
-
-class ExecutionError(GearchaosError):
-    """Blocks cannot be computed where they should be."""
-
-    exit_code = FileError.exit_code
 
 
 class LocalExecutor(ExitStack):

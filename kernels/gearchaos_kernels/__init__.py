@@ -17,3 +17,4 @@ from gearchaos_kernels.system import (
     System,
     Teeth,
 )
+from gearchaos_kernels.turns import ForkedProcessError, require_threads

@@ -32,6 +32,7 @@ from numba.core.untyped_passes import RewriteSemanticConstants
 from numba.extending import intrinsic
 
 from gearchaos_kernels.cache import KernelCache, cache_folder
+from gearchaos_kernels.turns import in_turn
 
 # OpenMP asks when it is loaded, with the first parallel loop: a thread that waits shall leave its
 # core to others, as calls may be short, a thousand of them, and other processes run beside.
@@ -166,7 +167,7 @@ def part(function: Callable[..., Any]) -> Any:
     return _decorate(function, no_cfunc_wrapper=True, no_cpython_wrapper=True)
 
 
-def driver(function: Callable[..., Any], parallel: bool = True) -> Any:
+def dispatcher_of(function: Callable[..., Any], parallel: bool = True) -> Any:
     """Compile a function that only splits, calls and merges, in parallel and cached on disk."""
     dispatcher = _decorate(
         function, _DriverCompiler, parallel=parallel, nogil=True, no_cfunc_wrapper=True
@@ -175,9 +176,14 @@ def driver(function: Callable[..., Any], parallel: bool = True) -> Any:
     return dispatcher
 
 
+def driver(function: Callable[..., Any]) -> Any:
+    """Compile a function as `dispatcher_of` does; threads of Python enter it one at a time."""
+    return in_turn(dispatcher_of(function))
+
+
 def evaluator(function: Callable[..., Any]) -> Any:
     """Compile a function that visits lanes one after the other, cached on disk."""
-    return driver(function, parallel=False)
+    return dispatcher_of(function, parallel=False)
 
 
 @intrinsic

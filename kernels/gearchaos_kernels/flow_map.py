@@ -32,6 +32,7 @@ from gearchaos_kernels.flow_layout import Layout, layout
 from gearchaos_kernels.flow_series import TAIL, differentiate, make_maps, series_of_forcing
 from gearchaos_kernels.rows import LANES
 from gearchaos_kernels.system import Floats, Groups, Plan, System
+from gearchaos_kernels.turns import in_turn
 
 MOST_STEPS = 4096
 """Steps per period beyond which nothing is divided any more."""
@@ -115,13 +116,15 @@ class _Kept:
     def keep(self, name: Hashable, maps: Floats) -> None:
         """Keep the maps of a lane, shape (steps, size of a step)."""
         self.table[self.used : self.used + maps.size] = maps.reshape(-1)
-        self.places[name] = len(maps), self.used
-        self.used += maps.size
+        place, self.used = self.used, self.used + maps.size
+        # Last: a process that is forked meanwhile has no name without its maps.
+        self.places[name] = len(maps), place
 
 
 _kept = _Kept(0)
 
 
+@in_turn
 def maps_of(system: System, steps: int, present: Present) -> tuple[Floats, NDArray[np.intp]]:
     """Return the maps of the first lanes of a system, as many as fit into memory.
 

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from gearchaos_kernels import Effects, Plan, batch, integrate
 from gearchaos_kernels.cache import KernelCache
-from gearchaos_kernels.compilation import CACHE_FOLDER, driver
+from gearchaos_kernels.compilation import CACHE_FOLDER, dispatcher_of
 
 from .reference import FULL, NO_BACKLASH, TORSION, pan2021, system_of
 
@@ -39,7 +39,7 @@ class Anew(KernelCache):
         target_context.refresh()
 
 
-loop = driver(batch._integrate_blocks.py_func)
+loop = dispatcher_of(batch._integrate_blocks.__wrapped__.py_func)
 loop._cache = Anew(loop.py_func, CACHE_FOLDER)
 
 
