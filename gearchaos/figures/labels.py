@@ -8,6 +8,7 @@ from functools import cache
 from matplotlib.mathtext import MathTextParser
 
 from gearchaos.errors import FigureError
+from gearchaos.figures.style import DRAWING
 from gearchaos.gear.tooth_deviations import REALISATION
 from gearchaos.results import scales
 from gearchaos.results.result import Result
@@ -120,7 +121,8 @@ def _formula(text: str) -> str:
     """Return a symbol that is no formula as plain text."""
     # A file may come from anywhere; a formula that matplotlib cannot read would fail at drawing.
     try:
-        MathTextParser("path").parse(text)
+        with DRAWING:
+            MathTextParser("path").parse(text)
     except ValueError:
         return plain(text)
     return text if text.count("$") % 2 == 0 else plain(text)

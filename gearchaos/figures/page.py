@@ -8,7 +8,6 @@ from io import BytesIO
 from pathlib import Path
 from typing import Any
 
-import matplotlib as mpl
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
@@ -18,7 +17,14 @@ from matplotlib.mathtext import MathTextParser
 from matplotlib.ticker import AutoMinorLocator, MaxNLocator
 
 from gearchaos.errors import FigureError, FileError
-from gearchaos.figures.style import LEGEND, MM_PER_INCH, SINGLE_COLUMN_MM, SMALL_FONT_PT, style
+from gearchaos.figures.style import (
+    DRAWING,
+    LEGEND,
+    MM_PER_INCH,
+    SINGLE_COLUMN_MM,
+    SMALL_FONT_PT,
+    styled,
+)
 from gearchaos.figures.ticks import light
 from gearchaos.interrupts import check
 from gearchaos.results.atomic_file import check_output, replacing
@@ -44,15 +50,25 @@ class Page(Figure):
 
     def _repr_png_(self) -> bytes:
         picture = BytesIO()
-        with mpl.rc_context(style()):
+        with styled():
             self.savefig(picture, format="png", dpi=NOTEBOOK_DPI)
         return picture.getvalue()
+
+    def savefig(self, *given: Any, **named: Any) -> None:
+        """Write the page, as the same method of its base class does, while no other is drawn."""
+        with DRAWING:
+            super().savefig(*given, **named)
+
+    def draw(self, renderer: Any) -> None:
+        """Draw the page while no other is drawn."""
+        with DRAWING:
+            super().draw(renderer)
 
 
 @contextmanager
 def page(width_mm: float, height_mm: float) -> Iterator[Page]:
     """Make a page of this size; what is drawn on it meanwhile has the project's style."""
-    with mpl.rc_context(style()):
+    with styled():
         size = (width_mm / MM_PER_INCH, height_mm / MM_PER_INCH)
         layout = ConstrainedLayoutEngine()
         figure = Page(figsize=size, layout=layout)
@@ -131,7 +147,7 @@ def save_figure(
     dpi *= FINENESS.get(kind, 1)
     drawn, before = BytesIO(), [axes.get_rasterization_zorder() for axes in figure.axes]
     check()
-    with replacing(path, overwrite=overwrite) as partial, mpl.rc_context(style()):
+    with replacing(path, overwrite=overwrite) as partial, styled():
         for axes in figure.axes if kind == "eps" else ():
             axes.set_rasterization_zorder(BELOW_AXIS)
         figure.savefig(drawn, format=kind, dpi=dpi, **facts.get(kind, {"pil_kwargs": tags}))

@@ -3,7 +3,6 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
-from weakref import WeakKeyDictionary
 
 import numpy as np
 from matplotlib.artist import Artist
@@ -19,6 +18,9 @@ from gearchaos.results.result import Result
 
 OUTLYING_SHARE = 0.03
 MARGIN = 0.05
+
+_DIAGRAM = "_gearchaos_diagram"
+"""Attribute of the line of a diagram that holds the diagram."""
 
 
 @dataclass(eq=False)
@@ -44,18 +46,15 @@ class Diagram:
     legend: Legend | None = None
 
 
-_DRAWN: WeakKeyDictionary[Axes, list[Diagram]] = WeakKeyDictionary()
-
-
 def close_panel(axes: Axes, result: Result, own: Diagram, *, hold_zero: bool = False) -> Diagram:
     """Set limits and the label of the parameter, and mark the lanes that cannot be shown.
 
     Limits and marks are those of everything that was drawn into the axes in this way; ``hold_zero``
     is as for `robust_limits`.
     """
-    # Of axes that were cleared, nothing is left.
-    earlier = [one for one in _DRAWN.get(axes, []) if one.points.axes is axes]
-    drawn = _DRAWN[axes] = [*earlier, own]
+    # Kept by their lines: axes that are cleared lose them, and nothing outlives its figure.
+    setattr(own.points, _DIAGRAM, own)
+    drawn = [getattr(line, _DIAGRAM) for line in axes.lines if hasattr(line, _DIAGRAM)]
     left, right = zip(*(one.lanes.limits for one in drawn), strict=True)
     axes.set_xlim(min(left), max(right))
     axes.set_xlabel(axis_label(result, result.axis))

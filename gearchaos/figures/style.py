@@ -1,6 +1,10 @@
 """How the figures look: sizes for a journal column, and colours that also print in grey."""
 
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
+from threading import RLock
 from typing import Any
 
 import matplotlib as mpl
@@ -39,8 +43,27 @@ LEGEND: dict[str, Any] = {
 """Arguments of a legend outside of the axes."""
 
 
+DRAWING = RLock()
+"""Held by the one thread that draws a page or writes one.
+
+Matplotlib's settings are those of the whole process, and it has one parser of formulae.
+"""
+if hasattr(os, "register_at_fork"):
+    # A process forked in the middle of a page would keep its settings, and the lock for ever.
+    os.register_at_fork(
+        before=DRAWING.acquire, after_in_parent=DRAWING.release, after_in_child=DRAWING.release
+    )
+
+
+@contextmanager
+def styled() -> Iterator[None]:
+    """Set the project's style for what is drawn meanwhile; other threads wait for their pages."""
+    with DRAWING, mpl.rc_context(style()):
+        yield
+
+
 def style() -> dict[Any, Any]:
-    """Return settings for `matplotlib.rc_context`; what a user has set otherwise stays."""
+    """Return the settings of `styled`; what a user has set otherwise stays."""
     now, default = mpl.rcParams, mpl.rcParamsDefault
     return {
         **{key: now[key] if now[key] != default[key] else _STYLE[key] for key in _STYLE},

@@ -2,6 +2,7 @@
 
 import warnings
 from importlib import import_module
+from threading import RLock
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,10 +14,14 @@ if TYPE_CHECKING:
     from gearchaos.results.result import Result
 
 
+_IMPORTING = RLock()
+"""Held while filters of warnings, which are those of the whole process, are set aside."""
+
+
 def needed(package: str, extra: str = "export") -> Any:
     """Import a package of an extra of gearchaos; raises FileError if it is missing."""
     try:
-        with warnings.catch_warnings():
+        with _IMPORTING, warnings.catch_warnings():
             # What it has to say of other packages is not for who uses it here.
             warnings.simplefilter("ignore")
             return import_module(package)
