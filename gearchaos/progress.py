@@ -5,6 +5,7 @@ import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar, copy_context
+from functools import cache
 from io import StringIO
 from typing import Any
 
@@ -51,22 +52,34 @@ def notice(text: str) -> Iterator[None]:
 
 
 def progress(total: int, done: int = 0, unit: str = "lanes") -> Any:
-    """Tell of so many lanes or pages how many are done.
+    """Print how many of so many lanes or pages are done.
 
     On a terminal that is a bar, elsewhere a plain line now and then, and one at the end.
     """
-    from tqdm import tqdm
-
-    class Lines(tqdm):  # type: ignore[misc]
-        def display(self, **_: object) -> None:
-            if self.n > self.last_print_n:
-                say(str(self))
-
+    bar, lines = _bars()
     # Of one there is nothing to tell but that it is done.
     told: dict[str, Any] = {"total": total, "initial": done, "unit": f" {unit}"}
     told["disable"] = _quiet.get() or total < 2
     if sys.stderr.isatty():
-        return tqdm(**told, dynamic_ncols=True)
+        return bar(**told, dynamic_ncols=True, miniters=1)
     text = "{n} of {total}{unit}, {rate_noinv_fmt}, {remaining} left"
-    seldom = {"mininterval": SECONDS_BETWEEN_LINES, "miniters": 1}
-    return Lines(**told, **seldom, bar_format=text, file=StringIO())
+    return lines(
+        **told, mininterval=SECONDS_BETWEEN_LINES, miniters=1, bar_format=text, file=StringIO()
+    )
+
+
+@cache
+def _bars() -> tuple[Any, Any]:
+    """Return the classes of bars and of plain lines, made with the first of them."""
+    from tqdm import tqdm
+
+    class Bar(tqdm):  # type: ignore[misc]
+        # No thread that looks after bars: it outlives them, and every update is looked at anyway.
+        monitor_interval = 0
+
+    class Lines(Bar):
+        def display(self, **_: object) -> None:
+            if self.n > self.last_print_n:
+                say(str(self))
+
+    return Bar, Lines
