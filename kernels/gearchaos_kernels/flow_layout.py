@@ -6,23 +6,39 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gearchaos_kernels import rows
-from gearchaos_kernels.compilation import scalar
-from gearchaos_kernels.system import Floats
+from gearchaos_kernels.compilation import CACHE_LINE, scalar
+from gearchaos_kernels.system import STATES, Floats
 
 TERMS = 16
-"""Terms of the polynomials along a step."""
-
-BOUNDS, HEADER = (8, 24), 40
-"""What stands before the maps of a step: sine and cosine of the mesh phase at its beginning and at
-its end; by how much each column may bend either gap beyond a cubic, on any branch."""
+"""Terms of the polynomials along a step, an even number: even and odd ones are summed apart."""
 
 
-INPUTS, TANGENT_INPUTS, RESULT, OWN = 0, 16, 32, 48
-"""Where the numbers of a block's only lane stand: state and forces, tangent vector, either of them
-at the end of the step; and how many numbers that are."""
+def _filled(numbers: int) -> int:
+    """Return how many numbers fill whole cache lines, where so many are needed."""
+    line = CACHE_LINE // np.dtype(np.float64).itemsize
+    return -(-numbers // line) * line
+
+
+WIDEST = _filled(len(STATES) + rows.MARGINS - rows.FORCES)
+"""Numbers set aside for all states and all that forces a lane."""
+
+_BEGIN = _filled(4)
+BOUNDS = (_BEGIN, _BEGIN + WIDEST)
+HEADER = BOUNDS[-1] + WIDEST
+"""Numbers before the maps of a step: sine and cosine of the mesh phase at its beginning and at its
+end; from `BOUNDS` on, by how much each column may bend either gap beyond a cubic, on any branch."""
+
+
+INPUTS, TANGENT_INPUTS, RESULT, OWN = range(0, 4 * WIDEST, WIDEST)
+"""Places of the numbers of a block's only lane: state and forces, tangent vector, either of them at
+the end of the step; and how many numbers that are."""
 
 GAPS = rows.ROWS
-TANGENT_TERMS, MOMENT, CROSSED, SIDE, DISTANCE, BEND, GAP = 16, 32, 33, 35, 36, 37, 40
+TANGENT_TERMS = TERMS
+MOMENT = TANGENT_TERMS + TERMS
+CROSSED = MOMENT + 1
+SIDE, DISTANCE, BEND = range(CROSSED + 2, CROSSED + 5)
+GAP = _filled(BEND + 1)
 """Rows of a lane that has been taken aside, as it crosses: first those of the tangential and of the
 axial gap, with the terms along the step, those of what the tangent vector adds, the next crossing,
 value and slope there, the side from which the gap is seen, by what it is raised, and more than its
@@ -42,7 +58,8 @@ class Crossing(NamedTuple):
     axially: float
 
 
-AFTER, FACTOR, EDGE, AXIALLY, SUMS = range(GAPS + 2 * GAP, GAPS + 2 * GAP + 5)
+AFTER, FACTOR, EDGE, AXIALLY = range(GAPS + 2 * GAP, GAPS + 2 * GAP + len(Crossing._fields))
+SUMS = AXIALLY + 1
 TANGENT_SUMS = SUMS + TERMS
 ASIDE = TANGENT_SUMS + TERMS - rows.ROWS
 """Behind them: what carries state and tangent vector over it (see `flow_vectors.sum_along`); and
@@ -98,7 +115,7 @@ def layout(present):
     resolved = 0 if present.resolved is None else 1
     states = 2 + 4 * transverse + 4 * axial
     columns = states + 2 + axial + error + phase
-    width = 2 if states == 2 else 8 if states == 6 else 16
+    width = 2 if states == 2 else 8 if states == 6 else WIDEST
     ways = 1 + axial
     gap = columns * width
     switch = gap + ways * columns * TERMS
