@@ -20,7 +20,7 @@ from gearchaos.errors import ConfigurationError
 from gearchaos.interrupts import check
 from gearchaos.progress import say, speaking
 from gearchaos.results.result import Result
-from gearchaos.results.variables import Variable
+from gearchaos.results.variables import Variable, require_listed
 
 COMPILING = "preparing the kernel of this scene, once; this takes some seconds"
 
@@ -77,13 +77,15 @@ def result_of(
 ) -> Result:
     """Join blocks in the order of computation to a result, which says these facts about itself.
 
-    ``more``: what the blocks hold beside the variables of the sweep.
+    ``more``: what the blocks hold beside the variables of the sweep. Raises ValueError if they hold
+    anything else.
     """
     lanes = simulation.lanes
     order = np.argsort(lanes.computed_at(np.arange(len(lanes)))) if simulation.carried else ...
     data = {name: np.concatenate([arrays[name] for arrays in blocks])[order] for name in blocks[0]}
     axes = [axis.name for axis in lanes.axes]
     variables = [*simulation.variables, *more]
+    require_listed(data, [variable.name for variable in variables])
     return Result(axes, variables, data, lanes.parameters, facts)
 
 

@@ -18,7 +18,7 @@ from gearchaos.errors import FileError
 from gearchaos.results.atomic_file import PARTIAL, reason, replacing, unlinked_content
 from gearchaos.results.block_folder import LOCK, MANIFEST, StoreLock, folder_of, settle_manifest
 from gearchaos.results.result_file import Metadata, write_result
-from gearchaos.results.variables import Variable, lane_axes
+from gearchaos.results.variables import Variable, lane_axes, require_listed
 from gearchaos.version import Software
 
 Arrays: TypeAlias = Mapping[str, Array]
@@ -141,8 +141,10 @@ class BlockStore(AbstractContextManager["BlockStore"]):
     def write(self, first: int, last: int, arrays: Arrays) -> None:
         """Keep the lanes first to last - 1 of every computed variable.
 
-        Raises FileError if they cannot be kept, ValueError if an array has a wrong shape.
+        Raises FileError if they cannot be kept, ValueError if an array has a wrong shape or is none
+        of these variables.
         """
+        require_listed(arrays, self._record.names or ())
         records = np.empty(last - first, self._record)
         for name in self._record.names or ():
             if (shape := np.shape(arrays[name])) != records[name].shape:

@@ -15,7 +15,14 @@ import numpy as np
 from gearchaos.arrays import Array
 from gearchaos.interrupts import check
 from gearchaos.results.atomic_file import append_checksum, replacing
-from gearchaos.results.variables import HARMONIC, Variable, diagram_axis, lane_axes, listed
+from gearchaos.results.variables import (
+    HARMONIC,
+    Variable,
+    diagram_axis,
+    lane_axes,
+    listed,
+    require_listed,
+)
 
 SCHEMA = "gearchaos-sweep"
 SCHEMA_VERSION = "3.2"
@@ -75,6 +82,7 @@ def write_result(
             # Kept open: HDF5 packs a chunk anew each time its dataset is closed.
             of_the_lanes = {v.name: file[v.name] for v in everything if v.values is None}
             for first, last, arrays in blocks:
+                require_listed(arrays, [variable.name for variable in everything])
                 boxes = list(hyperslabs(first, last, shape))
                 for name, dataset in of_the_lanes.items():
                     place = 0

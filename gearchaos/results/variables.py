@@ -157,8 +157,16 @@ def listed(
     """List axes, and what of variables.csv is told with these subjects, in the order of the file.
 
     Each is as often there as there are subjects, and once where that is but true. ``values`` of
-    what is known beforehand, and ``meanings`` of 0, 1, ..., are by the names in the table.
+    what is known beforehand, and ``meanings`` of 0, 1, ..., are by the names in the table. Raises
+    ValueError if a subject, a value or a meaning is of none of its rows.
     """
+    kinds = _ROWS.keys() - _WORDING.keys()
+    names = {row["name"] for kind in kinds for row in _ROWS[kind]}
+    for given, there in ((subjects, kinds), (values, names), (meanings, names)):
+        if unknown := sorted(given.keys() - there):
+            raise ValueError(
+                f"{', '.join(unknown)}: no row of variables.csv; correct it or add one"
+            )
     lane, variables = tuple(axis.name for axis in axes), list(axes)
     words = {name: words for kind in _WORDING.values() for name, words in kind.items()}
     for told_with, rows in _ROWS.items():
@@ -182,6 +190,15 @@ def listed(
             )
     there = {one.name for one in variables}
     return [replace(v, errors=tuple(e for e in v.errors if e in there)) for v in variables]
+
+
+def require_listed(arrays: Collection[str], variables: Collection[str]) -> None:
+    """Raise ValueError if one of the arrays, by their names, is none of the variables."""
+    if unlisted := sorted(set(arrays) - set(variables)):
+        raise ValueError(
+            f"{', '.join(unlisted)}: would not be written, being none of the variables of the "
+            "result; add a row to variables.csv, or list it"
+        )
 
 
 def _dims(axes: Sequence[str], row: Mapping[str, str]) -> tuple[str, ...]:
