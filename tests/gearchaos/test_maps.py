@@ -8,6 +8,7 @@ from matplotlib.patches import PathPatch
 
 from gearchaos.errors import FigureError, FileError
 from gearchaos.figures import map_page, parameter_map
+from gearchaos.figures.maps import _number_cells
 from gearchaos.figures.stages import SHADES
 from gearchaos.plot import main
 from gearchaos.records.label import MEANINGS
@@ -128,6 +129,36 @@ def test_exponents_are_white_at_zero_blue_below_and_orange_above():
     assert below[2] > below[0] and above[0] > above[2]
     lightness = image.to_rgba(np.array([-0.4, 0.5]))[:, :3].sum(axis=1)
     assert lightness[1] < 0.5 < lightness[0]
+
+
+@pytest.mark.parametrize(
+    ("outlier", "ends"), [(-90.0, "min"), (90.0, "max"), (None, "neither")], ids=str
+)
+def test_the_bar_of_colours_ends_in_an_arrow_where_numbers_lie_beyond_it(outlier, ends):
+    """Of 60 numbers one far out is beyond robust limits, on the side on which it lies."""
+    numbers = np.linspace(0.0, 1.0, 60)
+    if outlier is not None:
+        numbers[7] = outlier
+    axes = Figure(layout="constrained").subplots()
+    edges = np.arange(11.0), np.arange(7.0)
+    image = _number_cells(axes, edges, numbers.reshape(6, 10), signed=False)
+    (bar,) = axes.child_axes
+    assert image.colorbar.extend == ends
+    # Beyond the ends of the bar lies a triangle, and to the left is below.
+    patches = [one.get_path().get_extents() for one in bar.get_children() if type(one) is PathPatch]
+    assert len(patches) == (outlier is not None)
+    assert all((patch.x0 < 0.0) == (ends == "min") for patch in patches)
+    assert (image.norm.vmin > numbers.min()) == (ends == "min")
+    assert (image.norm.vmax < numbers.max()) == (ends == "max")
+
+
+def test_the_bar_of_colours_has_both_arrows_where_numbers_lie_beyond_both_ends():
+    numbers = np.linspace(0.0, 1.0, 120)
+    numbers[[7, 70]] = -90.0, 90.0
+    axes = Figure(layout="constrained").subplots()
+    edges = np.arange(11.0), np.arange(13.0)
+    image = _number_cells(axes, edges, numbers.reshape(12, 10), signed=True)
+    assert image.colorbar.extend == "both"
 
 
 def test_a_part_of_the_range_is_that_of_the_first_parameter():
