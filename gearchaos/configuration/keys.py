@@ -1,7 +1,7 @@
 """Tables of a configuration and their keys: how they are declared, and what is declared of them."""
 
 import typing
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 from typing import Annotated, Any, TypeAlias
 
@@ -22,7 +22,6 @@ class Table(BaseModel):
         frozen=True,
         allow_inf_nan=False,
         validate_default=True,
-        serialize_by_alias=True,
         protected_namespaces=(),
         use_attribute_docstrings=True,
     )
@@ -34,6 +33,15 @@ class Table(BaseModel):
         kinds = (np.generic, np.ndarray)
         entries = given.items() if isinstance(given, dict) else ()
         return {k: v.tolist() if isinstance(v, kinds) else v for k, v in entries} or given
+
+    def tables(self, include: Collection[str] | None = None) -> dict[str, Any]:
+        """Return nested mappings of every known value by its key in the file, defaults included.
+
+        ``include``: which keys of this table, by default all.
+        """
+        # Before pydantic 2.11, no setting of the model makes aliases the default.
+        names = None if include is None else set(include)
+        return self.model_dump(include=names, exclude_none=True, by_alias=True)
 
 
 # TOML has lists, the models hold tuples; strictness about the entries is not affected.

@@ -120,10 +120,6 @@ class Configuration(Tables):
         tables |= dict(zip(self.sweeps, left, strict=False))
         return type(self).from_tables(tables, self.source)
 
-    def tables(self) -> dict[str, Any]:
-        """Return the nested mappings of everything that is known, defaults included."""
-        return self.model_dump(exclude_none=True)
-
     def resolved_toml(self) -> str:
         """Return TOML with every default filled in; it loads to an equal configuration."""
         return toml_text(self.tables())

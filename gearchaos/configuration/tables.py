@@ -71,8 +71,7 @@ class Tables(Table):
 
     def physical(self) -> dict[str, Any]:
         """Return every key of the physical tables by its path, with its value or None."""
-        known = self.model_dump(include=PHYSICAL_TABLES, exclude_none=True)
-        return dict.fromkeys(PHYSICAL_KEYS) | flat_tables(known)
+        return dict.fromkeys(PHYSICAL_KEYS) | flat_tables(self.tables(PHYSICAL_TABLES))
 
 
 PHYSICAL_TABLES = {"pair", "operation", "mesh", "pitch_error", "bearings"}

@@ -55,9 +55,9 @@ def judge(problem: Problem, run: int, parameters: dict[str, Floats]) -> Tried:
 
 def decisive_facts(problem: Problem) -> dict[str, Any]:
     """Return what decides which candidates are tried and what they come to."""
-    targets = problem.targets.model_dump(exclude_none=True)
-    tables = {"cma_version": version("cma"), "targets": targets, "of": problem.config.tables()}
-    return {**SOFTWARE._asdict(), "configuration": toml_text(tables)}
+    tables = {"targets": problem.targets.tables(), "of": problem.config.tables()}
+    text = toml_text({"cma_version": version("cma"), **tables})
+    return {**SOFTWARE._asdict(), "configuration": text}
 
 
 def search(problem: Problem, known: Tried, source: str) -> Iterator[Tried]:
