@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     """One page: what its name says beside that of the result, and how it is drawn."""
 
 RESULT_ENDINGS = (".h5", ".hdf5", ".nc")
+OTHER_PICTURES = ("avif", "gif")  # Endings that matplotlib knows from 3.11 on.
 
 
 def _plot(options: Namespace) -> None:
@@ -160,7 +161,7 @@ def _targets(options: Namespace, name: str, alone: bool) -> list[Path]:
         output /= f"{'_and_'.join(stems)}{name}"
     else:
         ending = output.suffix.lower().removeprefix(".")
-        if ending in FigureCanvasBase.filetypes:
+        if ending in {*FigureCanvasBase.filetypes, *OTHER_PICTURES}:
             output, asked = output.with_suffix(""), (ending,)
         output = output.with_name(f"{output.name}{'' if alone else name}")
     asked = asked if options.format is None else options.format.split(",")

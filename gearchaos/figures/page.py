@@ -9,11 +9,10 @@ from pathlib import Path
 from typing import Any
 
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.backends.backend_agg import FigureCanvasAgg, RendererAgg
 from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 from matplotlib.legend import Legend
-from matplotlib.mathtext import MathTextParser
 from matplotlib.ticker import AutoMinorLocator, MaxNLocator
 
 from gearchaos.errors import FigureError, FileError
@@ -41,8 +40,12 @@ OWN = rb"(Software[\0 ]|/Creator \(|%%Creator: |<dc:creator>\s*<cc:Agent>\s*<dc:
 NOTEBOOK_DPI = 200
 
 
-FORMULAE = MathTextParser("path")
-"""Keeps what it has read of formulae: the next page has most of them again."""
+FORMULAE: Any = getattr(RendererAgg(1, 1, 72.0), "mathtext_parser", None)  # type: ignore[no-untyped-call]
+"""Reads formulae for all pages and caches the results: the next page has most of them again.
+
+The parser of a renderer, since its kind depends on the version of matplotlib: Agg takes pictures
+before 3.11 and paths from then on.
+"""
 
 
 class Page(Figure):

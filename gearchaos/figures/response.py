@@ -159,10 +159,11 @@ def amplitude_spectrum(
     floor = top * 10.0**-DECADES
     axes.set_yscale("log")
     axes.yaxis.set_minor_formatter(NullFormatter())
+    # Before the lines: matplotlib 3.9 finds limits from their logarithms, and warns.
+    axes.set_ylim(floor, top)
     seen = amplitude > floor
     width = 0.5 if np.count_nonzero(amplitude > 1e-3 * top) > _MANY_LINES else 1.0
     lines = axes.vlines(order[seen], floor, amplitude[seen], color=BLUE, linewidth=width)
-    axes.set_ylim(floor, top)
     spare = 0.02 * highest
     axes.set_xlim(-spare, highest + spare)
     axes.set_xlabel("Frequency over mesh frequency")

@@ -39,7 +39,8 @@ def datasets_of(file: h5py.File) -> dict[str, h5py.Dataset]:
 
     Raises UnfitError unless all of it are arrays in this file, which may have so many bytes.
     """
-    names = _names(file)
+    # h5py 3.11 lists a file by name, and its root group in the order of creation.
+    names = _names(file["/"])
     # Whoever copies the root group alone leaves the parameters behind.
     if PARAMETERS in names:
         names.remove(PARAMETERS)

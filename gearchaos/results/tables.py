@@ -55,7 +55,9 @@ def to_dataframe(result: "Result", *along: str) -> Any:
     for name in (name for name in result if result.dims(name) == dims and name not in dims):
         columns[name], flags = result[name].ravel(), result.variables[name].flags
         if flags:
-            codes = np.where(columns[name] < len(flags), columns[name], -1).astype(int)
+            # Signed: -1 is what pandas takes for missing, and flags are stored unsigned.
+            codes = columns[name].astype(np.int64)
+            codes[(codes < 0) | (codes >= len(flags))] = -1
             columns[name] = pandas.Categorical.from_codes(codes, flags)
     if not columns:
         others = {result.dims(name)[len(result.axes) :] for name in result}

@@ -48,6 +48,16 @@ def test_a_table_has_a_row_per_lane_and_words_for_flags():
     assert one.index.name == "pitch_error"
 
 
+def test_a_flag_without_a_meaning_is_missing_in_the_table():
+    pytest.importorskip("pandas")
+    result = result_over(AXES["one start"])
+    flags = result["motion"].copy()
+    flags[2:4] = 2, 255
+    result._data["motion"] = flags
+    told = result.to_dataframe()["motion"]
+    assert told.isna().tolist() == [False, False, True, True, False, False, False]
+
+
 @pytest.mark.parametrize("ending", ["csv", "parquet"])
 @pytest.mark.parametrize("along", [(), ("section_point",)])
 def test_tables_as_files_come_back_as_they_were(path, ending, along, capsys):
@@ -58,7 +68,12 @@ def test_tables_as_files_come_back_as_they_were(path, ending, along, capsys):
     asked = [word for name in along for word in ("--along", name)]
     assert main([str(path), str(target), *asked]) == 0
     assert capsys.readouterr().out == f"{target}\n"
-    read = pandas.read_csv(target) if ending == "csv" else pandas.read_parquet(target).reset_index()
+    if ending == "csv":
+        # The default of pandas 2 is off in the last digit.
+        exact = {"float_precision": "round_trip"} if pandas.__version__ < "3" else {}
+        read = pandas.read_csv(target, **exact)
+    else:
+        read = pandas.read_parquet(target).reset_index()
     wanted = RESULT.to_dataframe(*along).reset_index()
     assert list(read.columns) == list(wanted.columns)
     for name in wanted:
