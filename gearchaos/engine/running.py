@@ -5,11 +5,12 @@ import os
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from functools import cache
 from typing import Any
 
 import numba
 import numpy as np
-from numba.core import event
+from gearchaos_kernels.compilation import on_compilation
 
 from gearchaos.configuration import Given, configuration_of
 from gearchaos.engine.error_check import Tally
@@ -25,24 +26,11 @@ from gearchaos.results.variables import Variable, require_listed
 COMPILING = "preparing the kernel of this scene, once; this takes some seconds"
 
 
-class _Announcer(event.Listener):  # type: ignore[misc]
-    """Says once that a kernel is compiled."""
-
-    _said = False
-
-    def on_start(self, _event: event.Event) -> None:
-        """Say it the first time."""
-        if not self._said:
-            self._said = True
-            say(COMPILING)
-
-    on_end = on_start
-
-
 @contextmanager
 def compiling() -> Iterator[None]:
     """Say so if what follows is compiled, and not only loaded from the cache."""
-    with event.install_listener("numba:compile", _Announcer()):
+    once = cache(lambda: say(COMPILING))
+    with on_compilation(once):
         yield
 
 
@@ -145,7 +133,7 @@ def metadata(simulation: Simulation, seconds: float) -> Mapping[str, Any]:
         "effects": " ".join(config.scene.effects),
         "start": config.start.kind,
         "carry": config.start.carry,
-        **config.integration.model_dump(exclude_none=True),
+        **config.integration.tables(),
         "steps_per_period": simulation.plan.steps_per_period,
         "transient_periods": simulation.plan.transient_periods,
         "recorded_periods": simulation.plan.recorded_periods,

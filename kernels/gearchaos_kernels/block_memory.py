@@ -6,11 +6,10 @@ from typing import Any
 import numpy as np
 from llvmlite import ir
 from numba import types
-from numba.core import cgutils
 from numba.extending import intrinsic
 
 from gearchaos_kernels import rows
-from gearchaos_kernels.compilation import CACHE_LINE, part, scalar
+from gearchaos_kernels.compilation import CACHE_LINE, first_element, part, scalar
 from gearchaos_kernels.rows import STRIDE, Branch, Coordinates, Directions, Lane, State
 from gearchaos_kernels.system import Plan, System
 
@@ -56,11 +55,11 @@ def aligned_memory(more=0):
 
 def _pointer(context: Any, builder: Any, signature: Any, arguments: Any, number: int) -> Any:
     """Address of one row of a slot: arguments are memory, row, slot."""
-    memory = context.make_array(signature.args[0])(context, builder, arguments[0])
+    first = first_element(context, builder, signature.args[0], arguments[0])
     row = builder.add(arguments[1], ir.Constant(arguments[1].type, number))
     stride = ir.Constant(row.type, STRIDE)
     index = builder.add(builder.mul(row, stride), arguments[2])
-    return builder.gep(memory.data, [index])
+    return builder.gep(first, [index])
 
 
 @intrinsic
@@ -81,7 +80,8 @@ def store(_typing_context: Any, memory: Any, row: Any, slot: Any, record: Any) -
     """Write a record of numbers into consecutive rows of one slot."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        for number, value in enumerate(cgutils.unpack_tuple(builder, arguments[3])):
+        for number in range(len(record)):
+            value = builder.extract_value(arguments[3], number)
             builder.store(value, _pointer(context, builder, signature, arguments, number))
         return context.get_dummy_value()
 

@@ -19,11 +19,24 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import numba
 from numba import config
-from numba.core.caching import NullCache
-from numba.core.compiler import CompileResult
-from numba.core.serialize import dumps
-from numba.misc.appdirs import user_cache_dir
+
+# What Numba keeps to itself: where a version lacks it, every process compiles anew.
+try:
+    from numba.core.caching import NullCache
+    from numba.core.compiler import CompileResult
+    from numba.core.serialize import dumps
+except ImportError:
+    NullCache = object
+    CompileResult = dumps = None
+try:
+    from numba.misc.appdirs import user_cache_dir
+except ImportError:
+
+    def user_cache_dir(name: str) -> str:
+        """Return the user's cache folder of Linux, a relative one where none is set."""
+        return os.path.join(os.environ.get("XDG_CACHE_HOME", ""), name)
 
 
 def cache_folder(name: str) -> Path:
@@ -72,6 +85,21 @@ def _tell(text: str) -> None:
     logging.getLogger("gearchaos").warning("gearchaos: %s", text)
 
 
+def keep_compiled(dispatcher: Any, folder: Path) -> None:
+    """Keep the compiled code of a dispatcher in a folder, if this version of Numba lets it."""
+    if CompileResult is None or not hasattr(dispatcher, "_cache"):
+        _tell_unfit("it has another cache")
+    else:
+        dispatcher._cache = KernelCache(dispatcher.py_func, folder)
+
+
+def _tell_unfit(fault: object) -> None:
+    _tell(
+        f"compiled code cannot be kept with Numba {numba.__version__} ({fault}), every process "
+        "compiles anew; install an older version of Numba"
+    )
+
+
 class KernelCache(NullCache):  # type: ignore[misc]
     """The compiled code of one function in a folder, one file for each signature."""
 
@@ -81,6 +109,13 @@ class KernelCache(NullCache):  # type: ignore[misc]
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """Return the code that was kept for a signature, or None where it has to be compiled."""
+        try:
+            return self._load(sig, target_context)
+        except Exception as error:  # Whatever another version of Numba raises.
+            _tell_unfit(f"{type(error).__name__}: {error}")
+            return None
+
+    def _load(self, sig: Any, target_context: Any) -> Any:
         target_context.refresh()
         path = self._path(sig, target_context.codegen())
         try:
@@ -97,10 +132,10 @@ class KernelCache(NullCache):  # type: ignore[misc]
 
     def save_overload(self, sig: Any, data: Any) -> None:
         """Keep code for later processes; where that fails, a line says what to do about it."""
-        if data.library.has_dynamic_globals:  # Addresses in this process.
-            return
-        path = self._path(sig, data.codegen)
         try:
+            if data.library.has_dynamic_globals:  # Addresses in this process.
+                return
+            path = self._path(sig, data.codegen)
             with tempfile.TemporaryDirectory(dir=self._folder) as folder:
                 written = Path(folder, path.name)
                 written.touch(0o600)
@@ -111,6 +146,8 @@ class KernelCache(NullCache):  # type: ignore[misc]
                 f"{self._folder}: cannot keep compiled code, every process compiles anew "
                 f"({error.strerror}); free space there or set NUMBA_CACHE_DIR to another folder"
             )
+        except Exception as error:  # Whatever another version of Numba raises.
+            _tell_unfit(f"{type(error).__name__}: {error}")
 
     def _path(self, sig: Any, codegen: Any) -> Path:
         """Name a file after all that decides what is in it; the folder stands for the sources."""

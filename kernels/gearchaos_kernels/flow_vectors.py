@@ -10,11 +10,10 @@ from typing import Any
 
 from llvmlite import ir
 from numba import types
-from numba.core import cgutils
 from numba.extending import intrinsic
 
 from gearchaos_kernels import rows
-from gearchaos_kernels.compilation import FASTMATH
+from gearchaos_kernels.compilation import FASTMATH, first_element
 from gearchaos_kernels.flow_layout import (
     AFTER,
     AXIALLY,
@@ -68,7 +67,7 @@ class _Writer:
     def element(self, number: int, at: Any) -> Any:
         """Return the address of an element of the array that is this argument."""
         kind, array = self.arguments[number]
-        first = self.context.make_array(kind)(self.context, self.builder, array).data
+        first = first_element(self.context, self.builder, kind, array)
         return self.builder.gep(first, [at])
 
     def load(self, pointer: Any, at: int, width: int = VECTOR) -> Any:
@@ -116,8 +115,9 @@ class _Writer:
         """Return the sizes of the numbers of a vector."""
         kind = vector.type
         name = f"llvm.fabs.v{kind.count}f64"
-        function = ir.FunctionType(kind, [kind])
-        fabs = cgutils.get_or_insert_function(self.builder.module, function, name)
+        module = self.builder.module
+        declared = module.globals.get(name)
+        fabs = declared or ir.Function(module, ir.FunctionType(kind, [kind]), name)
         return self.builder.call(fabs, [vector])
 
     def multiply_add(self, a: Any, b: Any, c: Any) -> Any:

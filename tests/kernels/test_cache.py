@@ -7,9 +7,11 @@ import site
 import stat
 import subprocess
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 
 import gearchaos_kernels
+import numpy as np
 import pytest
 from gearchaos_kernels.cache import cache_folder
 from gearchaos_kernels.compilation import CACHE_FOLDER, source_hash
@@ -19,7 +21,15 @@ PACKAGE = Path(gearchaos_kernels.__file__).parent
 # What is asked for are expressions. The Jacobian is the kernel that compiles fastest; `double`, of
 # which every type of argument is compiled for itself, is faster still and cached in the same way.
 PROGRAM = """
-import json, sys
+import importlib, json, sys
+import numba, numba.core.ccallback
+for hook in sys.argv[2:]:
+    where, _, name = hook.rpartition(".")
+    module, _, kind = where.partition(":")
+    holder = importlib.import_module(module)
+    delattr(getattr(holder, kind) if kind else holder, name)
+    if where + "." + name in sys.modules:
+        sys.modules[where + "." + name] = None
 limit, *expressions = json.loads(sys.argv[1])
 if limit:
     import resource
@@ -57,20 +67,23 @@ def compute(
     package: Path = PACKAGE,
     largest_file: int = 0,
     complaint: str | None = None,
+    without: Sequence[str] = (),
     **variables: str,
 ) -> dict:
     """Evaluate expressions in a new process and return what it says of its cache.
 
-    It says nothing on stderr, or one line that contains the complaint.
+    It says nothing on stderr, or one line that contains the complaint. ``without``: names that
+    Numba lacks, such as ``numba.core.codegen.JITCodeLibrary``, or of a class ``module:Class.name``.
     """
     environment = {**os.environ, "PYTHONPATH": str(package.parent), "PYTHONDONTWRITEBYTECODE": "1"}
     environment |= {"NUMBA_CACHE_DIR": str(cache), **variables}
+    command = [sys.executable, "-W", "error", "-c", PROGRAM]
     done = subprocess.run(
-        [sys.executable, "-W", "error", "-c", PROGRAM, json.dumps([largest_file, *expressions])],
+        [*command, json.dumps([largest_file, *expressions]), *without],
         env=environment,
         capture_output=True,
         text=True,
-        timeout=300,
+        timeout=1800,
         check=False,
     )
     assert done.returncode == 0, done.stderr
@@ -155,6 +168,40 @@ def test_a_full_disk_does_not_stop_a_computation(tmp_path):
     outcome = compute(tmp_path, REAL, COMPLEX, largest_file=999, complaint=complaint)
     assert outcome["values"] == [3.0, 3.0]
     assert list(folder.iterdir()) == []
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "hook",
+    [
+        "numba.core.caching.NullCache",
+        "numba.core.compiler:CompileResult._reduce",
+        "numba.core.codegen:CPUCodegen.magic_tuple",
+    ],
+)
+def test_a_numba_whose_code_cannot_be_kept_computes_the_same(hook, tmp_path):
+    folder = tmp_path / source_hash()
+    complaint = "compiled code cannot be kept with Numba"
+    outcome = compute(tmp_path, REAL, COMPLEX, without=[hook], complaint=complaint)
+    assert outcome["values"] == [3.0, 3.0]
+    assert list(folder.iterdir()) == []
+
+
+@pytest.mark.slow
+def test_code_that_another_numba_cannot_load_is_compiled(tmp_path):
+    assert compute(tmp_path, REAL)["misses"] == 1
+    hook, complaint = "numba.core.compiler:CompileResult._rebuild", "AttributeError: "
+    assert compute(tmp_path, REAL, without=[hook], complaint=complaint)["values"] == [3.0]
+
+
+@pytest.mark.slow
+def test_a_numba_without_what_speeds_up_compilation_computes_the_same(first, tmp_path):
+    without = ["numba.core.codegen.JITCodeLibrary", "numba.core.cpu.CPUTargetOptions"]
+    without += ["numba.core.event", "numba.misc.appdirs.user_cache_dir"]
+    outcome = compute(tmp_path, TORSIONAL, without=without)
+    # Other code may round in another order.
+    np.testing.assert_allclose(outcome["values"], first["values"], rtol=1e-14)
+    assert compute(tmp_path, TORSIONAL, without=without)["hits"] == 1
 
 
 @pytest.mark.parametrize("name", sorted(path.name for path in PACKAGE.glob("*.py")))
