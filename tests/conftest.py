@@ -4,10 +4,14 @@ import gc
 import os
 
 import pytest
-from hypothesis import settings
+from hypothesis import HealthCheck, settings
 
-# The same examples on every run: a failure is a failure of the change that was made.
-settings.register_profile("repeatable", derandomize=True, deadline=None)
+# The same examples on every run: a failure is a failure of the change that was made, and not of a
+# machine that is busy.
+TIMED = [HealthCheck.too_slow]
+settings.register_profile(
+    "repeatable", derandomize=True, deadline=None, suppress_health_check=TIMED
+)
 settings.load_profile("repeatable")
 
 FIRST = ("vectorisation", "flow_map", "explore", "oracle", "shard_option", "dask", "loads")

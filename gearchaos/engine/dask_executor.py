@@ -28,6 +28,9 @@ BLOCKS_PER_WORKER = 2  # One that is computed, and one that waits, so that a wor
 _HOURS_WITHOUT_WORKERS = 24.0  # Their jobs may stand in a queue.
 _SECONDS_TO_IMPORT = 300.0
 _SECONDS_BETWEEN_LOOKS = 0.2
+_WORKERS_PER_CORE = (
+    8  # Each is a process of some 200 MB: with many more, a typing error fills memory.
+)
 
 # Ctrl-C in a terminal reaches the workers too: they finish the blocks that they have.
 _IGNORE_INTERRUPTS = "import signal; signal.signal(signal.SIGINT, signal.SIG_IGN)"
@@ -184,13 +187,19 @@ def _connected(stack: ExitStack, address: str) -> Any:
                 f"{address}: no dask scheduler answers ({error}); start one with `dask scheduler` "
                 "or give its address"
             ) from None
-    most = numba.config.NUMBA_NUM_THREADS
-    if not local[1].isdecimal() or not 1 <= int(local[1]) <= most:
+    cores = numba.config.NUMBA_NUM_THREADS
+    most = _WORKERS_PER_CORE * cores
+    # Of more digits, int() may raise an error of its own.
+    known = re.fullmatch(r"0*(\d{1,9})", local[1], re.ASCII)
+    workers = int(known[1]) if known else 0
+    if not 1 <= workers <= most:
         raise ConfigurationError(
             f"--dask {address}: must be local:N with N from 1 to {most} workers, or the address of "
             "a scheduler"
         )
-    workers = int(local[1])
+    if workers > cores:
+        only = "the only core" if cores == 1 else f"the {cores} cores"
+        say(f"{address}: the workers share {only} here; local:{cores} is as fast")
     cluster = distributed.LocalCluster(
         n_workers=workers,
         threads_per_worker=1,

@@ -1,9 +1,10 @@
 """A process that has imported what commands import, and forks to run each of them as a process.
 
-It reads one JSON list a line: module, arguments, folder, the files for stdin, stdout and stderr,
-more variables of the environment, and the size of the largest file that may be written, or null. It
-answers with the number of the process, and then with its exit code, each on a line. Everything but
-the imports happens as in a process of its own.
+It reads one JSON list a line: the number of the request, module, arguments, folder, the files for
+stdin, stdout and stderr, more variables of the environment, and the size of the largest file that
+may be written, or null. It answers with the number of the process, and then with its exit code,
+each on a line after the number of the request: of a request that nobody waited for, the answers are
+known as such. Everything but the imports happens as in a process of its own.
 """
 
 import atexit
@@ -24,8 +25,8 @@ import gearchaos.engine.store_filling
 import gearchaos.figures.response_page
 import gearchaos.figures.sweep_page  # noqa: F401
 
-LONGEST = 300
-"""Seconds after which a command is killed."""
+LONGEST = 3600
+"""Seconds after which a command is killed: it hangs, however busy the machine is."""
 
 
 def main() -> None:
@@ -36,16 +37,17 @@ def main() -> None:
     # A collection would write to every object of this process, and so copy its memory.
     gc.freeze()
     for line in sys.stdin:
+        request, *command = json.loads(line)
         process = os.fork()
         if process == 0:
-            run(*json.loads(line))
-        answer(process)
-        answer(os.waitstatus_to_exitcode(os.waitpid(process, 0)[1]))
+            run(*command)
+        answer(request, process)
+        answer(request, os.waitstatus_to_exitcode(os.waitpid(process, 0)[1]))
 
 
-def answer(number: int) -> None:
+def answer(request: int, number: int) -> None:
     """Write a line."""
-    sys.stdout.write(f"{number}\n")
+    sys.stdout.write(f"{request} {number}\n")
     sys.stdout.flush()
 
 

@@ -3,13 +3,17 @@
 import atexit
 import json
 import os
+import shutil
+import signal
 import subprocess
 import sys
 import time
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from functools import cache
 from pathlib import Path
-from tempfile import TemporaryDirectory
+from select import select
+from tempfile import TemporaryDirectory, mkdtemp
 from typing import NamedTuple
 
 import numpy as np
@@ -83,6 +87,9 @@ LINEAR = (
 )
 """The smallest scene, two states of a linear pair, where it does not matter what is computed."""
 
+HANGS = 1800.0
+"""Seconds after which what has not happened never will, on a busy machine either."""
+
 DIVERGING = ("--set", "groups.load=1e150")
 """A load that drives every lane beyond every length scale."""
 
@@ -110,7 +117,9 @@ def run_module(
         return begin(module, arguments, cwd, **options)[1]()
     options["preexec_fn"] = preexec_fn
     command = [sys.executable, "-m", module, *arguments]
-    done = subprocess.run(command, cwd=cwd, capture_output=True, text=True, timeout=300, **options)
+    done = subprocess.run(
+        command, cwd=cwd, capture_output=True, text=True, timeout=HANGS, **options
+    )
     assert "Traceback" not in done.stderr, done.stderr
     return Ended(done.returncode, done.stdout, done.stderr)
 
@@ -124,32 +133,76 @@ def begin(
     variables: dict[str, str] | None = None,
     largest_file: int | None = None,
 ) -> tuple[int, Callable[[], Ended]]:
-    """Begin a command that need not import what it needs; return its process, and how to wait."""
-    server, folder = _server(), TemporaryDirectory()
-    files = [Path(folder.name, name) for name in ("in", "out", "err")]
+    """Begin a command that need not import what it needs; return its process, and how to wait.
+
+    A command that was begun before and not waited for, as of a test that has failed, is killed.
+    """
+    server, folder = _server(), Path(mkdtemp(dir=_folder().name))
+    files = [folder / name for name in ("in", "out", "err")]
     for file, text in zip(files, (stdin, "", ""), strict=True):
         file.write_text(text)
     _, out, err = files
     words = [module, arguments, str(cwd), [*map(str, files)], variables or {}, largest_file]
-    server.stdin.write(json.dumps(words) + "\n")
-    server.stdin.flush()
+    request, process = server.begin(words)
 
     def ended() -> Ended:
-        with folder:
-            ended = Ended(int(server.stdout.readline()), out.read_text(), err.read_text())
+        ended = Ended(server.end(request), out.read_text(), err.read_text())
+        shutil.rmtree(folder)
         assert "Traceback" not in ended.err, ended.err
         return ended
 
-    return int(server.stdout.readline()), ended
+    return process, ended
 
 
 @cache
-def _server() -> subprocess.Popen:
-    pipe = subprocess.PIPE
-    script = Path(__file__).with_name("command_server.py")
-    server = subprocess.Popen([sys.executable, str(script)], stdin=pipe, stdout=pipe, text=True)
-    atexit.register(server.communicate)
-    return server
+def _folder() -> TemporaryDirectory:
+    """Make the folder of what all commands read and write; it goes with this process."""
+    folder = TemporaryDirectory()
+    atexit.register(folder.cleanup)
+    return folder
+
+
+class Server:
+    """The process of `command_server`, which runs one command at a time."""
+
+    def __init__(self) -> None:
+        """Start it."""
+        pipe, script = subprocess.PIPE, Path(__file__).with_name("command_server.py")
+        command = [sys.executable, str(script)]
+        # Without a buffer: what has been answered and not read can then be seen.
+        self._process = subprocess.Popen(command, stdin=pipe, stdout=pipe, bufsize=0)
+        atexit.register(self._process.communicate)
+        self._requests, self._running = 0, 0
+
+    def begin(self, words: list) -> tuple[int, int]:
+        """Begin a command, and return the number of the request and that of its process."""
+        if self._running and not select([self._process.stdout], [], [], 0.0)[0]:
+            with suppress(ProcessLookupError):
+                os.kill(self._running, signal.SIGKILL)
+        self._requests += 1
+        with suppress(BrokenPipeError):
+            self._process.stdin.write(json.dumps([self._requests, *words]).encode() + b"\n")
+        self._running = self._answer(self._requests)
+        return self._requests, self._running
+
+    def end(self, request: int) -> int:
+        """Wait for the end of a command, the latest one, and return its exit code."""
+        assert request == self._requests, "killed when another command was begun"
+        code, self._running = self._answer(request), 0
+        return code
+
+    def _answer(self, request: int) -> int:
+        for line in self._process.stdout:
+            number, answer = map(int, line.split())
+            if number == request:
+                return answer
+        _server.cache_clear()  # The next command gets another one.
+        raise RuntimeError(f"the command server has ended with {self._process.wait()}")
+
+
+@cache
+def _server() -> Server:
+    return Server()
 
 
 def sweep(folder: Path, *arguments: str, **options) -> Ended:
@@ -178,8 +231,16 @@ def same_data(one: gearchaos.Result, other: gearchaos.Result) -> bool:
 def signalled(folder: Path, blocks: str, number: int, *arguments: str) -> Ended:
     """Run a sweep, send it a signal once a block is finished; return exit code, stdout, stderr."""
     process, ended = begin("gearchaos.sweep", arguments, folder)
-    late = time.monotonic() + 60.0
-    while not list((folder / blocks).glob("*.block")) and time.monotonic() < late:
+    while is_running(process) and not list((folder / blocks).glob("*.block")):
         time.sleep(0.005)
-    os.kill(process, number)
+    with suppress(ProcessLookupError):
+        os.kill(process, number)
     return ended()
+
+
+def is_running(process: int) -> bool:
+    """Tell whether a process that was begun has not ended."""
+    with suppress(ProcessLookupError):
+        os.kill(process, 0)
+        return True
+    return False

@@ -23,7 +23,7 @@ STARTING_SECONDS = 60.0
 COMPILING_SECONDS = 20.0
 """Added to the time without an answer after which a case hangs: it may compile its kernels."""
 
-BUSY = 4.0
+BUSY = 30.0
 """Seconds in which a process is given one second of the processor, at least."""
 
 

@@ -11,7 +11,7 @@ import pytest
 import gearchaos
 from gearchaos.__main__ import COMMANDS
 
-from .commands import run_module, small_config
+from .commands import HANGS, run_module, small_config
 
 
 def test_the_script_runs_a_sweep_and_draws_it(tmp_path):
@@ -79,7 +79,7 @@ def test_an_interrupt_while_a_command_is_imported_ends_it_without_a_traceback(tm
         while not process.stderr.readline().endswith(" gearchaos\n"):
             assert process.poll() is None
         process.send_signal(signal.SIGINT)
-        _, err = process.communicate(timeout=60)
+        _, err = process.communicate(timeout=HANGS)
     assert process.returncode in (-signal.SIGINT, 130)
     assert "Traceback" not in err
     assert "KeyboardInterrupt" not in err

@@ -11,12 +11,13 @@ import threading
 import time
 from contextlib import contextmanager
 
+import numba
 import psutil
 import pytest
 
 import gearchaos
 
-from .commands import LINEAR, begin, names_in, same_data, small_config, sweep
+from .commands import HANGS, LINEAR, begin, is_running, names_in, same_data, small_config, sweep
 
 pytest.importorskip("distributed")
 
@@ -24,6 +25,8 @@ BLOCKS = "gears.h5.blocks"
 # Eight blocks of lanes that take a tenth of a second or more each.
 LONG = ("--set", "sweep.count=2000", "--set", "integration.transient_periods=250")
 LONG += ("--set", "outputs.motion=false")
+# Many more of them, for what is not waited for: a busy machine does not finish them meanwhile.
+ENDLESS = ("--set", "sweep.count=100000")
 SCHEDULER = "from distributed.cli.dask_scheduler import main; main()"
 WORKER = "from distributed.cli.dask_worker import main; main()"
 
@@ -79,8 +82,8 @@ def begun(folder, *arguments):
     """Start the long sweep and yield its process, and its end, once a block is finished."""
     small_config(folder)
     words = ("gears.toml", *LONG, *arguments)
-    process, ended = begin("gearchaos.sweep", words, folder, variables=timeout("3s"))
-    while psutil.pid_exists(process) and not list((folder / BLOCKS).glob("*.block")):
+    process, ended = begin("gearchaos.sweep", words, folder, variables=timeout("60s"))
+    while is_running(process) and not list((folder / BLOCKS).glob("*.block")):
         time.sleep(0.005)
     yield process, ended
 
@@ -107,15 +110,18 @@ def test_the_blocks_of_a_killed_worker_are_run_again(tmp_path, undisturbed):
 
 @pytest.mark.slow
 def test_an_interrupt_keeps_what_local_workers_have_and_any_machine_goes_on(tmp_path, undisturbed):
-    with begun(tmp_path, "--dask", "local:2") as (process, ended):
+    # One more than there are cores, which is allowed and remarked.
+    cores = numba.config.NUMBA_NUM_THREADS
+    with begun(tmp_path, "--dask", f"local:{cores + 1}") as (process, ended):
         # Ctrl-C in a terminal reaches everybody.
         workers = psutil.Process(process).children(recursive=True)
         for each in (psutil.Process(process), *workers):
             each.send_signal(signal.SIGINT)
         code, out, err = ended()
     assert (code, out) == (130, ""), err
+    assert f"local:{cores + 1}: the workers share the " in err
     assert 0 < int(re.search(r"(\d+) of 2000 lanes are kept", err)[1]) < 2000
-    _, alive = psutil.wait_procs(workers, timeout=10)
+    _, alive = psutil.wait_procs(workers, timeout=HANGS)
     assert alive == []
     assert names_in(tmp_path) == [BLOCKS, "gears.toml"]
     assert sweep(tmp_path, *LONG, "--resume", "--quiet") == (0, "gears.h5\n", "")
@@ -172,7 +178,7 @@ def begun_and_lost(cluster, folder):
     with (
         scheduler(cluster) as address,
         worker(address, cluster),
-        begun(folder, "--dask", address) as (_, ended),
+        begun(folder, "--dask", address, *ENDLESS) as (_, ended),
     ):
         for each in psutil.Process().children():
             if "dask_scheduler" in " ".join(each.cmdline()):
@@ -198,14 +204,17 @@ def port(answer):
 
 def test_a_scheduler_that_does_not_answer_is_code_4(tmp_path):
     with port(None) as silent, port(b"HTTP/1.0 400 Bad Request\r\n\r\n") as other:
+        # On a busy machine dask is too slow to say itself that the time is up.
         for address, reason in {
-            "tcp://127.0.0.1:9": "Timed out",
+            "tcp://127.0.0.1:9": "Timed out|silent for 1 s",
             silent: "silent for 1 s",
             other: "",
         }.items():
             ended = sweep(tmp_path, "--dask", address, variables=timeout("1s"))
             assert (ended.code, ended.out) == (4, "")
-            assert f"error: {address}: no dask scheduler answers ({reason}" in ended.err
+            assert re.search(
+                f"error: {address}: no dask scheduler answers [(]({reason})", ended.err
+            )
             assert names_in(tmp_path) == ["gears.toml"]
 
 
@@ -237,7 +246,7 @@ def signalled_while_it_waits(folder, address, number):
     ) as process:
         said = process.stderr.readline()
         process.send_signal(number)
-        _, err = process.communicate(timeout=10)
+        _, err = process.communicate(timeout=HANGS)
     assert "Traceback" not in err
     return process.returncode, said
 
@@ -262,7 +271,7 @@ def test_an_interrupt_does_not_wait_for_workers_that_are_gone(tmp_path):
     with (
         scheduler(cluster) as address,
         worker(address, cluster) as only,
-        begun(tmp_path, "--dask", address) as (process, ended),
+        begun(tmp_path, "--dask", address, *ENDLESS) as (process, ended),
     ):
         only.kill()
         os.kill(process, signal.SIGINT)
@@ -275,6 +284,7 @@ def test_an_interrupt_does_not_wait_for_workers_that_are_gone(tmp_path):
     ("arguments", "message"),
     [
         (["--dask", "local:0"], "--dask local:0: must be local:N with N from 1 to"),
+        (["--dask", f"local:{'9' * 5000}"], "must be local:N with N from 1 to"),
         (["--dask", "local:two"], "--dask local:two: must be local:N"),
         (
             ["--dask", "local:1", "--set", "start.carry=upwards"],

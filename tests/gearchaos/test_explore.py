@@ -26,7 +26,7 @@ from gearchaos.engine.recomputing import continued
 from gearchaos.engine.response import compute_response, prepared
 from gearchaos.explore import main
 
-from .commands import small_config
+from .commands import HANGS, small_config
 
 # Not imported: every process collects all files, and one of them runs this one.
 missing = [name for name in ("panel", "datashader", "playwright") if find_spec(name) is None]
@@ -104,6 +104,7 @@ def browser():
 def page(browser, address):
     """Open the page, and see that nothing comes from elsewhere and nothing goes wrong."""
     opened, wrong = browser.new_page(viewport={"width": 1400, "height": 900}), []
+    opened.set_default_timeout(1000.0 * HANGS)
     opened.on("pageerror", lambda error: wrong.append(str(error)))
     opened.on("console", lambda said: wrong.append(said.text) if said.type == "error" else None)
     opened.on("request", lambda asked: wrong.append(asked.url) if foreign(asked.url) else None)
@@ -149,7 +150,8 @@ def click(page, across: float) -> float:
     from playwright.sync_api import Error as PlaywrightError
 
     before = lane_in(page.url)
-    for _ in range(20):
+    # A second is enough unless the machine is busy, and a click more does no harm.
+    for _ in range(int(HANGS)):
         # While panels come in, the diagram moves: a click may fall beside it.
         box = page.locator(".bk-Figure").first.bounding_box()
         place = box["x"] + across * box["width"], box["y"] + 0.5 * box["height"]
@@ -165,7 +167,7 @@ def click(page, across: float) -> float:
 
 def wait_for(page, panel: str, values: np.ndarray) -> list:
     """Wait until a panel shows these values upwards, and return all that it shows."""
-    for _ in range(100):
+    for _ in range(int(10 * HANGS)):
         shown = panels(page).get(panel, [{}])
         if np.array_equal(shown[0].get("y", ()), values):
             return shown
@@ -217,7 +219,7 @@ def zoom(page) -> None:
 
 def assert_counted_anew(page, path: Path, sizes: list[int]) -> None:
     """See that the picture after a zoom counts the points in view, for each pixel of the screen."""
-    for _ in range(50):
+    for _ in range(int(10 * HANGS)):
         drawn = page.evaluate(PICTURE)
         left, low, *_ = drawn["seen"]
         if np.allclose(drawn["frame"][:2], (left, low)):

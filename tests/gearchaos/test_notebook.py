@@ -4,6 +4,8 @@ from pathlib import Path
 
 import pytest
 
+from .commands import HANGS
+
 NOTEBOOK = Path(__file__).parents[2] / "docs" / "own_pair.ipynb"
 
 
@@ -24,6 +26,6 @@ def test_the_notebook_runs_and_prints_what_it_shows(tmp_path):
     notebook = nbformat.read(NOTEBOOK, as_version=4)
     shown = printed(notebook)
     resources = {"metadata": {"path": str(tmp_path)}}
-    NotebookClient(notebook, timeout=300, resources=resources).execute()
+    NotebookClient(notebook, timeout=HANGS, resources=resources).execute()
     assert printed(notebook) == shown
     assert sum(["image/png" in output for cell in shown for output in cell]) == 2

@@ -19,8 +19,10 @@ import gearchaos
 from gearchaos.results.block_folder import LOCK, folder_of
 
 from .commands import (
+    HANGS,
     LINEAR,
     begin,
+    is_running,
     names_in,
     run_module,
     same_data,
@@ -207,10 +209,6 @@ def test_twenty_kills_at_random_moments_cost_no_bit(tmp_path):
     assert same_data(gearchaos.open_result(tmp_path / "gears.h5"), undisturbed)
 
 
-def is_running(process):
-    return Path(f"/proc/{process}").exists()
-
-
 def blocks_in(folder):
     return len(list((folder / BLOCKS).glob("*.block")))
 
@@ -253,7 +251,7 @@ def test_an_output_folder_that_is_removed_meanwhile_is_code_4(tmp_path):
             time.sleep(0.005)
         while (tmp_path / "results").exists():
             shutil.rmtree(tmp_path / "results", ignore_errors=True)
-        _, err = process.communicate(timeout=60)
+        _, err = process.communicate(timeout=HANGS)
     assert process.returncode == 4
     assert "Traceback" not in err
     assert "cannot be written: No such file or directory; create the folder first" in err
@@ -304,7 +302,7 @@ def test_the_same_command_is_not_recommended_where_it_must_fail_again(tmp_path):
         while process.poll() is None and not (tmp_path / BLOCKS / "manifest.json").exists():
             time.sleep(0.005)
         (tmp_path / "gears.h5").write_bytes(b"precious")
-        _, err = process.communicate(timeout=60)
+        _, err = process.communicate(timeout=HANGS)
     assert process.returncode == 4
     assert "gears.h5: exists already; replace it with --overwrite" in err
     assert "1000 of 1000 lanes are kept" in err
