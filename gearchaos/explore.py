@@ -8,10 +8,11 @@ from argparse import Namespace
 from collections.abc import Sequence
 from contextlib import redirect_stderr, redirect_stdout
 from io import StringIO
+from typing import Any
 
 from gearchaos import plot
 from gearchaos.command_line import Command
-from gearchaos.errors import ConfigurationError, FigureError
+from gearchaos.errors import ConfigurationError, FigureError, FileError
 from gearchaos.progress import say
 
 HOST = "127.0.0.1"
@@ -57,7 +58,7 @@ def _explore(options: Namespace) -> None:
     )
     # A page of another site can give its own name to this address, and would be taken for ours.
     refused = (".*", ErrorHandler, {"status_code": 403})
-    server._tornado.add_handlers(rf"(?!({HOST}|localhost)$).*", [refused])
+    application(server).add_handlers(rf"(?!({HOST}|localhost)$).*", [refused])
     server.start()
     address = f"http://{HOST}:{port}/"
     print(address, flush=True)
@@ -65,6 +66,20 @@ def _explore(options: Namespace) -> None:
     if not options.no_browser:
         webbrowser.open(address)
     server.io_loop.start()
+
+
+def application(server: Any) -> Any:
+    """Return the tornado application of a bokeh server, which bokeh keeps to itself.
+
+    Raises FileError where there is none: a page that cannot be protected is not served.
+    """
+    from bokeh import __version__
+
+    try:
+        return server._tornado
+    except AttributeError:
+        text = "does not tell how requests of other sites are refused; install an older one"
+        raise FileError(f"bokeh {__version__} {text}") from None
 
 
 def _draw(arguments: Sequence[str]) -> None:

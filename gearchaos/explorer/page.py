@@ -49,12 +49,12 @@ class Page:
         for axis in self._others:
             choices[axis] = {coordinate_text(axis, at): at for at in result[axis].tolist()}
         choices |= {"units": ["dimensionless", "physical"], "motion_from": ["end", "start"]}
-        self._switches = {name: pn.widgets.Select(options=choices[name]) for name in choices}
+        self._switches = {
+            name: pn.widgets.Select(options=choices[name], **_named(name)) for name in choices
+        }
         for axis in self._swept:
-            middle = float(result[axis][result[axis].size // 2])
-            self._switches[axis] = pn.widgets.FloatInput(value=middle, format="0.[000000]")
-        for name, switch in self._switches.items():
-            switch.name, switch.width = name.replace("_", " ").capitalize(), 170
+            given = {"value": float(result[axis][result[axis].size // 2]), "format": "0.[000000]"}
+            self._switches[axis] = pn.widgets.FloatInput(**given, **_named(axis))
         self._window = pn.widgets.LiteralInput(value=[], visible=False)
         # A line of its own from the beginning: what is below would move under the pointer.
         texts = (pn.pane.HTML("&nbsp;", **WIDE) for _ in range(5))
@@ -282,6 +282,11 @@ class Page:
             drawn.save(path)
             self._draw([str(path), *self._arguments()[name][2:], "--output", str(target)])
             return BytesIO(target.read_bytes())
+
+
+def _named(switch: str) -> dict[str, Any]:
+    """Return name and width of a switch: some versions of panel keep the name once it is made."""
+    return {"name": switch.replace("_", " ").capitalize(), "width": 170}
 
 
 def _marked(marks: Sequence[Span], plot: Any, _element: Any) -> None:
