@@ -6,6 +6,7 @@
 """
 
 from collections.abc import Mapping
+from functools import cached_property
 from typing import NamedTuple, Self
 
 import gearchaos_kernels as kernels
@@ -23,6 +24,7 @@ from gearchaos.dynamics.systems import plan_of, system_of
 from gearchaos.engine.lanes import Lanes, start_states
 from gearchaos.engine.recomputing import computable
 from gearchaos.engine.response import respond
+from gearchaos.engine.step_choice import judged_steps
 from gearchaos.engine.steps import stable_steps
 from gearchaos.errors import ConfigurationError
 from gearchaos.records.amplitude_spectrum import SpectralLines, spectral_lines
@@ -66,7 +68,7 @@ class System:
                     f'{{"{sweep.parameter}": ...}})'
                 )
         lanes = Lanes(self.config)
-        self._steps, _ = stable_steps(lanes, self.config.integration.steps_per_period)
+        self._first_steps, _ = stable_steps(lanes, self.config.integration.steps_per_period)
         self._record = self._at({})
         self.state = start_states(self.config, self._record, np.zeros(1, dtype=np.intp))[0]
 
@@ -229,6 +231,14 @@ class System:
         states = motion.states[np.newaxis]
         found = kernels.mesh_motion(self._record, states, self._steps, motion.first_period)
         return kernels.MeshMotion(*(array[0] for array in found))
+
+    @cached_property
+    def _steps(self) -> int:
+        """Steps per mesh period: those given, raised if need be, or those chosen for the scene."""
+        plan = plan_of(self.config, steps_per_period=self._first_steps)
+        if self.config.integration.steps_per_period is not None:
+            return self._first_steps
+        return judged_steps(Lanes(self.config), plan)[0].steps_per_period
 
     @property
     def _plan(self) -> Plan:

@@ -12,6 +12,8 @@ from gearchaos.gear.groups import GROUP_TABLE, GroupRow
 
 MOST_LANES = 100_000_000  # Lanes of one run: what a file and a machine can still hold.
 MOST_STEPS_PER_PERIOD = 1_000_000
+DEFAULT_STEPS = 200
+"""Fewest Runge-Kutta steps per period that are chosen for a scene where none are given."""
 FLOW_MAP_STEPS = 24
 """Steps per period of flow maps: fewer cost more at a crossing, more cost more between them."""
 _MOST_VALUES = 10_000_000
@@ -165,10 +167,11 @@ class Integration(Table):
     method: Literal["rk4", "flow_map"] = key(default="rk4")
     """classical Runge-Kutta of order 4, or maps of whole steps that are exact between crossings and
     at them"""
-    steps_per_period: int = key(
-        f'steps per mesh period; {FLOW_MAP_STEPS} with method = "flow_map", where nothing else is '
-        "given",
-        default=200,
+    steps_per_period: int | None = key(
+        f"steps per mesh period; left out, {DEFAULT_STEPS} or as many times 2 as the scene needs "
+        f'are chosen, and {FLOW_MAP_STEPS} with method = "flow_map"',
+        example=400,
+        default=None,
         ge=1,
         le=MOST_STEPS_PER_PERIOD,
     )

@@ -16,6 +16,7 @@ from gearchaos_kernels import (
 
 from gearchaos.arrays import Floats
 from gearchaos.configuration import Configuration
+from gearchaos.configuration.run_tables import DEFAULT_STEPS
 from gearchaos.configuration.tables import groups_at, physical_at
 from gearchaos.errors import ConfigurationError, ExecutionError
 from gearchaos.gear.contact_lines import contact_shares
@@ -26,7 +27,8 @@ from gearchaos.gear.tooth_deviations import tooth_deviations
 def plan_of(config: Configuration, **others: Any) -> Plan:
     """Return the configured plan of an integration that keeps no section, but for some fields.
 
-    Raises ExecutionError in a process that cannot integrate, as it was forked from one that has.
+    Where no steps per period are configured, it has the fewest that are ever chosen. Raises
+    ExecutionError in a process that cannot integrate, as it was forked from one that has.
     """
     try:
         require_threads()
@@ -34,7 +36,7 @@ def plan_of(config: Configuration, **others: Any) -> Plan:
         raise ExecutionError(str(error)) from None
     integration = config.integration
     configured = Plan(
-        integration.steps_per_period,
+        integration.steps_per_period or DEFAULT_STEPS,
         integration.transient_periods,
         integration.recorded_periods,
         section_points=0,

@@ -7,12 +7,14 @@ import numpy as np
 from gearchaos_kernels import Teeth
 
 from gearchaos.arrays import Floats
+from gearchaos.configuration.run_tables import DEFAULT_STEPS
 from gearchaos.dynamics.stability import mesh_stiffnesses
 from gearchaos.engine.lanes import Lanes
 from gearchaos.engine.steps import PILOT_LANES
 from gearchaos.errors import ConfigurationError
 from gearchaos.gear.derivation import LENGTH
 from gearchaos.records.period import LONGEST_PERIOD, RETURNS
+from gearchaos.results.variables import Variable
 
 LONGEST_EXCITATION = 50_000
 """Mesh periods after which pitch errors repeat, at most: a record holds some of them."""
@@ -36,7 +38,8 @@ def whole_lengths(lanes: Lanes) -> dict[str, int]:
         for name, count in least.items()
     }
     orders, record = lanes.config.outputs.mesh_orders, lengths["recorded_periods"]
-    most = integration.steps_per_period / 2
+    # A choice has no fewer steps.
+    most = (integration.steps_per_period or DEFAULT_STEPS) / 2
     if unfit := [str(one) for one in orders if record % one.denominator or one >= most]:
         whole = math.lcm(repeats, *(order.denominator for order in orders))
         raise ConfigurationError(
@@ -122,14 +125,23 @@ def _mistaken_units(lanes: Lanes) -> str:
     if pair is None or not pair.normal_module_mm:
         return ""
     error = () if lanes.repeats_after > 1 else ("pitch_error", "pitch_error_amplitude", LENGTH)
-    for what, names in {"static deflection": ("load", LENGTH), "pitch error": error}.items():
+    bending = ("load", LENGTH, "base_helix_angle_deg")
+    for what, names in {"static deflection": bending, "pitch error": error}.items():
         if names and {*names} <= {*groups}:
-            um = math.prod(float(np.abs(groups[name].values).max()) for name in names)
+            um = math.prod(_largest_factor(groups[name]) for name in names)
             found += [f"{what} {um:.4g} um"] if um > 100.0 * pair.normal_module_mm else []
     if (pair.face_width_mm or math.inf) < pair.normal_module_mm:
         found.append(f"face width {pair.face_width_mm:g} mm")
     rule = f"unlikely at a normal module of {pair.normal_module_mm:g} mm; are the units those of"
     return f"{', '.join(found)}: {rule} the keys?" if found else ""
+
+
+def _largest_factor(group: Variable) -> float:
+    """Return the largest size of a group; a static deflection has 1 / cos(beta_b) as a factor."""
+    values = np.asarray(group.values)
+    if group.name == "base_helix_angle_deg":
+        values = 1.0 / np.cos(np.radians(values))
+    return float(np.abs(values).max())
 
 
 def _negative_stiffness(lanes: Lanes) -> str:

@@ -34,8 +34,9 @@ def computable(result: Result, name: str) -> Configuration:
         config = config.at(fixed)
     # The steps and periods that were taken, not those from which they were chosen or raised.
     taken = {
-        f"integration.{name}": int(result.metadata.get(name, getattr(config.integration, name)))
+        f"integration.{name}": int(result.metadata[name])
         for name in ("steps_per_period", "transient_periods", "recorded_periods")
+        if name in result.metadata
     }
     for key, value in {
         **taken,

@@ -94,7 +94,8 @@ def prepare(simulation: Simulation, *, compile_now: bool = True, history_periods
         with compiling():
             simulation.rehearse(history_periods)
         check()
-    simulation.choose_steps()
+    with compiling():
+        simulation.choose_steps()
     say(*simulation.notes)
 
 

@@ -19,6 +19,7 @@ from gearchaos.engine import error_check
 from gearchaos.engine.claims import completed
 from gearchaos.engine.excitation import remarks, whole_lengths
 from gearchaos.engine.lanes import Lanes
+from gearchaos.engine.step_choice import judged_steps, steps_for_exponents
 from gearchaos.engine.steps import (
     MOST_STEPS,
     PILOT_LANES,
@@ -55,6 +56,9 @@ class Simulation:
         self.lanes = Lanes(config)
         integration, outputs = config.integration, config.outputs
         steps, note = stable_steps(self.lanes, integration.steps_per_period)
+        judged = outputs.lyapunov and integration.tolerance is None
+        if judged and integration.steps_per_period is None:
+            steps = steps_for_exponents(self.lanes, steps)
         lengths = whole_lengths(self.lanes)
         self.plan = plan_of(
             config,
@@ -67,15 +71,21 @@ class Simulation:
             states=outputs.states,
             orders=outputs.mesh_orders,
         )
-        judged = outputs.lyapunov and integration.tolerance is None
         coarse = coarse_steps(self.lanes, steps) if judged else ""
         notes = [note, coarse, needless_maps(self.lanes, self.plan), *remarks(self.lanes, lengths)]
         self.notes = [text for text in notes if text]
 
     def choose_steps(self) -> None:
-        """Measure which transient and which number of steps the tolerance needs, and take them."""
+        """Measure which transient and steps the tolerance or, without one, the scene needs.
+
+        They are taken where a tolerance or no number of steps is configured; where one is
+        configured that is too coarse, the notes say so.
+        """
         tolerance = self.config.integration.tolerance
         if tolerance is None:
+            if self.plan.method == "rk4":
+                self.plan, note = judged_steps(self.lanes, self.plan)
+                self.notes += [note] if note else []
             return
         kept = self.plan.section_points
         transient, left, note = settled(self.lanes, self.recording, kept, tolerance, PILOT_LANES)

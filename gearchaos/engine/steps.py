@@ -9,7 +9,11 @@ from gearchaos_kernels import Outcome, Plan, Status, System, integrate, maps_are
 
 from gearchaos.arrays import Integers, Mask
 from gearchaos.configuration.messages import Fault
-from gearchaos.configuration.run_tables import FLOW_MAP_STEPS, MOST_STEPS_PER_PERIOD
+from gearchaos.configuration.run_tables import (
+    DEFAULT_STEPS,
+    FLOW_MAP_STEPS,
+    MOST_STEPS_PER_PERIOD,
+)
 from gearchaos.dynamics import stability
 from gearchaos.dynamics.hidden_modes import hidden_error
 from gearchaos.dynamics.labelling import Told
@@ -61,9 +65,10 @@ class Candidate(NamedTuple):
         return float(np.fmax(self.section_error, self.exponent_error))
 
 
-def stable_steps(lanes: Lanes, steps: int) -> tuple[int, str]:
+def stable_steps(lanes: Lanes, given: int | None) -> tuple[int, str]:
     """Return a number of steps with which the method does not blow up, and what to say of it.
 
+    Where none is given, it is 200, doubled until it is stable in all lanes.
     Raises ConfigurationError if so many steps are unstable in some lanes and may not be raised, or
     not far enough.
     """
@@ -72,7 +77,9 @@ def stable_steps(lanes: Lanes, steps: int) -> tuple[int, str]:
     parts = np.split(every, range(LANES_AT_ONCE, every.size, LANES_AT_ONCE))
     needed = [stability.fewest_stable_steps(lanes.system_of(part)) for part in parts]
     fewest = np.concatenate(needed)
-    unstable, limit = every[fewest > steps], int(fewest.max())
+    limit = int(fewest.max())
+    steps = _doubled(DEFAULT_STEPS, limit) if given is None else given
+    unstable = every[fewest > steps]
     if limit <= steps:
         return steps, ""
     integration, beyond = lanes.config.integration, limit > MOST_STEPS_PER_PERIOD
@@ -82,11 +89,18 @@ def stable_steps(lanes: Lanes, steps: int) -> tuple[int, str]:
             "stable; flow maps have no such limit"
         )
     if integration.unstable == "refuse" or beyond:
-        raise ConfigurationError(_fault(lanes, limit, unstable, steps).text(lanes.config.source))
+        raise ConfigurationError(_fault(lanes, limit, unstable, given).text(lanes.config.source))
     return limit, (
         f"integration.steps_per_period raised from {steps} to {limit}, the stability limit "
         f"of {unstable.size * lanes.repeats} of {len(lanes)} lanes"
     )
+
+
+def _doubled(steps: int, limit: int) -> int:
+    """Double a number of steps until it is no less than this limit, as far as steps go."""
+    while steps < min(limit, MOST_STEPS_PER_PERIOD):
+        steps *= 2
+    return min(steps, MOST_STEPS_PER_PERIOD)
 
 
 def coarse_steps(lanes: Lanes, steps: int) -> str:
@@ -123,7 +137,7 @@ def needless_maps(lanes: Lanes, plan: Plan) -> str:
     )
 
 
-def _fault(lanes: Lanes, limit: int, unstable: Integers, steps: int) -> Fault:
+def _fault(lanes: Lanes, limit: int, unstable: Integers, steps: int | None) -> Fault:
     places = []
     swept = lanes.values_of(unstable)
     swept.pop(REALISATION, None)

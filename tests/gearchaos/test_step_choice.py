@@ -1,0 +1,165 @@
+"""Steps per period that nobody gives are chosen, and those that are too coarse are named."""
+
+import re
+
+import numpy as np
+import pytest
+from gearchaos_kernels import Plan, integrate
+
+import gearchaos
+from gearchaos.configuration import Configuration
+from gearchaos.engine.simulation import Simulation
+from gearchaos.engine.step_choice import AMPLIFIED, PERIODS, WANTED, WRONG, Trial
+
+from .commands import run_module, small_config
+from .random_pairs import random_configuration
+from .short_sweeps import PAN2021
+
+COARSE = [38, 104, 106, 137, 149, 293]
+"""Pairs that are stable with 200 steps, and wrong by more than 1 %."""
+
+UNSTABLE = [14, 64, 284]  # Pairs for which 200 steps are too few to be stable.
+ORDINARY = [0, 1, 2, 30, 31, 32]
+
+
+def prepared(number: int, steps: int | None = None) -> Simulation:
+    config = Configuration.from_toml(random_configuration(number, steps))
+    simulation = Simulation(config)
+    simulation.choose_steps()
+    return simulation
+
+
+def error_with(simulation: Simulation, steps: int) -> float:
+    """Return the error after the last period against eight times the steps that were chosen."""
+    lane = np.arange(1)
+    system, start = simulation.lanes.system_of(lane), simulation.lanes.start_of(lane)
+    plan = simulation.plan._replace(
+        transient_periods=0, recorded_periods=PERIODS, section_points=PERIODS
+    )
+    found, truth = (
+        integrate(system, start, plan._replace(steps_per_period=count)).section[0]
+        for count in (steps, 8 * simulation.plan.steps_per_period)
+    )
+    return float(np.max(np.abs(found[-1] - truth[-1]) / np.max(np.abs(truth), axis=0)))
+
+
+def told(simulation: Simulation, words: str) -> list[str]:
+    return [note for note in simulation.notes if words in note]
+
+
+@pytest.mark.parametrize("number", [*COARSE, *UNSTABLE, *ORDINARY])
+def test_no_pair_is_wrong_with_the_steps_that_are_chosen_for_it(number):
+    simulation = prepared(number)
+    steps = simulation.plan.steps_per_period
+    # 200, doubled so many times as it takes.
+    assert steps % 200 == 0 and (steps // 200).bit_count() == 1
+    assert error_with(simulation, steps) < WRONG
+    (note,) = told(simulation, f"integration.steps_per_period = {steps}, chosen for this scene")
+    assert not told(simulation, "too coarse")
+    if number in (*COARSE, *UNSTABLE):
+        assert steps > 200, note
+
+
+@pytest.mark.parametrize("number", COARSE)
+def test_a_given_number_that_is_too_coarse_is_told_with_one_that_is_not(number):
+    simulation = prepared(number, 200)
+    assert simulation.plan.steps_per_period == 200
+    (note,) = told(simulation, "integration.steps_per_period = 200 is too coarse")
+    better = int(re.search(r"set it to (\d+)", note).group(1))
+    fine = prepared(number, better)
+    assert not told(fine, "too coarse")
+    assert error_with(fine, better) < WRONG < error_with(fine, 200)
+
+
+@pytest.mark.parametrize("number", ORDINARY[:3])
+def test_a_given_number_that_is_fine_enough_is_not_spoken_of(number):
+    assert prepared(number, 800).notes == []
+
+
+@pytest.mark.parametrize("number", [104, 149])
+def test_the_error_that_is_told_is_that_against_much_finer_steps(number):
+    simulation = prepared(number)
+    trial = Trial(simulation.lanes, simulation.plan)
+    # Twice the steps leave a sixteenth of the error, or more where they are not yet fine enough.
+    for steps in (400, 800):
+        found = trial.verdict(steps).error[0]
+        assert found == pytest.approx(error_with(simulation, steps), rel=0.1)
+
+
+def test_chaos_is_told_and_does_not_ask_for_ever_more_steps():
+    simulation = prepared(356)
+    trial = Trial(simulation.lanes, simulation.plan)
+    verdict = trial.verdict(200)
+    # Its tangent vector grows e^10 times, and with it an error that no step could avoid. A norm of
+    # other weights differs by a factor, not by an order of magnitude.
+    grown = integrate(
+        simulation.lanes.system_of(np.arange(1)), np.zeros((1, 10)), Plan(1600, 0, 12, 0, True)
+    ).growth.sum()
+    assert np.log(verdict.granted[0] * AMPLIFIED) == pytest.approx(grown, abs=np.log(10.0))
+    assert WANTED < verdict.error[0] < WANTED * verdict.granted[0]
+    assert simulation.plan.steps_per_period == 200
+    (note,) = simulation.notes
+    assert "1 of them amplifies any difference more than 100 times" in note
+    # The same where the number is given, and the error is one to speak of.
+    coarse = prepared(356, 100)
+    (note,) = told(coarse, "amplifies")
+    assert coarse.plan.steps_per_period == 100 and "off by up to" in note
+
+
+def test_flow_maps_have_their_own_number():
+    config = Configuration.from_toml(random_configuration(104))
+    simulation = Simulation(config.replace("integration", {"method": "flow_map"}))
+    simulation.choose_steps()
+    assert simulation.plan.steps_per_period == 24
+    assert not told(simulation, "chosen") and not told(simulation, "coarse")
+
+
+def test_a_motion_at_rest_has_no_error_to_judge():
+    still = {"operation.torque_Nm": 0.0, "pitch_error.amplitude_um": 0.0}
+    config = Configuration.from_toml(random_configuration(0))
+    for key, value in still.items():
+        config = config.replace(key, value)
+    simulation = Simulation(config)
+    assert Trial(simulation.lanes, simulation.plan).verdict(200).error.tolist() == [0.0]
+
+
+def test_the_lane_with_the_fastest_mode_is_tried_wherever_it_is():
+    # The lowest mesh frequency with the stiffest bearing: neither the first lane nor the last.
+    swept = (
+        "sweep={parameter='mesh_frequency', from=0.5, to=1.5, count=101}",
+        "second_sweep={parameter='transverse_stiffness_p', from=1.0, to=5000.0, count=5}",
+        "groups.pitch_error=1.0",
+    )
+    config = gearchaos.load_config(PAN2021, swept)
+    simulation = Simulation(config.replace("integration.steps_per_period", None))
+    fastest = 4 * 101
+    assert fastest not in simulation.lanes.spread(48)
+    trial = Trial(simulation.lanes, simulation.plan)
+    assert fastest in trial.numbers and trial.numbers.size == 49
+    # An undamped mode is stable up to sqrt(8) a step.
+    limit = 2.0 * np.pi / 0.5 * np.sqrt(5000.0 / 8.0)
+    assert trial.limit == pytest.approx(limit, rel=0.02)
+
+
+def test_a_sweep_records_and_prints_its_choice_and_shards_agree_on_it(tmp_path):
+    config = small_config(tmp_path)
+    text = config.read_text("utf-8").replace("steps_per_period = 40\n", "")
+    config.write_text(text.replace("speed_rpm = 8000.0", "speed_rpm = 150.0"), "utf-8")
+    few = ("gears.toml", "--set", "sweep.count=4")
+    whole = run_module("gearchaos.sweep", *few, "-o", "whole.h5", cwd=tmp_path)
+    assert whole.code == 0
+    (printed,) = re.findall(r"steps_per_period = (\d+), chosen for this scene", whole.err)
+    for number in "12":
+        shard = ("-o", "parts.h5", "--shard", f"{number}/2")
+        assert run_module("gearchaos.sweep", *few, *shard, cwd=tmp_path).code == 0
+    assert run_module("gearchaos.merge", "parts.h5", cwd=tmp_path).code == 0
+    one, joined = (gearchaos.open_result(tmp_path / f"{name}.h5") for name in ("whole", "parts"))
+    assert int(printed) > 200
+    assert one.metadata["steps_per_period"] == joined.metadata["steps_per_period"] == int(printed)
+    assert "chosen for this scene" in one.metadata["notes"] == joined.metadata["notes"]
+    assert one["end_state"].tobytes() == joined["end_state"].tobytes()
+    # What is computed of a result takes the same steps, and a system as many as its sweep.
+    system = gearchaos.System.of_lane(one, pitch_error=0.0)
+    assert system.integrate(1).states.shape[0] == int(printed) + 1
+    free = gearchaos.load_config(config, ["sweep={parameter='pitch_error',values=[5.0]}"])
+    assert gearchaos.System(free).integrate(1).states.shape[0] == int(printed) + 1
