@@ -16,9 +16,9 @@ from gearchaos_kernels import LANES
 from tqdm import tqdm
 
 from gearchaos.arrays import Integers
+from gearchaos.engine.resonances import resonances
 from gearchaos.engine.simulation import Simulation
 from gearchaos.engine.store_filling import Shard
-from gearchaos.gear.derivation import FREQUENCY, LENGTH
 from gearchaos.progress import notice
 from gearchaos.results.block_store import PIECE_BYTES, lanes_and_record
 from gearchaos.results.result_file import CACHE_BYTES
@@ -39,12 +39,13 @@ def describe(simulation: Simulation, output: str, shard: Shard | None, as_json: 
     memory += min(PIECE_BYTES, bytes_kept) if simulation.carried else 0
     # What HDF5 and the allocator keep while a file is written is not known beforehand.
     memory += memory // 20
-    plan = simulation.plan
+    plan, resonant = simulation.plan, resonances(lanes)
     steps = own * (plan.transient_periods + plan.recorded_periods) * plan.steps_per_period
     if as_json:
         facts = {"output": output, "exists": os.path.exists(output), "states": len(lanes.states)}
         facts |= {"lanes": own, "steps": steps, "seconds": seconds, "threads": threads}
-        facts |= {"file_bytes": bytes_kept, "memory_bytes": memory}
+        facts |= {"file_bytes": bytes_kept, "memory_bytes": memory, **resonant.facts}
+        facts["steps_per_period"] = plan.steps_per_period
         print(json.dumps(facts, indent=1))
         return
     duration = f"{seconds:.1f} s" if seconds < 100 else str(timedelta(seconds=round(seconds)))
@@ -59,15 +60,9 @@ def describe(simulation: Simulation, output: str, shard: Shard | None, as_json: 
         spans.append("in both directions")
     unused = ", ".join(name for name in config.scene.effects if name not in lanes.effects)
     unused = f" (nothing that is kept needs {unused})" if unused else ""
-    pair, groups = {}, lanes.parameters
-    if config.pair is not None and {FREQUENCY, LENGTH} <= {*groups}:
-        length, load = (np.mean(groups[name].values) for name in (LENGTH, "load"))
-        hertz = np.mean(groups[FREQUENCY].values) / (2.0 * math.pi)
-        text = f"{hertz:.4g} Hz, that of the mesh at {60.0 * hertz / config.pair.teeth[0]:.0f} rpm"
-        pair = {"pair": f"natural frequency {text}; static deflection {load * length:.4g} um"}
     for key, value in {
         "output": f"{output}{' (exists)' if os.path.exists(output) else ''}",
-        **pair,
+        **resonant.texts,
         "effects": ", ".join(config.scene.effects) or "none",
         "states": f"{len(lanes.states)}{unused}",
         "lanes": f"{own}{'' if shard is None else f' of {every}'} ({', '.join(spans)})",
@@ -76,7 +71,7 @@ def describe(simulation: Simulation, output: str, shard: Shard | None, as_json: 
         "memory": f"about {tqdm.format_sizeof(memory, 'B')} at the peak of the process",
         "time": f"about {duration} with {threads} thread{'s' if threads > 1 else ''}",
     }.items():
-        sys.stderr.write(f"{key + ':':10}{value}\n")
+        sys.stderr.write(f"{key + ':':12}{value}\n")
 
 
 def _seconds_per_lane(simulation: Simulation) -> float:

@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 
 import gearchaos
+from gearchaos.dynamics.eigenfrequencies import eigenfrequencies
+from gearchaos.engine.lanes import Lanes
 from gearchaos.engine.simulation import Simulation
 from gearchaos.export import main as export
 from gearchaos.figures.labels import unit_of
@@ -50,8 +52,16 @@ def test_what_a_mistaken_unit_makes_of_a_pair_is_told(tmp_path):
 
 def test_a_dry_run_tells_frequency_and_deflection_of_the_pair(path, result, capsys):
     assert sweep([str(small_config(path.parent)), "--dry-run"]) == 0
-    hertz = result.parameters["scaling_frequency"].values / (2.0 * np.pi)
-    assert f"natural frequency {hertz:.4g} Hz" in capsys.readouterr().err
+    groups = result.parameters
+    found = eigenfrequencies(
+        Lanes(gearchaos.load_config(path.parent / "gears.toml")).system_of([0])
+    )
+    hertz = found[0] * groups["scaling_frequency"].values / (2.0 * np.pi)
+    deflection = groups["load"].values * groups["length_scale"].values
+    deflection /= np.cos(np.radians(groups["base_helix_angle_deg"].values))
+    told = capsys.readouterr().err
+    assert f"eigenfrequencies {', '.join(f'{one:.4g}' for one in hertz)} Hz" in told
+    assert f"{deflection:.4g} um of the mesh under the static load" in told
 
 
 def test_a_table_says_its_units(path, tmp_path):
