@@ -25,7 +25,7 @@ def _identify(options: Namespace) -> None:
     from gearchaos.identification.evaluation import require_stable
     from gearchaos.identification.loading import load_targets
     from gearchaos.identification.report import report
-    from gearchaos.identification.search import MOST_CENTRES, RUNGS, decisive_facts, search
+    from gearchaos.identification.search import decisive_facts, search
     from gearchaos.identification.tried import fields_of, read_tried, write_tried
     from gearchaos.results.atomic_file import check_output
     from gearchaos.results.block_folder import require_same
@@ -49,9 +49,8 @@ def _identify(options: Namespace) -> None:
     def keep() -> None:
         write_tried(output, tried, problem, {**provenance(time.monotonic() - began), **facts})
 
-    most = targets.search.candidates + MOST_CENTRES * (1 + 2 * RUNGS * len(targets.parameter))
     try:
-        with progress(most, len(known), "candidates") as bar:
+        with progress(targets.search.candidates, len(known), "candidates") as bar:
             for found in search(problem, known, output):
                 tried = np.concatenate([tried, found])
                 if len(tried) > len(known):

@@ -8,12 +8,18 @@ from numpy.lib.stride_tricks import sliding_window_view
 
 from gearchaos.arrays import Floats
 from gearchaos.configuration.tables import SWEEPABLE_GROUPS
+from gearchaos.identification.flat_directions import ONE_UNIT, directions_at, distinct
 from gearchaos.identification.loading import Problem
-from gearchaos.identification.search import RUNGS, STEPS_ALONE, distinct
+from gearchaos.identification.search import STEPS_ALONE, answers_of, shares
 from gearchaos.identification.tried import Tried
 
-ONE_UNIT = 1.0  # By how much the misfit grows where a parameter counts as moved too far.
 NEAREST = 3  # Steps in each direction whose misfits tell how even the best set's surroundings are.
+
+UNDETERMINED = 0.5
+"""Share of its bounds from which on a parameter counts as not determined by the observations."""
+
+FLAT_EXTENT = 0.1
+"""Way in the unit cube from which on sets that fit alike are said to lie along a direction."""
 
 LABEL, COLUMN = 34, 12
 
@@ -31,8 +37,10 @@ class Reach(NamedTuple):
     surroundings: float
 
 
-def reach(tried: Tried) -> Reach:
-    """Return how far each parameter can move.
+def reach(tried: Tried, rungs: int) -> Reach:
+    """Return how far each parameter can move; ``rungs`` are the steps of the last candidates.
+
+    With none, nothing is known of one that moves alone.
 
     A label changes at once, and chaos is judged by a short record: the misfit is uneven on the
     smallest scale. So a parameter is too far where the median of three neighbouring steps exceeds
@@ -41,16 +49,18 @@ def reach(tried: Tried) -> Reach:
     parameters = tried["values"].shape[1]
     alike = tried["values"][tried["misfit"] <= np.min(tried["misfit"]) + ONE_UNIT]
     among = np.stack([alike.min(axis=0), alike.max(axis=0)], axis=1)
-    steps = np.flatnonzero(tried["run"] == STEPS_ALONE)[-1 - 2 * RUNGS * parameters :]
-    misfit = tried["misfit"][steps[1:]].reshape(parameters, 2, RUNGS)
+    if rungs == 0:
+        return Reach(np.full((parameters, 2), np.nan), among, np.nan)
+    steps = np.flatnonzero(tried["run"] == STEPS_ALONE)[-1 - 2 * rungs * parameters :]
+    misfit = tried["misfit"][steps[1:]].reshape(parameters, 2, rungs)
     surroundings = float(np.median(misfit[..., :NEAREST]))
     padded = np.pad(misfit, ((0, 0), (0, 0), (1, 1)), mode="edge")
     median = np.median(sliding_window_view(padded, 3, axis=2), axis=3)
     too_far = median > max(surroundings, tried["misfit"][steps[0]]) + ONE_UNIT
     # The last step before the first one that is too far; 0 is the centre.
-    last = np.where(too_far.any(axis=2), np.argmax(too_far, axis=2), RUNGS)
+    last = np.where(too_far.any(axis=2), np.argmax(too_far, axis=2), rungs)
     number = np.arange(parameters)[:, np.newaxis]
-    row = np.where(last > 0, RUNGS * (2 * number + [0, 1]) + last, 0)
+    row = np.where(last > 0, rungs * (2 * number + [0, 1]) + last, 0)
     alone = tried["values"][steps[row], number]
     return Reach(alone, among, surroundings)
 
@@ -58,10 +68,10 @@ def reach(tried: Tried) -> Reach:
 def report(problem: Problem, tried: Tried, most: int = 4) -> Iterator[str]:
     """Word the best sets, what they come to, and how well the targets determine them."""
     free, apart = problem.targets.parameter, problem.targets.search.apart
-    columns = zip(free, tried["values"].T, strict=True)
-    points = np.stack([[one.share(v) for v in values.tolist()] for one, values in columns], axis=1)
+    points = _points(problem, tried["values"])
     sets, keys = distinct(points, tried["misfit"], apart, most), [one.name for one in free]
     titles = [f"set {number}" for number in range(1, len(sets) + 1)]
+    yield _counted(len(problem.observations), len(keys))
     yield f"{len(tried)} candidates; the best sets that differ:"
     yield _row("", titles)
     yield _row("misfit", tried["misfit"][sets])
@@ -72,17 +82,69 @@ def report(problem: Problem, tried: Tried, most: int = 4) -> Iterator[str]:
     for one, row in zip(problem.observations, tried["computed"][sets].T, strict=True):
         yield _row(one.name, [one.wanted, one.width, *row])
     yield ""
-    found = reach(tried)
-    yield "how far each can move before the misfit grows by one, alone and with the others:"
-    yield _row("", ["alone from", "to", "all from", "to"])
-    for key, *ends in zip(keys, found.alone, found.among, strict=True):
-        yield _row(key, np.ravel(ends))
-    beside = "a thousandth of the bounds beside where the last steps began"
-    yield f"({beside}: misfit {found.surroundings:.4g})"
+    yield from _moved(problem, tried, points, keys)
     yield ""
     yield "set 1 in full, for a configuration:"
     for key, value in zip(keys, tried["values"][sets[0]].tolist(), strict=True):
         yield f"{'groups.' if key in SWEEPABLE_GROUPS else ''}{key} = {value!r}"
+
+
+def _counted(observations: int, unknowns: int) -> str:
+    """Word how many numbers stand against how many unknowns."""
+    text = f"{observations} observations, {unknowns} unknowns"
+    if observations < unknowns:
+        free = unknowns - observations
+        text += f": at least {free} combination{'s' if free > 1 else ''} of them not determined"
+    return text
+
+
+def _moved(problem: Problem, tried: Tried, points: Floats, keys: list[str]) -> Iterator[str]:
+    """Word how far the parameters can move, alone and together."""
+    rungs = shares(problem.targets.search, len(keys)).rungs
+    found = reach(tried, rungs)
+    yield "how far each can move before the misfit grows by one, alone and with the others:"
+    yield _row("", ["alone from", "to", "all from", "to"])
+    low, high = _points(problem, found.among.T)
+    answers = answers_of(problem, tried)
+    near = directions_at(points[np.argmin(answers[:, 0])], points, answers)
+    # As far as sets were found that fit, or as the residuals near the best one promise them.
+    wide_ones = np.maximum(high - low, np.minimum(1.0, 2.0 * near.reach))
+    for key, wide, *row in zip(keys, wide_ones, found.alone, found.among, strict=True):
+        yield _row(key, np.ravel(row)) + ("  not determined" if wide >= UNDETERMINED else "")
+    if rungs == 0:
+        yield (
+            "(too few candidates to move the best set: these ranges hold what happened to be "
+            "tried, and the true ones are wider; raise search.candidates)"
+        )
+        return
+    beside = "a thousandth of the bounds beside where the last steps began"
+    yield f"({beside}: misfit {found.surroundings:.4g})"
+    alike = points[tried["misfit"] <= np.min(tried["misfit"]) + ONE_UNIT]
+    for extent, direction in flat_directions(alike):
+        # As much as the parameter that moves most.
+        parts = zip(keys, direction / np.max(np.abs(direction)), strict=True)
+        together = ", ".join(f"{key} {part:+.2f}" for key, part in parts if abs(part) >= 0.05)
+        yield f"flat over {extent:.2f} of the bounds: {together}"
+
+
+def flat_directions(alike: Floats) -> list[tuple[float, Floats]]:
+    """Return along which directions the sets that fit alike lie, and how far, the longest first.
+
+    ``alike`` (sets, parameters) are points of the unit cube; the directions are those of their
+    principal components.
+    """
+    around = alike - alike.mean(axis=0)
+    vectors = np.linalg.svd(around, full_matrices=False)[2]
+    extents = np.ptp(around @ vectors.T, axis=0)
+    found = zip(extents.tolist(), vectors, strict=True)
+    signed = ((extent, v * np.sign(v[np.argmax(np.abs(v))])) for extent, v in found)
+    return [one for one in signed if one[0] >= FLAT_EXTENT]
+
+
+def _points(problem: Problem, values: Floats) -> Floats:
+    """Return sets of parameters as points of the unit cube."""
+    columns = zip(problem.targets.parameter, values.T, strict=True)
+    return np.stack([[one.share(v) for v in column.tolist()] for one, column in columns], axis=1)
 
 
 def _row(name: str, entries: Iterable[str | float]) -> str:

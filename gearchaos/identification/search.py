@@ -1,13 +1,14 @@
 """The search: candidates are drawn, bred by CMA-ES and moved alone, computed, judged and kept.
 
-The candidates of a generation are yielded as points of the unit cube, and their misfits sent back:
-the same misfits lead to the same candidates, which is how a search that was stopped goes on.
+The candidates of a generation are yielded as points of the unit cube, and their misfits and
+residuals sent back: the same ones lead to the same candidates, which is how a search that was
+stopped goes on.
 """
 
 import warnings
-from collections.abc import Generator, Iterator
+from collections.abc import Iterator
 from importlib.metadata import version
-from typing import Any, TypeAlias
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -16,6 +17,13 @@ from gearchaos.configuration.toml_text import toml_text
 from gearchaos.engine.provenance import SOFTWARE
 from gearchaos.errors import FileError
 from gearchaos.identification.evaluation import evaluate
+from gearchaos.identification.flat_directions import (
+    ONE_UNIT,
+    Proposals,
+    directions_at,
+    distinct,
+    walks,
+)
 from gearchaos.identification.loading import Problem
 from gearchaos.identification.observations import misfit
 from gearchaos.identification.targets import Search
@@ -25,7 +33,8 @@ from gearchaos.interrupts import check
 DRAWN = 0  # Number of the run to which drawn candidates belong; those of CMA-ES count from 1.
 STEPS_ALONE = -1  # Number of the run of the steps away from the best candidate.
 FIRST_SPREAD = 0.2  # Standard deviation with which CMA-ES begins, as a share of the bounds.
-RUNGS = 20  # Steps away from the best candidate, for each parameter and direction.
+RUNGS = 20  # Most steps away from the best candidate, for each parameter and direction.
+FEWEST_RUNGS = 4  # With fewer it is not told how far a parameter can move.
 STARTS = 4  # Drawn sets kept for each run to begin from: runs that end early are followed by more.
 
 MOST_CENTRES = 5
@@ -33,8 +42,36 @@ MOST_CENTRES = 5
 
 LANES_AT_ONCE = 2**13  # Lanes of one batch: enough for all threads, and little memory.
 
-Proposals: TypeAlias = Generator[tuple[int, Floats], Floats, None]
-"""Candidates that are tried together: the number of their run, and their points."""
+
+class Shares(NamedTuple):
+    """How the candidates of a search are shared out.
+
+    ``bred``: those of CMA-ES; ``last``: those that tell how far the best set can move, by
+    ``rungs`` steps of each parameter in each direction, 0 where they are too few, and by walks.
+    """
+
+    bred: int
+    last: int
+    rungs: int
+
+    @property
+    def looked(self) -> bool:
+        """Whether it is told how far the best set can move."""
+        return self.rungs > 0
+
+
+def shares(search: Search, parameters: int) -> Shares:
+    """Share out the candidates of a search with so many parameters.
+
+    A third of those that are not drawn, at most, is left for the surroundings of the best set: two
+    fifths of it for steps of single parameters, the others for walks along flat directions.
+    """
+    others = search.candidates - search.drawn
+    last = min(others // 3, 2 * MOST_CENTRES * (1 + 2 * RUNGS * parameters))
+    rungs = min(RUNGS, (2 * last // 5 - 1) // (2 * parameters))
+    if rungs < FEWEST_RUNGS:
+        return Shares(others, 0, 0)
+    return Shares(others - last, last, rungs)
 
 
 def judge(problem: Problem, run: int, parameters: dict[str, Floats]) -> Tried:
@@ -71,7 +108,7 @@ def search(problem: Problem, known: Tried, source: str) -> Iterator[Tried]:
     asking = proposals(targets.search, len(targets.parameter))
     run, points = next(asking)
     while True:
-        misfits = []
+        answers = []
         for first in range(0, len(points), at_once):
             check()
             parameters = targets.values(points[first : first + at_once])
@@ -81,25 +118,46 @@ def search(problem: Problem, known: Tried, source: str) -> Iterator[Tried]:
             else:
                 found = judge(problem, run, parameters)
             done += len(found)
-            misfits.append(found["misfit"])
+            answers.append(answers_of(problem, found))
             yield found
         try:
-            run, points = asking.send(np.concatenate(misfits))
+            run, points = asking.send(np.concatenate(answers))
         except StopIteration:
             return
 
 
-def proposals(search: Search, parameters: int) -> Proposals:
-    """Yield one generation after the other; their misfits are to be sent back.
+def answers_of(problem: Problem, tried: Tried) -> Floats:
+    """Return misfit and residuals of candidates, (candidates, 1 + observations)."""
+    columns = zip(problem.observations, tried["computed"].T, strict=True)
+    return np.column_stack([tried["misfit"], *(one.residual(values) for one, values in columns)])
 
-    All of them together are ``search.candidates`` at most, and `steps_alone` after these.
+
+def proposals(search: Search, parameters: int) -> Proposals:
+    """Yield one generation after the other; their misfits and residuals are to be sent back.
+
+    All of them together are ``search.candidates`` at most.
     """
-    random = np.random.default_rng(search.seed)
+    random, part = np.random.default_rng(search.seed), shares(search, parameters)
+    points, answers = np.empty((0, parameters)), []
+    bred = _bred(search, parameters, part.bred, random)
+    asked = next(bred)
+    while True:
+        answers.append((yield asked))
+        points = np.concatenate([points, asked[1]])
+        try:
+            asked = bred.send(answers[-1])
+        except StopIteration:
+            break
+    if part.looked:
+        yield from _surroundings(points, np.concatenate(answers), part, random)
+
+
+def _bred(search: Search, parameters: int, left: int, random: np.random.Generator) -> Proposals:
+    """Yield the drawn candidates, and after them at most so many generations of CMA-ES."""
     drawn = random.random((search.drawn, parameters))
-    misfits = yield DRAWN, drawn
-    best, least = drawn[np.argmin(misfits)], float(np.min(misfits))
+    misfits = (yield DRAWN, drawn)[:, 0]
     starts = distinct(drawn, misfits, search.apart, most=STARTS * search.runs)
-    left, run = search.candidates - search.drawn, 0
+    run = 0
     while left >= search.population:
         begin = drawn[starts[run % len(starts)]]
         strategy = _strategy(begin, search.population, random)
@@ -109,47 +167,44 @@ def proposals(search: Search, parameters: int) -> Proposals:
         while min(left, share) >= search.population and not strategy.stop():
             asked = strategy.ask()
             points = np.clip(np.array(asked), 0.0, 1.0)
-            misfits = yield run, points
+            misfits = (yield run, points)[:, 0]
             strategy.tell(asked, misfits.tolist())
             left, share = left - search.population, share - search.population
-            if np.min(misfits) < least:
-                best, least = points[np.argmin(misfits)], float(np.min(misfits))
+
+
+def _surroundings(
+    points: Floats, answers: Floats, part: Shares, random: np.random.Generator
+) -> Proposals:
+    """Yield steps away from the best candidate so far, and walks along its flat directions."""
+    best, least = points[np.argmin(answers[:, 0])], float(np.min(answers[:, 0]))
+    left, again = part.last, 2 * part.last // 5
     for _ in range(MOST_CENTRES):
-        points = steps_alone(best)
-        misfits = yield STEPS_ALONE, points
-        if np.min(misfits) >= least:
+        steps = steps_alone(best, part.rungs)
+        if again < len(steps):
             break
-        best, least = points[np.argmin(misfits)], float(np.min(misfits))
+        found = yield STEPS_ALONE, steps
+        left, again = left - len(steps), again - len(steps)
+        points, answers = np.concatenate([points, steps]), np.concatenate([answers, found])
+        if np.min(found[:, 0]) >= least:
+            break
+        best, least = steps[np.argmin(found[:, 0])], float(np.min(found[:, 0]))
+    flat = directions_at(best, points, answers)
+    yield from walks(best, flat, least + ONE_UNIT, left, random)
 
 
-def steps_alone(centre: Floats) -> Floats:
+def steps_alone(centre: Floats, rungs: int) -> Floats:
     """Return points away from a centre, one parameter at a time.
 
     First the centre, then for each parameter the steps down and those up, smallest first, from a
     thousandth of the bounds to all of them; at a bound they stay there.
     """
-    steps = 2.0 ** -np.linspace(10.0, 0.0, RUNGS)
-    points = np.tile(centre, (centre.size, 2, RUNGS, 1))
+    steps = 2.0 ** -np.linspace(10.0, 0.0, rungs)
+    points = np.tile(centre, (centre.size, 2, rungs, 1))
     for number in range(centre.size):
         points[number, :, :, number] += np.outer([-1.0, 1.0], steps)
     rows = np.concatenate([centre[np.newaxis], points.reshape(-1, centre.size)])
     clipped: Floats = np.clip(rows, 0.0, 1.0)
     return clipped
-
-
-def distinct(points: Floats, misfits: Floats, apart: float, most: int) -> list[int]:
-    """Return the numbers of the best points that differ from each other, the best one first.
-
-    Two points differ where one of their coordinates does by more than ``apart``.
-    """
-    found: list[int] = []
-    for number in np.argsort(misfits, kind="stable").tolist():
-        if len(found) == most:
-            break
-        far = np.max(np.abs(points[found] - points[number]), axis=1, initial=0.0) > apart
-        if np.all(far):
-            found.append(number)
-    return found
 
 
 def _require_these(parameters: dict[str, Floats], known: Tried, source: str) -> None:

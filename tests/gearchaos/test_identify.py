@@ -15,7 +15,7 @@ from gearchaos.identification import search as searching
 from gearchaos.identification.evaluation import require_stable
 from gearchaos.identification.loading import load_targets
 from gearchaos.identification.report import _row, reach
-from gearchaos.identification.search import decisive_facts, judge
+from gearchaos.identification.search import decisive_facts, judge, shares
 from gearchaos.identification.tried import read_tried, write_tried
 from gearchaos.identify import main
 
@@ -59,7 +59,7 @@ configuration = "pair.toml"
 
 [search]
 seed = 3
-candidates = 240
+candidates = 360
 drawn = 40
 runs = 1
 population = 12
@@ -171,7 +171,7 @@ class TestALinearPair:
 
     def test_the_report_tells_what_the_targets_determine(self, identified):
         tried, _ = tried_of(identified)
-        found = reach(tried)
+        found = reach(tried, shares(problem_of(identified).targets.search, 2).rungs)
         best = tried["values"][np.argmin(tried["misfit"])]
         assert np.all(found.alone[:, 0] < best) and np.all(best < found.alone[:, 1])
         # The misfit is 2 (sqrt(1 + r^2) - 1) of the exponent at least, and may grow by one.
@@ -180,6 +180,9 @@ class TestALinearPair:
         assert found.alone[0, 1] - best[0] < 2.0 * most
         for word in ("damping_ratio", "set 1", "exponent at 1", "groups.pitch_error_amplitude = "):
             assert word in identified.out
+        assert identified.out.startswith("3 observations, 2 unknowns\n")
+        assert "not determined" not in identified.out and "flat over" not in identified.out
+        assert len(tried) <= 360
 
 
 class TestASearchThatWasStopped:
