@@ -4,7 +4,8 @@ import sys
 from collections.abc import Sequence
 from importlib import import_module
 
-from gearchaos.command_line import COMMANDS, OK, USAGE, version_text
+from gearchaos.command_line import CANNOT_READ_OR_WRITE, COMMANDS, OK, USAGE, version_text
+from gearchaos.progress import complain, discard, print_error, standing_streams
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -14,17 +15,28 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if first in COMMANDS:
         code: int = import_module(f"gearchaos.{first}").main(given[1:])
         return code
+    with standing_streams():
+        try:
+            return _overview(given)
+        except OSError as error:
+            complain(f"error: {error}")
+            discard(sys.stdout)
+            return CANNOT_READ_OR_WRITE
+
+
+def _overview(given: list[str]) -> int:
+    """Print the version or the commands; without either, or with a wrong name, on stderr."""
     if given == ["--version"]:
-        print(version_text())
+        print(version_text(), flush=True)
         return OK
     lines = [f"  {name:14} {one['summary']}" for name, one in COMMANDS.items()]
     usage = "\n".join(["usage: gearchaos COMMAND ...", "", *lines])
-    if first in ("-h", "--help"):
-        print(usage)
+    if given and given[0] in ("-h", "--help"):
+        print(usage, flush=True)
         return OK
-    if first:
-        print(f"gearchaos: error: no command `{first}`", file=sys.stderr)
-    print(usage, file=sys.stderr)
+    if given:
+        print_error(f"gearchaos: error: no command `{given[0]}`")
+    print_error(usage)
     return USAGE
 
 

@@ -7,15 +7,14 @@ import sys
 import tomllib
 from argparse import ArgumentParser, ArgumentTypeError, Namespace
 from collections.abc import Callable, Sequence
-from contextlib import suppress
 from functools import partial
 from io import TextIOWrapper
 from pathlib import Path
-from typing import Any, NamedTuple, Self, TextIO
+from typing import Any, NamedTuple, Self
 
 from gearchaos.errors import ConfigurationError, FileError, GearchaosError
 from gearchaos.interrupts import Termination, check, heeded
-from gearchaos.progress import complain, speaking
+from gearchaos.progress import complain, discard, speaking, standing_streams
 from gearchaos.version import software_version
 
 OK = 0
@@ -62,32 +61,34 @@ class Command(NamedTuple):
 
     def __call__(self, arguments: Sequence[str] | None = None) -> int:
         """Run the command and return its exit code."""
+        with standing_streams(), speaking(f"gearchaos {self.name}"):
+            return self._ended(list(sys.argv[1:] if arguments is None else arguments))
+
+    def _ended(self, arguments: list[str]) -> int:
+        """Run the command, report any fault, and return the exit code."""
         if isinstance(sys.stdout, TextIOWrapper):
             # Paths that are not Unicode go out byte for byte, as they came in.
             sys.stdout.reconfigure(errors="surrogateescape")
-        with speaking(f"gearchaos {self.name}"):
-            try:
-                with heeded(at_once=not COMMANDS[self.name].get("writes", True)):
-                    code = self._code(list(sys.argv[1:] if arguments is None else arguments))
-                    check()
-                if sys.stdout is not None:
-                    sys.stdout.flush()
-                return code
-            except GearchaosError as error:
-                texts = [f"error: {text}" for text in error.problems]
-                return _report(error, texts, error.exit_code)
-            except Termination as termination:
-                return _report(termination, ["terminated"], TERMINATED)
-            except KeyboardInterrupt as interrupt:
-                return _report(interrupt, ["interrupted"], INTERRUPTED)
-            except BrokenPipeError:
-                _discard(sys.stdout)
-                return CLOSED_PIPE
-            except (OSError, MemoryError, ImportError) as error:
-                text = str(error) or "out of memory"
-                if isinstance(error, ImportError):  # Such as Numba, of a newer NumPy.
-                    text += "; a package is missing or does not fit, install gearchaos again"
-                return _report(error, [f"error: {text}"], CANNOT_READ_OR_WRITE)
+        try:
+            with heeded(at_once=not COMMANDS[self.name].get("writes", True)):
+                code = self._code(arguments)
+                check()
+            sys.stdout.flush()
+            return code
+        except GearchaosError as error:
+            return _report(error, [f"error: {text}" for text in error.problems], error.exit_code)
+        except Termination as termination:
+            return _report(termination, ["terminated"], TERMINATED)
+        except KeyboardInterrupt as interrupt:
+            return _report(interrupt, ["interrupted"], INTERRUPTED)
+        except BrokenPipeError:
+            discard(sys.stdout)
+            return CLOSED_PIPE
+        except (OSError, MemoryError, ImportError) as error:
+            text = str(error) or "out of memory"
+            if isinstance(error, ImportError):  # Such as Numba, of a newer NumPy.
+                text += "; a package is missing or does not fit, install gearchaos again"
+            return _report(error, [f"error: {text}"], CANNOT_READ_OR_WRITE)
 
     def start(self, module: str) -> Self:
         """Run it as a process where its module, by ``__name__``, is what was started."""
@@ -213,16 +214,5 @@ def version_text() -> str:
 
 
 def _report(fault: BaseException, texts: list[str], code: int) -> int:
-    try:
-        complain(*texts, *getattr(fault, "__notes__", []))
-    except BrokenPipeError:
-        _discard(sys.stderr)
+    complain(*texts, *getattr(fault, "__notes__", []))
     return code
-
-
-def _discard(stream: TextIO) -> None:
-    # The interpreter flushes once more on its way out; what is left must have somewhere to go.
-    with suppress(OSError, ValueError):
-        sink = os.open(os.devnull, os.O_WRONLY)
-        os.dup2(sink, stream.fileno())
-        os.close(sink)

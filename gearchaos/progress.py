@@ -1,13 +1,14 @@
 """What is said on stderr while a command runs, and how far a sweep has come."""
 
+import os
 import sys
 import threading
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager, redirect_stderr, redirect_stdout, suppress
 from contextvars import ContextVar, copy_context
 from functools import cache
 from io import StringIO
-from typing import Any
+from typing import Any, TextIO
 
 SECONDS_BETWEEN_LINES = 30.0
 SECONDS_BEFORE_NOTICE = 0.5
@@ -28,9 +29,49 @@ def speaking(name: str | None = None, *, quiet: bool = False) -> Iterator[None]:
         _quiet.reset(hushed)
 
 
+@contextmanager
+def standing_streams() -> Iterator[None]:
+    """Connect every standard stream that is closed to the null device.
+
+    A file opened later would get the number of the closed stream, and then receive what libraries
+    print there. A stream that the interpreter lacks is replaced within the context.
+    """
+    while (descriptor := os.open(os.devnull, os.O_RDWR)) <= 2:
+        os.set_inheritable(descriptor, True)
+    os.close(descriptor)
+    with ExitStack() as stack:
+        for stream, redirect in (sys.stdout, redirect_stdout), (sys.stderr, redirect_stderr):
+            if stream is None:
+                sink = stack.enter_context(open(os.devnull, "w", encoding="utf-8"))
+                stack.enter_context(redirect(sink))
+        yield
+
+
+def print_error(text: str) -> None:
+    """Print text on stderr; if stderr is closed or full, the text is lost and the work goes on."""
+    # Without this test, print would write to stdout.
+    if sys.stderr is None:
+        return
+    try:
+        print(text, file=sys.stderr, flush=True)
+    except (OSError, ValueError):
+        discard(sys.stderr)
+
+
+def discard(stream: TextIO) -> None:
+    """Connect a stream that cannot be written to the null device.
+
+    The interpreter flushes once more when it exits, and would replace the exit code.
+    """
+    with suppress(OSError, ValueError):
+        sink = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(sink, stream.fileno())
+        os.close(sink)
+
+
 def complain(*texts: str) -> None:
     """Print lines on stderr, also where it is quiet."""
-    print(*(f"{_name.get()}: {text}" for text in texts), sep="\n", file=sys.stderr, flush=True)
+    print_error("\n".join(f"{_name.get()}: {text}" for text in texts))
 
 
 def say(*texts: str) -> None:
@@ -60,7 +101,7 @@ def progress(total: int, done: int = 0, unit: str = "lanes") -> Any:
     # Of one there is nothing to tell but that it is done.
     told: dict[str, Any] = {"total": total, "initial": done, "unit": f" {unit}"}
     told["disable"] = _quiet.get() or total < 2
-    if sys.stderr.isatty():
+    if sys.stderr is not None and sys.stderr.isatty():
         return bar(**told, dynamic_ncols=True, miniters=1)
     text = "{n} of {total}{unit}, {rate_noinv_fmt}, {remaining} left"
     return lines(
