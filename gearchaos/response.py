@@ -7,6 +7,7 @@ The path of the result goes to stdout, everything else to stderr; python -m gear
 it.
 """
 
+import os
 from argparse import Namespace
 from typing import TYPE_CHECKING, Any
 
@@ -24,7 +25,9 @@ if TYPE_CHECKING:
 def _respond(options: Namespace) -> int:
     from h5py import is_hdf5
 
-    config, text, note, fixed = (_lane if is_hdf5(options.config) else _configuration)(options)
+    # HDF5 would take the beginning out of a pipe.
+    of_result = os.path.isfile(options.config) and is_hdf5(options.config)
+    config, text, note, fixed = (_lane if of_result else _configuration)(options)
     from gearchaos.engine.response import compute_response, prepared
     from gearchaos.engine.running import choose_threads, prepare
     from gearchaos.results.atomic_file import check_output
@@ -74,7 +77,8 @@ def _configuration(options: Namespace) -> "Asked":
     text = text_of_file(options.config)
 
     def configured(*more: str) -> Configuration:
-        return Configuration.from_toml(text, options.config, [*options.set, *more])
+        folder = os.path.dirname(options.config) or "."
+        return Configuration.from_toml(text, options.config, [*options.set, *more], folder)
 
     names = {name or configured().sweep.parameter for name, _ in options.at}
     if len(names) != 1:

@@ -34,6 +34,7 @@ class Configuration(Tables):
 
     _source: str = PrivateAttr(default="<python>")
     _text: str | None = PrivateAttr(default=None)
+    _folder: str | None = PrivateAttr(default=None)
 
     @property
     def source(self) -> str:
@@ -49,26 +50,36 @@ class Configuration(Tables):
         return self.resolved_toml() if self._text is None else self._text
 
     @classmethod
-    def from_toml(cls, text: str, source: str = "<text>", overrides: Iterable[str] = ()) -> Self:
+    def from_toml(
+        cls,
+        text: str,
+        source: str = "<text>",
+        overrides: Iterable[str] = (),
+        folder: str | None = None,
+    ) -> Self:
         """Make a configuration from TOML text, which messages call ``source``.
 
-        ``overrides`` are those of `load_config`. Raises ConfigurationError with one message per
-        fault, all faults at once.
+        ``overrides`` are those of `load_config`. Files that the text names are read from
+        ``folder``; without one, their text must be part of it, under ``[files]``. Raises
+        ConfigurationError with one message per fault, all faults at once.
         """
         tables = with_overrides(tables_from_toml(text, source), overrides, source)
-        config = cls.from_tables(tables, source)
+        config = cls.from_tables(tables, source, folder)
         config._text = text
         if config.files is not None and "files" not in tables:
             config._text += f"\n[files]\n{toml_text(config.files)}"
         return config
 
     @classmethod
-    def from_tables(cls, tables: Mapping[str, Any], source: str = "<python>") -> Self:
+    def from_tables(
+        cls, tables: Mapping[str, Any], source: str = "<python>", folder: str | None = None
+    ) -> Self:
         """Make a configuration from nested mappings with the keys of the TOML file.
 
-        Raises ConfigurationError with one message per fault, all faults at once.
+        Files that they name are read from ``folder``; without one, their text must be among them,
+        under ``files``. Raises ConfigurationError with one message per fault, all faults at once.
         """
-        tables, faults = with_deviation_files(tables, source)
+        tables, faults = with_deviation_files(tables, folder)
         if faults:
             raise ConfigurationError(texts(faults, source))
         try:
@@ -78,7 +89,7 @@ class Configuration(Tables):
             unreadable = {str(one["loc"][0]) for one in error.errors(include_url=False)}
             shared = _broken_rules(_readable(tables, unreadable), unreadable)
             raise ConfigurationError(texts([*own, *shared], source, more)) from None
-        config._source = source
+        config._source, config._folder = source, folder
         return config
 
     def replace(self, path: str, value: Any) -> Self:
@@ -91,7 +102,7 @@ class Configuration(Tables):
             tables = with_value(self.tables(), path.split("."), value)
         except KeyError as error:
             raise ConfigurationError(f"{self.source}: {error.args[0]} is not a table") from None
-        return type(self).from_tables(tables, self.source)
+        return type(self).from_tables(tables, self.source, self._folder)
 
     def at(self, values: Mapping[str, float]) -> Self:
         """Return a copy in which parameters, by name, are fixed at values in their units.
@@ -118,7 +129,7 @@ class Configuration(Tables):
             swept = self.sweep.parameter
             left = [{"parameter": swept, "values": [float(values[swept])]}]
         tables |= dict(zip(self.sweeps, left, strict=False))
-        return type(self).from_tables(tables, self.source)
+        return type(self).from_tables(tables, self.source, self._folder)
 
     def resolved_toml(self) -> str:
         """Return TOML with every default filled in; it loads to an equal configuration."""
@@ -150,7 +161,8 @@ def load_config(path: str | os.PathLike[str], overrides: Iterable[str] = ()) -> 
     once.
     """
     source = os.fspath(path)
-    return Configuration.from_toml(text_of_file(source), source, overrides)
+    folder = os.path.dirname(source) or "."
+    return Configuration.from_toml(text_of_file(source), source, overrides, folder)
 
 
 def configuration_of(given: Given) -> Configuration:

@@ -34,12 +34,13 @@ _LARGEST_SUM_UM, _LARGEST_SUM_SHARE = 0.1, 0.01
 
 
 def with_deviation_files(
-    tables: Mapping[str, Any], source: str
+    tables: Mapping[str, Any], folder: str | None
 ) -> tuple[Mapping[str, Any], list[Fault]]:
     """Return the tables of a configuration with the deviations in the files they name, and faults.
 
     The numbers go into the table of the gear, where none are listed, and the text into ``files``,
-    from which it is taken when it is needed again.
+    from which it is taken when it is needed again. Other files are read from ``folder`` only, none
+    without it: a result from elsewhere must not open files of this machine.
     """
     faults = []
     for gear in ("driving", "driven"):
@@ -48,19 +49,29 @@ def with_deviation_files(
         name = table.get("file")
         if not isinstance(name, str) or not table.keys().isdisjoint(LISTS.values()):
             continue
-        path = os.path.join(os.path.dirname(source) or ".", name)
         read = LISTS.get(str(table.get("holds")), LISTS["cumulative"])
         try:
             if not isinstance(files.get(name), str):
-                files[name] = text_of_file(path, "file of pitch deviations")
+                files[name] = _text_beside(folder, name)
             table[read] = _column(files[name], table.get("column"))
             tables = {**tables, "pitch_error": {**error, gear: table}, "files": files}
         except (GearchaosError, ValueError, csv.Error) as fault:
             rule, remedy = [*map(str, fault.args), ""][:2]
-            # The fault names the file.
-            rule = rule.removeprefix(f"{path}: ")
             faults.append(Fault(f"pitch_error.{gear}.file", rule, remedy, name))
     return tables, faults
+
+
+def _text_beside(folder: str | None, name: str) -> str:
+    """Read the text of a file in the folder of the configuration."""
+    if folder is None:
+        rule = "is not kept under [files], and other files are not read here"
+        raise ValueError(rule, "run the sweep again, or read the configuration with load_config")
+    path = os.path.join(folder, name)
+    try:
+        return text_of_file(path, "file of pitch deviations")
+    except GearchaosError as fault:
+        # The fault names the file.
+        raise ValueError(str(fault).removeprefix(f"{path}: ")) from None
 
 
 def _table(tables: Mapping[str, Any], name: str) -> dict[str, Any]:
@@ -79,7 +90,8 @@ def _column(text: str, column: object) -> list[float]:
     headings = rows.pop(0)[1] if rows else []
     if column not in headings:
         asked = "column is missing" if column is None else f"has no column {shown(column)}"
-        raise ValueError(asked, f"its first line has the headings {shown(headings)}")
+        # Content is never quoted: the path may lead to any file of this machine.
+        raise ValueError(asked, "name a heading of its first line")
     place = headings.index(column)
     cells = [(line, "".join(row[place : place + 1])) for line, row in rows]
     # Beside a gear with more teeth a column ends in empty cells.
@@ -87,7 +99,7 @@ def _column(text: str, column: object) -> list[float]:
         cells.pop()
     for line, cell in cells:
         if not (NUMBER.fullmatch(cell) and isfinite(float(cell))):
-            rule = f"line {line}, column {column}: must be a finite number, not {shown(cell)}"
+            rule = f"line {line}, column {column}: must be a finite number"
             raise ValueError(rule, "give one for every tooth, decimals with a point")
     return [float(cell) for _, cell in cells]
 

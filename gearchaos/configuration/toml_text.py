@@ -1,7 +1,9 @@
 """TOML text: read from a file, to tables and back, with `key.path=value` overrides."""
 
 import json
+import os
 import re
+import stat
 import tomllib
 from collections.abc import Iterable, Mapping
 from typing import Any
@@ -26,13 +28,13 @@ _ENDLESS_INTEGER = re.compile(r"0[xob][0-9A-Fa-f_]{1000}")
 def text_of_file(source: str, what: str = CONFIGURATION) -> str:
     """Read the text of a file at a path, a configuration or what else the messages call it.
 
-    Raises FileError or ConfigurationError if it cannot be read.
+    A configuration may come through a pipe, whatever it names is a regular file. Raises FileError
+    or ConfigurationError if it cannot be read.
     """
     if not source:
         raise FileError("no configuration file: the path is empty; name a TOML file")
     try:
-        with open(0 if source == "-" else source, "rb", closefd=source != "-") as file:
-            content = file.read(LARGEST_FILE + 1)
+        content = _content(source, regular=what != CONFIGURATION)
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) else str(error)
         rule = f"cannot be read: {reason}"
@@ -52,6 +54,19 @@ def text_of_file(source: str, what: str = CONFIGURATION) -> str:
         raise ConfigurationError(
             f"{source}: line {line} is not UTF-8 text; save the {what} as UTF-8"
         ) from None
+
+
+def _content(source: str, regular: bool) -> bytes:
+    """Read no more of a file than shows that it is too large; ValueError if it is not regular."""
+    if source == "-":
+        with open(0, "rb", closefd=False) as file:
+            return file.read(LARGEST_FILE + 1)
+    # A pipe is opened without waiting for its writer, and then refused.
+    more = getattr(os, "O_NONBLOCK", 0) if regular else 0
+    with open(source, "rb", opener=lambda path, flags: os.open(path, flags | more)) as file:
+        if regular and not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
+            raise ValueError("it is not a regular file")
+        return file.read(LARGEST_FILE + 1)
 
 
 def quoted_key(name: str) -> str:

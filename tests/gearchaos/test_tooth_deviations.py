@@ -1,14 +1,21 @@
 """Pitch deviations of every tooth: from a file or a grade to both gears in the order of mesh."""
 
+import json
+import os
+
+import h5py
 import numpy as np
 import pytest
 
 from gearchaos.configuration import Configuration, groups_at, load_config
 from gearchaos.engine.lanes import Lanes
+from gearchaos.engine.provenance import SOFTWARE
+from gearchaos.errors import ConfigurationError
 from gearchaos.gear.tooth_deviations import drawn_gears, tooth_deviations
 from gearchaos.iso1328 import cumulative_pitch_um, single_pitch_um
 
 from .commands import SMALL, run_module
+from .fuzz_results import CHECKSUM_LINE, good_result
 
 SINE = "amplitude_um = 11.0\nmean_um = 2.0\nphase_deg = 30.0\n"
 ERROR = '[pitch_error]\nkind = "teeth"\n'
@@ -184,18 +191,18 @@ def test_a_configuration_and_its_result_stand_alone_without_the_file(tmp_path):
 
 ROWS = "Fp\n" + "".join(f"{f}\n" for f in F)
 FAULTY_FILES = {
-    "no column": ("p\n1\n", 'has no column "Fp"; its first line has the headings ["p"]'),
-    "nothing": ("# note\n", "its first line has the headings []"),
-    "text": (ROWS.replace("4.0", "four"), 'line 3, column Fp: must be a finite number, not "four"'),
-    "nan": (ROWS.replace("4.0", "nan"), 'line 3, column Fp: must be a finite number, not "nan"'),
+    "no column": ("p\n1\n", 'has no column "Fp"; name a heading of its first line'),
+    "nothing": ("# note\n", "name a heading of its first line"),
+    "text": (ROWS.replace("4.0", "four"), "line 3, column Fp: must be a finite number; give"),
+    "nan": (ROWS.replace("4.0", "nan"), "line 3, column Fp: must be a finite number; give"),
     "inf": (
         ROWS.replace("4.0", "1e999"),
-        'line 3, column Fp: must be a finite number, not "1e999"',
+        "line 3, column Fp: must be a finite number; give",
     ),
     "decimal comma": (ROWS.replace("Fp", "x;Fp").replace("4.0", "0;4,0"), "decimals with a point"),
     "short row": (
         "x;Fp\n1;0.0\n\n2\n3;1.0\n",
-        'line 4, column Fp: must be a finite number, not ""',
+        "line 4, column Fp: must be a finite number; give",
     ),
     "missing tooth": (ROWS.replace("4.0\n", ""), "gear.csv, column Fp: holds 4 values for 5 teeth"),
     "binary": (
@@ -217,16 +224,84 @@ def test_a_faulty_file_is_refused_with_its_line(content, message, tmp_path):
     assert message in ended.err and "gear.csv" in ended.err and "pitch_error.driving" in ended.err
 
 
+SECRET = "Fp\n" + "".join(f"{1000.0 + f}\n" for f in F)
+
+
+def test_no_message_quotes_a_file_that_a_configuration_names(tmp_path):
+    path = tmp_path / "gears.toml"
+    for content in ("password 1234\n", "Fp\n0.0\npassword 1234\n", "Fp\n" + 5 * "0.0 1234\n"):
+        (tmp_path / "secret").write_text(content)
+        path.write_text(driving('file = "secret"', 'column = "Fp"'))
+        with pytest.raises(ConfigurationError, match="secret") as caught:
+            load_config(path)
+        assert "1234" not in str(caught.value)
+
+
+def stored_elsewhere(folder, text):
+    """Write a result whose stored configuration is another one."""
+    good_result(folder / "good.h5")
+    (folder / "stored.h5").write_bytes((folder / "good.h5").read_bytes()[:-CHECKSUM_LINE])
+    with h5py.File(folder / "stored.h5", "r+") as file:
+        for name in ("configuration", "configuration_resolved"):
+            file.attrs[name] = text
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("response", "stored.h5", "--at", "0.5"),
+        ("stages", "stored.h5", "--refine", "0.1"),
+        ("stages", "stored.h5", "--survival", "2"),
+        ("basins", "stored.h5"),
+        ("info", "stored.h5"),
+    ],
+)
+def test_a_stored_configuration_opens_no_other_file(arguments, tmp_path):
+    # It would do: whoever opened it would go on.
+    (tmp_path / "secret").write_text(SECRET)
+    stored_elsewhere(tmp_path, driving('file = "secret"', 'column = "Fp"'))
+    module, *rest = arguments
+    ended = run_module(f"gearchaos.{module}", *rest, cwd=tmp_path)
+    assert "100" not in ended.out + ended.err and "sweep.count" not in ended.out
+    if module != "info":
+        assert ended.code == 2
+        assert 'driving.file = "secret": is not kept under [files]' in ended.err
+
+
+def test_blocks_of_a_forged_manifest_open_no_other_file(tmp_path):
+    (tmp_path / "secret").write_text(SECRET)
+    (tmp_path / "gears.h5.blocks").mkdir()
+    text = driving('file = "../secret"', 'column = "Fp"')
+    manifest = {"configuration": text, "text": text, **SOFTWARE._asdict()}
+    (tmp_path / "gears.h5.blocks" / "manifest.json").write_text(json.dumps(manifest))
+    ended = run_module("gearchaos.merge", "gears.h5", cwd=tmp_path)
+    assert ended.code == 2 and "is not kept under [files]" in ended.err
+
+
+def test_a_text_reads_files_of_the_folder_that_it_is_given(tmp_path):
+    (tmp_path / "gear.csv").write_text(ROWS)
+    text = driving('file = "gear.csv"', 'column = "Fp"')
+    config = Configuration.from_toml(text, folder=str(tmp_path))
+    assert config.pitch_error.driving.cumulative_um == tuple(F)
+    again = config.replace("pitch_error.driving", {"file": "gear.csv", "column": "Fp"})
+    assert again.pitch_error.driving.cumulative_um == tuple(F)
+    with pytest.raises(ConfigurationError, match="read the configuration with load_config"):
+        Configuration.from_toml(text)
+
+
 @pytest.mark.parametrize(
     ("name", "message"),
     [
         ("none.csv", 'driving.file = "none.csv": cannot be read: No such file or directory; check'),
+        ("pipe", "cannot be read: it is not a regular file; check the path of the file of pitch"),
         (".", "cannot be read: Is a directory; check the path of the file of pitch deviations"),
         ("a\\u0000b", "cannot be read: embedded null byte"),
         ("\\u001b[31m", r'driving.file = "\u001b[31m": cannot be read: No such file'),
     ],
 )
 def test_a_missing_file_is_refused_with_its_key(name, message, tmp_path):
+    # Whoever waits for its writer waits for ever.
+    os.mkfifo(tmp_path / "pipe")
     (tmp_path / "gears.toml").write_text(driving(f'file = "{name}"', 'column = "Fp"'))
     ended = run_module("gearchaos.sweep", "gears.toml", "--dry-run", cwd=tmp_path)
     assert ended.code == 2 and message in ended.err
