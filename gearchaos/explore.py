@@ -15,7 +15,6 @@ from gearchaos.command_line import Command
 from gearchaos.errors import ConfigurationError, FigureError, FileError
 from gearchaos.progress import say
 
-HOST = "127.0.0.1"
 PACKAGES = ("panel", "holoviews", "datashader")
 
 
@@ -23,6 +22,7 @@ def _explore(options: Namespace) -> None:
     import webbrowser
     from socket import create_server
 
+    from gearchaos.explorer import HOST
     from gearchaos.figures.response import is_response
     from gearchaos.results.atomic_file import reason
     from gearchaos.results.result import open_result
@@ -43,22 +43,19 @@ def _explore(options: Namespace) -> None:
     import gearchaos_kernels  # noqa: F401
 
     panel, *_ = (needed(package, "explore") for package in PACKAGES)
-    from tornado.web import ErrorHandler
-
     from gearchaos.explorer.page import Page
+    from gearchaos.explorer.policy import origins, protect
 
     panel.extension()
     server = panel.io.server.get_server(
         lambda: Page(result, options.result, _draw).view(),
         port=port,
         address=HOST,
-        websocket_origin=[f"{HOST}:{port}", f"localhost:{port}"],
+        websocket_origin=origins(port),
         title=f"gearchaos: {options.result}",
         warm=True,
     )
-    # A page of another site can give its own name to this address, and would be taken for ours.
-    refused = (".*", ErrorHandler, {"status_code": 403})
-    application(server).add_handlers(rf"(?!({HOST}|localhost)$).*", [refused])
+    protect(application(server), port)
     server.start()
     address = f"http://{HOST}:{port}/"
     print(address, flush=True)

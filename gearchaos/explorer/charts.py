@@ -31,6 +31,9 @@ COLOURS = 256
 FILLED = 0.05
 """Share of the pixels of a diagram below which dots take those beside them too."""
 
+VALUE = "z"
+"""Name that HoloViews gives to what is drawn over two axes."""
+
 DRAWN = 4000
 """Points of a line, which follow its outline where there are more."""
 
@@ -117,4 +120,8 @@ def _dimensions(result: Result, *names: str) -> list[Any]:
     labels = [
         axis_label(result, name, length) for name, length in zip(names, (60, 26), strict=True)
     ]
-    return [hv.Dimension(n, label=plain_text(one)) for n, one in zip(names, labels, strict=True)]
+    texts = [plain_text(label) for label in labels]
+    # HoloViews takes axes for one if the label of the first is label or name of the second.
+    if len({*texts, *names, VALUE}) < len([*texts, *names, VALUE]):
+        texts = [f"{text} [{name}]" for text, name in zip(texts, names, strict=True)]
+    return [hv.Dimension(n, label=one) for n, one in zip(names, texts, strict=True)]

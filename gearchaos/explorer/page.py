@@ -17,7 +17,7 @@ from bokeh.models import CrosshairTool, Span
 from gearchaos.engine.recomputing import continued
 from gearchaos.engine.response import compute_response, prepared
 from gearchaos.engine.running import compiling
-from gearchaos.errors import FigureError
+from gearchaos.errors import ConfigurationError, FigureError, GearchaosError
 from gearchaos.explorer.charts import diagram, plain_text, two_parameter_map
 from gearchaos.explorer.motion import FORCE, SCALES, empty_panel, show
 from gearchaos.figures.labels import in_words, unit_of
@@ -25,6 +25,7 @@ from gearchaos.figures.lanes import diagram_lanes, swept_axes
 from gearchaos.figures.page import FORMATS
 from gearchaos.figures.response import COORDINATE
 from gearchaos.figures.style import GREY, VERMILION
+from gearchaos.gear.groups import LARGEST_VALUE
 from gearchaos.results.response_variables import DEFAULT_PERIODS
 from gearchaos.results.result import Result, section_variables
 from gearchaos.results.stage_table import label_text
@@ -44,7 +45,10 @@ class Page:
         self._result, self._path, self._draw, self._shown = result, path, draw, result
         self._swept = swept_axes(result)[::-1]
         self._others = [axis for axis in result.axes if axis not in self._swept]
-        self._periods = min(DEFAULT_PERIODS, int(result.metadata["recorded_periods"]))
+        recorded = result.metadata.get("recorded_periods")
+        self._periods = DEFAULT_PERIODS
+        if isinstance(recorded, int) and recorded > 0:
+            self._periods = min(DEFAULT_PERIODS, recorded)
         choices: dict[str, Any] = {"variable": self._variables()}
         for axis in self._others:
             choices[axis] = {coordinate_text(axis, at): at for at in result[axis].tolist()}
@@ -69,7 +73,7 @@ class Page:
 
     def view(self) -> Any:
         """Compose what the link asks for; from then on the link follows what is changed."""
-        pn.config.exception_handler = lambda error: self._say(_reason(error))
+        pn.config.exception_handler = self._say_fault
         for name, switch in (*self._switches.items(), ("window", self._window)):
             wrong = partial(self._refuse, name)
             pn.state.location.sync(switch, {"value": name}, lambda _, wrong=wrong: wrong())
@@ -78,8 +82,10 @@ class Page:
             changed = partial(self._change, name, self._move if moves else self._redraw)
             switch.param.watch(changed, "value")
         self._redraw()
-        for name in (*self._switches, *self._refused):
+        for name in self._switches:
             self._allowed(name)
+        for name in self._refused:
+            self._refuse(name)
         files = [(name, kind) for name in ("sweep", "motion", "mesh_force") for kind in FORMATS]
         saves = [
             pn.widgets.FileDownload(
@@ -118,7 +124,7 @@ class Page:
         """The ends of both axes of the first chart, empty where all of it is seen."""
         ends = self._window.value
         given = isinstance(ends, list) and len(ends) == 4
-        return ends if given and all(isinstance(end, float | int) for end in ends) else []
+        return ends if given and all(map(_is_number, ends)) else []
 
     def _value(self, name: str) -> Any:
         return self._switches[name].value
@@ -135,10 +141,10 @@ class Page:
 
     def _allowed(self, name: str) -> bool:
         """Tell whether a switch has one of its values; if a link gave another, take the first."""
-        choices = getattr(self._switches[name], "values", [self._value(name)])
-        if self._value(name) in choices:
+        choices = getattr(self._switches[name], "values", None)
+        if self._value(name) in choices if choices else _is_number(self._value(name)):
             return True
-        self._switches[name].value = choices[0]
+        self._switches[name].value = choices[0] if choices else float(self._result[name][0])
         self._refuse(name)
         return False
 
@@ -152,11 +158,14 @@ class Page:
         draw = two_parameter_map if len(self._swept) > 1 else diagram
         try:
             self._shown = self._in_units(chosen)
-            charts, kinds = draw(self._shown, self._value("variable"))
-        except Exception as error:
-            # Most often there are no physical units.
+        except ConfigurationError as error:  # The pair has no physical units.
             self._switches["units"].value = "dimensionless"
-            self._say(_reason(error))
+            self._say_fault(error)
+            return
+        try:
+            charts, kinds = draw(self._shown, self._value("variable"))
+        except GearchaosError as error:
+            self._say_fault(error)
             return
         line = Span(dimension="height", line_color=GREY)
         zero = Span(dimension="width", location=0.0, line_color=GREY, line_dash="dashed")
@@ -224,7 +233,7 @@ class Page:
             with pn.io.unlocked(), pn.state.curdoc.models.freeze():
                 show(self._panels, self._in_units(motion), self._coordinate)
             self._motion = motion
-        except Exception as error:
+        except (GearchaosError, MemoryError) as error:
             fault = _reason(error)
         self._say(fault)
 
@@ -250,6 +259,12 @@ class Page:
 
     def _say(self, text: str) -> None:
         self._fault.object = f"<b style='color:{VERMILION}'>{escape(text)}</b>" if text else ""
+
+    def _say_fault(self, error: Exception) -> None:
+        """Say on the page what went wrong; the traceback of a defect goes to the terminal too."""
+        self._say(_reason(error))
+        if not isinstance(error, GearchaosError | MemoryError):
+            raise error
 
     def _arguments(self) -> dict[str, list[str]]:
         """Return the words of the commands that make what is shown, by the name of the figure."""
@@ -297,6 +312,10 @@ def _marked(marks: Sequence[Span], plot: Any, _element: Any) -> None:
         plot.state.center = [*plot.state.center, *marks]
 
 
+def _is_number(value: object) -> bool:
+    """Whether a link or a switch holds a number that sweeps can reach."""
+    return isinstance(value, float | int) and -LARGEST_VALUE <= value <= LARGEST_VALUE
+
+
 def _reason(error: Exception) -> str:
-    # A file from elsewhere may ask for anything; whatever comes of it, the page stays.
     return str(error) or type(error).__name__

@@ -367,3 +367,91 @@ def test_the_page_runs_the_code_that_other_commands_have_compiled(path):
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert "panel is not installed" in done.stderr
     assert done.returncode == 0
+
+
+def answer_to(address: str, path: str = "", **headers: str) -> tuple[int, dict[str, str], str]:
+    """Return code, headers and text of an answer, as a program gets it that is no browser."""
+    asked = HTTPConnection("127.0.0.1", int(address.split(":")[-1].strip("/")), timeout=60)
+    named = {name.replace("_", "-"): value for name, value in headers.items()}
+    asked.request("GET", f"/{path}", headers=named)
+    answer = asked.getresponse()
+    found = answer.status, dict(answer.getheaders()), answer.read().decode(errors="replace")
+    asked.close()
+    return found
+
+
+SCRIPT = "autoload.js?bokeh-autoload-element=x"
+
+
+@pytest.mark.parametrize("place", ["", SCRIPT, "static/js/bokeh.min.js", "nothing"])
+def test_every_answer_forbids_frames_other_types_and_other_sites(address, place):
+    code, headers, _ = answer_to(address, place)
+    assert code == (404 if place == "nothing" else 200)
+    policy = headers["Content-Security-Policy"]
+    assert "default-src 'self';" in policy and "frame-ancestors 'none'" in policy
+    assert headers["X-Frame-Options"] == "DENY"
+    assert headers["X-Content-Type-Options"] == "nosniff"
+    assert headers["Cross-Origin-Resource-Policy"] == "same-origin"
+    assert not [name for name in headers if name.startswith("Access-Control")]
+
+
+def test_a_request_of_another_site_is_refused_and_a_link_in_it_is_not(address):
+    port, own = address.split(":")[-1].strip("/"), address.strip("/")
+    for path in ("", SCRIPT):
+        assert answer_to(address, path, Origin=own)[0] == 200
+        assert answer_to(address, path, Origin=f"http://localhost:{port}")[0] == 200
+        others = "http://evil.example", f"http://evil.example:{port}", "null", f"https://{own[7:]}"
+        for origin in (*others, "http://127.0.0.1:1"):
+            code, headers, _ = answer_to(address, path, Origin=origin)
+            assert code == 403 and "Access-Control-Allow-Origin" not in headers
+    # A script or a picture that another page names comes without an origin.
+    for site in ("cross-site", "same-site"):
+        script = {"Sec_Fetch_Site": site, "Sec_Fetch_Mode": "no-cors", "Sec_Fetch_Dest": "script"}
+        frame = {"Sec_Fetch_Site": site, "Sec_Fetch_Mode": "navigate", "Sec_Fetch_Dest": "iframe"}
+        assert answer_to(address, SCRIPT, **script)[0] == 403
+        assert answer_to(address, **frame)[0] == 403
+        assert answer_to(address, **{**frame, "Sec_Fetch_Dest": "document"})[0] == 200
+
+
+def test_a_link_that_cannot_be_read_is_code_400(address):
+    for query in ("?pitch_error=" + "1" * 5000, "?other=" + "1" * 5000, "?units=%C2%B2"):
+        code, _, text = answer_to(address, query)
+        assert code == 400 and "open the address without it" in text
+    for query in ("?pitch_error=" + "1" * 400, "?window=[" + "1" * 5000 + "]", "?window=[1e999]"):
+        assert answer_to(address, query)[0] == 200
+
+
+def test_axes_with_the_same_label_stay_two_axes(path, monkeypatch):
+    import holoviews
+
+    from gearchaos.explorer import charts
+
+    config = gearchaos.load_config(
+        path.parent / "gears.toml",
+        ("sweep.count=3", "second_sweep={parameter='damping_ratio', values=[0.05, 0.1]}"),
+    )
+    result = gearchaos.run(config)
+    holoviews.extension("bokeh")
+    for label in ("P", "damping_ratio", "z"):
+        monkeypatch.setattr(charts, "axis_label", lambda *_, label=label: label)
+        (chart,), _ = charts.two_parameter_map(result, "lyapunov_exponent")
+        image = chart[()]
+        assert sorted(np.unique(image.dimension_values(2))) == sorted(
+            np.unique(result["lyapunov_exponent"].astype(image.dimension_values(2).dtype))
+        )
+
+
+@needs_browser
+def test_a_link_to_a_number_that_no_sweep_reaches_is_told(page, address):
+    look(page, address, "?pitch_error=1e999&window=[1,2,3,1e999]&direction=1.0")
+    page.get_by_text("the link asks for what there is not: pitch_error").wait_for()
+    assert lane_in(page.url) == "0.0"
+
+
+@needs_browser
+def test_no_frame_of_another_page_shows_the_page(browser, address):
+    opened = browser.new_page()
+    opened.set_content(f"<iframe src='{address}'></iframe>")
+    opened.wait_for_timeout(1000)
+    assert not any(frame.url == address for frame in opened.frames)
+    opened.close()
