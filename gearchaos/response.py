@@ -53,7 +53,7 @@ def _respond(options: Namespace) -> int:
 
 def _lane(options: Namespace) -> "Asked":
     """Go on from where one lane of a result ended."""
-    from gearchaos.engine.recomputing import continued
+    from gearchaos.engine.recomputing import continued, stored_text
     from gearchaos.results.result import open_result
 
     if options.set:
@@ -66,7 +66,8 @@ def _lane(options: Namespace) -> "Asked":
         raise ConfigurationError(f"{options.config}: name one lane, with {rest} as well")
     note = f"goes on from the {options.begin} of the lane {lane.where} of {options.config}"
     config = continued(lane, options.config, options.begin)
-    return config, str(lane.metadata["configuration"]), [note], lane.metadata["fixed"]
+    text = stored_text(lane, options.config, "configuration")
+    return config, text, [note], lane.metadata["fixed"]
 
 
 def _configuration(options: Namespace) -> "Asked":

@@ -19,14 +19,22 @@ from gearchaos.results.variables import axis_name
 MOST_LANES = 25  # Chaotic lanes that are tried, spread evenly over the sweep: they bound the cost.
 
 
+def stored_text(result: Result, name: str, attribute: str) -> str:
+    """Return the configuration in an attribute of a result; FileError if it is missing."""
+    text = str(result.metadata.get(attribute, ""))
+    if not text:
+        raise FileError(
+            f"{name}: holds no configuration in its attribute {attribute}; run the sweep again"
+        )
+    return text
+
+
 def computable(result: Result, name: str) -> Configuration:
     """Return the configuration with which lanes of a result can be computed again, or go on.
 
     Messages call the result ``name``. Raises FileError if it does not hold its configuration.
     """
-    text = str(result.metadata.get("configuration_resolved", ""))
-    if not text:
-        raise FileError(f"{name}: holds no configuration; run the sweep again")
+    text = stored_text(result, name, "configuration_resolved")
     config = Configuration.from_toml(text, f"{name} (configuration_resolved)")
     parameters = [REALISATION, *(sweep.parameter for sweep in config.sweeps.values())]
     fixed = {p: result.fixed[axis_name(p)] for p in parameters if axis_name(p) in result.fixed}
@@ -34,9 +42,9 @@ def computable(result: Result, name: str) -> Configuration:
         config = config.at(fixed)
     # The steps and periods that were taken, not those from which they were chosen or raised.
     taken = {
-        f"integration.{name}": int(result.metadata[name])
-        for name in ("steps_per_period", "transient_periods", "recorded_periods")
-        if name in result.metadata
+        f"integration.{key}": int(result.metadata[key])
+        for key in ("steps_per_period", "transient_periods", "recorded_periods")
+        if key in result.metadata
     }
     for key, value in {
         **taken,

@@ -196,5 +196,6 @@ def _check_variables(
             rule = f"do not ascend, each once, between -{LARGEST_VALUE:g} and {LARGEST_VALUE:g}"
             raise UnfitError(f"holds values of {name} that {rule}")
     for name in {known.STATUS, STATE, known.DIRECTION, "motion"} & found.keys():
-        if data[name].max() >= max(1, len(found[name].flags)):
-            raise UnfitError(f"holds a {name} without a meaning")
+        meanings = len(found[name].flags)
+        if data[name].max() >= meanings or (name == STATE and data[name].size != meanings):
+            raise UnfitError(f"holds a {name} without a meaning in its attribute flag_meanings")

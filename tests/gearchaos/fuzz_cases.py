@@ -13,7 +13,7 @@ from typing import Any, NamedTuple, Self
 from gearchaos.command_line import TOO_MANY_DIVERGED
 
 from .fuzz_configurations import COMPUTED, configuration, large_configuration
-from .fuzz_forgeries import FORGERIES, forged_result
+from .fuzz_forgeries import FORGERIES, forged_result, parts_of, without
 from .fuzz_results import GOOD_AXES, damaged_result, good_result
 
 WORKER = Path(__file__).with_name("fuzz_worker.py")
@@ -36,6 +36,16 @@ READERS = (
     "plot --stages --output stages.png --dpi 50 --overwrite",
 )
 """Commands that read a result file, and their options."""
+
+
+USERS = (
+    "info",
+    "stages",
+    "export table.csv --overwrite",
+    "plot --output figure.png --dpi 50 --overwrite",
+    "response --at=load=1 --periods 1 --output motion.h5 --overwrite",
+)
+"""Commands that need most of what a result file holds."""
 
 
 class Case(NamedTuple):
@@ -197,6 +207,21 @@ def result_cases(numbers: Iterable[int], folder: Path) -> Iterator[Case]:
             path.rmdir()
         else:
             path.unlink(missing_ok=True)
+
+
+def lacking_cases(folder: Path) -> Iterator[Case]:
+    """Remove each dataset and attribute of a sound result in turn, and give it to its readers.
+
+    Wordings, which only figures and tables need, are left out for the others.
+    """
+    good, path = _good_results(folder)[0], folder / "lacking.h5"
+    for number, part in enumerate(parts_of(good)):
+        wording = part[1] in ("units", "long_name", "symbol", "origin", "ancillary_variables")
+        without(part, good, path)
+        for command, *options in map(str.split, (USERS[3],) if wording else USERS):
+            arguments = [str(path), *(str(folder / one) if "." in one else one for one in options)]
+            yield Case(" ".join(part), number, command, arguments, path)
+    path.unlink()
 
 
 def forged_cases(folder: Path, readers: Sequence[str] = READERS) -> Iterator[Case]:

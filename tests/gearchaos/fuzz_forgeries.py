@@ -21,6 +21,31 @@ def forged_result(name: str, good: bytes, path: Path) -> None:
     path.write_bytes(damage(path.read_bytes()))
 
 
+BOOKKEEPING = ("CLASS", "NAME", "REFERENCE_LIST", "DIMENSION_LIST", "_FillValue", "flag_values")
+"""Attributes that HDF5 and netCDF read, and gearchaos does not."""
+
+
+def parts_of(good: bytes) -> list[tuple[str, str]]:
+    """List the datasets of a file, each with "", and the attributes of each; one parameter."""
+    parts: list[tuple[str, str]] = []
+    with h5py.File(io.BytesIO(good)) as file:
+        for name in ("/", *file, "parameters/load"):
+            parts += [(name, "")] if name != "/" else []
+            parts += [(name, key) for key in file[name].attrs if key not in BOOKKEEPING]
+    return parts
+
+
+def without(part: tuple[str, str], good: bytes, path: Path) -> None:
+    """Write a sound result file without one of its datasets or attributes."""
+    path.write_bytes(good[:-CHECKSUM_LINE])
+    name, key = part
+    with h5py.File(path, "r+") as file:
+        if key:
+            del file[name].attrs[key]
+        else:
+            del file[name]
+
+
 def _damaged_heaps(content: bytes) -> bytes:
     # Over free space of no size the HDF5 library walks for ever.
     place = content.index(b"GCOL") + 16

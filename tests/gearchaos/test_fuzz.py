@@ -6,7 +6,14 @@ from pathlib import Path
 import h5py
 import pytest
 
-from .fuzz_cases import Case, Watch, configuration_cases, forged_cases, result_cases
+from .fuzz_cases import (
+    Case,
+    Watch,
+    configuration_cases,
+    forged_cases,
+    lacking_cases,
+    result_cases,
+)
 from .fuzz_results import LANES, damaged_result, good_result
 
 DRAWN = ("words of a later version", "forty nested fractions", "an axis to 1.7e308", "long texts")
@@ -47,6 +54,24 @@ def test_more_than_half_of_the_configurations_are_computed(endings):
     commands = ("load_config", "run", "sweep")
     computed = sum(codes[command, code] for command in commands[1:] for code in (0, 3))
     assert computed > sum(case.command in commands for case, _ in endings) / 2
+
+
+@pytest.mark.slow
+def test_whatever_a_result_lacks_ends_in_a_sentence(tmp_path):
+    with Watch(tmp_path) as watch:
+        endings = [*watch.run(lacking_cases(tmp_path))]
+    assert [(case[:3], ending.fault) for case, ending in endings if ending.fault] == []
+    said = {(case.kind, case.command): ending for case, ending in endings}
+    for part, command, words in (
+        ("/ configuration", "response", "in its attribute configuration; run the sweep again"),
+        ("/ configuration_resolved", "response", "in its attribute configuration_resolved"),
+        ("motion flag_meanings", "info", "motion without a meaning in its attribute flag_meanings"),
+        ("motion flag_meanings", "stages", "run the sweep again"),
+        ("state ", "plot", "lacks the variable state"),
+    ):
+        assert said[part, command].code == 4, part
+        assert words in said[part, command].said, part
+    assert said["/ title", "response"].code == 0
 
 
 def test_a_case_is_made_again_by_its_number(tmp_path):
