@@ -20,7 +20,7 @@ from gearchaos.configuration.run_tables import DEFAULT_STEPS
 from gearchaos.configuration.tables import groups_at, physical_at
 from gearchaos.errors import ConfigurationError, ExecutionError
 from gearchaos.gear.contact_lines import contact_shares
-from gearchaos.gear.derivation import Quantities
+from gearchaos.gear.derivation import Quantities, common_contact_ratios
 from gearchaos.gear.tooth_deviations import tooth_deviations
 
 
@@ -93,12 +93,11 @@ def _teeth(
     if error is None or error.kind == "sine" or "pitch_error" not in config.scene.effects:
         return None
     pair = Quantities(physical_at(config, values)).pair
-    ratios = [np.unique(r) for r in (pair.transverse_contact_ratio, pair.overlap_contact_ratio)]
-    if any(ratio.size > 1 for ratio in ratios):
+    ratios = common_contact_ratios(pair)
+    if ratios is None:
         raise ConfigurationError(
             f"{config.source}: the contact ratio of [pair] would differ between the swept values, "
             "but all of them share one table of contact lines; sweep another parameter"
         )
-    transverse, overlap = (float(ratio[0]) for ratio in ratios)
-    shares = contact_shares(transverse, overlap, error.smoothing, fundamental)
+    shares = contact_shares(*ratios, error.smoothing, fundamental)
     return Teeth(*tooth_deviations(error, config.pair, values), *shares)

@@ -3,6 +3,7 @@
 Scales: length b', time 1 / omega_h with omega_h = sqrt(k_m / m_e).
 """
 
+import math
 from collections.abc import Callable, Collection, Mapping
 from contextlib import suppress
 from functools import cached_property
@@ -187,26 +188,51 @@ class Quantities:
     def stiffness_harmonics(self) -> tuple[Any, Any]:
         """Cosine and sine harmonics of the stiffness relative to its mean (Pan 2021, eqs 15-19)."""
         if self["mesh.stiffness.shape"] == "fourier":
-            mean = _common_to_lanes(self["mesh.mean_stiffness_N_per_um_mm"])
+            mean = _common(self["mesh.mean_stiffness_N_per_um_mm"], 0.0)
+            if mean is None:
+                raise ConfigurationError(_ONE_TABLE)
             cosine = np.divide(self["mesh.stiffness.cosine_N_per_um_mm"], mean)
             return cosine, np.divide(self["mesh.stiffness.sine_N_per_um_mm"], mean)
-        trapezoid = TrapezoidalStiffness.from_contact_ratios(
-            _common_to_lanes(self.pair.transverse_contact_ratio),
-            _common_to_lanes(self.pair.overlap_contact_ratio),
-        )
+        ratios = common_contact_ratios(self.pair)
+        if ratios is None:
+            raise ConfigurationError(_ONE_TABLE)
+        trapezoid = TrapezoidalStiffness.from_contact_ratios(*ratios)
         coefficients = trapezoid.coefficients(self["mesh.stiffness.harmonics"])
         return coefficients.real, -coefficients.imag
 
 
-def _common_to_lanes(value: Any) -> float:
-    values = np.unique(np.asarray(value, dtype=np.float64))
-    if values.size != 1:
-        raise ConfigurationError(
-            "the harmonics of the mesh stiffness would differ between the swept values, but all "
-            "values of a sweep share one stiffness table: give stiffness_cosine and "
-            "stiffness_sine in [groups], or sweep stiffness_variation_scale"
-        )
-    return float(values[0])
+_ONE_TABLE = (
+    "the harmonics of the mesh stiffness would differ between the swept values, but all "
+    "values of a sweep share one stiffness table: give stiffness_cosine and "
+    "stiffness_sine in [groups], or sweep stiffness_variation_scale"
+)
+
+
+def common_contact_ratios(pair: HelicalPair) -> tuple[float, float] | None:
+    """Return eps_alpha and eps_beta of all lanes, None where they differ by more than rounding.
+
+    In a spur pair they do not depend on the module, but their last digits do.
+    """
+    overlap = pair.overlap_contact_ratio
+    rounding = 10.0 * np.finfo(np.float64).eps * np.abs(overlap)
+    found = (
+        _common(pair.transverse_contact_ratio, pair.transverse_contact_rounding),
+        _common(overlap, rounding),
+    )
+    return None if found[0] is None or found[1] is None else (found[0], found[1])
+
+
+def _common(value: Value, rounding: Value) -> float | None:
+    """Return the value that all lanes share, each up to its rounding error, None if there is none.
+
+    Of values that differ by rounding the smallest stands for all.
+    """
+    values, bound = np.ravel(value), float(np.max(rounding))
+    # Not a number where the pair is impossible; the rules of the lanes refuse it with its key.
+    if np.isnan(values).all():
+        return math.nan
+    smallest, largest = float(np.min(values)), float(np.max(values))
+    return smallest if largest - smallest <= 2.0 * bound else None
 
 
 LENGTH, FREQUENCY, STIFFNESS = "length_scale", "scaling_frequency", "mean_mesh_stiffness"

@@ -75,6 +75,20 @@ class HelicalPair:
         return (reaches[0] + reaches[1] - between_base_circles) / self.transverse_base_pitch
 
     @property
+    def transverse_contact_rounding(self) -> Value:
+        """Bound of the rounding error of eps_alpha.
+
+        Each reach is the root of a difference of squares. A rounding error of the tip radius r_a
+        by eps r_a changes it by eps r_a^2 / reach, which is larger than that of any other term;
+        about ten operations round.
+        """
+        bound: Value = 0.0
+        for reference, base in zip(self.reference_radii, self.base_radii, strict=True):
+            tip = reference + self.normal_module
+            bound = bound + tip**2 / np.sqrt(tip**2 - base**2)
+        return 10.0 * np.finfo(np.float64).eps * bound / self.transverse_base_pitch
+
+    @property
     def overlap_contact_ratio(self) -> Value:
         """eps_beta = B tan(beta_b) / p_bt: the lead of the tooth across the face over p_bt."""
         return self.face_width * np.tan(self.base_helix_angle) / self.transverse_base_pitch

@@ -8,8 +8,10 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
-from gearchaos.configuration import load_config
+from gearchaos.configuration import Configuration, axis_values, groups_at, load_config
+from gearchaos.engine.lanes import Lanes
 from gearchaos.engine.simulation import Simulation
+from gearchaos.errors import ConfigurationError
 from gearchaos.records.label import GROWS, PERIODIC
 
 from .short_sweeps import computed, values_of
@@ -264,3 +266,58 @@ def test_a_resonance_that_outgrows_the_clearance_is_told_from_chaos():
     assert lanes["motion"].tolist() == [GROWS, PERIODIC]
     # Where the clearance is nothing beside the motion, it grows as the linear equation does.
     assert lanes["lyapunov_exponent"][0] == pytest.approx(np.log(multiplier) / period, rel=1e-6)
+
+
+TRAPEZOID = """
+[pair]
+teeth = [21, 38]
+normal_module_mm = 2.0
+normal_pressure_angle_deg = 20.0
+face_width_mm = 15.0
+[operation]
+speed_rpm = 8000.0
+torque_Nm = 50.0
+[mesh]
+mean_stiffness_N_per_um_mm = 13.0
+half_backlash_um = 20.0
+damping_ratio = 0.1
+stiffness = { shape = "trapezoid" }
+[pitch_error]
+amplitude_um = 5.0
+[scene]
+effects = ["pitch_error", "stiffness_variation", "backlash"]
+[sweep]
+parameter = "pair.normal_module_mm"
+from = 1.0
+to = 7.3
+count = 50
+"""
+
+
+def test_a_sweep_of_the_module_of_a_spur_pair_has_one_table_of_stiffness():
+    config = Configuration.from_toml(TRAPEZOID)
+    swept = groups_at(config, axis_values(config))
+    assert np.ptp(swept.mesh_frequency) > 0.0
+    # The contact ratio in multiples of the module: it does not depend on it.
+    one = groups_at(config.at({"pair.normal_module_mm": 2.0}), {})
+    np.testing.assert_allclose(swept.stiffness_cosine, one.stiffness_cosine, rtol=0.0, atol=1e-13)
+    np.testing.assert_allclose(swept.stiffness_sine, one.stiffness_sine, rtol=0.0, atol=1e-13)
+
+
+def test_a_sweep_of_the_module_of_a_spur_pair_with_teeth_of_their_own_has_one_table_of_lines():
+    teeth = 'kind = "teeth"\nsmoothing = 0.1\ndriving = { cumulative_um = [FP] }'
+    text = TRAPEZOID.replace("amplitude_um = 5.0", teeth.replace("[FP]", str([0.0] * 20 + [3.0])))
+    lanes = Lanes(Configuration.from_toml(text))
+    assert lanes.system_of(np.arange(len(lanes))).teeth is not None
+
+
+@pytest.mark.parametrize(
+    "other",
+    [
+        "sweep={parameter='pair.normal_pressure_angle_deg', values=[20.0, 20.00000001]}",
+        "pair.helix_angle_deg=1e-6",
+    ],
+)
+def test_a_contact_ratio_that_differs_by_more_than_rounding_is_refused(other):
+    with pytest.raises(ConfigurationError, match="would differ between the swept values"):
+        Configuration.from_toml(TRAPEZOID, overrides=[other])
