@@ -112,6 +112,11 @@ def _demand(matrix: Floats) -> Floats:
     rows = np.ascontiguousarray(matrix).reshape(matrix.shape[0], -1)
     every = rows.view(np.dtype((np.void, rows.itemsize * rows.shape[1])))[:, 0]
     _, distinct, kind = np.unique(every, return_index=True, return_inverse=True)
-    eigenvalues = np.linalg.eigvals(matrix[distinct]).astype(np.complex128)
-    demand: Floats = np.max(steps_per_time(eigenvalues), axis=1)
+    # Where groups are so large that their products overflow, no number of steps is enough.
+    demand = np.full(distinct.size, np.inf)
+    computable = np.isfinite(matrix[distinct]).all(axis=(1, 2))
+    eigenvalues = np.linalg.eigvals(matrix[distinct][computable]).astype(np.complex128)
+    with np.errstate(invalid="ignore", over="ignore"):
+        found = np.max(steps_per_time(eigenvalues), axis=1, initial=0.0)
+    demand[computable] = np.where(np.isfinite(found), found, np.inf)
     return demand[kind]

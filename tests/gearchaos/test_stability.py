@@ -260,3 +260,15 @@ def test_the_shift_of_an_exponent_by_the_step_is_that_of_the_linear_pair(steps):
     multipliers = np.linalg.eigvals(period_jacobian(system, np.zeros((1, 6)), once)[0])
     computed = np.log(np.abs(multipliers).max()) / system.mesh_period[0]
     assert true[0] + bias[0] == pytest.approx(computed, rel=1e-6)
+
+
+def test_groups_whose_products_overflow_need_more_steps_than_there_are():
+    groups = pan2021(1.0, damping_ratio=np.array([0.1, 1e300]), mass_ratio_g=1e300)
+    found = fewest(FULL._replace(axial=True), groups)
+    assert found.tolist() == [MOST_STEPS, MOST_STEPS]
+
+
+def test_a_lane_that_overflows_leaves_the_limits_of_the_others():
+    alone = fewest(TORSION, oscillator(np.array([0.1])))
+    both = fewest(TORSION, oscillator(np.array([0.1, 1e200])))
+    assert both[0] == alone[0] and both[1] == MOST_STEPS
