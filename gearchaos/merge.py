@@ -6,13 +6,19 @@ everything else to stderr. Where shards are missing they are named, and everythi
 """
 
 from argparse import Namespace
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from gearchaos.command_line import OK, Command
+from gearchaos.errors import FileError
 from gearchaos.finishing import complete_already, ending
 
 if TYPE_CHECKING:
+    from gearchaos.configuration import Configuration
     from gearchaos.results.block_store import BlockStore, Finished
+
+MANY_LANES = 2**17
+"""Lanes of a sweep that are looked at in less than a second."""
 
 
 def _merge(options: Namespace) -> int:
@@ -36,6 +42,7 @@ def _merge(options: Namespace) -> int:
     # Another gearchaos may have other keys.
     require_same(f"{folder}: holds blocks", manifest, SOFTWARE._asdict())
     config = Configuration.from_toml(manifest["configuration"], f"{folder}: configuration")
+    _require_some(config, folder)
     simulation = Simulation(config)
     code = None if options.overwrite else complete_already(simulation, output)
     if code is not None:
@@ -53,6 +60,22 @@ def _merge(options: Namespace) -> int:
         store.merge(*told, overwrite=options.overwrite, found=found)
     text = f"{store.lanes} lanes, {tally.diverged} diverged"
     return ending(simulation, output, tally.diverged, text, *tally.remarks)
+
+
+def _require_some(config: "Configuration", folder: Path) -> None:
+    """Refuse blocks that are far too small for a large sweep, before its lanes are looked at.
+
+    A manifest may declare millions of lanes. Every lane takes more than a byte in its block.
+    """
+    from gearchaos.engine.lanes import Lanes
+
+    lanes = len(Lanes(config))
+    size = sum(path.lstat().st_size for path in folder.glob("*.block"))
+    if lanes > MANY_LANES and size < lanes:
+        raise FileError(
+            f"{folder}: holds blocks of {size} bytes for {lanes} lanes, so nearly all are missing; "
+            "go on with the sweep and --resume"
+        )
 
 
 def _require_all(store: "BlockStore", found: "Finished", shards: object) -> None:

@@ -1,5 +1,7 @@
 """The merge command: it joins what is complete, and names what is not."""
 
+import json
+
 import gearchaos
 
 from .commands import DIVERGING, LINEAR, SMALL, names_in, run_module, same_data, sweep
@@ -100,3 +102,14 @@ def test_a_damaged_manifest_is_named(tmp_path):
         assert ended.code in (2, 4)
         assert BLOCKS in ended.err
         assert (tmp_path / BLOCKS / "manifest.json").read_text() == content
+
+
+def test_a_manifest_that_declares_millions_of_lanes_is_refused_before_they_are_looked_at(tmp_path):
+    shards(tmp_path, 1)
+    path = tmp_path / BLOCKS / "manifest.json"
+    manifest = json.loads(path.read_text())
+    text = manifest["configuration"].replace("sweep.count = 1000", "sweep.count = 9999999")
+    path.write_text(json.dumps({**manifest, "configuration": text}))
+    ended = merge(tmp_path, "gears.h5")
+    assert ended.code == 4
+    assert "bytes for 9999999 lanes, so nearly all are missing; go on with the sweep" in ended.err
