@@ -200,15 +200,30 @@ def _connected(stack: ExitStack, address: str) -> Any:
     if workers > cores:
         only = "the only core" if cores == 1 else f"the {cores} cores"
         say(f"{address}: the workers share {only} here; local:{cores} is as fast")
-    cluster = distributed.LocalCluster(
-        n_workers=workers,
-        threads_per_worker=1,
-        processes=True,
-        dashboard_address="127.0.0.1:0",
-        memory_limit=0,
-        silence_logs=logging.CRITICAL,
-        env={"NUMBA_NUM_THREADS": str(max(1, numba.get_num_threads() // workers))},
-        preload=[_IGNORE_INTERRUPTS],
-    )
-    stack.enter_context(cluster)
+    stack.enter_context(cluster := _local_cluster(address, workers))
     return distributed.Client(cluster)
+
+
+def _local_cluster(address: str, workers: int) -> Any:
+    """Start workers here; ExecutionError if one of them dies before it has joined."""
+
+    def started() -> Any:
+        return distributed.LocalCluster(
+            n_workers=workers,
+            threads_per_worker=1,
+            processes=True,
+            dashboard_address="127.0.0.1:0",
+            memory_limit=0,
+            silence_logs=logging.CRITICAL,
+            env={"NUMBA_NUM_THREADS": str(max(1, numba.get_num_threads() // workers))},
+            preload=[_IGNORE_INTERRUPTS],
+        )
+
+    try:
+        with notice(f"{address}: waits up to {_SECONDS_TO_IMPORT:g} s for the workers to start"):
+            return _answer(started, _SECONDS_TO_IMPORT)
+    except Exception as error:
+        raise ExecutionError(
+            f"{address}: a worker has ended before it could join ({error}); look for a lack of "
+            "memory or processes, or leave --dask out"
+        ) from error

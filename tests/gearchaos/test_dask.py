@@ -308,3 +308,18 @@ def test_without_the_extra_the_message_names_it(tmp_path):
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
     assert (done.returncode, done.stdout) == (4, "")
     assert "pip install gearchaos[dask]" in done.stderr
+
+
+def test_a_worker_that_dies_before_it_has_joined_is_reported(tmp_path):
+    small_config(tmp_path)
+    # Whatever a process does first when it starts.
+    (tmp_path / "sitecustomize.py").write_text(
+        "import os, sys\n"
+        "if any('multiprocessing-fork' in word for word in sys.orig_argv):\n"
+        "    os._exit(1)\n"
+    )
+    path = os.pathsep.join([str(tmp_path), *sys.path])
+    ended = sweep(tmp_path, "--dask", "local:1", variables={"PYTHONPATH": path})
+    assert ended.code == 4
+    assert "waits up to 300 s for the workers to start" in ended.err
+    assert "local:1: a worker has ended before it could join" in ended.err
