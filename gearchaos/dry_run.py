@@ -16,6 +16,7 @@ from gearchaos_kernels import LANES
 from tqdm import tqdm
 
 from gearchaos.arrays import Integers
+from gearchaos.dynamics.stability import fewest_stable_steps
 from gearchaos.engine.resonances import resonances
 from gearchaos.engine.simulation import Simulation
 from gearchaos.engine.store_filling import Shard
@@ -23,6 +24,9 @@ from gearchaos.progress import notice
 from gearchaos.results.block_store import PIECE_BYTES, lanes_and_record
 from gearchaos.results.result_file import CACHE_BYTES
 from gearchaos.results.variables import DIRECTION, START
+
+SAMPLE_STEPS = 500
+"""Steps per period of a sample, if they are stable: several times as many as most sweeps take."""
 
 SAMPLE_PERIODS = 1000
 """Mesh periods of a sample: over much fewer, labels cost more than their share."""
@@ -82,6 +86,8 @@ def _seconds_per_lane(simulation: Simulation) -> float:
     sample, plan = copy(simulation), simulation.plan
     block = simulation.block_lanes(numba.get_num_threads())
     places = some_places(simulation, block // 8 if simulation.carried else block)
+    steps = _sampled_steps(simulation, places)
+    finer = plan.steps_per_period / steps
     periods, whole = plan.transient_periods + plan.recorded_periods, simulation.lanes.repeats_after
     with notice("computing some lanes, to tell how long all take"):
         # The first time, little is computed, and the kernels are loaded. It takes a step more, so
@@ -92,7 +98,9 @@ def _seconds_per_lane(simulation: Simulation) -> float:
                 for every in (plan.transient_periods, plan.recorded_periods)
             )
             sample.plan = plan._replace(
-                steps_per_period=plan.steps_per_period + more,
+                steps_per_period=steps + more,
+                # As large a share of the flow maps is kept as in the whole run.
+                map_bytes=int(plan.map_bytes / finer),
                 transient_periods=transient,
                 recorded_periods=recorded,
                 section_points=min(plan.section_points, recorded),
@@ -104,7 +112,21 @@ def _seconds_per_lane(simulation: Simulation) -> float:
             sample.arrays(sample.lanes.computed_at(places), *found)
             scale = periods / (transient + recorded)
             seconds = (made - began + scale * (time.perf_counter() - made)) / places.size
-    return seconds
+    return finer * seconds
+
+
+def _sampled_steps(simulation: Simulation, places: Integers) -> int:
+    """Return the steps per period of a sample: the time grows with them in proportion.
+
+    So few that a sample takes seconds, and as many as a step of RK4 needs to be stable, and a flow
+    map not to be divided.
+    """
+    steps = simulation.plan.steps_per_period
+    if steps <= SAMPLE_STEPS:
+        return steps
+    system = simulation.lanes.system_of(simulation.lanes.computed_at(places))
+    needed = int(fewest_stable_steps(system).max()) + 2 * system.stiffness_cosine.size
+    return min(steps, max(SAMPLE_STEPS, needed))
 
 
 def some_places(simulation: Simulation, count: int) -> Integers:

@@ -125,7 +125,7 @@ def _shares(system: System, plan: Plan, present: Present) -> Iterator[tuple[Any,
     _, first, counts = np.unique(group[every], return_index=True, return_counts=True)
     done = 0
     while done < first.size:
-        maps, places = maps_of(system.of(every[first[done:]]), steps, present)
+        maps, places = maps_of(system.of(every[first[done:]]), steps, present, plan.map_bytes)
         lanes_of = counts[done : done + places.shape[1]]
         order = every[first[done] : first[done] + lanes_of.sum()]
         steps_of = np.full(lanes, steps)

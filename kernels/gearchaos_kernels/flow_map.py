@@ -125,8 +125,10 @@ _kept = _Kept(0)
 
 
 @in_turn
-def maps_of(system: System, steps: int, present: Present) -> tuple[Floats, NDArray[np.intp]]:
-    """Return the maps of the first lanes of a system, as many as fit into memory.
+def maps_of(
+    system: System, steps: int, present: Present, map_bytes: int = MOST_MAP_BYTES
+) -> tuple[Floats, NDArray[np.intp]]:
+    """Return the maps of the first lanes of a system, as many as fit into so much memory.
 
     And, shape (2, lanes): steps per period of each, a multiple of those asked for, and where its
     maps begin. They are kept: the same lanes may be integrated again and again.
@@ -142,7 +144,7 @@ def maps_of(system: System, steps: int, present: Present) -> tuple[Floats, NDArr
         new = [number for number in some if names[number] not in _kept.places]
         made = _make(system.of(new), steps, present) if new else []
         size = sum(maps.size for maps in made)
-        if _kept.used + size > _kept.table.size:
+        if _kept.used + size > min(_kept.table.size, max(size, map_bytes // 8)):
             if done:
                 break
             # A new table: somebody may still be reading the old one.
@@ -154,7 +156,7 @@ def maps_of(system: System, steps: int, present: Present) -> tuple[Floats, NDArr
         # Lanes side by side need about as many steps.
         steps_made, _ = _kept.places[names[done - 1]]
         size = 8 * steps_made * layout.py_func(present).step_size
-        together = max(1, min(LANES, MOST_MAP_BYTES // (4 * size)))
+        together = max(1, min(LANES, map_bytes // (4 * size)))
     return _kept.table, np.array([_kept.places[name] for name in names[:done]], dtype=np.intp).T
 
 

@@ -174,7 +174,8 @@ class Plan(NamedTuple):
     before tau = 0. ``contact``: whether crossings are told by flank, where they are resolved.
     ``loads``: whether mesh forces and transmission error are told; and so are the
     extremes of these ``states``, and at these mesh ``orders``, of which the record has whole
-    cycles, amplitudes of them and of the transmission error.
+    cycles, amplitudes of them and of the transmission error. ``map_bytes``: memory in which flow
+    maps are kept, unless those of one group of lanes take more.
     """
 
     steps_per_period: int
@@ -190,6 +191,7 @@ class Plan(NamedTuple):
     loads: bool = False
     states: tuple[str, ...] = ()
     orders: tuple[Fraction, ...] = ()
+    map_bytes: int = 2**27
 
     @property
     def told_by_steps(self) -> bool:
