@@ -36,6 +36,10 @@ class ExecutionError(GearchaosError):
     exit_code = 4
 
 
+class RangeError(ConfigurationError, ValueError):
+    """A number lies outside the range of a formula."""
+
+
 class FigureError(GearchaosError):
     """What is asked of a figure cannot be drawn from the result."""
 

@@ -13,6 +13,8 @@ entry of the tables of 1995, which leave out large modules on small diameters.
 import math
 from bisect import bisect_left
 
+from gearchaos.errors import RangeError
+
 _MODULES_MM = (0.5, 2.0, 3.5, 6.0, 10.0, 16.0, 25.0, 40.0, 70.0)
 _DIAMETERS_MM = (5, 20, 50, 125, 280, 560, 1000, 1600, 2500, 4000, 6000, 8000, 10_000)
 _RANGES = {
@@ -51,7 +53,7 @@ def single_pitch_um(
 
     Grades go from 1 to 12, to 11 in the edition of 2013; the grade 0 of 1995 is not offered.
     Modules go from 0.5 to 70 mm, diameters from 5 to 10000 mm, to 15000 mm in the edition of 2013.
-    Raises ValueError outside of that.
+    Raises RangeError, a ConfigurationError and a ValueError, outside of that.
     """
     return _limits(grade, normal_module_mm, reference_diameter_mm, edition)[0]
 
@@ -65,15 +67,15 @@ def cumulative_pitch_um(
 
 def _limits(grade: float, module: float, diameter: float, edition: int) -> list[float]:
     if edition not in _RANGES:
-        raise ValueError(f"edition {edition} of ISO 1328-1: must be 1995 or 2013")
+        raise RangeError(f"edition {edition} of ISO 1328-1: must be 1995 or 2013")
     (grades, *ranges), sizes = _RANGES[edition], []
     if grade not in grades:
-        raise ValueError(f"grade {grade:g}: ISO 1328-1:{edition} has grades 1 to {grades[-1]}")
+        raise RangeError(f"grade {grade:g}: ISO 1328-1:{edition} has grades 1 to {grades[-1]}")
     names = ("normal module", "reference diameter")
     for name, value, ends in zip(names, (module, diameter), ranges, strict=True):
         if not ends[0] <= value <= ends[-1]:
             within = f"{ends[0]:g} to {ends[-1]:g} mm"
-            raise ValueError(f"{name} {value:.6g} mm: ISO 1328-1:{edition} goes from {within}")
+            raise RangeError(f"{name} {value:.6g} mm: ISO 1328-1:{edition} goes from {within}")
         upper = bisect_left(ends, value, lo=1)
         sizes.append(math.sqrt(ends[upper - 1] * ends[upper]) if edition == 1995 else value)
     m, d = sizes

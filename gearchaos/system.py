@@ -13,6 +13,14 @@ import gearchaos_kernels as kernels
 import numpy as np
 from gearchaos_kernels import Plan, Status
 
+from gearchaos.arguments import (
+    coordinates,
+    finite_number,
+    instance,
+    one_of,
+    whole_number,
+)
+from gearchaos.arguments import state as checked_state
 from gearchaos.arrays import Floats
 from gearchaos.configuration import Given, axis_values, configuration_of, swept_values
 from gearchaos.dynamics.exponents import Exponents, exponents, sum_of_exponents
@@ -58,7 +66,7 @@ class System:
         self, config: Given, at: Mapping[str, float] | None = None, **groups: float
     ) -> None:
         config = configuration_of(config)
-        values = {name: float(value) for name, value in {**(at or {}), **groups}.items()}
+        values = coordinates("at", at or {}) | coordinates("groups", groups)
         self.config = config.at(values)
         for sweep in self.config.sweeps.values():
             if swept_values(sweep).size > 1:
@@ -80,6 +88,7 @@ class System:
         of its axes, by name; the nearest lane is taken. Raises ConfigurationError if a coordinate
         is missing or of no axis.
         """
+        instance("result", result, Result, "open_result reads it from a file")
         missing = [axis for axis in result.axes if axis not in coordinates]
         if missing:
             raise ConfigurationError(f"give a value of {', '.join(missing)}, an axis of the result")
@@ -121,6 +130,8 @@ class System:
         ``start`` (states,) is the state at mesh phase 0, by default `state`. Raises
         ConfigurationError if the motion leaves the range of numbers.
         """
+        periods = whole_number("periods", periods, least=1)
+        transient = whole_number("transient", transient, least=0)
         plan = self._plan._replace(
             transient_periods=transient, recorded_periods=periods, history_periods=periods
         )
@@ -151,12 +162,15 @@ class System:
         default the one after the configured transient. Raises ConfigurationError if there is no
         orbit of this period next to the guess.
         """
+        period = whole_number("period", period, least=1)
         if guess is None:
             repeats = self.repeats_after
             transient = repeats * max(-(-self.config.integration.transient_periods // repeats), 1)
             guess = self.integrate(1, transient=transient - 1).states[-1]
         periods = np.array([period], np.int32)
-        found = polish(self._record, np.atleast_2d(guess), periods, self._plan)
+        found = polish(
+            self._record, checked_state("guess", guess, self.states), periods, self._plan
+        )
         if not found.converged[0]:
             raise ConfigurationError(
                 f"{self.config.source}: no orbit of {period * self.repeats_after} mesh periods "
@@ -174,13 +188,20 @@ class System:
         group by its name or a physical key by its path, and ``width`` the wanted distance of the
         last stable value and the one beyond it.
         """
+        instance("orbit", orbit, Orbit, "System.orbit finds it")
+        instance("parameter", parameter, str, "name a group, or a key by its path")
+        for end in (first, last):
+            self.config.at(coordinates("parameter", {parameter: end}))
+        width = finite_number("width", width)
+        if width <= 0.0:
+            raise ConfigurationError(f"width = {width:g}: must be greater than 0")
         period = np.array([orbit.period], np.int32)
         followed = follow(
             lambda values: self._at({parameter: values}),
-            np.atleast_2d(orbit.point),
+            checked_state("orbit.point", orbit.point, self.states),
             period,
-            np.array([float(first)]),
-            np.array([float(last)]),
+            np.array([finite_number("first", first)]),
+            np.array([finite_number("last", last)]),
             width,
             self._plan,
         )
@@ -210,7 +231,9 @@ class System:
         """Return the amplitude spectrum of a state after the configured transient.
 
         Over a record of so many mesh periods: its lines are one mesh frequency over them apart.
+        Raises ConfigurationError if there is no such state.
         """
+        one_of("state", state, self.states)
         motion = self.integrate(periods, transient=self.config.integration.transient_periods)
         values = motion.states[:-1, self.states.index(state)]
         return spectral_lines(values, self._steps)
@@ -228,6 +251,7 @@ class System:
 
         Every array has the shape (samples,), accelerations (samples, coordinates).
         """
+        instance("motion", motion, Trajectory, "System.integrate gives it")
         states = motion.states[np.newaxis]
         found = kernels.mesh_motion(self._record, states, self._steps, motion.first_period)
         return kernels.MeshMotion(*(array[0] for array in found))
@@ -248,7 +272,7 @@ class System:
         return system_of(self.config, {**axis_values(self.config), **values})
 
     def _start(self, start: Floats | None) -> Floats:
-        return np.atleast_2d(self.state if start is None else np.asarray(start, dtype=np.float64))
+        return checked_state("start", self.state if start is None else start, self.states)
 
     def _orbit(self, found: Orbits, period: int) -> Orbit:
         duration = period * self._record.excitation_period[0]

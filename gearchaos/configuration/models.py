@@ -7,6 +7,8 @@ from typing import Any, Self, TypeAlias
 
 from pydantic import PrivateAttr, TypeAdapter, ValidationError, ValidationInfo, model_validator
 
+from gearchaos.arguments import path_text
+from gearchaos.arguments import texts as texts_of
 from gearchaos.configuration.keys import Key, keys_of
 from gearchaos.configuration.messages import Fault, faults_of, texts
 from gearchaos.configuration.physical_tables import GradeError
@@ -160,13 +162,18 @@ def load_config(path: str | os.PathLike[str], overrides: Iterable[str] = ()) -> 
     ConfigurationError if it is not a sound configuration: one message per fault, all faults at
     once.
     """
-    source = os.fspath(path)
+    source, overrides = path_text(path, "a TOML file"), texts_of("overrides", overrides)
     folder = os.path.dirname(source) or "."
     return Configuration.from_toml(text_of_file(source), source, overrides, folder)
 
 
 def configuration_of(given: Given) -> Configuration:
     """Return a configuration, or read it from the TOML file at a path, see `load_config`."""
+    if isinstance(given, Mapping):
+        raise ConfigurationError(
+            "<python>: is a mapping and no configuration; make one of it with "
+            "gearchaos.Configuration.from_tables"
+        )
     return given if isinstance(given, Configuration) else load_config(given)
 
 

@@ -5,6 +5,7 @@ import time
 import numpy as np
 from gearchaos_kernels import Outcome, Plan, Status, System, mesh_motion
 
+from gearchaos.arguments import whole_number
 from gearchaos.arrays import Array
 from gearchaos.configuration import Configuration, Given, configuration_of
 from gearchaos.engine.running import choose_threads, metadata, require_memory, result_of
@@ -33,7 +34,7 @@ def respond(config: Given, periods: int = DEFAULT_PERIODS, threads: int | None =
     threads.
     """
     choose_threads(threads)
-    config = configuration_of(config)
+    config, periods = configuration_of(config), whole_number("periods", periods, least=1)
     simulation = prepared(config, periods)
     simulation.choose_steps()
     return compute_response(simulation, periods, config.text)

@@ -12,6 +12,7 @@ import numba
 import numpy as np
 from gearchaos_kernels.compilation import on_compilation
 
+from gearchaos.arguments import whole_number
 from gearchaos.configuration import Given, configuration_of
 from gearchaos.engine.error_check import Tally
 from gearchaos.engine.executors import LocalExecutor, compute_blocks
@@ -114,6 +115,7 @@ def require_memory(simulation: Simulation, wanted: int, what: str, remedy: str) 
 def choose_threads(threads: int | None) -> None:
     """Use so many threads from now on, by default all; ConfigurationError if there are fewer."""
     most = numba.config.NUMBA_NUM_THREADS
+    threads = None if threads is None else whole_number("threads", threads)
     if threads is not None and not 1 <= threads <= most:
         raise ConfigurationError(
             f"threads = {threads}: must be between 1 and {most}, the number of cores here "

@@ -13,6 +13,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from gearchaos.arguments import finite_number, one_of, path_text
 from gearchaos.arrays import Array
 from gearchaos.errors import ConfigurationError, FileError
 from gearchaos.results import tables
@@ -119,7 +120,7 @@ class Result:
         """
         if axis not in self.axes:
             there = ", ".join(self.axes) or "none: leave one in sel"
-            raise ConfigurationError(f"no axis {axis!r} in the result; it has {there}")
+            raise ConfigurationError(f"{axis}: is no axis of the result; it has {there}")
         grid = np.meshgrid(*(self[name] for name in self.axes), indexing="ij")
         return np.ravel(grid[self.axes.index(axis)])
 
@@ -133,16 +134,19 @@ class Result:
         exactly. Raises ConfigurationError if there is no such axis or value; the message names the
         nearest.
         """
+        one_of("method", method, (None, "nearest", "within"))
         index: dict[str, int] = {}
         for name, wanted in coordinates.items():
             if name not in self.axes:
                 there = ", ".join(self.axes) or "none"
                 raise ConfigurationError(f"{name}: is no axis of the result; its axes: {there}")
             values, flags = self[name], self.variables[name].flags
-            wanted = flags.index(wanted) if wanted in flags else wanted
-            if isinstance(wanted, str) or not math.isfinite(wanted):
-                rule = " or ".join(["a number", *flags])
-                raise ConfigurationError(f"{name} = {wanted}: must be {rule}")
+            if isinstance(wanted, str):
+                if wanted not in flags:
+                    rule = " or ".join(["a number", *flags])
+                    raise ConfigurationError(f"{name} = {wanted}: must be {rule}")
+                wanted = flags.index(wanted)
+            wanted = finite_number(name, wanted)
             # Far from all of them, every difference would be the same number.
             near = np.clip(wanted, values[0], values[-1])
             number = values.size - 1 - int(np.argmin(np.abs(values - near)[::-1]))
@@ -206,6 +210,7 @@ class Result:
         Raises FileError if the file exists and may not be overwritten, cannot be written, or if no
         axis is left.
         """
+        path = path_text(path, "the file to be written")
         if not self.axes:
             raise FileError(f"{path}: a single lane is no result file; leave one axis in sel")
         variables = list(self.variables.values())
@@ -248,6 +253,7 @@ def open_result(path: str | os.PathLike[str], *, rows: bool = True) -> Result:
 
     Raises FileError if the file is missing, damaged, of another kind or another major version.
     """
+    path = path_text(path, "a result file")
     variables, data, parameters, metadata = read_result(path, rows=rows)
     there = [variable for variable in variables if variable.name in data]
     return Result(str(metadata["axes"]).split(), there, data, parameters, metadata)
