@@ -34,7 +34,7 @@ def respond(config: Given, periods: int = DEFAULT_PERIODS, threads: int | None =
     threads.
     """
     choose_threads(threads)
-    config, periods = configuration_of(config), whole_number("periods", periods, least=1)
+    config, periods = configuration_of(config), whole_number("periods", periods)
     simulation = prepared(config, periods)
     simulation.choose_steps()
     return compute_response(simulation, periods, config.text)

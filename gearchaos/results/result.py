@@ -141,12 +141,11 @@ class Result:
                 there = ", ".join(self.axes) or "none"
                 raise ConfigurationError(f"{name}: is no axis of the result; its axes: {there}")
             values, flags = self[name], self.variables[name].flags
-            if isinstance(wanted, str):
-                if wanted not in flags:
-                    rule = " or ".join(["a number", *flags])
-                    raise ConfigurationError(f"{name} = {wanted}: must be {rule}")
-                wanted = flags.index(wanted)
-            wanted = finite_number(name, wanted)
+            try:
+                wanted = finite_number(name, flags.index(wanted) if wanted in flags else wanted)
+            except ConfigurationError:
+                rule = " or ".join(["a number", *flags])
+                raise ConfigurationError(f"{name} = {wanted}: must be {rule}") from None
             # Far from all of them, every difference would be the same number.
             near = np.clip(wanted, values[0], values[-1])
             number = values.size - 1 - int(np.argmin(np.abs(values - near)[::-1]))
