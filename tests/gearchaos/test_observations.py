@@ -118,7 +118,7 @@ def test_sets_differ_where_one_parameter_does():
 
 def test_steps_move_one_parameter_at_a_time():
     centre = np.array([0.5, 0.9])
-    points = steps_alone(centre)
+    points = steps_alone(centre, 6)
     assert np.array_equal(points[0], centre)
     assert np.all(np.count_nonzero(points[1:] != centre, axis=1) == 1)
     assert points.min() == 0.0 and points.max() == 1.0

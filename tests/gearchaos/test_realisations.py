@@ -151,7 +151,8 @@ def test_a_dry_run_tells_how_many_there_are(tmp_path):
     ended = run_module("gearchaos.sweep", "gears.toml", "--dry-run", cwd=tmp_path)
     assert ended.code == 0
     assert (
-        "lanes:    120 (40 values of pitch_error from 0 to 5, 3 values of realisation" in ended.err
+        "lanes:      120 (40 values of pitch_error from 0 to 5, 3 values of realisation"
+        in ended.err
     )
 
 

@@ -66,7 +66,7 @@ def test_a_dry_run_needs_no_whole_cycles(tmp_path):
     settings = [f"--set={one}" for one in ASKED]
     ended = run_module("gearchaos.sweep", str(PAN2021), *settings, "--dry-run", cwd=tmp_path)
     assert (ended.code, ended.out) == (0, "")
-    assert "time:     about" in ended.err
+    assert "time:       about" in ended.err
 
 
 def test_half_an_order_rises_where_the_period_doubles(result):
