@@ -212,13 +212,16 @@ def result_cases(numbers: Iterable[int], folder: Path) -> Iterator[Case]:
 def lacking_cases(folder: Path) -> Iterator[Case]:
     """Remove each dataset and attribute of a sound result in turn, and give it to its readers.
 
-    Wordings, which only figures and tables need, are left out for the others.
+    Datasets, attributes of the file and meanings of flags go to every command, other attributes of
+    a dataset to the commands in turn, and wordings to the one that draws figures.
     """
     good, path = _good_results(folder)[0], folder / "lacking.h5"
     for number, part in enumerate(parts_of(good)):
         wording = part[1] in ("units", "long_name", "symbol", "origin", "ancillary_variables")
         without(part, good, path)
-        for command, *options in map(str.split, (USERS[3],) if wording else USERS):
+        decisive = part[0] == "/" or part[1] in ("", "flag_meanings")
+        users = USERS if decisive else USERS[3:4] if wording else [USERS[number % len(USERS)]]
+        for command, *options in map(str.split, users):
             arguments = [str(path), *(str(folder / one) if "." in one else one for one in options)]
             yield Case(" ".join(part), number, command, arguments, path)
     path.unlink()

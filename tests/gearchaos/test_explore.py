@@ -445,7 +445,7 @@ def test_axes_with_the_same_label_stay_two_axes(path, monkeypatch):
 def test_a_link_to_a_number_that_no_sweep_reaches_is_told(page, address):
     look(page, address, "?pitch_error=1e999&window=[1,2,3,1e999]&direction=1.0")
     page.get_by_text("the link asks for what there is not: pitch_error").wait_for()
-    assert lane_in(page.url) == "0.0"
+    page.wait_for_url(lambda url: lane_in(url) == "0.0")
 
 
 @needs_browser
