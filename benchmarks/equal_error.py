@@ -18,8 +18,8 @@ from pathlib import Path
 import numba
 import numpy as np
 from gearchaos_kernels import Effects, Plan, integrate
-from gearchaos_kernels.block_memory import flags
-from gearchaos_kernels.flow_map import maps_of
+from gearchaos_kernels.batch import scene_of
+from gearchaos_kernels.methods.flow_map.store import maps_of
 from machine import print_machine
 
 from gearchaos import load_config
@@ -96,7 +96,7 @@ def _making(system) -> float:
     damping = system.groups.damping_ratio * (1.0 + 1e-9)
     system = system._replace(groups=system.groups._replace(damping_ratio=damping))
     began = time.process_time()
-    maps_of(system, FLOW_MAP_STEPS, flags(system, plan))
+    maps_of(system, FLOW_MAP_STEPS, scene_of(system, plan))
     return time.process_time() - began
 
 

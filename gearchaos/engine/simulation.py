@@ -299,10 +299,8 @@ class Simulation:
         """Return what is kept of contact, loads and states; of lanes that diverged none of it."""
         told: dict[str, Array] = {}
         if self.plan.contact and self._splits_steps:
-            for way, columns in zip(
-                self._directions, np.split(outcome.contact, 2, 1), strict=False
-            ):
-                found = contact_told(columns, self.plan.recorded_periods)
+            for number, way in enumerate(self._directions):
+                found = contact_told(outcome.contact[:, number], self.plan.recorded_periods)
                 told |= {f"{name}_{way}": values for name, values in found.items()}
         if self.plan.loads:
             static = system.groups.load / np.cos(system.groups.base_helix_angle)

@@ -126,7 +126,7 @@ def coarse_steps(lanes: Lanes, steps: int) -> str:
 
 def needless_maps(lanes: Lanes, plan: Plan) -> str:
     """Tell where flow maps are too many to be kept and fewer would do; empty where they are not."""
-    if plan.method != "flow_map" or plan.told_by_steps or plan.steps_per_period <= FLOW_MAP_STEPS:
+    if plan.method != "flow_map" or plan.records_steps or plan.steps_per_period <= FLOW_MAP_STEPS:
         return ""
     if maps_are_kept(lanes.system_of(np.arange(min(len(lanes), LANES_AT_ONCE))), plan):
         return ""

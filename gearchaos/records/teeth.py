@@ -15,8 +15,8 @@ both flanks, never meet."""
 def contact_told(contact: Floats, periods: int) -> dict[str, Array]:
     """Return what is told of one direction, each of shape (lanes,), by name.
 
-    ``contact`` (lanes, 6), one half of that of an `Outcome`, is that of
-    so many mesh periods. Speeds are not a number without any impact.
+    ``contact`` (lanes, 6), that of one element of an `Outcome`, covers this number of mesh periods.
+    Speeds are not a number without any impact.
     """
     driving, on_driving, back, on_back, speeds, largest = contact.T
     impacts = on_driving + on_back
@@ -43,10 +43,10 @@ def contact_told(contact: Floats, periods: int) -> dict[str, Array]:
 def loads_told(loads: Floats, static: Floats, directions: Sequence[str]) -> dict[str, Floats]:
     """Return the loads of lanes, each of shape (lanes,), by name.
 
-    ``loads`` (lanes, 3, 4) as in an `Outcome`; ``static`` (lanes,): the tangential mesh force at
-    rest, without which a factor is not a number.
+    ``loads`` (lanes, directions + 1, 4) as in an `Outcome`; ``static`` (lanes,): the tangential
+    mesh force at rest, without which a factor is not a number.
     """
-    force, _, error = signals = np.moveaxis(loads, 0, 2)
+    force, *_, error = signals = np.moveaxis(loads, 0, 2)
     told: dict[str, Floats] = {}
     for way, (*values, square) in zip(directions, signals, strict=False):
         forces = zip(("largest", "smallest", "mean"), values, strict=True)

@@ -56,7 +56,7 @@ CACHE_LINE = 64  # Bytes that one aligned 512-bit vector occupies.
 def source_hash() -> str:
     """Return a hash of every source file of this package and of Numba's version."""
     digest = hashlib.sha256(numba.__version__.encode())
-    for source in sorted(Path(__file__).parent.glob("*.py")):
+    for source in sorted(Path(__file__).parent.rglob("*.py")):
         digest.update(source.name.encode())
         digest.update(source.read_bytes())
     return digest.hexdigest()[:16]

@@ -46,7 +46,7 @@ def jacobian(transverse):
     groups = Groups(*[np.full(1, 0.1) for _ in Groups._fields])
     effects = Effects(False, False, False, transverse, False)
     system = System(effects, groups, np.zeros(0), np.zeros(0))
-    return evaluation.jacobian(system, np.ones(1), np.ones(1)).tolist()
+    return evaluation.jacobian(system, np.ones((1, 2))).tolist()
 
 values = [eval(expression) for expression in expressions]
 stats = [function.stats for function in (evaluation._differentiate, double)]
@@ -123,11 +123,11 @@ def test_a_second_process_compiles_only_scenes_that_none_has_seen(cache, first):
 def test_an_edited_formula_in_another_file_is_never_served_from_the_cache(cache, first, tmp_path):
     package = tmp_path / "gearchaos_kernels"
     shutil.copytree(PACKAGE, package, ignore=shutil.ignore_patterns("__pycache__"))
-    equations = package / "equations.py"
+    equations = package / "models" / "gear_pair" / "equations.py"
     source = equations.read_text()
-    line = "return Directions(slopes.tangential * gap + lane.mesh_damping * rate, force_z)"
+    line = "torsion = forcing.drive - force"
     assert source.count(line) == 1
-    equations.write_text(source.replace(line, line.replace("* gap", "* 2.0 * gap")))
+    equations.write_text(source.replace(line, line.replace("- force", "- 2.0 * force")))
     edited = compute(cache, TORSIONAL, package=package)
     assert edited["misses"] == 1
     assert edited["values"] != first["values"]
@@ -204,7 +204,9 @@ def test_a_numba_without_what_speeds_up_compilation_computes_the_same(first, tmp
     assert compute(tmp_path, TORSIONAL, without=without)["hits"] == 1
 
 
-@pytest.mark.parametrize("name", sorted(path.name for path in PACKAGE.glob("*.py")))
+@pytest.mark.parametrize(
+    "name", sorted(str(path.relative_to(PACKAGE)) for path in PACKAGE.rglob("*.py"))
+)
 def test_the_name_of_the_cache_folder_depends_on_every_kernel_source(name, tmp_path):
     package = tmp_path / "gearchaos_kernels"
     shutil.copytree(PACKAGE, package, ignore=shutil.ignore_patterns("__pycache__"))

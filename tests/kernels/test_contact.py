@@ -5,20 +5,20 @@ import math
 
 import numpy as np
 import pytest
-from gearchaos_kernels import contact
-from gearchaos_kernels.contact import NEVER
-from gearchaos_kernels.equations import Gap
-from gearchaos_kernels.rows import Branch
+from gearchaos_kernels.contact import branches, leaving
+from gearchaos_kernels.contact.leaving import NEVER
+from gearchaos_kernels.memory.rows import Branch
+from gearchaos_kernels.models.protocol import Gap
 from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 
 from .reference import from_python
 
-branch_at = from_python(contact.branch_at)
-first_fall = from_python(contact.first_fall)
-leaving_fraction = from_python(contact.leaving_fraction)
-may_leave = from_python(contact.may_leave)
-next_branch = from_python(contact.next_branch)
+branch_at = from_python(branches.branch_at)
+first_fall = from_python(leaving.first_fall)
+leaving_fraction = from_python(leaving.leaving_fraction)
+may_leave = from_python(leaving.may_leave)
+next_branch = from_python(branches.next_branch)
 
 settings.register_profile("contact", derandomize=True, deadline=None, max_examples=150)
 PROPERTY = settings.get_profile("contact")
@@ -27,6 +27,13 @@ ROUNDING = 1e-12
 """Of a cubic, relative to the numbers that give it; Newton's method stops at its square root."""
 
 HALF_BACKLASH = 0.75
+
+
+def moving(value: float, rate: float) -> Gap:
+    """Return a gap whose flanks approach at its own rate."""
+    return Gap(value, rate, rate)
+
+
 SAMPLES = np.linspace(0.0, 1.0, 2001)
 
 
@@ -190,7 +197,7 @@ def distance_inside(curve: np.polynomial.Polynomial, branch: Branch) -> np.ndarr
 def test_a_gap_leaves_its_branch_where_dense_sampling_sees_it_leave(gap0, rate0, gap1, rate1):
     branch = branch_at(gap0, HALF_BACKLASH)
     curve = cubic(gap0, rate0, gap1, rate1)
-    found = leaving_fraction(Gap(gap0, rate0), Gap(gap1, rate1), 1.0, branch, HALF_BACKLASH)
+    found = leaving_fraction(moving(gap0, rate0), moving(gap1, rate1), 1.0, branch, HALF_BACKLASH)
     inside = distance_inside(curve, branch)
     nearly = 10.0 * ROUNDING * (size_of(curve) + HALF_BACKLASH)
     if found == NEVER:
@@ -207,8 +214,11 @@ def test_a_gap_leaves_its_branch_where_dense_sampling_sees_it_leave(gap0, rate0,
 def test_a_step_that_leaves_its_branch_is_suspected(gap0, rate0, gap1, rate1):
     branch = branch_at(gap0, HALF_BACKLASH)
     curve = cubic(gap0, rate0, gap1, rate1)
-    leaves = leaving_fraction(Gap(gap0, rate0), Gap(gap1, rate1), 1.0, branch, HALF_BACKLASH) <= 1.0
-    if not leaves or may_leave(Gap(gap0, rate0), Gap(gap1, rate1), branch):
+    leaves = (
+        leaving_fraction(moving(gap0, rate0), moving(gap1, rate1), 1.0, branch, HALF_BACKLASH)
+        <= 1.0
+    )
+    if not leaves or may_leave(moving(gap0, rate0), moving(gap1, rate1), branch):
         return
     # Only what rounding sees outside is missed.
     nearly = 10.0 * ROUNDING * (size_of(curve) + HALF_BACKLASH)
@@ -222,20 +232,20 @@ def test_a_dip_with_one_turn_is_always_suspected(above0, rate0, above1, rate1):
     curve = cubic(gap0, rate0, gap1, rate1)
     branch = branch_at(gap0, HALF_BACKLASH)
     dips = distance_inside(curve, branch).min() < -1e-12
-    assert not dips or may_leave(Gap(gap0, rate0), Gap(gap1, rate1), branch)
+    assert not dips or may_leave(moving(gap0, rate0), moving(gap1, rate1), branch)
 
 
 @pytest.mark.parametrize("rate1", [5.0, 10.0, 30.0])
 def test_a_dip_that_begins_at_rest_at_the_boundary_is_suspected(rate1):
     b = HALF_BACKLASH
-    assert leaving_fraction(Gap(b, 0.0), Gap(b, rate1), 1.0, branch_at(b, b), b) == 0.0
-    assert may_leave(Gap(b, 0.0), Gap(b, rate1), branch_at(b, b))
-    assert may_leave(Gap(-b, 0.0), Gap(-b, -rate1), branch_at(-b, b))
+    assert leaving_fraction(moving(b, 0.0), moving(b, rate1), 1.0, branch_at(b, b), b) == 0.0
+    assert may_leave(moving(b, 0.0), moving(b, rate1), branch_at(b, b))
+    assert may_leave(moving(-b, 0.0), moving(-b, -rate1), branch_at(-b, b))
 
 
 @pytest.mark.parametrize("gap", [HALF_BACKLASH, -HALF_BACKLASH, 2.0, 0.0, 0.3])
 def test_a_gap_at_rest_is_not_suspected(gap):
-    assert not may_leave(Gap(gap, 0.0), Gap(gap, 0.0), branch_at(gap, HALF_BACKLASH))
+    assert not may_leave(moving(gap, 0.0), moving(gap, 0.0), branch_at(gap, HALF_BACKLASH))
 
 
 @pytest.mark.parametrize("far", [3.0, -3.0])
@@ -243,7 +253,9 @@ def test_a_gap_far_from_the_boundary_is_not_suspected_whatever_it_does(far):
     # Most steps are of this kind: they must not come to the scalar path.
     for rate0 in (-2.0, 0.0, 2.0):
         for rate1 in (-2.0, 0.0, 2.0):
-            assert not may_leave(Gap(far, rate0), Gap(far, rate1), branch_at(far, HALF_BACKLASH))
+            assert not may_leave(
+                moving(far, rate0), moving(far, rate1), branch_at(far, HALF_BACKLASH)
+            )
 
 
 @PROPERTY
@@ -276,12 +288,12 @@ def test_neighbouring_branches_meet_at_the_boundary():
 def test_without_clearance_there_is_no_branch_to_leave():
     for gap0, gap1 in ((1.0, -1.0), (-1.0, 1.0), (0.0, 0.0)):
         branch = branch_at(gap0, 0.0)
-        assert leaving_fraction(Gap(gap0, -2.0), Gap(gap1, -2.0), 1.0, branch, 0.0) == NEVER
-        assert not may_leave(Gap(gap0, -2.0), Gap(gap1, -2.0), branch)
+        assert leaving_fraction(moving(gap0, -2.0), moving(gap1, -2.0), 1.0, branch, 0.0) == NEVER
+        assert not may_leave(moving(gap0, -2.0), moving(gap1, -2.0), branch)
 
 
 @pytest.mark.parametrize("lost", [math.nan, math.inf, -math.inf])
 def test_a_gap_out_of_the_range_of_numbers_gives_no_moment_within_the_step(lost):
     branch = branch_at(1.0, HALF_BACKLASH)
-    found = leaving_fraction(Gap(1.0, 0.0), Gap(lost, lost), 1.0, branch, HALF_BACKLASH)
+    found = leaving_fraction(moving(1.0, 0.0), moving(lost, lost), 1.0, branch, HALF_BACKLASH)
     assert not 0.0 < found < 1.0

@@ -19,7 +19,7 @@ def told(system, start, periods=PERIODS, **plan):
     plan = {"transient_periods": 60, "recorded_periods": periods, "section_points": 1, **plan}
     # Loads are told too: other tests have compiled this loop.
     outcome = integrate(system, start, Plan(**plan, tangent=True, contact=True, loads=True))
-    return outcome, outcome.contact.reshape(-1, 2, 6)
+    return outcome, outcome.contact
 
 
 @pytest.mark.parametrize("method", METHODS)

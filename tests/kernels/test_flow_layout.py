@@ -2,39 +2,47 @@
 
 from itertools import pairwise
 from pathlib import Path
-from types import SimpleNamespace
+from typing import Any
 
 import pytest
-from gearchaos_kernels import STATES, flow_layout, rows
+from gearchaos_kernels.memory.rows import rows_of
+from gearchaos_kernels.methods.flow_map import layout
+from gearchaos_kernels.methods.flow_map.method import FlowMap
 
-COLUMNS = len(STATES) + 5
-"""Of a map: all states, the load, an offset for each gap, and two parts of the error."""
+from .scenes import scene_with
+
+SCENE = scene_with(True, method=FlowMap(), teeth=None, wide=None, undamped=None)
 
 
-def layout_with(terms: int) -> SimpleNamespace:
-    """Return the names of the module were its polynomials to have so many terms."""
-    path = Path(flow_layout.__file__)
-    text, names = path.read_text(encoding="utf-8"), {"__name__": flow_layout.__name__}
+def layout_with(terms: int) -> dict[str, Any]:
+    """Return the names of the module were its polynomials to have this number of terms."""
+    path = Path(layout.__file__)
+    text, names = path.read_text(encoding="utf-8"), {"__name__": layout.__name__}
     exec(compile(text.replace("\nTERMS = 16\n", f"\nTERMS = {terms}\n"), path, "exec"), names)
     assert names["TERMS"] == terms
-    return SimpleNamespace(**names)
+    return names
 
 
 def assert_apart(parts: list[tuple[int, int]], end: int) -> None:
-    """Make sure that parts, each a place and how many there are, neither overlap nor go too far."""
+    """Make sure that parts, each a place and a size, neither overlap nor reach beyond the end."""
     for (place, size), (following, _) in pairwise([*sorted(parts), (end, 0)]):
         assert place + size <= following
 
 
 @pytest.mark.parametrize("terms", [12, 16, 18, 24])
 def test_nothing_overlaps_whatever_the_number_of_terms(terms):
-    at = layout_with(terms)
-    of_a_gap = [(0, terms), (at.TANGENT_TERMS, terms), (at.MOMENT, 1), (at.CROSSED, 2)]
-    assert_apart([*of_a_gap, (at.SIDE, 1), (at.DISTANCE, 1), (at.BEND, 1)], at.GAP)
-    gaps = [(at.GAPS, at.GAP), (at.GAPS + at.GAP, at.GAP)]
-    crossing = [(row, 1) for row in (at.AFTER, at.FACTOR, at.EDGE, at.AXIALLY)]
-    sums = [(at.SUMS, terms), (at.TANGENT_SUMS, terms)]
-    assert_apart([(0, rows.ROWS), *gaps, *crossing, *sums], rows.ROWS + at.ASIDE)
-    assert_apart([(0, 4), *((bound, COLUMNS) for bound in at.BOUNDS)], at.HEADER)
-    numbers = [(place, COLUMNS) for place in (at.INPUTS, at.TANGENT_INPUTS, at.RESULT)]
-    assert_apart(numbers, at.OWN)
+    names = layout_with(terms)
+    at, place = names["aside_of"](SCENE), names["layout_of"](SCENE)
+    of_a_gap = [(0, terms), (at.tangent_terms, terms), (at.moment, 1), (at.crossed, 2)]
+    assert_apart([*of_a_gap, (at.side, 1), (at.distance, 1), (at.bend, 1)], at.gap_rows)
+    gaps = [(at.gaps + at.gap_rows * element, at.gap_rows) for element in range(place.elements)]
+    crossing = [(row, 1) for row in (at.after, at.factor, at.edge, at.element)]
+    sums = [(at.sums, terms), (at.tangent_sums, terms)]
+    assert_apart([(0, rows_of(SCENE).total), *gaps, *crossing, *sums], at.total)
+    bounds = [(place.bounds + n * place.bound_size, place.columns) for n in range(place.elements)]
+    assert_apart([(0, 2 * place.waves), *bounds], place.header)
+    numbers = [(0, place.columns), (place.tangent_inputs, place.states)]
+    assert_apart([*numbers, (place.result, place.width)], place.own)
+    polynomials = [(place.gap, place.elements * place.columns * terms)]
+    switches = [(place.switch, place.elements * terms * place.width)]
+    assert_apart([(0, place.columns * place.width), *polynomials, *switches], place.size)

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 from gearchaos_kernels import Plan, integrate, maps_memory
-from gearchaos_kernels.block_memory import flags
-from gearchaos_kernels.flow_layout import layout
-from gearchaos_kernels.flow_map import maps_of
+from gearchaos_kernels.batch import scene_of as compiled_scene
+from gearchaos_kernels.methods.flow_map.layout import layout_of
+from gearchaos_kernels.methods.flow_map.store import maps_of
 from scipy.linalg import expm
 
 from gearchaos.dynamics.exponents import exponents, period_jacobian, sum_of_exponents
@@ -121,9 +121,9 @@ def test_the_memory_of_maps_is_foretold_within_a_factor_of_two(scene, steps):
     for frequency in (0.06, 0.3, 1.5):
         pair = system_of(pan2021(1.0, mesh_frequency=frequency), scene)
         plan = Plan(steps, 0, 1, 0, method=FLOW_MAP)
-        present = flags(pair, plan)
-        _, places = maps_of(pair, steps, present)
-        made = 8 * places[0, 0] * layout.py_func(present).step_size
+        compiled = compiled_scene(pair, plan)
+        _, places = maps_of(pair, steps, compiled)
+        made = 8 * places[0, 0] * layout_of(compiled).step_size
         # Those kept and those being made.
         told = maps_memory(pair, plan, fewest_stable_steps(pair))
         assert 1 <= told / (2 * made) <= 2

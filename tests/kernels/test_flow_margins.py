@@ -13,8 +13,8 @@ period a cubic sees a straight line where the gap meets the flank and leaves it 
 
 import numpy as np
 import pytest
-from gearchaos_kernels.flow_layout import TERMS
-from gearchaos_kernels.flow_series import _BENDS
+from gearchaos_kernels.methods.flow_map.layout import TERMS
+from gearchaos_kernels.methods.flow_map.series import _BENDS
 from numpy.polynomial import Polynomial
 
 from .reference import FLOW_MAP, TORSION_ONLY, pan2021, run

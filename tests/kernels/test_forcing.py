@@ -4,12 +4,12 @@ import math
 
 import numpy as np
 import pytest
-from gearchaos_kernels import forcing
-from gearchaos_kernels.block_memory import Present
-from gearchaos_kernels.forcing import phase_table
-from gearchaos_kernels.rows import Lane
+from gearchaos_kernels.models.gear_pair import forcing
+from gearchaos_kernels.models.gear_pair.coefficients import Lane
+from gearchaos_kernels.models.gear_pair.forcing import phase_table
 
 from .reference import from_python
+from .scenes import scene_with
 
 forcing_at = from_python(forcing.forcing_at)
 phase_on_grid = from_python(forcing.phase_on_grid)
@@ -93,8 +93,8 @@ def test_the_table_is_no_wider_than_its_series_needs():
     assert widths == sorted(widths, reverse=True)
 
 
-ALL, NOTHING = (Present(*[flag] * len(Present._fields)) for flag in (True, None))
-EVERYTHING = ALL._replace(undamped=None)
+ALL, NOTHING = scene_with(True), scene_with(None)
+EVERYTHING = scene_with(True, undamped=None)
 """With the sine of eq. 14: what teeth have of their own does not drive delta_5."""
 
 
@@ -156,6 +156,8 @@ def test_what_a_scene_leaves_out_is_zero_or_constant():
     )
     point = phase_within(phase_table(*series(6), 40), 3, 0.3)
     assert tuple(forcing_at(groups, point, NOTHING)) == (0.9, 0.3, 0.0, 0.0, 0, 0)
-    without_axial = forcing_at(groups, point, EVERYTHING._replace(phase=None, axial=None))
+    without_axial = forcing_at(
+        groups, point, scene_with(True, undamped=None, phase=None, axial=None)
+    )
     assert without_axial.axial_error == without_axial.axial_error_rate == 0.0
     assert without_axial.error == pytest.approx(0.05 + 1.3 * point.value, abs=ROUNDING)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from gearchaos_kernels import Status, batch
-from gearchaos_kernels.coefficients import steps_between_scalings
+from gearchaos_kernels.batch import steps_between_scalings
 
 from .reference import (
     FLOW_MAP,

@@ -4,7 +4,7 @@ import numba
 import numpy as np
 import pytest
 from gearchaos_kernels import LANES, Effects, Plan, Teeth, integrate, mesh_motion
-from gearchaos_kernels.teeth import share_table
+from gearchaos_kernels.models.gear_pair.teeth import share_table
 from scipy.interpolate import BSpline
 
 from .reference import FULL, assert_same_bits, drawn_teeth, lanes_out_of, pan2021, run, system_of

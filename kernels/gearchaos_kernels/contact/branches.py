@@ -1,0 +1,112 @@
+"""Contact branches of a clearance, and what happens where a gap leaves one.
+
+On one branch the clearance function (eqs 22, 23) is linear, f(x) = engaged x - offset: engaged is 1
+on a flank and 0 between the flanks, offset is +b, -b or 0. A step that stays on its branch meets a
+smooth field, so that the method keeps its order; one that leaves it has to be split where it does.
+"""
+
+import math
+from typing import NamedTuple
+
+from gearchaos_kernels.compilation import scalar
+from gearchaos_kernels.contact.leaving import may_leave
+from gearchaos_kernels.memory.block_memory import store
+from gearchaos_kernels.memory.rows import BRANCH, STRIDE, Branch, rows
+from gearchaos_kernels.memory.tuples import as_mask, each
+from gearchaos_kernels.models.protocol import gap_speeds, half_clearances
+from gearchaos_kernels.recorders.protocol import record_crossing
+
+
+class Crossing(NamedTuple):
+    """A gap that leaves its branch.
+
+    Attributes
+    ----------
+    element : int
+        The element whose gap it is.
+    moment : float
+        In steps since the mesh period began.
+    closing : float
+        Rate at which the flanks approach, per step.
+    offset : float
+        Of the flank that is met or left.
+    meets : float
+        1 where a flank is met, 0 where one is left.
+    speed : float
+        Size of the closing rate per unit of tau.
+    """
+
+    element: int
+    moment: float
+    closing: float
+    offset: float
+    meets: float
+    speed: float
+
+
+@scalar
+def branch_at(gap, half_clearance):
+    """Return the branch on which a gap lies."""
+    if half_clearance == 0.0:
+        return Branch(1.0, 0.0, -math.inf, math.inf)
+    if gap >= half_clearance:
+        return Branch(1.0, half_clearance, half_clearance, math.inf)
+    if gap <= -half_clearance:
+        return Branch(1.0, -half_clearance, -math.inf, -half_clearance)
+    return Branch(0.0, 0.0, -half_clearance, half_clearance)
+
+
+@scalar
+def branches_at(gaps, lane, scene):
+    """Return the branches on which the gaps of a lane lie."""
+    return each(branch_of, gaps, half_clearances(lane, scene))
+
+
+@scalar
+def branch_of(gap, half_clearance):
+    """Return the branch of a gap with its rate."""
+    return branch_at(gap.value, half_clearance)
+
+
+@scalar
+def flank_at(gap, half_clearance):
+    """Return 0 between the flanks, 1 on the driving flank and 2 on the back flank."""
+    if gap > half_clearance:
+        return 1
+    return 2 if gap < -half_clearance else 0
+
+
+@scalar
+def next_branch(branch, gap, half_clearance):
+    """Return the branch that follows where a gap leaves one."""
+    # Branch-free: the direction is unpredictable.
+    meets = 1.0 - branch.engaged
+    offset = meets * math.copysign(half_clearance, gap)
+    end = offset if meets != 0.0 else half_clearance
+    floor = -math.inf if offset < 0.0 else -end if meets == 0.0 else end
+    ceiling = math.inf if offset > 0.0 else end
+    return Branch(meets, offset, floor, ceiling)
+
+
+@scalar
+def leave(memory, slot, element, gap, branches, lane, moment, recorded, scene):
+    """Put a lane on the branch that follows where a gap leaves one, and record the crossing."""
+    branch = branches[element]
+    following = next_branch(branch, gap.value, half_clearances(lane, scene)[element])
+    store(memory, rows(scene).branches + BRANCH * element, slot, following)
+    if recorded:
+        scale = gap_speeds(lane, scene)[element]
+        at = rows(scene).crossings * STRIDE + slot
+        memory[at] += 1.0
+        memory[at + STRIDE] = min(memory[at + STRIDE], scale * abs(gap.rate))
+        # One of the two offsets is that of the flank, the other one 0.
+        offset = branch.offset + following.offset
+        speed = scale * abs(gap.closing)
+        crossing = Crossing(element, moment, gap.closing, offset, following.engaged, speed)
+        record_crossing(memory, slot, crossing, lane, scene)
+
+
+@scalar
+def suspects_of(begin, end, branches, margins, scene):
+    """Return the elements whose gaps may leave their branches in a step: the sum of 2**element."""
+    return as_mask(each(may_leave, begin, end, branches, margins))

@@ -1,0 +1,83 @@
+"""Arithmetic of records and tuples whose length the scene decides, unrolled as it is compiled."""
+
+from typing import Any
+
+from llvmlite import ir
+from numba import types
+from numba.extending import intrinsic
+
+from gearchaos_kernels.compilation import FASTMATH
+
+_FLAGS = tuple(sorted(FASTMATH))
+_DOUBLE = ir.DoubleType()
+
+
+@intrinsic
+def each(typing_context: Any, function: Any, *given: Any) -> Any:
+    """Call a compiled function for each element of the tuples given, and return a tuple.
+
+    Plain tuples are taken element by element; everything else, such as a number or a named tuple,
+    goes into every call.
+    """
+    mapped = [isinstance(kind, types.BaseAnonymousTuple) for kind in given]
+    count = next(len(kind) for kind, maps in zip(given, mapped, strict=True) if maps)
+
+    def arguments_of(number: int) -> tuple[Any, ...]:
+        kinds = zip(given, mapped, strict=True)
+        return tuple(kind.types[number] if maps else kind for kind, maps in kinds)
+
+    signatures = [
+        function.get_call_type(typing_context, arguments_of(number), {}) for number in range(count)
+    ]
+    returned = types.BaseTuple.from_types(tuple(one.return_type for one in signatures))
+
+    def generate(context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
+        values = [builder.extract_value(arguments[1], number) for number in range(len(given))]
+        results = []
+        for number, signature in enumerate(signatures):
+            passed = [
+                builder.extract_value(value, number) if maps else value
+                for value, maps in zip(values, mapped, strict=True)
+            ]
+            implementation = context.get_function(function, signature)
+            context.add_linking_libs(getattr(implementation, "libs", ()))
+            results.append(implementation(builder, passed))
+        return context.make_tuple(builder, returned, results)
+
+    return returned(function, types.StarArgTuple.from_types(given)), generate
+
+
+@intrinsic
+def along(_typing_context: Any, a: Any, factor: Any, b: Any) -> Any:
+    """Return a + factor b of two records of numbers, field by field."""
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        first, number, second = arguments
+        number = context.cast(builder, number, signature.args[1], types.float64)
+        sums = [
+            builder.fadd(
+                builder.extract_value(first, field),
+                builder.fmul(number, builder.extract_value(second, field), flags=_FLAGS),
+                flags=_FLAGS,
+            )
+            for field in range(len(a))
+        ]
+        return context.make_tuple(builder, a, sums)
+
+    return a(a, factor, b), generate
+
+
+@intrinsic
+def as_mask(_typing_context: Any, conditions: Any) -> Any:
+    """Return a tuple of conditions as a number: the sum of 2**n over those that hold."""
+
+    def generate(_context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
+        mask = None
+        for number in range(len(conditions)):
+            condition = builder.extract_value(arguments[0], number)
+            bit = builder.trunc(condition, ir.IntType(1)) if condition.type.width > 1 else condition
+            value = builder.select(bit, _DOUBLE(2.0**number), _DOUBLE(0.0))
+            mask = value if mask is None else builder.fadd(mask, value, flags=_FLAGS)
+        return mask
+
+    return types.float64(conditions), generate

@@ -1,0 +1,1 @@
+"""Methods of integration, each in a folder, behind one protocol."""

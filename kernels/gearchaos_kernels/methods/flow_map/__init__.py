@@ -1,0 +1,1 @@
+"""Flow maps: exact steps of piecewise-linear systems."""

@@ -1,0 +1,101 @@
+"""Flow maps as a method: exact steps, with maps that lanes share."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from gearchaos_kernels.compilation import part, scalar
+from gearchaos_kernels.memory.block_memory import aligned_memory
+from gearchaos_kernels.memory.rows import LANES
+from gearchaos_kernels.methods.flow_map.crossings import resolve
+from gearchaos_kernels.methods.flow_map.layout import Work, aside_rows, layout, rows_needed
+from gearchaos_kernels.methods.flow_map.steps import begin_lane, move_block
+from gearchaos_kernels.methods.flow_map.store import (
+    fewest_steps,
+    maps_are_kept,
+    maps_memory,
+    maps_of,
+    sharing,
+)
+from gearchaos_kernels.methods.flow_map.vectors import VECTOR
+from gearchaos_kernels.methods.protocol import Method, Share, cut
+from gearchaos_kernels.models.protocol import grid_within
+from gearchaos_kernels.plan import Plan
+from gearchaos_kernels.scene import Scene, implement
+
+
+@dataclass(frozen=True)
+class FlowMap:
+    """Stands for flow maps in a scene."""
+
+
+def prepare(system: Any, plan: Plan, scene: Scene) -> Iterator[Share]:
+    """Yield lanes in the order in which they share maps, as many as have maps that fit."""
+    refusal = system.refuses_maps()
+    if refusal:
+        raise ValueError(refusal)
+    lanes, steps, group = system.lanes, fewest_steps(plan), sharing(system)
+    every = np.argsort(group, kind="stable")
+    _, first, counts = np.unique(group[every], return_index=True, return_counts=True)
+    done = 0
+    while done < first.size:
+        maps, places = maps_of(system.of(every[first[done:]]), steps, scene, plan.map_bytes)
+        lanes_of = counts[done : done + places.shape[1]]
+        order = every[first[done] : first[done] + lanes_of.sum()]
+        steps_of = np.full(lanes, steps)
+        steps_of[order] = np.repeat(places[0], lanes_of)
+        yield Share(order, cut(lanes_of, *places), maps, steps_of)
+        done += lanes_of.size
+
+
+@scalar
+def maps_per_step(scene):
+    """Return the size of the maps of a step."""
+    return layout(scene).step_size
+
+
+@part
+def workspace(scene):
+    """Return memory for the lanes that cross, and for a block's only lane."""
+    aside = aligned_memory(aside_rows(scene).total)
+    for number in range(aside.shape[0]):
+        aside[number] = 0.0
+    return Work(aside, np.zeros(LANES, dtype=np.uint32), np.zeros(layout(scene).own))
+
+
+@scalar
+def step(memory, lanes, at, given, scene):
+    """Take one step in every slot; return how many may have left a contact branch."""
+    # A few lanes need no more than one vector, and one lane with maps of its own not even that.
+    slots = 1 if lanes == 1 else VECTOR if lanes <= VECTOR else LANES
+    return move_block(memory, given.maps, at.maps_at, slots, given.work.numbers, scene)
+
+
+@scalar
+def grids(clock, given, scene):
+    """Return what all lanes share at the beginning of the step, in its middle and at its end."""
+    requested, of_it = clock.number // clock.every, clock.number % clock.every
+    begin = grid_within(given.tables, requested, of_it / clock.every, scene)
+    middle = grid_within(given.tables, requested, (of_it + 0.5) / clock.every, scene)
+    return begin, middle, grid_within(given.tables, requested, (of_it + 1.0) / clock.every, scene)
+
+
+FLOW_MAP = Method(
+    name="flow_map",
+    flags=FlowMap,
+    always_resolved=True,
+    rows=rows_needed,
+    prepare=prepare,
+    memory=maps_memory,
+    is_kept=maps_are_kept,
+    maps_per_step=maps_per_step,
+    workspace=workspace,
+    begin_lane=begin_lane,
+    step=step,
+    resolve=resolve,
+    grids=grids,
+)
+
+implement(FlowMap, FLOW_MAP)

@@ -1,0 +1,210 @@
+"""The moment at which a gap leaves its branch in a step that is a map.
+
+The gap is a polynomial along the step, from -1 to 1; seen from one side and raised by a distance it
+falls below zero where it leaves. Nearly every one that may leave falls all the way, and is solved
+side by side with others (`find_side_by_side`), in the same steps for each, so that none depends on
+its neighbours. What is left is searched piece by piece (`find_in_pieces`).
+"""
+
+import math
+
+from gearchaos_kernels.compilation import part, scalar
+from gearchaos_kernels.contact.leaving import LAST_CORRECTION, NEVER, falling_root
+from gearchaos_kernels.memory.block_memory import read_branches, read_lane
+from gearchaos_kernels.memory.rows import STRIDE, rows
+from gearchaos_kernels.methods.flow_map.layout import TERMS, aside_rows, fourth_derivative
+from gearchaos_kernels.methods.flow_map.vectors import VECTOR
+from gearchaos_kernels.models.protocol import half_clearances, mean_gaps
+
+largest_bend = scalar(fourth_derivative)
+
+_THIRD = 1.0 / 3.0
+UNKNOWN = -2.0
+"""In place of a moment that has to be searched."""
+
+_LOOKS = 300
+_NARROW = 1e-9
+"""In so short a piece of a step a gap that turns around goes as far as rounding does."""
+
+
+@scalar
+def find_moments(aside, element, lanes, scene):
+    """Find the next crossing of a gap of some lanes side by side, or `NEVER`."""
+    if find_side_by_side(aside, element, scene) > 0:
+        at = aside_rows(scene)
+        for n in range(lanes):
+            if aside[(at.gaps + element * at.gap_rows + at.moment) * STRIDE + n] == UNKNOWN:
+                find_in_pieces(aside, element, n, scene)
+
+
+@scalar
+def find_side_by_side(aside, element, scene):
+    """Find the crossings of gaps that fall all the way from the beginning of the step.
+
+    Returns of how many lanes it is still unknown.
+    """
+    at_rows = aside_rows(scene)
+    unknown = 0
+    for n in range(VECTOR):
+        first = (at_rows.gaps + element * at_rows.gap_rows) * STRIDE + n
+        lane = read_lane(aside, n, scene)
+        branch = read_branches(aside, n, scene)[element]
+        aside[first] -= mean_gaps(lane, scene)[element]
+        even, odd, even_slope, odd_slope, bend = 0.0, 0.0, 0.0, 0.0, 0.0
+        for term in range(0, TERMS, 2):
+            a, b = aside[first + term * STRIDE], aside[first + (term + 1) * STRIDE]
+            even += a
+            odd += b
+            even_slope += term * a
+            odd_slope += (term + 1) * b
+            bend += largest_bend(term) * abs(a) + largest_bend(term + 1) * abs(b)
+        # A flank is left to the middle; between the flanks, most likely to where the step ends.
+        side = math.copysign(1.0, branch.offset if branch.engaged != 0.0 else -even - odd)
+        distance = half_clearances(lane, scene)[element] * (1.0 - 2.0 * branch.engaged)
+        # What begins where the last step ended, at the boundary, begins on the right side of it.
+        value_left = max(side * (even - odd) + distance, 0.0)
+        slope_left = side * (odd_slope - even_slope)
+        value_right = side * (even + odd) + distance
+        slope_right = side * (odd_slope + even_slope)
+        ends = value_left, slope_left, value_right, slope_right
+        lowest, highest, steepest = bounds_of(ends, 2.0, bend)
+        stays = lowest >= 0.0 and value_right >= 0.0
+        # From the other side: a lane between the flanks may meet either.
+        one_way = distance < 0.0 or max(highest, value_right) <= 2.0 * distance
+        falls = steepest < 0.0 and value_right < 0.0
+        guess = guess_fall(ends, 2.0)
+        at = min(max(guess - 1.0, -1.0), 1.0)
+        # From a cubic's guess by Chebyshev's method to nearly all of the place, by Newton's to it.
+        value, slope, curvature = gap_along(aside, first, at)
+        inverse = 1.0 / slope
+        shift = (value + side * distance) * inverse
+        at -= shift + shift * shift * curvature * inverse
+        value, slope, _ = gap_along(aside, first, at)
+        correction = (value + side * distance) / slope
+        at -= correction
+        found = falls and abs(correction) < LAST_CORRECTION and -1.0 <= at <= 1.0
+        moment = NEVER if stays else at
+        known = one_way and (stays or found) and aside[at_rows.after * STRIDE + n] == -1.0
+        # Of the sum of 2**element over the suspects, the bit of this one.
+        suspects = int(aside[rows(scene).suspect * STRIDE + n])
+        looked_at = (suspects >> element) & 1 == 1
+        unknown += 1 if looked_at and not known else 0
+        if not known:
+            moment = UNKNOWN
+        aside[first + at_rows.moment * STRIDE] = moment if looked_at else NEVER
+        aside[first + at_rows.crossed * STRIDE] = value
+        aside[first + (at_rows.crossed + 1) * STRIDE] = slope
+        aside[first + at_rows.side * STRIDE] = side
+        aside[first + at_rows.distance * STRIDE] = distance
+        aside[first + at_rows.bend * STRIDE] = bend
+    return unknown
+
+
+@scalar
+def bounds_of(ends, width, bend):
+    """Bound a gap within a piece, from below and above, and the rise of its steepest slope.
+
+    ``ends``: value and slope on the left and on the right; ``bend``: more than the fourth
+    derivative. The gap and the cubic differ by bend (width^4 / 24) t^2 (1 - t)^2 at most.
+    """
+    value_left, slope_left, value_right, slope_right = ends
+    point1 = value_left + _THIRD * width * slope_left
+    point2 = value_right - _THIRD * width * slope_right
+    stray = bend * width**4 / 24.0
+    steepest = max(max(width * slope_left, 3.0 * (point2 - point1)), width * slope_right)
+    # Their slopes differ by less than a fifth of the same number.
+    lowest, highest = min(point1, point2), max(point1, point2)
+    return lowest - stray / 12.0, highest + stray / 12.0, steepest + 0.2 * stray
+
+
+@scalar
+def guess_fall(ends, width):
+    """Return where in a piece a gap falls below 0, by the cubic of the place over the value."""
+    value_left, slope_left, value_right, slope_right = ends
+    fallen = value_left - value_right
+    done = value_left / fallen
+    early = (1.0 - done) * (-fallen / slope_left - width)
+    late = done * (-fallen / slope_right - width)
+    return width * done + done * (1.0 - done) * (early - late)
+
+
+@scalar
+def gap_along(aside, first, at):
+    """Return value, slope and half the curvature of a gap whose terms stand from a place on."""
+    # Even and odd terms, which do not wait for each other.
+    square = at * at
+    even, odd = aside[first + (TERMS - 2) * STRIDE], aside[first + (TERMS - 1) * STRIDE]
+    even_slope, odd_slope, even_bend, odd_bend = 0.0, 0.0, 0.0, 0.0
+    for term in range(TERMS - 4, -1, -2):
+        even_bend = even_bend * square + even_slope
+        odd_bend = odd_bend * square + odd_slope
+        even_slope = even_slope * square + even
+        odd_slope = odd_slope * square + odd
+        even = even * square + aside[first + term * STRIDE]
+        odd = odd * square + aside[first + (term + 1) * STRIDE]
+    bends = even_slope + 4.0 * square * even_bend, 3.0 * odd_slope + 4.0 * square * odd_bend
+    slope = odd + 2.0 * at * (even_slope + at * odd_slope)
+    return even + at * odd, slope, bends[0] + at * bends[1]
+
+
+@part
+def find_in_pieces(aside, element, n, scene):
+    """Find the crossing of a gap after the last one of its lane, or `NEVER`, whatever it does."""
+    at_rows = aside_rows(scene)
+    first = (at_rows.gaps + element * at_rows.gap_rows) * STRIDE + n
+    side, distance = aside[first + at_rows.side * STRIDE], aside[first + at_rows.distance * STRIDE]
+    after, bend = aside[at_rows.after * STRIDE + n], aside[first + at_rows.bend * STRIDE]
+    moment = first_below((aside, first, side, distance), bend, after)
+    if distance > 0.0:
+        # A lane between the flanks may meet either.
+        moment = min(moment, first_below((aside, first, -side, distance), bend, after))
+    value, slope, _ = gap_along(aside, first, moment)
+    aside[first + at_rows.moment * STRIDE] = moment
+    aside[first + at_rows.crossed * STRIDE] = value
+    aside[first + (at_rows.crossed + 1) * STRIDE] = slope
+
+
+@part
+def first_below(given, bend, left):
+    """Return where a gap, seen from a side and raised, first falls below zero after a moment.
+
+    Piece by piece: one whose Bezier points with their margins are not below zero has no such place,
+    in one that only falls it is found by Newton's method, others are halved.
+    """
+    value_left, slope_left = gap_at(given, left)
+    value_left = max(value_left, 0.0)
+    right = 1.0
+    value_right, slope_right = gap_at(given, right)
+    for _ in range(_LOOKS):
+        width = right - left
+        ends = value_left, slope_left, value_right, slope_right
+        lowest, _, steepest = bounds_of(ends, width, bend)
+        clear = lowest >= 0.0 and value_right >= 0.0
+        if not clear:
+            if steepest < 0.0 and value_right < 0.0:
+                guess = min(max(left + guess_fall(ends, width), left), right)
+                return falling_root(gap_at, given, left, right, guess)
+            clear = steepest < 0.0
+            if not clear and width < _NARROW:
+                if value_right < 0.0:
+                    return right
+                clear = True
+        if clear:
+            if right >= 1.0:
+                return NEVER
+            left = right
+            value_left = max(value_right, 0.0)
+            slope_left = slope_right
+            right = min(1.0, left + 2.0 * width)
+        else:
+            right = left + 0.5 * width
+        value_right, slope_right = gap_at(given, right)
+    return NEVER
+
+
+@scalar
+def gap_at(given, at):
+    """Return a gap, seen from one side and raised by a distance, and its slope."""
+    aside, first, side, distance = given
+    value, slope, _ = gap_along(aside, first, at)
+    return side * value + distance, side * slope

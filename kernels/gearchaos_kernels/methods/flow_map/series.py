@@ -1,0 +1,320 @@
+"""The maps of one lane from the Taylor series of its equations about the middle of every step.
+
+Two things enter: the formulas of the model, applied to unit vectors, and the functions of the mesh
+phase that excite it. `store` has the equations that are solved here.
+"""
+
+import numpy as np
+from numba import prange
+from numpy.polynomial import chebyshev
+
+from gearchaos_kernels.compilation import driver, evaluator, part, scalar
+from gearchaos_kernels.contact.elements import Push
+from gearchaos_kernels.memory.block_memory import (
+    aligned_memory,
+    fill_lane,
+    numbers_of_elements,
+    state_of,
+    write_state,
+)
+from gearchaos_kernels.memory.rows import STATE, STRIDE, State, rows
+from gearchaos_kernels.memory.tuples import each
+from gearchaos_kernels.methods.flow_map.layout import TERMS, fourth_derivative, layout, waves_at
+from gearchaos_kernels.models.protocol import (
+    accelerations,
+    elements_at,
+    gaps_at,
+    mobility_forces,
+    unit_forcing,
+)
+from gearchaos_kernels.plan import Floats
+
+ORDER = 22
+"""Terms of the Taylor series that they come from."""
+
+TAIL = 2e-15
+"""What may be left of the series, relative to their largest term."""
+
+TOGETHER = 8
+"""Steps whose series are computed side by side: they fill vectors, and the cache holds them."""
+
+
+def _economy() -> tuple[Floats, Floats]:
+    """What cuts a Taylor series (ORDER,) to TERMS terms, and the Chebyshev terms that it drops."""
+    exact = np.stack(
+        [np.pad(chebyshev.poly2cheb(unit), (0, ORDER))[:ORDER] for unit in np.eye(ORDER)]
+    )
+    kept = np.stack([np.pad(chebyshev.cheb2poly(one[:TERMS]), (0, TERMS))[:TERMS] for one in exact])
+    return np.ascontiguousarray(kept.T), np.ascontiguousarray(exact.T[TERMS:])
+
+
+_KEPT, _DROPPED = _economy()
+
+
+_BENDS = fourth_derivative(np.arange(TERMS, dtype=float)) / 18.0
+"""By how much each power of s may lower the middle Bezier points of its Hermite cubic.
+
+With t from 0 to 1 along the step, which is 2 long, both differ by no more than f t^2 (1 - t)^2 2/3,
+where f is the fourth derivative, and that is no more than f/6 (t (1 - t)^2 + t^2 (1 - t)): what
+both middle points add, moved by f/18. A piece of the step has the fourth power of its share.
+"""
+
+_ENDS = np.stack([(-1.0) ** np.arange(ORDER + 1), np.ones(ORDER + 1)])
+"""What makes the values at both ends of a step of a series."""
+
+
+@evaluator
+def differentiate(coefficients, matrices, scene):
+    """Apply the formulas of a model to one unit after the other, lane by lane.
+
+    ``matrices`` (lanes, states + elements, states + 1 + waves + elements): rates of the states
+    without the springs of the elements, and all gaps, by state, drive, waves, and by a force of
+    one of each element, with its share of the stiffness.
+    """
+    memory = aligned_memory(rows(scene).total)
+    place = layout(scene)
+    states = place.states
+    forced = states + 1 + place.waves
+    for number in range(matrices.shape[0]):
+        lane, matrix = fill_lane(memory, 0, coefficients[number], scene), matrices[number]
+        for column in range(forced + place.elements):
+            unit = np.zeros(forced + place.elements)
+            unit[column] = 1.0
+            for line in range(states):
+                memory[(STATE + line) * STRIDE] = unit[line]
+            state = state_of(memory, 0, scene)
+            acting = unit_forcing(lane, unit[states], waves_at(unit, states + 1, scene), scene)
+            gaps = gaps_at(state, lane, acting, scene)
+            elements, shares = elements_at(lane, acting, scene), mobility_forces(lane, scene)
+            units = numbers_of_elements(unit, forced, scene)
+            pushes = each(unit_push, gaps, elements, shares, units)
+            change = accelerations(state, pushes, acting, lane, scene)
+            write_state(memory, STATE, 0, State(state.rate, change), scene)
+            for line in range(states):
+                matrix[line, column] = memory[(STATE + line) * STRIDE]
+            for element in range(place.elements):
+                matrix[states + element, column] = gaps[element].value
+
+
+@scalar
+def unit_push(gap, element, share, unit):
+    """Return the push of an element without its spring, with its share of a force of one."""
+    return Push(element.damping * gap.closing + share * unit, 0.0)
+
+
+@driver
+def make_maps(matrices, stiffness, inputs, forcing, tables, tails, place):
+    """Fill the maps of lanes, shape (lanes, steps, size of a step), and return what series leave.
+
+    Compiled once for all scenes. ``matrices``: see `differentiate`; ``stiffness`` (lanes, 2): mean
+    and variation; ``inputs``: see `MapFormulas`; ``forcing`` (1 + waves, `ORDER`, steps): Taylor
+    coefficients about the middle of every step, of the stiffness variation and of the waves;
+    ``place``: the `Layout`.
+    """
+    for number in prange(tables.shape[0]):
+        # One type of number inside and outside of the parallel loop: else two are compiled.
+        lane = np.int64(number)
+        tails[lane] = fill_maps(
+            matrices[lane], stiffness[lane], inputs, forcing, tables[lane], place
+        )
+
+
+@part
+def fill_maps(matrix, stiffness, inputs, forcing, table, place):
+    """Fill the maps of a lane, shape (steps, size of a step); return what series leave."""
+    tail = 0.0
+    for first in range(0, table.shape[0], TOGETHER):
+        some = table[first : first + TOGETHER]
+        near = forcing[:, :, first : first + TOGETHER]
+        width = place.branches * some.shape[0]
+        engaged = np.empty((place.elements, width))
+        acting = np.empty((forcing.shape[0], ORDER, width))
+        for at in range(width):
+            number, step = divmod(at, some.shape[0])
+            for element in range(place.elements):
+                engaged[element, at] = 1.0 - (number >> element) % 2
+            for term in range(ORDER):
+                acting[0, term, at] = stiffness[1] * near[0, term, step]
+                for wave in range(1, forcing.shape[0]):
+                    acting[wave, term, at] = near[wave, term, step]
+            acting[0, 0, at] += stiffness[0]
+        tail = np.maximum(tail, fill_steps(matrix, engaged, inputs, acting, some, place))
+        if not tail < TAIL:
+            break
+    return tail
+
+
+@part
+def fill_steps(matrix, engaged, inputs, forcing, table, place):
+    """Fill the maps of some steps on all sets of branches; return what is left of the series.
+
+    In every array the last numbers are those of these steps, one set of branches after the other.
+    They are written one by one: with an array for a part of another one Numba compiles a text for
+    where they do not fit.
+    """
+    states, columns, elements = place.states, place.columns, place.elements
+    functions = 1 + place.waves
+    rates = matrix[:states, : states + functions].copy()
+    gaps = matrix[states:, : states + functions].copy()
+    mobility = matrix[:states, states + functions :].copy()
+    width = engaged.shape[1]
+
+    # The motion by column with drive and waves below it, the gaps, and the forces times K.
+    psi = np.zeros((ORDER + 1, states + functions, columns * width))
+    gap = np.zeros((ORDER, elements, columns * width))
+    force = np.zeros((ORDER, elements, columns * width))
+    for column in range(states):
+        psi[0, column, column * width : (column + 1) * width] = 1.0
+    for number in range(place.inputs):
+        column = states if number == 0 else states + elements + number
+        for function in range(functions):
+            steady = inputs[number, function, 0]
+            for at in range(width):
+                psi[0, states + function, column * width + at] += steady
+            for wave in range(1, functions):
+                share = inputs[number, function, wave]
+                if share != 0.0:
+                    for k in range(ORDER):
+                        for at in range(width):
+                            value = share * forcing[wave, k, at]
+                            psi[k, states + function, column * width + at] += value
+    # An offset is no part of the gap, but less deflection.
+    for element in range(elements):
+        gap[0, element, (states + 1 + element) * width : (states + 2 + element) * width] = -1.0
+    solve(0.5, (rates, mobility, gaps), forcing[0], engaged, psi, gap, force)
+    for element in range(elements):
+        for at in range((states + 1 + element) * width, (states + 2 + element) * width):
+            gap[0, element, at] += 1.0
+
+    # The inverse flow, transposed, and what it makes of the mobilities, with K.
+    inverse = np.zeros((ORDER + 1, states, states * width))
+    moved = np.zeros((ORDER, elements, states * width))
+    switch = np.zeros((ORDER, elements, states * width))
+    for line in range(states):
+        inverse[0, line, line * width : (line + 1) * width] = 1.0
+    backward = np.ascontiguousarray(rates[:, :states].T), gaps.T.copy(), mobility.T.copy()
+    solve(-0.5, backward, forcing[0], engaged, inverse, moved, switch)
+
+    # From the middle of the step to its beginning; a step is 2 long in s.
+    ends = combined(_ENDS, psi).reshape((2, states + functions, columns, width))
+    back = combined(_ENDS, inverse).reshape((2, states, states, width))[0]
+    from_beginning = np.zeros((columns, columns, width))
+    first = np.zeros((states, states, width))
+    for at in range(width):
+        for line in range(states):
+            for source in range(states):
+                from_beginning[line, source, at] = back[source, line, at]
+                first[source, line, at] = 0.5 * ends[0, line, source, at]
+        for column in range(states, columns):
+            from_beginning[column, column, at] = 1.0
+            for line in range(states):
+                for source in range(states):
+                    begin = ends[0, source, column, at]
+                    from_beginning[line, column, at] -= back[source, line, at] * begin
+    end = multiplied(ends[1, :states], from_beginning)
+    along, tail = economised(gap)
+    along = multiplied(along.reshape((TERMS * elements, columns, width)), from_beginning)
+    traced, lost = economised(switch)
+    traced = multiplied(traced.reshape((TERMS * elements, states, width)), first)
+    for left in (lost, largest(psi[ORDER, :states]), largest(inverse[ORDER])):
+        tail = np.maximum(tail, left)
+
+    for at in range(width):
+        number, step = divmod(at, table.shape[0])
+        row = table[step]
+        piece = row[place.header + number * place.size :]
+        for column in range(columns):
+            for line in range(states):
+                piece[column * place.width + line] = end[line, column, at]
+        for element in range(elements):
+            for column in range(columns):
+                bend = 0.0
+                for term in range(TERMS):
+                    value = along[term * elements + element, column, at]
+                    piece[place.gap + (element * columns + column) * TERMS + term] = value
+                    bend += _BENDS[term] * abs(value)
+                bound = place.bounds + element * place.bound_size + column
+                row[bound] = max(row[bound], bend)
+            for term in range(TERMS):
+                for line in range(states):
+                    value = traced[term * elements + element, line, at]
+                    piece[place.switch + (element * TERMS + term) * place.width + line] = value
+    return tail
+
+
+@part
+def solve(scale, matrices, stiffness, engaged, terms, seen, pulled):
+    """Solve terms' = scale (rates + outer K engaged inner) terms; give inner terms, and K of it."""
+    rates, outer, inner = matrices
+    width = engaged.shape[1]
+    acting = np.zeros(seen.shape[1:])
+    for k in range(ORDER):
+        add_product(1.0, inner, terms[k], seen[k])
+        for element in range(seen.shape[1]):
+            for begin in range(0, seen.shape[2], width):
+                part = pulled[k, element, begin : begin + width]
+                for j in range(k + 1):
+                    for at in range(width):
+                        part[at] += stiffness[k - j, at] * seen[j, element, begin + at]
+                for at in range(width):
+                    acting[element, begin + at] = engaged[element, at] * part[at]
+        add_product(scale / (k + 1), rates, terms[k], terms[k + 1])
+        add_product(scale / (k + 1), outer, acting, terms[k + 1])
+
+
+@part
+def add_product(scale, a, b, target):
+    """Add the product of two matrices, the first of which is small, times a number.
+
+    What one of them has more of than the target or the other one does not count.
+    """
+    for line in range(min(a.shape[0], target.shape[0])):
+        for source in range(min(a.shape[1], b.shape[0])):
+            factor = scale * a[line, source]
+            if factor != 0.0:
+                for column in range(target.shape[1]):
+                    target[line, column] += factor * b[source, column]
+
+
+@part
+def combined(matrix, series):
+    """Return combinations of the terms of a series."""
+    flat = series.reshape((series.shape[0], -1))
+    target = np.zeros((matrix.shape[0], flat.shape[1]))
+    add_product(1.0, matrix, flat, target)
+    return target
+
+
+@part
+def multiplied(a, b):
+    """Return the product of the matrices of every step."""
+    target = np.zeros((a.shape[0], b.shape[1], b.shape[2]))
+    for line in range(a.shape[0]):
+        for source in range(b.shape[0]):
+            for column in range(b.shape[1]):
+                for at in range(b.shape[2]):
+                    target[line, column, at] += a[line, source, at] * b[source, column, at]
+    return target
+
+
+@part
+def economised(series):
+    """Cut Taylor series to fewer terms; return them, and the largest share that is lost."""
+    kept, lost = combined(_KEPT, series), combined(_DROPPED, series)
+    most = 0.0
+    for column in range(lost.shape[1]):
+        together = 0.0
+        for term in range(lost.shape[0]):
+            together += abs(lost[term, column])
+        most = np.maximum(most, together)
+    return kept, most / np.maximum(largest(kept), 1e-300)
+
+
+@part
+def largest(matrix):
+    """Return the size of the largest element; what is not a number is larger than any."""
+    most = 0.0
+    for row in matrix:
+        for number in row:
+            most = np.maximum(most, abs(number))
+    return most

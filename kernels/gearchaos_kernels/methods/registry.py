@@ -1,0 +1,8 @@
+"""All methods."""
+
+from gearchaos_kernels.methods.flow_map.method import FLOW_MAP
+from gearchaos_kernels.methods.protocol import Method
+from gearchaos_kernels.methods.rk4.method import RK4
+
+METHODS: dict[str, Method] = {method.name: method for method in (RK4, FLOW_MAP)}
+"""All methods by their names."""

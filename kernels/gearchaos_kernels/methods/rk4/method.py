@@ -1,0 +1,139 @@
+"""RK4 as a method: fixed steps, split at crossings if the plan says so."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from gearchaos_kernels.compilation import scalar
+from gearchaos_kernels.contact.branches import suspects_of
+from gearchaos_kernels.memory.block_memory import (
+    read_branches,
+    read_lane,
+    read_state,
+    state_of,
+    write_state,
+)
+from gearchaos_kernels.memory.rows import LANES, STATE, STRIDE, rows
+from gearchaos_kernels.methods.protocol import Method, Share, cut
+from gearchaos_kernels.methods.rk4 import steps as rk4
+from gearchaos_kernels.methods.rk4.splitting import split_step
+from gearchaos_kernels.models.protocol import (
+    first_point,
+    forcing_at,
+    from_kept,
+    gaps_at,
+    grid_at,
+    keep_point,
+    point_at,
+    to_kept,
+)
+from gearchaos_kernels.plan import Plan
+from gearchaos_kernels.scene import Scene, implement
+
+
+@dataclass(frozen=True)
+class Rk4:
+    """Stands for RK4 in a scene."""
+
+
+def prepare(system: Any, plan: Plan, _scene: Scene) -> Iterator[Share]:
+    """Yield all lanes at once: they share nothing but the number of steps."""
+    lanes, steps = system.lanes, plan.steps_per_period
+    blocks = cut(np.array([lanes]), np.array([steps]), np.array([0]))
+    yield Share(np.arange(lanes), blocks, np.zeros(0), np.full(lanes, steps))
+
+
+@scalar
+def maps_per_step(scene):
+    """Return 0: RK4 prepares nothing."""
+    return 0
+
+
+@scalar
+def workspace(scene):
+    """Return nothing: RK4 needs none."""
+    return
+
+
+@scalar
+def begin_lane(memory, slot, lane, scene):
+    """Prepare nothing."""
+
+
+@scalar
+def step(memory, lanes, at, given, scene):
+    """Take one step in every slot; return how many may have left a contact branch."""
+    # Not in the loop over slots: the compiler cannot know that its stores leave the tables alone.
+    start = grid_at(given.tables, 2 * at.number, scene)
+    middle = grid_at(given.tables, 2 * at.number + 1, scene)
+    final = grid_at(given.tables, 2 * at.number + 2, scene)
+    # A sum of integers, which the compiler vectorises; it does not vectorise a flag.
+    suspects = 0
+    for slot in range(LANES):
+        lane = read_lane(memory, slot, scene)
+        state = state_of(memory, slot, scene)
+        begin = forcing_at(lane, first_point(memory, slot, start, scene), scene)
+        halfway = forcing_at(lane, point_at(memory, slot, middle, scene), scene)
+        point = point_at(memory, slot, final, scene)
+        end = forcing_at(lane, point, scene)
+        keep_point(memory, slot, point, scene)
+        during = begin, halfway, halfway, end
+        branches = None
+        if scene.resolved is not None:
+            branches = read_branches(memory, slot, scene)
+        moving = from_kept(state, begin, scene)
+        after, pushes = rk4.advance(rk4.motion, moving, 1.0, lane, during, branches, scene)
+        if scene.resolved is not None:
+            gaps = gaps_at(moving, lane, begin, scene)
+            gaps_after = gaps_at(after, lane, end, scene)
+            elements = suspects_of(gaps, gaps_after, branches, 0.0, scene)
+            suspects += 1 if elements != 0.0 else 0
+            memory[rows(scene).suspect * STRIDE + slot] = elements
+        if scene.before is not None:
+            write_state(memory, rows(scene).state_before, slot, state, scene)
+        write_state(memory, STATE, slot, to_kept(after, end, scene), scene)
+        if scene.tangent is not None:
+            tangent = read_state(memory, rows(scene).tangent, slot, scene)
+            if scene.resolved is not None:
+                write_state(memory, rows(scene).tangent_before, slot, tangent, scene)
+            tangent, _ = rk4.advance(rk4.tangent, tangent, 1.0, lane, pushes, None, scene)
+            write_state(memory, rows(scene).tangent, slot, tangent, scene)
+    return suspects
+
+
+@scalar
+def resolve(memory, lanes, at, given, scene):
+    """Split the step of every lane that may have left a contact branch."""
+    # No array of the outcome here: passing one means counting references to it at every step.
+    for slot in range(lanes):
+        if memory[rows(scene).suspect * STRIDE + slot] != 0.0:
+            split_step(memory, slot, at, given.tables, scene)
+
+
+@scalar
+def grids(clock, given, scene):
+    """Return what all lanes share at the beginning of the step, in its middle and at its end."""
+    begin = grid_at(given.tables, 2 * clock.number, scene)
+    middle = grid_at(given.tables, 2 * clock.number + 1, scene)
+    return begin, middle, grid_at(given.tables, 2 * clock.number + 2, scene)
+
+
+RK4 = Method(
+    name="rk4",
+    flags=Rk4,
+    always_resolved=False,
+    rows=lambda _scene: 0,
+    prepare=prepare,
+    memory=lambda _system, _plan, _scene, _stable: 0,
+    is_kept=lambda _system, _plan, _scene: True,
+    maps_per_step=maps_per_step,
+    workspace=workspace,
+    begin_lane=begin_lane,
+    step=step,
+    resolve=resolve,
+    grids=grids,
+)
+
+implement(Rk4, RK4)

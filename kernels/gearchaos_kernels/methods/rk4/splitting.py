@@ -1,0 +1,117 @@
+"""One step of one lane, split wherever it leaves a contact branch.
+
+The loop over slots integrates every step on the contact branches on which it begins, where the
+field is smooth. The few steps and lanes that may have left a branch come here one by one: the step
+is repeated up to the crossing, then on the next branch, as often as it crosses.
+"""
+
+from gearchaos_kernels.compilation import scalar
+from gearchaos_kernels.contact.branches import branches_at, leave
+from gearchaos_kernels.contact.leaving import NEVER, leaving_fraction
+from gearchaos_kernels.memory.block_memory import (
+    read_branches,
+    read_lane,
+    read_state,
+    state_before,
+    state_of,
+    write_branches,
+    write_state,
+)
+from gearchaos_kernels.memory.rows import STATE, STRIDE, rows
+from gearchaos_kernels.memory.tuples import each
+from gearchaos_kernels.methods.rk4 import steps as rk4
+from gearchaos_kernels.models.protocol import (
+    forcing_at,
+    from_kept,
+    gaps_at,
+    grid_at,
+    half_clearances,
+    point_at,
+    point_within,
+    to_kept,
+)
+
+MOST_SPLITS = 16
+"""Crossings of one step; a step with more continues with its last branches and is counted."""
+
+
+@scalar
+def split_step(memory, slot, at, tables, scene):
+    """Repeat a step of a lane that ignored a crossing in pieces that stay on their branches."""
+    lane = read_lane(memory, slot, scene)
+    state = state_before(memory, slot, scene)
+    after = state_of(memory, slot, scene)
+    tangent = state
+    if scene.tangent is not None:
+        tangent = read_state(memory, rows(scene).tangent_before, slot, scene)
+    number = at.number
+    begin = forcing_on_grid(memory, slot, lane, tables, 2 * number, scene)
+    end = forcing_on_grid(memory, slot, lane, tables, 2 * number + 2, scene)
+    state, after = from_kept(state, begin, scene), from_kept(after, end, scene)
+    gaps = gaps_at(state, lane, begin, scene)
+    branches = read_branches(memory, slot, scene)
+    done = 0.0
+    crossings = 0
+    while True:
+        left = 1.0 - done
+        gaps_after = gaps_at(after, lane, end, scene)
+        fraction, element = first_crossing(gaps, gaps_after, left, branches, lane, scene)
+        # Also where the lane has left the range of numbers, and the fraction is not one.
+        if not fraction <= 1.0 or crossings == MOST_SPLITS:
+            break
+
+        piece = fraction * left
+        middle = forcing_within(memory, slot, lane, tables, number, done + 0.5 * piece, scene)
+        done += piece
+        crossing = forcing_within(memory, slot, lane, tables, number, done, scene)
+        during = begin, middle, middle, crossing
+        state, pushes = rk4.advance(rk4.motion, state, piece, lane, during, branches, scene)
+        if scene.tangent is not None:
+            tangent, _ = rk4.advance(rk4.tangent, tangent, piece, lane, pushes, None, scene)
+        begin = crossing
+        crossings += 1
+        gaps = gaps_at(state, lane, begin, scene)
+        moment = number + done
+        leave(memory, slot, element, gaps[element], branches, lane, moment, at.recorded, scene)
+        branches = read_branches(memory, slot, scene)
+
+        left = 1.0 - done
+        middle = forcing_within(memory, slot, lane, tables, number, done + 0.5 * left, scene)
+        during = begin, middle, middle, end
+        after, pushes = rk4.advance(rk4.motion, state, left, lane, during, branches, scene)
+        write_state(memory, STATE, slot, to_kept(after, end, scene), scene)
+        if scene.tangent is not None:
+            tangent_after, _ = rk4.advance(rk4.tangent, tangent, left, lane, pushes, None, scene)
+            write_state(memory, rows(scene).tangent, slot, tangent_after, scene)
+    if crossings > 0:
+        write_branches(memory, slot, branches_at(gaps_after, lane, scene), scene)
+    if fraction <= 1.0:
+        memory[(rows(scene).crossings + 2) * STRIDE + slot] += 1.0
+
+
+@scalar
+def forcing_on_grid(memory, slot, lane, tables, row, scene):
+    """Return what acts on a lane at a row of the grid of half steps."""
+    point = point_at(memory, slot, grid_at(tables, row, scene), scene)
+    return forcing_at(lane, point, scene)
+
+
+@scalar
+def forcing_within(memory, slot, lane, tables, number, fraction, scene):
+    """Return what acts on a lane at a fraction of a step."""
+    point = point_within(memory, slot, tables, number, fraction, scene)
+    return forcing_at(lane, point, scene)
+
+
+@scalar
+def first_crossing(begin, end, length, branches, lane, scene):
+    """Return where in a piece, ``length`` steps long, a gap leaves its branch, and which one."""
+    fractions = each(leaving_fraction, begin, end, length, branches, half_clearances(lane, scene))
+    first = NEVER
+    element = 0
+    for number in range(len(fractions)):
+        # An element of a lower number comes first at the same moment.
+        earlier = number > 0 and not first <= fractions[number]
+        element = number if earlier else element
+        first = fractions[number] if number == 0 else min(first, fractions[number])
+    return first, element

@@ -1,0 +1,1 @@
+"""The helical gear pair with pitch error of Pan 2021."""

@@ -1,0 +1,103 @@
+"""From the dimensionless groups to the numbers the inner loop reads.
+
+This is the only place that knows both the notation of Pan 2021 and the scaled coordinates of
+`equations`: the groups come in as they are printed in eqs 8-13, and leave as coefficients per
+step. With a step of 1 they are those per unit of tau.
+"""
+
+from collections import namedtuple
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from gearchaos_kernels.models.gear_pair.groups import Groups
+from gearchaos_kernels.plan import Floats
+
+if TYPE_CHECKING:
+    from gearchaos_kernels.models.gear_pair.system import System
+
+Lane = namedtuple(
+    "Lane",
+    "mass_ratio_p mass_ratio_g "
+    "transverse_damping_p transverse_damping_g transverse_stiffness_p transverse_stiffness_g "
+    "axial_damping_p axial_damping_g axial_stiffness_p axial_stiffness_g "
+    "mean_stiffness stiffness_variation mesh_damping axial_share half_backlash load "
+    "error_inertia error_mean error_amplitude error_rate "
+    "axial_error_mean axial_error_amplitude axial_error_rate "
+    "cos_phase sin_phase cosine tangential_speed axial_speed",
+)
+"""Coefficients of one lane (numbers) or of many (arrays), per step; see `lane_coefficients`."""
+
+BEARING_DAMPING = [name for name in Groups._fields if "_damping_" in name]
+BEARING_STIFFNESS = [name for name in Groups._fields if "_stiffness_" in name]
+
+
+def state_scales(system: "System", step: Floats) -> Floats:
+    """Return what turns scaled states into those of eq. 13, shape (lanes, states).
+
+    ``step``, shape (lanes,), is the length of a step in units of tau.
+    """
+    groups, effects = system.groups, system.effects
+    cosine, sine = np.cos(groups.base_helix_angle), np.sin(groups.base_helix_angle)
+    # A spur pair has no axial mesh force: any non-zero scale serves its axial bearings.
+    sine = np.where(sine == 0.0, 1.0, sine)
+    displacements = [cosine]
+    for present, way in ((effects.transverse, cosine), (effects.axial, sine)):
+        if present:
+            displacements += [way * groups.mass_ratio_p, -way * groups.mass_ratio_g]
+    scales = np.repeat(np.array(displacements), 2, axis=0)
+    scales[1::2] /= step
+    return scales.T.copy()
+
+
+def lane_coefficients(system: "System", step: Floats) -> Floats:
+    """Return the coefficients of every lane, shape (lanes, number of fields of `Lane`)."""
+    groups = system.groups
+    cosine, sine = np.cos(groups.base_helix_angle), np.sin(groups.base_helix_angle)
+    # y_1 = q - e cos(beta_b) as printed in eq. 6, or q + e - e cos(beta_b) as eq. 1 gives.
+    share = 1.0 - 1.0 / cosine if system.physical else np.ones_like(cosine)
+    share_z = 2.0 * np.ones_like(cosine)
+    if system.physical and system.teeth is not None:
+        # Deviations of teeth lie in the transverse plane: y_1 = q - e, with q itself.
+        share, share_z = 1.0 / cosine, 2.0 / cosine
+    phase_step = groups.mesh_frequency * step
+    lane = Lane(
+        mass_ratio_p=groups.mass_ratio_p,
+        mass_ratio_g=groups.mass_ratio_g,
+        **{name: 2.0 * getattr(groups, name) * step for name in BEARING_DAMPING},
+        **{name: getattr(groups, name) * step**2 for name in BEARING_STIFFNESS},
+        mean_stiffness=cosine * step**2,
+        stiffness_variation=cosine * step**2 * groups.stiffness_variation_scale,
+        mesh_damping=2.0 * groups.damping_ratio * cosine * step,
+        axial_share=np.tan(groups.base_helix_angle),
+        half_backlash=groups.half_backlash,
+        load=groups.load / cosine * step**2,
+        error_inertia=phase_step**2 * groups.error_amplitude / cosine,
+        error_mean=share * groups.error_mean,
+        error_amplitude=share * groups.error_amplitude,
+        error_rate=share * groups.error_amplitude * phase_step,
+        axial_error_mean=share_z * groups.error_mean,
+        axial_error_amplitude=share_z * groups.error_amplitude,
+        axial_error_rate=share_z * groups.error_amplitude * phase_step,
+        cos_phase=np.cos(groups.error_phase),
+        sin_phase=np.sin(groups.error_phase),
+        cosine=cosine,
+        tangential_speed=cosine / step,
+        axial_speed=sine / step,
+    )
+    return np.array(lane, dtype=np.float64).T.copy()
+
+
+def growth_rates(system: "System") -> Floats:
+    """Return a bound on how fast a tangent vector grows or decays, per unit of tau, shape (lanes,).
+
+    The bound follows from the damping and the square root of the largest stiffness of the mesh in
+    one direction; bearings only exchange energy and dissipate it.
+    """
+    groups = system.groups
+    bearings = np.maximum.reduce([getattr(groups, name) for name in BEARING_DAMPING])
+    # How much a unit of mesh force accelerates the approach of the gears in one direction.
+    mobility = 1.0 + groups.mass_ratio_p + groups.mass_ratio_g
+    damping = 2.0 * groups.damping_ratio * mobility + 2.0 * bearings
+    bound: Floats = damping + np.sqrt(mobility * (1.0 + np.abs(groups.stiffness_variation_scale)))
+    return bound

@@ -1,0 +1,71 @@
+"""Eq. 13 evaluated on given states, in the terms of a gear pair."""
+
+import numpy as np
+
+from gearchaos_kernels import evaluation
+from gearchaos_kernels.batch import scene_of
+from gearchaos_kernels.compilation import evaluator
+from gearchaos_kernels.memory.block_memory import aligned_memory, fill_lane
+from gearchaos_kernels.memory.rows import rows
+from gearchaos_kernels.models.gear_pair.forcing import pitch_error_at
+from gearchaos_kernels.models.gear_pair.system import MeshMotion, System
+from gearchaos_kernels.models.protocol import begin_period, grid_at, point_at
+from gearchaos_kernels.plan import Floats, Plan
+
+_ALONE = Plan(1, 0, 0, 0, resolved=False)
+
+
+def jacobian(system: System, tangential: Floats, axial: Floats) -> Floats:
+    """Return the Jacobian of eq. 13 per unit of tau, shape (lanes, states, states).
+
+    On one contact branch of either direction: ``tangential``, ``axial`` (lanes,) are kappa f' in
+    N_y and in N_z, the relative mesh stiffness in contact and 0 without contact.
+    """
+    slopes = np.stack(np.broadcast_arrays(tangential, axial), axis=1)
+    return evaluation.jacobian(system, slopes)
+
+
+def mesh_motion(
+    system: System, states: Floats, steps_per_period: int, first_period: int = 0
+) -> MeshMotion:
+    """Return forces, contact and accelerations along a motion (eqs 6, 7, 13, 22 and 23).
+
+    Without clearance teeth never part, and the sign of the gap decides the flank. ``states``
+    (lanes, samples, states): one step apart, the first one at mesh phase 0, after ``first_period``
+    mesh periods that the teeth have turned.
+    """
+    found = evaluation.evaluate(system, states, steps_per_period, first_period)
+    error = np.zeros(states.shape[:2])
+    if system.effects.pitch_error:
+        _follow_error(
+            system.coefficients(system.mesh_period / steps_per_period),
+            system.tables(steps_per_period),
+            2 * steps_per_period,
+            first_period,
+            error,
+            scene_of(system, _ALONE),
+        )
+    axial = system.effects.axial
+    nothing = np.zeros(error.shape)
+    return MeshMotion(
+        force_tangential=found.forces[:, :, 0].copy(),
+        force_axial=found.forces[:, :, 1].copy() if axial else nothing,
+        contact_tangential=found.contact[:, :, 0].copy(),
+        contact_axial=found.contact[:, :, 1].copy() if axial else nothing.astype(np.uint8),
+        accelerations=found.accelerations,
+        pitch_error=error,
+    )
+
+
+@evaluator
+def _follow_error(coefficients, tables, half_steps, first, error, scene):
+    """Evaluate the pitch error at every sample, lane by lane."""
+    memory = aligned_memory(rows(scene).total)
+    for index in range(error.shape[0]):
+        lane = fill_lane(memory, 0, coefficients[index], scene)
+        for sample in range(error.shape[1]):
+            row = 2 * sample % half_steps
+            if row == 0:
+                begin_period(memory, 0, index, first + 2 * sample // half_steps, tables, scene)
+            point = point_at(memory, 0, grid_at(tables, row, scene), scene)
+            error[index, sample] = pitch_error_at(lane, point, scene)

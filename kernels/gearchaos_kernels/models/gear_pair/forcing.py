@@ -1,0 +1,173 @@
+"""What acts on a lane at one instant: mesh stiffness, load and pitch error.
+
+The pitch error here is the sine of eq. 14; `teeth` has the one that teeth share. With a fixed
+number of steps per mesh period, every period meets the same phases, so that all of it comes from
+one table: the inner loop evaluates no trigonometric function. Between the points of the table the
+series about the nearest one is as exact as the table itself.
+"""
+
+import math
+from functools import lru_cache
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gearchaos_kernels.compilation import scalar
+from gearchaos_kernels.plan import Floats
+
+if TYPE_CHECKING:
+    from gearchaos_kernels.models.gear_pair.system import System
+
+SINE, COSINE, VARIATION = 0, 1, 2
+"""Columns of the table; from `VARIATION` on the Taylor coefficients of the stiffness variation."""
+
+_SERIES_ERROR = 1e-15
+_MOST_TERMS = 40
+
+
+class Phase(NamedTuple):
+    """A mesh phase: stiffness variation relative to the mean, and a pitch error of amplitude 1.
+
+    Of the error its value, and its first and second derivative by the phase in radians.
+    """
+
+    variation: float
+    value: float
+    slope: float
+    curvature: float
+
+
+class Forcing(NamedTuple):
+    """What acts on a lane at one instant, per step; what a scene leaves out is the constant 0."""
+
+    stiffness: float
+    drive: float
+    error: float
+    error_rate: float
+    axial_error: float
+    axial_error_rate: float
+
+
+@lru_cache(maxsize=8)  # Made anew it would be half of what a call costs beforehand.
+def phase_table(
+    cosine: tuple[float, ...], sine: tuple[float, ...], steps_per_period: int
+) -> NDArray[np.float64]:
+    """Return sine, cosine and stiffness variation at every half step of a mesh period.
+
+    From the Fourier coefficients of the mesh stiffness relative to its mean (eq. 19), as an array
+    of shape (2 steps + 1, 2 + terms). The last row repeats the first: the phase begins anew with
+    every period. The terms are the variation and its further Taylor coefficients in the mesh phase,
+    as many as it takes to reach halfway to the next row.
+    """
+    half_steps = np.arange(2 * steps_per_period + 1) % (2 * steps_per_period)
+    angle = np.pi * half_steps / steps_per_period
+    order = np.arange(1, len(cosine) + 1)
+    amplitude = np.array(cosine) - 1j * np.array(sine)
+    reach = order * np.pi / (2 * steps_per_period)
+    waves = amplitude * np.exp(1j * np.outer(angle, order))
+    coefficients = [np.sum(waves.real, axis=1)]
+    for term in range(1, _MOST_TERMS):
+        waves = waves * 1j * order / term
+        coefficients.append(np.sum(waves.real, axis=1))
+        if np.sum(np.abs(amplitude) * reach**term) < _SERIES_ERROR * math.factorial(term):
+            break
+    return np.stack([np.sin(angle), np.cos(angle), *coefficients], axis=1)
+
+
+def wave_series(system: "System", steps: int, terms: int) -> Floats:
+    """Return Taylor coefficients about the middle of every step, shape (3, terms, steps).
+
+    Of the stiffness variation relative to the mean (eq. 19), and of sine and cosine of the phase.
+    """
+    half = np.pi / steps
+    middle = (2 * np.arange(steps) + 1) * half
+    term = np.arange(terms)[:, np.newaxis]
+    factor = half**term / np.cumprod(np.maximum(term, 1.0))[:, np.newaxis]
+    turn = np.exp(1j * middle) * 1j**term * factor
+    variation = np.zeros(turn.shape)
+    if system.effects.stiffness_variation:
+        for number, amplitude in enumerate(system.stiffness_cosine - 1j * system.stiffness_sine, 1):
+            waves = amplitude * np.exp(1j * number * middle) * (1j * number) ** term * factor
+            variation += waves.real
+    return np.stack([variation, turn.imag, turn.real])
+
+
+@scalar
+def phase_on_grid(table, row):
+    """Return one row of the table."""
+    sine = table[row, SINE]
+    return Phase(table[row, VARIATION], sine, table[row, COSINE], -sine)
+
+
+@scalar
+def phase_within(table, number, fraction):
+    """Return the mesh phase at a fraction of a step, from the series about the nearest row."""
+    nearest = int(2.0 * fraction + 0.5)
+    row = 2 * number + nearest
+    angle = (2.0 * fraction - nearest) * (2.0 * math.pi / (table.shape[0] - 1))
+    square = angle * angle
+    sine = angle * (
+        1.0
+        - square
+        * (1.0 / 6.0 - square * (1.0 / 120.0 - square * (1.0 / 5040.0 - square / 362880.0)))
+    )
+    cosine = 1.0 - square * (
+        0.5
+        - square
+        * (1.0 / 24.0 - square * (1.0 / 720.0 - square * (1.0 / 40320.0 - square / 3628800.0)))
+    )
+    variation = 0.0
+    for term in range(table.shape[1] - 1, VARIATION - 1, -1):
+        variation = variation * angle + table[row, term]
+    value = table[row, SINE] * cosine + table[row, COSINE] * sine
+    return Phase(variation, value, table[row, COSINE] * cosine - table[row, SINE] * sine, -value)
+
+
+@scalar
+def forcing_at(lane, point, scene):
+    """Return mesh stiffness (eq. 19), load and pitch error (eq. 14) of a lane at a mesh phase."""
+    stiffness = lane.mean_stiffness
+    if scene.model.stiffness_variation is not None:
+        stiffness = lane.mean_stiffness + lane.stiffness_variation * point.variation
+    drive = lane.load
+    error = 0.0
+    error_rate = 0.0
+    axial_error = 0.0
+    axial_error_rate = 0.0
+    if scene.model.pitch_error is not None:
+        point = shifted(lane, point, scene)
+        if scene.model.undamped is None:
+            # -e'' drives delta_5, which is measured from e (eq. 13).
+            drive = lane.load - lane.error_inertia * point.curvature
+        error = lane.error_mean + lane.error_amplitude * point.value
+        error_rate = lane.error_rate * point.slope
+        if scene.model.axial is not None:
+            axial_error = lane.axial_error_mean + lane.axial_error_amplitude * point.value
+            axial_error_rate = lane.axial_error_rate * point.slope
+    return Forcing(stiffness, drive, error, error_rate, axial_error, axial_error_rate)
+
+
+@scalar
+def unforced(lane, scene):
+    """Return a mesh of mean stiffness with nothing else acting."""
+    return Forcing(lane.mean_stiffness, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+@scalar
+def pitch_error_at(lane, point, scene):
+    """Return e at a mesh phase: half of what the axial gap has, whatever the form of the gaps."""
+    value = lane.axial_error_amplitude * shifted(lane, point, scene).value
+    if scene.model.undamped is not None:
+        return 0.5 * lane.cosine * (lane.axial_error_mean + value)
+    return 0.5 * (lane.axial_error_mean + value)
+
+
+@scalar
+def shifted(lane, point, scene):
+    """Return a mesh phase with the sine of the error shifted by the phase that a lane gives it."""
+    if scene.model.phase is None:
+        return point
+    value = lane.cos_phase * point.value + lane.sin_phase * point.slope
+    slope = lane.cos_phase * point.slope - lane.sin_phase * point.value
+    return Phase(point.variation, value, slope, -value)

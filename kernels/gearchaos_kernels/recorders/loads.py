@@ -1,0 +1,226 @@
+"""Forces of the elements, and the signals that a model has observed, over the recorded periods.
+
+Of each signal its extremes and the integrals of itself and of its square. A step gives three
+values: at both ends, and in the middle, where the state is on the cubic through both. Integrals
+follow by Simpson's rule, extremes from the parabola through the three. Where an element is met or
+left in between, its force has a kink; what it is there, damping alone, counts as a fourth value and
+the parabola does not.
+
+The rows: the signals and the slopes of the forces at the end of the last step, then of each signal
+its largest and smallest value, and the sums over the steps of six times the mean of itself and of
+its square.
+"""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba import types
+from numba.extending import intrinsic
+
+from gearchaos_kernels.compilation import scalar
+from gearchaos_kernels.contact.elements import pushes_of
+from gearchaos_kernels.memory.block_memory import (
+    load_like,
+    read_lane,
+    state_before,
+    state_of,
+    store,
+)
+from gearchaos_kernels.memory.rows import LANES, STRIDE, State, constants
+from gearchaos_kernels.memory.tuples import along, each
+from gearchaos_kernels.methods.protocol import grids_of
+from gearchaos_kernels.models.protocol import (
+    elements_at,
+    forcing_at,
+    from_kept,
+    gaps_at,
+    grid_at,
+    observed_at,
+    point_at,
+    unforced,
+)
+from gearchaos_kernels.recorders.protocol import Recorder
+from gearchaos_kernels.scene import Scene, provider_of
+
+SIGNAL_ROWS = 4
+"""Rows of the record of one signal."""
+
+
+def elements_of(scene: Scene) -> int:
+    """Return the number of forces among the signals."""
+    elements: int = provider_of(scene.model).elements(scene.model)
+    return elements
+
+
+def signals_of(scene: Scene) -> int:
+    """Return the number of signals: the forces, then what the model has observed."""
+    return elements_of(scene) + len(provider_of(scene.model).observed)
+
+
+def rows(scene: Scene) -> int:
+    """Return the number of rows of a scene."""
+    return signals_of(scene) * (1 + SIGNAL_ROWS) + elements_of(scene)
+
+
+class Signals(NamedTuple):
+    """Of the rows of a recorder: how far behind its first one the records of signals begin."""
+
+    signals: int
+    records: int
+
+
+signals = constants(
+    lambda scene: Signals(signals_of(scene), signals_of(scene) + elements_of(scene))
+)
+"""`Signals` of a scene, as constants of compiled code."""
+
+
+@intrinsic
+def numbered(_typing_context: Any, values: Any) -> Any:
+    """Return the numbers of the elements of a tuple, from 0 on, as a tuple."""
+    count = len(values)
+    kind = types.UniTuple(types.intp, count)
+
+    def generate(context: Any, builder: Any, _signature: Any, _arguments: Any) -> Any:
+        numbers = [context.get_constant(types.intp, number) for number in range(count)]
+        return context.make_tuple(builder, kind, numbers)
+
+    return kind(values), generate
+
+
+@scalar
+def force_of(push):
+    """Return the force of a push."""
+    return push.force
+
+
+@scalar
+def slope_of(push):
+    """Return the slope of a push."""
+    return push.slope
+
+
+@scalar
+def signals_at(state, lane, point, forcing, scene):
+    """Return all signals of a state at a mesh phase, forces per step squared, and the slopes."""
+    gaps = gaps_at(state, lane, forcing, scene)
+    pushes = pushes_of(gaps, elements_at(lane, forcing, scene), None, scene)
+    values = each(force_of, pushes) + observed_at(state, lane, point, scene)
+    return values, each(slope_of, pushes)
+
+
+@scalar
+def begin(memory, at, block, clock, given, scene):
+    """Begin the record of every slot with its signals when the recorded periods begin."""
+    if clock.recorded == 0:
+        for slot in range(LANES):
+            lane = read_lane(memory, slot, scene)
+            point = point_at(memory, slot, grid_at(given.steps.tables, 0, scene), scene)
+            forcing = forcing_at(lane, point, scene)
+            state = from_kept(state_of(memory, slot, scene), forcing, scene)
+            values, slopes = signals_at(state, lane, point, forcing, scene)
+            store(memory, at, slot, values + slopes)
+            first = at + signals(scene).records
+            each(begin_signal, memory, first, slot, numbered(values), values)
+
+
+@scalar
+def begin_signal(memory, first, slot, number, value):
+    """Begin the record of one signal."""
+    store(memory, first + SIGNAL_ROWS * number, slot, (value, value, 0.0, 0.0))
+
+
+@scalar
+def step(memory, at, block, clock, given, scene):
+    """Add a step to the record of every slot."""
+    if clock.recorded >= 0:
+        start, middle, end = grids_of(clock, given.steps, scene)
+        for slot in range(LANES):
+            lane = read_lane(memory, slot, scene)
+            forcing = forcing_at(lane, point_at(memory, slot, start, scene), scene)
+            before = from_kept(state_before(memory, slot, scene), forcing, scene)
+            last = point_at(memory, slot, end, scene)
+            forcing = forcing_at(lane, last, scene)
+            after = from_kept(state_of(memory, slot, scene), forcing, scene)
+            values, slopes = signals_at(after, lane, last, forcing, scene)
+            point = point_at(memory, slot, middle, scene)
+            forcing = forcing_at(lane, point, scene)
+            halves, _ = signals_at(halfway(before, after), lane, point, forcing, scene)
+            firsts = load_like(memory, at, slot, values)
+            slopes_before = load_like(memory, at + signals(scene).signals, slot, slopes)
+            store(memory, at, slot, values + slopes)
+            smooth = each(without_kink, slopes_before, slopes)
+            smooth = smooth + each(always_smooth, observed_at(after, lane, last, scene))
+            first, numbers = at + signals(scene).records, numbered(values)
+            each(add_step, memory, first, slot, numbers, firsts, halves, values, smooth)
+
+
+@scalar
+def without_kink(before, after):
+    """Return whether an element is in contact at both ends of a step, or at neither."""
+    return (before == 0.0) == (after == 0.0)
+
+
+@scalar
+def always_smooth(_signal):
+    """Return that a signal that the model has observed has no kink."""
+    return True
+
+
+@scalar
+def halfway(before, after):
+    """Return the state in the middle of a step, on the cubic through both ends."""
+    change = along(after.position, -1.0, before.position)
+    straight = along(before.position, 0.5, change)
+    rates = along(before.rate, 1.0, after.rate)
+    return State(
+        along(straight, 0.125, along(before.rate, -1.0, after.rate)),
+        along(along(change, 0.5, change), -0.25, rates),
+    )
+
+
+@scalar
+def add_step(memory, first_row, slot, number, first, half, last, smooth):
+    """Add the three values of a step to the record of one signal."""
+    bend = first - 2.0 * half + last
+    slope = 4.0 * half - 3.0 * first - last
+    # Where the parabola turns, or an end; next to there it is as high: single precision is enough.
+    at = min(1.0, max(0.0, np.float64(np.float32(slope) / np.float32(-4.0 * bend))))
+    turn = first + at * (slope + 2.0 * bend * at) if smooth else half
+    row = (first_row + SIGNAL_ROWS * number) * STRIDE + slot
+    memory[row] = max(memory[row], max(last, turn))
+    memory[row + STRIDE] = min(memory[row + STRIDE], min(last, turn))
+    memory[row + 2 * STRIDE] += first + 4.0 * half + last
+    memory[row + 3 * STRIDE] += first * first + 4.0 * half * half + last * last
+
+
+@scalar
+def crossing(memory, at, slot, crossing, lane, scene):
+    """Enter the force of an element at a crossing: without deflection, it is damping alone."""
+    elements = elements_at(lane, unforced(lane, scene), scene)
+    force = elements[crossing.element].damping * crossing.closing
+    row = (at + signals(scene).records + SIGNAL_ROWS * crossing.element) * STRIDE + slot
+    memory[row] = max(memory[row], force)
+    memory[row + STRIDE] = min(memory[row + STRIDE], force)
+
+
+@scalar
+def finish(memory, at, place, clock, given, scene):
+    """Write the record of all signals of a lane."""
+    loads = given.outcome.loads
+    for signal in range(loads.shape[1]):
+        for number in range(SIGNAL_ROWS):
+            row = at + signals(scene).records + signal * SIGNAL_ROWS + number
+            loads[place.lane, signal, number] = memory[row * STRIDE + place.slot]
+
+
+LOADS = Recorder(
+    name="loads",
+    wanted=lambda plan, _resolved: plan.records_steps,
+    rows=rows,
+    reads_before=True,
+    begin=begin,
+    step=step,
+    crossing=crossing,
+    finish=finish,
+)

@@ -1,0 +1,22 @@
+"""All recorders."""
+
+from dataclasses import make_dataclass
+from typing import Any
+
+from gearchaos_kernels.recorders.amplitudes import AMPLITUDES
+from gearchaos_kernels.recorders.contact import CONTACT
+from gearchaos_kernels.recorders.growth import GROWTH
+from gearchaos_kernels.recorders.history import HISTORY
+from gearchaos_kernels.recorders.loads import LOADS
+from gearchaos_kernels.recorders.protocol import Recorders
+from gearchaos_kernels.recorders.section import SECTION
+from gearchaos_kernels.scene import implement
+
+RECORDERS = (SECTION, HISTORY, GROWTH, CONTACT, LOADS, AMPLITUDES)
+"""All recorders, in the order in which they are called: amplitudes read what loads keep."""
+
+Recorded = make_dataclass("Recorded", [(one.name, Any, None) for one in RECORDERS], frozen=True)
+Recorded.__module__ = __name__
+"""Flags of the recorders of a scene."""
+
+implement(Recorded, Recorders(RECORDERS))
