@@ -1,0 +1,69 @@
+"""The protocol of models serves another model than the gear pair, an oscillator with clearance."""
+
+import numpy as np
+import pytest
+from gearchaos_kernels import Plan, integrate
+
+from .oscillator import System
+
+ZETA, LOAD, HALF_CLEARANCE = 0.05, 0.1, 1.0
+
+
+def oscillators(frequency: np.ndarray, amplitude: float) -> System:
+    """Return lanes of x'' + 2 zeta x' + D(x; 1) = 0.1 + amplitude W^2 cos(W tau)."""
+    alike = (np.full(frequency.size, value) for value in (ZETA, HALF_CLEARANCE, LOAD))
+    return System(frequency, *alike, amplitude * frequency**2)
+
+
+def linear_response(system: System) -> np.ndarray:
+    """Return x and x' at tau = 0 of the motion that never leaves the flank, in closed form."""
+    w = system.frequency
+    wave = system.amplitude / (1.0 - w**2 + 2j * ZETA * w)
+    return np.stack([HALF_CLEARANCE + LOAD + wave.real, -w * wave.imag], axis=1)
+
+
+FREQUENCY = np.array([0.5, 0.7, 0.8, 1.3, 1.9])
+
+
+@pytest.mark.parametrize(
+    ("method", "steps", "error"), [("rk4", 200, 1e-7), ("flow_map", 12, 1e-13)]
+)
+def test_the_motion_on_a_flank_is_the_linear_response(method, steps, error):
+    system = oscillators(FREQUENCY, 0.02)
+    start = linear_response(system)
+    plan = Plan(steps, 0, 20, 20, tangent=True, method=method, contact=True, loads=True)
+    outcome = integrate(system, start, plan)
+    assert outcome.section == pytest.approx(np.repeat(start[:, np.newaxis], 20, axis=1), abs=error)
+    # The tangent vector shrinks as the free vibration does, with the rate zeta.
+    assert outcome.contact[:, 0, 0] == pytest.approx(20.0)
+    mean_force = outcome.loads[:, 0, 2]
+    assert mean_force == pytest.approx(LOAD, abs=1e-6)
+    assert outcome.loads[:, 1, 2] == pytest.approx(HALF_CLEARANCE + LOAD, abs=1e-6)
+
+
+def test_both_methods_agree_where_the_mass_leaves_the_flank():
+    system = oscillators(FREQUENCY, 0.1)
+    start = np.tile([1.3, 0.0], (FREQUENCY.size, 1))
+    exact = integrate(system, start, Plan(24, 0, 10, 10, tangent=True, method="flow_map"))
+    finer = integrate(system, start, Plan(48, 0, 10, 10, tangent=True, method="flow_map"))
+    assert exact.section == pytest.approx(finer.section, abs=1e-12)
+    assert (exact.crossings >= 2).all()
+    errors = [
+        np.abs(
+            integrate(system, start, Plan(steps, 0, 10, 10, tangent=True)).section - exact.section
+        ).max()
+        for steps in (100, 200, 400)
+    ]
+    orders = np.log2(np.divide(errors[:-1], errors[1:]))
+    assert (orders > 3.5).all()
+
+
+def test_a_lane_does_not_depend_on_its_neighbours():
+    system = oscillators(np.linspace(0.4, 1.8, 37), 0.1)
+    start = np.tile([1.3, 0.0], (37, 1))
+    for method in ("rk4", "flow_map"):
+        plan = Plan(24, 2, 5, 5, tangent=True, method=method)
+        together = integrate(system, start, plan)
+        alone = integrate(system.of(np.array([20])), start[:1], plan)
+        assert np.array_equal(together.section[20:21], alone.section)
+        assert np.array_equal(together.growth[20:21], alone.growth)
