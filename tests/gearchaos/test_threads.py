@@ -14,7 +14,7 @@ from threading import Event, Thread
 import matplotlib as mpl
 import numpy as np
 import pytest
-from gearchaos_kernels import flow_map
+from gearchaos_kernels.methods.flow_map import store
 
 import gearchaos
 from gearchaos.figures import bifurcation_page, map_page, save_figure
@@ -42,7 +42,7 @@ def _quick_switches() -> Iterator[None]:
 
 
 def forget_maps(monkeypatch) -> None:
-    monkeypatch.setattr(flow_map, "_kept", flow_map._Kept(0))
+    monkeypatch.setattr(store, "_kept", store._Kept(0))
 
 
 @pytest.mark.parametrize("threads", THREADS)
