@@ -32,7 +32,7 @@ from gearchaos.dynamics.systems import plan_of, system_of
 from gearchaos.engine.lanes import Lanes, start_states
 from gearchaos.engine.recomputing import computable
 from gearchaos.engine.response import respond
-from gearchaos.engine.step_choice import judged_steps
+from gearchaos.engine.simulation import Simulation
 from gearchaos.engine.steps import stable_steps
 from gearchaos.errors import ConfigurationError
 from gearchaos.records.amplitude_spectrum import SpectralLines, spectral_lines
@@ -259,10 +259,12 @@ class System:
     @cached_property
     def _steps(self) -> int:
         """Steps per mesh period: those given, raised if need be, or those chosen for the scene."""
-        plan = plan_of(self.config, steps_per_period=self._first_steps)
         if self.config.integration.steps_per_period is not None:
             return self._first_steps
-        return judged_steps(Lanes(self.config), plan)[0].steps_per_period
+        # As `run` of this configuration chooses them.
+        simulation = Simulation(self.config)
+        simulation.choose_steps()
+        return simulation.plan.steps_per_period
 
     @property
     def _plan(self) -> Plan:

@@ -177,7 +177,8 @@ class Integration(Table):
     )
     tolerance: float | None = key(example=1e-6, default=None, gt=0)
     """largest error of section and exponent; the steps are then doubled, from steps_per_period on,
-    until lanes of the sweep that are tried beforehand reach it; flow maps are tried once"""
+    until lanes of the sweep that are tried beforehand reach it, and transient_periods are raised
+    where the section is still on its way; flow maps are tried once"""
     error_check: float = key(units="1", default=0.0, ge=0, le=1)
     """share of the lanes that are computed again with half the step, to measure their error"""
     crossings: Literal["resolved", "plain"] = key(default="resolved")

@@ -133,6 +133,8 @@ class Curve(NamedTuple):
             defect, slopes, half_return = self._defect(place)
             size = float(np.max(np.abs(defect)))
             if size <= CLOSED:
+                if not np.isfinite(slopes).all():
+                    break
                 return self._point(place, slopes, direction, (size, half_return))
             # Not a number, too, where the motion diverged.
             if not size < 0.5 * last:
@@ -148,13 +150,16 @@ class Curve(NamedTuple):
     def _defect(self, place: Floats) -> tuple[Floats, Floats, float]:
         """Return P(x) - x in the scales, its derivatives by place, and the half return distance."""
         point = place[:-1] * self.scale
-        system = self.system_at(place[-1] + DIFFERENCE * np.array([0.0, -1.0, 1.0]))
+        # Beyond the way a parameter may have values that no system has.
+        shares = np.clip(place[-1] + DIFFERENCE * np.array([0.0, -1.0, 1.0]), 0.0, 1.0)
+        system = self.system_at(shares)
         start = np.repeat(point[np.newaxis], 3, axis=0)
         section = integrate(system, start, self.plan).every(system.repeats_after).section
         ends = section[:, -1] / self.scale
         jacobian = period_jacobian(system.of([0]), point[np.newaxis], self.plan)[0]
         by_state = jacobian * self.scale / self.scale[:, np.newaxis] - np.eye(self.scale.size)
-        by_share = (ends[2] - ends[1]) / (2.0 * DIFFERENCE)
+        with np.errstate(invalid="ignore", divide="ignore"):
+            by_share = (ends[2] - ends[1]) / (shares[2] - shares[1])
         half_return = np.inf
         if self.periods % 2 == 0:
             halfway = section[0, self.periods // 2 - 1] / self.scale

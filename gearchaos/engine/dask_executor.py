@@ -18,7 +18,7 @@ from dask.utils import parse_timedelta
 
 from gearchaos.configuration import Configuration
 from gearchaos.engine.provenance import SOFTWARE
-from gearchaos.engine.simulation import Arrays, Bounds, Simulation
+from gearchaos.engine.simulation import Arrays, Bounds, Chosen, Simulation
 from gearchaos.errors import ConfigurationError, ExecutionError
 from gearchaos.interrupts import check
 from gearchaos.progress import notice, say
@@ -47,7 +47,7 @@ class DaskExecutor(ExitStack):
     def __init__(self, simulation: Simulation, address: str) -> None:
         super().__init__()
         self._address = address
-        self._recipe = simulation.config.resolved_toml(), simulation.plan.steps_per_period
+        self._recipe = simulation.config.resolved_toml(), simulation.chosen
         for name in ("distributed", "distributed.client"):
             # What goes wrong comes as an exception.
             logging.getLogger(name).setLevel(logging.CRITICAL)
@@ -115,12 +115,12 @@ class DaskExecutor(ExitStack):
 
 
 def compute_block(
-    software: Software, configuration: str, steps: int, block: Bounds
+    software: Software, configuration: str, chosen: Chosen, block: Bounds
 ) -> dict[str, Any]:
     """Compute a block on a worker; ExecutionError if its software is not that of the client.
 
-    ``configuration`` is the resolved one in TOML; the steps per period are chosen once, not on
-    every worker.
+    ``configuration`` is the resolved one in TOML; steps and transient are chosen once, not on every
+    worker.
     """
     if software != SOFTWARE:
         raise ExecutionError(
@@ -131,16 +131,16 @@ def compute_block(
     with _ONE_AT_A_TIME:
         tasks, most = distributed.get_worker().state.nthreads, numba.config.NUMBA_NUM_THREADS
         numba.set_num_threads(min(tasks, most) if tasks > 1 else most)
-        return _simulation(configuration, steps).compute(*block)
+        return _simulation(configuration, chosen).compute(*block)
 
 
 _ONE_AT_A_TIME = Lock()
 
 
 @lru_cache(maxsize=1)
-def _simulation(configuration: str, steps: int) -> Simulation:
+def _simulation(configuration: str, chosen: Chosen) -> Simulation:
     simulation = Simulation(Configuration.from_toml(configuration, "<client>"))
-    simulation.plan = simulation.plan._replace(steps_per_period=steps)
+    simulation.plan = simulation.plan._replace(**chosen._asdict())
     return simulation
 
 

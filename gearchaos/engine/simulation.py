@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import gearchaos_kernels as kernels
 import numpy as np
@@ -41,6 +41,13 @@ from gearchaos.results import variables as known
 
 Arrays = Mapping[str, Array]
 Bounds = tuple[int, int]
+
+
+class Chosen(NamedTuple):
+    """What of a plan is chosen by trials before a sweep begins."""
+
+    steps_per_period: int
+    transient_periods: int
 
 
 class Simulation:
@@ -87,8 +94,11 @@ class Simulation:
                 self.plan, note = judged_steps(self.lanes, self.plan)
                 self.notes += [note] if note else []
             return
-        kept = self.plan.section_points
-        transient, left, note = settled(self.lanes, self.recording, kept, tolerance, PILOT_LANES)
+        kept, recording = self.plan.section_points, self.recording
+        # As many points as tell a period, however few the file keeps.
+        enough = min(MOST_POINTS * self.lanes.repeats_after, recording.recorded_periods)
+        recording = recording._replace(section_points=max(recording.section_points, enough))
+        transient, left, note = settled(self.lanes, recording, kept, tolerance, PILOT_LANES)
         self.plan = self.plan._replace(transient_periods=transient)
         self.notes += [note] if note else []
         coarsest = self.plan.steps_per_period
@@ -111,6 +121,11 @@ class Simulation:
             f"{tried.changed_share * lanes:.0f} move in another way with finer steps"
             for tried in candidates
         ]
+
+    @property
+    def chosen(self) -> Chosen:
+        """What the plan has now, after `choose_steps` for all who compute lanes of the sweep."""
+        return Chosen(self.plan.steps_per_period, self.plan.transient_periods)
 
     @property
     def carried(self) -> bool:

@@ -150,8 +150,11 @@ def judged_steps(lanes: Lanes, plan: Plan) -> tuple[Plan, str]:
 def choice_note(verdict: Verdict, limit: int) -> str:
     """Word which number of steps was chosen, and why."""
     lanes = verdict.error.size
+    chosen = "chosen for this scene"
+    if not verdict.within(WANTED):
+        chosen = 'the most that are chosen; integration.method = "flow_map" is more exact'
     return (
-        f"integration.steps_per_period = {verdict.steps}, chosen for this scene: RK4 is stable "
+        f"integration.steps_per_period = {verdict.steps}, {chosen}: RK4 is stable "
         f"from {limit} on, and after {PERIODS} mesh periods {_off(verdict)} in {_tried(lanes)}"
         f"{_sensitive_ones(verdict)}"
     )
@@ -168,15 +171,19 @@ def coarse_note(verdict: Verdict, better: Verdict) -> str:
     where = f"in {np.count_nonzero(wrong)} of {_tried(verdict.error.size)}"
     text = f"after {PERIODS} mesh periods {_off(verdict)} {where}"
     if not verdict.within(WRONG):
-        text = (
-            f"integration.steps_per_period = {verdict.steps} is too coarse: {text}; leave it out, "
-            f"or set it to {better.steps}"
-        )
+        remedy = f"leave it out, or set it to {better.steps}"
+        if not better.within(WANTED):
+            remedy = (
+                f'no number up to {MOST_CHOSEN} is fine enough; set integration.method = "flow_map"'
+            )
+        text = f"integration.steps_per_period = {verdict.steps} is too coarse: {text}; {remedy}"
     return text + _sensitive_ones(verdict)
 
 
 def _off(verdict: Verdict) -> str:
     largest = np.max(verdict.error)
+    if not np.isfinite(largest):
+        return "states leave the range of numbers"
     return (
         f"states are off by up to {largest:.1%}"
         if largest > 1e-3

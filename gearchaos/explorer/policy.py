@@ -21,7 +21,8 @@ NAMES = (HOST, "localhost")
 
 def origins(port: int) -> list[str]:
     """Return the names under which the page is served, with its port."""
-    return [f"{name}:{port}" for name in NAMES]
+    # Browsers leave the port of HTTP out.
+    return [f"{name}:{port}" for name in NAMES] + (list(NAMES) if port == 80 else [])
 
 
 def protect(application: Application, port: int) -> None:

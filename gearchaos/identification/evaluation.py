@@ -85,7 +85,7 @@ def require_stable(config: Configuration, values: Floats, parameters: dict[str, 
 
     ``values`` and ``parameters`` as in `evaluate`. Raises ConfigurationError.
     """
-    steps, ends = config.integration.steps_per_period, values[[0, -1]]
+    steps, ends = plan_of(config).steps_per_period, values[[0, -1]]
     if config.integration.method == "flow_map":
         return
     candidates = len(next(iter(parameters.values())))

@@ -79,6 +79,8 @@ def integrate(
     if tangent_start is None:
         tangent_start = np.full((lanes, states), 1.0 / np.sqrt(states))
     scene = scene_of(system, plan)
+    if plan.orders and not provider_of(scene.model).observed:
+        raise ValueError("amplitudes need a model that has a signal observed")
     outcome = _allocated(lanes, states, plan, scene)
     columns = [system.states.index(name) for name in plan.states]
     chosen = np.array([*columns, _observed_row(scene)], dtype=np.intp)
@@ -117,7 +119,7 @@ def integrate(
             unmapped = np.isnan(share.maps[share.blocks[:, 3]])
             lost = np.repeat(unmapped, share.blocks[:, 1])
             outcome.status[share.order[lost]] = Status.TOO_FAST
-    return _per_tau(system, plan, outcome, steps_taken, columns)
+    return _per_tau(system, plan, outcome, steps_taken, scene)
 
 
 def _allocated(lanes: int, states: int, plan: Plan, scene: Scene) -> Outcome:
@@ -152,15 +154,16 @@ def _observed_row(scene: Scene) -> int:
 
 
 def _per_tau(
-    system: Any, plan: Plan, outcome: Outcome, steps_taken: NDArray[np.intp], columns: list[int]
+    system: Any, plan: Plan, outcome: Outcome, steps_taken: NDArray[np.intp], scene: Scene
 ) -> Outcome:
     """Turn what was recorded per step into the units of the equations."""
+    columns = [system.states.index(name) for name in plan.states]
     sums = outcome.amplitudes.reshape(len(steps_taken), len(columns) + 1, len(plan.orders))
     if not outcome.loads.size:
         return outcome._replace(amplitudes=sums)
     step = system.mesh_period / steps_taken
     samples = (steps_taken * max(1, plan.recorded_periods))[:, np.newaxis, np.newaxis]
-    elements = outcome.loads.shape[1] - 1
+    elements = provider_of(scene.model).elements(scene.model)
     # Forces come per step squared, and the sums of Simpson's rule.
     outcome.loads[:, :, 2:] /= 6.0 * samples
     outcome.loads[:, :elements] /= step[:, np.newaxis, np.newaxis] ** 2

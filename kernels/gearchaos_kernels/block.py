@@ -110,8 +110,7 @@ def integrate_block(number_of_block, batch, tables, plan, outcome, scene):
     records = Records(given, batch, outcome)
     block = Block(first, lanes)
     every = steps // plan.steps_per_period
-    start_period(memory, block, batch, tables, plan.first_period, scene)
-    interval = begin(memory, block, batch, tables, scene)
+    interval = begin(memory, block, batch, tables, plan.first_period, scene)
     periods = plan.transient_periods + plan.recorded_periods
     for period in range(periods):
         recorded = period - plan.transient_periods
@@ -145,7 +144,7 @@ def start_period(memory, block, batch, tables, period, scene):
 
 
 @scalar
-def begin(memory, block, batch, tables, scene):
+def begin(memory, block, batch, tables, period, scene):
     """Fill the memory of a block; return the shortest interval between scalings of a tangent."""
     # A scaling interval belongs to a lane, whatever its neighbours need.
     interval = batch.steps_between_scalings[batch.order[block.first]]
@@ -164,6 +163,7 @@ def begin(memory, block, batch, tables, scene):
         store(memory, place.crossings, slot, (0.0, math.inf, 0.0))
         for row in range(place.recorders, place.total):
             memory[row * STRIDE + slot] = 0.0
+        begin_period(memory, slot, index, period, tables, scene)
         point = point_at(memory, slot, grid_at(tables, 0, scene), scene)
         keep_point(memory, slot, point, scene)
         if scene.resolved is not None:

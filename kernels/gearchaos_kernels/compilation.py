@@ -4,8 +4,8 @@ Every flag is named here and nowhere else. Three facts about Numba shape this fi
 
 * a cached caller contains the code of its callees, and would keep it when one is edited in another
   file. The cache folder is therefore named after a hash of all kernel sources;
-* every function is optimised and made executable for itself, and again in each function it is
-  linked into: five times for the block of lanes. Here only what Python calls is;
+* Numba optimises every function on its own, and again in every function that it is linked into:
+  five times for the block of lanes. Here only functions that Python calls are optimised;
 * LLVM prefers 256-bit vectors on some AVX-512 processors, and it spills vector registers to an
   unaligned stack. Both cost up to half of the speed of the lane loop.
 """
@@ -41,8 +41,8 @@ try:
 except ImportError:
     event = None
 
-# OpenMP asks when it is loaded, with the first parallel loop: a thread that waits shall leave its
-# core to others, as calls may be short, a thousand of them, and other processes run beside.
+# OpenMP reads this when it is loaded, with the first parallel loop. Waiting threads then sleep
+# instead of spinning, which leaves cores to other processes between many short calls.
 os.environ.setdefault("OMP_WAIT_POLICY", "passive")
 
 FASTMATH = {"contract", "nsz"}
@@ -57,7 +57,7 @@ def source_hash() -> str:
     """Return a hash of every source file of this package and of Numba's version."""
     digest = hashlib.sha256(numba.__version__.encode())
     for source in sorted(Path(__file__).parent.rglob("*.py")):
-        digest.update(source.name.encode())
+        digest.update(str(source.relative_to(Path(__file__).parent)).encode())
         digest.update(source.read_bytes())
     return digest.hexdigest()[:16]
 

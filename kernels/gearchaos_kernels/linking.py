@@ -13,7 +13,8 @@ from numba.core.codegen import JITCodeLibrary, JITCPUCodegen
 
 from gearchaos_kernels.compiler import PartCompiler
 
-# Overridden or called below: of a method with another name nobody would notice, or too late.
+# Overridden or called below. If Numba renamed one, the override would be ignored, or a call would
+# fail late; this fails at import.
 _ = PartCompiler._compile_core, JITCPUCodegen._library_class
 _ = JITCodeLibrary._optimize_final_module, JITCodeLibrary._finalize_final_module
 _ = JITCodeLibrary._finalize_dynamic_globals, JITCodeLibrary._ensure_finalized

@@ -8,11 +8,12 @@ looked up at run time.
 """
 
 import inspect
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, is_dataclass, replace
 from functools import cache
 from hashlib import sha256
 from pathlib import Path
 from typing import Any
+from uuid import uuid4
 
 from numba import types
 from numba.extending import NativeValue, models, register_model, typeof_impl, unbox
@@ -56,18 +57,35 @@ class SceneType(types.Opaque):  # type: ignore[misc]
 
     def __init__(self, scene: Scene) -> None:
         self.scene = scene
-        super().__init__(f"{scene!r}{_sources(scene)}")
+        super().__init__(f"{scene!r}{_sources_of(scene)}")
+
+    @property
+    def key(self) -> Scene:
+        """Scenes are equal only if the classes of their parts are; their names may be alike."""
+        return self.scene
 
 
-@cache
-def _sources(scene: Scene) -> str:
-    """Return a hash of implementations outside this package, for which no other one may stand."""
-    classes = [type(part) for part in (scene.model, scene.method, scene.recorders)]
-    others = [one for one in classes if one.__module__.partition(".")[0] != __package__]
-    hashes = (sha256(Path(inspect.getfile(one)).read_bytes()).hexdigest() for one in others)
-    return "".join(
-        f" {one.__module__} {digest}" for one, digest in zip(others, hashes, strict=True)
-    )
+def _sources_of(scene: Scene) -> str:
+    """Return hashes of the implementations outside this package that a scene names."""
+    parts = type(scene.model), type(scene.method), type(scene.recorders)
+    return "".join(_SOURCES[part] for part in parts)
+
+
+def _hash_of(flags: type) -> str:
+    """Return a hash of the sources beside a class outside this package, empty within it.
+
+    Cached code is then not used after they change.
+    """
+    if flags.__module__.partition(".")[0] == __package__:
+        return ""
+    digest = sha256(flags.__module__.encode())
+    try:
+        for source in sorted(Path(inspect.getfile(flags)).parent.glob("*.py")):
+            digest.update(source.read_bytes())
+    except (TypeError, OSError):
+        # Made at a prompt: code that another process keeps is never the same.
+        digest.update(uuid4().bytes)
+    return f" {flags.__module__} {digest.hexdigest()}"
 
 
 register_model(SceneType)(models.OpaqueModel)
@@ -75,12 +93,16 @@ register_model(SceneType)(models.OpaqueModel)
 
 @typeof_impl.register(Scene)
 def _typeof_scene(scene: Scene, _context: Any) -> SceneType:
+    for part in (scene.model, scene.method, scene.recorders):
+        for name, value in vars(part).items():
+            if value is not None and value is not True:
+                raise TypeError(f"{type(part).__qualname__}.{name}: is {value!r}, not True or None")
     return SceneType(scene)
 
 
 @unbox(SceneType)
 def _unbox_scene(_kind: Any, _scene: Any, c: Any) -> NativeValue:
-    # All there is to know of a scene is its type.
+    # A scene has no data at run time: its type says everything.
     return NativeValue(c.context.get_dummy_value())
 
 
@@ -112,6 +134,7 @@ class Interface:
 
 
 _IMPLEMENTATIONS: dict[type, Any] = {}
+_SOURCES: dict[type, str] = {}
 
 
 def implement(flags: type, provider: Any) -> None:
@@ -123,8 +146,23 @@ def implement(flags: type, provider: Any) -> None:
         Class of the flags, a frozen dataclass.
     provider : object
         Has a method ``function(name, scene)`` that returns the compiled function of this name.
+
+    Raises
+    ------
+    TypeError
+        If the class is no frozen dataclass, as named tuples equal those of other classes, or is
+        defined within a function, as its name does not tell it from others.
+
+    Notes
+    -----
+    Compiled code is kept between processes. It is found again by a hash of all Python files in the
+    folder of the class, taken now; keep what a model is made of there.
     """
-    _IMPLEMENTATIONS[flags] = provider
+    if not (is_dataclass(flags) and flags.__dataclass_params__.frozen):  # type: ignore[attr-defined]
+        raise TypeError(f"{flags.__qualname__}: flags have to be a frozen dataclass")
+    if "<locals>" in flags.__qualname__:
+        raise TypeError(f"{flags.__qualname__}: flags have to be defined in a module")
+    _IMPLEMENTATIONS[flags], _SOURCES[flags] = provider, _hash_of(flags)
 
 
 def provider_of(flags: Any) -> Any:

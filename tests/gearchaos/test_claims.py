@@ -9,6 +9,7 @@ from gearchaos.dynamics.modes import hidden_decay, memory
 from gearchaos.dynamics.orbits import polish
 from gearchaos.dynamics.remainders import remainders
 from gearchaos.dynamics.stability import fewest_stable_steps
+from gearchaos.engine.dask_executor import _simulation
 from gearchaos.engine.error_check import CHANGED, NOT_CHECKED, SAME, Tally
 from gearchaos.engine.steps import solution_of
 from gearchaos.errors import ConfigurationError
@@ -117,6 +118,20 @@ def test_a_tolerance_is_kept_behind_a_longer_transient():
     claimed = float(sweep.notes[-1].split("section is off by ")[1].split(",")[0])
     # Printed with two digits.
     assert 0.9 * true.max() < claimed < 1e-8
+
+
+def test_workers_of_a_cluster_take_the_transient_that_was_chosen():
+    sweep = simulation(*SLOW, "integration.tolerance=1e-8")
+    sweep.plan = sweep.plan._replace(transient_periods=777, steps_per_period=123)
+    _simulation.cache_clear()
+    assert _simulation(sweep.config.resolved_toml(), sweep.chosen).plan == sweep.plan
+
+
+def test_a_tolerance_raises_the_transient_however_few_points_are_kept():
+    kept = "outputs.motion=false", "outputs.section_points=1"
+    sweep = simulation(*SLOW, *kept, "integration.tolerance=1e-8")
+    sweep.choose_steps()
+    assert sweep.plan.transient_periods > 300
 
 
 def test_a_tolerance_is_kept_where_both_grids_damp_the_mode_that_decides():

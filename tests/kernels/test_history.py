@@ -49,3 +49,15 @@ def test_between_two_steps_displacements_follow_the_rates(outcome):
     rates = outcome.history[:, :, 1::2]
     expected = 0.5 * step * (rates[:, 1:] + rates[:, :-1])
     assert np.max(np.abs(moved - expected)) < 0.01 * np.max(np.abs(moved))
+
+
+def test_the_history_of_a_lane_that_diverges_in_the_last_period_ends_as_the_lane_does():
+    model = pan2021(np.ones(2))
+    model.transverse_damping_g[1] = -2.5
+    system, start = system_of(model), np.zeros((2, 10))
+    long = integrate(system, start, Plan(STEPS, 0, 30, 30, True, True, 1))
+    (_, last), status = long.diverged_period, long.status
+    assert status.tolist() == [0, 1]
+    ended = integrate(system, start, Plan(STEPS, 0, last + 1, 1, True, True, 1))
+    assert np.isnan(ended.end_state[1]).all() and np.isnan(ended.history[1, -1]).all()
+    assert np.isfinite(ended.history[0]).all() and np.isfinite(ended.history[1, 0]).all()

@@ -45,7 +45,7 @@ class Method:
     name : str
         As in configurations.
     flags : type
-        Named tuple without fields; stands for the method in a scene.
+        Frozen dataclass without fields; stands for the method in a scene.
     always_resolved : bool
         Whether it resolves every crossing, whatever the plan says.
     rows : callable

@@ -106,7 +106,8 @@ class Model:
     kept_accelerations(changes, lane, point, scene)
         The accelerations of the state that is kept, from those of the equations.
     elements_at(lane, forcing, scene)
-        The elements, a tuple of `Element`.
+        The elements, a tuple of `Element`. Only the stiffness may depend on the forcing, and half
+        clearances are those of `half_clearances`.
     half_clearances(lane, scene), gap_speeds(lane, scene)
         Tuples of the half clearance of each element, and of what turns the rate of its gap into a
         speed per unit of tau.

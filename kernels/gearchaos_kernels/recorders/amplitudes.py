@@ -117,6 +117,9 @@ def turns_of(c0, c1, c2, c3):
 @scalar
 def finish(memory, at, place, clock, given, scene):
     """Write extremes and the sizes of the sums of a lane."""
+    if clock.recorded == 0:
+        # Nothing was recorded, and the rows were never filled.
+        return
     found = memory[rows(scene).total * STRIDE + place.slot :: STRIDE]
     half = half_of(given.batch)
     states = given.batch.chosen.size - 1

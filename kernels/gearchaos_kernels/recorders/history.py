@@ -1,5 +1,7 @@
 """The history: the state at every step of the last mesh periods."""
 
+import math
+
 from gearchaos_kernels.compilation import scalar
 from gearchaos_kernels.memory.block_memory import take
 from gearchaos_kernels.memory.rows import STATE
@@ -38,10 +40,21 @@ def keep(memory, block, given, sample):
         take(memory, STATE, slot, given.batch.scales[index], history[index, sample])
 
 
+@scalar
+def stop(memory, at, place, clock, given, scene):
+    """Mark the state of a lane at the end of the period in which it was stopped."""
+    history = given.outcome.history
+    sample = sample_of(clock, history, clock.steps // clock.every)
+    if sample >= 0:
+        for column in range(history.shape[2]):
+            history[place.lane, sample, column] = math.nan
+
+
 HISTORY = Recorder(
     name="history",
     wanted=lambda plan, _resolved: plan.history_periods > 0,
     rows=lambda _scene: 0,
     begin=begin,
     step=step,
+    stop=stop,
 )

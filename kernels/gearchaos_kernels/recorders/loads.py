@@ -3,8 +3,8 @@
 Of each signal its extremes and the integrals of itself and of its square. A step gives three
 values: at both ends, and in the middle, where the state is on the cubic through both. Integrals
 follow by Simpson's rule, extremes from the parabola through the three. Where an element is met or
-left in between, its force has a kink; what it is there, damping alone, counts as a fourth value and
-the parabola does not.
+left within a step, its force has a kink. The parabola is then not used; the force at the kink,
+which is that of the damper alone, counts as a fourth value.
 
 The rows: the signals and the slopes of the forces at the end of the last step, then of each signal
 its largest and smallest value, and the sums over the steps of six times the mean of itself and of

@@ -61,8 +61,8 @@ class Recorder:
     name : str
         Its flag among those of the scene's recorders.
     wanted : callable
-        ``wanted(plan, clearance)``: whether a plan requests it for a scene with resolved
-        clearances or without.
+        ``wanted(plan, resolved)``: whether a plan requests it, for a scene that resolves crossings
+        or does not.
     rows : callable
         ``rows(scene)``: number of its rows in the memory of a block.
     reads_before : bool

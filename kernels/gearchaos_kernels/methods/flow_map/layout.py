@@ -140,8 +140,8 @@ waves_at = numbers_of(lambda scene: layout_of(scene).waves)
 class Crossing(NamedTuple):
     """The last crossing of a lane that has been taken aside, in rows behind those of its gaps.
 
-    ``after``: its moment; ``factor``, ``edge``: by what and from which gap on the deflection acts
-    that begins or ends there; ``element``: whose.
+    ``after``: its moment; ``element``: the element that crosses. A deflection begins or ends to act
+    there: ``factor`` is its sign, ``edge`` the gap from which it is measured.
     """
 
     after: float

@@ -119,7 +119,7 @@ def bounds_of(ends, width, bend):
 
 @scalar
 def guess_fall(ends, width):
-    """Return where in a piece a gap falls below 0, by the cubic of the place over the value."""
+    """Estimate where in a piece a gap falls below 0, by a cubic of the inverse function."""
     value_left, slope_left, value_right, slope_right = ends
     fallen = value_left - value_right
     done = value_left / fallen

@@ -33,7 +33,7 @@ ORDER = 22
 """Terms of the Taylor series that they come from."""
 
 TAIL = 2e-15
-"""What may be left of the series, relative to their largest term."""
+"""Largest truncation error of the series, relative to their largest term."""
 
 TOGETHER = 8
 """Steps whose series are computed side by side: they fill vectors, and the cache holds them."""
@@ -104,7 +104,7 @@ def unit_push(gap, element, share, unit):
 
 @driver
 def make_maps(matrices, stiffness, inputs, forcing, tables, tails, place):
-    """Fill the maps of lanes, shape (lanes, steps, size of a step), and return what series leave.
+    """Fill the maps of lanes, shape (lanes, steps, size of a step), and return the truncation error.
 
     Compiled once for all scenes. ``matrices``: see `differentiate`; ``stiffness`` (lanes, 2): mean
     and variation; ``inputs``: see `MapFormulas`; ``forcing`` (1 + waves, `ORDER`, steps): Taylor
@@ -121,7 +121,7 @@ def make_maps(matrices, stiffness, inputs, forcing, tables, tails, place):
 
 @part
 def fill_maps(matrix, stiffness, inputs, forcing, table, place):
-    """Fill the maps of a lane, shape (steps, size of a step); return what series leave."""
+    """Fill the maps of a lane, shape (steps, size of a step); return the truncation error."""
     tail = 0.0
     for first in range(0, table.shape[0], TOGETHER):
         some = table[first : first + TOGETHER]
@@ -146,11 +146,11 @@ def fill_maps(matrix, stiffness, inputs, forcing, table, place):
 
 @part
 def fill_steps(matrix, engaged, inputs, forcing, table, place):
-    """Fill the maps of some steps on all sets of branches; return what is left of the series.
+    """Fill the maps of some steps on all sets of branches; return the truncation error.
 
     In every array the last numbers are those of these steps, one set of branches after the other.
-    They are written one by one: with an array for a part of another one Numba compiles a text for
-    where they do not fit.
+    Elements are written in loops: for an assignment of slices Numba also compiles an error message
+    for shapes that differ.
     """
     states, columns, elements = place.states, place.columns, place.elements
     functions = 1 + place.waves
@@ -266,7 +266,7 @@ def solve(scale, matrices, stiffness, engaged, terms, seen, pulled):
 def add_product(scale, a, b, target):
     """Add the product of two matrices, the first of which is small, times a number.
 
-    What one of them has more of than the target or the other one does not count.
+    Rows and columns beyond the size of the other matrix or of the target are ignored.
     """
     for line in range(min(a.shape[0], target.shape[0])):
         for source in range(min(a.shape[1], b.shape[0])):

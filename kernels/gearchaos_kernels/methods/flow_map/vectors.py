@@ -73,7 +73,7 @@ class _Writer:
         self.store(value, lanes, row * STRIDE)
 
     def equal(self, lanes: Any, row: int, number: float) -> Any:
-        """Return of which of eight lanes a row is a number."""
+        """Return a mask of the lanes, of eight, in which a row equals a number."""
         given = self.load(lanes, row * STRIDE)
         return self.builder.fcmp_ordered("==", given, self.constant(number))
 
@@ -107,7 +107,7 @@ class _Writer:
         return product if c is None else self.builder.fadd(product, c, flags=_FLAGS)
 
     def sum(self, factors: Iterable[tuple[int, Any]], terms: Sequence[Any]) -> Any:
-        """Return a sum of products with numbered terms, as two that do not wait for each other.
+        """Return a sum of products as two independent partial sums, which run in parallel.
 
         Those of even and of odd numbers: leaving out columns of zeros changes no bit.
         """

@@ -82,9 +82,8 @@ def tables_of(system: "System", steps_per_period: int) -> Tables:
 def share_table(teeth: Teeth, steps_per_period: int) -> Floats:
     """Return the shares of the pairs in mesh at every half step, shape (2 steps + 1, 3, pairs).
 
-    The share and its first and second derivative by the mesh phase in radians, of all pairs but the
-    one that came last, which has the rest, and of pairs that fill up, without a share. Raises
-    ValueError with too many in mesh.
+    The share and its first and second derivative by the mesh phase in radians. The newest pair is
+    left out: it takes the rest. Unused columns are zero. Raises ValueError with too many in mesh.
     """
     if teeth is NO_TEETH:
         return np.zeros((1, 3, NARROW - 1))
