@@ -104,7 +104,7 @@ def unit_push(gap, element, share, unit):
 
 @driver
 def make_maps(matrices, stiffness, inputs, forcing, tables, tails, place):
-    """Fill the maps of lanes, shape (lanes, steps, size of a step), and return the truncation error.
+    """Fill the maps of lanes, shape (lanes, steps, size of a step), and their truncation errors.
 
     Compiled once for all scenes. ``matrices``: see `differentiate`; ``stiffness`` (lanes, 2): mean
     and variation; ``inputs``: see `MapFormulas`; ``forcing`` (1 + waves, `ORDER`, steps): Taylor
