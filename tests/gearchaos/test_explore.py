@@ -455,3 +455,9 @@ def test_no_frame_of_another_page_shows_the_page(browser, address):
     opened.wait_for_timeout(1000)
     assert not any(frame.url == address for frame in opened.frames)
     opened.close()
+
+
+def test_the_port_of_http_need_not_be_named():
+    policy = import_module("gearchaos.explorer.policy")
+    assert policy.origins(8080) == ["127.0.0.1:8080", "localhost:8080"]
+    assert {"127.0.0.1", "localhost", "127.0.0.1:80"} <= {*policy.origins(80)}

@@ -342,6 +342,9 @@ def test_bounds_with_which_the_steps_are_unstable_are_refused(identified):
     problem = load_targets(identified.folder / "targets.toml", [few])
     exact = problem.config.replace("integration.method", "flow_map")
     require_stable(exact, np.array([1.0]), problem.targets.corners())
+    # Left out, they are those that a search takes by default.
+    free = problem.config.replace("integration.steps_per_period", None)
+    require_stable(free, np.array([1.0]), problem.targets.corners())
 
 
 def test_numbers_beside_each_other_stay_apart():

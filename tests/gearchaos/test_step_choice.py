@@ -9,7 +9,15 @@ from gearchaos_kernels import Plan, integrate
 import gearchaos
 from gearchaos.configuration import Configuration
 from gearchaos.engine.simulation import Simulation
-from gearchaos.engine.step_choice import AMPLIFIED, PERIODS, WANTED, WRONG, Trial
+from gearchaos.engine.step_choice import (
+    AMPLIFIED,
+    PERIODS,
+    WANTED,
+    WRONG,
+    Trial,
+    Verdict,
+    coarse_note,
+)
 
 from .commands import run_module, small_config
 from .random_pairs import random_configuration
@@ -163,3 +171,13 @@ def test_a_sweep_records_and_prints_its_choice_and_shards_agree_on_it(tmp_path):
     assert system.integrate(1).states.shape[0] == int(printed) + 1
     free = gearchaos.load_config(config, ["sweep={parameter='pitch_error',values=[5.0]}"])
     assert gearchaos.System(free).integrate(1).states.shape[0] == int(printed) + 1
+
+
+def test_notes_name_a_better_number_only_if_there_is_one():
+    one = np.ones(1)
+    given = Verdict(13_000, 5.0 * WRONG * one, one)
+    note = coarse_note(given, given)
+    assert "no number up to 25600 is fine enough" in note and 'method = "flow_map"' in note
+    assert "set it to 26000" in coarse_note(given, Verdict(26_000, 0.0 * one, one))
+    lost = coarse_note(Verdict(200, np.inf * one, one), Verdict(400, 0.0 * one, one))
+    assert "states leave the range of numbers in 1 of 1 lane" in lost
