@@ -90,8 +90,6 @@ def integrate(
         plan.steps_per_period,
         plan.transient_periods,
         plan.recorded_periods,
-        plan.section_points,
-        plan.history_periods,
         plan.first_period,
         more_rows=2 * half,
     )

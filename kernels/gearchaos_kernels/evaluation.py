@@ -40,7 +40,7 @@ from gearchaos_kernels.models.protocol import (
 from gearchaos_kernels.plan import Floats, Plan
 from gearchaos_kernels.scene import provider_of
 
-_ALONE = Plan(1, 0, 0, 0, resolved=False)
+ALONE = Plan(1, 0, 0, 0, resolved=False)
 """No loop: nothing is split and no tangent vector integrated."""
 
 
@@ -76,7 +76,7 @@ def jacobian(system: Any, stiffnesses: Floats) -> Floats:
     scales = system.scales(per_tau)
     result = np.empty((*scales.shape, scales.shape[1]))
     # What excites the system is not part of its linearisation: it need not be compiled.
-    scene = scene_of(system.linearised(), _ALONE)
+    scene = scene_of(system.linearised(), ALONE)
     slopes = np.ascontiguousarray(stiffnesses, dtype=np.float64)
     _differentiate(system.coefficients(per_tau), scales, slopes, result, scene)
     return result
@@ -116,7 +116,7 @@ def evaluate(system: Any, states: Floats, steps_per_period: int, first_period: i
     """
     lanes, samples, count = states.shape
     step = system.mesh_period / steps_per_period
-    scene = scene_of(system, _ALONE)
+    scene = scene_of(system, ALONE)
     model = provider_of(scene.model)
     elements = model.elements(scene.model)
     motion = Motion(

@@ -69,8 +69,7 @@ class Plan(NamedTuple):
 
 Schedule = namedtuple(
     "Schedule",
-    "steps_per_period transient_periods recorded_periods section_points history_periods "
-    "first_period more_rows",
+    "steps_per_period transient_periods recorded_periods first_period more_rows",
 )
 """What the compiled loop over the periods has to know of a plan."""
 

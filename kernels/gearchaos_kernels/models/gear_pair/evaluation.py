@@ -10,9 +10,7 @@ from gearchaos_kernels.memory.rows import rows
 from gearchaos_kernels.models.gear_pair.forcing import pitch_error_at
 from gearchaos_kernels.models.gear_pair.system import MeshMotion, System
 from gearchaos_kernels.models.protocol import begin_period, grid_at, point_at
-from gearchaos_kernels.plan import Floats, Plan
-
-_ALONE = Plan(1, 0, 0, 0, resolved=False)
+from gearchaos_kernels.plan import Floats
 
 
 def jacobian(system: System, tangential: Floats, axial: Floats) -> Floats:
@@ -43,7 +41,7 @@ def mesh_motion(
             2 * steps_per_period,
             first_period,
             error,
-            scene_of(system, _ALONE),
+            scene_of(system, evaluation.ALONE),
         )
     axial = system.effects.axial
     nothing = np.zeros(error.shape)
