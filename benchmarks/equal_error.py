@@ -94,7 +94,7 @@ def _making(system) -> float:
     plan = Plan(FLOW_MAP_STEPS, 0, PERIODS, 0, method="flow_map")
     # Maps that were made are kept; those of a slightly larger damping are not.
     damping = system.groups.damping_ratio * (1.0 + 1e-9)
-    system = system._replace(groups=system.groups._replace(damping_ratio=damping))
+    system = system.replace(groups=system.groups._replace(damping_ratio=damping))
     began = time.process_time()
     maps_of(system, FLOW_MAP_STEPS, scene_of(system, plan))
     return time.process_time() - began

@@ -15,7 +15,7 @@ from pathlib import Path
 
 import numba
 import numpy as np
-from gearchaos_kernels import Plan, System, integrate
+from gearchaos_kernels import GearPairs, Plan, integrate
 from machine import print_machine
 from throughput import SCENES
 
@@ -55,12 +55,12 @@ def main() -> None:
     print(f"{'scene':40}" + "".join(f"{name:>17}" for name in OUTPUTS))
     for name, effects in SCENES.items():
         for tangent in (False, True):
-            ratios = costs(system._replace(effects=effects), plan._replace(tangent=tangent), rounds)
+            ratios = costs(system.replace(effects=effects), plan._replace(tangent=tangent), rounds)
             row = f"{name}{', tangent' if tangent else ''}"
             print(f"{row:40}" + "".join(f"{ratio:17.2f}" for ratio in ratios), flush=True)
 
 
-def costs(system: System, plan: Plan, rounds: int) -> list[float]:
+def costs(system: GearPairs, plan: Plan, rounds: int) -> list[float]:
     """Return the processor time with each of the `OUTPUTS` in that without any."""
     start = np.zeros((LANES, len(system.states)))
 

@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numba
 import numpy as np
-from gearchaos_kernels import Plan, System, integrate
+from gearchaos_kernels import GearPairs, Plan, integrate
 from machine import print_machine
 from throughput import SCENES
 
@@ -43,7 +43,7 @@ def main() -> None:
     print(f"teeth over sine, median of {rounds} rounds\n")
     print(f"{'scene':34}" + "".join(f"{mode:>20}" for mode in MODES))
     for name, effects in SCENES.items():
-        system = teeth._replace(effects=effects)
+        system = teeth.replace(effects=effects)
         start = np.zeros((LANES, len(system.states)))
         start[:, 0] = system.groups.half_backlash + system.groups.load
         settled = integrate(system, start, Plan(200, 300, 0, 0)).end_state
@@ -51,12 +51,12 @@ def main() -> None:
         print(f"{name:34}" + "".join(f"{ratio:20.2f}" for ratio in ratios), flush=True)
 
 
-def cost(system: System, start, mode, rounds: int) -> float:
+def cost(system: GearPairs, start, mode, rounds: int) -> float:
     """Return the processor time of one in that of the other."""
     plan = Plan(200, 0, 20, 1, **{"resolved": False, **mode})
-    sine = system._replace(teeth=None)
+    sine = system.replace(teeth=None)
 
-    def seconds(one: System) -> float:
+    def seconds(one: GearPairs) -> float:
         began = time.process_time()
         integrate(one, start, plan)
         return time.process_time() - began

@@ -15,7 +15,7 @@ from pathlib import Path
 
 import numba
 import numpy as np
-from gearchaos_kernels import Effects, Plan, System, integrate
+from gearchaos_kernels import Effects, GearPairs, Plan, integrate
 from machine import print_machine
 from textbook import run_textbook
 
@@ -69,7 +69,7 @@ def _contestants():
             yield f"full, {numba.config.NUMBA_NUM_THREADS} threads{kind}", tangent, everything
 
 
-def _pan(lanes: int) -> System:
+def _pan(lanes: int) -> GearPairs:
     config = load_config(SWEEP, ["sweep.from=0.0", "sweep.to=15.0", f"sweep.count={lanes}"])
     return Lanes(config).system_of(np.arange(lanes))
 
@@ -87,7 +87,7 @@ def engine(
     Steps of RK4: flow maps count for `STEPS` a period.
     """
     lanes = LANES * threads
-    system = _pan(lanes)._replace(effects=scene)
+    system = _pan(lanes).replace(effects=scene)
     # The end state is written in full, so that no effect can be optimised away.
     plan = Plan(steps, 0, PERIODS, 1, tangent, resolved, method=method)
     counted = lanes * PERIODS * (steps if method == "rk4" else STEPS)

@@ -125,7 +125,7 @@ def _sampled_steps(simulation: Simulation, places: Integers) -> int:
     if steps <= SAMPLE_STEPS:
         return steps
     system = simulation.lanes.system_of(simulation.lanes.computed_at(places))
-    needed = int(fewest_stable_steps(system).max()) + 2 * system.stiffness_cosine.size
+    needed = int(fewest_stable_steps(system).max()) + 2 * system.harmonics()
     return min(steps, max(SAMPLE_STEPS, needed))
 
 

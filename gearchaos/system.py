@@ -270,7 +270,7 @@ class System:
     def _plan(self) -> Plan:
         return plan_of(self.config, steps_per_period=self._steps)
 
-    def _at(self, values: Mapping[str, Floats]) -> kernels.System:
+    def _at(self, values: Mapping[str, Floats]) -> kernels.GearPairs:
         return system_of(self.config, {**axis_values(self.config), **values})
 
     def _start(self, start: Floats | None) -> Floats:

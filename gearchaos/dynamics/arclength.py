@@ -9,7 +9,7 @@ from collections.abc import Callable
 from typing import NamedTuple, Self
 
 import numpy as np
-from gearchaos_kernels import Plan, System, integrate
+from gearchaos_kernels import LaneSystem, Plan, integrate
 
 from gearchaos.arrays import Complex, Floats
 from gearchaos.dynamics.exponents import period_jacobian
@@ -102,7 +102,7 @@ class Curve(NamedTuple):
     excitation periods with a tangent; ``scale`` (states,) measures the coordinates.
     """
 
-    system_at: Callable[[Floats], System]
+    system_at: Callable[[Floats], LaneSystem]
     plan: Plan
     periods: int
     scale: Floats
@@ -110,7 +110,7 @@ class Curve(NamedTuple):
     @classmethod
     def through(
         cls,
-        system_at: Callable[[Floats], System],
+        system_at: Callable[[Floats], LaneSystem],
         plan: Plan,
         periods: int,
         point: Floats,

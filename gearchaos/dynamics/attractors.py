@@ -3,7 +3,7 @@
 from typing import NamedTuple
 
 import numpy as np
-from gearchaos_kernels import Plan, System, integrate
+from gearchaos_kernels import LaneSystem, Plan, integrate
 
 from gearchaos.arrays import Codes, Complex, Counts, Floats, Integers
 from gearchaos.dynamics.orbits import polish
@@ -43,7 +43,7 @@ class Attractor(NamedTuple):
 
 
 def find_attractors(
-    system: System, group: Integers, state: Floats, motion: Codes, period: Counts, plan: Plan
+    system: LaneSystem, group: Integers, state: Floats, motion: Codes, period: Counts, plan: Plan
 ) -> tuple[list[Attractor], Integers]:
     """Find the attractors of lanes, and to which of them each has come: its place in the list.
 

@@ -8,7 +8,7 @@ tangent vectors are the Euclidean ones of the states of eq. 13.
 from typing import NamedTuple, Self
 
 import numpy as np
-from gearchaos_kernels import Plan, System, integrate, jacobian
+from gearchaos_kernels import LaneSystem, Plan, integrate, jacobian
 
 from gearchaos.arrays import Floats
 from gearchaos.dynamics.modes import memory
@@ -36,7 +36,7 @@ class Exponents(NamedTuple):
         )
 
 
-def exponents(system: System, start: Floats, plan: Plan) -> Exponents:
+def exponents(system: LaneSystem, start: Floats, plan: Plan) -> Exponents:
     """Compute all Lyapunov exponents of every lane, per unit of tau.
 
     An orthonormal frame of tangent vectors is carried along and made orthonormal again after every
@@ -72,23 +72,22 @@ def exponents(system: System, start: Floats, plan: Plan) -> Exponents:
     return Exponents(*(np.take_along_axis(found, descending, axis=1) for found in (mean, error)))
 
 
-def sum_of_exponents(system: System) -> Floats:
+def sum_of_exponents(system: LaneSystem) -> Floats:
     """Return the sum of all Lyapunov exponents of every lane, per unit of tau, shape (lanes,).
 
-    It is the trace of the Jacobian of eq. 13. The damping is constant and also acts where the teeth
-    are apart, so that the trace depends neither on contact nor on stiffness, load or pitch error::
+    It is the trace of the Jacobian. The damping is constant and also acts out of contact, so that
+    the trace depends neither on contact nor on stiffness or excitation. For the full scene of
+    eq. 13 it is::
 
         -2 xi [cos(beta_b) (1 + m_e/m_p + m_e/m_g) + sin(beta_b) (m_e/m_p + m_e/m_g)]
         -2 (eta_11 + eta_21 + eta_12 + eta_22)
-
-    in the full scene.
     """
-    apart = np.zeros(system.lanes)
-    trace: Floats = np.trace(jacobian(system, apart, apart), axis1=1, axis2=2)
+    apart = np.zeros((system.lanes, system.elements))
+    trace: Floats = np.trace(jacobian(system, apart), axis1=1, axis2=2)
     return trace
 
 
-def period_jacobian(system: System, start: Floats, plan: Plan) -> Floats:
+def period_jacobian(system: LaneSystem, start: Floats, plan: Plan) -> Floats:
     """Return the Jacobian of the map over the recorded mesh periods, with no transient before.
 
     On a periodic orbit over its own number of periods this is the monodromy matrix, whose
@@ -103,7 +102,7 @@ def period_jacobian(system: System, start: Floats, plan: Plan) -> Floats:
 
 
 def _carry(
-    system: System, start: Floats, frame: Floats, plan: Plan
+    system: LaneSystem, start: Floats, frame: Floats, plan: Plan
 ) -> tuple[Floats, Floats, Floats]:
     """Integrate every lane over its recorded periods for every column of its frame, at once.
 

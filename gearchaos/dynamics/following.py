@@ -9,7 +9,7 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
-from gearchaos_kernels import Plan, System
+from gearchaos_kernels import LaneSystem, Plan
 
 from gearchaos.arrays import Codes, Complex, Counts, Floats, Mask
 from gearchaos.dynamics.arclength import Curve, End, end_of_curve
@@ -79,7 +79,7 @@ class Followed(NamedTuple):
 
 
 def follow(
-    system_at: Callable[[Floats], System],
+    system_at: Callable[[Floats], LaneSystem],
     guess: Floats,
     period: Counts,
     first: Floats,
@@ -117,7 +117,7 @@ class _Lanes:
 
     def __init__(
         self,
-        system_at: Callable[[Floats], System],
+        system_at: Callable[[Floats], LaneSystem],
         guess: Floats,
         period: Counts,
         ends: tuple[Floats, Floats],
@@ -202,7 +202,7 @@ class _Lanes:
         limit = min(max(share, float(self._end[lane])) + LONGEST_STEP, 1.0)
         width = float(self._smallest[lane])
 
-        def system_at(shares: Floats) -> System:
+        def system_at(shares: Floats) -> LaneSystem:
             return self._system_at(first + shares * way)
 
         curve = Curve.through(system_at, self._plan, periods, point, share)

@@ -6,7 +6,7 @@ difference of the two says nothing of the error.
 """
 
 import numpy as np
-from gearchaos_kernels import Plan, System
+from gearchaos_kernels import LaneSystem, Plan
 
 from gearchaos.arrays import Counts, Floats
 from gearchaos.configuration.run_tables import FLOW_MAP_STEPS
@@ -15,7 +15,7 @@ from gearchaos.dynamics.orbits import polish
 
 
 def hidden_error(
-    system: System, plan: Plan, period: Counts, state: Floats, exponent: Floats
+    system: LaneSystem, plan: Plan, period: Counts, state: Floats, exponent: Floats
 ) -> Floats:
     """Return the error of the largest exponent of periodic lanes whose modes half a step damps.
 
@@ -25,7 +25,7 @@ def hidden_error(
 
     Parameters
     ----------
-    system : System
+    system : LaneSystem
         Lanes of the kernels.
     plan : Plan
         Of it only method and steps per period count.
@@ -49,8 +49,7 @@ def hidden_error(
     if not lanes.size:
         return error
     error[lanes] = np.maximum(decay[lanes] - exponent[lanes], 0.0)
-    # Flow maps do not know errors of single teeth.
-    if system.teeth is not None:
+    if system.refuses_maps():
         return error
     exact = plan._replace(method="flow_map", steps_per_period=FLOW_MAP_STEPS)
     orbits = polish(system.of(lanes), state[lanes], period[lanes], exact)

@@ -3,7 +3,7 @@
 from typing import NamedTuple
 
 import numpy as np
-from gearchaos_kernels import Outcome, Plan, Status, System, integrate
+from gearchaos_kernels import LaneSystem, Outcome, Plan, Status, integrate
 
 from gearchaos.arrays import Counts, Floats, Integers, Mask
 from gearchaos.dynamics.exponents import period_jacobian, sum_of_exponents
@@ -30,7 +30,7 @@ class Told(NamedTuple):
     state: Floats
 
 
-def labels_of(system: System, outcome: Outcome, plan: Plan) -> Told:
+def labels_of(system: LaneSystem, outcome: Outcome, plan: Plan) -> Told:
     """Label lanes by their record, which should hold `MOST_POINTS` section points or all there are.
 
     ``plan`` is that by which they were integrated, over whole excitation periods. `doubtful` lanes
@@ -66,12 +66,12 @@ def labels_of(system: System, outcome: Outcome, plan: Plan) -> Told:
     return Told(labels, state)
 
 
-def _told(system: System, outcome: Outcome, plan: Plan, most_points: int) -> label.Labels:
+def _told(system: LaneSystem, outcome: Outcome, plan: Plan, most_points: int) -> label.Labels:
     """Return what one record tells."""
     section, diverged = outcome.section[:, -most_points:], outcome.status != Status.OK
     record = label.Record(section, outcome.growth, diverged, _admits_tori(system))
     labels = label.label(record)
-    if not system.effects.backlash:
+    if not system.clearance:
         _tell_linear(system, plan, labels)
     _settle(system, outcome, plan, labels, label.settling_periods(record, labels))
     lanes = np.flatnonzero(np.isin(labels.motion, (label.CHAOTIC, label.QUASI_PERIODIC)))
@@ -79,7 +79,7 @@ def _told(system: System, outcome: Outcome, plan: Plan, most_points: int) -> lab
     return labels
 
 
-def _told_again(system: System, outcome: Outcome, plan: Plan) -> label.Labels:
+def _told_again(system: LaneSystem, outcome: Outcome, plan: Plan) -> label.Labels:
     """Return what a longer record tells; also of a torus, that it is not a cascade."""
     labels = _told(system, outcome, plan, plan.section_points)
     tori = np.flatnonzero(labels.motion == label.QUASI_PERIODIC)
@@ -90,7 +90,7 @@ def _told_again(system: System, outcome: Outcome, plan: Plan) -> label.Labels:
     return labels
 
 
-def _tell_linear(system: System, plan: Plan, labels: label.Labels) -> None:
+def _tell_linear(system: LaneSystem, plan: Plan, labels: label.Labels) -> None:
     """Tell growth without bound by the multipliers, in place: what is linear is never chaotic."""
     once = plan._replace(recorded_periods=system.repeats_after)
     jacobian = period_jacobian(system, np.zeros((system.lanes, len(system.states))), once)
@@ -109,7 +109,7 @@ def _measure_return(labels: label.Labels, section: Floats, lanes: Integers) -> N
     labels.return_distance[lanes] = distances[np.arange(lanes.size), labels.period[lanes] - 1]
 
 
-def _admits_tori(system: System) -> Mask:
+def _admits_tori(system: LaneSystem) -> Mask:
     """Whether quasi-periodic motion can exist at all.
 
     With two states and damping the period map contracts every area by the same factor; a closed
@@ -121,7 +121,7 @@ def _admits_tori(system: System) -> Mask:
 
 
 def _settle(
-    system: System, outcome: Outcome, plan: Plan, labels: label.Labels, period: Counts
+    system: LaneSystem, outcome: Outcome, plan: Plan, labels: label.Labels, period: Counts
 ) -> None:
     """Give the lanes that have come close to a stable orbit its period, in place."""
     searched = period > 0

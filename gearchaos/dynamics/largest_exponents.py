@@ -3,7 +3,7 @@
 from typing import NamedTuple
 
 import numpy as np
-from gearchaos_kernels import Outcome, Plan, System
+from gearchaos_kernels import LaneSystem, Outcome, Plan
 
 from gearchaos.arrays import Codes, Counts, Floats
 from gearchaos.dynamics.exponents import SMALLEST_RESOLVED
@@ -34,7 +34,7 @@ class LargestExponents(NamedTuple):
 
 
 def largest_exponents(
-    system: System, outcome: Outcome, plan: Plan, period: Counts, state: Floats
+    system: LaneSystem, outcome: Outcome, plan: Plan, period: Counts, state: Floats
 ) -> LargestExponents:
     """Tell the exponent of lanes from the multipliers of their orbits, or else from their records.
 

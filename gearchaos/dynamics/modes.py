@@ -1,31 +1,30 @@
-"""Modes of a pair on its contact branches: how long they last, and which ones a step damps.
+"""Modes of a system on its contact branches: how long they last, and which ones a step damps.
 
-On a contact branch with its mesh stiffness held, eq. 13 is linear. Its eigenvalues lambda are the
-modes of the pair: a disturbance decays as exp(Re lambda tau), and in computed steps of length h as
-abs(R(h lambda)) a step, see `stability`. Damping is constant and also acts where the teeth are
-apart, so that the decay of a fast mode is nearly the same on all branches.
+On a contact branch with the stiffnesses of its elements held, the equations are linear. Their
+eigenvalues lambda are the modes: a disturbance decays as exp(Re lambda tau), and in computed steps
+of length h as abs(R(h lambda)) a step, see `stability`. Where damping is constant and also acts
+out of contact, the decay of a fast mode is nearly the same on all branches.
 """
 
 import numpy as np
-from gearchaos_kernels import System, jacobian
+from gearchaos_kernels import LaneSystem, jacobian
 
 from gearchaos.arrays import Complex, Floats, Mask
-from gearchaos.dynamics.stability import ROUNDING, amplification, measurable, mesh_stiffnesses
+from gearchaos.dynamics.stability import ROUNDING, amplification, in_contact
 
 MOST_SHIFT = 0.05
 """Largest change of a decay by half the step, relative to it, that a comparison bears."""
 
-AXIAL = ("delta_3", "delta_4")  # Names of the axial states begin with these.
 
-
-def memory(system: System) -> Floats:
+def memory(system: LaneSystem) -> Floats:
     """Return the mesh periods in which the slowest mode in contact falls by a factor e.
 
-    Shape (lanes,); infinite without damping. Axial modes are left out: they act on no other one.
+    Shape (lanes,); infinite without damping. Modes of independent states are left out: they act on
+    no other one.
     """
-    contact = np.ones(system.lanes)
-    matrix = jacobian(measurable(system), contact, contact)
-    acting = [n for n, name in enumerate(system.states) if not name.startswith(AXIAL)]
+    matrix = jacobian(system.measurable(), in_contact(system))
+    independent = system.independent_states
+    acting = [n for n, name in enumerate(system.states) if name not in independent]
     modes = np.linalg.eigvals(matrix[:, acting][:, :, acting])
     slowest = -np.max(modes.real, axis=1) * system.mesh_period
     with np.errstate(divide="ignore"):
@@ -33,7 +32,7 @@ def memory(system: System) -> Floats:
     return periods
 
 
-def hidden_decay(system: System, steps: int) -> Floats:
+def hidden_decay(system: LaneSystem, steps: int) -> Floats:
     """Return the slowest decay rate among the modes that neither a step nor half of it computes.
 
     Comparing two grids does not show what both damp away. A mode belongs to them if half the step
@@ -52,9 +51,9 @@ def hidden_decay(system: System, steps: int) -> Floats:
     return slowest
 
 
-def _of_branches(system: System) -> Complex:
+def _of_branches(system: LaneSystem) -> Complex:
     """Return the eigenvalues on every branch, shape (lanes, branches, states)."""
-    system = measurable(system)
-    held = [jacobian(system, stiffness, stiffness) for stiffness in mesh_stiffnesses(system)]
+    system = system.measurable()
+    held = [jacobian(system, stiffnesses) for stiffnesses in system.branch_stiffnesses()]
     modes: Complex = np.linalg.eigvals(np.stack(held, axis=1)).astype(np.complex128)
     return modes

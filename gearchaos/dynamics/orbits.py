@@ -3,7 +3,7 @@
 from typing import NamedTuple
 
 import numpy as np
-from gearchaos_kernels import Plan, System, integrate
+from gearchaos_kernels import LaneSystem, Plan, integrate
 
 from gearchaos.arrays import Complex, Counts, Floats, Mask
 from gearchaos.dynamics.exponents import period_jacobian
@@ -43,7 +43,7 @@ class Orbits(NamedTuple):
         return inside
 
 
-def polish(system: System, guess: Floats, period: Counts, plan: Plan) -> Orbits:
+def polish(system: LaneSystem, guess: Floats, period: Counts, plan: Plan) -> Orbits:
     """Find the periodic orbit next to the guess of every lane.
 
     Newton's method on the map over ``period`` excitation periods, with its Jacobian from the
@@ -52,10 +52,10 @@ def polish(system: System, guess: Floats, period: Counts, plan: Plan) -> Orbits:
     thousandth of that of the largest coordinate where this is more.
 
     ``guess`` (lanes, states): states of eq. 13 at tau = 0; ``period`` (lanes,) in excitation
-    periods, see `System.repeats_after`, 0 where there is no orbit to look for; of the ``plan`` only
-    method and steps per period count, which are resolved. Not converged is a lane in which Newton's
-    method does not close the orbit or leads out of the neighbourhood of the guess, in which the
-    orbit found repeats after a divisor of the period, or whose period is 0.
+    periods, see `LaneSystem.repeats_after`, 0 where there is no orbit to look for; of the ``plan``
+    only method and steps per period count, which are resolved. Not converged is a lane in which
+    Newton's method does not close the orbit or leads out of the neighbourhood of the guess, in
+    which the orbit found repeats after a divisor of the period, or whose period is 0.
     """
     found = Orbits(
         points=np.full(guess.shape, np.nan),
@@ -75,7 +75,7 @@ def polish(system: System, guess: Floats, period: Counts, plan: Plan) -> Orbits:
     return found
 
 
-def _polish(system: System, guess: Floats, plan: Plan) -> Orbits:
+def _polish(system: LaneSystem, guess: Floats, plan: Plan) -> Orbits:
     """Polish lanes of one period."""
     lanes = np.arange(guess.shape[0])
     start, points = guess, guess.copy()

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
-from gearchaos_kernels import Plan, System, integrate
+from gearchaos_kernels import LaneSystem, Plan, integrate
 
 from gearchaos.arrays import Counts, Floats, Integers
 from gearchaos.dynamics.orbits import Orbits, polish
@@ -35,7 +35,7 @@ class Remainders(NamedTuple):
 
 
 def remainders(
-    system: System,
+    system: LaneSystem,
     section: Floats,
     kept: tuple[int, Sequence[int]],
     period: Counts,
@@ -46,7 +46,7 @@ def remainders(
 
     Parameters
     ----------
-    system : System
+    system : LaneSystem
         Lanes of the kernels.
     section : array, shape (lanes, points, states)
         Points of the section once an excitation period, all states.
@@ -85,7 +85,7 @@ def remainders(
     return found
 
 
-def _orbit_section(system: System, orbits: Orbits, period: int, plan: Plan) -> Floats:
+def _orbit_section(system: LaneSystem, orbits: Orbits, period: int, plan: Plan) -> Floats:
     """Return the section of orbits over one period, shape (lanes, period, states)."""
     whole = period * system.repeats_after
     once = Plan(plan.steps_per_period, 0, whole, whole, tangent=True, method=plan.method)
@@ -97,7 +97,7 @@ def _orbit_section(system: System, orbits: Orbits, period: int, plan: Plan) -> F
 
 
 def _decay_and_rounding(
-    system: System, orbits: Orbits, orbit: Floats, plan: Plan
+    system: LaneSystem, orbits: Orbits, orbit: Floats, plan: Plan
 ) -> tuple[Floats, Floats, Floats]:
     """Return the decay to orbits, and what rounding makes of their sections and exponents.
 

@@ -1,16 +1,17 @@
 """The fewest steps per mesh period with which the integration of a lane is stable.
 
-On a contact branch with its mesh stiffness held, eq. 13 is linear with the eigenvalues of its
-Jacobian. None of them may lie outside the stable region of the Runge-Kutta method of order 4, or
-the computed motion grows where the true one decays. A step of length h multiplies the mode of an
-eigenvalue lambda by R(h lambda), R(z) = 1 + z + z^2/2 + z^3/6 + z^4/24 (Hairer, Wanner 1996, sec.
-IV.2). The size of R need not rise steadily along a ray from 0: on the negative real axis it first
-falls. But on every ray of the left half plane it passes 1 only once, so that all steps shorter than
-the longest stable one are stable.
+On a contact branch with the stiffnesses of its elements held, the equations of motion are linear
+with the eigenvalues of their Jacobian. None of them may lie outside the stable region of the
+Runge-Kutta method of order 4, or the computed motion grows where the true one decays.
+
+A step of length h multiplies the mode of an eigenvalue lambda by R(h lambda),
+R(z) = 1 + z + z^2/2 + z^3/6 + z^4/24 (Hairer, Wanner 1996, sec. IV.2). The size of R need not
+rise steadily along a ray from 0: on the negative real axis it first falls. But on every ray of the
+left half plane it passes 1 only once. All steps shorter than the longest stable one are stable.
 """
 
 import numpy as np
-from gearchaos_kernels import Groups, System, jacobian
+from gearchaos_kernels import LaneSystem, jacobian
 
 from gearchaos.arrays import Complex, Floats, Integers
 
@@ -19,44 +20,41 @@ MOST_STEPS = 2**53  # Stands for every number of steps beyond it.
 ROUNDING = 1e-9
 """Relative error granted to eigenvalues: an undamped mode lies on the imaginary axis up to that."""
 
-_BEYOND_MEASURE = 1e150
-_POINTS_PER_WAVE = 64
 _RAYS = 2**14
 
 
-def fewest_stable_steps(system: System) -> Integers:
+def fewest_stable_steps(system: LaneSystem) -> Integers:
     """Return the fewest steps per period with which every lane is stable on every branch.
 
-    The branches are those with and without contact in either direction, with the mesh stiffness
-    held at its smallest and at its largest value. A motion that stays on one branch for some of the
-    time only may survive with fewer steps. Eigenvalues whose real part is positive grow by
-    themselves and set no limit. Every larger number of steps, shape (lanes,), is stable too.
+    The branches are those with and without contact, with the stiffness held at its smallest and at
+    its largest value, see `LaneSystem.branch_stiffnesses`. A motion that stays on one branch for
+    some of the time only may survive with fewer steps. Eigenvalues whose real part is positive grow
+    by themselves and set no limit. Every larger number of steps, shape (lanes,), is stable too.
     """
-    system = measurable(system)
-    # The axial motion acts on nothing else: both directions in contact or apart are all there is.
-    held = (jacobian(system, stiffness, stiffness) for stiffness in mesh_stiffnesses(system))
+    system = system.measurable()
+    held = (jacobian(system, stiffnesses) for stiffnesses in system.branch_stiffnesses())
     demand = np.max([_demand(matrix) for matrix in held], axis=0)
     with np.errstate(over="ignore"):
         steps: Floats = np.ceil(demand * (1.0 - ROUNDING) * system.mesh_period)
     return np.clip(steps, 1.0, MOST_STEPS).astype(np.intp)
 
 
-def measurable(system: System) -> System:
-    """Return a system whose groups that no computation could hold are cut short of overflow."""
-    clipped = (np.clip(group, -_BEYOND_MEASURE, _BEYOND_MEASURE) for group in system.groups)
-    return system._replace(groups=Groups(*clipped))
+def in_contact(system: LaneSystem) -> Floats:
+    """Return the relative stiffnesses of all elements in contact, at their mean: ones."""
+    return np.ones((system.lanes, system.elements))
 
 
-def exponent_bias(system: System, steps: int) -> tuple[Floats, Floats]:
-    """Return by how much a step alone shifts the largest exponent of the pair in contact.
+def exponent_bias(system: LaneSystem, steps: int) -> tuple[Floats, Floats]:
+    """Return by how much a step alone shifts the largest exponent of the system in contact.
 
-    With its stiffness held at the mean, eq. 13 is linear: the method multiplies the mode of an
-    eigenvalue by R(h lambda) in each step, where the true factor is exp(h lambda). Returned are the
-    difference of the largest rate of growth from the true one, and this one, both per unit of tau,
-    shape (lanes,).
+    With stiffnesses held at their mean, the equations are linear: the method multiplies the mode of
+    an eigenvalue by R(h lambda) in each step, where the true factor is exp(h lambda).
+
+    Returns the difference of the largest rate of growth from the true one, and the true one, both
+    per unit of tau, shape (lanes,).
     """
-    step, contact = system.mesh_period[:, np.newaxis] / steps, np.ones(system.lanes)
-    eigenvalues = np.linalg.eigvals(jacobian(system, contact, contact)).astype(np.complex128)
+    step, contact = system.mesh_period[:, np.newaxis] / steps, in_contact(system)
+    eigenvalues = np.linalg.eigvals(jacobian(system, contact)).astype(np.complex128)
     true = np.max(eigenvalues.real, axis=1)
     computed = np.max(np.log(amplification(step * eigenvalues)) / step, axis=1)
     return computed - true, true
@@ -90,20 +88,6 @@ def steps_per_time(eigenvalues: Complex) -> Floats:
     size = np.abs(eigenvalues)
     ray = np.interp(np.abs(np.angle(eigenvalues)), _ANGLES, _LENGTHS)
     return np.where(eigenvalues.real <= ROUNDING * size, size / ray, 0.0)
-
-
-def mesh_stiffnesses(system: System) -> Floats:
-    """Return kappa f' on the branches, (stiffnesses, lanes): its extremes, and 0 out of contact."""
-    values = [np.ones(system.lanes)]
-    if system.effects.stiffness_variation:
-        waves = system.stiffness_cosine + 1j * system.stiffness_sine
-        harmonics = np.concatenate([[0.0], waves])
-        variation = np.fft.fft(harmonics, _POINTS_PER_WAVE * harmonics.size).real
-        scale = system.groups.stiffness_variation_scale
-        values = [1.0 + scale * extreme for extreme in (np.min(variation), np.max(variation))]
-    if system.effects.backlash:
-        values.append(np.zeros(system.lanes))
-    return np.stack(values)
 
 
 def _demand(matrix: Floats) -> Floats:

@@ -7,9 +7,9 @@ import numpy as np
 from gearchaos_kernels import (
     Effects,
     ForkedProcessError,
+    GearPairs,
     Groups,
     Plan,
-    System,
     Teeth,
     require_threads,
 )
@@ -48,7 +48,7 @@ def plan_of(config: Configuration, **others: Any) -> Plan:
 
 def system_of(
     config: Configuration, values: Mapping[str, Floats], effects: Collection[str] | None = None
-) -> System:
+) -> GearPairs:
     """Return the system of some lanes.
 
     ``values``: that of each swept parameter in every lane, (lanes,), and the number of its drawn
@@ -75,7 +75,7 @@ def system_of(
     acting = config.scene.effects if effects is None else effects
     cosine, sine = found.stiffness_cosine, found.stiffness_sine
     cosine, sine = (np.zeros(0) if wave is None else wave for wave in (cosine, sine))
-    return System(
+    return GearPairs(
         Effects(**{effect: effect in acting for effect in Effects._fields}),
         Groups(**groups),
         cosine,

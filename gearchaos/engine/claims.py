@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 import numpy as np
-from gearchaos_kernels import Outcome, Plan, System
+from gearchaos_kernels import LaneSystem, Outcome, Plan
 
 from gearchaos.dynamics.hidden_modes import hidden_error
 from gearchaos.dynamics.labelling import Told
@@ -11,14 +11,14 @@ from gearchaos.dynamics.remainders import remainders
 from gearchaos.records.difference import Solution
 
 
-def columns_of(system: System, kept: Sequence[str]) -> list[int]:
+def columns_of(system: LaneSystem, kept: Sequence[str]) -> list[int]:
     """Return the numbers of the kept states, or of all where none is kept."""
     return [system.states.index(name) for name in kept or system.states]
 
 
 def completed(
     solution: Solution,
-    system: System,
+    system: LaneSystem,
     outcome: Outcome,
     plan: Plan,
     kept: Sequence[str],

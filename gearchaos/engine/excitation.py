@@ -8,7 +8,6 @@ from gearchaos_kernels import Teeth
 
 from gearchaos.arrays import Floats
 from gearchaos.configuration.run_tables import DEFAULT_STEPS
-from gearchaos.dynamics.stability import mesh_stiffnesses
 from gearchaos.engine.lanes import Lanes
 from gearchaos.engine.steps import PILOT_LANES
 from gearchaos.errors import ConfigurationError
@@ -147,7 +146,7 @@ def _largest_factor(group: Variable) -> float:
 def _negative_stiffness(lanes: Lanes) -> str:
     """Tell where the variation of the mesh stiffness exceeds its mean."""
     # The first lane and the last one are those of the ends of its scale, if that is swept.
-    lowest = np.min(mesh_stiffnesses(lanes.system_of(lanes.spread(PILOT_LANES))))
+    lowest = np.min(lanes.system_of(lanes.spread(PILOT_LANES)).branch_stiffnesses())
     if lowest >= 0.0:
         return ""
     return (

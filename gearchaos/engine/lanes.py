@@ -5,7 +5,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from gearchaos_kernels import System
+from gearchaos_kernels import GearPairs
 
 from gearchaos.arrays import Array, Floats, Integers
 from gearchaos.configuration import Configuration, axis_values, swept_values
@@ -99,7 +99,7 @@ class Lanes:
         found = zip(self._of_systems.items(), index, strict=False)
         return {parameter: values[at] for (parameter, values), at in found}
 
-    def system_of(self, lanes: Integers) -> System:
+    def system_of(self, lanes: Integers) -> GearPairs:
         """Return the system of some lanes."""
         return system_of(self.config, self.values_of(lanes), self.effects)
 
@@ -154,18 +154,18 @@ def axis_of(parameter: str, values: Floats) -> known.Variable:
     return known.coordinate(name, key.units or "1", key.wording, "", values)
 
 
-def start_states(config: Configuration, system: System, numbers: Integers) -> Floats:
+def start_states(config: Configuration, system: GearPairs, numbers: Integers) -> Floats:
     """Return the start states, shape (lanes, states), of lanes with this system.
 
     ``numbers`` (lanes,): those that they have in the whole sweep: the random state of a lane
     depends on its number and the seed alone.
     """
     values: dict[Any, Any] = dict.fromkeys(system.states, 0.0)
-    values |= config.start.state
     kind, spread = config.start.kind, config.start.spread
     box: dict[Any, tuple[float, float]] = {**config.start.box}
+    values |= config.start.state
     if kind == "contact":
-        values["delta_5"] = _contact(system)
+        values |= dict(zip(system.states, system.contact_state().T, strict=True))
     elif kind == "grid":
         count = config.start.count
         places = np.unravel_index(numbers % config.start.size, [count] * len(box))
@@ -191,12 +191,3 @@ def _draws(seed: int, run: Integers) -> Floats:
     generator.advance(int(run[0]) * (_DRAWS_PER_LANE // _PHILOX_WIDTH))
     shape = run.size, _DRAWS_PER_LANE
     return np.random.Generator(generator).uniform(-1.0, 1.0, shape)
-
-
-def _contact(system: System) -> Floats:
-    """Clearance taken up towards the load, and the deflection f_n of a mesh of stiffness 1."""
-    groups = system.groups
-    clearance = np.zeros(system.lanes)
-    if system.effects.backlash:
-        clearance = groups.half_backlash * np.cos(groups.base_helix_angle)
-    return np.copysign(clearance, groups.load) + groups.load

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numba
 import numpy as np
-from gearchaos_kernels import System, integrate
+from gearchaos_kernels import LaneSystem, integrate
 
 from gearchaos.arrays import Array, Floats
 from gearchaos.configuration import Configuration, swept_values
@@ -217,7 +217,7 @@ def _losses(
 
 
 def _followed(config: Configuration, edge: Array, last: Floats, width: float = np.inf) -> Followed:
-    def system(values: Floats) -> System:
+    def system(values: Floats) -> LaneSystem:
         return system_of(config, {config.sweep.parameter: values}, config.needed_effects)
 
     first, state = edge["value"], edge["state"].copy()

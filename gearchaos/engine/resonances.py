@@ -6,7 +6,7 @@ import numpy as np
 
 from gearchaos.arrays import Floats
 from gearchaos.configuration.tables import groups_at, physical_at
-from gearchaos.dynamics.eigenfrequencies import eigenfrequencies, static_deflection
+from gearchaos.dynamics.eigenfrequencies import eigenfrequencies
 from gearchaos.dynamics.systems import system_of
 from gearchaos.engine.lanes import Lanes
 from gearchaos.gear.derivation import FREQUENCY, LENGTH, derive_scales
@@ -78,7 +78,7 @@ def resonances(lanes: Lanes) -> Resonances:
         None if name not in scales else np.broadcast_to(scales[name], (system.lanes,))
         for name in (FREQUENCY, LENGTH)
     )
-    found, bent = eigenfrequencies(system), static_deflection(system)
+    found, bent = eigenfrequencies(system), system.static_force()
     hertz = None if scale is None else found * scale[:, np.newaxis] / (2.0 * np.pi)
     teeth = None if config.pair is None else config.pair.teeth
     modes = np.isfinite(found).any(axis=0)

@@ -3,7 +3,7 @@
 import time
 
 import numpy as np
-from gearchaos_kernels import Outcome, Plan, Status, System, mesh_motion
+from gearchaos_kernels import GearPairs, Outcome, Plan, Status, mesh_motion
 
 from gearchaos.arguments import whole_number
 from gearchaos.arrays import Array
@@ -92,7 +92,7 @@ def compute_response(simulation: Simulation, periods: int, text: str, fixed: str
     return result_of(simulation, [arrays], facts, variables)
 
 
-def _motion(system: System, outcome: Outcome, plan: Plan) -> dict[str, Array]:
+def _motion(system: GearPairs, outcome: Outcome, plan: Plan) -> dict[str, Array]:
     turned = plan.transient_periods + plan.recorded_periods - plan.history_periods
     found = mesh_motion(system, outcome.history, plan.steps_per_period, turned)
     motion: dict[str, Array] = {

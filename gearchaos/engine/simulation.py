@@ -310,7 +310,9 @@ class Simulation:
             arrays |= self._check(lanes, start, outcome, told)
         return arrays
 
-    def _told_of_teeth(self, system: kernels.System, outcome: kernels.Outcome) -> dict[str, Array]:
+    def _told_of_teeth(
+        self, system: kernels.LaneSystem, outcome: kernels.Outcome
+    ) -> dict[str, Array]:
         """Return what is kept of contact, loads and states; of lanes that diverged none of it."""
         told: dict[str, Array] = {}
         if self.plan.contact and self._splits_steps:
@@ -318,8 +320,7 @@ class Simulation:
                 found = contact_told(outcome.contact[:, number], self.plan.recorded_periods)
                 told |= {f"{name}_{way}": values for name, values in found.items()}
         if self.plan.loads:
-            static = system.groups.load / np.cos(system.groups.base_helix_angle)
-            told |= loads_told(outcome.loads, static, self._directions)
+            told |= loads_told(outcome.loads, system.static_force(), self._directions)
         told |= states_told(outcome, self.plan)
         for values in told.values():
             if values.dtype != np.uint8:

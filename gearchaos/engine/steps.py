@@ -5,7 +5,7 @@ from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
-from gearchaos_kernels import Outcome, Plan, Status, System, integrate, maps_are_kept
+from gearchaos_kernels import LaneSystem, Outcome, Plan, Status, integrate, maps_are_kept
 
 from gearchaos.arrays import Integers, Mask
 from gearchaos.configuration.messages import Fault
@@ -159,7 +159,7 @@ def _fault(lanes: Lanes, limit: int, unstable: Integers, steps: int | None) -> F
 
 
 def solution_of(
-    system: System, outcome: Outcome, plan: Plan, kept: Sequence[str], told: Told | None = None
+    system: LaneSystem, outcome: Outcome, plan: Plan, kept: Sequence[str], told: Told | None = None
 ) -> Solution:
     """Return of integrated lanes what tells two grids apart.
 

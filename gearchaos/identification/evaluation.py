@@ -3,7 +3,7 @@
 from typing import Any, NamedTuple
 
 import numpy as np
-from gearchaos_kernels import Outcome, Plan, Status, System, integrate, mesh_motion
+from gearchaos_kernels import GearPairs, Outcome, Plan, Status, integrate, mesh_motion
 
 from gearchaos.arrays import Counts, Floats, Integers, Mask
 from gearchaos.configuration import Configuration
@@ -102,7 +102,7 @@ def require_stable(config: Configuration, values: Floats, parameters: dict[str, 
         )
 
 
-def _records(system: System, outcome: Outcome, looked_at: Integers, plan: Plan) -> Records:
+def _records(system: GearPairs, outcome: Outcome, looked_at: Integers, plan: Plan) -> Records:
     """Return what lanes came to, each array with the lanes first."""
     sound = outcome.status == Status.OK
     # The torsion and its rate: the other coordinates follow them.

@@ -2,10 +2,12 @@
 
 from gearchaos_kernels.batch import integrate, maps_are_kept, maps_memory
 from gearchaos_kernels.compilation import CACHE_FOLDER, source_hash
+from gearchaos_kernels.evaluation import jacobian
 from gearchaos_kernels.memory.rows import LANES
-from gearchaos_kernels.models.gear_pair.evaluation import jacobian, mesh_motion
+from gearchaos_kernels.models.gear_pair.evaluation import mesh_motion
 from gearchaos_kernels.models.gear_pair.groups import STATES, Effects, Groups
-from gearchaos_kernels.models.gear_pair.system import MeshMotion, System
+from gearchaos_kernels.models.gear_pair.pairs import GearPairs, MeshMotion
 from gearchaos_kernels.models.gear_pair.tooth_errors import Teeth
+from gearchaos_kernels.models.lane_system import LaneSystem
 from gearchaos_kernels.plan import STATUS_TEXTS, Outcome, Plan, Status
 from gearchaos_kernels.turns import ForkedProcessError, require_threads

@@ -1,7 +1,5 @@
 """The batch driver: splits lanes into blocks, runs them side by side, returns arrays."""
 
-from typing import Any
-
 import numpy as np
 from numba import get_num_threads, prange
 from numpy.typing import NDArray
@@ -9,6 +7,7 @@ from numpy.typing import NDArray
 from gearchaos_kernels.block import Batch, integrate_block
 from gearchaos_kernels.compilation import count_up, driver
 from gearchaos_kernels.methods.registry import METHODS
+from gearchaos_kernels.models.lane_system import LaneSystem
 from gearchaos_kernels.plan import Floats, Outcome, Plan, Schedule, Status
 from gearchaos_kernels.recorders.contact import ROWS as CONTACT_ROWS
 from gearchaos_kernels.recorders.loads import SIGNAL_ROWS, signals_of
@@ -31,7 +30,7 @@ def _integrate_blocks(threads, taken, batch, tables, plan, outcome, scene):
             number = count_up(taken)
 
 
-def scene_of(system: Any, plan: Plan) -> Scene:
+def scene_of(system: LaneSystem, plan: Plan) -> Scene:
     """Return what the compiled loop has for a system and a plan."""
     method = METHODS[plan.method]
     resolved = system.clearance and (plan.resolved or method.always_resolved)
@@ -48,14 +47,14 @@ def scene_of(system: Any, plan: Plan) -> Scene:
 
 
 def integrate(
-    system: Any, start: Floats, plan: Plan, *, tangent_start: Floats | None = None
+    system: LaneSystem, start: Floats, plan: Plan, *, tangent_start: Floats | None = None
 ) -> Outcome:
     """Integrate a batch of lanes from tau = 0.
 
     Parameters
     ----------
-    system : System of a model
-        Everything that defines the equations of motion of every lane.
+    system : LaneSystem
+        The equations of motion of every lane.
     start : array, shape (lanes, states)
         States at tau = 0, in the units of the equations.
     plan : Plan
@@ -152,7 +151,7 @@ def _observed_row(scene: Scene) -> int:
 
 
 def _per_tau(
-    system: Any, plan: Plan, outcome: Outcome, steps_taken: NDArray[np.intp], scene: Scene
+    system: LaneSystem, plan: Plan, outcome: Outcome, steps_taken: NDArray[np.intp], scene: Scene
 ) -> Outcome:
     """Turn what was recorded per step into the units of the equations."""
     columns = [system.states.index(name) for name in plan.states]
@@ -176,7 +175,7 @@ def _per_tau(
 
 
 def steps_between_scalings(
-    system: Any, steps_per_period: int | NDArray[np.intp]
+    system: LaneSystem, steps_per_period: int | NDArray[np.intp]
 ) -> NDArray[np.intp]:
     """Return after how many steps each tangent vector is scaled back to length 1, shape (lanes,).
 
@@ -188,7 +187,7 @@ def steps_between_scalings(
     return np.where(scalings > 1.0, interval, steps_per_period).astype(np.intp)
 
 
-def maps_memory(system: Any, plan: Plan, stable: NDArray[np.int64]) -> int:
+def maps_memory(system: LaneSystem, plan: Plan, stable: NDArray[np.int64]) -> int:
     """Return about how many bytes a method prepares for lanes that are integrated together.
 
     ``stable`` (lanes,): steps per period with which RK4 is stable.
@@ -196,6 +195,6 @@ def maps_memory(system: Any, plan: Plan, stable: NDArray[np.int64]) -> int:
     return METHODS[plan.method].memory(system, plan, scene_of(system, plan), stable)
 
 
-def maps_are_kept(system: Any, plan: Plan) -> bool:
+def maps_are_kept(system: LaneSystem, plan: Plan) -> bool:
     """Return whether what a method prepares for all lanes stays in memory from call to call."""
     return METHODS[plan.method].is_kept(system, plan, scene_of(system, plan))

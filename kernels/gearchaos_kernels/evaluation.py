@@ -3,7 +3,7 @@
 Both call the formulas that the steps of the methods call.
 """
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +23,7 @@ from gearchaos_kernels.memory.block_memory import (
 )
 from gearchaos_kernels.memory.rows import STATE, State, rows
 from gearchaos_kernels.memory.tuples import each
+from gearchaos_kernels.models.lane_system import LaneSystem
 from gearchaos_kernels.models.protocol import (
     accelerations,
     begin_period,
@@ -66,7 +67,7 @@ class Motion(NamedTuple):
     observed: Floats
 
 
-def jacobian(system: Any, stiffnesses: Floats) -> Floats:
+def jacobian(system: LaneSystem, stiffnesses: Floats) -> Floats:
     """Return the Jacobian of the equations per unit of tau, shape (lanes, states, states).
 
     On one contact branch of every element: ``stiffnesses`` (lanes, elements) are those of the
@@ -108,7 +109,9 @@ def held_at(element, share):
     return Push(0.0, element.stiffness * share)
 
 
-def evaluate(system: Any, states: Floats, steps_per_period: int, first_period: int = 0) -> Motion:
+def evaluate(
+    system: LaneSystem, states: Floats, steps_per_period: int, first_period: int = 0
+) -> Motion:
     """Return forces, contact and accelerations along a motion.
 
     ``states`` (lanes, samples, states): one step apart, the first one at mesh phase 0, after

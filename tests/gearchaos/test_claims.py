@@ -199,7 +199,7 @@ def test_the_distance_from_the_orbit_of_a_linear_pair_is_exact():
     found = of_linear(system, section, kept=8)
     assert found.distance == pytest.approx(apart[:, -1], rel=1e-8)
     assert found.of_kept == pytest.approx(apart.max(axis=1), rel=1e-8)
-    modes = np.linalg.eigvals(jacobian(system, np.ones(2), np.ones(2)))
+    modes = np.linalg.eigvals(jacobian(system, np.ones((2, system.elements))))
     assert found.decay == pytest.approx(-np.max(modes.real, axis=1) * PERIOD, rel=1e-9)
 
 
@@ -234,7 +234,7 @@ def test_no_claim_is_below_the_rounding_of_flow_maps(steps):
     truth = np.abs(outcome.section[:, -1] - linear_orbit(system)).max(axis=1)
     assert (truth <= found.section_rounding).all()
     assert (found.section_rounding < 1e-11).all()
-    modes = np.linalg.eigvals(jacobian(system, np.ones(2), np.ones(2)))
+    modes = np.linalg.eigvals(jacobian(system, np.ones((2, system.elements))))
     error = np.abs(solution.exponent - np.max(modes.real, axis=1))
     # Twice: eigenvalues of a nearly symmetric pair of modes are less well conditioned.
     assert (error <= 2.0 * found.exponent_rounding).all()
@@ -275,7 +275,7 @@ STIFF_MODE = {
 
 def test_modes_that_half_the_step_damps_are_hidden_until_steps_are_fine():
     system = linear_pair(**STIFF_MODE)
-    modes = np.linalg.eigvals(jacobian(system, np.ones(2), np.ones(2)))
+    modes = np.linalg.eigvals(jacobian(system, np.ones((2, system.elements))))
     stiffest = modes[0, np.argmax(np.abs(modes[0]))]
     limit = int(fewest_stable_steps(system)[0])
     assert hidden_decay(system, limit) == pytest.approx(np.full(2, stiffest.real))
@@ -291,7 +291,7 @@ def test_modes_that_half_the_step_damps_are_hidden_until_steps_are_fine():
 def test_a_hidden_mode_gives_the_error_with_and_without_flow_maps(teeth):
     system = linear_pair(**STIFF_MODE)
     if teeth:
-        system = system._replace(teeth=drawn_teeth(3, 2, lanes=2))
+        system = system.replace(teeth=drawn_teeth(3, 2, lanes=2))
     steps = int(fewest_stable_steps(system)[0])
     plan = Plan(steps, 0, 0, 0)
     period = np.ones(2, dtype=np.int32)
@@ -300,7 +300,7 @@ def test_a_hidden_mode_gives_the_error_with_and_without_flow_maps(teeth):
         settled = integrate(system, np.zeros((2, 6)), Plan(steps, 600, 6, 0)).end_state
         orbits = polish(system, settled, period, plan)
     exponent = np.log(np.abs(orbits.multipliers[:, 0])) / system.excitation_period
-    modes = np.linalg.eigvals(jacobian(system, np.ones(2), np.ones(2)))
+    modes = np.linalg.eigvals(jacobian(system, np.ones((2, system.elements))))
     true = np.abs(exponent - np.max(modes.real, axis=1))
     found = hidden_error(system, plan, period, orbits.points, exponent)
     assert (true > 0.01).all()

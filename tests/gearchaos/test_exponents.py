@@ -73,9 +73,9 @@ def test_error_of_the_sum_falls_with_the_fourth_power_of_the_step():
 
 @pytest.mark.parametrize("steps", [16, 50, 200, 3200])
 def test_sum_in_a_linear_scene_is_that_of_the_amplifications_of_a_step(steps):
-    model, stiffness = pan2021(5.86), np.ones(1)
+    model, stiffness = pan2021(5.86), np.ones((1, 2))
     step = PERIOD / steps
-    modes = np.linalg.eigvals(jacobian(system_of(model, LINEAR), stiffness, stiffness)[0])
+    modes = np.linalg.eigvals(jacobian(system_of(model, LINEAR), stiffness)[0])
     wanted = np.sum(np.log(amplification(step * modes))) / step
     found = exponents_of(LINEAR, model, steps, 6, 2).values.sum()
     assert found == pytest.approx(wanted, rel=0, abs=1e-12)

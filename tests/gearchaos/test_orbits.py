@@ -69,9 +69,9 @@ def multiplier_errors(name: str, found: Orbits) -> np.ndarray:
 
 def test_multipliers_of_the_linear_scene_are_the_exponentials_of_its_eigenvalues():
     found = found_orbits(LINEAR, 5.86, settled(LINEAR, 5.86, 200)[0], [1], 3200)
-    in_contact = np.ones(1)
     system = system_of(pan2021(5.86), LINEAR)
-    modes = np.linalg.eigvals(jacobian(system, in_contact, in_contact)[0])
+    in_contact = np.ones((1, system.elements))
+    modes = np.linalg.eigvals(jacobian(system, in_contact)[0])
     wanted = np.exp(modes * PERIOD)
     assert found.converged.all()
     assert np.sort_complex(found.multipliers[0]) == pytest.approx(

@@ -4,7 +4,7 @@ import itertools
 
 import numpy as np
 import pytest
-from gearchaos_kernels import Effects, Groups, Plan, Status, System, jacobian
+from gearchaos_kernels import Effects, GearPairs, Groups, Plan, Status, jacobian
 
 from gearchaos import ConfigurationError
 from gearchaos.dynamics.exponents import period_jacobian
@@ -81,7 +81,7 @@ def test_a_mode_that_grows_by_itself_sets_no_limit():
     # Mesh stiffness -0.5 at its lowest: exponents +-0.7, beside the oscillation at 1.5.
     model = oscillator(0.0)._replace(stiffness_variation_scale=np.ones(1))
     scene = TORSION._replace(stiffness_variation=True)
-    found = fewest_stable_steps(System(scene, model, np.array([1.5]), np.zeros(1)))
+    found = fewest_stable_steps(GearPairs(scene, model, np.array([1.5]), np.zeros(1)))
     assert found == np.ceil(200.0 * np.pi * np.sqrt(2.5) / np.sqrt(8.0))
 
 
@@ -94,7 +94,7 @@ def test_limit_of_every_scene_is_that_of_its_whole_jacobian(scene):
     demand = np.zeros(40)
     for tangential, axial in itertools.product(branches, repeat=2):
         system = system_of(model, scene)
-        whole = jacobian(system, np.full(40, tangential), np.full(40, axial))
+        whole = jacobian(system, np.tile([tangential, axial][: system.elements], (40, 1)))
         demand = np.maximum(demand, steps_per_time(np.linalg.eigvals(whole)).max(axis=1))
     wanted = 2.0 * np.pi / model.mesh_frequency * demand
     found = fewest(scene, model)

@@ -13,7 +13,7 @@ from typing import Any
 
 import numba
 import numpy as np
-from gearchaos_kernels import STATES, Effects, Groups, Outcome, Plan, System, Teeth, integrate
+from gearchaos_kernels import STATES, Effects, GearPairs, Groups, Outcome, Plan, Teeth, integrate
 
 SOLUTIONS = json.loads((Path(__file__).parents[1] / "data" / "pan2021.json").read_text())
 
@@ -87,12 +87,12 @@ def lanes_of(model: Groups, chosen: Any) -> Groups:
 
 def system_of(
     groups: Groups, effects: Effects = FULL, physical: bool = False, teeth: Teeth | None = None
-) -> System:
+) -> GearPairs:
     """Return a system with the mesh stiffness of Pan 2021."""
-    return System(effects, groups, COSINE, SINE, physical, teeth)
+    return GearPairs(effects, groups, COSINE, SINE, physical, teeth)
 
 
-def swinging() -> tuple[System, float]:
+def swinging() -> tuple[GearPairs, float]:
     """Return a pair that swings in contact without end, half a swing in every period, and how fast.
 
     Without clearance, damping and load delta_5 = A cos(w tau), w^2 = cos(beta_b), and N_y too; what

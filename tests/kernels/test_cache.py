@@ -35,7 +35,7 @@ if limit:
     import resource
     resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit))
 import numpy as np
-from gearchaos_kernels import Effects, Groups, System, evaluation
+from gearchaos_kernels import Effects, Groups, GearPairs, evaluation
 from gearchaos_kernels.compilation import CACHE_FOLDER, evaluator
 
 @evaluator
@@ -45,7 +45,7 @@ def double(number):
 def jacobian(transverse):
     groups = Groups(*[np.full(1, 0.1) for _ in Groups._fields])
     effects = Effects(False, False, False, transverse, False)
-    system = System(effects, groups, np.zeros(0), np.zeros(0))
+    system = GearPairs(effects, groups, np.zeros(0), np.zeros(0))
     return evaluation.jacobian(system, np.ones((1, 2))).tolist()
 
 values = [eval(expression) for expression in expressions]

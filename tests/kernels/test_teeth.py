@@ -25,7 +25,7 @@ PLAN = Plan(STEPS, 2, 10, 5, tangent=True, history_periods=1)
 
 def follow(chosen=slice(None), teeth: Teeth = TEETH, **plan):
     """Integrate some lanes of this test, with split steps."""
-    system = SYSTEM._replace(teeth=teeth).of(chosen)
+    system = SYSTEM.replace(teeth=teeth).of(chosen)
     return integrate(system, START[chosen], PLAN._replace(**plan))
 
 
@@ -64,7 +64,7 @@ def test_a_pair_comes_into_mesh_at_its_own_phase(entry, first):
     teeth = spur_teeth(1, 5, 1)._replace(entry=entry, profile=np.zeros(3, np.intp))
     teeth = teeth._replace(driving=np.zeros((1, 1)), driven=np.eye(5)[:1])
     model = MODEL._replace(error_mean=np.zeros(TOTAL), error_amplitude=np.ones(TOTAL))
-    system = system_of(model, teeth=teeth)._replace(physical=True).of([0, 1, 2])
+    system = system_of(model, teeth=teeth).replace(physical=True).of([0, 1, 2])
     states = np.zeros((3, 5 * STEPS + 1, 10))
     error = mesh_motion(system, states, STEPS, first).pitch_error[0]
     phase = first + np.arange(error.size) / STEPS
@@ -109,7 +109,7 @@ def test_teeth_with_the_same_error_have_an_error_mean_and_no_more(driving, drive
     def with_mean(error: float):
         mean = MODEL.error_mean + error * MODEL.error_amplitude
         groups = MODEL._replace(error_mean=mean, error_amplitude=np.zeros(TOTAL))
-        return integrate(SYSTEM._replace(groups=groups, teeth=None), START, PLAN)
+        return integrate(SYSTEM.replace(groups=groups, teeth=None), START, PLAN)
 
     assert_same_bits(follow(teeth=equal_teeth(1.0, driving, driven)), with_mean(1.0))
     found = follow(teeth=equal_teeth(-0.3, driving, driven))
@@ -118,7 +118,7 @@ def test_teeth_with_the_same_error_have_an_error_mean_and_no_more(driving, drive
 
 def test_the_excitation_repeats_when_the_same_teeth_meet(whole):
     assert SYSTEM.repeats_after == 12
-    assert SYSTEM._replace(effects=FULL._replace(pitch_error=False)).repeats_after == 1
+    assert SYSTEM.replace(effects=FULL._replace(pitch_error=False)).repeats_after == 1
     assert SYSTEM.excitation_period == pytest.approx(12.0 * SYSTEM.mesh_period)
     for turned in (12, 24, 12 * 10**9):
         assert_same_bits(follow(first_period=turned), whole)
@@ -173,7 +173,7 @@ def test_any_number_of_threads_gives_the_same_bits(whole):
 @pytest.mark.parametrize("physical", [False, True])
 def test_forces_along_a_motion_are_those_of_the_teeth_then_in_mesh(physical):
     first = 8
-    system = SYSTEM._replace(physical=physical).of([0, LANES, TOTAL - 1])
+    system = SYSTEM.replace(physical=physical).of([0, LANES, TOTAL - 1])
     plan = Plan(STEPS, 2, 2, 0, tangent=True, history_periods=2, first_period=first)
     states = integrate(system, START[: system.lanes], plan).history
     motion = mesh_motion(system, states, STEPS, first + 2)

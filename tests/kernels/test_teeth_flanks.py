@@ -7,7 +7,7 @@ mean is a row of steps, and the motion between them one of constant coefficients
 
 import numpy as np
 import pytest
-from gearchaos_kernels import Groups, Plan, System, Teeth, integrate, mesh_motion
+from gearchaos_kernels import GearPairs, Groups, Plan, Teeth, integrate, mesh_motion
 from scipy.linalg import expm
 
 from .reference import TORSION, TORSION_ONLY, drawn_teeth, pan2021, system_of
@@ -24,7 +24,7 @@ TEETH = np.array([0.0, 0.9, -0.7, 0.4, -0.2])
 """Errors of the driven teeth; neighbours differ by more than the static deflection."""
 
 
-def spur_system(smoothing: float, physical: bool = True) -> System:
+def spur_system(smoothing: float, physical: bool = True) -> GearPairs:
     """Return a spur pair of contact ratio 1.5 whose teeth take their load in so short a time."""
     cells = round(6.0 / smoothing)
     assert cells % 2 == 0
@@ -39,7 +39,7 @@ def spur_system(smoothing: float, physical: bool = True) -> System:
         "mass_ratio_g": 1.0,
     }
     groups = Groups(*(np.full(1, values.get(name, 0.0)) for name in Groups._fields))
-    return System(ERRORS_ONLY, groups, np.zeros(0), np.zeros(0), physical, teeth)
+    return GearPairs(ERRORS_ONLY, groups, np.zeros(0), np.zeros(0), physical, teeth)
 
 
 def extremes(smoothing: float, physical: bool = True) -> np.ndarray:

@@ -14,7 +14,7 @@ from gearchaos_kernels.models.gear_pair.groups import Groups
 from gearchaos_kernels.plan import Floats
 
 if TYPE_CHECKING:
-    from gearchaos_kernels.models.gear_pair.system import System
+    from gearchaos_kernels.models.gear_pair.pairs import GearPairs
 
 Lane = namedtuple(
     "Lane",
@@ -32,7 +32,7 @@ BEARING_DAMPING = [name for name in Groups._fields if "_damping_" in name]
 BEARING_STIFFNESS = [name for name in Groups._fields if "_stiffness_" in name]
 
 
-def state_scales(system: "System", step: Floats) -> Floats:
+def state_scales(system: "GearPairs", step: Floats) -> Floats:
     """Return what turns scaled states into those of eq. 13, shape (lanes, states).
 
     ``step``, shape (lanes,), is the length of a step in units of tau.
@@ -50,7 +50,7 @@ def state_scales(system: "System", step: Floats) -> Floats:
     return scales.T.copy()
 
 
-def lane_coefficients(system: "System", step: Floats) -> Floats:
+def lane_coefficients(system: "GearPairs", step: Floats) -> Floats:
     """Return the coefficients of every lane, shape (lanes, number of fields of `Lane`)."""
     groups = system.groups
     cosine, sine = np.cos(groups.base_helix_angle), np.sin(groups.base_helix_angle)
@@ -88,7 +88,7 @@ def lane_coefficients(system: "System", step: Floats) -> Floats:
     return np.array(lane, dtype=np.float64).T.copy()
 
 
-def growth_rates(system: "System") -> Floats:
+def growth_rates(system: "GearPairs") -> Floats:
     """Return a bound on how fast a tangent vector grows or decays, per unit of tau, shape (lanes,).
 
     The bound follows from the damping and the square root of the largest stiffness of the mesh in

@@ -8,23 +8,13 @@ from gearchaos_kernels.compilation import evaluator
 from gearchaos_kernels.memory.block_memory import aligned_memory, fill_lane
 from gearchaos_kernels.memory.rows import rows
 from gearchaos_kernels.models.gear_pair.forcing import pitch_error_at
-from gearchaos_kernels.models.gear_pair.system import MeshMotion, System
+from gearchaos_kernels.models.gear_pair.pairs import GearPairs, MeshMotion
 from gearchaos_kernels.models.protocol import begin_period, grid_at, point_at
 from gearchaos_kernels.plan import Floats
 
 
-def jacobian(system: System, tangential: Floats, axial: Floats) -> Floats:
-    """Return the Jacobian of eq. 13 per unit of tau, shape (lanes, states, states).
-
-    On one contact branch of either direction: ``tangential``, ``axial`` (lanes,) are kappa f' in
-    N_y and in N_z, the relative mesh stiffness in contact and 0 without contact.
-    """
-    slopes = np.stack(np.broadcast_arrays(tangential, axial), axis=1)
-    return evaluation.jacobian(system, slopes)
-
-
 def mesh_motion(
-    system: System, states: Floats, steps_per_period: int, first_period: int = 0
+    system: GearPairs, states: Floats, steps_per_period: int, first_period: int = 0
 ) -> MeshMotion:
     """Return forces, contact and accelerations along a motion (eqs 6, 7, 13, 22 and 23).
 

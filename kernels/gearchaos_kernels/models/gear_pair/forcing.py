@@ -17,7 +17,7 @@ from gearchaos_kernels.compilation import scalar
 from gearchaos_kernels.plan import Floats
 
 if TYPE_CHECKING:
-    from gearchaos_kernels.models.gear_pair.system import System
+    from gearchaos_kernels.models.gear_pair.pairs import GearPairs
 
 SINE, COSINE, VARIATION = 0, 1, 2
 """Columns of the table; from `VARIATION` on the Taylor coefficients of the stiffness variation."""
@@ -75,7 +75,7 @@ def phase_table(
     return np.stack([np.sin(angle), np.cos(angle), *coefficients], axis=1)
 
 
-def wave_series(system: "System", steps: int, terms: int) -> Floats:
+def wave_series(system: "GearPairs", steps: int, terms: int) -> Floats:
     """Return Taylor coefficients about the middle of every step, shape (3, terms, steps).
 
     Of the stiffness variation relative to the mean (eq. 19), and of sine and cosine of the phase.

@@ -28,7 +28,7 @@ from gearchaos_kernels.models.gear_pair.tooth_errors import SPLINE_DEGREE, Teeth
 from gearchaos_kernels.plan import Floats
 
 if TYPE_CHECKING:
-    from gearchaos_kernels.models.gear_pair.system import System
+    from gearchaos_kernels.models.gear_pair.pairs import GearPairs
 
 NARROW, MOST_PAIRS = 4, 7
 """Tooth pairs in mesh at once: with more than the first the loop is another one."""
@@ -63,7 +63,7 @@ class Tables(NamedTuple):
     ahead: int
 
 
-def tables_of(system: "System", steps_per_period: int) -> Tables:
+def tables_of(system: "GearPairs", steps_per_period: int) -> Tables:
     """Return the tables of a system. Raises ValueError with too many pairs in mesh."""
     waves = tuple(system.stiffness_cosine), tuple(system.stiffness_sine)
     phases = phase_table(*waves, steps_per_period)

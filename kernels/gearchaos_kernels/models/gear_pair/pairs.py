@@ -1,6 +1,7 @@
-"""A gear pair with pitch error: what defines the right-hand side of eq. 13 of Pan 2021."""
+"""Gear pairs with pitch error, one in every lane: the right-hand side of eq. 13 of Pan 2021."""
 
 import math
+from dataclasses import dataclass
 from typing import NamedTuple, Self
 
 import numpy as np
@@ -16,6 +17,7 @@ from gearchaos_kernels.models.gear_pair.groups import Effects, Groups
 from gearchaos_kernels.models.gear_pair.model import GearPair
 from gearchaos_kernels.models.gear_pair.teeth import NARROW, Tables, tables_of
 from gearchaos_kernels.models.gear_pair.tooth_errors import Teeth
+from gearchaos_kernels.models.lane_system import LaneSystem
 from gearchaos_kernels.plan import Floats
 from gearchaos_kernels.scene import flag
 
@@ -28,17 +30,33 @@ _UNIT = {
 }
 """Groups on which flow maps do not depend, with their values for inputs of one."""
 
+_BEYOND_MEASURE = 1e150
+"""Groups are cut short of it where the modes of a pair are computed: products do not overflow."""
+
+_POINTS_PER_WAVE = 64
+"""Points at which extremes of the mesh stiffness are sought, per period of its last harmonic."""
+
 _OWN = [name for name in Groups._fields if name not in _UNIT]
 """Groups on which the flow maps of a lane depend."""
 
 
-class System(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class GearPairs(LaneSystem):
     """Everything that defines the right-hand side of eq. 13 for a batch of lanes.
 
-    ``stiffness_cosine`` and ``stiffness_sine``, shape (harmonics,), are the Fourier coefficients of
-    the mesh stiffness relative to its mean (eq. 19); ``physical`` says whether delta_5 + e enters
-    the gaps, as eq. 1 gives, instead of delta_5 as eqs 6 and 7 are printed. With ``teeth`` the
-    pitch error is not that of eq. 14.
+    Attributes
+    ----------
+    effects : Effects
+        Which effects act, the same for all lanes.
+    groups : Groups
+        Dimensionless groups of eqs 8-13, each an array of shape (lanes,).
+    stiffness_cosine, stiffness_sine : array, shape (harmonics,)
+        Fourier coefficients of the mesh stiffness relative to its mean (eq. 19).
+    physical : bool
+        Whether delta_5 + e enters the gaps, as eq. 1 gives, instead of delta_5 as eqs 6 and 7 are
+        printed.
+    teeth : Teeth or None
+        Pitch errors tooth by tooth in place of the sine of eq. 14.
     """
 
     effects: Effects
@@ -54,11 +72,6 @@ class System(NamedTuple):
         return self.effects.states
 
     @property
-    def lanes(self) -> int:
-        """Number of lanes."""
-        return int(self.groups.mesh_frequency.size)
-
-    @property
     def mesh_period(self) -> Floats:
         """Duration of a mesh period in units of tau, shape (lanes,)."""
         return 2.0 * np.pi / self.groups.mesh_frequency
@@ -69,11 +82,6 @@ class System(NamedTuple):
         if self.teeth is None or not self.effects.pitch_error:
             return 1
         return math.lcm(self.teeth.driving.shape[1], self.teeth.driven.shape[1])
-
-    @property
-    def excitation_period(self) -> Floats:
-        """Duration of `repeats_after` mesh periods in units of tau, shape (lanes,)."""
-        return self.repeats_after * self.mesh_period
 
     @property
     def clearance(self) -> bool:
@@ -115,12 +123,51 @@ class System(NamedTuple):
     def linearised(self) -> Self:
         """Return it without excitation and clearance, which are no part of its linearisation."""
         effects = Effects(False, False, False, self.effects.transverse, self.effects.axial)
-        return self._replace(effects=effects)
+        return self.replace(effects=effects)
+
+    def measurable(self) -> Self:
+        """Return it with groups cut short of overflow."""
+        clipped = (np.clip(group, -_BEYOND_MEASURE, _BEYOND_MEASURE) for group in self.groups)
+        return self.replace(groups=Groups(*clipped))
+
+    def branch_stiffnesses(self) -> Floats:
+        """Return kappa f' on the branches, (branches, lanes, elements).
+
+        In contact at the extremes of the mesh stiffness, and 0 out of contact. The axial motion
+        acts on nothing else: both directions in contact or apart are all branches that count.
+        """
+        values = [np.ones(self.lanes)]
+        if self.effects.stiffness_variation:
+            waves = self.stiffness_cosine + 1j * self.stiffness_sine
+            harmonics = np.concatenate([[0.0], waves])
+            variation = np.fft.fft(harmonics, _POINTS_PER_WAVE * harmonics.size).real
+            scale = self.groups.stiffness_variation_scale
+            values = [1.0 + scale * extreme for extreme in (np.min(variation), np.max(variation))]
+        if self.effects.backlash:
+            values.append(np.zeros(self.lanes))
+        return np.repeat(np.stack(values)[..., np.newaxis], self.elements, axis=2)
+
+    def contact_state(self) -> Floats:
+        """Return the clearance taken up towards the load, and the deflection f_n at stiffness 1."""
+        groups, state = self.groups, np.zeros((self.lanes, len(self.states)))
+        clearance = np.zeros(self.lanes)
+        if self.effects.backlash:
+            clearance = groups.half_backlash * np.cos(groups.base_helix_angle)
+        state[:, 0] = np.copysign(clearance, groups.load) + groups.load
+        return state
+
+    def static_force(self) -> Floats:
+        """Return N_y at rest and mean stiffness: eq. 13 gives cos(beta_b) N_y = f_n.
+
+        The gap y_1 less its clearance b cos(beta_b) is as large.
+        """
+        force: Floats = self.groups.load / np.cos(self.groups.base_helix_angle)
+        return force
 
     def of_unit_inputs(self) -> Self:
         """Return it forced by inputs of one, from which flow maps are made."""
         unit = {name: np.full(self.lanes, value) for name, value in _UNIT.items()}
-        return self._replace(groups=self.groups._replace(**unit))
+        return self.replace(groups=self.groups._replace(**unit))
 
     def owned(self) -> Floats:
         """Return all numbers on which the flow maps of a lane depend, shape (lanes, numbers)."""
@@ -155,11 +202,7 @@ class System(NamedTuple):
         """Return the system of some lanes, in the order given."""
         teeth = self.teeth and self.teeth._replace(profile=self.teeth.profile[lanes])
         groups = Groups(*(group[lanes] for group in self.groups))
-        return self._replace(groups=groups, teeth=teeth)
-
-    def repeated(self, times: int) -> Self:
-        """Return the system with every lane so many times in a row."""
-        return self.of(np.repeat(np.arange(self.lanes), times))
+        return self.replace(groups=groups, teeth=teeth)
 
 
 class MeshMotion(NamedTuple):
