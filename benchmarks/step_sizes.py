@@ -25,7 +25,7 @@ from gearchaos.accuracy import MODES
 from gearchaos.figures.style import style
 from gearchaos.figures.work_precision import LOOKS
 from gearchaos.records.period import motion_period
-from gearchaos.results.result import Result
+from gearchaos.results.reading.result import Result
 
 SWEEP = Path(__file__).parent.parent / "sweeps" / "pan2021.toml"
 CHAOTIC = 0.01

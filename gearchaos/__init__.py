@@ -28,7 +28,7 @@ _HOMES = {
     "engine.running": ("run",),
     "errors": ("ConfigurationError", "FigureError", "FileError", "GearchaosError"),
     "iso1328": ("iso1328",),
-    "results.result": ("Result", "open_result"),
+    "results.reading.result": ("Result", "open_result"),
     "system": ("System",),
     "version": ("software_version",),
 }

@@ -8,7 +8,7 @@ from gearchaos.errors import ConfigurationError as ConfigurationError
 from gearchaos.errors import FigureError as FigureError
 from gearchaos.errors import FileError as FileError
 from gearchaos.errors import GearchaosError as GearchaosError
-from gearchaos.results.result import Result as Result
-from gearchaos.results.result import open_result as open_result
+from gearchaos.results.reading.result import Result as Result
+from gearchaos.results.reading.result import open_result as open_result
 from gearchaos.system import System as System
 from gearchaos.version import software_version as software_version

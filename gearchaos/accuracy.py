@@ -34,7 +34,7 @@ def _accuracy(options: Namespace) -> None:
     from gearchaos.engine.simulation import Simulation
     from gearchaos.figures.page import FORMATS, save_figure
     from gearchaos.figures.work_precision import work_precision_page
-    from gearchaos.results.atomic_file import check_output
+    from gearchaos.results.files.atomic_file import check_output
 
     steps = options.steps
     config = load_config(options.config, options.set)

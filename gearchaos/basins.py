@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 from gearchaos.command_line import Command, coordinates
 
 if TYPE_CHECKING:
-    from gearchaos.results.ensembles import Basins
+    from gearchaos.results.reading.ensembles import Basins
 
 
 def _basins(options: Namespace) -> None:
@@ -21,9 +21,9 @@ def _basins(options: Namespace) -> None:
     from gearchaos.engine.running import compiling
     from gearchaos.figures import basins_page
     from gearchaos.figures.page import check_figures, save_figure
-    from gearchaos.results.overview import plain, slice_lines
-    from gearchaos.results.result import open_result
-    from gearchaos.results.stage_table import slice_facts
+    from gearchaos.results.reading.overview import plain, slice_lines
+    from gearchaos.results.reading.result import open_result
+    from gearchaos.results.reading.stage_table import slice_facts
     from gearchaos.results.variables import REPEATS, START
 
     whole = open_result(options.result)

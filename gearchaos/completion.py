@@ -12,7 +12,7 @@ from gearchaos.command_line import COMMANDS, Command
 
 
 def _complete(options: Namespace) -> None:
-    from gearchaos.results.tables import needed
+    from gearchaos.results.reading.tables import needed
 
     shtab = needed("shtab", "completion")
     whole = ArgumentParser(prog="gearchaos")

@@ -21,8 +21,8 @@ from gearchaos.engine.resonances import resonances
 from gearchaos.engine.simulation import Simulation
 from gearchaos.engine.store_filling import Shard
 from gearchaos.progress import notice
-from gearchaos.results.block_store import PIECE_BYTES, lanes_and_record
-from gearchaos.results.result_file import CACHE_BYTES
+from gearchaos.results.files.block_store import PIECE_BYTES, lanes_and_record
+from gearchaos.results.files.result_file import CACHE_BYTES
 from gearchaos.results.variables import DIRECTION, START
 
 SAMPLE_STEPS = 500

@@ -8,7 +8,7 @@ from gearchaos.errors import ConfigurationError
 
 
 def _example(options: Namespace) -> None:
-    from gearchaos.results.atomic_file import check_output, replacing
+    from gearchaos.results.files.atomic_file import check_output, replacing
 
     ready = {path.stem: path for path in sorted(SWEEPS.glob("*.toml"))}
     if options.name is None:

@@ -24,9 +24,9 @@ def _explore(options: Namespace) -> None:
 
     from gearchaos.explorer import HOST
     from gearchaos.figures.response import is_response
-    from gearchaos.results.atomic_file import reason
-    from gearchaos.results.result import open_result
-    from gearchaos.results.tables import needed
+    from gearchaos.results.files.atomic_file import reason
+    from gearchaos.results.reading.result import open_result
+    from gearchaos.results.reading.tables import needed
 
     result = open_result(options.result)
     if is_response(result):

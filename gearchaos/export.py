@@ -17,9 +17,9 @@ ENDINGS = (".csv", ".parquet", ".mat")
 def _export(options: Namespace) -> None:
     import numpy as np
 
-    from gearchaos.results.atomic_file import check_output, replacing
-    from gearchaos.results.result import open_result
-    from gearchaos.results.tables import needed
+    from gearchaos.results.files.atomic_file import check_output, replacing
+    from gearchaos.results.reading.result import open_result
+    from gearchaos.results.reading.tables import needed
 
     kind = options.output.lower().rpartition(".")[2]
     if not options.output.lower().endswith(ENDINGS):

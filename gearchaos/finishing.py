@@ -58,8 +58,8 @@ def complete_already(simulation: "Simulation", output: str) -> int | None:
     """
     from gearchaos.engine.provenance import SOFTWARE
     from gearchaos.engine.store_filling import open_store
-    from gearchaos.results.block_folder import folder_of, require_same
-    from gearchaos.results.result import completed
+    from gearchaos.results.files.block_folder import folder_of, require_same
+    from gearchaos.results.reading.result import completed
 
     found = completed(output)
     if found is None:

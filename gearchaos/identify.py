@@ -27,9 +27,9 @@ def _identify(options: Namespace) -> None:
     from gearchaos.identification.report import report
     from gearchaos.identification.search import decisive_facts, search
     from gearchaos.identification.tried import fields_of, read_tried, write_tried
-    from gearchaos.results.atomic_file import check_output
-    from gearchaos.results.block_folder import require_same
-    from gearchaos.results.tables import needed
+    from gearchaos.results.files.atomic_file import check_output
+    from gearchaos.results.files.block_folder import require_same
+    from gearchaos.results.reading.tables import needed
 
     problem = load_targets(options.config, options.set)
     choose_threads(options.threads)

@@ -16,8 +16,8 @@ from gearchaos.command_line import Command
 def _info(options: Namespace) -> None:
     # Imported only now: --help and --version answer at once, and an interrupt is caught.
     from gearchaos.progress import notice
-    from gearchaos.results.overview import overview, overview_page
-    from gearchaos.results.result_reader import verify
+    from gearchaos.results.files.result_reader import verify
+    from gearchaos.results.reading.overview import overview, overview_page
 
     verified: list[str] = []
     if options.verify:

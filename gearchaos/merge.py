@@ -15,7 +15,7 @@ from gearchaos.finishing import complete_already, ending
 
 if TYPE_CHECKING:
     from gearchaos.configuration import Configuration
-    from gearchaos.results.block_store import BlockStore, Finished
+    from gearchaos.results.files.block_store import BlockStore, Finished
 
 MANY_LANES = 2**17
 """Lanes of a sweep that are looked at in less than a second."""
@@ -23,9 +23,9 @@ MANY_LANES = 2**17
 
 def _merge(options: Namespace) -> int:
     output: str = options.output
-    from gearchaos.results.atomic_file import check_output
-    from gearchaos.results.block_folder import folder_of, read_manifest, require_same
-    from gearchaos.results.result import completed
+    from gearchaos.results.files.atomic_file import check_output
+    from gearchaos.results.files.block_folder import folder_of, read_manifest, require_same
+    from gearchaos.results.reading.result import completed
 
     folder = folder_of(output)
     if not (options.overwrite or folder.is_dir() or completed(output) is None):
@@ -81,7 +81,7 @@ def _require_some(config: "Configuration", folder: Path) -> None:
 def _require_all(store: "BlockStore", found: "Finished", shards: object) -> None:
     """Name the shards of which blocks are missing, as far as it is known how many there are."""
     from gearchaos.engine.store_filling import shared_blocks
-    from gearchaos.results.block_store import uncovered
+    from gearchaos.results.files.block_store import uncovered
 
     remedy = "go on with the sweep and --resume"
     if isinstance(shards, int) and shards > 0:

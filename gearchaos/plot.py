@@ -19,7 +19,7 @@ from gearchaos.progress import progress, say
 
 if TYPE_CHECKING:
     from gearchaos.figures.page import Page
-    from gearchaos.results.result import Result
+    from gearchaos.results.reading.result import Result
 
     Sheet = tuple[str, Callable[[], Page]]
     """One page: what its name says beside that of the result, and how it is drawn."""
@@ -75,7 +75,7 @@ def _sweep_sheets(results: "Sequence[Result]", options: Namespace) -> "list[Shee
     from gearchaos.figures.labels import in_a_name, in_words
     from gearchaos.figures.lanes import swept_axes
     from gearchaos.figures.style import SINGLE_COLUMN_MM
-    from gearchaos.results.result import DEFAULT_VARIABLE
+    from gearchaos.results.reading.result import DEFAULT_VARIABLE
 
     # A detail does not take the place of the whole.
     name = in_a_name(results[0].fixed, digits=6)
@@ -130,7 +130,7 @@ def _response_sheets(results: "Sequence[Result]", options: Namespace) -> "list[S
 def _opened(path: Path, at: Sequence[tuple[str, float]]) -> "Result":
     """Read a result, its sections too unless it is a map, with the axes fixed that --at names."""
     from gearchaos.figures.lanes import swept_axes
-    from gearchaos.results.result import open_result
+    from gearchaos.results.reading.result import open_result
 
     for rows in (False, True):  # Sections are most of a file.
         result = open_result(path, rows=rows)

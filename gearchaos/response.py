@@ -30,7 +30,7 @@ def _respond(options: Namespace) -> int:
     config, text, note, fixed = (_lane if of_result else _configuration)(options)
     from gearchaos.engine.response import compute_response, prepared
     from gearchaos.engine.running import choose_threads, prepare
-    from gearchaos.results.atomic_file import check_output
+    from gearchaos.results.files.atomic_file import check_output
     from gearchaos.results.response_variables import DEFAULT_PERIODS
 
     choose_threads(options.threads)
@@ -54,7 +54,7 @@ def _respond(options: Namespace) -> int:
 def _lane(options: Namespace) -> "Asked":
     """Go on from where one lane of a result ended."""
     from gearchaos.engine.recomputing import continued, stored_text
-    from gearchaos.results.result import open_result
+    from gearchaos.results.reading.result import open_result
 
     if options.set:
         rule = "is a result, and goes on with its own configuration; leave --set out"

@@ -16,20 +16,25 @@ from gearchaos.errors import ConfigurationError
 if TYPE_CHECKING:
     from gearchaos.engine.recomputing import Survival
     from gearchaos.engine.refinement import Boundary
-    from gearchaos.results.jumps import Apart, Crisis, Jump
-    from gearchaos.results.result import Result
-    from gearchaos.results.stage_table import Stage
+    from gearchaos.results.reading.jumps import Apart, Crisis, Jump
+    from gearchaos.results.reading.result import Result
+    from gearchaos.results.reading.stage_table import Stage
 
 
 WIDTH = 80  # Columns of a terminal.
 
 
 def _stages(options: Namespace) -> None:
-    from gearchaos.results.jumps import apart, crises, jumps
-    from gearchaos.results.overview import plain, slice_lines
-    from gearchaos.results.result import open_result
+    from gearchaos.results.reading.jumps import apart, crises, jumps
+    from gearchaos.results.reading.overview import plain, slice_lines
+    from gearchaos.results.reading.result import open_result
+    from gearchaos.results.reading.stage_table import (
+        labelled_lanes,
+        one_axis,
+        slice_facts,
+        stage_table,
+    )
     from gearchaos.results.scales import excitation_of
-    from gearchaos.results.stage_table import labelled_lanes, one_axis, slice_facts, stage_table
     from gearchaos.results.variables import DIRECTION, RECORD, REPEATS, UNSWEPT
 
     whole = open_result(options.result)
@@ -83,7 +88,7 @@ def _map_boundaries(result: "Result", options: Namespace) -> None:
     from gearchaos.engine.recomputing import refinable
     from gearchaos.engine.refinement import refined_map
     from gearchaos.engine.running import choose_threads, compiling
-    from gearchaos.results.overview import plain
+    from gearchaos.results.reading.overview import plain
 
     choose_threads(options.threads)
     config = refinable(result, options.result)

@@ -50,7 +50,7 @@ def _sweep(options: Namespace) -> int:
 
 def _check_sharing(options: Namespace, config: "Configuration") -> None:
     """Refuse what --dask and --shard cannot do."""
-    from gearchaos.results.tables import needed
+    from gearchaos.results.reading.tables import needed
 
     for flag in ("dask", "shard"):
         if getattr(options, flag) is not None and config.start.carry != "none":
@@ -73,7 +73,7 @@ def _compute(
 ) -> int:
     from gearchaos.engine.running import metadata, prepare
     from gearchaos.engine.store_filling import fill, open_store
-    from gearchaos.results.atomic_file import check_output
+    from gearchaos.results.files.atomic_file import check_output
 
     check_output(output, options.overwrite)
     began = time.monotonic()

@@ -36,8 +36,8 @@ from gearchaos.engine.simulation import Simulation
 from gearchaos.engine.steps import stable_steps
 from gearchaos.errors import ConfigurationError
 from gearchaos.records.amplitude_spectrum import SpectralLines, spectral_lines
+from gearchaos.results.reading.result import Result
 from gearchaos.results.response_variables import DEFAULT_PERIODS
-from gearchaos.results.result import Result
 
 
 class Trajectory(NamedTuple):

@@ -11,9 +11,9 @@ from gearchaos.errors import ConfigurationError, FileError
 from gearchaos.records.label import UNRESOLVED
 from gearchaos.records.wilson import wilson_interval
 from gearchaos.results import variables as known
-from gearchaos.results.ensembles import Basin, Basins, basin_entropy, in_order
-from gearchaos.results.result import Result
-from gearchaos.results.stage_table import label_text, require_labels
+from gearchaos.results.reading.ensembles import Basin, Basins, basin_entropy, in_order
+from gearchaos.results.reading.result import Result
+from gearchaos.results.reading.stage_table import label_text, require_labels
 
 NO_MEANS = (
     *("return_distance", "section_error", "lyapunov_sum"),

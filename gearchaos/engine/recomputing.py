@@ -12,8 +12,8 @@ from gearchaos.gear.tooth_deviations import REALISATION
 from gearchaos.interrupts import check
 from gearchaos.records.label import CHAOTIC_GROWTH
 from gearchaos.records.lyapunov import largest_exponent
-from gearchaos.results.result import Result
-from gearchaos.results.stage_table import labelled_lanes
+from gearchaos.results.reading.result import Result
+from gearchaos.results.reading.stage_table import labelled_lanes
 from gearchaos.results.variables import axis_name
 
 MOST_LANES = 25  # Chaotic lanes that are tried, spread evenly over the sweep: they bound the cost.

@@ -20,9 +20,9 @@ from gearchaos.engine.simulation import Simulation
 from gearchaos.interrupts import check
 from gearchaos.records.label import MEANINGS
 from gearchaos.records.period import TOLERANCE
-from gearchaos.results.jumps import Apart, directions_of
-from gearchaos.results.result import Result
-from gearchaos.results.stage_table import Stage, label_text
+from gearchaos.results.reading.jumps import Apart, directions_of
+from gearchaos.results.reading.result import Result
+from gearchaos.results.reading.stage_table import Stage, label_text
 from gearchaos.results.variables import LABELS, WAYS
 
 FOLLOWED_WIDTH = 2.0**-16

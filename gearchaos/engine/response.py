@@ -11,6 +11,7 @@ from gearchaos.configuration import Configuration, Given, configuration_of
 from gearchaos.engine.running import choose_threads, metadata, require_memory, result_of
 from gearchaos.engine.simulation import Simulation
 from gearchaos.errors import ConfigurationError
+from gearchaos.results.reading.result import Result
 from gearchaos.results.response_variables import (
     DEFAULT_PERIODS,
     MESH_ERROR,
@@ -19,7 +20,6 @@ from gearchaos.results.response_variables import (
     acceleration_of,
     response_variables,
 )
-from gearchaos.results.result import Result
 from gearchaos.results.variables import DIRECTIONS
 
 

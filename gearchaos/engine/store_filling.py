@@ -12,7 +12,7 @@ from gearchaos.engine.provenance import SOFTWARE
 from gearchaos.engine.simulation import Bounds, Simulation
 from gearchaos.errors import ConfigurationError
 from gearchaos.progress import complain
-from gearchaos.results.block_store import BlockStore
+from gearchaos.results.files.block_store import BlockStore
 
 BLOCKS_PER_SHARD = 4
 """At least so many blocks for everyone, as far as there are enough lanes: shards end together."""

@@ -26,9 +26,9 @@ from gearchaos.figures.page import FORMATS
 from gearchaos.figures.response import COORDINATE
 from gearchaos.figures.style import GREY, VERMILION
 from gearchaos.gear.groups import LARGEST_VALUE
+from gearchaos.results.reading.result import Result, section_variables
+from gearchaos.results.reading.stage_table import label_text
 from gearchaos.results.response_variables import DEFAULT_PERIODS
-from gearchaos.results.result import Result, section_variables
-from gearchaos.results.stage_table import label_text
 from gearchaos.results.variables import LABELS, LARGEST_EXPONENT, SECTION, STATUS, coordinate_text
 
 WIDE = {"sizing_mode": "stretch_width"}

@@ -19,8 +19,8 @@ from gearchaos.figures.lanes import Between, cell_edges, diagram_lanes
 from gearchaos.figures.page import Page, few_ticks, legend_below, letter, page, remark
 from gearchaos.figures.stages import SHADES, look_of
 from gearchaos.figures.style import BLACK, SINGLE_COLUMN_MM
-from gearchaos.results.ensembles import Basin, Basins, Counted, in_order, motion_shares
-from gearchaos.results.result import Result
+from gearchaos.results.reading.ensembles import Basin, Basins, Counted, in_order, motion_shares
+from gearchaos.results.reading.result import Result
 from gearchaos.results.scales import unit_of
 from gearchaos.results.variables import REPEATS, STATE_WORDING
 

@@ -11,7 +11,7 @@ from gearchaos.errors import FigureError
 from gearchaos.figures.style import DRAWING
 from gearchaos.gear.tooth_deviations import REALISATION
 from gearchaos.results import scales
-from gearchaos.results.result import Result
+from gearchaos.results.reading.result import Result
 from gearchaos.results.scales import excitation_of
 from gearchaos.results.variables import DIRECTION, START, Variable, coordinate_text
 

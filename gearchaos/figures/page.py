@@ -26,7 +26,7 @@ from gearchaos.figures.style import (
 )
 from gearchaos.figures.ticks import light
 from gearchaos.interrupts import check
-from gearchaos.results.atomic_file import check_output, replacing
+from gearchaos.results.files.atomic_file import check_output, replacing
 from gearchaos.version import software_version
 
 FORMATS: tuple[str, ...] = ("png", "pdf")  # What is written unless asked otherwise.

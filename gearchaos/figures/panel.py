@@ -14,7 +14,7 @@ from gearchaos.arrays import Floats
 from gearchaos.figures.labels import axis_label, short
 from gearchaos.figures.lanes import Lanes, columns
 from gearchaos.figures.style import BLACK, GREY, LEGEND, VERMILION
-from gearchaos.results.result import Result
+from gearchaos.results.reading.result import Result
 
 OUTLYING_SHARE = 0.03
 MARGIN = 0.05

@@ -16,8 +16,8 @@ from gearchaos.figures.page import remark
 from gearchaos.figures.style import BLACK, BLUE, LEGEND, ORANGE, VERMILION
 from gearchaos.records.amplitude_spectrum import spectral_lines
 from gearchaos.records.period import motion_period
+from gearchaos.results.reading.result import Result, section_variables
 from gearchaos.results.response_variables import MESH_FORCE, TIME, acceleration_of
-from gearchaos.results.result import Result, section_variables
 from gearchaos.results.scales import excitation_of
 
 COORDINATE = "delta_5"  # The coordinate that is drawn unless another is asked for: the torsion.

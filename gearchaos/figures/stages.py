@@ -12,8 +12,8 @@ from matplotlib.patches import Patch, Rectangle
 from gearchaos.figures.labels import legend_title
 from gearchaos.figures.lanes import diagram_lanes
 from gearchaos.figures.page import legend_below
-from gearchaos.results.result import Result
-from gearchaos.results.stage_table import LabelledLanes, Stage, labelled_lanes, stage_table
+from gearchaos.results.reading.result import Result
+from gearchaos.results.reading.stage_table import LabelledLanes, Stage, labelled_lanes, stage_table
 
 # Blues that darken with the period, but for period 3, the window in chaos that is looked for. Those
 # without hatching differ in lightness, and all are light enough for black points to stand out.

@@ -8,7 +8,7 @@ import numpy as np
 from gearchaos.arrays import Floats, Mask
 from gearchaos.identification.evaluation import Records
 from gearchaos.identification.targets import Exponent, Increment, Place, Stage, Targets
-from gearchaos.results.jumps import jump_sizes
+from gearchaos.results.reading.jumps import jump_sizes
 
 GROWTH = 1.2  # Least factor by which the section of a chaotic motion grows where there is a crisis.
 NOWHERE = 100.0  # Widths that a number is off which a candidate does not have.

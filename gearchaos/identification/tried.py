@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from gearchaos.errors import FileError
 from gearchaos.identification.loading import Problem
-from gearchaos.results.atomic_file import reason, replacing
+from gearchaos.results.files.atomic_file import reason, replacing
 from gearchaos.results.variables import STATUS
 
 Tried: TypeAlias = NDArray[np.void]

@@ -12,7 +12,7 @@ import numpy as np
 from gearchaos.figures.labels import short
 from gearchaos.paper.computation import Reproduction, largest_acceleration
 from gearchaos.paper.published import Printed, contact_line_stiffness, published
-from gearchaos.results.stage_table import LabelledLanes, Stage, stage_table
+from gearchaos.results.reading.stage_table import LabelledLanes, Stage, stage_table
 
 WINDOW = 0.1
 """Narrowest stage, in multiples of e(tau): narrower ones are windows in what surrounds them."""

@@ -24,9 +24,9 @@ from gearchaos.paper.stages import Crisis, crisis_of, lanes_as_printed
 from gearchaos.progress import say
 from gearchaos.records.amplitude_spectrum import spectral_lines
 from gearchaos.records.period import POINTS_NEEDED
-from gearchaos.results.jumps import apart
-from gearchaos.results.result import Result
-from gearchaos.results.stage_table import LabelledLanes
+from gearchaos.results.reading.jumps import apart
+from gearchaos.results.reading.result import Result
+from gearchaos.results.reading.stage_table import LabelledLanes
 from gearchaos.results.variables import CROSSINGS
 from gearchaos.system import System
 

@@ -30,8 +30,8 @@ from gearchaos.paper.published import (
     published,
 )
 from gearchaos.records.amplitude_spectrum import spectral_lines
+from gearchaos.results.reading.result import Result
 from gearchaos.results.response_variables import TIME, acceleration_of
-from gearchaos.results.result import Result
 
 CYCLE = np.arange(1001) / 1000  # Mesh phases, in parts of the mesh period.
 

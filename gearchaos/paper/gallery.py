@@ -21,9 +21,9 @@ from gearchaos.paper.computation import Reproduction, lane_of, largest_accelerat
 from gearchaos.paper.published import published
 from gearchaos.paper.stages import OUT_OF_TURN, TWO_BANDS
 from gearchaos.progress import say
-from gearchaos.results.atomic_file import check_output, replacing, writing
+from gearchaos.results.files.atomic_file import check_output, replacing, writing
+from gearchaos.results.reading.result import Result
 from gearchaos.results.response_variables import acceleration_of
-from gearchaos.results.result import Result
 from gearchaos.results.variables import CROSSINGS
 from gearchaos.version import software_version
 

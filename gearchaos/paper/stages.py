@@ -11,8 +11,8 @@ from typing import NamedTuple
 import numpy as np
 
 from gearchaos.arrays import Floats, Mask
-from gearchaos.results.result import Result
-from gearchaos.results.stage_table import LabelledLanes, labelled_lanes
+from gearchaos.results.reading.result import Result
+from gearchaos.results.reading.stage_table import LabelledLanes, labelled_lanes
 
 TWO_BANDS = "two bands"
 TOUCHING = "two bands that touch"

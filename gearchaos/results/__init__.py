@@ -1,1 +1,1 @@
-"""Named arrays with units, and the HDF5 files that hold them."""
+"""Named arrays with units, the HDF5 files that hold them, and what is read off them."""

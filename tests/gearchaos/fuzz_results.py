@@ -10,8 +10,8 @@ from typing import Any
 import h5py
 import numpy as np
 
-from gearchaos.results.atomic_file import append_checksum
-from gearchaos.results.result import Result
+from gearchaos.results.files.atomic_file import append_checksum
+from gearchaos.results.reading.result import Result
 from gearchaos.results.variables import (
     STATE_WORDING,
     Variable,

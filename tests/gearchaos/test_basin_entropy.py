@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from gearchaos.results.ensembles import basin_entropy
+from gearchaos.results.reading.ensembles import basin_entropy
 
 
 def test_where_there_is_one_attractor_nothing_is_uncertain():

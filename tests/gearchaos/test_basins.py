@@ -13,7 +13,7 @@ from gearchaos.errors import ConfigurationError, FigureError, FileError
 from gearchaos.figures import basins, basins_page, fractions
 from gearchaos.figures.ensembles import COLORS
 from gearchaos.records.label import DIVERGED, UNRESOLVED
-from gearchaos.results.result import Result
+from gearchaos.results.reading.result import Result
 
 from .commands import run_module
 from .short_sweeps import PAN2021

@@ -15,9 +15,9 @@ import numpy as np
 import pytest
 
 from gearchaos.errors import FileError
-from gearchaos.results.block_folder import StoreLock, read_manifest, require_same
-from gearchaos.results.block_store import BlockStore
-from gearchaos.results.result import Result, open_result
+from gearchaos.results.files.block_folder import StoreLock, read_manifest, require_same
+from gearchaos.results.files.block_store import BlockStore
+from gearchaos.results.reading.result import Result, open_result
 from gearchaos.results.variables import Variable, coordinate, listed, unswept_axis
 from gearchaos.version import Software
 
@@ -404,7 +404,7 @@ def test_merging_takes_the_memory_of_a_block(output: Path) -> None:
     program = """
 import numpy as np
 from test_block_store import CONFIGURATION, POINTS, SOFTWARE
-from gearchaos.results.block_store import BlockStore
+from gearchaos.results.files.block_store import BlockStore
 from gearchaos.results.variables import coordinate, listed
 points, size, count = 500, 250, 80
 variables = listed(

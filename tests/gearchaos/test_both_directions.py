@@ -11,7 +11,7 @@ from gearchaos import figures
 from gearchaos.engine.recomputing import computable
 from gearchaos.engine.refinement import refined_jumps
 from gearchaos.errors import ConfigurationError, FigureError
-from gearchaos.results.jumps import apart
+from gearchaos.results.reading.jumps import apart
 from gearchaos.results.variables import WAYS
 
 from .commands import run_module, same_data

@@ -7,7 +7,7 @@ import pytest
 
 from gearchaos.errors import ConfigurationError, FileError
 from gearchaos.export import main
-from gearchaos.results.result import open_result
+from gearchaos.results.reading.result import open_result
 
 from .test_result_axes import AXES, result_over
 

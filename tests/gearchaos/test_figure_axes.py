@@ -12,7 +12,7 @@ from gearchaos.figures.labels import axis_label, in_words
 from gearchaos.figures.stages import HATCHES
 from gearchaos.figures.style import OVERLAID
 from gearchaos.plot import main
-from gearchaos.results.result import Result
+from gearchaos.results.reading.result import Result
 
 from .test_result_axes import AXES, result_over
 

@@ -16,7 +16,7 @@ from matplotlib.text import Text
 from gearchaos.errors import FigureError
 from gearchaos.figures import bifurcation, bifurcation_page, lyapunov, save_figure
 from gearchaos.figures.panel import robust_limits
-from gearchaos.results.result import Result, open_result
+from gearchaos.results.reading.result import Result, open_result
 from gearchaos.results.variables import coordinate, unswept_axis
 
 from .listed_variables import sweep_variables

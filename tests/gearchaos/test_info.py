@@ -8,9 +8,9 @@ import h5py
 import numpy as np
 import pytest
 
-from gearchaos.results.atomic_file import append_checksum
-from gearchaos.results.overview import overview
-from gearchaos.results.result import Result, open_result
+from gearchaos.results.files.atomic_file import append_checksum
+from gearchaos.results.reading.overview import overview
+from gearchaos.results.reading.result import Result, open_result
 from gearchaos.results.variables import coordinate
 
 from .commands import run_module

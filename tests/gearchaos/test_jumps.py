@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import gearchaos
-from gearchaos.results.jumps import jump_sizes, jumps
+from gearchaos.results.reading.jumps import jump_sizes, jumps
 
 from .commands import run_module
 from .short_sweeps import PAN2021

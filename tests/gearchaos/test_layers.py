@@ -34,7 +34,7 @@ def test_the_import_contracts_of_the_project_are_kept(capsys, monkeypatch):
 @pytest.mark.parametrize(
     "statement",
     [
-        "import gearchaos.results.result",
+        "import gearchaos.results.reading.result",
         "import gearchaos.figures",
         "import gearchaos.plot",
         "import gearchaos.info",

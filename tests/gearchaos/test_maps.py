@@ -13,7 +13,7 @@ from gearchaos.figures.stages import SHADES
 from gearchaos.plot import main
 from gearchaos.records.label import MEANINGS
 from gearchaos.records.teeth import CONTACT_STATES
-from gearchaos.results.result import Result
+from gearchaos.results.reading.result import Result
 from gearchaos.results.variables import Variable, coordinate, unswept_axis
 
 from .listed_variables import sweep_variables

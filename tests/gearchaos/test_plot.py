@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from gearchaos.plot import main
-from gearchaos.results.result import Result
+from gearchaos.results.reading.result import Result
 from gearchaos.results.variables import coordinate
 
 from .listed_variables import sweep_variables

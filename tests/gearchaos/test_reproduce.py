@@ -27,7 +27,7 @@ from gearchaos.paper.computation import compute, lane_of, largest_acceleration
 from gearchaos.paper.gallery import KINDS, check_folder, pictures, write_gallery
 from gearchaos.paper.published import contact_line_stiffness, printed_coefficients, published
 from gearchaos.paper.stages import OUT_OF_TURN, out_of_turn
-from gearchaos.results.stage_table import stage_table
+from gearchaos.results.reading.stage_table import stage_table
 
 from .commands import run_module
 

@@ -20,8 +20,8 @@ from gearchaos.figures import (
 )
 from gearchaos.figures.response import coordinates_of, is_response, repeats_after
 from gearchaos.plot import main
+from gearchaos.results.reading.result import Result
 from gearchaos.results.response_variables import response_variables
-from gearchaos.results.result import Result
 from gearchaos.results.variables import axis_name, coordinate
 
 from .listed_variables import sweep_variables

@@ -13,8 +13,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gearchaos.errors import ConfigurationError, FileError
-from gearchaos.results.result import Result, open_result, section_variables
-from gearchaos.results.result_file import hyperslabs, write_result
+from gearchaos.results.files.result_file import hyperslabs, write_result
+from gearchaos.results.reading.result import Result, open_result, section_variables
 from gearchaos.results.variables import Variable, coordinate, unswept_axis
 
 from .listed_variables import parameter, sweep_variables

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from gearchaos.errors import FileError
-from gearchaos.results.result import Result, open_result
+from gearchaos.results.reading.result import Result, open_result
 from gearchaos.results.variables import coordinate
 
 from .listed_variables import parameter, sweep_variables
@@ -223,7 +223,7 @@ def test_a_declared_petabyte_costs_no_memory(good: Path, tmp_path: Path) -> None
     with h5py.File(path, "r+") as file:
         replace("section_delta_5", **HUGE)(file)
     program = (
-        "import resource, sys; from gearchaos.results.result import open_result\n"
+        "import resource, sys; from gearchaos.results.reading.result import open_result\n"
         "before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss\n"
         "try: open_result(sys.argv[1])\n"
         "except Exception as error: print(type(error).__name__)\n"

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from gearchaos.results.result import Result, open_result
+from gearchaos.results.reading.result import Result, open_result
 from gearchaos.results.variables import (
     STATE_WORDING,
     Variable,

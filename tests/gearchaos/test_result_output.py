@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 
 from gearchaos.errors import FileError
-from gearchaos.results.atomic_file import check_output, replacing
-from gearchaos.results.result import Result, open_result
+from gearchaos.results.files.atomic_file import check_output, replacing
+from gearchaos.results.reading.result import Result, open_result
 from gearchaos.results.variables import coordinate
 
 from .listed_variables import sweep_variables
@@ -23,7 +23,7 @@ PROGRAM = """
 import sys
 import numpy as np
 from gearchaos.errors import FileError
-from gearchaos.results.result import Result
+from gearchaos.results.reading.result import Result
 from gearchaos.results.variables import coordinate, listed
 
 def result(lanes):

@@ -6,7 +6,7 @@ import pytest
 import gearchaos
 from gearchaos.engine.store_filling import Shard, shared_blocks
 from gearchaos.errors import ConfigurationError
-from gearchaos.results.block_folder import StoreLock, folder_of
+from gearchaos.results.files.block_folder import StoreLock, folder_of
 
 from .commands import LINEAR, names_in, run_module, same_data, sweep
 from .short_sweeps import METHODS

@@ -15,8 +15,8 @@ from gearchaos.figures import shares, shares_page
 from gearchaos.plot import main
 from gearchaos.records.label import MEANINGS
 from gearchaos.records.wilson import wilson_interval
-from gearchaos.results.ensembles import motion_shares
-from gearchaos.results.result import Result
+from gearchaos.results.reading.ensembles import motion_shares
+from gearchaos.results.reading.result import Result
 from gearchaos.results.variables import coordinate, unswept_axis
 
 from .listed_variables import sweep_variables

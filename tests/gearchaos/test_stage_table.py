@@ -9,10 +9,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gearchaos.errors import ConfigurationError, FileError
-from gearchaos.results import stage_table as table_module
-from gearchaos.results.overview import slice_lines
-from gearchaos.results.result import Result
-from gearchaos.results.stage_table import (
+from gearchaos.results.reading import stage_table as table_module
+from gearchaos.results.reading.overview import slice_lines
+from gearchaos.results.reading.result import Result
+from gearchaos.results.reading.stage_table import (
     LabelledLanes,
     Stage,
     label_text,

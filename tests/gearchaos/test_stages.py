@@ -9,7 +9,7 @@ import pytest
 
 import gearchaos
 from gearchaos.engine.recomputing import refinable
-from gearchaos.results.result import Result
+from gearchaos.results.reading.result import Result
 
 from .commands import run_module
 from .short_sweeps import METHODS, PAN2021, SOFT_BEARINGS, SPEEDS

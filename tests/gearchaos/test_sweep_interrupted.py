@@ -16,7 +16,7 @@ import pytest
 from gearchaos_kernels import source_hash
 
 import gearchaos
-from gearchaos.results.block_folder import LOCK, folder_of
+from gearchaos.results.files.block_folder import LOCK, folder_of
 
 from .commands import (
     HANGS,

@@ -15,8 +15,8 @@ from gearchaos.figures.response import repeats_after
 from gearchaos.figures.style import BLACK, BLUE, VERMILION
 from gearchaos.info import main as info
 from gearchaos.plot import main as plot
+from gearchaos.results.reading.result import Result
 from gearchaos.results.response_variables import response_variables
-from gearchaos.results.result import Result
 from gearchaos.results.scales import Excitation, excitation_of
 from gearchaos.results.variables import coordinate
 from gearchaos.stages import main as stages

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from gearchaos.engine.running import result_of
-from gearchaos.results.block_store import BlockStore
-from gearchaos.results.result_file import write_result
+from gearchaos.results.files.block_store import BlockStore
+from gearchaos.results.files.result_file import write_result
 from gearchaos.results.variables import STATUS, listed, require_listed
 
 from .short_sweeps import unlabelled

@@ -12,8 +12,8 @@ import h5py
 import numpy as np
 
 from gearchaos.arrays import Array
-from gearchaos.results.atomic_file import reason
-from gearchaos.results.result_file import DIMS, PARAMETERS
+from gearchaos.results.files.atomic_file import reason
+from gearchaos.results.files.result_file import DIMS, PARAMETERS
 
 _DTYPES = {"f8": "float64", "i4": "int32", "u1": "uint8"}
 _PACKED, _ROOM = 128, 1 << 20

@@ -14,7 +14,13 @@ from typing import Any, TypeAlias
 
 from gearchaos.configuration.toml_text import flat_tables
 from gearchaos.errors import FileError
-from gearchaos.results.atomic_file import UNDISTURBED, reason, replacing, unlinked_content, writing
+from gearchaos.results.files.atomic_file import (
+    UNDISTURBED,
+    reason,
+    replacing,
+    unlinked_content,
+    writing,
+)
 from gearchaos.version import Software
 
 try:

@@ -13,11 +13,11 @@ import numpy as np
 from gearchaos.arrays import Array
 from gearchaos.errors import FileError
 from gearchaos.gear.groups import LARGEST_VALUE
-from gearchaos.results import stored_dataset as stored
 from gearchaos.results import variables as known
-from gearchaos.results.atomic_file import checksum_fits, reason
-from gearchaos.results.result_file import PARAMETERS, SCHEMA, SCHEMA_VERSION
-from gearchaos.results.stored_dataset import UnfitError
+from gearchaos.results.files import stored_dataset as stored
+from gearchaos.results.files.atomic_file import checksum_fits, reason
+from gearchaos.results.files.result_file import PARAMETERS, SCHEMA, SCHEMA_VERSION
+from gearchaos.results.files.stored_dataset import UnfitError
 from gearchaos.results.variables import HARMONIC, ORIGINS, STATE, Variable
 
 Contents = tuple[

@@ -15,9 +15,15 @@ import numpy as np
 
 from gearchaos.arrays import Array, Integers
 from gearchaos.errors import FileError
-from gearchaos.results.atomic_file import PARTIAL, reason, replacing, unlinked_content
-from gearchaos.results.block_folder import LOCK, MANIFEST, StoreLock, folder_of, settle_manifest
-from gearchaos.results.result_file import Metadata, write_result
+from gearchaos.results.files.atomic_file import PARTIAL, reason, replacing, unlinked_content
+from gearchaos.results.files.block_folder import (
+    LOCK,
+    MANIFEST,
+    StoreLock,
+    folder_of,
+    settle_manifest,
+)
+from gearchaos.results.files.result_file import Metadata, write_result
 from gearchaos.results.variables import Variable, lane_axes, require_listed
 from gearchaos.version import Software
 

@@ -11,9 +11,9 @@ import numpy as np
 
 from gearchaos.arrays import Counts, Floats, Integers, Mask
 from gearchaos.records.period import TOLERANCE, section_distance
-from gearchaos.results.result import Result, section_variables
+from gearchaos.results.reading.result import Result, section_variables
+from gearchaos.results.reading.stage_table import labelled_lanes
 from gearchaos.results.scales import excitation_of
-from gearchaos.results.stage_table import labelled_lanes
 from gearchaos.results.variables import DIRECTION, WAYS
 
 STEEPEST = 5.0

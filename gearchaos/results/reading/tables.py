@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from gearchaos.errors import ConfigurationError, FileError
-from gearchaos.results.result_file import DIMS
+from gearchaos.results.files.result_file import DIMS
 
 if TYPE_CHECKING:
-    from gearchaos.results.result import Result
+    from gearchaos.results.reading.result import Result
 
 
 _IMPORTING = RLock()

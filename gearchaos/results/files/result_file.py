@@ -14,7 +14,7 @@ import numpy as np
 
 from gearchaos.arrays import Array
 from gearchaos.interrupts import check
-from gearchaos.results.atomic_file import append_checksum, replacing
+from gearchaos.results.files.atomic_file import append_checksum, replacing
 from gearchaos.results.variables import (
     HARMONIC,
     Variable,

@@ -11,10 +11,10 @@ import numpy as np
 
 from gearchaos.arrays import Array
 from gearchaos.results import variables as known
-from gearchaos.results.result import Result
-from gearchaos.results.result_reader import printable, read_result
+from gearchaos.results.files.result_reader import printable, read_result
+from gearchaos.results.reading.result import Result
+from gearchaos.results.reading.stage_table import labelled_lanes, one_axis, slice_facts, stage_table
 from gearchaos.results.scales import excitation_of
-from gearchaos.results.stage_table import labelled_lanes, one_axis, slice_facts, stage_table
 
 ERRORS = {
     "section_error": ("section error", "from the step and from what the transient has left"),

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from gearchaos.arrays import Counts, Floats
 from gearchaos.errors import ConfigurationError, FileError
-from gearchaos.results.result import Result
+from gearchaos.results.reading.result import Result
 from gearchaos.results.variables import BANDS, LABELS, LARGEST_EXPONENT, REPEATS, UNSWEPT
 
 
