@@ -20,9 +20,9 @@ from machine import print_machine
 
 sys.path.insert(0, str(Path(__file__).parent.parent))
 
-from gearchaos.configuration import Configuration
 from gearchaos.engine.simulation import Simulation
 from gearchaos.errors import ConfigurationError
+from gearchaos.models import Configuration
 from tests.gearchaos.random_pairs import random_configuration
 
 WRONG = 1e-2

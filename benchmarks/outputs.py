@@ -20,7 +20,7 @@ from machine import print_machine
 from throughput import SCENES
 
 from gearchaos import load_config
-from gearchaos.dynamics.systems import plan_of
+from gearchaos.dynamics.plans import plan_of
 from gearchaos.engine.lanes import Lanes
 
 SWEEP = Path(__file__).parent.parent / "sweeps" / "pan2021_full.toml"

@@ -23,7 +23,7 @@ from typing import Any
 # Each name is imported on first use: reading and drawing results needs neither Numba nor the
 # kernels, and a command that only prints its help imports nothing.
 _HOMES = {
-    "configuration": ("Configuration", "load_config"),
+    "models": ("Configuration", "load_config"),
     "engine.response": ("respond",),
     "engine.running": ("run",),
     "errors": ("ConfigurationError", "FigureError", "FileError", "GearchaosError"),

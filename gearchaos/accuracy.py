@@ -29,11 +29,14 @@ WANTED = (1e-4, 1e-6, 1e-8)
 
 
 def _accuracy(options: Namespace) -> None:
-    from gearchaos.configuration import load_config
+    import numpy as np
+
+    from gearchaos.engine.lanes import Lanes
     from gearchaos.engine.running import choose_threads
     from gearchaos.engine.simulation import Simulation
     from gearchaos.figures.page import FORMATS, save_figure
     from gearchaos.figures.work_precision import work_precision_page
+    from gearchaos.models import load_config
     from gearchaos.results.files.atomic_file import check_output
 
     steps = options.steps
@@ -43,10 +46,10 @@ def _accuracy(options: Namespace) -> None:
     for target in targets:
         check_output(target, options.overwrite)
     choose_threads(options.threads)
-    if config.pitch_error is not None and config.pitch_error.kind != "sine":
+    if refusal := Lanes(config).system_of(np.arange(1)).refuses_maps():
         raise ConfigurationError(
-            f'{config.source}: pitch_error.kind = "{config.pitch_error.kind}": the truth comes '
-            "from flow maps, which know the sine alone; measure errors with integration.error_check"
+            f"{config.source}: the truth comes from flow maps, and {refusal}; measure errors with "
+            "integration.error_check"
         )
     config = config.replace("integration.method", "rk4")
     # What a sweep could not measure is refused as it would refuse it, and too few steps, too.

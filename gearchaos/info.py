@@ -35,10 +35,10 @@ def _info(options: Namespace) -> None:
 
 def _settings(metadata: Mapping[str, Any]) -> list[str]:
     """Word the keys of the configuration, and where those that were not written come from."""
-    from gearchaos.configuration import Configuration
     from gearchaos.configuration.messages import shown
     from gearchaos.configuration.toml_text import flat_tables, tables_from_toml
     from gearchaos.errors import ConfigurationError
+    from gearchaos.models import Configuration
 
     text = str(metadata.get("configuration", ""))
     resolved = str(metadata.get("configuration_resolved", ""))

@@ -14,7 +14,7 @@ from gearchaos.errors import FileError
 from gearchaos.finishing import complete_already, ending
 
 if TYPE_CHECKING:
-    from gearchaos.configuration import Configuration
+    from gearchaos.models import Configuration
     from gearchaos.results.files.block_store import BlockStore, Finished
 
 MANY_LANES = 2**17
@@ -32,12 +32,12 @@ def _merge(options: Namespace) -> int:
         print(output, flush=True)
         return OK
     manifest = read_manifest(folder)
-    from gearchaos.configuration import Configuration
     from gearchaos.engine.error_check import Tally
     from gearchaos.engine.provenance import SOFTWARE
     from gearchaos.engine.running import metadata, prepare
     from gearchaos.engine.simulation import Simulation
     from gearchaos.engine.store_filling import open_store
+    from gearchaos.models import Configuration
 
     # Another gearchaos may have other keys.
     require_same(f"{folder}: holds blocks", manifest, SOFTWARE._asdict())

@@ -13,8 +13,8 @@ from gearchaos.progress import say
 
 
 def _reproduce(options: Namespace) -> None:
-    from gearchaos.configuration import load_config
     from gearchaos.engine.running import choose_threads
+    from gearchaos.models import load_config
     from gearchaos.paper.computation import compute
     from gearchaos.paper.gallery import check_folder, write_gallery
 

@@ -16,7 +16,7 @@ from gearchaos.errors import ConfigurationError
 from gearchaos.finishing import ending, output_of
 
 if TYPE_CHECKING:
-    from gearchaos.configuration import Configuration
+    from gearchaos.models import Configuration
 
     Asked = tuple[Configuration, str, list[str], Any]
     """What to compute, the configuration as it was written, what to say of it, and its place."""
@@ -72,8 +72,8 @@ def _lane(options: Namespace) -> "Asked":
 
 def _configuration(options: Namespace) -> "Asked":
     """Take the place of what a configuration sweeps."""
-    from gearchaos.configuration import Configuration
     from gearchaos.configuration.toml_text import text_of_file, toml_literal
+    from gearchaos.models import Configuration
 
     text = text_of_file(options.config)
 

@@ -9,8 +9,10 @@ def _describe(options: Namespace) -> None:
     import json
 
     from gearchaos.configuration.schema import json_schema, key_tables
+    from gearchaos.models import GearPairConfiguration
 
-    print(key_tables() if options.keys else json.dumps(json_schema(), indent=2))
+    kind = GearPairConfiguration
+    print(key_tables(kind) if options.keys else json.dumps(json_schema(kind), indent=2))
 
 
 main = Command("schema", __doc__, _describe).start(__name__)

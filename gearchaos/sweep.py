@@ -16,13 +16,13 @@ from gearchaos.finishing import complete_already, ending, output_of
 from gearchaos.progress import say
 
 if TYPE_CHECKING:
-    from gearchaos.configuration import Configuration
     from gearchaos.engine.simulation import Simulation
     from gearchaos.engine.store_filling import Shard
+    from gearchaos.models import Configuration
 
 
 def _sweep(options: Namespace) -> int:
-    from gearchaos.configuration import load_config
+    from gearchaos.models import load_config
 
     config = load_config(options.config, options.set)
     from gearchaos.engine.running import choose_threads, prepare

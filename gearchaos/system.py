@@ -22,19 +22,20 @@ from gearchaos.arguments import (
 )
 from gearchaos.arguments import state as checked_state
 from gearchaos.arrays import Floats
-from gearchaos.configuration import Given, axis_values, configuration_of, swept_values
 from gearchaos.dynamics.exponents import Exponents, exponents, sum_of_exponents
 from gearchaos.dynamics.following import Branch, Orbit, follow
 from gearchaos.dynamics.orbits import Orbits, polish
+from gearchaos.dynamics.plans import plan_of
 from gearchaos.dynamics.stability import fewest_stable_steps
 from gearchaos.dynamics.stability_loss import STABILITY_LOSS_TEXTS, StabilityLoss
-from gearchaos.dynamics.systems import plan_of, system_of
 from gearchaos.engine.lanes import Lanes, start_states
 from gearchaos.engine.recomputing import computable
 from gearchaos.engine.response import respond
 from gearchaos.engine.simulation import Simulation
 from gearchaos.engine.steps import stable_steps
 from gearchaos.errors import ConfigurationError
+from gearchaos.models import Given, axis_values, configuration_of, swept_values
+from gearchaos.models.registry import system_of
 from gearchaos.records.amplitude_spectrum import SpectralLines, spectral_lines
 from gearchaos.results.reading.result import Result
 from gearchaos.results.response_variables import DEFAULT_PERIODS
@@ -106,7 +107,16 @@ class System:
     @property
     def groups(self) -> dict[str, float]:
         """The dimensionless groups as the kernels take them, angles in rad."""
-        return {name: float(value[0]) for name, value in self._record.groups._asdict().items()}
+        return {name: float(value[0]) for name, value in self._pair.groups._asdict().items()}
+
+    @property
+    def _pair(self) -> kernels.GearPairs:
+        """The system of a model that is a gear pair."""
+        if not isinstance(self._record, kernels.GearPairs):
+            raise ConfigurationError(
+                f"{self.config.source}: is no gear pair, and has neither its groups nor its mesh"
+            )
+        return self._record
 
     @property
     def mesh_period(self) -> float:
@@ -253,7 +263,7 @@ class System:
         """
         instance("motion", motion, Trajectory, "System.integrate gives it")
         states = motion.states[np.newaxis]
-        found = kernels.mesh_motion(self._record, states, self._steps, motion.first_period)
+        found = kernels.mesh_motion(self._pair, states, self._steps, motion.first_period)
         return kernels.MeshMotion(*(array[0] for array in found))
 
     @cached_property
@@ -270,7 +280,7 @@ class System:
     def _plan(self) -> Plan:
         return plan_of(self.config, steps_per_period=self._steps)
 
-    def _at(self, values: Mapping[str, Floats]) -> kernels.GearPairs:
+    def _at(self, values: Mapping[str, Floats]) -> kernels.LaneSystem:
         return system_of(self.config, {**axis_values(self.config), **values})
 
     def _start(self, start: Floats | None) -> Floats:

@@ -9,8 +9,8 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 from pydantic.fields import FieldInfo
 
+from gearchaos.configuration.ranges import Range
 from gearchaos.configuration.toml_text import toml_literal
-from gearchaos.gear.groups import Range
 
 
 class Table(BaseModel):
@@ -45,17 +45,8 @@ class Table(BaseModel):
 
 
 # TOML has lists, the models hold tuples; strictness about the entries is not affected.
-_AS_LIST = Field(strict=False)
-_Teeth: TypeAlias = Annotated[int, Field(ge=1, le=100_000)]
-_NotNegative: TypeAlias = Annotated[float, Field(ge=0)]
-_Positive: TypeAlias = Annotated[float, Field(gt=0)]
-Numbers: TypeAlias = Annotated[tuple[float, ...], _AS_LIST]
-Harmonics: TypeAlias = Annotated[
-    tuple[float, ...], Field(strict=False, min_length=1, max_length=1000)
-]
-PositivePair: TypeAlias = Annotated[tuple[_Positive, _Positive], _AS_LIST]
-NotNegativePair: TypeAlias = Annotated[tuple[_NotNegative, _NotNegative], _AS_LIST]
-TeethPair: TypeAlias = Annotated[tuple[_Teeth, _Teeth], _AS_LIST]
+AS_LIST = Field(strict=False)
+Numbers: TypeAlias = Annotated[tuple[float, ...], AS_LIST]
 
 
 def key(

@@ -1,14 +1,12 @@
-"""The tables that say what is computed: groups given directly, scene, start, sweeps, outputs."""
+"""The tables that say what is computed, for any model: scene, start, sweeps, method, outputs."""
 
 import math
-from collections.abc import Collection
 from fractions import Fraction
-from typing import TYPE_CHECKING, Annotated, Any, Literal, Self, TypeAlias, get_args
+from typing import Annotated, Any, Generic, Literal, Self, TypeAlias, TypeVar
 
-from pydantic import AfterValidator, BeforeValidator, Field, create_model, model_validator
+from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 
-from gearchaos.configuration.keys import Harmonics, Numbers, Table, key
-from gearchaos.gear.groups import GROUP_TABLE, GroupRow
+from gearchaos.configuration.keys import AS_LIST, Numbers, Table, key
 
 MOST_LANES = 100_000_000  # Lanes of one run: what a file and a machine can still hold.
 MOST_STEPS_PER_PERIOD = 1_000_000
@@ -19,26 +17,13 @@ FLOW_MAP_STEPS = 24
 _MOST_VALUES = 10_000_000
 _MOST_STARTS = 1_000_000
 
-Effect: TypeAlias = Literal["pitch_error", "stiffness_variation", "backlash", "transverse", "axial"]
-EFFECTS: tuple[str, ...] = get_args(Effect)
+State = TypeVar("State", bound=str, covariant=True)
+"""Names of the states of a model, a ``Literal``."""
 
-State: TypeAlias = Literal[
-    "delta_5",
-    "delta_5_rate",
-    "delta_1",
-    "delta_1_rate",
-    "delta_2",
-    "delta_2_rate",
-    "delta_3",
-    "delta_3_rate",
-    "delta_4",
-    "delta_4_rate",
-]
-STATES: tuple[str, ...] = get_args(State)
-_ONCE = AfterValidator(lambda given: tuple(dict.fromkeys(given)))
+ONCE = AfterValidator(lambda given: tuple(dict.fromkeys(given)))
 """Repeating a name or value is no mistake worth a message."""
 
-States: TypeAlias = Annotated[tuple[State, ...], Field(strict=False), _ONCE]
+Bounds: TypeAlias = Annotated[tuple[float, float], AS_LIST]
 Order: TypeAlias = Annotated[
     str,
     BeforeValidator(str, json_schema_input_type=int | str),
@@ -46,71 +31,30 @@ Order: TypeAlias = Annotated[
 ]
 
 
-def states_of(effects: Collection[str]) -> tuple[str, ...]:
-    """Return the states of a scene with these effects, in the order of `STATES`."""
-    transverse = STATES[2:6] if "transverse" in effects else ()
-    axial = STATES[6:] if "axial" in effects else ()
-    return STATES[:2] + transverse + axial
-
-
-class GroupsTable(Table):
-    """Dimensionless groups given directly; one given here wins over the one derived."""
-
-    def given(self) -> dict[str, float | tuple[float, ...]]:
-        """Return the groups that the file gives, by name."""
-        return {name: value for name, value in self if value is not None}
-
-
-def _group_field(row: GroupRow) -> tuple[Any, Any]:
-    units = "" if row.units == "1" else row.units
-    description = f"{row.long_name} ({row.symbol})"
-    if row.is_list:
-        return Harmonics | None, key(description, units, default=None)
-    bounds = {name: bound for name, bound in row.valid._asdict().items() if bound is not None}
-    return float | None, key(description, units, default=None, **bounds)
-
-
-if TYPE_CHECKING:
-    GivenGroups = GroupsTable
-else:
-    # The table of the groups knows their names and ranges; nothing is written twice.
-    GivenGroups = create_model(
-        "GivenGroups",
-        __base__=GroupsTable,
-        __module__=__name__,
-        __doc__=GroupsTable.__doc__,
-        **{row.name: _group_field(row) for row in GROUP_TABLE},
-    )
-
-
 class Scene(Table):
     """Which effects exist; what is not listed is not computed."""
 
-    effects: Annotated[tuple[Effect, ...], Field(strict=False), _ONCE] = key(
-        "the effects that exist beside torsion and mesh damping",
-        example=["pitch_error", "stiffness_variation", "backlash", "transverse"],
-    )
+    effects: tuple[str, ...] = ()
 
     @property
     def states(self) -> tuple[str, ...]:
-        """States of the scene, 2, 6 or 10, in the order of `STATES`."""
-        return states_of(self.effects)
+        """States of the scene, each coordinate followed by its rate."""
+        raise NotImplementedError
 
 
-_Box = dict[State, Annotated[tuple[float, float], Field(strict=False)]]
-
-
-class Start(Table):
+class Start(Table, Generic[State]):
     """The state in which the lanes start."""
 
     kind: Literal["rest", "contact", "given", "random", "grid"] = key(default="rest")
     """all zero, on the contact flank, as in `state`, at random, or on a grid"""
     state: dict[State, float] = key(example={"delta_5": 1.0}, default={})
     """start values by state for kind = "given", and beside a box; those not named are 0"""
-    box: _Box = key(example={"delta_5": [-2.0, 2.0], "delta_5_rate": [-1.5, 1.5]}, default={})
+    box: dict[State, Bounds] = key(
+        example={"delta_5": [-2.0, 2.0], "delta_5_rate": [-1.5, 1.5]}, default={}
+    )
     """lowest and highest start value by state: where a grid reaches, both ends included, or where
     random starts are uniform; those not named are as in `state`"""
-    drawn: _Box = key(example={"delta_1": [-0.5, 0.5]}, default={})
+    drawn: dict[State, Bounds] = key(example={"delta_1": [-0.5, 0.5]}, default={})
     """for kind = "grid": lowest and highest start value of states that are drawn beside it"""
     spread: float = key(units="1", default=1.0, gt=0)
     """for kind = "random" without a box: every state is uniform between minus and plus this"""
@@ -137,7 +81,7 @@ class Sweep(Table):
     to: float | None = key("last value", example=15.0, default=None)
     count: int | None = key(example=1501, default=None, ge=1, le=_MOST_VALUES)
     """number of values, evenly spaced"""
-    values: Annotated[Numbers, _ONCE] | None = key(example=[1.0, 2.0], default=None, min_length=1)
+    values: Annotated[Numbers, ONCE] | None = key(example=[1.0, 2.0], default=None, min_length=1)
     """the values themselves, instead of from, to and count"""
 
     @model_validator(mode="after")
@@ -201,11 +145,11 @@ class Integration(Table):
         return given
 
 
-class Outputs(Table):
+class Outputs(Table, Generic[State]):
     """What is kept of every lane."""
 
-    section: States = key(
-        "states recorded once per mesh period", example=["delta_5"], default=("delta_5",)
+    section: Annotated[tuple[State, ...], AS_LIST, ONCE] = key(
+        "states recorded once per mesh period", example=["delta_5"], default=()
     )
     section_points: int = key("last mesh periods of the section that are kept", default=100, ge=1)
     lyapunov: bool = key("whether the largest Lyapunov exponent is computed", default=True)
@@ -215,7 +159,7 @@ class Outputs(Table):
     """whether the shares of time on either flank and the impacts on it are told"""
     loads: bool = key(default=False)
     """whether mesh forces, load factors and the transmission error are told"""
-    states: States = key(example=["delta_5"], default=())
+    states: Annotated[tuple[State, ...], AS_LIST, ONCE] = key(example=["delta_5"], default=())
     """states of which extremes, and amplitudes at the orders, are told"""
     orders: Annotated[tuple[Order, ...], Field(strict=False, max_length=1000)] = key(
         "multiples of the mesh frequency, whole or fractions of two whole numbers, at which "

@@ -1,47 +1,76 @@
-"""The tables of a configuration, the swept values and the groups; `models` checks them."""
+"""The tables that every configuration has, whatever its model, and the swept values."""
 
-from collections.abc import Mapping
-from typing import Any, Literal
+from collections.abc import Collection, Iterator, Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Any, ClassVar
 
 import numpy as np
-import numpy.typing as npt
 
-from gearchaos.arrays import Floats
-from gearchaos.configuration.keys import Table, key, keys_of
-from gearchaos.configuration.physical_tables import Bearings, Mesh, Operation, Pair, PitchError
-from gearchaos.configuration.run_tables import (
-    GivenGroups,
-    Integration,
-    Outputs,
-    Scene,
-    Start,
-    Sweep,
-    states_of,
-)
-from gearchaos.configuration.toml_text import flat_tables
-from gearchaos.gear.groups import GROUPS_BY_NAME, Groups, resolve_groups
-from gearchaos.gear.tooth_deviations import REALISATION
+from gearchaos.arrays import Floats, Integers
+from gearchaos.configuration.keys import Key, Table, key
+from gearchaos.configuration.messages import Fault, suggestion
+from gearchaos.configuration.ranges import Range
+from gearchaos.configuration.run_tables import Integration, Outputs, Scene, Start, Sweep
+
+REALISATION = "realisation"
+"""Name of the axis of realisations that are drawn at random, and of their numbers in lanes."""
 
 
-class Tables(Table):
-    """The tables of a configuration, each sound by itself."""
+@dataclass(frozen=True)
+class Parameter:
+    """A parameter of a model that a sweep can vary.
+
+    Attributes
+    ----------
+    name : str
+        Its name, as ``sweep.parameter`` has it.
+    path : str
+        Dotted path of the key that has its value.
+    valid : Range
+        Valid values.
+    units, long_name, symbol : str
+        Unit, ``"1"`` if dimensionless, wording, and mathtext symbol if it has one.
+    """
+
+    name: str
+    path: str
+    valid: Range
+    units: str = "1"
+    long_name: str = ""
+    symbol: str = ""
+
+
+class Titled(Table):
+    """What comes first in every file."""
 
     title: str = key("title of the sweep, for figures and files", default="")
-    formulation: Literal["physical", "published"] = key(default="physical")
-    """gaps as the equations of motion give them, or as Pan 2021 prints them ("published")"""
-    pair: Pair | None = key("catalogue data of the two gears", default=None)
-    operation: Operation | None = key("the point of operation", default=None)
-    mesh: Mesh | None = key("stiffness, damping and clearance of the mesh", default=None)
-    pitch_error: PitchError | None = key("the pitch error", default=None)
-    bearings: Bearings | None = key("the bearings", default=None)
-    groups: GivenGroups = key("dimensionless groups given directly", default=GivenGroups())
-    scene: Scene = key("which effects exist")
-    start: Start = key("the state in which the lanes start", default=Start())
+
+
+class Tables(Titled):
+    """The tables that every configuration has; a model adds those of its parameters.
+
+    Attributes
+    ----------
+    parameters : mapping of str to Parameter
+        The parameters of the model that a sweep can vary, by name.
+    realisation_words : str
+        What realisations are, in the plural.
+    tables_of_lanes : frozenset of str
+        Tables that `lane_faults` needs free of faults of their own.
+    """
+
+    parameters: ClassVar[Mapping[str, Parameter]] = MappingProxyType({})
+    realisation_words: ClassVar[str] = "realisations"
+    tables_of_lanes: ClassVar[frozenset[str]] = frozenset({"sweep", "second_sweep", "scene"})
+
+    scene: Scene = key("which effects exist", default=Scene())
+    start: Start[str] = key("the state in which the lanes start", default=Start())
     sweep: Sweep = key("the swept parameter and its values")
     second_sweep: Sweep | None = key(default=None)
     """a second swept parameter: every value of it with every one of [sweep]"""
     integration: Integration = key("the fixed grid of the integration", default=Integration())
-    outputs: Outputs = key("what is kept of every lane", default=Outputs())
+    outputs: Outputs[str] = key("what is kept of every lane", default=Outputs())
     files: dict[str, str] | None = key(default=None)
     """files that are named above, word for word, as a result keeps them"""
 
@@ -57,44 +86,46 @@ class Tables(Table):
         return {sweep.parameter: f"{table}.parameter" for table, sweep in self.sweeps.items()}
 
     @property
+    def states(self) -> tuple[str, ...]:
+        """States of the scene, each coordinate followed by its rate."""
+        return self.scene.states
+
+    def states_of(self, effects: Collection[str]) -> tuple[str, ...]:
+        """Return the states of a scene with some of the effects; by default all there are."""
+        del effects
+        return self.scene.states
+
+    @property
     def needed_effects(self) -> tuple[str, ...]:
-        """The effects of the scene that act on what is kept.
+        """The effects of the scene that act on what is kept; by default all."""
+        return self.scene.effects
 
-        The axial pair is driven one way: without an axial state among the outputs and without the
-        exponent of the whole system, nothing that is kept depends on it.
+    @property
+    def realisations(self) -> Integers:
+        """Numbers of the realisations of each value that are drawn, (realisations,)."""
+        return np.zeros(1, dtype=np.intp)
+
+    def keys_of_realisation(self, number: float) -> dict[str, float]:
+        """Return the keys by path, and values, that make this realisation the only one.
+
+        None if none is drawn.
         """
-        without_axial = states_of({"transverse"})
-        kept = {*self.outputs.section, *self.outputs.states}
-        if self.outputs.lyapunov or not kept.issubset(without_axial):
-            return self.scene.effects
-        return tuple(effect for effect in self.scene.effects if effect != "axial")
+        del number
+        return {}
 
-    def physical(self) -> dict[str, Any]:
-        """Return every key of the physical tables by its path, with its value or None."""
-        return dict.fromkeys(PHYSICAL_KEYS) | flat_tables(self.tables(PHYSICAL_TABLES))
+    @classmethod
+    def default_of(cls, key: Key) -> Any:
+        """Return the default of a key, None where it has none."""
+        return None if key.field.is_required() else key.field.default
 
+    @classmethod
+    def parameter_remedy(cls, unknown: str) -> str:
+        """Return what to sweep instead of an unknown parameter."""
+        return suggestion(unknown, cls.parameters) or f"parameters: {', '.join(cls.parameters)}"
 
-PHYSICAL_TABLES = {"pair", "operation", "mesh", "pitch_error", "bearings"}
-
-PHYSICAL_KEYS = {
-    key.path: key
-    for key in keys_of(Tables)
-    if key.path.partition(".")[0] in PHYSICAL_TABLES and not key.tables
-}
-"""Every value of the physical tables by its path."""
-
-SMOOTHING = "pitch_error.smoothing"
-"""A single number that all lanes share, with the weights with which pairs of teeth carry."""
-
-SWEEPABLE_KEYS = {
-    path: key
-    for path, key in PHYSICAL_KEYS.items()
-    if key.is_number and path.count(".") == 1 and path != SMOOTHING
-}
-"""Physical keys that a sweep may vary, by path: the single numbers of the physical tables."""
-
-SWEEPABLE_GROUPS = {name: row for name, row in GROUPS_BY_NAME.items() if not row.is_list}
-"""Groups that a sweep may vary, by name."""
+    def lane_faults(self) -> Iterator[Fault]:
+        """Yield what is wrong with the parameters of the lanes, where each table is sound."""
+        yield from ()
 
 
 def swept_values(sweep: Sweep) -> Floats:
@@ -117,36 +148,3 @@ def axis_values(config: Tables) -> dict[str, Floats]:
     Each has the shape (values,); a parameter is in its own unit.
     """
     return {one.parameter: swept_values(one) for one in reversed(config.sweeps.values())}
-
-
-def groups_at(config: Tables, values: Mapping[str, npt.ArrayLike]) -> Groups:
-    """Resolve the groups for given values of parameters.
-
-    ``values``, by parameter and in its unit, are arrays that broadcast against each other. A group
-    replaces the one in the file; a physical quantity takes part in the derivation of every group
-    that is not given; no group depends on the number of a drawn gear pair. Each group comes in the
-    broadcast shape of the values on which it depends, as a float where on none. Raises
-    ConfigurationError if the harmonics of the mesh stiffness would differ between lanes, KeyError
-    if a parameter cannot be swept.
-    """
-    physical = physical_at(config, values)
-    given: dict[str, Any] = dict(config.groups.given())
-    if "stiffness_variation" not in config.scene.effects:
-        # Lanes share one table of harmonics; a scene without it may sweep what they depend on.
-        physical["mesh.stiffness.shape"] = None
-    for parameter, value in values.items():
-        if parameter in SWEEPABLE_GROUPS:
-            given[parameter] = value
-        elif parameter != REALISATION and parameter not in SWEEPABLE_KEYS:
-            raise KeyError(parameter)
-    return resolve_groups(physical, given)
-
-
-def physical_at(config: Tables, values: Mapping[str, npt.ArrayLike]) -> dict[str, Any]:
-    """Return every key of the physical tables by its path, with the values that are swept."""
-    swept = {
-        SWEEPABLE_KEYS[parameter].path: np.asarray(value, dtype=np.float64)
-        for parameter, value in values.items()
-        if parameter in SWEEPABLE_KEYS
-    }
-    return config.physical() | swept

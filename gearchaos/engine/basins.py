@@ -3,7 +3,7 @@
 import numpy as np
 
 from gearchaos.dynamics.attractors import find_attractors, numbers_along
-from gearchaos.dynamics.systems import plan_of
+from gearchaos.dynamics.plans import plan_of
 from gearchaos.engine.lanes import Lanes
 from gearchaos.engine.recomputing import computable
 from gearchaos.engine.running import choose_threads

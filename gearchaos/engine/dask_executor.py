@@ -16,11 +16,11 @@ import distributed
 import numba
 from dask.utils import parse_timedelta
 
-from gearchaos.configuration import Configuration
 from gearchaos.engine.provenance import SOFTWARE
 from gearchaos.engine.simulation import Arrays, Bounds, Chosen, Simulation
 from gearchaos.errors import ConfigurationError, ExecutionError
 from gearchaos.interrupts import check
+from gearchaos.models import Configuration
 from gearchaos.progress import notice, say
 from gearchaos.version import Software, software_version
 

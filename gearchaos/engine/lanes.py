@@ -1,20 +1,18 @@
 """The lanes of a configured sweep: their axes, and the system and the start of any of them."""
 
 import math
+from collections.abc import Sequence
 from functools import cached_property
 from typing import Any
 
 import numpy as np
-from gearchaos_kernels import GearPairs
+from gearchaos_kernels import LaneSystem
 
 from gearchaos.arrays import Array, Floats, Integers
-from gearchaos.configuration import Configuration, axis_values, swept_values
-from gearchaos.configuration.run_tables import states_of
-from gearchaos.configuration.tables import SWEEPABLE_GROUPS, SWEEPABLE_KEYS, groups_at, physical_at
-from gearchaos.dynamics.systems import system_of
-from gearchaos.gear.derivation import SCALES, derive_scales
-from gearchaos.gear.groups import GROUP_TABLE, HARMONICS
-from gearchaos.gear.tooth_deviations import REALISATION
+from gearchaos.configuration.tables import REALISATION, Parameter
+from gearchaos.models import Configuration, axis_values, swept_values
+from gearchaos.models.protocol import ParameterValue
+from gearchaos.models.registry import model_of, system_of
 from gearchaos.results import variables as known
 from gearchaos.results.variables import Variable
 
@@ -37,12 +35,12 @@ class Lanes:
 
     def __init__(self, config: Configuration) -> None:
         self.config = config
+        self.model = model_of(config)
         self._values = axis_values(config)
-        self.axes = [axis_of(parameter, values) for parameter, values in self._values.items()]
+        self.axes = [axis_of(config.parameters[name], one) for name, one in self._values.items()]
         # What the system of a lane depends on, in the order of the axes.
         self._of_systems: dict[str, Array] = dict(self._values)
-        first = getattr(config.pitch_error, "first_realisation", 0)
-        numbers = first + np.arange(getattr(config.pitch_error, "realisations", 1))
+        numbers = config.realisations
         if numbers.size > 1:
             self.axes.append(known.unswept_axis(REALISATION, numbers))
             self._of_systems[REALISATION] = numbers
@@ -54,7 +52,7 @@ class Lanes:
             self.axes.append(known.unswept_axis(known.DIRECTION, np.arange(2)))
         self.repeats = numbers.size * self.starts * self.directions
         self.effects = config.needed_effects
-        self.states = states_of(self.effects)
+        self.states = config.states_of(self.effects)
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -68,6 +66,11 @@ class Lanes:
     def repeats_after(self) -> int:
         """Mesh periods after which the excitation of every lane repeats."""
         return self.system_of(np.arange(1)).repeats_after
+
+    @cached_property
+    def clearance(self) -> bool:
+        """Whether the elements have clearance."""
+        return self.system_of(np.arange(1)).clearance
 
     @property
     def side_by_side(self) -> int:
@@ -99,7 +102,7 @@ class Lanes:
         found = zip(self._of_systems.items(), index, strict=False)
         return {parameter: values[at] for (parameter, values), at in found}
 
-    def system_of(self, lanes: Integers) -> GearPairs:
+    def system_of(self, lanes: Integers) -> LaneSystem:
         """Return the system of some lanes."""
         return system_of(self.config, self.values_of(lanes), self.effects)
 
@@ -115,46 +118,37 @@ class Lanes:
 
     @property
     def parameters(self) -> dict[str, Variable]:
-        """The groups of the model with their origin; those that no effect needs are left out."""
+        """The parameters of the model that some effect needs, with their origin."""
         names = [known.axis_name(parameter) for parameter in self._values]
         sizes = [values.size for values in self._values.values()]
         values = dict(zip(self._values, np.ix_(*self._values.values()), strict=True))
-        groups = groups_at(self.config, values)
-
-        def entry(name: str, value: Any, origin: str, texts: tuple[str, str, str]) -> Variable:
-            dims: tuple[str, ...] = (known.HARMONIC,) if name in HARMONICS else ()
-            if np.ndim(value) > 0 and not dims:
-                origin = "swept"
-                along = [n for n, size in enumerate(np.shape(value)) if size > 1]
-                # Of an axis with one value nothing tells whether the group depends on it.
-                along = along or list(range(len(names)))
-                dims = tuple(names[n] for n in along)
-                value = np.broadcast_to(np.squeeze(value), [sizes[n] for n in along])
-            return Variable(name, dims, "float64", *texts, values=value, origin=origin)
-
-        parameters = {}
-        for row in GROUP_TABLE:
-            value, texts = getattr(groups, row.name), (row.units, row.long_name, row.mathtext)
-            if value is not None and row.needed_by(self.effects):
-                origin = groups.origin[row.name]
-                parameters[row.name] = entry(row.name, value, origin, texts)
-        physical = physical_at(self.config, values)
-        for name, value in derive_scales(physical, groups.load, groups.mesh_frequency).items():
-            parameters[name] = entry(name, value, "derived", SCALES[name])
-        return parameters
+        found = self.model.parameters(self.config, values, self.effects)
+        return {one.name: _kept(one, names, sizes) for one in found}
 
 
-def axis_of(parameter: str, values: Floats) -> known.Variable:
+def _kept(one: ParameterValue, names: Sequence[str], sizes: Sequence[int]) -> Variable:
+    """Return a parameter as a result keeps it; ``names``, ``sizes``: of the swept axes."""
+    value, origin = one.value, one.origin
+    dims: tuple[str, ...] = (known.HARMONIC,) if one.is_list else ()
+    if np.ndim(value) > 0 and not dims:
+        origin = "swept"
+        along = [n for n, size in enumerate(np.shape(value)) if size > 1]
+        # With one value on the axis nothing shows whether the parameter depends on it.
+        along = along or list(range(len(names)))
+        dims = tuple(names[n] for n in along)
+        value = np.broadcast_to(np.squeeze(value), [sizes[n] for n in along])
+    texts = one.units, one.long_name, one.symbol
+    return Variable(one.name, dims, "float64", *texts, values=value, origin=origin)
+
+
+def axis_of(parameter: Parameter, values: Floats) -> known.Variable:
     """Return the axis of a swept parameter with values (values,), as files name and word it."""
-    name = known.axis_name(parameter)
-    if parameter in SWEEPABLE_GROUPS:
-        row = SWEEPABLE_GROUPS[parameter]
-        return known.coordinate(name, row.units, row.long_name, row.mathtext, values)
-    key = SWEEPABLE_KEYS[parameter]
-    return known.coordinate(name, key.units or "1", key.wording, "", values)
+    name = known.axis_name(parameter.name)
+    texts = parameter.units, parameter.long_name, parameter.symbol
+    return known.coordinate(name, *texts, values)
 
 
-def start_states(config: Configuration, system: GearPairs, numbers: Integers) -> Floats:
+def start_states(config: Configuration, system: LaneSystem, numbers: Integers) -> Floats:
     """Return the start states, shape (lanes, states), of lanes with this system.
 
     ``numbers`` (lanes,): those that they have in the whole sweep: the random state of a lane

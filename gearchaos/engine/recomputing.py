@@ -5,11 +5,12 @@ from typing import NamedTuple
 import numpy as np
 from gearchaos_kernels import Status, integrate
 
-from gearchaos.configuration import Configuration
-from gearchaos.dynamics.systems import plan_of, system_of
+from gearchaos.configuration.tables import REALISATION
+from gearchaos.dynamics.plans import plan_of
 from gearchaos.errors import ConfigurationError, FileError
-from gearchaos.gear.tooth_deviations import REALISATION
 from gearchaos.interrupts import check
+from gearchaos.models import Configuration
+from gearchaos.models.registry import system_of
 from gearchaos.records.label import CHAOTIC_GROWTH
 from gearchaos.records.lyapunov import largest_exponent
 from gearchaos.results.reading.result import Result

@@ -10,14 +10,15 @@ import numpy as np
 from gearchaos_kernels import LaneSystem, integrate
 
 from gearchaos.arrays import Array, Floats
-from gearchaos.configuration import Configuration, swept_values
 from gearchaos.dynamics.following import Followed, follow
 from gearchaos.dynamics.labelling import LOOKS, labels_of
+from gearchaos.dynamics.plans import plan_of
 from gearchaos.dynamics.stability_loss import STABILITY_LOSS_TEXTS, StabilityLoss
-from gearchaos.dynamics.systems import plan_of, system_of
 from gearchaos.engine.lanes import start_states
 from gearchaos.engine.simulation import Simulation
 from gearchaos.interrupts import check
+from gearchaos.models import Configuration, swept_values
+from gearchaos.models.registry import system_of
 from gearchaos.records.label import MEANINGS
 from gearchaos.records.period import TOLERANCE
 from gearchaos.results.reading.jumps import Apart, directions_of

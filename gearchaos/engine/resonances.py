@@ -1,15 +1,13 @@
-"""Where mesh orders meet the eigenfrequencies of a sweep, and the static deflection of its mesh."""
+"""Where mesh orders meet the eigenfrequencies of a sweep, and its static deflection."""
 
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from gearchaos.arrays import Floats
-from gearchaos.configuration.tables import groups_at, physical_at
 from gearchaos.dynamics.eigenfrequencies import eigenfrequencies
-from gearchaos.dynamics.systems import system_of
 from gearchaos.engine.lanes import Lanes
-from gearchaos.gear.derivation import FREQUENCY, LENGTH, derive_scales
+from gearchaos.models.registry import system_of
 
 ORDERS = (1, 2, 3)
 """Multiples of the mesh frequency that are told."""
@@ -22,10 +20,19 @@ UNIT, MESH_FREQUENCY = "per unit of tau", "(mesh frequency)"
 class Resonances(NamedTuple):
     """What is known of a sweep before it runs; each value as its smallest and its largest one.
 
-    ``frequencies`` (modes, 2): eigenfrequencies, angular per unit of tau; ``hertz`` the same, and
-    ``rpm`` the speeds of the driving gear at which its mesh frequency is one of them;
-    ``deflection`` (2,): the static one in b', ``micrometres`` the same. None where the data of the
-    pair are not given.
+    Attributes
+    ----------
+    frequencies : array, shape (modes, 2)
+        Eigenfrequencies, angular per unit of tau.
+    hertz, rpm : array, shape (modes, 2), or None
+        The same in Hz, and the speeds at which the mesh frequency equals them; None where the
+        scales are not known.
+    deflection : array, shape (2,)
+        Static deflection in units of b'; NaN where the model has none.
+    micrometres : array, shape (2,), or None
+        The same in micrometres.
+    contact_words, deflection_words : str
+        What both are those of, see `Model`.
     """
 
     frequencies: Floats
@@ -33,11 +40,13 @@ class Resonances(NamedTuple):
     rpm: Floats | None
     deflection: Floats
     micrometres: Floats | None
+    contact_words: str
+    deflection_words: str
 
     @property
     def texts(self) -> dict[str, str]:
         """Lines for a person, by what they are about."""
-        where = "(mean mesh stiffness, teeth in contact)"
+        where = f"({self.contact_words})"
         texts = {"modes": f"none that oscillates {where}"}
         if len(self.frequencies):
             values, unit, met, speed = self.frequencies, UNIT, self.frequencies, MESH_FREQUENCY
@@ -51,8 +60,9 @@ class Resonances(NamedTuple):
         bent, unit = self.deflection, "b'"
         if self.micrometres is not None:
             bent, unit = self.micrometres, "um"
-        deflection = f"{_span(bent)} {unit} of the mesh under the static load"
-        return {**texts, "deflection": f"{deflection}, along the transverse line of action"}
+        if np.isfinite(bent).all():
+            texts["deflection"] = f"{_span(bent)} {unit} {self.deflection_words}"
+        return texts
 
     @property
     def facts(self) -> dict[str, Any]:
@@ -72,23 +82,20 @@ class Resonances(NamedTuple):
 def resonances(lanes: Lanes) -> Resonances:
     """Return the resonances of the whole scene, with the effects on which nothing kept depends."""
     config, values = lanes.config, lanes.values_of(lanes.spread(LANES))
-    system, groups = system_of(config, values), groups_at(config, values)
-    scales = derive_scales(physical_at(config, values), groups.load, groups.mesh_frequency)
-    scale, length = (
-        None if name not in scales else np.broadcast_to(scales[name], (system.lanes,))
-        for name in (FREQUENCY, LENGTH)
-    )
+    system, scales = system_of(config, values), lanes.model.scales(config, values)
     found, bent = eigenfrequencies(system), system.static_force()
-    hertz = None if scale is None else found * scale[:, np.newaxis] / (2.0 * np.pi)
-    teeth = None if config.pair is None else config.pair.teeth
-    modes = np.isfinite(found).any(axis=0)
-    hertz = None if hertz is None else _ends(hertz[:, modes])
+    modes, hertz, rpm = np.isfinite(found).any(axis=0), None, None
+    if scales.frequency is not None:
+        hertz = _ends((found * scales.frequency[:, np.newaxis] / (2.0 * np.pi))[:, modes])
+        rpm = None if scales.speed is None else scales.speed * hertz
     return Resonances(
         _ends(found[:, modes]),
         hertz,
-        None if hertz is None or teeth is None else 60.0 * hertz / teeth[0],
+        rpm,
         _ends(bent),
-        None if length is None else _ends(bent * length),
+        None if scales.length is None else _ends(bent * scales.length),
+        lanes.model.contact_words,
+        lanes.model.deflection_words,
     )
 
 

@@ -3,24 +3,22 @@
 import time
 
 import numpy as np
-from gearchaos_kernels import GearPairs, Outcome, Plan, Status, mesh_motion
+from gearchaos_kernels import LaneSystem, Outcome, Plan, Status
 
 from gearchaos.arguments import whole_number
 from gearchaos.arrays import Array
-from gearchaos.configuration import Configuration, Given, configuration_of
 from gearchaos.engine.running import choose_threads, metadata, require_memory, result_of
 from gearchaos.engine.simulation import Simulation
 from gearchaos.errors import ConfigurationError
+from gearchaos.models import Configuration, Given, configuration_of
+from gearchaos.models.protocol import Model
 from gearchaos.results.reading.result import Result
 from gearchaos.results.response_variables import (
     DEFAULT_PERIODS,
-    MESH_ERROR,
     MESH_PERIOD,
     NO_CONTACT_STATE,
-    acceleration_of,
     response_variables,
 )
-from gearchaos.results.variables import DIRECTIONS
 
 
 def respond(config: Given, periods: int = DEFAULT_PERIODS, threads: int | None = None) -> Result:
@@ -74,7 +72,7 @@ def compute_response(simulation: Simulation, periods: int, text: str, fixed: str
     arrays = {
         **simulation.arrays(places, start, outcome),
         MESH_PERIOD: system.mesh_period,
-        **_motion(system, outcome, plan),
+        **_motion(simulation.lanes.model, system, outcome, plan),
     }
     variables = response_variables(
         simulation.lanes.axes,
@@ -92,18 +90,13 @@ def compute_response(simulation: Simulation, periods: int, text: str, fixed: str
     return result_of(simulation, [arrays], facts, variables)
 
 
-def _motion(system: GearPairs, outcome: Outcome, plan: Plan) -> dict[str, Array]:
+def _motion(model: Model, system: LaneSystem, outcome: Outcome, plan: Plan) -> dict[str, Array]:
+    """Return states and what the model derives from them; of lanes that diverged none of it."""
     turned = plan.transient_periods + plan.recorded_periods - plan.history_periods
-    found = mesh_motion(system, outcome.history, plan.steps_per_period, turned)
     motion: dict[str, Array] = {
         name: outcome.history[..., column].copy() for column, name in enumerate(system.states)
     }
-    for column, name in enumerate(system.states[::2]):
-        motion[acceleration_of(name)] = found.accelerations[..., column].copy()
-    motion[MESH_ERROR] = found.pitch_error
-    for way in DIRECTIONS[: 1 + system.effects.axial]:
-        motion[f"mesh_force_{way}"] = getattr(found, f"force_{way}")
-        motion[f"contact_{way}"] = getattr(found, f"contact_{way}")
+    motion |= model.motion(system, outcome.history, plan.steps_per_period, turned)
     for values in motion.values():
         nothing = NO_CONTACT_STATE if values.dtype == np.uint8 else np.nan
         values[outcome.status != Status.OK] = nothing

@@ -13,13 +13,13 @@ import numpy as np
 from gearchaos_kernels.compilation import on_compilation
 
 from gearchaos.arguments import whole_number
-from gearchaos.configuration import Given, configuration_of
 from gearchaos.engine.error_check import Tally
 from gearchaos.engine.executors import LocalExecutor, compute_blocks
 from gearchaos.engine.provenance import provenance
 from gearchaos.engine.simulation import Arrays, Bounds, Simulation
 from gearchaos.errors import ConfigurationError
 from gearchaos.interrupts import check
+from gearchaos.models import Given, configuration_of
 from gearchaos.progress import say, speaking
 from gearchaos.results.reading.result import Result
 from gearchaos.results.variables import Variable, require_listed
@@ -127,12 +127,8 @@ def choose_threads(threads: int | None) -> None:
 def metadata(simulation: Simulation, seconds: float) -> Mapping[str, Any]:
     """Return what a result says of itself beside its arrays, after so many seconds of wall time."""
     config, repeats = simulation.config, simulation.lanes.repeats_after
-    # What figures of teeth need, see `Excitation`.
-    pair = config.pair if repeats > 1 else None
-    teeth = zip(("driving_teeth", "driven_teeth"), pair.teeth, strict=True) if pair else ()
     return {
         "title": config.title,
-        "formulation": config.formulation,
         "effects": " ".join(config.scene.effects),
         "start": config.start.kind,
         "carry": config.start.carry,
@@ -141,7 +137,7 @@ def metadata(simulation: Simulation, seconds: float) -> Mapping[str, Any]:
         "transient_periods": simulation.plan.transient_periods,
         "recorded_periods": simulation.plan.recorded_periods,
         "excitation_period": repeats,
-        **dict(teeth),
+        **simulation.lanes.model.facts(config, repeats),
         "notes": "\n".join(simulation.notes),
         **provenance(seconds),
         "configuration": config.text,

@@ -8,13 +8,12 @@ import gearchaos_kernels as kernels
 import numpy as np
 
 from gearchaos.arrays import Array, Floats, Integers
-from gearchaos.configuration import Configuration
 from gearchaos.dynamics.exponents import exponents, sum_of_exponents
 from gearchaos.dynamics.labelling import LOOK_BYTES, LOOKS, Told, labels_of
 from gearchaos.dynamics.largest_exponents import MEANINGS as RECORD_MEANINGS
 from gearchaos.dynamics.largest_exponents import largest_exponents
+from gearchaos.dynamics.plans import plan_of
 from gearchaos.dynamics.stability import fewest_stable_steps
-from gearchaos.dynamics.systems import plan_of
 from gearchaos.engine import error_check
 from gearchaos.engine.claims import completed
 from gearchaos.engine.excitation import remarks, whole_lengths
@@ -32,11 +31,12 @@ from gearchaos.engine.steps import (
 )
 from gearchaos.engine.transient import settled
 from gearchaos.interrupts import check
+from gearchaos.models import Configuration
+from gearchaos.records.contact import CONTACT_STATES, contact_told
 from gearchaos.records.difference import difference
 from gearchaos.records.label import MEANINGS as MOTION_MEANINGS
 from gearchaos.records.label import MOST_POINTS
 from gearchaos.records.period import POINTS_NEEDED
-from gearchaos.records.teeth import CONTACT_STATES, contact_told, loads_told
 from gearchaos.results import variables as known
 
 Arrays = Mapping[str, Array]
@@ -155,12 +155,14 @@ class Simulation:
             "record": outputs.motion and outputs.lyapunov,
             "exponents": outputs.exponents,
             "crossings": self._splits_steps,
-            "contact": self._directions if touched else (),
-            "forces": self._directions if self.plan.loads else (),
+            "contact": self._elements if touched else (),
+            "forces": self._elements if self.plan.loads else (),
             "loads": self.plan.loads,
             "chosen": outputs.states,
             "orders": bool(self.plan.orders),
-            "amplitudes": (*outputs.states, "transmission_error") if self.plan.orders else (),
+            "amplitudes": (*outputs.states, *self.lanes.model.signals[:1])
+            if self.plan.orders
+            else (),
             "check": self.config.integration.error_check > 0.0,
             "every sweep": True,
         }
@@ -182,12 +184,12 @@ class Simulation:
 
     @property
     def _splits_steps(self) -> bool:
-        return self.plan.resolved and "backlash" in self.lanes.effects
+        return self.plan.resolved and self.lanes.clearance
 
     @property
-    def _directions(self) -> tuple[str, ...]:
-        """Directions in which teeth touch."""
-        return known.DIRECTIONS[: 1 + ("axial" in self.lanes.effects)]
+    def _elements(self) -> tuple[str, ...]:
+        """Names of the clearance elements."""
+        return self.lanes.model.elements(self.lanes.effects)
 
     def rehearse(self, periods: int = 0) -> None:
         """Integrate the first lane, and so many mesh periods of it step by step.
@@ -282,7 +284,7 @@ class Simulation:
             slowest = np.where(outcome.crossings > 0, outcome.slowest_crossing, np.nan)
             arrays["slowest_crossing"] = np.where(sound, slowest, np.nan)
             arrays["unsplit_steps"] = outcome.overflows
-        arrays |= self._told_of_teeth(system, outcome)
+        arrays |= self._told_of_elements(system, outcome)
         for name in outputs.section:
             points = outcome.section[:, -plan.section_points :, system.states.index(name)]
             # A copy: a view would keep alive all that was recorded.
@@ -310,18 +312,18 @@ class Simulation:
             arrays |= self._check(lanes, start, outcome, told)
         return arrays
 
-    def _told_of_teeth(
+    def _told_of_elements(
         self, system: kernels.LaneSystem, outcome: kernels.Outcome
     ) -> dict[str, Array]:
         """Return what is kept of contact, loads and states; of lanes that diverged none of it."""
         told: dict[str, Array] = {}
         if self.plan.contact and self._splits_steps:
-            for number, way in enumerate(self._directions):
+            for number, way in enumerate(self._elements):
                 found = contact_told(outcome.contact[:, number], self.plan.recorded_periods)
                 told |= {f"{name}_{way}": values for name, values in found.items()}
         if self.plan.loads:
-            told |= loads_told(outcome.loads, system.static_force(), self._directions)
-        told |= states_told(outcome, self.plan)
+            told |= self.lanes.model.loads(outcome.loads, system)
+        told |= states_told(outcome, self.plan, self.lanes.model.signals[:1])
         for values in told.values():
             if values.dtype != np.uint8:
                 values[outcome.status != kernels.Status.OK] = np.nan
@@ -357,14 +359,19 @@ class Simulation:
         return dict(zip(error_check.CHECKED, (section, exponent, motion), strict=True))
 
 
-def states_told(outcome: kernels.Outcome, plan: kernels.Plan) -> dict[str, Floats]:
-    """Return extremes of the states of a plan, and amplitudes at its orders, by name."""
+def states_told(
+    outcome: kernels.Outcome, plan: kernels.Plan, signals: Sequence[str]
+) -> dict[str, Floats]:
+    """Return extremes of the states of a plan, and amplitudes at its orders, by name.
+
+    ``signals``: name of the observed signal of which there are amplitudes.
+    """
     told: dict[str, Floats] = {}
     for number, state in enumerate(plan.states):
         smallest, largest = outcome.extremes[:, number].T
         ends = smallest, largest, largest - smallest
         told |= {f"{state}_{name}": end for name, end in zip(known.EXTREMES, ends, strict=True)}
     if plan.orders:
-        names = (f"{known.AMPLITUDE}{name}" for name in (*plan.states, "transmission_error"))
+        names = (f"{known.AMPLITUDE}{name}" for name in (*plan.states, *signals))
         told |= zip(names, np.moveaxis(outcome.amplitudes, 1, 0), strict=True)
     return told

@@ -9,21 +9,17 @@ from gearchaos_kernels import LaneSystem, Outcome, Plan, Status, integrate, maps
 
 from gearchaos.arrays import Integers, Mask
 from gearchaos.configuration.messages import Fault
-from gearchaos.configuration.run_tables import (
-    DEFAULT_STEPS,
-    FLOW_MAP_STEPS,
-    MOST_STEPS_PER_PERIOD,
-)
+from gearchaos.configuration.run_tables import DEFAULT_STEPS, FLOW_MAP_STEPS, MOST_STEPS_PER_PERIOD
+from gearchaos.configuration.tables import REALISATION
 from gearchaos.dynamics import stability
 from gearchaos.dynamics.hidden_modes import hidden_error
 from gearchaos.dynamics.labelling import Told
 from gearchaos.dynamics.largest_exponents import largest_exponents
+from gearchaos.dynamics.plans import plan_of
 from gearchaos.dynamics.remainders import EPSILON
-from gearchaos.dynamics.systems import plan_of
 from gearchaos.engine.claims import columns_of
 from gearchaos.engine.lanes import Lanes
 from gearchaos.errors import ConfigurationError
-from gearchaos.gear.tooth_deviations import REALISATION
 from gearchaos.interrupts import check
 from gearchaos.records.difference import Difference, Solution, bound, difference
 from gearchaos.records.label import PERIODIC, UNRESOLVED

@@ -14,6 +14,7 @@ import numpy as np
 import panel as pn
 from bokeh.models import CrosshairTool, Span
 
+from gearchaos.configuration.ranges import LARGEST_VALUE
 from gearchaos.engine.recomputing import continued
 from gearchaos.engine.response import compute_response, prepared
 from gearchaos.engine.running import compiling
@@ -25,7 +26,6 @@ from gearchaos.figures.lanes import diagram_lanes, swept_axes
 from gearchaos.figures.page import FORMATS
 from gearchaos.figures.response import COORDINATE
 from gearchaos.figures.style import GREY, VERMILION
-from gearchaos.gear.groups import LARGEST_VALUE
 from gearchaos.results.reading.result import Result, section_variables
 from gearchaos.results.reading.stage_table import label_text
 from gearchaos.results.response_variables import DEFAULT_PERIODS

@@ -7,9 +7,9 @@ from functools import cache
 
 from matplotlib.mathtext import MathTextParser
 
+from gearchaos.configuration.tables import REALISATION
 from gearchaos.errors import FigureError
 from gearchaos.figures.style import DRAWING
-from gearchaos.gear.tooth_deviations import REALISATION
 from gearchaos.results import scales
 from gearchaos.results.reading.result import Result
 from gearchaos.results.scales import excitation_of

@@ -2,15 +2,17 @@
 
 from typing import Any, NamedTuple
 
+import gearchaos_kernels as kernels
 import numpy as np
-from gearchaos_kernels import GearPairs, Outcome, Plan, Status, integrate, mesh_motion
+from gearchaos_kernels import LaneSystem, Outcome, Plan, Status, integrate
 
 from gearchaos.arrays import Counts, Floats, Integers, Mask
-from gearchaos.configuration import Configuration
+from gearchaos.dynamics.plans import plan_of
 from gearchaos.dynamics.stability import fewest_stable_steps
-from gearchaos.dynamics.systems import plan_of, system_of
 from gearchaos.engine.lanes import start_states
 from gearchaos.errors import ConfigurationError
+from gearchaos.models import Configuration
+from gearchaos.models.registry import system_of
 from gearchaos.records.lyapunov import largest_exponent
 from gearchaos.records.period import period_of, return_distances
 
@@ -102,7 +104,7 @@ def require_stable(config: Configuration, values: Floats, parameters: dict[str, 
         )
 
 
-def _records(system: GearPairs, outcome: Outcome, looked_at: Integers, plan: Plan) -> Records:
+def _records(system: LaneSystem, outcome: Outcome, looked_at: Integers, plan: Plan) -> Records:
     """Return what lanes came to, each array with the lanes first."""
     sound = outcome.status == Status.OK
     # The torsion and its rate: the other coordinates follow them.
@@ -121,6 +123,6 @@ def _records(system: GearPairs, outcome: Outcome, looked_at: Integers, plan: Pla
         lanes = looked_at[first : first + MOTIONS_AT_ONCE]
         some = system.of(lanes)
         motion = integrate(some, outcome.end_state[lanes], finer)
-        found = mesh_motion(some, motion.history, finer.steps_per_period).accelerations
+        found = kernels.evaluate(some, motion.history, finer.steps_per_period).accelerations
         acceleration[lanes] = np.max(found, axis=1)
     return Records(outcome.section[..., 0], period, exponent, acceleration, sound)

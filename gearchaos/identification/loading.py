@@ -9,10 +9,8 @@ import numpy as np
 from pydantic import ValidationError
 
 from gearchaos.arrays import Floats
-from gearchaos.configuration import Configuration, load_config
 from gearchaos.configuration.keys import keys_of
 from gearchaos.configuration.messages import faults_of, texts
-from gearchaos.configuration.run_tables import states_of
 from gearchaos.configuration.toml_text import (
     tables_from_toml,
     text_of_file,
@@ -22,6 +20,8 @@ from gearchaos.configuration.toml_text import (
 from gearchaos.errors import ConfigurationError
 from gearchaos.identification.observations import Observation, observations_of
 from gearchaos.identification.targets import Targets
+from gearchaos.models import Configuration, load_config
+from gearchaos.models.gear_pair.scene import states_of
 from gearchaos.records.period import POINTS_NEEDED
 
 
@@ -69,7 +69,7 @@ def load_targets(file: str | os.PathLike[str], overrides: Iterable[str] = ()) ->
 
 
 def _unfit(config: Configuration, targets: Targets, source: str, values: Floats) -> Iterator[str]:
-    kind = getattr(config.pitch_error, "kind", "sine")
+    kind = getattr(getattr(config, "pitch_error", None), "kind", "sine")
     for key, unfit in {
         "second_sweep": config.second_sweep is not None,
         "start.count": config.start.count > 1,

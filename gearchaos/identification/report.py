@@ -7,11 +7,11 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
 from gearchaos.arrays import Floats
-from gearchaos.configuration.tables import SWEEPABLE_GROUPS
 from gearchaos.identification.flat_directions import ONE_UNIT, directions_at, distinct
 from gearchaos.identification.loading import Problem
 from gearchaos.identification.search import STEPS_ALONE, answers_of, shares
 from gearchaos.identification.tried import Tried
+from gearchaos.models.gear_pair.group_table import SWEEPABLE_GROUPS
 
 NEAREST = 3  # Steps in each direction whose misfits tell how even the best set's surroundings are.
 

@@ -6,19 +6,20 @@ place of a hop between them belongs to the start state as much as to the pair.
 """
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from gearchaos.configuration import Configuration
 from gearchaos.engine.refinement import Boundary, refined_jumps
 from gearchaos.engine.response import respond
 from gearchaos.engine.running import run
 from gearchaos.figures.response import coordinates_of, samples_per_period
-from gearchaos.gear.derivation import Quantities
-from gearchaos.gear.geometry import HelicalPair
+from gearchaos.models import Configuration, GearPairConfiguration
+from gearchaos.models.gear_pair.derivation import Quantities
+from gearchaos.models.gear_pair.geometry import HelicalPair
 from gearchaos.paper.published import contact_line_stiffness, printed_coefficients, published
 from gearchaos.paper.stages import Crisis, crisis_of, lanes_as_printed
 from gearchaos.progress import say
@@ -97,7 +98,7 @@ class Reproduction:
     @cached_property
     def pair(self) -> HelicalPair:
         """The gear pair of the configuration (Table 1)."""
-        return Quantities(self.config.physical()).pair
+        return Quantities(physical(self.config)).pair
 
     @cached_property
     def numbers(self) -> dict[str, float]:
@@ -105,7 +106,7 @@ class Reproduction:
         speed, response, pair = published().driving_speed_rpm, self.response, self.pair
         printed = published().numbers.mean_stiffness.value * printed_coefficients()
         lines = contact_line_stiffness().coefficients(printed.size)
-        driven = Quantities(self.config.replace("operation", {"speed_rpm": speed}).physical())
+        driven = Quantities(physical(self.config.replace("operation", {"speed_rpm": speed})))
         stiffness, xi = driven.mean_stiffness, self.group("damping_ratio")
         period = response["mesh_period"][0]
         torsion = response["delta_5_acceleration"][lane_of(response, 1.0), :-1]
@@ -130,6 +131,12 @@ class Reproduction:
             without, once = (largest_acceleration(response, p, name) for p in (0.0, 1.0))
             numbers[f"added_{name}"] = once - without
         return {key: float(number) for key, number in numbers.items()}
+
+
+def physical(config: Configuration) -> Mapping[str, Any]:
+    """Return every key of the physical tables by its path."""
+    assert isinstance(config, GearPairConfiguration)
+    return config.physical()
 
 
 def compute(

@@ -21,7 +21,7 @@ from gearchaos.figures.response import (
     time_history,
 )
 from gearchaos.figures.style import BLACK, BLUE, FONT_PT, GREY, ORANGE, VERMILION
-from gearchaos.gear.contact_lines import series_table
+from gearchaos.models.gear_pair.contact_lines import series_table
 from gearchaos.paper.computation import Reproduction, lane_of, largest_acceleration
 from gearchaos.paper.published import (
     Printed,

@@ -10,7 +10,7 @@ from typing import TypeAlias
 import numpy as np
 
 from gearchaos.arrays import Complex
-from gearchaos.gear.contact_lines import TrapezoidalStiffness
+from gearchaos.models.gear_pair.contact_lines import TrapezoidalStiffness
 
 Printed: TypeAlias = SimpleNamespace
 """A table of `published.toml`, with its keys as attributes."""

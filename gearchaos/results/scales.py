@@ -9,7 +9,7 @@ import numpy as np
 
 from gearchaos.arrays import Array
 from gearchaos.errors import ConfigurationError
-from gearchaos.gear.derivation import FREQUENCY, LENGTH, STIFFNESS
+from gearchaos.models.gear_pair.derivation import FREQUENCY, LENGTH, STIFFNESS
 from gearchaos.results.variables import Variable
 
 

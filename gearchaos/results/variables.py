@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from gearchaos.arrays import Array, Floats
-from gearchaos.gear.tooth_deviations import REALISATION
+from gearchaos.configuration.tables import REALISATION
 
 START = "start"
 DIRECTION = "direction"

@@ -6,7 +6,7 @@ from fractions import Fraction
 import numpy as np
 from numpy.typing import ArrayLike
 
-from gearchaos.records.teeth import CONTACT_STATES
+from gearchaos.records.contact import CONTACT_STATES
 from gearchaos.results.variables import (
     EXPONENT_NUMBER,
     ORDER,

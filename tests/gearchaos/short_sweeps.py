@@ -5,9 +5,9 @@ from pathlib import Path
 import numpy as np
 from gearchaos_kernels import integrate
 
-from gearchaos.configuration import load_config
 from gearchaos.engine.executors import LocalExecutor, compute_blocks
 from gearchaos.engine.simulation import Simulation
+from gearchaos.models import load_config
 
 PAN2021 = Path(__file__).resolve().parents[2] / "sweeps" / "pan2021_first.toml"
 """The pair with the groups of the stored reference solutions, whose motions are well known."""

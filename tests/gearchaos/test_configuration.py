@@ -11,21 +11,23 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gearchaos.configuration import (
-    EFFECTS,
-    STATES,
+from gearchaos.configuration.base import configuration_keys
+from gearchaos.configuration.schema import json_schema, key_tables
+from gearchaos.errors import ConfigurationError
+from gearchaos.models import (
     Configuration,
+    GearPairConfiguration,
     axis_values,
-    groups_at,
     load_config,
     swept_values,
 )
-from gearchaos.configuration.models import configuration_keys
-from gearchaos.configuration.schema import json_schema, key_tables
-from gearchaos.configuration.tables import SWEEPABLE_GROUPS
-from gearchaos.errors import ConfigurationError
-from gearchaos.gear.groups import GROUP_TABLE
+from gearchaos.models.gear_pair.group_table import GROUP_TABLE, SWEEPABLE_GROUPS
+from gearchaos.models.gear_pair.scene import EFFECTS, STATES
+from gearchaos.models.gear_pair.tables import groups_at
 from gearchaos.results.variables import STATE_WORDING
+
+KEYS = configuration_keys(GearPairConfiguration)
+KEY_TABLES = key_tables(GearPairConfiguration)
 
 
 def lane_groups(config):
@@ -390,27 +392,27 @@ def test_states_and_effects_are_those_of_the_files_and_the_groups():
 
 
 def test_every_group_is_a_key_of_the_groups_table():
-    keys = configuration_keys()
+    keys = KEYS
     assert all(f"groups.{row.name}" in keys for row in GROUP_TABLE)
 
 
 def test_the_command_prints_the_schema():
     command = [sys.executable, "-m", "gearchaos.schema"]
     output = subprocess.run(command, check=True, capture_output=True, text=True, cwd=ROOT).stdout
-    assert json.loads(output) == json_schema()
+    assert json.loads(output) == json_schema(GearPairConfiguration)
 
 
 def test_the_schema_knows_every_key_without_null():
-    schema = json_schema()
+    schema = json_schema(GearPairConfiguration)
     assert "null" not in json.dumps(schema)
     described = set(schema["properties"])
     for table in schema["$defs"].values():
         described |= set(table.get("properties", ()))
-    assert {path.rpartition(".")[2] for path in configuration_keys()} <= described
+    assert {path.rpartition(".")[2] for path in KEYS} <= described
 
 
 def test_the_tables_of_keys_list_the_choices():
-    rows = {line.split("|")[1].strip(): line for line in key_tables().splitlines() if "|" in line}
+    rows = {line.split("|")[1].strip(): line for line in KEY_TABLES.splitlines() if "|" in line}
     assert '| `"none"`, `"upwards"`, `"downwards"`, `"both"` | `"none"` |' in rows["`carry`"]
     assert '| `"resolved"`, `"plain"` |' in rows["`crossings`"]
     assert "| `1995`, `2013` |" in rows["`edition`"]
@@ -418,4 +420,4 @@ def test_the_tables_of_keys_list_the_choices():
 
 
 def test_the_documentation_has_the_tables_of_keys_as_the_models_declare_them():
-    assert key_tables() in (ROOT / "docs" / "configuration.md").read_text(encoding="utf-8")
+    assert KEY_TABLES in (ROOT / "docs" / "configuration.md").read_text(encoding="utf-8")

@@ -7,8 +7,8 @@ from pathlib import Path
 import h5py
 import pytest
 
-from gearchaos.configuration import Configuration, load_config
 from gearchaos.errors import ConfigurationError, FileError
+from gearchaos.models import Configuration, load_config
 
 ROOT = Path(__file__).resolve().parents[2]
 PAN2021 = ROOT / "sweeps" / "pan2021.toml"

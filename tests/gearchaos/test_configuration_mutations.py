@@ -9,9 +9,10 @@ import numpy as np
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from gearchaos.configuration import Configuration, axis_values, groups_at
-from gearchaos.configuration.models import configuration_keys
+from gearchaos.configuration.base import configuration_keys
 from gearchaos.errors import GearchaosError
+from gearchaos.models import Configuration, GearPairConfiguration, axis_values
+from gearchaos.models.gear_pair.tables import groups_at
 
 SWEEP = Path(__file__).resolve().parents[2] / "sweeps" / "pan2021_full.toml"
 TABLES = tomllib.loads(SWEEP.read_text(encoding="utf-8"))
@@ -21,7 +22,7 @@ PITCH_ERRORS = [
     {"kind": "teeth", "driving": DEVIATIONS},
     {"kind": "grade", "grade": 7, "realisations": 3},
 ]
-PATHS = sorted(configuration_keys())
+PATHS = sorted(configuration_keys(GearPairConfiguration))
 WORDS = ["load", "teeth", "grade", "axial", "delta_5", "random", "trapezoid", *PATHS]
 
 scalars = st.one_of(

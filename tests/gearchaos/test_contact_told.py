@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 import gearchaos
 from gearchaos import load_config
 from gearchaos.figures import bifurcation
-from gearchaos.records.teeth import CONTACT_STATES, contact_told
+from gearchaos.records.contact import CONTACT_STATES, contact_told
 
 from .commands import run_module
 from .short_sweeps import PAN2021, SHORT, simulation

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from gearchaos.gear.tooth_deviations import drawn_gears
+from gearchaos.models.gear_pair.tooth_deviations import drawn_gears
 
 GOLDEN = [0.0, -1.543392, -5.151616, -11.991532, -11.366002, -0.366002, 4.104212]
 ROUNDING = 2e-6

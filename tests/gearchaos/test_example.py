@@ -2,8 +2,8 @@
 
 from pathlib import Path
 
-from gearchaos.configuration import load_config
 from gearchaos.example import main
+from gearchaos.models import load_config
 
 SWEEPS = Path(__file__).resolve().parents[2] / "sweeps"
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from gearchaos.gear.geometry import HelicalPair
+from gearchaos.models.gear_pair.geometry import HelicalPair
 
 
 def pan_2021_pair(**changes):

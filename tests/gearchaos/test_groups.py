@@ -5,10 +5,11 @@ import pickle
 import numpy as np
 import pytest
 
-from gearchaos.configuration.tables import PHYSICAL_KEYS
 from gearchaos.errors import ConfigurationError
-from gearchaos.gear.derivation import derive_groups
-from gearchaos.gear.groups import GROUP_TABLE, GROUPS_BY_NAME, resolve_groups
+from gearchaos.models.gear_pair.derivation import derive_groups
+from gearchaos.models.gear_pair.group_table import GROUP_TABLE, GROUPS_BY_NAME
+from gearchaos.models.gear_pair.groups import resolve_groups
+from gearchaos.models.gear_pair.tables import PHYSICAL_KEYS
 
 MEAN_STIFFNESS = 13.3548 * 15 * 1e6  # N/m
 EQUIVALENT_MASS = 0.095448  # kg, to the digits of the geometry's own test

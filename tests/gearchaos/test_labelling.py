@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 from gearchaos_kernels import Plan, Status
 
-from gearchaos.configuration import load_config
 from gearchaos.dynamics.exponents import period_jacobian
 from gearchaos.dynamics.largest_exponents import MIXED
 from gearchaos.dynamics.orbits import polish
 from gearchaos.engine.error_check import Tally
 from gearchaos.engine.simulation import Simulation
+from gearchaos.models import load_config
 from gearchaos.records.label import (
     CHAOTIC,
     DIVERGED,

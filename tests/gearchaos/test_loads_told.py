@@ -5,7 +5,7 @@ import pytest
 
 import gearchaos
 from gearchaos import load_config
-from gearchaos.records.teeth import loads_told
+from gearchaos.records.contact import loads_told
 
 from .commands import run_module
 from .short_sweeps import PAN2021, SHORT, simulation

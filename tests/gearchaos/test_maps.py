@@ -11,8 +11,8 @@ from gearchaos.figures import map_page, parameter_map
 from gearchaos.figures.maps import _number_cells
 from gearchaos.figures.stages import SHADES
 from gearchaos.plot import main
+from gearchaos.records.contact import CONTACT_STATES
 from gearchaos.records.label import MEANINGS
-from gearchaos.records.teeth import CONTACT_STATES
 from gearchaos.results.reading.result import Result
 from gearchaos.results.variables import Variable, coordinate, unswept_axis
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from gearchaos.gear.contact_lines import TrapezoidalStiffness, series_table
+from gearchaos.models.gear_pair.contact_lines import TrapezoidalStiffness, series_table
 
 MEAN_STIFFNESS = 13.3548  # N/(um mm), Pan 2021, section 2.3
 TABLE_2_COSINE = np.array([-1.202, -5.79e-5, -0.1339, -5.784e-5, -0.04809, -5.79e-5])

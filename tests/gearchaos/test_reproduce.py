@@ -10,7 +10,7 @@ import pytest
 from gearchaos import FileError, load_config, open_result
 from gearchaos.command_line import SWEEPS
 from gearchaos.figures.response import coordinates_of
-from gearchaos.gear.contact_lines import series_table
+from gearchaos.models.gear_pair.contact_lines import series_table
 from gearchaos.paper.comparison import (
     RULES,
     WINDOW,

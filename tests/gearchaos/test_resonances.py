@@ -7,9 +7,9 @@ import pytest
 from numpy.lib.stride_tricks import sliding_window_view
 
 import gearchaos
-from gearchaos.configuration import load_config
 from gearchaos.engine.lanes import Lanes
 from gearchaos.engine.resonances import resonances
+from gearchaos.models import load_config
 
 from .commands import run_module, small_config
 from .short_sweeps import PAN2021

@@ -8,10 +8,11 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
-from gearchaos.configuration import Configuration, axis_values, groups_at, load_config
 from gearchaos.engine.lanes import Lanes
 from gearchaos.engine.simulation import Simulation
 from gearchaos.errors import ConfigurationError
+from gearchaos.models import Configuration, axis_values, load_config
+from gearchaos.models.gear_pair.tables import groups_at
 from gearchaos.records.label import GROWS, PERIODIC
 
 from .short_sweeps import computed, values_of

@@ -14,7 +14,7 @@ from gearchaos.dynamics.stability import (
     fewest_stable_steps,
     steps_per_time,
 )
-from gearchaos.gear.contact_lines import series_table
+from gearchaos.models.gear_pair.contact_lines import series_table
 
 from ..kernels.reference import (
     COSINE,

@@ -7,7 +7,6 @@ import pytest
 from gearchaos_kernels import Plan, integrate
 
 import gearchaos
-from gearchaos.configuration import Configuration
 from gearchaos.engine.simulation import Simulation
 from gearchaos.engine.step_choice import (
     AMPLIFIED,
@@ -18,6 +17,7 @@ from gearchaos.engine.step_choice import (
     Verdict,
     coarse_note,
 )
+from gearchaos.models import Configuration
 
 from .commands import run_module, small_config
 from .random_pairs import random_configuration

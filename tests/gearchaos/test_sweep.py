@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 
 import gearchaos
-from gearchaos.configuration import Configuration, load_config
 from gearchaos.dry_run import some_places
 from gearchaos.engine.simulation import Simulation
+from gearchaos.models import Configuration, load_config
 
 from .commands import (
     DIVERGING,

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 import gearchaos
-from gearchaos.configuration.tables import SWEEPABLE_GROUPS, SWEEPABLE_KEYS
+from gearchaos.models.gear_pair.group_table import SWEEPABLE_GROUPS
+from gearchaos.models.gear_pair.tables import SWEEPABLE_KEYS
 
 from .commands import SMALL
 

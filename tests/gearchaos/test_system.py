@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 import gearchaos
-from gearchaos.configuration import STATES
 from gearchaos.dynamics.stability_loss import StabilityLoss
+from gearchaos.models.gear_pair.scene import STATES
 
 from ..kernels.reference import SOLUTIONS
 from .short_sweeps import METHODS

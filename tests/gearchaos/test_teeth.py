@@ -5,12 +5,13 @@ import pytest
 from gearchaos_kernels import integrate
 
 import gearchaos
-from gearchaos.configuration import Configuration
-from gearchaos.dynamics.systems import plan_of, system_of
+from gearchaos.dynamics.plans import plan_of
 from gearchaos.engine.excitation import remarks, whole_lengths
 from gearchaos.engine.lanes import Lanes
 from gearchaos.engine.recomputing import computable
-from gearchaos.gear.contact_lines import TrapezoidalStiffness, contact_shares
+from gearchaos.models import Configuration
+from gearchaos.models.gear_pair.contact_lines import TrapezoidalStiffness, contact_shares
+from gearchaos.models.registry import system_of
 
 DEVIATIONS = np.round(12.0 * np.sin(2.0 * np.pi * np.arange(21) / 21), 2) + [0, 5, -4] * 7
 

@@ -7,12 +7,13 @@ import h5py
 import numpy as np
 import pytest
 
-from gearchaos.configuration import Configuration, groups_at, load_config
 from gearchaos.engine.lanes import Lanes
 from gearchaos.engine.provenance import SOFTWARE
 from gearchaos.errors import ConfigurationError
-from gearchaos.gear.tooth_deviations import drawn_gears, tooth_deviations
 from gearchaos.iso1328 import cumulative_pitch_um, single_pitch_um
+from gearchaos.models import Configuration, load_config
+from gearchaos.models.gear_pair.tables import groups_at
+from gearchaos.models.gear_pair.tooth_deviations import drawn_gears, tooth_deviations
 
 from .commands import SMALL, run_module
 from .fuzz_results import CHECKSUM_LINE, good_result

@@ -7,14 +7,17 @@ import subprocess
 import pint
 import pytest
 
-from gearchaos.configuration.models import configuration_keys
-from gearchaos.gear.derivation import SCALES
-from gearchaos.gear.groups import GROUP_TABLE
+from gearchaos.configuration.base import configuration_keys
+from gearchaos.models import GearPairConfiguration
+from gearchaos.models.gear_pair.derivation import SCALES
+from gearchaos.models.gear_pair.group_table import GROUP_TABLE
 from gearchaos.results.scales import unit_of
+
+KEYS = configuration_keys(GearPairConfiguration)
 
 PHYSICAL = ("delta_5", "delta_5_rate", "delta_5_acceleration", "mesh_force_tangential")
 PHYSICAL += ("lyapunov_exponent", "mesh_frequency", "period")
-UNITS = {one.units for one in (*configuration_keys().values(), *GROUP_TABLE)} - {""}
+UNITS = {one.units for one in (*KEYS.values(), *GROUP_TABLE)} - {""}
 UNITS |= {units for units, *_ in SCALES.values()} | {unit_of(name).units for name in PHYSICAL}
 REGISTRY = pint.UnitRegistry()
 

@@ -11,8 +11,8 @@ import h5py
 import numpy as np
 
 from gearchaos.arrays import Array
+from gearchaos.configuration.ranges import LARGEST_VALUE
 from gearchaos.errors import FileError
-from gearchaos.gear.groups import LARGEST_VALUE
 from gearchaos.results import variables as known
 from gearchaos.results.files import stored_dataset as stored
 from gearchaos.results.files.atomic_file import checksum_fits, reason

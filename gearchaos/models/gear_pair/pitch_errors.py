@@ -11,17 +11,18 @@ import numpy as np
 
 from gearchaos.arrays import Floats
 from gearchaos.configuration.messages import NUMBER, Fault, shown
-from gearchaos.configuration.physical_tables import (
+from gearchaos.configuration.tables import swept_values
+from gearchaos.configuration.toml_text import text_of_file
+from gearchaos.errors import GearchaosError
+from gearchaos.models.gear_pair.physical_tables import (
     GearDeviations,
     GradeError,
     SineError,
     TeethError,
 )
-from gearchaos.configuration.rules import reads
-from gearchaos.configuration.tables import SWEEPABLE_KEYS, Tables, swept_values
-from gearchaos.configuration.toml_text import text_of_file
-from gearchaos.errors import GearchaosError
-from gearchaos.gear.tooth_deviations import counted_deviations, tooth_deviations
+from gearchaos.models.gear_pair.rules import RULES
+from gearchaos.models.gear_pair.tables import SWEEPABLE_KEYS, GearPairTables
+from gearchaos.models.gear_pair.tooth_deviations import counted_deviations, tooth_deviations
 
 LISTS = {"cumulative": "cumulative_um", "single": "single_um"}
 """Keys of the lists of deviations by what a column holds."""
@@ -104,12 +105,12 @@ def _column(text: str, column: object) -> list[float]:
     return [float(cell) for _, cell in cells]
 
 
-def _kind(config: Tables) -> str:
+def _kind(config: GearPairTables) -> str:
     return "sine" if config.pitch_error is None else config.pitch_error.kind
 
 
-@reads("pitch_error", "pair")
-def _every_tooth_has_one_sound_deviation(config: Tables) -> Iterator[Fault]:
+@RULES.reads("pitch_error", "pair")
+def _every_tooth_has_one_sound_deviation(config: GearPairTables) -> Iterator[Fault]:
     error, pair = config.pitch_error, config.pair
     if pair is None and _kind(config) != "sine":
         rule = f'is missing, and pitch_error.kind = "{_kind(config)}" takes teeth and angles of it'
@@ -152,15 +153,15 @@ def _unsound(table: GearDeviations, teeth: int, module_mm: float) -> Iterator[tu
         yield rule, "give deviations, not places, in micrometres"
 
 
-@reads("pitch_error", "integration")
-def _flow_maps_know_the_sine(config: Tables) -> Iterator[Fault]:
+@RULES.reads("pitch_error", "integration")
+def _flow_maps_know_the_sine(config: GearPairTables) -> Iterator[Fault]:
     if _kind(config) != "sine" and config.integration.method == "flow_map":
         rule = 'cannot be computed with integration.method = "flow_map"'
         yield Fault("pitch_error.kind", rule, 'set integration.method = "rk4"', _kind(config))
 
 
-@reads("pitch_error", "groups")
-def _keys_belong_to_the_kind(config: Tables) -> Iterator[Fault]:
+@RULES.reads("pitch_error", "groups")
+def _keys_belong_to_the_kind(config: GearPairTables) -> Iterator[Fault]:
     kind, of_a_sine = _kind(config), ("pitch_error_amplitude", "pitch_error_phase_deg")
     own = SineError if config.pitch_error is None else type(config.pitch_error)
     named = {f"groups.{name}": name for name in config.groups.given()}
@@ -174,7 +175,7 @@ def _keys_belong_to_the_kind(config: Tables) -> Iterator[Fault]:
             yield Fault(key, rule, "choose another pitch_error.kind, or sweep pitch_error", name)
 
 
-def grade_faults(config: Tables, swept: Mapping[str, Floats]) -> Iterator[Fault]:
+def grade_faults(config: GearPairTables, swept: Mapping[str, Floats]) -> Iterator[Fault]:
     """Yield what is wrong with the grades of the lanes; ``swept`` has both ends of every sweep."""
     if not isinstance(config.pitch_error, GradeError):
         return

@@ -8,15 +8,17 @@ from typing import Annotated, Literal, TypeAlias
 
 from pydantic import BeforeValidator, Field
 
-from gearchaos.configuration.keys import (
-    Harmonics,
-    NotNegativePair,
-    Numbers,
-    PositivePair,
-    Table,
-    TeethPair,
-    key,
-)
+from gearchaos.configuration.keys import AS_LIST, Numbers, Table, key
+
+_Teeth: TypeAlias = Annotated[int, Field(ge=1, le=100_000)]
+_NotNegative: TypeAlias = Annotated[float, Field(ge=0)]
+_Positive: TypeAlias = Annotated[float, Field(gt=0)]
+Harmonics: TypeAlias = Annotated[
+    tuple[float, ...], Field(strict=False, min_length=1, max_length=1000)
+]
+PositivePair: TypeAlias = Annotated[tuple[_Positive, _Positive], AS_LIST]
+NotNegativePair: TypeAlias = Annotated[tuple[_NotNegative, _NotNegative], AS_LIST]
+TeethPair: TypeAlias = Annotated[tuple[_Teeth, _Teeth], AS_LIST]
 
 _SHAPE = '"fourier" takes the coefficients, "trapezoid" the contact ratio of [pair]'
 _KIND = '"sine": at mesh frequency, "teeth": as measured, "grade": drawn by an accuracy grade'

@@ -13,8 +13,8 @@ import numpy as np
 
 from gearchaos.arrays import Floats
 from gearchaos.errors import ConfigurationError
-from gearchaos.gear.contact_lines import TrapezoidalStiffness
-from gearchaos.gear.geometry import HelicalPair, Value
+from gearchaos.models.gear_pair.contact_lines import TrapezoidalStiffness
+from gearchaos.models.gear_pair.geometry import HelicalPair, Value
 
 _MICROMETRE = 1e-6
 _MILLIMETRE = 1e-3

@@ -1,9 +1,9 @@
-"""The whole configuration of a sweep, read and checked."""
+"""The whole configuration of a sweep, read and checked, whatever its model."""
 
 import os
-from collections.abc import Collection, Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from functools import cache
-from typing import Any, Self, TypeAlias
+from typing import Any, ClassVar, Self, TypeAlias
 
 from pydantic import PrivateAttr, TypeAdapter, ValidationError, ValidationInfo, model_validator
 
@@ -11,11 +11,8 @@ from gearchaos.arguments import path_text
 from gearchaos.arguments import texts as texts_of
 from gearchaos.configuration.keys import Key, keys_of
 from gearchaos.configuration.messages import Fault, faults_of, texts
-from gearchaos.configuration.physical_tables import GradeError
-from gearchaos.configuration.pitch_errors import with_deviation_files
-from gearchaos.configuration.rules import RULES
-from gearchaos.configuration.sweep_rules import lane_faults, unknown_parameter
-from gearchaos.configuration.tables import PHYSICAL_TABLES, SWEEPABLE_GROUPS, Tables
+from gearchaos.configuration.rules import GENERIC_RULES, Rule, unknown_parameter
+from gearchaos.configuration.tables import REALISATION, Tables
 from gearchaos.configuration.toml_text import (
     tables_from_toml,
     text_of_file,
@@ -24,19 +21,45 @@ from gearchaos.configuration.toml_text import (
     with_value,
 )
 from gearchaos.errors import ConfigurationError
-from gearchaos.gear.tooth_deviations import REALISATION
+
+DEFAULT_KIND = "gear_pair"
+"""Model of a configuration that names none."""
 
 
 class Configuration(Tables):
-    """A gear pair, the effects that exist, the sweeps, and what is kept of them.
+    """A machine, the effects that exist, the sweeps, and what is kept of them.
 
     A Configuration that exists is sound: every rule has been checked, also those between tables.
-    It cannot be changed; `replace` gives a changed copy.
+    It cannot be changed; `replace` gives a changed copy. Each model derives its own class, which
+    adds tables and rules; the class methods of this one choose among them.
+
+    Attributes
+    ----------
+    kind : str
+        Name of the model.
+    rules : sequence
+        Rules between tables, each with the tables that it needs free of faults of their own.
     """
+
+    kind: ClassVar[str] = ""
+    rules: ClassVar[Sequence[tuple[frozenset[str], Rule]]] = GENERIC_RULES
+    kinds: ClassVar[dict[str, type["Configuration"]]] = {}
 
     _source: str = PrivateAttr(default="<python>")
     _text: str | None = PrivateAttr(default=None)
     _folder: str | None = PrivateAttr(default=None)
+
+    @classmethod
+    def __pydantic_init_subclass__(cls, **_: Any) -> None:
+        Configuration.kinds[cls.kind] = cls
+
+    @classmethod
+    def with_files(
+        cls, tables: Mapping[str, Any], folder: str | None
+    ) -> tuple[Mapping[str, Any], list[Fault]]:
+        """Return tables with the contents of the files that they name, and the faults of files."""
+        del folder
+        return tables, []
 
     @property
     def source(self) -> str:
@@ -81,15 +104,18 @@ class Configuration(Tables):
         Files that they name are read from ``folder``; without one, their text must be among them,
         under ``files``. Raises ConfigurationError with one message per fault, all faults at once.
         """
-        tables, faults = with_deviation_files(tables, folder)
+        if cls is Configuration:
+            chosen: Any = cls.kinds[DEFAULT_KIND]
+            return chosen.from_tables(tables, source, folder)  # type: ignore[no-any-return]
+        tables, faults = cls.with_files(tables, folder)
         if faults:
             raise ConfigurationError(texts(faults, source))
         try:
             config = cls.model_validate(dict(tables), context={"source": source})
         except ValidationError as error:
-            own, more = faults_of(error, configuration_keys())
+            own, more = faults_of(error, configuration_keys(cls))
             unreadable = {str(one["loc"][0]) for one in error.errors(include_url=False)}
-            shared = _broken_rules(_readable(tables, unreadable), unreadable)
+            shared = _broken_rules(_readable(cls, tables, unreadable), unreadable)
             raise ConfigurationError(texts([*own, *shared], source, more)) from None
         config._source, config._folder = source, folder
         return config
@@ -113,19 +139,18 @@ class Configuration(Tables):
         [sweep] has the one value. ``realisation`` is the number of a drawn gear pair, then the only
         one. Raises ConfigurationError if a parameter cannot be swept, or if a rule is broken.
         """
-        drawn = isinstance(self.pitch_error, GradeError)
-        names = [name for name in values if not (drawn and name == REALISATION)]
-        unknown = [fault for name in names for fault in unknown_parameter("parameter", name)]
-        if unknown:
+        fixed = {REALISATION: self.keys_of_realisation(values.get(REALISATION, 0.0))}
+        for parameter in values:
+            if parameter in self.parameters:
+                fixed[parameter] = {self.parameters[parameter].path: float(values[parameter])}
+        names = [name for name in values if not fixed.get(name)]
+        if unknown := [
+            fault for name in names for fault in unknown_parameter(self, "parameter", name)
+        ]:
             raise ConfigurationError(texts(unknown, self.source))
         tables = self.tables()
-        for parameter, value in values.items():
-            if parameter == REALISATION:
-                number = int(value) if float(value).is_integer() else value
-                tables["pitch_error"] |= {"first_realisation": number, "realisations": 1}
-                continue
-            path = f"groups.{parameter}" if parameter in SWEEPABLE_GROUPS else parameter
-            tables = with_value(tables, path.split("."), float(value))
+        for path, value in (key for name in values for key in fixed[name].items()):
+            tables = with_value(tables, path.split("."), value)
         left = [one for one in map(tables.pop, self.sweeps) if one["parameter"] not in values]
         if not left:
             swept = self.sweep.parameter
@@ -178,29 +203,31 @@ def configuration_of(given: Given) -> Configuration:
 
 
 @cache
-def configuration_keys() -> dict[str, Key]:
-    """Every key of a configuration by its dotted path."""
-    every = [(one.path, one) for one in keys_of(Tables)]
+def configuration_keys(kind: type[Tables]) -> dict[str, Key]:
+    """Return every key of a class of configurations by its dotted path."""
+    every = [(one.path, one) for one in keys_of(kind)]
     # Of a key that several kinds of a table have, the first counts: that of the default.
     return dict(every) | dict(reversed(every))
 
 
-def _broken_rules(config: Tables, unreadable: Collection[str]) -> Iterator[Fault]:
+def _broken_rules(config: Configuration, unreadable: Collection[str]) -> Iterator[Fault]:
     suspect = set(unreadable)
-    for tables, broken in RULES:
+    for tables, broken in config.rules:
         if tables.isdisjoint(unreadable):
             for fault in broken(config):
                 suspect.add(fault.key.partition(".")[0])
                 yield fault
-    if suspect.isdisjoint({"sweep", "second_sweep", "scene", "groups", *PHYSICAL_TABLES}):
-        yield from lane_faults(config)
+    if suspect.isdisjoint(config.tables_of_lanes):
+        yield from config.lane_faults()
 
 
-def _readable(tables: Mapping[str, Any], unreadable: Collection[str]) -> Tables:
+def _readable(
+    kind: type[Configuration], tables: Mapping[str, Any], unreadable: Collection[str]
+) -> Configuration:
     """Return the tables without a fault of their own."""
     readable = {}
-    for name, field in Tables.model_fields.items():
+    for name, field in kind.model_fields.items():
         if name in tables and name not in unreadable:
             annotation: Any = field.annotation
             readable[name] = TypeAdapter(annotation).validate_python(tables[name])
-    return Tables.model_construct(**readable)
+    return kind.model_construct(**readable)

@@ -1,86 +1,27 @@
-"""Rules of the sweeps: parameter, values, and that groups of the lanes are known and moved."""
+"""Rules of the lanes of gear pairs: that their groups are known, in range, and moved by a sweep."""
 
-import math
 from collections.abc import Iterator
 
 import numpy as np
 
 from gearchaos.arrays import Floats
-from gearchaos.configuration.messages import Fault, suggestion
-from gearchaos.configuration.pitch_errors import OF_DRAWN_GEARS, grade_faults
-from gearchaos.configuration.rules import reads
-from gearchaos.configuration.run_tables import MOST_LANES, Sweep
-from gearchaos.configuration.tables import (
-    PHYSICAL_KEYS,
-    SWEEPABLE_GROUPS,
-    SWEEPABLE_KEYS,
-    Tables,
-    groups_at,
-    swept_values,
-)
+from gearchaos.configuration.messages import Fault
+from gearchaos.configuration.run_tables import Sweep
+from gearchaos.configuration.tables import swept_values
 from gearchaos.errors import ConfigurationError
-from gearchaos.gear.derivation import asked_for, derive_groups
-from gearchaos.gear.groups import GROUPS_BY_NAME, HARMONICS, LARGEST_VALUE, GroupRow, Groups
+from gearchaos.models.gear_pair.derivation import asked_for, derive_groups
+from gearchaos.models.gear_pair.group_table import (
+    GROUPS_BY_NAME,
+    HARMONICS,
+    SWEEPABLE_GROUPS,
+    GroupRow,
+)
+from gearchaos.models.gear_pair.groups import Groups
+from gearchaos.models.gear_pair.pitch_errors import OF_DRAWN_GEARS, grade_faults
+from gearchaos.models.gear_pair.tables import PHYSICAL_KEYS, GearPairTables, groups_at
 
 
-def unknown_parameter(key: str, parameter: str) -> Iterator[Fault]:
-    """Yield the fault of a parameter, given under some key, that cannot be swept."""
-    if parameter in SWEEPABLE_GROUPS or parameter in SWEEPABLE_KEYS:
-        return
-    rule = "is not a parameter that can be swept"
-    remedy = suggestion(parameter, [*SWEEPABLE_GROUPS, *SWEEPABLE_KEYS]) or (
-        f"groups: {', '.join(SWEEPABLE_GROUPS)}; physical keys: {', '.join(SWEEPABLE_KEYS)}"
-    )
-    if parameter.startswith("bearings."):
-        remedy = "sweep the group of one gear, such as axial_damping_p"
-    yield Fault(key, rule, remedy, parameter)
-
-
-@reads()
-def _parameter_is_known(config: Tables) -> Iterator[Fault]:
-    for table, sweep in config.sweeps.items():
-        yield from unknown_parameter(f"{table}.parameter", sweep.parameter)
-
-
-@reads()
-def _parameters_differ(config: Tables) -> Iterator[Fault]:
-    parameters = [sweep.parameter for sweep in config.sweeps.values()]
-    if len(set(parameters)) < len(parameters):
-        remedy = "sweep another parameter, or drop [second_sweep]"
-        rule = "is what [sweep] sweeps already"
-        yield Fault("second_sweep.parameter", rule, remedy, parameters[0])
-
-
-@reads()
-def _values_are_in_range(config: Tables) -> Iterator[Fault]:
-    for table, sweep in config.sweeps.items():
-        known = SWEEPABLE_GROUPS.get(sweep.parameter) or SWEEPABLE_KEYS.get(sweep.parameter)
-        named = [("from", sweep.from_), ("to", None if sweep.count == 1 else sweep.to)]
-        if sweep.values is not None:
-            named = [("values", min(sweep.values)), ("values", max(sweep.values))]
-        for name, value in named:
-            if known is None or value is None:
-                continue
-            if not known.valid.admits(value) or abs(value) > LARGEST_VALUE:
-                within = f"{known.valid.rule}, and at most {LARGEST_VALUE:g} in size"
-                rule = f"{sweep.parameter} must be {within}"
-                yield Fault(f"{table}.{name}", rule, "sweep inside that range", value)
-
-
-@reads("start", "pitch_error")
-def _lanes_are_not_too_many(config: Tables) -> Iterator[Fault]:
-    counts = {f"values of [{table}]": sweep.size for table, sweep in config.sweeps.items()}
-    counts["drawn gear pairs"] = getattr(config.pitch_error, "realisations", 1)
-    counts["starts"] = config.start.size
-    counts["directions"] = 2 if config.start.carry == "both" else 1
-    lanes = math.prod(counts.values())
-    if lanes > MOST_LANES:
-        product = " x ".join(f"{count} {name}" for name, count in counts.items() if count > 1)
-        rule = f"{product} make {lanes} lanes, must be at most {MOST_LANES}"
-        yield Fault(list(config.sweeps)[-1], rule, "lower a count, or split it into several runs")
-
-
-def lane_faults(config: Tables) -> Iterator[Fault]:
+def lane_faults(config: GearPairTables) -> Iterator[Fault]:
     """Yield what is wrong with the groups of the lanes, where every table by itself is sound."""
     sweeps = config.sweeps
     # The groups are smooth in every parameter: both ends of a sweep and a value between them
@@ -115,7 +56,7 @@ def _some_values(sweep: Sweep) -> Floats:
     return np.unique(some) if values.size > 1 else some[:2]
 
 
-def _moved(config: Tables, groups: Groups, axis: int, count: int) -> bool:
+def _moved(config: GearPairTables, groups: Groups, axis: int, count: int) -> bool:
     """Whether a sweep, along this axis, changes a group on which what is kept depends."""
     for name, value in groups.values.items():
         row = GROUPS_BY_NAME[name]
@@ -126,7 +67,7 @@ def _moved(config: Tables, groups: Groups, axis: int, count: int) -> bool:
     return False
 
 
-def _without_effect(config: Tables, table: str, values: Floats) -> Fault:
+def _without_effect(config: GearPairTables, table: str, values: Floats) -> Fault:
     parameter, swept = config.sweeps[table].parameter, config.swept
     derived = derive_groups({**config.physical(), parameter: values}, without=HARMONICS)
     names = [name for name, value in derived.items() if np.ndim(value) > 0]
@@ -149,7 +90,7 @@ def _without_effect(config: Tables, table: str, values: Floats) -> Fault:
     return Fault(f"{table}.parameter", rule, remedy, parameter)
 
 
-def _missing(config: Tables, row: GroupRow) -> Fault:
+def _missing(config: GearPairTables, row: GroupRow) -> Fault:
     effects = [f'"{name}"' for name in config.scene.effects if name in row.effects]
     because = f" for {' and '.join(effects)}" if effects else ""
     lacking = [path for path in asked_for(row.name, config.physical()) if _is_unknown(config, path)]
@@ -159,14 +100,14 @@ def _missing(config: Tables, row: GroupRow) -> Fault:
     return Fault(f"groups.{row.name}", rule, f"give {row.name} in [groups]{otherwise}")
 
 
-def _is_unknown(config: Tables, path: str) -> bool:
+def _is_unknown(config: GearPairTables, path: str) -> bool:
     """Whether a physical key is neither given nor swept, and has no default either."""
     field, value = PHYSICAL_KEYS[path].field, config.physical()[path]
     has_default = not field.is_required() and field.default is not None
     return value is None and path not in config.swept and not has_default
 
 
-def _out_of_range(config: Tables, groups: Groups) -> Iterator[Fault]:
+def _out_of_range(config: GearPairTables, groups: Groups) -> Iterator[Fault]:
     for name, value in groups.values.items():
         row = GROUPS_BY_NAME[name]
         if groups.origin[name] == "derived" and not row.valid.admits(value):
@@ -177,7 +118,7 @@ def _out_of_range(config: Tables, groups: Groups) -> Iterator[Fault]:
             yield Fault(f"groups.{name}", rule, remedy, float(worst))
 
 
-def _decoupled(config: Tables, groups: Groups) -> Iterator[Fault]:
+def _decoupled(config: GearPairTables, groups: Groups) -> Iterator[Fault]:
     effects, angle = config.scene.effects, groups.base_helix_angle_deg
     if "axial" in effects and angle is not None and np.all(np.equal(angle, 0.0)):
         rule = '"axial" needs a helix angle: in a spur pair nothing drives the axial motion'

@@ -1,0 +1,13 @@
+"""The models of machines: what each configures, derives and computes."""
+
+from gearchaos.configuration import (
+    Configuration,
+    Given,
+    axis_values,
+    configuration_of,
+    load_config,
+    swept_values,
+)
+
+# It makes gear pairs known to `Configuration`.
+from gearchaos.models.gear_pair.configuration import GearPairConfiguration

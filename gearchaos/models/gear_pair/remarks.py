@@ -1,0 +1,106 @@
+"""What a user should know of a gear pair before its sweep runs."""
+
+import math
+from collections.abc import Iterator, Mapping
+
+import numpy as np
+from gearchaos_kernels import GearPairs, Teeth
+
+from gearchaos.arrays import Floats
+from gearchaos.models.gear_pair.derivation import LENGTH
+from gearchaos.models.gear_pair.tables import GearPairTables
+
+
+def remarks(
+    config: GearPairTables, system: GearPairs, parameters: Mapping[str, Floats]
+) -> Iterator[str]:
+    """Yield the remarks; an empty text is none.
+
+    ``system``: lanes spread over the sweep; ``parameters``: values of the groups and scales by
+    name, as a result keeps them.
+    """
+    if system.repeats_after > 1:
+        yield _parting_pairs(system)
+        yield _printed_gaps(config)
+    yield _negative_stiffness(system)
+    yield _mistaken_units(config, system.repeats_after > 1, parameters)
+
+
+def _printed_gaps(config: GearPairTables) -> str:
+    """Return what the equations as printed make of errors that differ from tooth to tooth."""
+    if config.formulation != "published":
+        return ""
+    return (
+        'formulation = "published" enters the mean of the errors of teeth into the equations as '
+        "they are printed: in the gaps it counts cos(beta_b) times, and the mesh damping acts on "
+        'its rate, so that forces grow as pitch_error.smoothing is made smaller; "physical" is '
+        "free of both"
+    )
+
+
+def _parting_pairs(system: GearPairs) -> str:
+    """Return where tooth pairs in mesh together differ by more than the load bends them."""
+    if system.teeth is None:
+        return ""
+    groups, cosine = system.groups, np.cos(system.groups.base_helix_angle)
+    # Along the transverse line of action, in which gaps of the published form have cos(beta_b) e.
+    projection = 1.0 if system.physical else cosine
+    spread = _largest_spread(system.teeth)[system.teeth.profile]
+    apart = np.abs(groups.error_amplitude) * projection * spread
+    parting = np.mean(apart > np.abs(groups.load) / cosine)
+    if parting == 0.0:
+        return ""
+    return (
+        f"in {parting:.0%} of the lanes tooth pairs that share the load differ by up to "
+        f"{apart.max():.2g} b', more than the static deflection there; single pairs may then part "
+        "while the others carry, which the model leaves out"
+    )
+
+
+def _largest_spread(teeth: Teeth) -> Floats:
+    """Return by how much errors of pairs in mesh together differ at most, shape (profiles,)."""
+    gears = teeth.driving, teeth.driven
+    pairs = np.arange(math.lcm(*(gear.shape[1] for gear in gears)))
+    driving, driven = (gear[:, pairs % gear.shape[1]] for gear in gears)
+    errors = driven - driving
+    later = range(1, teeth.most_at_once)
+    apart = [np.abs(errors - np.roll(errors, -n, axis=1)).max(axis=1) for n in later]
+    spread: Floats = np.max([np.zeros(len(errors)), *apart], axis=0)
+    return spread
+
+
+def _mistaken_units(config: GearPairTables, teeth: bool, parameters: Mapping[str, Floats]) -> str:
+    """Return which lengths do not suit the module, as those in another unit do not."""
+    pair, found = config.pair, []
+    if pair is None or not pair.normal_module_mm:
+        return ""
+    error = () if teeth else ("pitch_error", "pitch_error_amplitude", LENGTH)
+    bending = ("load", LENGTH, "base_helix_angle_deg")
+    for what, names in {"static deflection": bending, "pitch error": error}.items():
+        if names and {*names} <= {*parameters}:
+            um = math.prod(_largest_factor(name, parameters[name]) for name in names)
+            found += [f"{what} {um:.4g} um"] if um > 100.0 * pair.normal_module_mm else []
+    if (pair.face_width_mm or math.inf) < pair.normal_module_mm:
+        found.append(f"face width {pair.face_width_mm:g} mm")
+    rule = f"unlikely at a normal module of {pair.normal_module_mm:g} mm; are the units those of"
+    return f"{', '.join(found)}: {rule} the keys?" if found else ""
+
+
+def _largest_factor(name: str, value: Floats) -> float:
+    """Return the largest size of a group; a static deflection has 1 / cos(beta_b) as a factor."""
+    values = np.asarray(value)
+    if name == "base_helix_angle_deg":
+        values = 1.0 / np.cos(np.radians(values))
+    return float(np.abs(values).max())
+
+
+def _negative_stiffness(system: GearPairs) -> str:
+    """Return where the variation of the mesh stiffness exceeds its mean."""
+    # The first lane and the last one are those of the ends of its scale, if that is swept.
+    lowest = np.min(system.branch_stiffnesses())
+    if lowest >= 0.0:
+        return ""
+    return (
+        f"the mesh stiffness falls to {lowest:.2g} of its mean within a mesh period, below "
+        "zero; groups.stiffness_variation_scale is too large for these harmonics"
+    )

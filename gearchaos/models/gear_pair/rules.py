@@ -1,0 +1,90 @@
+"""Rules that tie several keys of a gear pair together, but for those of its lanes."""
+
+from collections.abc import Iterator
+from functools import partial
+
+from gearchaos.configuration.messages import Fault
+from gearchaos.configuration.rules import Rules
+from gearchaos.models.gear_pair.derivation import BACKLASHES
+from gearchaos.models.gear_pair.tables import GearPairTables
+
+ANGLES = {"pair.normal_pressure_angle_deg", "pair.helix_angle_deg"}
+"""Paths of the angles by which a backlash is converted from one plane to another."""
+
+RULES = Rules()
+
+
+@RULES.reads("mesh")
+def _one_damping(config: GearPairTables) -> Iterator[Fault]:
+    ratio, damping = "mesh.damping_ratio", "mesh.damping_N_s_per_m"
+    swept, given = config.swept, config.physical()
+    if all(path in swept or given[path] is not None for path in (ratio, damping)):
+        rule = f"{ratio} is swept" if ratio in swept else f"{ratio} = {given[ratio]} is given"
+        yield Fault(damping, f"{rule} as well", "keep one of the two", given[damping])
+
+
+@RULES.reads("mesh")
+def _length_scale_is_known(config: GearPairTables) -> Iterator[Fault]:
+    scale, swept, given = "mesh.length_scale_um", config.swept, config.physical()
+    if given[scale] is not None or scale in swept:
+        return
+    rule = "is also the length scale, so that sweeping it would change the unit of every length"
+    for backlash in BACKLASHES:
+        if given[backlash] == 0:
+            yield Fault(backlash, "cannot be the length scale when it is 0", f"give {scale}", 0.0)
+        if config.mesh and backlash in swept:
+            yield Fault(swept[backlash], rule, f"give {scale}", backlash)
+    rule = "changes the half backlash, which is also the length scale, the unit of every length"
+    for path in ANGLES & swept.keys():
+        if any(given[backlash] is not None for backlash in BACKLASHES[1:]):
+            yield Fault(swept[path], rule, f"give {scale}", path)
+
+
+@RULES.reads("mesh")
+def _one_backlash(config: GearPairTables) -> Iterator[Fault]:
+    swept, given = config.swept, config.physical()
+    first, *others = [path for path in BACKLASHES if path in swept or given[path] is not None] or [
+        ""
+    ]
+    for path in others:
+        rule = f"{first} is swept" if first in swept else f"{first} = {given[first]} is given"
+        yield Fault(path, f"{rule} as well", "keep one of them", given[path])
+
+
+@RULES.reads("mesh", "pair")
+def _backlash_can_be_converted(config: GearPairTables) -> Iterator[Fault]:
+    for path in BACKLASHES[1:]:
+        if config.pair is None and (path in config.swept or config.physical()[path] is not None):
+            rule = "is converted by the angles of [pair], which is missing"
+            yield Fault(path, rule, f"give [pair], or {BACKLASHES[0]}", config.physical()[path])
+
+
+@RULES.reads("mesh", "pair")
+def _contact_ratio_is_known(config: GearPairTables) -> Iterator[Fault]:
+    if config.pair is None and config.physical()["mesh.stiffness.shape"] == "trapezoid":
+        rule = "a trapezoid takes its shape from the contact ratio of [pair]"
+        yield Fault("mesh.stiffness", rule, 'give [pair], or shape = "fourier"')
+
+
+def _states_exist(table: str, key: str, config: GearPairTables) -> Iterator[Fault]:
+    names, states = getattr(getattr(config, table), key), config.scene.states
+    for name in dict.fromkeys(names):
+        if name not in states:
+            effect = "transverse" if name.startswith(("delta_1", "delta_2")) else "axial"
+            remedy = f'add "{effect}" to scene.effects, which now give {", ".join(states)}'
+            rule = f"the scene has no state `{name}`"
+            yield Fault(f"{table}.{key}", rule, remedy, tuple(names))
+
+
+for _table, _keys in (("outputs", ("section", "states")), ("start", ("state", "box", "drawn"))):
+    for _key in _keys:
+        RULES.reads("scene", _table)(partial(_states_exist, _table, _key))
+
+
+@RULES.reads("outputs", "scene", "integration")
+def _contact_is_told_by_crossings(config: GearPairTables) -> Iterator[Fault]:
+    crosses = "backlash" in config.scene.effects and config.integration.crossings == "resolved"
+    if config.outputs.contact and not crosses:
+        rule = "is told by the crossings of clearance boundaries, and there are none"
+        remedy = 'add "backlash" to scene.effects and set integration.crossings = "resolved"'
+        yield Fault("outputs.contact", rule, remedy, True)
