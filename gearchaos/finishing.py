@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from gearchaos.command_line import OK, TOO_MANY_DIVERGED
+from gearchaos.configuration.methods import METHODS
 from gearchaos.errors import FileError
 from gearchaos.progress import complain, say
 
@@ -43,7 +44,7 @@ def ending(simulation: "Simulation", output: str, diverged: int, *said: str) -> 
         return OK
     complain(
         f"{diverged} of {len(simulation.lanes)} lanes diverged"
-        f"{' or were too fast' if simulation.plan.method == 'flow_map' else ''}, more than "
+        f"{' or were too fast' if METHODS[simulation.plan.method].shares_maps else ''}, more than "
         f"outputs.allowed_diverged_share = {allowed:g} allows; the file marks them: "
         "raise integration.steps_per_period, or check the load and the start state"
     )

@@ -28,6 +28,7 @@ def _respond(options: Namespace) -> int:
     # HDF5 would take the beginning out of a pipe.
     of_result = os.path.isfile(options.config) and is_hdf5(options.config)
     config, text, note, fixed = (_lane if of_result else _configuration)(options)
+    from gearchaos.configuration.methods import METHODS
     from gearchaos.engine.response import compute_response, prepared
     from gearchaos.engine.running import choose_threads, prepare
     from gearchaos.results.files.atomic_file import check_output
@@ -43,10 +44,11 @@ def _respond(options: Namespace) -> int:
     result = compute_response(simulation, periods, text, fixed)
     result.save(output, overwrite=options.overwrite)
     diverged, lanes = int((result["status"] != 0).sum()), len(simulation.lanes)
+    fast = " or too fast" if METHODS[simulation.plan.method].shares_maps else ""
     text = (
         f"{lanes} lane{'s' if lanes != 1 else ''} over {' by '.join(result.axes)}, "
         f"{periods} mesh periods of {simulation.plan.steps_per_period} steps, "
-        f"{diverged} diverged{' or too fast' if config.integration.method == 'flow_map' else ''}"
+        f"{diverged} diverged{fast}"
     )
     return ending(simulation, output, diverged, text)
 

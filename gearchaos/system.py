@@ -253,8 +253,7 @@ class System:
 
         Of flow maps that is one.
         """
-        rk4 = self.config.integration.method == "rk4"
-        return int(fewest_stable_steps(self._record)[0]) if rk4 else 1
+        return int(fewest_stable_steps(self._record, self.config.integration.method)[0])
 
     def mesh_motion(self, motion: Trajectory) -> kernels.MeshMotion:
         """Return mesh forces, contact and accelerations along a motion from `integrate` (eq. 13).

@@ -5,6 +5,7 @@ from collections.abc import Callable, Iterator
 from typing import Any, TypeAlias
 
 from gearchaos.configuration.messages import Fault
+from gearchaos.configuration.methods import METHODS
 from gearchaos.configuration.ranges import LARGEST_VALUE
 from gearchaos.configuration.run_tables import MOST_LANES, Start
 from gearchaos.configuration.tables import Tables
@@ -81,8 +82,9 @@ def _exponents_are_not_carried(config: Tables) -> Iterator[Fault]:
 
 @GENERIC_RULES.reads("integration")
 def _plain_steps_are_those_of_rk4(config: Tables) -> Iterator[Fault]:
-    if config.integration.method == "flow_map" and config.integration.crossings == "plain":
-        rule = 'has no meaning with integration.method = "flow_map", which resolves every crossing'
+    method = config.integration.method
+    if METHODS[method].always_resolved and config.integration.crossings == "plain":
+        rule = f'has no meaning with integration.method = "{method}", which resolves every crossing'
         yield Fault("integration.crossings", rule, 'it goes with method = "rk4"', "plain")
 
 

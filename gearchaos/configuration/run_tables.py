@@ -2,18 +2,17 @@
 
 import math
 from fractions import Fraction
-from typing import Annotated, Any, Generic, Literal, Self, TypeAlias, TypeVar
+from typing import TYPE_CHECKING, Annotated, Any, Generic, Literal, Self, TypeAlias, TypeVar
 
 from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 
 from gearchaos.configuration.keys import AS_LIST, Numbers, Table, key
+from gearchaos.configuration.methods import EXACT, METHODS
 
 MOST_LANES = 100_000_000  # Lanes of one run: what a file and a machine can still hold.
 MOST_STEPS_PER_PERIOD = 1_000_000
 DEFAULT_STEPS = 200
 """Fewest Runge-Kutta steps per period that are chosen for a scene where none are given."""
-FLOW_MAP_STEPS = 24
-"""Steps per period of flow maps: fewer cost more at a crossing, more cost more between them."""
 _MOST_VALUES = 10_000_000
 _MOST_STARTS = 1_000_000
 
@@ -105,15 +104,19 @@ class Sweep(Table):
         return (self.count or 0) if self.values is None else len(self.values)
 
 
+if TYPE_CHECKING:
+    MethodName: TypeAlias = str
+else:
+    MethodName = Literal[tuple(METHODS)]
+
+
 class Integration(Table):
     """The method, on a fixed grid over the mesh period."""
 
-    method: Literal["rk4", "flow_map"] = key(default="rk4")
-    """classical Runge-Kutta of order 4, or maps of whole steps that are exact between crossings and
-    at them"""
+    method: MethodName = key(", or ".join(one.words for one in METHODS.values()), default="rk4")
     steps_per_period: int | None = key(
         f"steps per mesh period; left out, {DEFAULT_STEPS} or as many times 2 as the scene needs "
-        f'are chosen, and {FLOW_MAP_STEPS} with method = "flow_map"',
+        f'are chosen, and {EXACT.steps} with method = "{EXACT.name}"',
         example=400,
         default=None,
         ge=1,
@@ -140,8 +143,9 @@ class Integration(Table):
     @model_validator(mode="before")
     @classmethod
     def _steps_of_the_method(cls, given: Any) -> Any:
-        if isinstance(given, dict) and given.get("method") == "flow_map":
-            return {"steps_per_period": FLOW_MAP_STEPS, **given}
+        method = METHODS.get(str(given.get("method"))) if isinstance(given, dict) else None
+        if method is not None and method.steps is not None:
+            return {"steps_per_period": method.steps, **given}
         return given
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from gearchaos_kernels import LaneSystem, Plan
 
 from gearchaos.arrays import Counts, Floats
-from gearchaos.configuration.run_tables import FLOW_MAP_STEPS
+from gearchaos.configuration.methods import EXACT, FLOW_MAP_STEPS, METHODS
 from gearchaos.dynamics.modes import hidden_decay
 from gearchaos.dynamics.orbits import polish
 
@@ -42,16 +42,16 @@ def hidden_error(
         Error per unit of tau; 0 where half the step shows it, and in lanes that are not periodic.
     """
     error = np.zeros(period.size)
-    if plan.method == "flow_map":
+    if METHODS[plan.method].exact:
         return error
-    decay = hidden_decay(system, plan.steps_per_period)
+    decay = hidden_decay(system, plan.steps_per_period, plan.method)
     lanes = np.flatnonzero((period > 0) & np.isfinite(decay) & np.isfinite(exponent))
     if not lanes.size:
         return error
     error[lanes] = np.maximum(decay[lanes] - exponent[lanes], 0.0)
     if system.refuses_maps():
         return error
-    exact = plan._replace(method="flow_map", steps_per_period=FLOW_MAP_STEPS)
+    exact = plan._replace(method=EXACT.name, steps_per_period=FLOW_MAP_STEPS)
     orbits = polish(system.of(lanes), state[lanes], period[lanes], exact)
     known = orbits.stable & (np.abs(orbits.multipliers[:, 0]) > 0.0)
     lanes, size = lanes[known], np.abs(orbits.multipliers[known, 0])

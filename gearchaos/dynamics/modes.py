@@ -7,10 +7,10 @@ out of contact, the decay of a fast mode is nearly the same on all branches.
 """
 
 import numpy as np
-from gearchaos_kernels import LaneSystem, jacobian
+from gearchaos_kernels import METHODS, LaneSystem, jacobian
 
 from gearchaos.arrays import Complex, Floats, Mask
-from gearchaos.dynamics.stability import ROUNDING, amplification, in_contact
+from gearchaos.dynamics.stability import ROUNDING, in_contact
 
 MOST_SHIFT = 0.05
 """Largest change of a decay by half the step, relative to it, that a comparison bears."""
@@ -32,7 +32,7 @@ def memory(system: LaneSystem) -> Floats:
     return periods
 
 
-def hidden_decay(system: LaneSystem, steps: int) -> Floats:
+def hidden_decay(system: LaneSystem, steps: int, method: str) -> Floats:
     """Return the slowest decay rate among the modes that neither a step nor half of it computes.
 
     Comparing two grids does not show what both damp away. A mode belongs to them if half the step
@@ -43,7 +43,7 @@ def hidden_decay(system: LaneSystem, steps: int) -> Floats:
     half = system.mesh_period[:, np.newaxis, np.newaxis] / (2 * steps)
     modes = _of_branches(system)
     with np.errstate(divide="ignore"):
-        computed = np.log(amplification(half * modes)) / half
+        computed = np.log(METHODS[method].amplification(half * modes)) / half
     # The second term: an undamped mode is computed up to the rounding of its growth in a step.
     borne = MOST_SHIFT * np.abs(modes.real) + ROUNDING / half
     hidden: Mask = np.abs(computed - modes.real) > borne

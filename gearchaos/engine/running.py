@@ -13,6 +13,7 @@ import numpy as np
 from gearchaos_kernels.compilation import on_compilation
 
 from gearchaos.arguments import whole_number
+from gearchaos.configuration.methods import METHODS
 from gearchaos.engine.error_check import Tally
 from gearchaos.engine.executors import LocalExecutor, compute_blocks
 from gearchaos.engine.provenance import provenance
@@ -89,7 +90,7 @@ def prepare(simulation: Simulation, *, compile_now: bool = True, history_periods
         plan, wanted = simulation.plan, simulation.block_memory(numba.get_num_threads())
         what = f"integration.recorded_periods = {plan.recorded_periods}, outputs.section_points = "
         what += f"{plan.section_points}: a block of lanes"
-        fewer = ", take fewer steps" if plan.method == "flow_map" else ""
+        fewer = ", take fewer steps" if METHODS[plan.method].shares_maps else ""
         remedy = f"record fewer periods, keep fewer points{fewer}"
         require_memory(simulation, wanted, what, remedy)
         with compiling():

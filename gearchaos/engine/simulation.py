@@ -8,6 +8,7 @@ import gearchaos_kernels as kernels
 import numpy as np
 
 from gearchaos.arrays import Array, Floats, Integers
+from gearchaos.configuration.methods import METHODS
 from gearchaos.dynamics.exponents import exponents, sum_of_exponents
 from gearchaos.dynamics.labelling import LOOK_BYTES, LOOKS, Told, labels_of
 from gearchaos.dynamics.largest_exponents import MEANINGS as RECORD_MEANINGS
@@ -90,7 +91,7 @@ class Simulation:
         """
         tolerance = self.config.integration.tolerance
         if tolerance is None:
-            if self.plan.method == "rk4":
+            if not METHODS[self.plan.method].exact:
                 self.plan, note = judged_steps(self.lanes, self.plan)
                 self.notes += [note] if note else []
             return
@@ -108,8 +109,8 @@ class Simulation:
             coarsest,
             tolerance,
             self.config.source,
-            # Finer flow maps are no more exact.
-            4 * coarsest if self.plan.method == "flow_map" else MOST_STEPS,
+            # Finer steps of an exact method are no more exact.
+            4 * coarsest if METHODS[self.plan.method].exact else MOST_STEPS,
             left,
         )
         self.plan = self.plan._replace(steps_per_period=candidates[-1].steps)
@@ -214,7 +215,7 @@ class Simulation:
         if self.config.outputs.exponents:
             numbers += self.plan.recorded_periods * states
         maps = 0
-        if self.plan.method == "flow_map":
+        if METHODS[self.plan.method].shares_maps:
             for block in np.arange(lanes), np.arange(len(self.lanes) - lanes, len(self.lanes)):
                 system = self.lanes.system_of(block)
                 maps = max(

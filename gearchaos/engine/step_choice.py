@@ -11,6 +11,7 @@ import numpy as np
 from gearchaos_kernels import Plan, Status, integrate
 
 from gearchaos.arrays import Floats, Integers, Mask
+from gearchaos.configuration.methods import EXACT
 from gearchaos.dynamics.stability import fewest_stable_steps
 from gearchaos.engine.lanes import Lanes
 from gearchaos.engine.steps import coarse_steps
@@ -152,7 +153,7 @@ def choice_note(verdict: Verdict, limit: int) -> str:
     lanes = verdict.error.size
     chosen = "chosen for this scene"
     if not verdict.within(WANTED):
-        chosen = 'the most that are chosen; integration.method = "flow_map" is more exact'
+        chosen = f'the most that are chosen; integration.method = "{EXACT.name}" is more exact'
     return (
         f"integration.steps_per_period = {verdict.steps}, {chosen}: RK4 is stable "
         f"from {limit} on, and after {PERIODS} mesh periods {_off(verdict)} in {_tried(lanes)}"
@@ -173,9 +174,8 @@ def coarse_note(verdict: Verdict, better: Verdict) -> str:
     if not verdict.within(WRONG):
         remedy = f"leave it out, or set it to {better.steps}"
         if not better.within(WANTED):
-            remedy = (
-                f'no number up to {MOST_CHOSEN} is fine enough; set integration.method = "flow_map"'
-            )
+            remedy = f"no number up to {MOST_CHOSEN} is fine enough"
+            remedy += f'; set integration.method = "{EXACT.name}"'
         text = f"integration.steps_per_period = {verdict.steps} is too coarse: {text}; {remedy}"
     return text + _sensitive_ones(verdict)
 

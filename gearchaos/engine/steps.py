@@ -9,7 +9,8 @@ from gearchaos_kernels import LaneSystem, Outcome, Plan, Status, integrate, maps
 
 from gearchaos.arrays import Integers, Mask
 from gearchaos.configuration.messages import Fault
-from gearchaos.configuration.run_tables import DEFAULT_STEPS, FLOW_MAP_STEPS, MOST_STEPS_PER_PERIOD
+from gearchaos.configuration.methods import METHODS
+from gearchaos.configuration.run_tables import DEFAULT_STEPS, MOST_STEPS_PER_PERIOD
 from gearchaos.configuration.tables import REALISATION
 from gearchaos.dynamics import stability
 from gearchaos.dynamics.hidden_modes import hidden_error
@@ -79,7 +80,7 @@ def stable_steps(lanes: Lanes, given: int | None) -> tuple[int, str]:
     if limit <= steps:
         return steps, ""
     integration, beyond = lanes.config.integration, limit > MOST_STEPS_PER_PERIOD
-    if integration.method == "flow_map" and not beyond:
+    if METHODS[integration.method].exact and not beyond:
         return steps, (
             f"integration.steps_per_period = {steps}: RK4 would need {limit} steps to be "
             "stable; flow maps have no such limit"
@@ -105,11 +106,12 @@ def coarse_steps(lanes: Lanes, steps: int) -> str:
     A standard error does not show it: it speaks of the length of the record.
     """
     system = lanes.system_of(lanes.spread(PILOT_LANES))
-    if lanes.config.integration.method != "rk4":
+    method = lanes.config.integration.method
+    if METHODS[method].exact:
         return ""
     if steps >= SURELY_FINE * np.max(stability.fewest_stable_steps(system)):
         return ""
-    bias, true = stability.exponent_bias(system, steps)
+    bias, true = stability.exponent_bias(system, steps, method)
     worst = int(np.argmax(np.abs(bias) - MOST_BIAS * np.abs(true)))
     if abs(bias[worst]) <= MOST_BIAS * abs(true[worst]):
         return ""
@@ -122,14 +124,15 @@ def coarse_steps(lanes: Lanes, steps: int) -> str:
 
 def needless_maps(lanes: Lanes, plan: Plan) -> str:
     """Tell where flow maps are too many to be kept and fewer would do; empty where they are not."""
-    if plan.method != "flow_map" or plan.records_steps or plan.steps_per_period <= FLOW_MAP_STEPS:
+    enough = METHODS[plan.method].steps
+    if enough is None or plan.records_steps or plan.steps_per_period <= enough:
         return ""
     if maps_are_kept(lanes.system_of(np.arange(min(len(lanes), LANES_AT_ONCE))), plan):
         return ""
     return (
         f"integration.steps_per_period = {plan.steps_per_period}: lanes that differ in more than "
         f"pitch error, load and clearance have flow maps of their own, so many that they are made "
-        f"again for every look at a lane; {FLOW_MAP_STEPS} steps are as exact and much faster"
+        f"again for every look at a lane; {enough} steps are as exact and much faster"
     )
 
 

@@ -7,6 +7,7 @@ import numpy as np
 from gearchaos_kernels import LaneSystem, Outcome, Plan, Status, integrate
 
 from gearchaos.arrays import Counts, Floats, Integers, Mask
+from gearchaos.configuration.methods import METHODS
 from gearchaos.dynamics.plans import plan_of
 from gearchaos.dynamics.stability import fewest_stable_steps
 from gearchaos.engine.lanes import start_states
@@ -88,7 +89,7 @@ def require_stable(config: Configuration, values: Floats, parameters: dict[str, 
     ``values`` and ``parameters`` as in `evaluate`. Raises ConfigurationError.
     """
     steps, ends = plan_of(config).steps_per_period, values[[0, -1]]
-    if config.integration.method == "flow_map":
+    if METHODS[config.integration.method].exact:
         return
     candidates = len(next(iter(parameters.values())))
     swept = {config.sweep.parameter: np.tile(ends, candidates)}

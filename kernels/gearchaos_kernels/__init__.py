@@ -4,6 +4,7 @@ from gearchaos_kernels.batch import integrate, maps_are_kept, maps_memory
 from gearchaos_kernels.compilation import CACHE_FOLDER, source_hash
 from gearchaos_kernels.evaluation import Motion, evaluate, jacobian
 from gearchaos_kernels.memory.rows import LANES
+from gearchaos_kernels.methods.registry import METHODS
 from gearchaos_kernels.models.gear_pair.evaluation import mesh_motion
 from gearchaos_kernels.models.gear_pair.groups import STATES, Effects, Groups
 from gearchaos_kernels.models.gear_pair.pairs import GearPairs, MeshMotion

@@ -278,13 +278,13 @@ def test_modes_that_half_the_step_damps_are_hidden_until_steps_are_fine():
     modes = np.linalg.eigvals(jacobian(system, np.ones((2, system.elements))))
     stiffest = modes[0, np.argmax(np.abs(modes[0]))]
     limit = int(fewest_stable_steps(system)[0])
-    assert hidden_decay(system, limit) == pytest.approx(np.full(2, stiffest.real))
-    assert np.isneginf(hidden_decay(system, 40 * limit)).all()
+    assert hidden_decay(system, limit, "rk4") == pytest.approx(np.full(2, stiffest.real))
+    assert np.isneginf(hidden_decay(system, 40 * limit, "rk4")).all()
     # Both sides of the limit of five per cent, from the leading error |h lambda|^6 / 144 a step.
     step = (0.05 * 144.0 * abs(stiffest.real) / abs(stiffest) ** 6) ** 0.2
     steps = 0.5 * PERIOD / step
-    assert np.isfinite(hidden_decay(system, int(0.9 * steps))).all()
-    assert np.isneginf(hidden_decay(system, int(1.1 * steps))).all()
+    assert np.isfinite(hidden_decay(system, int(0.9 * steps), "rk4")).all()
+    assert np.isneginf(hidden_decay(system, int(1.1 * steps), "rk4")).all()
 
 
 @pytest.mark.parametrize("teeth", [False, True])

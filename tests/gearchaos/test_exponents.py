@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 from gearchaos_kernels import Effects, Groups, Plan, integrate, jacobian
+from gearchaos_kernels.methods.rk4.stability import amplification
 
 from gearchaos.dynamics.exponents import exponents, period_jacobian, sum_of_exponents
 from gearchaos.dynamics.largest_exponents import largest_exponents
-from gearchaos.dynamics.stability import amplification
 from gearchaos.records.lyapunov import largest_exponent
 
 from ..kernels.reference import (

@@ -255,7 +255,7 @@ def test_steps_that_are_stable_but_too_few_for_exponents_are_told(steps, warned)
 def test_the_shift_of_an_exponent_by_the_step_is_that_of_the_linear_pair(steps):
     linear = "groups.half_backlash=0.0", "groups.stiffness_variation_scale=0.0"
     system = simulation(*linear).lanes.system_of(np.arange(1))
-    bias, true = exponent_bias(system, steps)
+    bias, true = exponent_bias(system, steps, "rk4")
     once = Plan(steps, 0, 1, 0, tangent=True)
     multipliers = np.linalg.eigvals(period_jacobian(system, np.zeros((1, 6)), once)[0])
     computed = np.log(np.abs(multipliers).max()) / system.mesh_period[0]

@@ -2,8 +2,9 @@
 
 import numpy as np
 import pytest
+from gearchaos_kernels.methods.rk4.stability import amplification
 
-from gearchaos.dynamics.stability import amplification, steps_per_time
+from gearchaos.dynamics.stability import steps_per_time
 
 
 @pytest.mark.parametrize("angle", np.linspace(0.5 * np.pi, np.pi, 46))

@@ -11,6 +11,7 @@ import numpy as np
 
 from gearchaos.arrays import Floats
 from gearchaos.configuration.messages import NUMBER, Fault, shown
+from gearchaos.configuration.methods import METHODS
 from gearchaos.configuration.tables import swept_values
 from gearchaos.configuration.toml_text import text_of_file
 from gearchaos.errors import GearchaosError
@@ -154,9 +155,9 @@ def _unsound(table: GearDeviations, teeth: int, module_mm: float) -> Iterator[tu
 
 
 @RULES.reads("pitch_error", "integration")
-def _flow_maps_know_the_sine(config: GearPairTables) -> Iterator[Fault]:
-    if _kind(config) != "sine" and config.integration.method == "flow_map":
-        rule = 'cannot be computed with integration.method = "flow_map"'
+def _maps_know_the_sine(config: GearPairTables) -> Iterator[Fault]:
+    if _kind(config) != "sine" and METHODS[config.integration.method].shares_maps:
+        rule = f'cannot be computed with integration.method = "{config.integration.method}"'
         yield Fault("pitch_error.kind", rule, 'set integration.method = "rk4"', _kind(config))
 
 

@@ -56,6 +56,12 @@ class Method:
     memory : callable
         ``memory(system, plan, scene, stable)``: about how many bytes that takes; ``stable``
         (lanes,): steps per period with which RK4 is stable.
+    amplification : callable
+        ``amplification(z)``: by how much one step multiplies the size of a mode, z being step
+        length times eigenvalue.
+    stable_reach : callable or None
+        ``stable_reach(angles)``: length of the longest stable z on rays from 0 at these angles,
+        between pi/2 and pi; None if every step is stable.
     is_kept : callable
         ``is_kept(system, plan, scene)``: whether all of it stays in memory from call to call.
     maps_per_step(scene)
@@ -79,6 +85,8 @@ class Method:
     rows: Callable[[Scene], int]
     prepare: Callable[[Any, Plan, Scene], Iterator[Share]]
     memory: Callable[[Any, Plan, Scene, NDArray[np.int64]], int]
+    amplification: Callable[[NDArray[np.complex128]], Floats]
+    stable_reach: Callable[[Floats], Floats] | None
     is_kept: Callable[[Any, Plan, Scene], bool]
     maps_per_step: Any
     workspace: Any

@@ -89,6 +89,9 @@ FLOW_MAP = Method(
     rows=rows_needed,
     prepare=prepare,
     memory=maps_memory,
+    # A map is the exponential itself.
+    amplification=lambda z: np.exp(z.real),
+    stable_reach=None,
     is_kept=maps_are_kept,
     maps_per_step=maps_per_step,
     workspace=workspace,

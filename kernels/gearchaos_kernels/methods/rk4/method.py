@@ -19,6 +19,7 @@ from gearchaos_kernels.memory.rows import LANES, STATE, STRIDE, rows
 from gearchaos_kernels.methods.protocol import Method, Share, cut
 from gearchaos_kernels.methods.rk4 import steps as rk4
 from gearchaos_kernels.methods.rk4.splitting import split_step
+from gearchaos_kernels.methods.rk4.stability import amplification, stable_reach
 from gearchaos_kernels.models.protocol import (
     first_point,
     forcing_at,
@@ -127,6 +128,8 @@ RK4 = Method(
     rows=lambda _scene: 0,
     prepare=prepare,
     memory=lambda _system, _plan, _scene, _stable: 0,
+    amplification=amplification,
+    stable_reach=stable_reach,
     is_kept=lambda _system, _plan, _scene: True,
     maps_per_step=maps_per_step,
     workspace=workspace,

@@ -1,0 +1,45 @@
+"""The stable region of RK4: where a step does not amplify a mode (Hairer, Wanner 1996, sec. IV.2).
+
+A step of length h multiplies the mode of an eigenvalue lambda by R(h lambda), with
+R(z) = 1 + z + z^2/2 + z^3/6 + z^4/24.
+"""
+
+from functools import cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gearchaos_kernels.plan import Floats
+
+Complex = NDArray[np.complex128]
+
+_RAYS = 2**14
+_HALVINGS = 52
+
+
+def amplification(z: Complex) -> Floats:
+    """Return abs(R(z)), by which one step multiplies a mode, for z = h lambda."""
+    return np.abs(1.0 + z * (1.0 + z / 2.0 * (1.0 + z / 3.0 * (1.0 + z / 4.0))))
+
+
+def stable_reach(angles: Floats) -> Floats:
+    """Return where rays from 0 at these angles leave the stable region.
+
+    ``angles``: between pi/2 and pi. The size of R need not rise steadily along a ray: on the
+    negative real axis it first falls. But it passes 1 only once, so that all steps shorter than the
+    longest stable one are stable.
+    """
+    known, lengths = _reach()
+    return np.interp(angles, known, lengths)
+
+
+@cache
+def _reach() -> tuple[Floats, Floats]:
+    """Return angles, and the lengths of the rays there, which all end between 2.5 and 3."""
+    angles = np.linspace(0.5 * np.pi, np.pi, _RAYS)
+    inside, outside = np.full_like(angles, 2.5), np.full_like(angles, 3.0)
+    for _ in range(_HALVINGS):
+        middle = 0.5 * (inside + outside)
+        stable = amplification(middle * np.exp(1j * angles)) <= 1.0
+        inside, outside = np.where(stable, middle, inside), np.where(stable, outside, middle)
+    return angles, inside
