@@ -21,10 +21,10 @@ def _basins(options: Namespace) -> None:
     from gearchaos.engine.running import compiling
     from gearchaos.figures import basins_page
     from gearchaos.figures.page import check_figures, save_figure
+    from gearchaos.outputs.names import REPEATS, START
     from gearchaos.results.reading.overview import plain, slice_lines
     from gearchaos.results.reading.result import open_result
     from gearchaos.results.reading.stage_table import slice_facts
-    from gearchaos.results.variables import REPEATS, START
 
     whole = open_result(options.result)
     if options.output:

@@ -164,7 +164,7 @@ def place(text: str) -> tuple[str, float]:
 
     A way, such as "upwards", needs none.
     """
-    from gearchaos.results.variables import DIRECTION, WAYS
+    from gearchaos.outputs.names import DIRECTION, WAYS
 
     name, _, value = text.rpartition("=")
     if name.strip() in ("", DIRECTION) and value in WAYS:
@@ -191,7 +191,7 @@ def coordinates(
 
     Raises ConfigurationError if that is not one, or an axis comes twice.
     """
-    from gearchaos.results.variables import axis_name
+    from gearchaos.outputs.names import axis_name
 
     others = [axis for axis in axes if axis != free]
     found: dict[str, float] = {}

@@ -20,10 +20,10 @@ from gearchaos.dynamics.stability import fewest_stable_steps
 from gearchaos.engine.resonances import resonances
 from gearchaos.engine.simulation import Simulation
 from gearchaos.engine.store_filling import Shard
+from gearchaos.outputs.names import DIRECTION, START
 from gearchaos.progress import notice
 from gearchaos.results.files.block_store import PIECE_BYTES, lanes_and_record
 from gearchaos.results.files.result_file import CACHE_BYTES
-from gearchaos.results.variables import DIRECTION, START
 
 SAMPLE_STEPS = 500
 """Steps per period of a sample, if they are stable: several times as many as most sweeps take."""

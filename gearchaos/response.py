@@ -31,8 +31,8 @@ def _respond(options: Namespace) -> int:
     from gearchaos.configuration.methods import METHODS
     from gearchaos.engine.response import compute_response, prepared
     from gearchaos.engine.running import choose_threads, prepare
+    from gearchaos.outputs.catalogue import DEFAULT_PERIODS
     from gearchaos.results.files.atomic_file import check_output
-    from gearchaos.results.response_variables import DEFAULT_PERIODS
 
     choose_threads(options.threads)
     periods = DEFAULT_PERIODS if options.periods is None else options.periods

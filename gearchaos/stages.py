@@ -25,6 +25,8 @@ WIDTH = 80  # Columns of a terminal.
 
 
 def _stages(options: Namespace) -> None:
+    from gearchaos.outputs.names import DIRECTION, RECORD, REPEATS, UNSWEPT
+    from gearchaos.results.reading.excitation import excitation_of
     from gearchaos.results.reading.jumps import apart, crises, jumps
     from gearchaos.results.reading.overview import plain, slice_lines
     from gearchaos.results.reading.result import open_result
@@ -34,8 +36,6 @@ def _stages(options: Namespace) -> None:
         slice_facts,
         stage_table,
     )
-    from gearchaos.results.scales import excitation_of
-    from gearchaos.results.variables import DIRECTION, RECORD, REPEATS, UNSWEPT
 
     whole = open_result(options.result)
     # What is computed again is that of one pair and one start.
@@ -132,7 +132,7 @@ def _computed_again(
     from gearchaos.engine.recomputing import computable, refinable, survival
     from gearchaos.engine.refinement import refined_boundaries, refined_jumps
     from gearchaos.engine.running import choose_threads, compiling
-    from gearchaos.results.variables import DIRECTION
+    from gearchaos.outputs.names import DIRECTION
 
     choose_threads(options.threads)
     boundaries = outlasting = None

@@ -36,9 +36,9 @@ from gearchaos.engine.steps import stable_steps
 from gearchaos.errors import ConfigurationError
 from gearchaos.models import Given, axis_values, configuration_of, swept_values
 from gearchaos.models.registry import system_of
+from gearchaos.outputs.catalogue import DEFAULT_PERIODS
 from gearchaos.records.amplitude_spectrum import SpectralLines, spectral_lines
 from gearchaos.results.reading.result import Result
-from gearchaos.results.response_variables import DEFAULT_PERIODS
 
 
 class Trajectory(NamedTuple):

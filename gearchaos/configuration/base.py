@@ -12,7 +12,7 @@ from gearchaos.arguments import texts as texts_of
 from gearchaos.configuration.keys import Key, keys_of
 from gearchaos.configuration.messages import Fault, faults_of, texts
 from gearchaos.configuration.rules import GENERIC_RULES, Rule, unknown_parameter
-from gearchaos.configuration.tables import REALISATION, Tables
+from gearchaos.configuration.tables import Tables
 from gearchaos.configuration.toml_text import (
     tables_from_toml,
     text_of_file,
@@ -21,6 +21,7 @@ from gearchaos.configuration.toml_text import (
     with_value,
 )
 from gearchaos.errors import ConfigurationError
+from gearchaos.outputs.names import REALISATION
 
 DEFAULT_KIND = "gear_pair"
 """Model of a configuration that names none."""

@@ -13,9 +13,6 @@ from gearchaos.configuration.messages import Fault, suggestion
 from gearchaos.configuration.ranges import Range
 from gearchaos.configuration.run_tables import Integration, Outputs, Scene, Start, Sweep
 
-REALISATION = "realisation"
-"""Name of the axis of realisations that are drawn at random, and of their numbers in lanes."""
-
 
 @dataclass(frozen=True)
 class Parameter:

@@ -8,9 +8,9 @@ from gearchaos.engine.lanes import Lanes
 from gearchaos.engine.recomputing import computable
 from gearchaos.engine.running import choose_threads
 from gearchaos.errors import ConfigurationError, FileError
+from gearchaos.outputs import names as known
 from gearchaos.records.label import UNRESOLVED
 from gearchaos.records.wilson import wilson_interval
-from gearchaos.results import variables as known
 from gearchaos.results.reading.ensembles import Basin, Basins, basin_entropy, in_order
 from gearchaos.results.reading.result import Result
 from gearchaos.results.reading.stage_table import label_text, require_labels

@@ -7,7 +7,7 @@ from gearchaos_kernels import Status
 
 from gearchaos.arrays import Array, Floats, Integers
 from gearchaos.dynamics.largest_exponents import MIXED, UNIFORM
-from gearchaos.results.variables import SECTION
+from gearchaos.outputs.names import SECTION
 
 NOT_CHECKED, SAME, CHANGED = 0, 1, 2
 MEANINGS = ("not_checked", "same", "changed")  # Meanings of the values of ``motion_changed``.

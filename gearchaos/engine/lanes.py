@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import cached_property
 from typing import Any
 
@@ -9,12 +10,12 @@ import numpy as np
 from gearchaos_kernels import LaneSystem
 
 from gearchaos.arrays import Array, Floats, Integers
-from gearchaos.configuration.tables import REALISATION, Parameter
+from gearchaos.configuration.tables import Parameter
 from gearchaos.models import Configuration, axis_values, swept_values
-from gearchaos.models.protocol import ParameterValue
+from gearchaos.models.protocol import Model, ParameterValue
 from gearchaos.models.registry import model_of, system_of
-from gearchaos.results import variables as known
-from gearchaos.results.variables import Variable
+from gearchaos.outputs.names import DIRECTION, HARMONIC, REALISATION, START, axis_name
+from gearchaos.outputs.variable import Variable, coordinate
 
 _DRAWS_PER_LANE = 12
 """Random numbers set aside per lane: a multiple of the four that one Philox counter yields."""
@@ -37,19 +38,21 @@ class Lanes:
         self.config = config
         self.model = model_of(config)
         self._values = axis_values(config)
-        self.axes = [axis_of(config.parameters[name], one) for name, one in self._values.items()]
+        self.axes = [
+            axis_of(config.parameters[name], one, self.model) for name, one in self._values.items()
+        ]
         # What the system of a lane depends on, in the order of the axes.
         self._of_systems: dict[str, Array] = dict(self._values)
         numbers = config.realisations
         if numbers.size > 1:
-            self.axes.append(known.unswept_axis(REALISATION, numbers))
+            self.axes.append(self.model.catalogue.axis(REALISATION, numbers))
             self._of_systems[REALISATION] = numbers
         self.starts = config.start.size
         if self.starts > 1:
-            self.axes.append(known.unswept_axis(known.START, np.arange(self.starts)))
+            self.axes.append(self.model.catalogue.axis(START, np.arange(self.starts)))
         self.directions = 2 if config.start.carry == "both" else 1
         if self.directions > 1:
-            self.axes.append(known.unswept_axis(known.DIRECTION, np.arange(2)))
+            self.axes.append(self.model.catalogue.axis(DIRECTION, np.arange(2)))
         self.repeats = numbers.size * self.starts * self.directions
         self.effects = config.needed_effects
         self.states = config.states_of(self.effects)
@@ -119,17 +122,19 @@ class Lanes:
     @property
     def parameters(self) -> dict[str, Variable]:
         """The parameters of the model that some effect needs, with their origin."""
-        names = [known.axis_name(parameter) for parameter in self._values]
+        names = [axis_name(parameter) for parameter in self._values]
         sizes = [values.size for values in self._values.values()]
         values = dict(zip(self._values, np.ix_(*self._values.values()), strict=True))
         found = self.model.parameters(self.config, values, self.effects)
-        return {one.name: _kept(one, names, sizes) for one in found}
+        kept = (_kept(one, names, sizes) for one in found)
+        scale_of = self.model.catalogue.scale_of
+        return {one.name: replace(one, scale=scale_of(one.name)) for one in kept}
 
 
 def _kept(one: ParameterValue, names: Sequence[str], sizes: Sequence[int]) -> Variable:
     """Return a parameter as a result keeps it; ``names``, ``sizes``: of the swept axes."""
     value, origin = one.value, one.origin
-    dims: tuple[str, ...] = (known.HARMONIC,) if one.is_list else ()
+    dims: tuple[str, ...] = (HARMONIC,) if one.is_list else ()
     if np.ndim(value) > 0 and not dims:
         origin = "swept"
         along = [n for n, size in enumerate(np.shape(value)) if size > 1]
@@ -141,11 +146,11 @@ def _kept(one: ParameterValue, names: Sequence[str], sizes: Sequence[int]) -> Va
     return Variable(one.name, dims, "float64", *texts, values=value, origin=origin)
 
 
-def axis_of(parameter: Parameter, values: Floats) -> known.Variable:
-    """Return the axis of a swept parameter with values (values,), as files name and word it."""
-    name = known.axis_name(parameter.name)
+def axis_of(parameter: Parameter, values: Floats, model: Model) -> Variable:
+    """Return the axis of a swept parameter of a model, with values (values,)."""
+    name = axis_name(parameter.name)
     texts = parameter.units, parameter.long_name, parameter.symbol
-    return known.coordinate(name, *texts, values)
+    return coordinate(name, *texts, values, model.catalogue.scale_of(name))
 
 
 def start_states(config: Configuration, system: LaneSystem, numbers: Integers) -> Floats:

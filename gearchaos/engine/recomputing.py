@@ -5,17 +5,16 @@ from typing import NamedTuple
 import numpy as np
 from gearchaos_kernels import Status, integrate
 
-from gearchaos.configuration.tables import REALISATION
 from gearchaos.dynamics.plans import plan_of
 from gearchaos.errors import ConfigurationError, FileError
 from gearchaos.interrupts import check
 from gearchaos.models import Configuration
 from gearchaos.models.registry import system_of
+from gearchaos.outputs.names import REALISATION, axis_name
 from gearchaos.records.label import CHAOTIC_GROWTH
 from gearchaos.records.lyapunov import largest_exponent
 from gearchaos.results.reading.result import Result
 from gearchaos.results.reading.stage_table import labelled_lanes
-from gearchaos.results.variables import axis_name
 
 MOST_LANES = 25  # Chaotic lanes that are tried, spread evenly over the sweep: they bound the cost.
 

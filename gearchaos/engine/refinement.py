@@ -19,12 +19,12 @@ from gearchaos.engine.simulation import Simulation
 from gearchaos.interrupts import check
 from gearchaos.models import Configuration, swept_values
 from gearchaos.models.registry import system_of
+from gearchaos.outputs.names import LABELS, WAYS
 from gearchaos.records.label import MEANINGS
 from gearchaos.records.period import TOLERANCE
 from gearchaos.results.reading.jumps import Apart, directions_of
 from gearchaos.results.reading.result import Result
 from gearchaos.results.reading.stage_table import Stage, label_text
-from gearchaos.results.variables import LABELS, WAYS
 
 FOLLOWED_WIDTH = 2.0**-16
 """Share of its way to which the end of an orbit is located: next to a fold a multiplier nears +1

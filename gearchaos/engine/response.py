@@ -12,13 +12,9 @@ from gearchaos.engine.simulation import Simulation
 from gearchaos.errors import ConfigurationError
 from gearchaos.models import Configuration, Given, configuration_of
 from gearchaos.models.protocol import Model
+from gearchaos.outputs.catalogue import DEFAULT_PERIODS, NO_CONTACT
+from gearchaos.outputs.names import MESH_PERIOD
 from gearchaos.results.reading.result import Result
-from gearchaos.results.response_variables import (
-    DEFAULT_PERIODS,
-    MESH_PERIOD,
-    NO_CONTACT_STATE,
-    response_variables,
-)
 
 
 def respond(config: Given, periods: int = DEFAULT_PERIODS, threads: int | None = None) -> Result:
@@ -74,11 +70,10 @@ def compute_response(simulation: Simulation, periods: int, text: str, fixed: str
         MESH_PERIOD: system.mesh_period,
         **_motion(simulation.lanes.model, system, outcome, plan),
     }
-    variables = response_variables(
-        simulation.lanes.axes,
-        states=system.states,
-        periods=periods,
-        steps_per_period=plan.steps_per_period,
+    model = simulation.lanes.model
+    instants = np.arange(periods * plan.steps_per_period + 1) / plan.steps_per_period
+    variables = model.catalogue.motion(
+        simulation.lanes.axes, instants, system.states, model.elements(simulation.lanes.effects)
     )
     facts = {
         **metadata(simulation, time.monotonic() - began),
@@ -98,6 +93,6 @@ def _motion(model: Model, system: LaneSystem, outcome: Outcome, plan: Plan) -> d
     }
     motion |= model.motion(system, outcome.history, plan.steps_per_period, turned)
     for values in motion.values():
-        nothing = NO_CONTACT_STATE if values.dtype == np.uint8 else np.nan
+        nothing = NO_CONTACT if values.dtype == np.uint8 else np.nan
         values[outcome.status != Status.OK] = nothing
     return motion

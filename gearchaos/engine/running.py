@@ -21,9 +21,9 @@ from gearchaos.engine.simulation import Arrays, Bounds, Simulation
 from gearchaos.errors import ConfigurationError
 from gearchaos.interrupts import check
 from gearchaos.models import Given, configuration_of
+from gearchaos.outputs.variable import Variable, require_listed
 from gearchaos.progress import say, speaking
 from gearchaos.results.reading.result import Result
-from gearchaos.results.variables import Variable, require_listed
 
 COMPILING = "preparing the kernel of this scene, once; this takes some seconds"
 

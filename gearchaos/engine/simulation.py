@@ -33,12 +33,15 @@ from gearchaos.engine.steps import (
 from gearchaos.engine.transient import settled
 from gearchaos.interrupts import check
 from gearchaos.models import Configuration
+from gearchaos.outputs import catalogue, names
+from gearchaos.outputs.entries import Part
+from gearchaos.outputs.listing import Details, for_each
+from gearchaos.outputs.variable import Variable
 from gearchaos.records.contact import CONTACT_STATES, contact_told
 from gearchaos.records.difference import difference
 from gearchaos.records.label import MEANINGS as MOTION_MEANINGS
 from gearchaos.records.label import MOST_POINTS
 from gearchaos.records.period import POINTS_NEEDED
-from gearchaos.results import variables as known
 
 Arrays = Mapping[str, Array]
 Bounds = tuple[int, int]
@@ -142,46 +145,47 @@ class Simulation:
         return self.plan._replace(section_points=max(self.plan.section_points, enough))
 
     @property
-    def variables(self) -> list[known.Variable]:
-        """What the sweep yields."""
+    def variables(self) -> list[Variable]:
+        """The variables of the sweep, in the order of the file."""
         outputs, repeats = self.config.outputs, self.lanes.repeats_after
         of_teeth = f"periods of the excitation, {repeats} mesh periods each,"
-        motions = [of_teeth if repeats > 1 else "mesh periods"]
         touched = self.plan.contact and self._splits_steps
-        subjects: dict[str, Sequence[str] | bool] = {
-            "section points": bool(outputs.section),
-            "section": outputs.section,
-            "lyapunov": outputs.lyapunov,
-            "motion": motions if outputs.motion else (),
-            "record": outputs.motion and outputs.lyapunov,
-            "exponents": outputs.exponents,
-            "crossings": self._splits_steps,
-            "contact": self._elements if touched else (),
-            "forces": self._elements if self.plan.loads else (),
-            "loads": self.plan.loads,
-            "chosen": outputs.states,
-            "orders": bool(self.plan.orders),
-            "amplitudes": (*outputs.states, *self.lanes.model.signals[:1])
-            if self.plan.orders
-            else (),
-            "check": self.config.integration.error_check > 0.0,
-            "every sweep": True,
+        model = self.lanes.model
+        signals = (*outputs.states, *model.signals[:1])
+        parts: dict[Part, bool | Sequence[str]] = {
+            catalogue.SECTION_POINTS: bool(outputs.section),
+            catalogue.SECTION: outputs.section,
+            catalogue.LYAPUNOV: outputs.lyapunov,
+            catalogue.MOTION: outputs.motion,
+            catalogue.RECORD: outputs.motion and outputs.lyapunov,
+            catalogue.EXPONENTS: outputs.exponents,
+            catalogue.CROSSINGS: self._splits_steps,
+            catalogue.CONTACT: self._elements if touched else (),
+            **(for_each(model.load_parts, self._elements) if self.plan.loads else {}),
+            catalogue.EXTREMES: outputs.states,
+            catalogue.ORDERS: bool(self.plan.orders),
+            catalogue.AMPLITUDES: signals if self.plan.orders else (),
+            catalogue.CHECK: self.config.integration.error_check > 0.0,
+            catalogue.EVERY_SWEEP: True,
         }
         values = {
-            known.SECTION_POINT: np.arange(outputs.section_points),
-            known.EXPONENT_NUMBER: np.arange(1, len(self.lanes.states) + 1),
-            known.ORDER: np.array([float(order) for order in self.plan.orders]),
-            known.STATE: np.arange(len(self.lanes.states)),
+            names.SECTION_POINT: np.arange(outputs.section_points),
+            names.EXPONENT_NUMBER: np.arange(1, len(self.lanes.states) + 1),
+            names.ORDER: np.array([float(order) for order in self.plan.orders]),
+            names.STATE: np.arange(len(self.lanes.states)),
         }
         meanings = {
             "motion": MOTION_MEANINGS,
-            known.RECORD: RECORD_MEANINGS,
+            names.RECORD: RECORD_MEANINGS,
             "contact_state_@": CONTACT_STATES,
             "motion_changed": error_check.MEANINGS,
-            known.STATUS: [status.name.lower() for status in kernels.STATUS_TEXTS],
-            known.STATE: self.lanes.states,
+            names.STATUS: [status.name.lower() for status in kernels.STATUS_TEXTS],
+            names.STATE: self.lanes.states,
         }
-        return known.listed(self.lanes.axes, subjects, values, meanings)
+        wordings = {"period": of_teeth if repeats > 1 else "mesh periods"}
+        return model.catalogue.variables(
+            self.lanes.axes, parts, Details(values, meanings, wordings)
+        )
 
     @property
     def _splits_steps(self) -> bool:
@@ -246,7 +250,7 @@ class Simulation:
 
     @cached_property
     def ended(self) -> Floats:
-        """End states of a carried sweep in the order of computation, not a number where unknown."""
+        """End states of a carried sweep in the order of computation, not a number where unnames."""
         return np.full((len(self.lanes), len(self.lanes.states)), np.nan)
 
     def integrate(self, places: Integers, plan: kernels.Plan) -> tuple[Floats, kernels.Outcome]:
@@ -371,8 +375,8 @@ def states_told(
     for number, state in enumerate(plan.states):
         smallest, largest = outcome.extremes[:, number].T
         ends = smallest, largest, largest - smallest
-        told |= {f"{state}_{name}": end for name, end in zip(known.EXTREMES, ends, strict=True)}
+        told |= {f"{state}_{name}": end for name, end in zip(names.EXTREMES, ends, strict=True)}
     if plan.orders:
-        names = (f"{known.AMPLITUDE}{name}" for name in (*plan.states, *signals))
-        told |= zip(names, np.moveaxis(outcome.amplitudes, 1, 0), strict=True)
+        amplitudes = (f"{names.AMPLITUDE}{one}" for one in (*plan.states, *signals))
+        told |= zip(amplitudes, np.moveaxis(outcome.amplitudes, 1, 0), strict=True)
     return told

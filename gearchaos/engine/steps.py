@@ -11,7 +11,6 @@ from gearchaos.arrays import Integers, Mask
 from gearchaos.configuration.messages import Fault
 from gearchaos.configuration.methods import METHODS
 from gearchaos.configuration.run_tables import DEFAULT_STEPS, MOST_STEPS_PER_PERIOD
-from gearchaos.configuration.tables import REALISATION
 from gearchaos.dynamics import stability
 from gearchaos.dynamics.hidden_modes import hidden_error
 from gearchaos.dynamics.labelling import Told
@@ -22,6 +21,7 @@ from gearchaos.engine.claims import columns_of
 from gearchaos.engine.lanes import Lanes
 from gearchaos.errors import ConfigurationError
 from gearchaos.interrupts import check
+from gearchaos.outputs.names import REALISATION
 from gearchaos.records.difference import Difference, Solution, bound, difference
 from gearchaos.records.label import PERIODIC, UNRESOLVED
 from gearchaos.records.period import POINTS_NEEDED, RETURNS, motion_period

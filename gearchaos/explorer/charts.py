@@ -17,8 +17,8 @@ from gearchaos.figures.lanes import diagram_lanes, map_axes
 from gearchaos.figures.maps import parameter_map
 from gearchaos.figures.panel import robust_limits
 from gearchaos.figures.style import BLACK
+from gearchaos.outputs.names import LARGEST_EXPONENT
 from gearchaos.results.reading.result import Result
-from gearchaos.results.variables import LARGEST_EXPONENT
 
 Charts = tuple[list[Any], dict[str, str]]
 """Panels, of which the first is zoomed into, and the colours of kinds by their names."""

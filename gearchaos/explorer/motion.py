@@ -13,8 +13,9 @@ from matplotlib.figure import Figure
 from gearchaos.explorer.charts import plain_text
 from gearchaos.figures import response as figures
 from gearchaos.figures.response_page import SHOWN_PERIODS
+from gearchaos.models.gear_pair.outputs import MESH_FORCE
+from gearchaos.outputs.names import TIME, acceleration_of
 from gearchaos.results.reading.result import Result
-from gearchaos.results.response_variables import MESH_FORCE, TIME, acceleration_of
 
 FORCE = f"{MESH_FORCE}tangential"
 SCALES = ("linear", "linear", "log", "linear")

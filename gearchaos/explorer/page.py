@@ -26,10 +26,10 @@ from gearchaos.figures.lanes import diagram_lanes, swept_axes
 from gearchaos.figures.page import FORMATS
 from gearchaos.figures.response import COORDINATE
 from gearchaos.figures.style import GREY, VERMILION
+from gearchaos.outputs.catalogue import DEFAULT_PERIODS
+from gearchaos.outputs.names import LABELS, LARGEST_EXPONENT, SECTION, STATUS, coordinate_text
 from gearchaos.results.reading.result import Result, section_variables
 from gearchaos.results.reading.stage_table import label_text
-from gearchaos.results.response_variables import DEFAULT_PERIODS
-from gearchaos.results.variables import LABELS, LARGEST_EXPONENT, SECTION, STATUS, coordinate_text
 
 WIDE = {"sizing_mode": "stretch_width"}
 HALF = {"flex": "1 1 560px", "min-width": "0"}  # Side by side where the window is wide enough.

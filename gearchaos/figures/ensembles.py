@@ -19,10 +19,10 @@ from gearchaos.figures.lanes import Between, cell_edges, diagram_lanes
 from gearchaos.figures.page import Page, few_ticks, legend_below, letter, page, remark
 from gearchaos.figures.stages import SHADES, look_of
 from gearchaos.figures.style import BLACK, SINGLE_COLUMN_MM
+from gearchaos.models.catalogues import scale_of, subject_of
+from gearchaos.outputs.names import REPEATS
 from gearchaos.results.reading.ensembles import Basin, Basins, Counted, in_order, motion_shares
 from gearchaos.results.reading.result import Result
-from gearchaos.results.scales import unit_of
-from gearchaos.results.variables import REPEATS, STATE_WORDING
 
 Drawn = Artist | Container
 
@@ -205,8 +205,8 @@ def _look(one: Basin) -> dict[str, Any]:
 
 
 def _label(state: str) -> str:
-    wording, symbol = STATE_WORDING[state]
-    return f"{wording.capitalize()}, {symbol} ({unit_of(state).stands_for})"
+    subject = subject_of(state)
+    return f"{subject.long_name.capitalize()}, {subject.symbol} ({scale_of(state).stands_for})"
 
 
 def _in_words(one: Basin) -> str:

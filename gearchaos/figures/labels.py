@@ -7,13 +7,12 @@ from functools import cache
 
 from matplotlib.mathtext import MathTextParser
 
-from gearchaos.configuration.tables import REALISATION
 from gearchaos.errors import FigureError
 from gearchaos.figures.style import DRAWING
-from gearchaos.results import scales
+from gearchaos.outputs.names import DIRECTION, REALISATION, START, coordinate_text
+from gearchaos.outputs.variable import Variable
+from gearchaos.results.reading.excitation import excitation_of
 from gearchaos.results.reading.result import Result
-from gearchaos.results.scales import excitation_of
-from gearchaos.results.variables import DIRECTION, START, Variable, coordinate_text
 
 
 def axis_label(result: Result, name: str, line_length: int = 60) -> str:
@@ -38,10 +37,10 @@ def axis_label(result: Result, name: str, line_length: int = 60) -> str:
 
 def unit_of(result: Result, name: str) -> str:
     """Word the unit of a variable, or what its numbers are multiples of; "" of a pure number."""
-    written = _known(result)[name].units
-    if written in ("", "1"):
-        return scales.unit_of(name).stands_for
-    words = plain(re.sub(r"\bum\b", "\N{MICRO SIGN}m", written))
+    variable = _known(result)[name]
+    if variable.units in ("", "1"):
+        return variable.scale.stands_for
+    words = plain(re.sub(r"\bum\b", "\N{MICRO SIGN}m", variable.units))
     return re.sub(r"\^(-?\d)", r"$^{\1}$", words)
 
 

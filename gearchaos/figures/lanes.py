@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from gearchaos.arrays import Floats, Integers, Mask
 from gearchaos.errors import FigureError
+from gearchaos.outputs.names import STATUS, UNSWEPT
 from gearchaos.results.reading.result import Result
-from gearchaos.results.variables import STATUS, UNSWEPT
 
 Between = tuple[float | None, float | None]
 

@@ -22,9 +22,10 @@ from gearchaos.figures.page import Page, few_ticks, footnote, page
 from gearchaos.figures.panel import robust_limits
 from gearchaos.figures.stages import look_of
 from gearchaos.figures.style import BLACK, LEGEND, SINGLE_COLUMN_MM, SMALL_FONT_PT
+from gearchaos.models.gear_pair.outputs import DIRECTIONS
+from gearchaos.outputs.names import LABELS, LARGEST_EXPONENT, STATUS
 from gearchaos.results.reading.ensembles import motion_kinds
 from gearchaos.results.reading.result import Result
-from gearchaos.results.variables import DIRECTIONS, LABELS, LARGEST_EXPONENT, STATUS
 
 SHOWN = (LABELS[0], LARGEST_EXPONENT, *(f"contact_state_{way}" for way in DIRECTIONS))
 """What a page shows, if the result has it."""

@@ -14,11 +14,12 @@ from gearchaos.figures.labels import axis_label, check_variable, place_of, plain
 from gearchaos.figures.lanes import Between
 from gearchaos.figures.page import remark
 from gearchaos.figures.style import BLACK, BLUE, LEGEND, ORANGE, VERMILION
+from gearchaos.models.gear_pair.outputs import MESH_FORCE
+from gearchaos.outputs.names import TIME, acceleration_of
 from gearchaos.records.amplitude_spectrum import spectral_lines
 from gearchaos.records.period import motion_period
+from gearchaos.results.reading.excitation import excitation_of
 from gearchaos.results.reading.result import Result, section_variables
-from gearchaos.results.response_variables import MESH_FORCE, TIME, acceleration_of
-from gearchaos.results.scales import excitation_of
 
 COORDINATE = "delta_5"  # The coordinate that is drawn unless another is asked for: the torsion.
 

@@ -16,9 +16,10 @@ from gearchaos.figures import response
 from gearchaos.figures.labels import form_in_words, in_words, place_of
 from gearchaos.figures.page import Page, few_ticks, footnote, letter, page, remark
 from gearchaos.figures.style import BLACK, BLUE, DOUBLE_COLUMN_MM, LEGEND, VERMILION
+from gearchaos.models.gear_pair.outputs import MESH_ERROR, MESH_FORCE
+from gearchaos.outputs.names import TIME, acceleration_of
+from gearchaos.results.reading.excitation import Excitation, excitation_of
 from gearchaos.results.reading.result import Result
-from gearchaos.results.response_variables import MESH_ERROR, MESH_FORCE, TIME, acceleration_of
-from gearchaos.results.scales import Excitation, excitation_of
 
 SIDE_BY_SIDE_MM = 120.0  # Width from which on two panels stand side by side.
 SHOWN_PERIODS = 12  # Mesh periods at the end of the record that the time history shows.

@@ -15,10 +15,10 @@ from gearchaos.figures.page import Page, few_ticks, footnote, letter, page
 from gearchaos.figures.panel import legend_above, mark_values
 from gearchaos.figures.stages import NARROWEST_SHARE, shade_stages
 from gearchaos.figures.style import OVERLAID, SINGLE_COLUMN_MM
+from gearchaos.outputs.names import LABELS, LARGEST_EXPONENT, ORDER, WAYS
 from gearchaos.results.reading.jumps import apart, directions_of
 from gearchaos.results.reading.result import Result, section_variables
 from gearchaos.results.reading.stage_table import LabelledLanes
-from gearchaos.results.variables import LABELS, LARGEST_EXPONENT, ORDER, WAYS
 
 HEIGHT_RATIOS = (1.6, 1.0)
 SHADE = "0.92"  # Where directions differ.

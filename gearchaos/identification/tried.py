@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from gearchaos.errors import FileError
 from gearchaos.identification.loading import Problem
+from gearchaos.outputs.names import STATUS
 from gearchaos.results.files.atomic_file import reason, replacing
-from gearchaos.results.variables import STATUS
 
 Tried: TypeAlias = NDArray[np.void]
 """Candidates, in the order in which they were tried: an array with the fields of `fields_of`."""

@@ -8,9 +8,9 @@ import numpy as np
 from gearchaos_kernels import LaneSystem, evaluate
 
 from gearchaos.arrays import Array, Floats
-
-HARMONIC = "harmonic"
-"""Dimension of what has one entry per harmonic."""
+from gearchaos.outputs.entries import Part
+from gearchaos.outputs.listing import Catalogue
+from gearchaos.outputs.names import acceleration_of
 
 
 class ParameterValue(NamedTuple):
@@ -63,6 +63,10 @@ class Model(ABC):
 
     Attributes
     ----------
+    catalogue : Catalogue
+        All outputs that a result may have; every model has its own.
+    load_parts : tuple of Part
+        Parts of the catalogue that `loads` computes.
     signals : tuple of str
         Names of the signals that the compiled formulas observe.
     contact_words, deflection_words : str
@@ -71,6 +75,8 @@ class Model(ABC):
         What repeats after several mesh periods, with its verb, and how it repeats earlier.
     """
 
+    catalogue: Catalogue
+    load_parts: tuple[Part, ...] = ()
     signals: tuple[str, ...] = ()
     contact_words: str = "mean stiffness, all elements in contact"
     deflection_words: str = "under the static load"
@@ -137,6 +143,6 @@ class Model(ABC):
 
 def accelerations(system: LaneSystem, values: Floats) -> dict[str, Array]:
     """Return accelerations, (lanes, samples, coordinates), by the names that files have."""
-    names = (f"{name}_acceleration" for name in system.states[::2])
+    names = (acceleration_of(name) for name in system.states[::2])
     columns = np.moveaxis(values, 2, 0)
     return {name: column.copy() for name, column in zip(names, columns, strict=True)}

@@ -20,6 +20,7 @@ from gearchaos.figures.response import coordinates_of, samples_per_period
 from gearchaos.models import Configuration, GearPairConfiguration
 from gearchaos.models.gear_pair.derivation import Quantities
 from gearchaos.models.gear_pair.geometry import HelicalPair
+from gearchaos.outputs.names import CROSSINGS
 from gearchaos.paper.published import contact_line_stiffness, printed_coefficients, published
 from gearchaos.paper.stages import Crisis, crisis_of, lanes_as_printed
 from gearchaos.progress import say
@@ -28,7 +29,6 @@ from gearchaos.records.period import POINTS_NEEDED
 from gearchaos.results.reading.jumps import apart
 from gearchaos.results.reading.result import Result
 from gearchaos.results.reading.stage_table import LabelledLanes
-from gearchaos.results.variables import CROSSINGS
 from gearchaos.system import System
 
 LOW, HIGH = 0.5, 2.0

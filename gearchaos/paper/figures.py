@@ -22,6 +22,7 @@ from gearchaos.figures.response import (
 )
 from gearchaos.figures.style import BLACK, BLUE, FONT_PT, GREY, ORANGE, VERMILION
 from gearchaos.models.gear_pair.contact_lines import series_table
+from gearchaos.outputs.names import TIME, acceleration_of
 from gearchaos.paper.computation import Reproduction, lane_of, largest_acceleration
 from gearchaos.paper.published import (
     Printed,
@@ -31,7 +32,6 @@ from gearchaos.paper.published import (
 )
 from gearchaos.records.amplitude_spectrum import spectral_lines
 from gearchaos.results.reading.result import Result
-from gearchaos.results.response_variables import TIME, acceleration_of
 
 CYCLE = np.arange(1001) / 1000  # Mesh phases, in parts of the mesh period.
 

@@ -15,6 +15,7 @@ from gearchaos.errors import FileError
 from gearchaos.figures.labels import short
 from gearchaos.figures.page import FORMATS, Page, save_figure
 from gearchaos.figures.response import coordinates_of
+from gearchaos.outputs.names import CROSSINGS, acceleration_of
 from gearchaos.paper import figures
 from gearchaos.paper.comparison import RULES, WINDOW, Row, Verdict, compare, signed
 from gearchaos.paper.computation import Reproduction, lane_of, largest_acceleration
@@ -23,8 +24,6 @@ from gearchaos.paper.stages import OUT_OF_TURN, TWO_BANDS
 from gearchaos.progress import say
 from gearchaos.results.files.atomic_file import check_output, replacing, writing
 from gearchaos.results.reading.result import Result
-from gearchaos.results.response_variables import acceleration_of
-from gearchaos.results.variables import CROSSINGS
 from gearchaos.version import software_version
 
 REPORT = "report.md"

@@ -10,14 +10,10 @@ from typing import Any
 import h5py
 import numpy as np
 
+from gearchaos.models.gear_pair.outputs import CATALOGUE, STATES
+from gearchaos.outputs.variable import Variable, coordinate
 from gearchaos.results.files.atomic_file import append_checksum
 from gearchaos.results.reading.result import Result
-from gearchaos.results.variables import (
-    STATE_WORDING,
-    Variable,
-    coordinate,
-    unswept_axis,
-)
 
 from .commands import SMALL
 from .listed_variables import parameter, sweep_variables
@@ -28,13 +24,13 @@ CHECKSUM_LINE = 82
 LANES, POINTS = 20, 5
 LOAD = coordinate("load", "1", "static load", "$f_n$", np.linspace(0.0, 1.0, LANES))
 ERRORS = coordinate("pitch_error", "1", "pitch error", "$P$", np.linspace(0.0, 3.0, 4))
-SEVERAL = [unswept_axis("start", np.arange(count)) for count in (2, 3)]
+SEVERAL = [CATALOGUE.axis("start", np.arange(count)) for count in (2, 3)]
 GOOD_AXES = ((LOAD,), (ERRORS, LOAD, SEVERAL[0]), (ERRORS, LOAD), (LOAD, SEVERAL[1]))
 
 
 def good_result(path: Path, axes: tuple[Variable, ...] = GOOD_AXES[0]) -> None:
     """Write a sound result file with every kind of variable that a sweep has."""
-    states = list(STATE_WORDING)[:2]
+    states = [one.name for one in STATES[:2]]
     variables = sweep_variables(
         axes,
         states=states,

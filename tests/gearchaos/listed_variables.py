@@ -6,17 +6,13 @@ from fractions import Fraction
 import numpy as np
 from numpy.typing import ArrayLike
 
+from gearchaos.models.gear_pair.outputs import CATALOGUE, FORCES, LOADS, TRANSMISSION_ERROR
+from gearchaos.outputs import catalogue
+from gearchaos.outputs.entries import Part
+from gearchaos.outputs.listing import Details
+from gearchaos.outputs.names import EXPONENT_NUMBER, ORDER, RECORD, SECTION_POINT, STATE, STATUS
+from gearchaos.outputs.variable import Variable
 from gearchaos.records.contact import CONTACT_STATES
-from gearchaos.results.variables import (
-    EXPONENT_NUMBER,
-    ORDER,
-    RECORD,
-    SECTION_POINT,
-    STATE,
-    STATUS,
-    Variable,
-    listed,
-)
 
 
 def parameter(
@@ -63,25 +59,23 @@ def sweep_variables(
     their error, and of ``motion`` and ``record`` where they are labelled. A motion repeats after
     whole excitation periods, of so many mesh periods each.
     """
-    periods = f"periods of the excitation, {excitation_period} mesh periods each,"
-    # What stands for @ in the rows that are told with each of these.
     kept = section if section_points > 0 else ()
-    subjects: dict[str, Sequence[str] | bool] = {
-        "section points": bool(kept),
-        "section": kept,
-        "lyapunov": lyapunov,
-        "motion": [periods if excitation_period > 1 else "mesh periods"] if motion_meanings else (),
-        "record": bool(record_meanings),
-        "exponents": exponents,
-        "crossings": crossings,
-        "contact": contact,
-        "forces": loads,
-        "loads": bool(loads),
-        "chosen": chosen,
-        "orders": bool(orders),
-        "amplitudes": (*chosen, "transmission_error") if orders else (),
-        "check": bool(check_meanings),
-        "every sweep": True,
+    parts: dict[Part, bool | Sequence[str]] = {
+        catalogue.SECTION_POINTS: bool(kept),
+        catalogue.SECTION: kept,
+        catalogue.LYAPUNOV: lyapunov,
+        catalogue.MOTION: bool(motion_meanings),
+        catalogue.RECORD: bool(record_meanings),
+        catalogue.EXPONENTS: exponents,
+        catalogue.CROSSINGS: crossings,
+        catalogue.CONTACT: contact,
+        FORCES: loads,
+        LOADS: bool(loads),
+        catalogue.EXTREMES: chosen,
+        catalogue.ORDERS: bool(orders),
+        catalogue.AMPLITUDES: (*chosen, TRANSMISSION_ERROR) if orders else (),
+        catalogue.CHECK: bool(check_meanings),
+        catalogue.EVERY_SWEEP: True,
     }
     values: dict[str, ArrayLike] = {
         SECTION_POINT: np.arange(section_points),
@@ -97,4 +91,6 @@ def sweep_variables(
         STATUS: status_meanings,
         STATE: states,
     }
-    return listed(axes, subjects, values, meanings)
+    periods = f"periods of the excitation, {excitation_period} mesh periods each,"
+    wordings = {"period": periods if excitation_period > 1 else "mesh periods"}
+    return CATALOGUE.variables(axes, parts, Details(values, meanings, wordings))

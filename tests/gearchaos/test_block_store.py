@@ -15,10 +15,13 @@ import numpy as np
 import pytest
 
 from gearchaos.errors import FileError
+from gearchaos.models.gear_pair.outputs import CATALOGUE
+from gearchaos.outputs import catalogue
+from gearchaos.outputs.listing import Details
+from gearchaos.outputs.variable import Variable, coordinate
 from gearchaos.results.files.block_folder import StoreLock, read_manifest, require_same
 from gearchaos.results.files.block_store import BlockStore
 from gearchaos.results.reading.result import Result, open_result
-from gearchaos.results.variables import Variable, coordinate, listed, unswept_axis
 from gearchaos.version import Software
 
 LANES = 100
@@ -33,11 +36,15 @@ values = [1.0, 2.0]
 
 
 def of_a_sweep(axes: Sequence[Variable]) -> list[Variable]:
-    told = ("section points", "lyapunov", "every sweep")
-    subjects = {"section": ["delta_5"], **{name: [""] for name in told}}
+    parts = {
+        catalogue.SECTION_POINTS: True,
+        catalogue.SECTION: ["delta_5"],
+        catalogue.LYAPUNOV: True,
+        catalogue.EVERY_SWEEP: True,
+    }
     values = {"section_point": np.arange(POINTS), "state": np.arange(2)}
-    states = ["delta_5", "delta_5_rate"]
-    return listed(axes, subjects, values, {"status": ["ok", "diverged"], "state": states})
+    meanings = {"status": ["ok", "diverged"], "state": ["delta_5", "delta_5_rate"]}
+    return CATALOGUE.variables(axes, parts, Details(values, meanings))
 
 
 def variables(lanes: int = LANES) -> list[Variable]:
@@ -405,13 +412,17 @@ def test_merging_takes_the_memory_of_a_block(output: Path) -> None:
 import numpy as np
 from test_block_store import CONFIGURATION, POINTS, SOFTWARE
 from gearchaos.results.files.block_store import BlockStore
-from gearchaos.results.variables import coordinate, listed
+from gearchaos.models.gear_pair.outputs import CATALOGUE
+from gearchaos.outputs import catalogue
+from gearchaos.outputs.listing import Details
+from gearchaos.outputs.variable import coordinate
 points, size, count = 500, 250, 80
-variables = listed(
+every, section = catalogue.EVERY_SWEEP, catalogue.SECTION
+values = {"section_point": np.arange(points), "state": np.arange(1)}
+variables = CATALOGUE.variables(
     [coordinate("load", "1", "load", "", np.arange(float(size * count)))],
-    {"section points": [""], "section": ["delta_5"], "every sweep": [""]},
-    {"section_point": np.arange(points), "state": np.arange(1)},
-    {"status": ["ok"], "state": ["delta_5"]},
+    {catalogue.SECTION_POINTS: True, section: ["delta_5"], every: True},
+    Details(values, {"status": ["ok"], "state": ["delta_5"]}),
 )
 random = np.random.default_rng(0)
 one = {
@@ -569,7 +580,7 @@ def test_several_axes_become_one_file_from_blocks_that_cut_them(output: Path) ->
     axes = [
         coordinate("load", "1", "load", "", np.arange(4.0)),
         coordinate("pitch_error", "1", "pitch error", "", np.arange(5.0)),
-        unswept_axis("start", np.arange(5)),
+        CATALOGUE.axis("start", np.arange(5)),
     ]
     several = of_a_sweep(axes)
     with BlockStore(output, several, CONFIGURATION, SOFTWARE) as store:

@@ -11,8 +11,8 @@ from gearchaos import figures
 from gearchaos.engine.recomputing import computable
 from gearchaos.engine.refinement import refined_jumps
 from gearchaos.errors import ConfigurationError, FigureError
+from gearchaos.outputs.names import WAYS
 from gearchaos.results.reading.jumps import apart
-from gearchaos.results.variables import WAYS
 
 from .commands import run_module, same_data
 from .short_sweeps import PAN2021

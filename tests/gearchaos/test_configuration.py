@@ -21,10 +21,10 @@ from gearchaos.models import (
     load_config,
     swept_values,
 )
+from gearchaos.models.gear_pair import outputs as gear_pair
 from gearchaos.models.gear_pair.group_table import GROUP_TABLE, SWEEPABLE_GROUPS
 from gearchaos.models.gear_pair.scene import EFFECTS, STATES
 from gearchaos.models.gear_pair.tables import groups_at
-from gearchaos.results.variables import STATE_WORDING
 
 KEYS = configuration_keys(GearPairConfiguration)
 KEY_TABLES = key_tables(GearPairConfiguration)
@@ -387,7 +387,7 @@ def test_the_effects_decide_the_states(effects, states):
 
 
 def test_states_and_effects_are_those_of_the_files_and_the_groups():
-    assert tuple(STATE_WORDING) == STATES
+    assert tuple(one.name for one in gear_pair.STATES) == STATES
     assert set().union(*(row.effects for row in GROUP_TABLE)) == set(EFFECTS)
 
 

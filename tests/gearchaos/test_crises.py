@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
+from gearchaos.outputs.variable import coordinate
 from gearchaos.records.label import CHAOTIC, MEANINGS, PERIODIC
 from gearchaos.results.reading.jumps import crises, grows_at
 from gearchaos.results.reading.result import Result
-from gearchaos.results.variables import coordinate
 
 from .listed_variables import sweep_variables
 

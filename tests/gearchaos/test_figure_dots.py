@@ -9,8 +9,8 @@ from matplotlib.figure import Figure
 
 from gearchaos.figures import bifurcation, lyapunov
 from gearchaos.figures.lanes import COLUMNS, MOST_DOTS, DenseDots, Lanes, counts, dots
+from gearchaos.outputs.variable import coordinate
 from gearchaos.results.reading.result import Result
-from gearchaos.results.variables import coordinate
 
 from .listed_variables import sweep_variables
 

@@ -16,8 +16,9 @@ from matplotlib.text import Text
 from gearchaos.errors import FigureError
 from gearchaos.figures import bifurcation, bifurcation_page, lyapunov, save_figure
 from gearchaos.figures.panel import robust_limits
+from gearchaos.models.gear_pair.outputs import CATALOGUE
+from gearchaos.outputs.variable import coordinate
 from gearchaos.results.reading.result import Result, open_result
-from gearchaos.results.variables import coordinate, unswept_axis
 
 from .listed_variables import sweep_variables
 
@@ -37,7 +38,7 @@ def logistic_sweep(
 ) -> Result:
     """Make a result of the logistic map, whose bifurcations and exponents are well known."""
     axes = [coordinate("growth", units, "growth rate", symbol, np.asarray(values, dtype=float))]
-    axes += [unswept_axis("start", np.arange(starts))] if starts > 1 else []
+    axes += [CATALOGUE.axis("start", np.arange(starts))] if starts > 1 else []
     r = np.repeat(axes[0].values, starts)
     x = np.full(r.shape, 0.4)
     orbit, slopes = [], []

@@ -8,10 +8,10 @@ import h5py
 import numpy as np
 import pytest
 
+from gearchaos.outputs.variable import coordinate
 from gearchaos.results.files.atomic_file import append_checksum
 from gearchaos.results.reading.overview import overview
 from gearchaos.results.reading.result import Result, open_result
-from gearchaos.results.variables import coordinate
 
 from .commands import run_module
 from .fuzz_results import CHECKSUM_LINE, LANES, good_result

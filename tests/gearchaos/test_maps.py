@@ -10,11 +10,12 @@ from gearchaos.errors import FigureError, FileError
 from gearchaos.figures import map_page, parameter_map
 from gearchaos.figures.maps import _number_cells
 from gearchaos.figures.stages import SHADES
+from gearchaos.models.gear_pair.outputs import CATALOGUE
+from gearchaos.outputs.variable import Variable, coordinate
 from gearchaos.plot import main
 from gearchaos.records.contact import CONTACT_STATES
 from gearchaos.records.label import MEANINGS
 from gearchaos.results.reading.result import Result
-from gearchaos.results.variables import Variable, coordinate, unswept_axis
 
 from .listed_variables import sweep_variables
 
@@ -188,7 +189,7 @@ def test_the_page_has_a_panel_for_each_of_motion_exponent_and_contact(width, sha
 
 
 def test_one_start_of_several_is_chosen_and_told():
-    several = result_over(ERRORS, SPEEDS, unswept_axis("start", np.arange(2)))
+    several = result_over(ERRORS, SPEEDS, CATALOGUE.axis("start", np.arange(2)))
     with pytest.raises(FigureError, match=r"along start, of which.*--at start=0"):
         map_page(several)
     assert map_page(several.sel(start=1)).get_suptitle() == "start 1"

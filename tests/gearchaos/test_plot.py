@@ -10,9 +10,9 @@ import h5py
 import numpy as np
 import pytest
 
+from gearchaos.outputs.variable import coordinate
 from gearchaos.plot import main
 from gearchaos.results.reading.result import Result
-from gearchaos.results.variables import coordinate
 
 from .listed_variables import sweep_variables
 

@@ -19,10 +19,11 @@ from gearchaos.figures import (
     time_history,
 )
 from gearchaos.figures.response import coordinates_of, is_response, repeats_after
+from gearchaos.models.gear_pair.outputs import CATALOGUE, DIRECTIONS
+from gearchaos.outputs.names import axis_name
+from gearchaos.outputs.variable import coordinate
 from gearchaos.plot import main
 from gearchaos.results.reading.result import Result
-from gearchaos.results.response_variables import response_variables
-from gearchaos.results.variables import axis_name, coordinate
 
 from .listed_variables import sweep_variables
 
@@ -62,12 +63,8 @@ def known_response(diverged: tuple[int, ...] = (), swept: str = "pitch_error") -
         lyapunov=False,
         status_meanings=("ok", "diverged"),
     )
-    variables += response_variables(
-        [axis],
-        states=STATES,
-        periods=PERIODS,
-        steps_per_period=STEPS,
-    )
+    instants = np.arange(PERIODS * STEPS + 1) / STEPS
+    variables += CATALOGUE.motion([axis], instants, STATES, DIRECTIONS[:1])
     status = np.isin(np.arange(2), diverged)
     data = {
         **{f"section_{name}": motion[name][:, STEPS::STEPS] for name in STATES},

@@ -13,9 +13,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gearchaos.errors import ConfigurationError, FileError
+from gearchaos.models.gear_pair.outputs import CATALOGUE
+from gearchaos.outputs.variable import Variable, coordinate
 from gearchaos.results.files.result_file import hyperslabs, write_result
 from gearchaos.results.reading.result import Result, open_result, section_variables
-from gearchaos.results.variables import Variable, coordinate, unswept_axis
 
 from .listed_variables import parameter, sweep_variables
 
@@ -24,9 +25,9 @@ LOADS = coordinate("load", "1", "static load", "$f_n$", np.linspace(0.1, 0.5, 3)
 ERRORS = coordinate("pitch_error", "1", "pitch error", "$P$", np.linspace(0.0, 3.0, 7))
 AXES = {
     "one start": (ERRORS,),
-    "several starts": (ERRORS, unswept_axis("start", np.arange(4))),
+    "several starts": (ERRORS, CATALOGUE.axis("start", np.arange(4))),
     "two parameters": (LOADS, ERRORS),
-    "two parameters, several starts": (LOADS, ERRORS, unswept_axis("start", np.arange(2))),
+    "two parameters, several starts": (LOADS, ERRORS, CATALOGUE.axis("start", np.arange(2))),
 }
 
 

@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 from gearchaos.errors import FileError
+from gearchaos.outputs.variable import coordinate
 from gearchaos.results.reading.result import Result, open_result
-from gearchaos.results.variables import coordinate
 
 from .listed_variables import parameter, sweep_variables
 

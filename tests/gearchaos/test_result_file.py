@@ -15,14 +15,11 @@ import numpy as np
 import pytest
 import xarray as xr
 
+from gearchaos.models.gear_pair.outputs import CATALOGUE
+from gearchaos.models.gear_pair.outputs import STATES as ALL_STATES
+from gearchaos.outputs.names import axis_name
+from gearchaos.outputs.variable import Variable, coordinate
 from gearchaos.results.reading.result import Result, open_result
-from gearchaos.results.variables import (
-    STATE_WORDING,
-    Variable,
-    axis_name,
-    coordinate,
-    unswept_axis,
-)
 
 from .listed_variables import parameter, sweep_variables
 
@@ -357,7 +354,7 @@ def test_what_has_an_error_names_where_it_is_told(path: Path) -> None:
 
 
 def test_every_state_has_a_wording_of_its_own() -> None:
-    assert len(set(STATE_WORDING.values())) == len(STATE_WORDING) == 10
+    assert len({(one.long_name, one.symbol) for one in ALL_STATES}) == len(ALL_STATES) == 10
 
 
 def test_the_documented_variables_are_those_that_are_written() -> None:
@@ -365,7 +362,7 @@ def test_the_documented_variables_are_those_that_are_written() -> None:
     lines = re.findall(r"^\| `\w+` \| \(.*$", page, re.M)
     rows = [[cell.strip(" `") for cell in line.split("|")[1:5]] for line in lines]
     documented = {name: (dims.strip("()"), dtype, fill) for name, dims, dtype, fill in rows}
-    repeats = [unswept_axis(name, np.arange(2)) for name in ("realisation", "start", "direction")]
+    repeats = [CATALOGUE.axis(name, np.arange(2)) for name in ("realisation", "start", "direction")]
     result = make_result(swept("load", 3), swept(count=4), *repeats)
     short = {"load": "B", "pitch_error": "A", "section_delta_5": "section_STATE"}
     ends = "delta_1_smallest", "delta_1_largest", "delta_1_peak_to_peak", "amplitude_delta_1"

@@ -13,9 +13,9 @@ import numpy as np
 import pytest
 
 from gearchaos.errors import FileError
+from gearchaos.outputs.variable import coordinate
 from gearchaos.results.files.atomic_file import check_output, replacing
 from gearchaos.results.reading.result import Result, open_result
-from gearchaos.results.variables import coordinate
 
 from .listed_variables import sweep_variables
 
@@ -24,14 +24,18 @@ import sys
 import numpy as np
 from gearchaos.errors import FileError
 from gearchaos.results.reading.result import Result
-from gearchaos.results.variables import coordinate, listed
+from gearchaos.models.gear_pair.outputs import CATALOGUE
+from gearchaos.outputs import catalogue
+from gearchaos.outputs.listing import Details
+from gearchaos.outputs.variable import coordinate
 
 def result(lanes):
-    variables = listed(
+    every, section = catalogue.EVERY_SWEEP, catalogue.SECTION
+    values = {"section_point": np.arange(100), "state": np.arange(1)}
+    variables = CATALOGUE.variables(
         [coordinate("load", "1", "static load", "$f_n$", np.arange(float(lanes)))],
-        {"section points": [""], "section": ["delta_5"], "every sweep": [""]},
-        {"section_point": np.arange(100), "state": np.arange(1)},
-        {"status": ["ok", "diverged"], "state": ["delta_5"]},
+        {catalogue.SECTION_POINTS: True, section: ["delta_5"], every: True},
+        Details(values, {"status": ["ok", "diverged"], "state": ["delta_5"]}),
     )
     sizes = {"section_point": 100, "state": 1}
     random = np.random.default_rng(0)

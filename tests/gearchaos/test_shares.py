@@ -12,12 +12,13 @@ from matplotlib.text import Text
 
 from gearchaos.errors import ConfigurationError, FileError
 from gearchaos.figures import shares, shares_page
+from gearchaos.models.gear_pair.outputs import CATALOGUE
+from gearchaos.outputs.variable import coordinate
 from gearchaos.plot import main
 from gearchaos.records.label import MEANINGS
 from gearchaos.records.wilson import wilson_interval
 from gearchaos.results.reading.ensembles import motion_shares
 from gearchaos.results.reading.result import Result
-from gearchaos.results.variables import coordinate, unswept_axis
 
 from .listed_variables import sweep_variables
 
@@ -44,8 +45,8 @@ def known_motions(
     axes = [coordinate("pitch_error_grade", "1", "accuracy grade of both gears", "", values)]
     if second > 1:
         axes.insert(0, coordinate("load", "1", "load", "$f_n$", np.arange(1.0, 1.0 + second)))
-    axes += [unswept_axis("realisation", np.arange(pairs))] if pairs > 1 else []
-    axes += [unswept_axis("start", np.arange(starts))] if starts > 1 else []
+    axes += [CATALOGUE.axis("realisation", np.arange(pairs))] if pairs > 1 else []
+    axes += [CATALOGUE.axis("start", np.arange(starts))] if starts > 1 else []
     variables = sweep_variables(
         axes,
         states=("delta_5", "delta_5_rate"),

@@ -10,10 +10,10 @@ from matplotlib.figure import Figure
 from gearchaos.errors import FileError
 from gearchaos.figures.panel import mark_values
 from gearchaos.figures.stages import HATCHES, SHADES, shade_stages
+from gearchaos.outputs.variable import coordinate
 from gearchaos.records.label import MEANINGS
 from gearchaos.results.reading.result import Result
 from gearchaos.results.reading.stage_table import labelled_lanes
-from gearchaos.results.variables import coordinate
 
 from .listed_variables import sweep_variables
 

@@ -7,8 +7,8 @@ from matplotlib.figure import Figure
 import gearchaos
 from gearchaos import load_config
 from gearchaos.figures import waterfall
+from gearchaos.models.gear_pair.outputs import CATALOGUE
 from gearchaos.plot import main as plot
-from gearchaos.results.scales import unit_of
 
 from .commands import run_module
 from .short_sweeps import PAN2021, SHORT
@@ -93,7 +93,7 @@ def test_they_are_in_physical_units():
         ("amplitude_delta_1_rate", "m/s"),
         ("amplitude_transmission_error", "um"),
     ):
-        assert unit_of(name).units == units
+        assert CATALOGUE.scale_of(name).units == units
 
 
 def test_the_waterfall_has_a_row_for_each_order(result, path, capsys):

@@ -14,11 +14,11 @@ from gearchaos.figures.page import Page
 from gearchaos.figures.response import repeats_after
 from gearchaos.figures.style import BLACK, BLUE, VERMILION
 from gearchaos.info import main as info
+from gearchaos.models.gear_pair.outputs import CATALOGUE, DIRECTIONS
+from gearchaos.outputs.variable import coordinate
 from gearchaos.plot import main as plot
+from gearchaos.results.reading.excitation import Excitation, excitation_of
 from gearchaos.results.reading.result import Result
-from gearchaos.results.response_variables import response_variables
-from gearchaos.results.scales import Excitation, excitation_of
-from gearchaos.results.variables import coordinate
 from gearchaos.stages import main as stages
 
 from .commands import small_config
@@ -72,7 +72,8 @@ def known_teeth(
         motion_meanings=meanings,
         excitation_period=MEET,
     )
-    variables += response_variables([axis], states=STATES, periods=kept, steps_per_period=STEPS)
+    instants = np.arange(kept * STEPS + 1) / STEPS
+    variables += CATALOGUE.motion([axis], instants, STATES, DIRECTIONS[:1])
     data = {
         **{f"section_{name}": motion[name][np.newaxis, STEPS::STEPS] for name in STATES},
         **dict.fromkeys(("motion", "bands", "status", "return_distance"), np.zeros(1)),

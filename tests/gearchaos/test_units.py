@@ -11,14 +11,16 @@ from gearchaos.configuration.base import configuration_keys
 from gearchaos.models import GearPairConfiguration
 from gearchaos.models.gear_pair.derivation import SCALES
 from gearchaos.models.gear_pair.group_table import GROUP_TABLE
-from gearchaos.results.scales import unit_of
+from gearchaos.models.gear_pair.outputs import CATALOGUE
 
 KEYS = configuration_keys(GearPairConfiguration)
 
 PHYSICAL = ("delta_5", "delta_5_rate", "delta_5_acceleration", "mesh_force_tangential")
 PHYSICAL += ("lyapunov_exponent", "mesh_frequency", "period")
 UNITS = {one.units for one in (*KEYS.values(), *GROUP_TABLE)} - {""}
-UNITS |= {units for units, *_ in SCALES.values()} | {unit_of(name).units for name in PHYSICAL}
+UNITS |= {units for units, *_ in SCALES.values()} | {
+    CATALOGUE.scale_of(name).units for name in PHYSICAL
+}
 REGISTRY = pint.UnitRegistry()
 
 

@@ -20,19 +20,27 @@ from gearchaos.models.gear_pair.derivation import (
 )
 from gearchaos.models.gear_pair.group_table import GROUP_TABLE
 from gearchaos.models.gear_pair.loads import loads_told
+from gearchaos.models.gear_pair.outputs import (
+    CATALOGUE,
+    DIRECTIONS,
+    FORCES,
+    LOADS,
+    MESH_ERROR,
+    MESH_FORCE,
+    TRANSMISSION_ERROR,
+)
 from gearchaos.models.gear_pair.remarks import remarks
 from gearchaos.models.gear_pair.tables import groups_at, physical_at
 from gearchaos.models.gear_pair.tooth_deviations import tooth_deviations
 from gearchaos.models.protocol import Model, ParameterValue, Scales, accelerations
 
-DIRECTIONS = ("tangential", "axial")
-"""Directions in which teeth have a clearance: the clearance elements of a gear pair."""
-
 
 class GearPairModel(Model):
     """A helical gear pair with pitch error (Pan 2021, eq. 13)."""
 
-    signals = ("transmission_error",)
+    catalogue = CATALOGUE
+    load_parts = (FORCES, LOADS)
+    signals = (TRANSMISSION_ERROR,)
     contact_words = "mean mesh stiffness, teeth in contact"
     deflection_words = "of the mesh under the static load, along the transverse line of action"
 
@@ -136,9 +144,9 @@ class GearPairModel(Model):
         assert isinstance(system, GearPairs)
         found = mesh_motion(system, states, steps_per_period, first_period)
         motion = accelerations(system, found.accelerations)
-        motion["mesh_error"] = found.pitch_error
+        motion[MESH_ERROR] = found.pitch_error
         for way in DIRECTIONS[: system.elements]:
-            motion[f"mesh_force_{way}"] = getattr(found, f"force_{way}")
+            motion[f"{MESH_FORCE}{way}"] = getattr(found, f"force_{way}")
             motion[f"contact_{way}"] = getattr(found, f"contact_{way}")
         return motion
 

@@ -11,7 +11,7 @@ from pydantic import create_model
 from gearchaos.arrays import Integers
 from gearchaos.configuration.keys import Key, Table, key, keys_of
 from gearchaos.configuration.messages import suggestion
-from gearchaos.configuration.tables import REALISATION, Parameter, Tables, Titled
+from gearchaos.configuration.tables import Parameter, Tables, Titled
 from gearchaos.configuration.toml_text import flat_tables
 from gearchaos.models.gear_pair.group_table import (
     GROUP_TABLE,
@@ -30,6 +30,7 @@ from gearchaos.models.gear_pair.physical_tables import (
     PitchError,
 )
 from gearchaos.models.gear_pair.scene import Outputs, Scene, Start, states_of
+from gearchaos.outputs.names import REALISATION
 
 
 class GroupsTable(Table):

@@ -8,9 +8,7 @@ import numpy.typing as npt
 
 from gearchaos.arrays import Floats, Integers
 from gearchaos.iso1328 import cumulative_pitch_um, require_gear, single_pitch_um
-
-REALISATION = "realisation"
-"""Name under which the values of lanes hold the number of the drawn gear pair."""
+from gearchaos.outputs.names import REALISATION
 
 _TINY = 1e-300
 """Keeps the deviations of a single tooth, which are zero, from being divided by zero."""

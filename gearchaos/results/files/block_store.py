@@ -15,6 +15,7 @@ import numpy as np
 
 from gearchaos.arrays import Array, Integers
 from gearchaos.errors import FileError
+from gearchaos.outputs.variable import Variable, lane_axes, require_listed
 from gearchaos.results.files.atomic_file import PARTIAL, reason, replacing, unlinked_content
 from gearchaos.results.files.block_folder import (
     LOCK,
@@ -24,7 +25,6 @@ from gearchaos.results.files.block_folder import (
     settle_manifest,
 )
 from gearchaos.results.files.result_file import Metadata, write_result
-from gearchaos.results.variables import Variable, lane_axes, require_listed
 from gearchaos.version import Software
 
 Arrays: TypeAlias = Mapping[str, Array]

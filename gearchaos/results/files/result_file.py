@@ -14,15 +14,11 @@ import numpy as np
 
 from gearchaos.arrays import Array
 from gearchaos.interrupts import check
+from gearchaos.outputs.catalogue import HARMONICS
+from gearchaos.outputs.listing import GENERIC, Details
+from gearchaos.outputs.names import HARMONIC, diagram_axis
+from gearchaos.outputs.variable import Variable, lane_axes, require_listed
 from gearchaos.results.files.atomic_file import append_checksum, replacing
-from gearchaos.results.variables import (
-    HARMONIC,
-    Variable,
-    diagram_axis,
-    lane_axes,
-    listed,
-    require_listed,
-)
 
 SCHEMA = "gearchaos-sweep"
 SCHEMA_VERSION = "3.2"
@@ -171,7 +167,7 @@ def _write_metadata(file: h5py.File, metadata: Metadata) -> None:
 def _harmonics(parameters: Mapping[str, Variable]) -> list[Variable]:
     rows = (np.size(p.values) for p in parameters.values() if p.dims == (HARMONIC,))
     numbers = np.arange(1, next(rows, 0) + 1)
-    return listed((), {"harmonics": numbers.size > 0}, {HARMONIC: numbers})
+    return GENERIC.variables((), {HARMONICS: numbers.size > 0}, Details({HARMONIC: numbers}))
 
 
 def _create(file: h5py.File, variable: Variable, shape: tuple[int, ...]) -> None:

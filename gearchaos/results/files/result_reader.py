@@ -13,12 +13,13 @@ import numpy as np
 from gearchaos.arrays import Array
 from gearchaos.configuration.ranges import LARGEST_VALUE
 from gearchaos.errors import FileError
-from gearchaos.results import variables as known
+from gearchaos.models.catalogues import due, scale_of
+from gearchaos.outputs.names import DIRECTION, HARMONIC, STATE, STATUS
+from gearchaos.outputs.variable import ORIGINS, Variable
 from gearchaos.results.files import stored_dataset as stored
 from gearchaos.results.files.atomic_file import checksum_fits, reason
 from gearchaos.results.files.result_file import PARAMETERS, SCHEMA, SCHEMA_VERSION
 from gearchaos.results.files.stored_dataset import UnfitError
-from gearchaos.results.variables import HARMONIC, ORIGINS, STATE, Variable
 
 Contents = tuple[
     list[Variable], dict[str, Array], dict[str, Variable], dict[str, str | int | float]
@@ -126,7 +127,7 @@ def _read(file: h5py.File, rows: bool) -> Contents:
                 data[name] = stored.values_of(name, dataset)
             more = {**_wording(notes), "fill_value": notes.get("_FillValue")}
             more |= {"flags": _words(notes, "flag_meanings")}
-            more |= {"errors": _words(notes, "ancillary_variables")}
+            more |= {"errors": _words(notes, "ancillary_variables"), "scale": scale_of(name)}
             variables[name] = Variable(name, dims, stored.dtype_of(name, dataset), **more)
     _check_variables(axes, variables, data)
     for dim in sizes.keys() - {HARMONIC}:
@@ -143,8 +144,8 @@ def _read(file: h5py.File, rows: bool) -> Contents:
             raise UnfitError(f"holds a parameter {name} that is none")
         values = stored.values_of(name, dataset)
         value = values if dims else float(values)
-        wording = _wording(notes)
-        parameters[name] = Variable(name, dims, "float64", **wording, values=value, origin=origin)
+        more = {**_wording(notes), "values": value, "origin": origin, "scale": scale_of(name)}
+        parameters[name] = Variable(name, dims, "float64", **more)
     return list(variables.values()), data, parameters, metadata
 
 
@@ -180,13 +181,13 @@ def _check_variables(
     """Compare what a sweep must yield with what there is; more than that is welcome."""
     if not axes or len(set(axes)) < len(axes):
         raise UnfitError("does not name its axes, each once")
-    for due, dims, dtype in known.due(axes, found):
-        got = found.get(due)
+    for name, dims, dtype in due(axes, found):
+        got = found.get(name)
         if got is None:
-            raise UnfitError(f"lacks the variable {due}")
+            raise UnfitError(f"lacks the variable {name}")
         if (got.dims, got.dtype) != (dims, dtype):
             raise UnfitError(
-                f"holds {due} as {got.dtype} over ({', '.join(got.dims)}), which should be "
+                f"holds {name} as {got.dtype} over ({', '.join(got.dims)}), which should be "
                 f"{dtype} over ({', '.join(dims)})"
             )
     for name in axes:
@@ -195,7 +196,7 @@ def _check_variables(
         if not (within and (np.diff(values) > 0).all()):
             rule = f"do not ascend, each once, between -{LARGEST_VALUE:g} and {LARGEST_VALUE:g}"
             raise UnfitError(f"holds values of {name} that {rule}")
-    for name in {known.STATUS, STATE, known.DIRECTION, "motion"} & found.keys():
+    for name in {STATUS, STATE, DIRECTION, "motion"} & found.keys():
         meanings = len(found[name].flags)
         if data[name].max() >= meanings or (name == STATE and data[name].size != meanings):
             raise UnfitError(f"holds a {name} without a meaning in its attribute flag_meanings")

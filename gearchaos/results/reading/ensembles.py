@@ -8,10 +8,10 @@ from numpy.typing import NDArray
 
 from gearchaos.arrays import Counts, Floats, Integers
 from gearchaos.errors import ConfigurationError
+from gearchaos.outputs.names import CROSSINGS, REPEATS
 from gearchaos.records.wilson import wilson_interval
 from gearchaos.results.reading.result import Result
 from gearchaos.results.reading.stage_table import label_text, require_labels
-from gearchaos.results.variables import CROSSINGS, REPEATS
 
 BOX = 5  # Starts along each side of a box of which `basin_entropy` asks how mixed it is.
 

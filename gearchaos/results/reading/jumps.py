@@ -10,11 +10,11 @@ from typing import NamedTuple
 import numpy as np
 
 from gearchaos.arrays import Counts, Floats, Integers, Mask
+from gearchaos.outputs.names import DIRECTION, WAYS
 from gearchaos.records.period import TOLERANCE, section_distance
+from gearchaos.results.reading.excitation import excitation_of
 from gearchaos.results.reading.result import Result, section_variables
 from gearchaos.results.reading.stage_table import labelled_lanes
-from gearchaos.results.scales import excitation_of
-from gearchaos.results.variables import DIRECTION, WAYS
 
 STEEPEST = 5.0
 """Neighbouring lanes lie this many times farther apart than those beside them where they jump."""

@@ -10,11 +10,12 @@ from typing import Any
 import numpy as np
 
 from gearchaos.arrays import Array
-from gearchaos.results import variables as known
+from gearchaos.outputs import names as known
+from gearchaos.outputs.variable import Variable
 from gearchaos.results.files.result_reader import printable, read_result
+from gearchaos.results.reading.excitation import excitation_of
 from gearchaos.results.reading.result import Result
 from gearchaos.results.reading.stage_table import labelled_lanes, one_axis, slice_facts, stage_table
-from gearchaos.results.scales import excitation_of
 
 ERRORS = {
     "section_error": ("section error", "from the step and from what the transient has left"),
@@ -91,7 +92,7 @@ def plain(value: Any) -> Any:
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
-def _parameter(parameter: known.Variable) -> dict[str, Any]:
+def _parameter(parameter: Variable) -> dict[str, Any]:
     value = np.asarray(parameter.values)
     # What differs from lane to lane may be a million numbers.
     along_axes = parameter.dims not in ((), (known.HARMONIC,))
@@ -99,7 +100,7 @@ def _parameter(parameter: known.Variable) -> dict[str, Any]:
     return {"origin": parameter.origin, **content, **_wording(parameter)}
 
 
-def _wording(entry: known.Variable) -> dict[str, str]:
+def _wording(entry: Variable) -> dict[str, str]:
     return {"units": entry.units, "long_name": entry.long_name}
 
 

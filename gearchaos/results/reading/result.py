@@ -16,13 +16,14 @@ import numpy as np
 from gearchaos.arguments import finite_number, one_of, path_text
 from gearchaos.arrays import Array
 from gearchaos.errors import ConfigurationError, FileError
-from gearchaos.results import variables as known
+from gearchaos.outputs import names as known
+from gearchaos.outputs.names import coordinate_text, diagram_axis
+from gearchaos.outputs.variable import Variable
 from gearchaos.results.files.atomic_file import checksum_fits
 from gearchaos.results.files.result_file import own_metadata, write_result
 from gearchaos.results.files.result_reader import fixed_coordinates, read_result
 from gearchaos.results.reading import tables
-from gearchaos.results.scales import in_physical_units
-from gearchaos.results.variables import Variable, coordinate_text, diagram_axis
+from gearchaos.results.reading.physical_units import in_physical_units
 
 __all__ = ["Result", "open_result", "section_variables"]
 

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from gearchaos.arrays import Counts, Floats
 from gearchaos.errors import ConfigurationError, FileError
+from gearchaos.outputs.names import BANDS, LABELS, LARGEST_EXPONENT, REPEATS, UNSWEPT
 from gearchaos.results.reading.result import Result
-from gearchaos.results.variables import BANDS, LABELS, LARGEST_EXPONENT, REPEATS, UNSWEPT
 
 
 class LabelledLanes(NamedTuple):

@@ -1,0 +1,27 @@
+"""The catalogues of all models, for result files, which do not name their model."""
+
+from collections.abc import Collection, Iterator, Sequence
+
+from gearchaos.models.gear_pair.outputs import CATALOGUE as GEAR_PAIR
+from gearchaos.outputs.entries import Subject
+from gearchaos.outputs.scales import PURE, Scale
+
+CATALOGUES = (GEAR_PAIR,)
+
+
+def scale_of(name: str) -> Scale:
+    """Return the scale of an output or a parameter by its name, that of pure numbers if unknown."""
+    scales = (catalogue.scale_of(name) for catalogue in CATALOGUES)
+    return next((scale for scale in scales if scale != PURE), PURE)
+
+
+def subject_of(name: str) -> Subject:
+    """Return the state of a model by its name; an unknown one is called by its name."""
+    found = (catalogue.subject(name) for catalogue in CATALOGUES)
+    return next((one for one in found if one is not None), Subject(name, name.replace("_", " ")))
+
+
+def due(axes: Sequence[str], found: Collection[str]) -> Iterator[tuple[str, tuple[str, ...], str]]:
+    """Give name, dimensions and type of all that a file with these variables must hold."""
+    for catalogue in CATALOGUES:
+        yield from catalogue.due(axes, found)

@@ -1,0 +1,1 @@
+"""The catalogue of outputs: every array that a result may hold, described once."""

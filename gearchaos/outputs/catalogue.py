@@ -1,0 +1,304 @@
+"""The generic entries of the catalogue: outputs of any model, in the order of a file.
+
+A model adds its own parts and wordings; that of the gear pair is
+`gearchaos.models.gear_pair.outputs`.
+"""
+
+from gearchaos.outputs import names
+from gearchaos.outputs.entries import LANES, Kind, Output, Part, numbers
+from gearchaos.outputs.scales import Quantity
+
+CONTACTS = ("apart", "driving_flank", "back_flank")
+"""Meanings of the contacts 0, 1 and 2 of an element at one instant."""
+NO_CONTACT = 255
+"""Contact of a lane that diverged."""
+DEFAULT_PERIODS = 32
+"""Mesh periods of a response where their number is not given."""
+
+REALISATION_AXIS = Part(
+    "with several drawn systems",
+    (numbers(names.REALISATION, "drawn system"),),
+)
+START_AXIS = Part(
+    "with several starts",
+    (numbers(names.START, "number of the start among those of one parameter value"),),
+)
+DIRECTION_AXIS = Part(
+    "with states that are carried in both directions",
+    (
+        numbers(
+            names.DIRECTION,
+            "direction in which each value starts from the end state of its neighbour",
+            meanings=names.WAYS,
+        ),
+    ),
+)
+HARMONICS = Part(
+    "with parameters that have a value for each harmonic",
+    (numbers(names.HARMONIC, "harmonic of the mesh frequency in the mesh stiffness", "$n$"),),
+)
+SECTION_POINTS = Part(
+    "with sections",
+    (
+        numbers(
+            names.SECTION_POINT,
+            "number of the section point, one mesh period apart; the last one ends the lane",
+        ),
+    ),
+)
+SECTION = Part(
+    "with sections, for each of their states",
+    (
+        Output(
+            f"{names.SECTION}@",
+            "@ at the stroboscopic section",
+            "@",
+            dims=(LANES, names.SECTION_POINT),
+            scale=None,
+            errors=("section_error",),
+        ),
+    ),
+    repeated_for=(Kind.STATE,),
+)
+LYAPUNOV = Part(
+    "with the largest Lyapunov exponent",
+    (
+        Output(
+            names.LARGEST_EXPONENT,
+            "largest Lyapunov exponent",
+            r"$\lambda_1$",
+            scale=Quantity.GROWTH_RATE,
+            errors=(names.LARGEST_EXPONENT + names.STANDARD_ERROR, names.STEP_ERROR),
+        ),
+        Output(
+            names.LARGEST_EXPONENT + names.STANDARD_ERROR,
+            "standard error of the largest Lyapunov exponent, 0 where it is that of a periodic "
+            "orbit",
+            r"$s_{\lambda_1}$",
+            scale=Quantity.GROWTH_RATE,
+        ),
+    ),
+)
+MOTION = Part(
+    "with labels of the motions",
+    (
+        Output("motion", "kind of motion", dtype="uint8", fill_value=None),
+        Output(
+            "period",
+            "@ after which the motion repeats, 0 where it is not periodic",
+            "$n$",
+            dtype="int32",
+            fill_value=None,
+        ),
+        Output(
+            "return_distance",
+            "smallest distance after which the motion returns, of all states, scaled",
+        ),
+        Output(
+            names.BANDS,
+            "bands a chaotic or quasi-periodic section hops between in turn, 0 for other motions",
+            dtype="int32",
+            fill_value=None,
+        ),
+    ),
+)
+RECORD = Part(
+    "with labels of the motions and the largest Lyapunov exponent",
+    (
+        Output(
+            names.RECORD,
+            "whether the record holds one kind of motion, or another one before the labelled one",
+            dtype="uint8",
+            fill_value=None,
+        ),
+    ),
+)
+EXPONENTS = Part(
+    "with all Lyapunov exponents",
+    (
+        numbers(names.EXPONENT_NUMBER, "number of the Lyapunov exponent, the largest first", "$i$"),
+        Output(
+            "lyapunov_exponents",
+            "all Lyapunov exponents",
+            r"$\lambda_i$",
+            dims=(LANES, names.EXPONENT_NUMBER),
+            scale=Quantity.GROWTH_RATE,
+            errors=(f"lyapunov_exponents{names.STANDARD_ERROR}",),
+        ),
+        Output(
+            f"lyapunov_exponents{names.STANDARD_ERROR}",
+            "standard error of each Lyapunov exponent",
+            dims=(LANES, names.EXPONENT_NUMBER),
+            scale=Quantity.GROWTH_RATE,
+        ),
+        Output(
+            "lyapunov_sum",
+            "sum of all Lyapunov exponents as the damping gives it, exactly",
+            r"$\sum\lambda_i$",
+            scale=Quantity.GROWTH_RATE,
+        ),
+    ),
+)
+CROSSINGS = Part(
+    "if steps are split where an element is met or left",
+    (
+        Output(names.CROSSINGS, "clearance boundaries crossed per mesh period"),
+        Output(
+            "slowest_crossing",
+            "smallest speed of a gap at a crossing of its clearance boundary",
+            scale=Quantity.SPEED,
+        ),
+        Output(
+            "unsplit_steps",
+            "steps with more crossings than they were split at",
+            dtype="int32",
+            fill_value=None,
+        ),
+    ),
+)
+CONTACT = Part(
+    "with the contact of elements, for each element",
+    (
+        Output("time_driving_@", "share of the recorded time on the driving flank, @"),
+        Output("time_back_@", "share of the recorded time on the back flank, @"),
+        Output("time_apart_@", "share of the recorded time between the flanks, @"),
+        Output("impacts_driving_@", "impacts on the driving flank per mesh period, @"),
+        Output("impacts_back_@", "impacts on the back flank per mesh period, @"),
+        Output("approach_mean_@", "mean speed of approach at an impact, @", scale=Quantity.SPEED),
+        Output(
+            "approach_largest_@", "largest speed of approach at an impact, @", scale=Quantity.SPEED
+        ),
+        Output("contact_state_@", "kind of @ contact", dtype="uint8", fill_value=None),
+    ),
+    repeated_for=(Kind.ELEMENT,),
+)
+EXTREMES = Part(
+    "for each state whose extremes are kept",
+    (
+        Output("@_smallest", "smallest @", scale=None),
+        Output("@_largest", "largest @", scale=None),
+        Output("@_peak_to_peak", "peak to peak @", scale=None),
+    ),
+    repeated_for=(Kind.STATE,),
+)
+ORDERS = Part(
+    "with amplitudes",
+    (Output(names.ORDER, "frequency over mesh frequency", dims=(names.ORDER,), fill_value=None),),
+)
+AMPLITUDES = Part(
+    "with amplitudes, for each state whose extremes are kept and each signal",
+    (
+        Output(
+            f"{names.AMPLITUDE}@",
+            "amplitude of the @",
+            "@",
+            dims=(LANES, names.ORDER),
+            scale=None,
+        ),
+    ),
+    repeated_for=(Kind.STATE, Kind.SIGNAL),
+)
+CHECK = Part(
+    "with an error check",
+    (
+        Output(
+            "section_error",
+            "error of the section of a periodic lane in its last period, by the step and by what "
+            "the transient has left",
+        ),
+        Output(
+            names.STEP_ERROR,
+            "error of the largest Lyapunov exponent by the step",
+            scale=Quantity.GROWTH_RATE,
+        ),
+        Output(
+            "motion_changed",
+            "whether the lane moves in another way when the step is halved",
+            dtype="uint8",
+            fill_value=None,
+        ),
+    ),
+)
+EVERY_SWEEP = Part(
+    "always",
+    (
+        Output(names.STATUS, "status of the lane", dtype="uint8", fill_value=None),
+        Output(
+            "diverged_period",
+            "mesh period in which the lane diverged, -1 where it did not",
+            dtype="int32",
+            fill_value=-1,
+        ),
+        numbers(names.STATE, "number of the state variable, which its meaning names"),
+        Output("start_state", "state at the start of the lane", dims=(LANES, names.STATE)),
+        Output("end_state", "state at the end of the lane", dims=(LANES, names.STATE)),
+    ),
+    required=True,
+)
+TIME = Part(
+    "in a response",
+    (
+        Output(
+            names.TIME,
+            "time in mesh periods",
+            r"$\Omega\tau/2\pi$",
+            dims=(names.TIME,),
+            fill_value=None,
+        ),
+        Output(
+            names.MESH_PERIOD,
+            "mesh period in units of dimensionless time",
+            r"$2\pi/\Omega$",
+            fill_value=None,
+        ),
+    ),
+    in_time=True,
+)
+MOTION_IN_TIME = Part(
+    "in a response, for each state and each acceleration",
+    (Output("@", "@", "@", dims=(LANES, names.TIME), scale=None),),
+    repeated_for=(Kind.STATE, Kind.ACCELERATION),
+    in_time=True,
+)
+CONTACT_IN_TIME = Part(
+    "in a response, for each element",
+    (
+        Output(
+            "contact_@",
+            "contact in the @ direction",
+            dims=(LANES, names.TIME),
+            dtype="uint8",
+            fill_value=NO_CONTACT,
+            meanings=CONTACTS,
+        ),
+    ),
+    repeated_for=(Kind.ELEMENT,),
+    in_time=True,
+)
+
+PARTS = (
+    REALISATION_AXIS,
+    START_AXIS,
+    DIRECTION_AXIS,
+    HARMONICS,
+    SECTION_POINTS,
+    SECTION,
+    LYAPUNOV,
+    MOTION,
+    RECORD,
+    EXPONENTS,
+    CROSSINGS,
+    CONTACT,
+    EXTREMES,
+    ORDERS,
+    AMPLITUDES,
+    CHECK,
+    EVERY_SWEEP,
+    TIME,
+    MOTION_IN_TIME,
+    CONTACT_IN_TIME,
+)
+"""All generic parts in the order of a file."""
+
+AXES = {part.outputs[0].name: part for part in (REALISATION_AXIS, START_AXIS, DIRECTION_AXIS)}
+"""Parts of the axes along which no parameter is swept, by the name of the axis."""
