@@ -75,7 +75,7 @@ def _sweep_sheets(results: "Sequence[Result]", options: Namespace) -> "list[Shee
     from gearchaos.figures.labels import in_a_name, in_words
     from gearchaos.figures.lanes import swept_axes
     from gearchaos.figures.style import SINGLE_COLUMN_MM
-    from gearchaos.results.reading.result import DEFAULT_VARIABLE
+    from gearchaos.models.gear_pair.outputs import DEFAULT_VARIABLE
 
     # A detail does not take the place of the whole.
     name = in_a_name(results[0].fixed, digits=6)

@@ -24,8 +24,9 @@ from gearchaos.figures.maps import NO_VALUE
 from gearchaos.figures.panel import Diagram, close_panel
 from gearchaos.figures.stages import look_of
 from gearchaos.figures.style import BLACK, GREY, VERMILION
+from gearchaos.models.gear_pair.outputs import DEFAULT_VARIABLE
 from gearchaos.outputs.names import LARGEST_EXPONENT, ORDER, RECORD, STANDARD_ERROR, STATUS
-from gearchaos.results.reading.result import DEFAULT_VARIABLE, Result, section_variables
+from gearchaos.results.reading.result import Result, section_variables
 
 BAND_STANDARD_ERRORS = 2.0
 DECADES = 5  # Below the largest amplitude; what is smaller has the lightest colour.

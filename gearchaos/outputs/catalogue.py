@@ -265,7 +265,7 @@ CONTACT_IN_TIME = Part(
     (
         Output(
             "contact_@",
-            "contact in the @ direction",
+            "contact, @",
             dims=(LANES, names.TIME),
             dtype="uint8",
             fill_value=NO_CONTACT,

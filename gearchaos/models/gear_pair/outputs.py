@@ -29,7 +29,9 @@ _COORDINATES = [
 STATES = tuple(
     subject for displacement, rate, _ in _COORDINATES for subject in (displacement, rate)
 )
-"""All states in their order; a scene has the first 2, 6 or 10."""
+"""All states in their order; a scene lacks those of the effects that it does not list."""
+DEFAULT_VARIABLE = f"{names.SECTION}{STATES[0].name}"
+"""The output that a diagram shows where none is chosen."""
 ELEMENTS = (Subject("tangential", "tangential", "$N_y$"), Subject("axial", "axial", "$N_z$"))
 """Directions in which the teeth have a clearance."""
 DIRECTIONS = tuple(element.name for element in ELEMENTS)
@@ -116,6 +118,7 @@ CATALOGUE = Catalogue(
     parameters={"mesh_frequency": Quantity.MESH_FREQUENCY},
     long_names={
         names.REALISATION: "drawn gear pair",
+        "contact_@": "contact in the @ direction",
         names.CROSSINGS: (
             "clearance boundaries crossed per mesh period, tangential and axial together"
         ),

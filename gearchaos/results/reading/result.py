@@ -9,37 +9,56 @@ from contextlib import suppress
 from dataclasses import replace
 from html import escape
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
-from gearchaos.arguments import finite_number, one_of, path_text
+from gearchaos.arguments import one_of, path_text
 from gearchaos.arrays import Array
 from gearchaos.errors import ConfigurationError, FileError
-from gearchaos.outputs import names as known
-from gearchaos.outputs.names import coordinate_text, diagram_axis
+from gearchaos.models.gear_pair.outputs import DEFAULT_VARIABLE
+from gearchaos.outputs.names import SECTION, SECTION_POINT, coordinate_text, diagram_axis
 from gearchaos.outputs.variable import Variable
 from gearchaos.results.files.atomic_file import checksum_fits
 from gearchaos.results.files.result_file import own_metadata, write_result
 from gearchaos.results.files.result_reader import fixed_coordinates, read_result
 from gearchaos.results.reading import tables
 from gearchaos.results.reading.physical_units import in_physical_units
+from gearchaos.results.reading.selection import (
+    Method,
+    number_on,
+    parameters_at,
+    part_of,
+    remaining,
+)
 
 __all__ = ["Result", "open_result", "section_variables"]
-
-Method = Literal["nearest", "within"] | None
-DEFAULT_VARIABLE = "section_delta_5"
 
 
 class Result:
     """Named arrays of one sweep, in memory.
 
-    ``axes``: names of the dimensions of the lanes: second swept parameter, first swept parameter,
-    realisation, start; those that there are; ``variables``: what there is, in the order of the
-    file; ``data`` by name: the values of each variable, of the shape of its dimensions or with all
-    axes flattened into the first one; those that carry their own ``values`` may be left out;
-    ``parameters``, ``metadata`` by name: dimensionless groups with their origin; title,
-    formulation, configuration, provenance; ``fixed_axes`` by name: axes that `sel` has fixed.
+    A result is a mapping: ``result["status"]`` is an array, and iteration gives the names.
+
+    Attributes
+    ----------
+    axes : tuple of str
+        Names of the dimensions of the lanes in the order second swept parameter, first swept
+        parameter, realisation, start, direction. Only those that the sweep has.
+    variables : dict of str to Variable
+        Description of each array, in the order of the file.
+    parameters : dict of str to Variable
+        Dimensionless groups with their origin, and the scales that make the model dimensionless.
+    metadata : dict of str to str, int or float
+        Title, formulation, configuration and provenance: the root attributes of a file.
+    fixed_axes : dict of str to Variable
+        Axes that `sel` has fixed.
+
+    Examples
+    --------
+    >>> result = gearchaos.open_result("pan2021.h5")  # doctest: +SKIP
+    >>> result["lyapunov_exponent"]  # doctest: +SKIP
+    >>> lane = result.sel(pitch_error=12.47, method="nearest")  # doctest: +SKIP
     """
 
     def __init__(
@@ -51,6 +70,16 @@ class Result:
         metadata: Mapping[str, str | int | float],
         fixed_axes: Mapping[str, Variable] = {},
     ) -> None:
+        """Make a result of arrays in memory.
+
+        Parameters
+        ----------
+        axes, variables, parameters, metadata, fixed_axes
+            As the attributes; ``variables`` is a sequence in the order of the file.
+        data : mapping of str to array
+            Values of each variable by its name, of the shape of its dimensions, or with all axes
+            flattened into the first one. Variables that carry their own values may be left out.
+        """
         self.axes = tuple(axes)
         self.parameters = dict(parameters)
         self.metadata = {**metadata, **own_metadata(self.axes)}
@@ -69,18 +98,18 @@ class Result:
 
     @property
     def axis(self) -> str:
-        """The axis along which a diagram runs: the first swept parameter."""
+        """Name of the axis along which a diagram runs: the first swept parameter."""
         return diagram_axis(self.axes)
 
     @property
     def fixed(self) -> dict[str, float]:
-        """Coordinates of the axes that `sel` has fixed, or of the lane from which this goes on."""
+        """Values of the axes that `sel` has fixed, or of the lane that a response continues."""
         found = fixed_coordinates(self.metadata)
         return {axis: value for axis, value in found.items() if axis not in self.axes}
 
     @property
     def where(self) -> str:
-        """Where `sel` has fixed axes, in words: ``pitch_error = 5.86, direction = upwards``."""
+        """The fixed values in words: ``pitch_error = 5.86, direction = upwards``."""
         fixed = self.fixed.items()
         return ", ".join(f"{axis} = {coordinate_text(axis, value)}" for axis, value in fixed)
 
@@ -94,30 +123,40 @@ class Result:
         return len(self._data)
 
     def __getitem__(self, name: str) -> Array:
-        """Give the values of a variable, of the shape of its dimensions.
+        """Return the values of a variable, of the shape of its dimensions.
 
-        Raises KeyError if there is no such variable; the message lists those there are.
+        Raises
+        ------
+        KeyError
+            If there is no such variable; the message lists those that exist.
         """
         return self._data[self._known(name)]
 
     def dims(self, name: str) -> tuple[str, ...]:
-        """Give the names of the dimensions of a variable."""
+        """Return the names of the dimensions of a variable; KeyError if there is none."""
         return self.variables[self._known(name)].dims
 
     def attributes(self, name: str) -> dict[str, Any]:
-        """Give units, long_name, symbol and, for the status, flag_values and flag_meanings."""
+        """Return units, long_name, symbol and flags of a variable; KeyError if there is none."""
         return self.variables[self._known(name)].attributes
 
     def lanes(self, name: str) -> Array:
-        """Give a variable of the lanes with all axes flattened into the first dimension."""
+        """Return a variable of the lanes with all axes flattened into the first dimension."""
         values = self[name]
         count = math.prod(values.shape[: len(self.axes)])
         return values.reshape(count, *values.shape[len(self.axes) :])
 
     def along(self, axis: str) -> Array:
-        """Give the value of an axis for every lane in that order, shape (lanes,).
+        """Return the value of an axis for every lane in the order of `lanes`.
 
-        Raises ConfigurationError if there is no such axis.
+        Returns
+        -------
+        array, shape (lanes,)
+
+        Raises
+        ------
+        ConfigurationError
+            If the result has no such axis.
         """
         if axis not in self.axes:
             there = ", ".join(self.axes) or "none: leave one in sel"
@@ -126,73 +165,71 @@ class Result:
         return np.ravel(grid[self.axes.index(axis)])
 
     def sel(self, method: Method = None, **coordinates: float | str) -> Result:
-        """Fix axes at one of their values each; what is left runs over the other axes.
+        """Fix axes at one of their values each.
 
-        Coordinates are by the name of their axis, and directions by their own, such as
-        ``direction="upwards"``; those that were met are in `fixed`, and their axes in `fixed_axes`.
-        With ``"nearest"`` the nearest value is taken, the larger of two, with ``"within"`` as well,
-        but nothing further than half a step beyond the outermost; by default a value must be met
-        exactly. Raises ConfigurationError if there is no such axis or value; the message names the
-        nearest.
+        Parameters
+        ----------
+        method : {None, "nearest", "within"}
+            None: the value must be one of the axis. ``"nearest"``: the nearest one is taken, the
+            larger of two. ``"within"``: the same, but not for values more than half a step beyond
+            the ends of the axis.
+        **coordinates : float or str
+            Values by the name of the axis. A direction is given by its name, such as
+            ``direction="upwards"``.
+
+        Returns
+        -------
+        Result
+            The lanes over the remaining axes. Its `fixed` holds the values that were taken, its
+            `fixed_axes` their axes.
+
+        Raises
+        ------
+        ConfigurationError
+            If there is no such axis or value; the message names the nearest one.
+
+        Examples
+        --------
+        >>> result.sel(pitch_error=12.47, direction="upwards")  # doctest: +SKIP
         """
         one_of("method", method, (None, "nearest", "within"))
-        index: dict[str, int] = {}
+        at: dict[str, int] = {}
         for name, wanted in coordinates.items():
             if name not in self.axes:
                 there = ", ".join(self.axes) or "none"
                 raise ConfigurationError(f"{name}: is no axis of the result; its axes: {there}")
-            values, flags = self[name], self.variables[name].flags
-            try:
-                wanted = finite_number(name, flags.index(wanted) if wanted in flags else wanted)
-            except ConfigurationError:
-                rule = " or ".join(["a number", *flags])
-                raise ConfigurationError(f"{name} = {wanted}: must be {rule}") from None
-            # Far from all of them, every difference would be the same number.
-            near = np.clip(wanted, values[0], values[-1])
-            number = values.size - 1 - int(np.argmin(np.abs(values - near)[::-1]))
-            if method is None and values[number] != wanted:
-                raise ConfigurationError(
-                    f"{name} = {wanted:g}: is none of the {values.size} values of the result; the "
-                    f'nearest is {values[number]!s}: give it, or method="nearest"'
-                )
-            steps = np.diff(values) if values.size > 1 else [math.inf]
-            reach = values[0] - steps[0] / 2.0, values[-1] + steps[-1] / 2.0
-            if method == "within" and not reach[0] <= wanted <= reach[1]:
-                raise ConfigurationError(
-                    f"{name} = {wanted:g}: lies beyond the values of the result, {values[0]:g} to "
-                    f"{values[-1]:g}; give one between these"
-                )
-            index[name] = number
-        if not index:
+            at[name] = number_on(self.variables[name], wanted, method)
+        if not at:
             return self
-        met = self.fixed | {name: float(self[name][at]) for name, at in index.items()}
-        fixed = " ".join(f"{name}={value!r}" for name, value in met.items())
-
-        def part(values: Any, dims: Sequence[str]) -> Any:
-            return values[tuple(index.get(dim, slice(None)) for dim in dims)] if dims else values
-
-        def rest(dims: Sequence[str]) -> tuple[str, ...]:
-            return tuple(dim for dim in dims if dim not in index)
-
-        left = [variable for variable in self.variables.values() if variable.name not in index]
+        fixed = self.fixed | {name: float(self[name][number]) for name, number in at.items()}
+        text = " ".join(f"{name}={value!r}" for name, value in fixed.items())
+        left = [variable for variable in self.variables.values() if variable.name not in at]
         return Result(
-            rest(self.axes),
-            [replace(variable, dims=rest(variable.dims)) for variable in left],
-            {variable.name: part(self[variable.name], variable.dims) for variable in left},
-            {
-                name: replace(entry, values=part(entry.values, entry.dims), dims=rest(entry.dims))
-                for name, entry in self.parameters.items()
-            },
-            {**self.metadata, "fixed": fixed},
-            {**self.fixed_axes, **{name: self.variables[name] for name in index}},
+            remaining(self.axes, at),
+            [replace(variable, dims=remaining(variable.dims, at)) for variable in left],
+            {one.name: part_of(self[one.name], one.dims, at) for one in left},
+            parameters_at(self.parameters, at),
+            {**self.metadata, "fixed": text},
+            {**self.fixed_axes, **{name: self.variables[name] for name in at}},
         )
 
     def physical(self, *names: str) -> Result:
-        """Give these variables, by default all, in physical units: um, m/s, N, 1/s.
+        """Convert variables to physical units: um, m/s, m/s^2, N, 1/s and Hz.
 
-        Pure numbers stay, and `parameters`, among them what the units are made of. Raises
-        ConfigurationError if the configuration gave no physical pair, KeyError if there is no such
-        variable.
+        Pure numbers and `parameters` stay as they are.
+
+        Parameters
+        ----------
+        *names : str
+            Names of the variables; by default all.
+
+        Raises
+        ------
+        ConfigurationError
+            If the configuration of the result describes no physical pair, or if a scale varies
+            along an axis that a variable lacks.
+        KeyError
+            If there is no such variable.
         """
         wanted = [self._known(name) for name in names or self]
         changed = {
@@ -207,8 +244,18 @@ class Result:
     def save(self, path: str | os.PathLike[str], overwrite: bool = False) -> None:
         """Write the result to an HDF5 file, which appears complete or not at all.
 
-        Raises FileError if the file exists and may not be overwritten, cannot be written, or if no
-        axis is left.
+        Parameters
+        ----------
+        path : path-like
+            Name of the file.
+        overwrite : bool
+            Whether an existing file is replaced.
+
+        Raises
+        ------
+        FileError
+            If the file exists and is not to be replaced, if it cannot be written, or if the result
+            has no axis left.
         """
         path = path_text(path, "the file to be written")
         if not self.axes:
@@ -240,18 +287,35 @@ class Result:
 
 
 def section_variables(result: Result) -> tuple[str, ...]:
-    """Return the section variables of a result, `section_delta_5` first where there is one."""
-    dims = (*result.axes, known.SECTION_POINT)
-    names = [
-        name for name in result if name.startswith(known.SECTION) and result.dims(name) == dims
-    ]
+    """Return the names of the sections of a result, `DEFAULT_VARIABLE` first if it is there."""
+    dims = (*result.axes, SECTION_POINT)
+    names = [name for name in result if name.startswith(SECTION) and result.dims(name) == dims]
     return tuple(sorted(names, key=lambda name: name != DEFAULT_VARIABLE))
 
 
 def open_result(path: str | os.PathLike[str], *, rows: bool = True) -> Result:
-    """Read a result file into memory; without ``rows`` only variables over axes alone, in a moment.
+    """Read a result file into memory.
 
-    Raises FileError if the file is missing, damaged, of another kind or another major version.
+    Parameters
+    ----------
+    path : path-like
+        Name of the file.
+    rows : bool
+        False: read only variables over the axes alone, which is fast for a file of any size.
+
+    Returns
+    -------
+    Result
+
+    Raises
+    ------
+    FileError
+        If the file is missing or damaged, if it is no result, or if its format has another major
+        version.
+
+    Examples
+    --------
+    >>> result = gearchaos.open_result("pan2021.h5")  # doctest: +SKIP
     """
     path = path_text(path, "a result file")
     variables, data, parameters, metadata = read_result(path, rows=rows)
@@ -260,9 +324,9 @@ def open_result(path: str | os.PathLike[str], *, rows: bool = True) -> Result:
 
 
 def completed(path: str | os.PathLike[str]) -> Result | None:
-    """Open a result without its rows; None if there is none, or it is not as it was written."""
+    """Open a finished result without its rows; None if there is no file or it was changed."""
     with suppress(OSError, ValueError, FileError):
-        # Whoever opened a pipe would wait for its writer.
+        # isfile first: opening a pipe would wait for a writer.
         if os.path.isfile(path) and checksum_fits(Path(path)):
             return open_result(path, rows=False)
     return None
