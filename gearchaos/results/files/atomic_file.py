@@ -1,9 +1,9 @@
-"""Files that appear complete or not at all, and tell by a checksum whether they still are.
+"""Files that appear complete or not at all, with a checksum at their end.
 
-The last line of a result file is a checksum of all that comes before it. HDF5 checks the numbers of
-a dataset, but neither texts nor the bookkeeping between datasets, and damage in the latter can make
-its library run forever. A line after the end of the HDF5 data disturbs no reader, and is checked
-before the library sees the file.
+The last line of a result file is a checksum of all bytes before it. HDF5 has checksums of the
+numbers of a dataset, but not of texts and of its own structures; damage in the latter can make its
+library loop forever. Readers of HDF5 ignore a line after the end of the data. gearchaos checks this
+line before it opens the file with the library.
 """
 
 import errno
@@ -20,10 +20,10 @@ from shutil import copymode
 from gearchaos.errors import FileError
 
 PARTIAL = ".partial"
-"""Ending of the names of unfinished files; nothing reads them and they can be deleted."""
+"""Ending of the names of unfinished files. Nothing reads them; they can be deleted."""
 
 UNDISTURBED: int = getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0)
-"""Flags with which a file in a folder of ours is opened: no link, and no waiting for a writer."""
+"""Flags for files in a folder of our own: do not follow a link, do not wait for a writer."""
 
 _REMEDIES = {
     errno.ENOSPC: "free some space or choose another place",
@@ -41,7 +41,7 @@ _PIECE = 1 << 20
 
 
 def reason(error: BaseException) -> str:
-    """Word the cause of a failed operation, also where it is buried in the text of HDF5."""
+    """Return the cause of a failed operation in words, also if only a text of HDF5 contains it."""
     number = getattr(error, "errno", None)
     if number is None and (found := re.search(r"errno = (\d+)", str(error))):
         number = int(found[1])
@@ -52,11 +52,11 @@ def reason(error: BaseException) -> str:
 
 @contextmanager
 def writing(path: str | os.PathLike[str]) -> Iterator[None]:
-    """Turn whatever goes wrong while writing a file into a FileError with a remedy."""
+    """Turn an error while a file is written into a FileError with a remedy."""
     try:
         yield
     except (OSError, RuntimeError) as error:
-        # A full disk that HDF5 meets while it closes a file is a RuntimeError.
+        # h5py raises a RuntimeError if the disk is full when a file is closed.
         if isinstance(error, RuntimeError) and "errno = " not in str(error):
             raise
         text = reason(error)
@@ -66,10 +66,20 @@ def writing(path: str | os.PathLike[str]) -> Iterator[None]:
 
 
 def check_output(path: str | os.PathLike[str], overwrite: bool = False) -> None:
-    """Make sure that a file can be written, before anything is computed for it.
+    """Check that a file can be written, before anything is computed for it.
 
-    Raises FileError if it exists and must not be overwritten, is a directory or a device, or if
-    its folder is missing or cannot be written to.
+    Parameters
+    ----------
+    path : path-like
+        Name of the file.
+    overwrite : bool
+        Whether an existing file may be replaced.
+
+    Raises
+    ------
+    FileError
+        If the file exists and must not be replaced, if it is a directory or a device, or if its
+        folder is missing or cannot be written to.
     """
     with writing(path):
         target = _checked_target(path, overwrite)
@@ -77,7 +87,7 @@ def check_output(path: str | os.PathLike[str], overwrite: bool = False) -> None:
 
 
 def unlinked_content(path: Path, most: int) -> bytes:
-    """Read a file, unless it is a link: at most so many bytes, and without waiting for any."""
+    """Read at most this number of bytes of a file; fail on a link, and do not wait for data."""
     descriptor = os.open(path, os.O_RDONLY | UNDISTURBED)
     with open(descriptor, "rb") as file:
         return file.read(min(most, os.fstat(descriptor).st_size))
@@ -91,32 +101,43 @@ def replacing(
     scratch: str | os.PathLike[str] | None = None,
     through_links: bool = True,
 ) -> Iterator[Path]:
-    """Write a file under a temporary name; it gets its own name once it is complete on the disk.
+    """Write a file under a temporary name, and rename it once it is complete on the disk.
 
-    The temporary name, of an empty file to be filled, lies in ``scratch``, a folder on the same
-    file system, or beside the file, and goes away if the block raises. Without ``through_links``
-    a symbolic link is replaced itself. A file that is replaced hands on its rights. Raises
-    FileError if the file cannot be written; one that existed before is left as it was.
+    The new file has the permissions of the one it replaces.
+
+    Parameters
+    ----------
+    path : path-like
+        Name of the file.
+    overwrite : bool
+        Whether an existing file is replaced.
+    scratch : path-like, optional
+        Folder of the temporary file, on the same file system. By default the folder of the file.
+    through_links : bool
+        Whether the target of a symbolic link is written. Otherwise the link itself is replaced.
+
+    Yields
+    ------
+    Path
+        An empty temporary file, which the block fills. It is removed if the block raises.
+
+    Raises
+    ------
+    FileError
+        If the file cannot be written. A file that existed before is left unchanged.
     """
     with writing(path):
         target = _checked_target(path, overwrite) if through_links else Path(path)
         replaced = overwrite and target.exists()
-        # What others may not read is not shown to them half-written either.
+        # Private at first: others may not be allowed to read the file that is replaced.
         rights = 0o600 if replaced else 0o666
         partial = _create_partial(Path(scratch or target.parent), target.name, rights)
         try:
             yield partial
-            with suppress(OSError):  # A file system without rights.
+            with suppress(OSError):  # The file system may have no permissions.
                 if replaced:
                     copymode(target, partial)
-            _synchronise(partial)
-            if overwrite:
-                partial.replace(target)
-            else:
-                _rename_to_new(partial, target)
-            # Not every system can do this to a folder; the file itself is on the disk by now.
-            with suppress(OSError):
-                _synchronise(target.parent)
+            _put_in_place(partial, target, overwrite)
         except FileExistsError as error:
             raise _exists(path) from error
         finally:
@@ -126,7 +147,7 @@ def replacing(
 
 def _checked_target(path: str | os.PathLike[str], overwrite: bool) -> Path:
     name = os.fspath(path)
-    # realpath drops the slash that tells a folder from a file.
+    # Checked first: realpath drops the slash that marks a folder.
     no_folder = name.endswith(os.sep) and not os.path.isdir(name)
     if not name or "\0" in name or no_folder:
         raise FileError(f"{name!r}: is not a file name; give the name of a file")
@@ -151,13 +172,25 @@ def _exists(path: str | os.PathLike[str]) -> FileError:
 
 def _create_partial(folder: Path, name: str, mode: int = 0o666) -> Path:
     partial = folder / f".{name[:40]}.{secrets.token_hex(8)}{PARTIAL}"
-    # Not by the tempfile module: its files are readable by their owner only, and stay so.
+    # The tempfile module would make files that only their owner can read.
     os.close(os.open(partial, os.O_CREAT | os.O_EXCL | os.O_WRONLY, mode))
     return partial
 
 
+def _put_in_place(partial: Path, target: Path, overwrite: bool) -> None:
+    """Give a file that is complete its name, once its content is on the disk."""
+    _synchronise(partial)
+    if overwrite:
+        partial.replace(target)
+    else:
+        _rename_to_new(partial, target)
+    # Not every system can synchronise a folder; the file itself is on the disk already.
+    with suppress(OSError):
+        _synchronise(target.parent)
+
+
 def _rename_to_new(partial: Path, target: Path) -> None:
-    # A rename silently replaces what came to be in the meantime; a hard link does not.
+    # A rename would silently replace a file made in the meantime; a hard link fails instead.
     try:
         target.hardlink_to(partial)
     except FileExistsError:
@@ -185,20 +218,20 @@ def append_checksum(path: Path) -> None:
 
 
 def checksum_fits(path: Path) -> bool | None:
-    """Tell whether a file is as it was written; None if it has no checksum line.
+    """Return whether the checksum of a file fits its content; None if it has no checksum line.
 
-    Other programs that change a result file drop the line, so that its absence is no damage.
+    Other programs that change a result file drop the line, so its absence does not mean damage.
     """
     with path.open("rb") as file:
         size = file.seek(0, os.SEEK_END)
         file.seek(max(0, size - _LENGTH))
-        _, prefix, told = file.read().rpartition(_PREFIX)
+        _, prefix, stored = file.read().rpartition(_PREFIX)
         if not prefix:
             return None
-        remaining = size - len(prefix) - len(told)
+        remaining = size - len(prefix) - len(stored)
         file.seek(0)
         digest = hashlib.sha256()
         while remaining > 0 and (piece := file.read(min(_PIECE, remaining))):
             digest.update(piece)
             remaining -= len(piece)
-    return told == digest.hexdigest().encode() + b"\n"
+    return stored == digest.hexdigest().encode() + b"\n"

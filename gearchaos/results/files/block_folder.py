@@ -1,6 +1,6 @@
-"""The folder beside an unfinished output: who works in it, and whose its finished blocks are.
+"""The folder beside an unfinished output: its lock, and the manifest of its finished blocks.
 
-Two sweeps do not work on the same output, unless each knows its shard.
+Two sweeps cannot write to the same output at the same time, except as shards of one sweep.
 """
 
 import json
@@ -36,13 +36,31 @@ _LONGEST = 60
 
 
 class StoreLock:
-    """A locked file in a folder that is made if need be; a killed process leaves it unlocked.
+    """A locked file in the folder of an output; a killed process leaves it unlocked.
 
-    A sweep that takes all blocks has the folder to itself. Shards share it among each other; two
-    that are the same do the same work and write the same bits. Where the system has no such locks,
-    two sweeps on one output are not noticed. `new` tells whether there was no such file before.
-    Raises FileError if another process holds the lock, if the folder is another user's or a link,
-    or if it cannot be made.
+    A sweep of all blocks locks the folder for itself. Shards share the lock; two equal shards do
+    the same work and write the same bits. On a system without such locks, two sweeps that write to
+    one output are not detected.
+
+    Parameters
+    ----------
+    folder : Path
+        The folder; it is made if it does not exist.
+    output : Path
+        The result file, for messages.
+    shared : bool
+        Whether other shards may hold the lock as well.
+
+    Attributes
+    ----------
+    new : bool
+        Whether the file did not exist before.
+
+    Raises
+    ------
+    FileError
+        If another process holds the lock, if the folder is a link or belongs to another user, or
+        if it cannot be made.
     """
 
     def __init__(self, folder: Path, output: Path, shared: bool = False) -> None:
@@ -52,7 +70,7 @@ class StoreLock:
             while self._descriptor is None:
                 with suppress(FileExistsError):
                     folder.mkdir(mode=0o700)
-                # A sweep that finishes may remove the folder, or the file that was just opened.
+                # A sweep that finishes may remove the folder or the open file; then try again.
                 with suppress(FileNotFoundError):
                     _require_own(folder)
                     self.new = not os.path.lexists(path)
@@ -73,7 +91,7 @@ class StoreLock:
                             os.close(descriptor)
 
     def alone(self) -> bool:
-        """Tell whether nobody else works in the folder, and keep it so."""
+        """Take the lock for this process alone; return whether that succeeded."""
         with suppress(BlockingIOError):
             if self._descriptor is not None:
                 _lock(self._descriptor, shared=False)
@@ -81,14 +99,14 @@ class StoreLock:
         return False
 
     def release(self) -> None:
-        """Let other sweeps in."""
+        """Release the lock, so that other sweeps can use the folder."""
         if self._descriptor is not None:
             os.close(self._descriptor)
             self._descriptor = None
 
 
 def _require_own(folder: Path) -> None:
-    """Refuse a link, which leads who knows where, and what another user can put files into."""
+    """Refuse a link, and a folder into which another user can put files."""
     found = folder.lstat()
     ours = fcntl is None or found.st_uid == os.geteuid()
     if not (ours and stat.S_ISDIR(found.st_mode)):
@@ -103,7 +121,7 @@ def _lock(descriptor: int, shared: bool) -> None:
     except BlockingIOError:
         raise
     except OSError:
-        pass  # A file system without locks.
+        pass  # The file system has no locks.
 
 
 def settle_manifest(
@@ -111,9 +129,10 @@ def settle_manifest(
 ) -> None:
     """Write the manifest of a folder, and refuse a folder of another sweep.
 
-    ``beside`` decides nothing: ``text``, the configuration as it was written, and ``shards``, into
-    how many whoever began divided the sweep. A manifest that somebody else has just written stays
-    unless `overwrite` is set. Raises FileError as `require_same` does.
+    ``decisive`` are the facts that must agree. ``beside`` are further facts: ``text``, the
+    configuration as it was written, and ``shards``, the number of shards. A manifest that another
+    process has just written is kept unless ``overwrite`` is set. Raises FileError as `require_same`
+    does.
     """
     path = folder / MANIFEST
     try:
@@ -129,11 +148,11 @@ def settle_manifest(
 def require_same(
     what: str, earlier: Facts, now: Facts, otherwise: str = "delete the folder"
 ) -> None:
-    """Refuse what was computed for another configuration or by another gearchaos.
+    """Refuse data that were computed for another configuration or by another gearchaos.
 
-    ``earlier`` and ``now`` are decisive facts, of which those are compared that there are now;
-    ``what`` says where what was found, and ``otherwise`` what to do unless one goes back to it.
-    Raises a FileError that names what differs, with both values.
+    ``earlier`` and ``now`` are decisive facts; those in ``now`` are compared. ``what`` names the
+    data in the message, ``otherwise`` the remedy beside going back to the earlier configuration.
+    Raises a FileError that names each difference with both values.
     """
     if keys := [key for key in now if earlier.get(key) != now[key]]:
         facts = ({key: said[key] for key in keys if key in said} for said in (earlier, now))
@@ -145,7 +164,7 @@ def require_same(
 
 
 def _differing(*facts: Facts) -> list[str]:
-    """Word software and keys of the configuration in which two rows of facts differ."""
+    """Return the software and the keys of the configuration that differ, each in words."""
     first, second = map(_flat, facts)
     return [
         f"{key} ({_short(first.get(key, 'absent'))}, now {_short(second.get(key, 'absent'))})"
@@ -155,25 +174,25 @@ def _differing(*facts: Facts) -> list[str]:
 
 
 def _short(value: object) -> str:
-    """Word a value, of a list or the text of a file no more than where it begins."""
+    """Return a value as text; only the beginning of a long one."""
     text = str(value)
     return text if len(text) <= _LONGEST else f"{text[:_LONGEST]!r}..."
 
 
 def _flat(facts: Facts) -> dict[str, Any]:
     flat = {key: facts[key] for key in (*Software._fields, "schema_version") if key in facts}
-    with suppress(ValueError, RecursionError):  # Not written by us: all keys are absent.
+    with suppress(ValueError, RecursionError):  # Written by another program: no key is known.
         flat |= flat_tables(tomllib.loads(facts.get("configuration", "")))
     return flat
 
 
 def folder_of(output: str | os.PathLike[str]) -> Path:
-    """Return the folder of the blocks of a result file to be."""
+    """Return the folder of the blocks of an unfinished result file."""
     return Path(os.path.realpath(output) + ".blocks")
 
 
 def read_manifest(folder: Path) -> dict[str, Any]:
-    """Read the manifest of a folder; FileError if there is none, or it is damaged."""
+    """Read the manifest of a folder; raise FileError if it is missing or damaged."""
     path = folder / MANIFEST
     if not folder.is_dir():
         raise FileError(

@@ -1,4 +1,4 @@
-"""Finished blocks of lanes, kept beside the output until all are there and become one file."""
+"""Finished blocks of lanes, kept beside the output until they are merged into one file."""
 
 import hashlib
 import json
@@ -31,7 +31,7 @@ Arrays: TypeAlias = Mapping[str, Array]
 Bounds: TypeAlias = tuple[int, int]  # First lane of a range, and the one after its last.
 
 PIECE_BYTES = 1 << 28
-"""Memory in which lanes that were computed in another order are brought into their own."""
+"""Memory for sorting lanes that were computed in another order than that of the file."""
 
 SCHEMA = {"schema": "gearchaos-blocks", "schema_version": "4.0"}
 _DIGEST = hashlib.sha256().digest_size
@@ -39,7 +39,7 @@ _NAME = re.compile(r"\d{12}-\d{12}\.block")
 
 
 class Finished(NamedTuple):
-    """Bounds of the sound blocks, without overlap, and a sentence for each that is not."""
+    """Bounds of the sound blocks, without overlap, and a sentence for each damaged block."""
 
     bounds: list[Bounds]
     problems: list[str]
@@ -48,15 +48,34 @@ class Finished(NamedTuple):
 class BlockStore(AbstractContextManager["BlockStore"]):
     """The finished blocks of one sweep, in the folder ``<output>.blocks``.
 
-    As long as its context lasts, a lock keeps other sweeps away from the same output. `merge` makes
-    the result file and removes the folder; before that, nothing that was written is ever removed.
+    A context manager: a lock keeps other sweeps from writing to the same output. `merge` makes the
+    result file and removes the folder. Before that, no block is ever removed.
 
-    The configuration is the resolved one in TOML; one's own blocks of another one, or of other
-    software, are refused, and without ``resume`` all of them. ``text`` is the configuration as it
-    was written. With ``blocks``, those of one's own shard of so many ``shards``, by lane, others
-    may compute other shards in the same folder; by default all lanes are one's own. Raises
-    FileError if blocks are refused (the message names what differs), if another sweep is writing to
-    the same output, or if the folder cannot be made; what was there before stays, and nothing else.
+    Parameters
+    ----------
+    output : path-like
+        Name of the result file.
+    variables : sequence of Variable
+        The variables of the sweep.
+    configuration : str
+        The resolved configuration in TOML. Own blocks of another configuration are refused.
+    software : Software
+        Versions that decide the numbers. Own blocks of other software are refused.
+    text : str
+        The configuration as it was written.
+    resume : bool
+        Whether own blocks of an earlier run are kept. Otherwise they are refused.
+    blocks : sequence of (int, int), optional
+        First and last lane (excluded) of the own blocks, if this is a shard; other shards may be
+        computed in the same folder. By default all lanes are own.
+    shards : int, optional
+        Number of shards of the sweep.
+
+    Raises
+    ------
+    FileError
+        If blocks are refused (the message names the differences), if another sweep is writing to
+        the same output, or if the folder cannot be made. Earlier files stay as they were.
     """
 
     def __init__(
@@ -76,7 +95,7 @@ class BlockStore(AbstractContextManager["BlockStore"]):
         facts = {**SCHEMA, **software._asdict(), "configuration": configuration}
         facts |= {"lanes": self.lanes, "variables": self._record.descr}
         self._owner = json.dumps(facts)
-        # As it is read again: with lists for tuples.
+        # Through JSON, since a manifest that is read has lists in place of tuples.
         decisive = json.loads(self._owner)
         shared = blocks is not None
         self._blocks = [(0, self.lanes)] if blocks is None else list(blocks)
@@ -84,7 +103,7 @@ class BlockStore(AbstractContextManager["BlockStore"]):
         try:
             own = self._own_blocks()
             beside = {"text": text, "shards": shards}
-            # Of several shards, whoever comes first writes it.
+            # The first of several shards writes the manifest.
             how = {"write": shared or not own, "overwrite": not shared}
             settle_manifest(self.folder, decisive, beside, **how)
             if own and not resume:
@@ -97,7 +116,7 @@ class BlockStore(AbstractContextManager["BlockStore"]):
                 self._remove([LOCK])
             self._lock.release()
             raise
-        # Those of other shards may be about to get their names.
+        # Partial files of other shards may be in use.
         if not shared:
             self._remove([partial.name for partial in self.folder.glob(f".*{PARTIAL}")])
 
@@ -107,19 +126,19 @@ class BlockStore(AbstractContextManager["BlockStore"]):
         self._lock.release()
 
     def remove(self) -> None:
-        """Remove the blocks, the folder if nothing else is in it, and let go of the lock."""
-        # Only what the store has made: the folder may hold files of the user.
+        """Remove the blocks, the folder if nothing else is in it, and release the lock."""
+        # Only files of the store: the folder may hold files of the user.
         self._remove([*self._names(), MANIFEST, LOCK])
-        # What comes to be there from now on is another sweep's.
+        # Released last: files that appear from now on belong to another sweep.
         self._lock.release()
 
     @property
     def own_lanes(self) -> int:
-        """Lanes of one's own blocks."""
+        """Number of lanes of the own blocks."""
         return sum(last - first for first, last in self._blocks)
 
     def finished(self, visit: Callable[[Arrays], None] | None = None) -> Finished:
-        """Verify one's own blocks that are there; `visit` gets the arrays of each sound one."""
+        """Verify the own blocks that exist; call ``visit`` with the arrays of each sound one."""
         bounds: list[Bounds] = []
         problems: list[str] = []
         for first, last in self._own_blocks():
@@ -136,7 +155,7 @@ class BlockStore(AbstractContextManager["BlockStore"]):
         return Finished(bounds, problems)
 
     def missing(self, bounds: Sequence[Bounds], block: int) -> list[Bounds]:
-        """List own blocks of at most so many lanes that cover what the given bounds leave out."""
+        """List own blocks of at most ``block`` lanes that cover all lanes outside the bounds."""
         return [
             (start, min(start + block, last))
             for own in self._blocks
@@ -145,10 +164,10 @@ class BlockStore(AbstractContextManager["BlockStore"]):
         ]
 
     def write(self, first: int, last: int, arrays: Arrays) -> None:
-        """Keep the lanes first to last - 1 of every computed variable.
+        """Write the lanes first to last - 1 of every computed variable as a block.
 
-        Raises FileError if they cannot be kept, ValueError if an array has a wrong shape or is none
-        of these variables.
+        Raises FileError if the block cannot be written, ValueError if an array has a wrong shape or
+        belongs to no variable.
         """
         require_listed(arrays, self._record.names or ())
         records = np.empty(last - first, self._record)
@@ -165,13 +184,13 @@ class BlockStore(AbstractContextManager["BlockStore"]):
             file.write(records.data)
 
     def read(self, first: int, last: int) -> dict[str, Array]:
-        """Give the arrays of one block; FileError if it is missing, damaged or of another sweep."""
+        """Return the arrays of one block; FileError if it is missing, damaged or does not fit."""
         path = self._path(first, last)
         if not 0 <= first < last <= self.lanes:
             raise FileError(f"{path}: its lanes are none of the {self.lanes} of this sweep")
         size = _DIGEST + (last - first) * self._record.itemsize
         try:
-            # Not more: what claims to be a block may be larger than the memory.
+            # Limited: a damaged block may be larger than the memory.
             content = memoryview(unlinked_content(path, size + 1))
         except OSError as error:
             raise FileError(f"{path}: cannot be read: {reason(error)}") from error
@@ -192,25 +211,40 @@ class BlockStore(AbstractContextManager["BlockStore"]):
         found: Finished | None = None,
         computed_at: Callable[[Integers], Integers] | None = None,
     ) -> Path:
-        """Make the result file of all blocks, one block in memory at a time, and tidy up.
+        """Merge all blocks into the result file, one block in memory at a time, and remove them.
 
-        The first four are those of `write_result`; ``found`` is what `finished` has just given;
-        ``computed_at`` gives the lanes at places in the order of computation, where that is not
-        their own, and takes the memory of a `PIECE_BYTES`. Raises FileError if blocks are missing
-        or the file cannot be written; the blocks stay.
+        Parameters
+        ----------
+        variables, parameters, metadata, overwrite
+            As for `write_result`.
+        found : Finished, optional
+            The result of `finished`, if it is known already.
+        computed_at : callable, optional
+            Returns the lanes at places in the order of computation, if that is not the order of
+            the file. Sorting takes `PIECE_BYTES` of memory.
+
+        Returns
+        -------
+        Path
+            The result file.
+
+        Raises
+        ------
+        FileError
+            If blocks are missing or the file cannot be written. The blocks are kept.
         """
         found = found or self.finished()
         self.require_all(found, "use --resume")
         by_block = ((first, last, self.read(first, last)) for first, last in found.bounds)
         ordered = computed_at and self._in_order_of_lanes(found.bounds, computed_at)
         blocks = ordered or by_block
-        told = variables, blocks, parameters, metadata
-        write_result(self.output, *told, overwrite=overwrite, scratch=self.folder)
+        content = variables, blocks, parameters, metadata
+        write_result(self.output, *content, overwrite=overwrite, scratch=self.folder)
         self.remove()
         return self.output
 
     def require_all(self, found: Finished, remedy: str) -> None:
-        """Raise a FileError that names the lanes which `finished` has not found, with a remedy."""
+        """Raise a FileError with the lanes that `finished` has not found, and with a remedy."""
         if gaps := self.missing(found.bounds, self.lanes):
             names = ", ".join(f"{first} to {last - 1}" for first, last in gaps[:3])
             more = f" and {len(gaps) - 3} more ranges" if len(gaps) > 3 else ""
@@ -252,14 +286,14 @@ class BlockStore(AbstractContextManager["BlockStore"]):
         return self.folder / f"{first:012d}-{last:012d}.block"
 
     def _digest(self, first: int, last: int, records: memoryview) -> bytes:
-        """Return what fits only these numbers of these lanes of this sweep."""
+        """Return a checksum of these numbers, of their lanes and of the sweep."""
         digest = hashlib.sha256(f"{self._owner} {first} {last}\n".encode())
         digest.update(records)
         return digest.digest()
 
 
 def lanes_and_record(variables: Sequence[Variable]) -> tuple[int, np.dtype[Any]]:
-    """Return how many lanes a sweep has, and the type of one: a field for all that it yields."""
+    """Return the number of lanes of a sweep, and the record type of one: a field per variable."""
     sizes = {v.name: len(v.values) for v in variables if v.values is not None}
     axes, of_the_lanes = lane_axes(variables), [v for v in variables if v.values is None]
     record = [(v.name, v.dtype, tuple(sizes[d] for d in v.dims[len(axes) :])) for v in of_the_lanes]
@@ -267,7 +301,7 @@ def lanes_and_record(variables: Sequence[Variable]) -> tuple[int, np.dtype[Any]]
 
 
 def uncovered(block: Bounds, finished: Sequence[Bounds]) -> Iterator[Bounds]:
-    """Give what finished blocks, sorted and without overlap, leave out of a block."""
+    """Yield the parts of a block that finished blocks, sorted and without overlap, leave out."""
     first, last = block
     for begin, end in finished[bisect_right(finished, first, key=lambda bounds: bounds[1]) :]:
         if begin >= last:

@@ -1,4 +1,4 @@
-"""The file of a result, one HDF5 file that is also netCDF-4: its rules, and how it is written."""
+"""Writing a result file: one HDF5 file that is also netCDF-4."""
 
 import math
 import os
@@ -16,7 +16,7 @@ from gearchaos.arrays import Array
 from gearchaos.interrupts import check
 from gearchaos.outputs.catalogue import HARMONICS
 from gearchaos.outputs.listing import GENERIC, Details
-from gearchaos.outputs.names import HARMONIC, diagram_axis
+from gearchaos.outputs.names import HARMONIC, STATUS, diagram_axis
 from gearchaos.outputs.variable import Variable, lane_axes, require_listed
 from gearchaos.results.files.atomic_file import append_checksum, replacing
 
@@ -25,19 +25,20 @@ SCHEMA_VERSION = "3.2"
 CONVENTIONS = "CF-1.9"  # The first one that knows uint8.
 PARAMETERS = "parameters"
 DIMS = "dims"
-"""Attribute with the names of dimensions: HDF5 keeps its own list of them in the global heap."""
+"""Attribute with the names of dimensions. HDF5's own list is in the global heap, which is slow and
+unsafe to read."""
 
 Block: TypeAlias = tuple[int, int, Mapping[str, Array]]
 Metadata: TypeAlias = Mapping[str, str | int | float]
 
 _CHUNK_BYTES = 1 << 19
 _LONGEST_ATTRIBUTE = 32_000
-CACHE_BYTES = 4 << 20  # Of each variable, while it is written.
+CACHE_BYTES = 4 << 20  # Memory for each variable while it is written.
 _PACKED = {"compression": "gzip", "compression_opts": 4, "shuffle": True, "fletcher32": True}
 
 
 def own_metadata(axes: Sequence[str]) -> dict[str, str]:
-    """Give the root attributes that tell a reader what it has before it."""
+    """Return the root attributes that identify the format and name the axes."""
     schema = {"Conventions": CONVENTIONS, "schema": SCHEMA, "schema_version": SCHEMA_VERSION}
     return {**schema, "axes": " ".join(axes), "axis": diagram_axis(axes)}
 
@@ -54,48 +55,66 @@ def write_result(
 ) -> None:
     """Write a result block by block; the file appears complete or not at all.
 
-    The variables come in this order. Of every one without values of its own, by name, a block
-    (first, last, arrays) holds the lanes first to last - 1, in C order over the axes: shape
-    (last - first, own dimensions). ``scratch`` is a folder for the temporary file, on the same file
-    system; by default that of the file. Raises FileError if the file cannot be written, or exists
-    and is not to be overwritten.
+    Parameters
+    ----------
+    path : path-like
+        Name of the file.
+    variables : sequence of Variable
+        The variables in the order of the file.
+    blocks : iterable of (int, int, mapping of str to array)
+        First lane, last lane (excluded), and an array of shape (lanes, own dimensions) for each
+        variable without values of its own. Lanes are in C order over the axes.
+    parameters : mapping of str to Variable
+        Parameters of the model.
+    metadata : mapping of str to str, int or float
+        Root attributes.
+    overwrite : bool
+        Whether an existing file is replaced.
+    scratch : path-like, optional
+        Folder of the temporary file, on the same file system. By default the folder of the file.
+
+    Raises
+    ------
+    FileError
+        If the file cannot be written, or exists and is not to be replaced.
+    ValueError
+        If a block holds an array that belongs to no variable.
     """
-    axes = lane_axes(variables)
     everything = [*variables, *_harmonics(parameters)]
-    sizes = {v.name: len(v.values) for v in everything if v.values is not None and v.dims}
-    shape = tuple(sizes[axis] for axis in axes)
     with replacing(path, overwrite=overwrite, scratch=scratch) as partial:
         with (
             Sink(partial) as sink,
             h5py.File(sink, "w", track_order=True, rdcc_nbytes=CACHE_BYTES) as file,
         ):
-            _write_metadata(file, {**metadata, **own_metadata(axes)})
-            for variable in everything:
-                _create(file, variable, tuple(sizes[dim] for dim in variable.dims))
-            for variable in everything:
-                _attach_scales(file, variable.name, variable.dims)
-            _write_parameters(file, parameters)
-            # Kept open: HDF5 packs a chunk anew each time its dataset is closed.
-            of_the_lanes = {v.name: file[v.name] for v in everything if v.values is None}
+            _write_metadata(file, {**metadata, **own_metadata(lane_axes(variables))})
+            of_the_lanes = _create_all(file, everything, parameters)
             for first, last, arrays in blocks:
                 require_listed(arrays, [variable.name for variable in everything])
-                boxes = list(hyperslabs(first, last, shape))
-                for name, dataset in of_the_lanes.items():
-                    place = 0
-                    for box in boxes:
-                        extent = [side.stop - side.start for side in box]
-                        piece = arrays[name][place : place + math.prod(extent)]
-                        dataset[box] = piece.reshape(*extent, *piece.shape[1:])
-                        place += len(piece)
+                _write_lanes(of_the_lanes, first, last, arrays)
                 sink.check()
                 check()
         append_checksum(partial)
 
 
+def _write_lanes(
+    datasets: Mapping[str, h5py.Dataset], first: int, last: int, arrays: Mapping[str, Array]
+) -> None:
+    """Write arrays (lanes, own dimensions) of the lanes first to last - 1 into their datasets."""
+    # The dimensions of the status are the axes alone.
+    boxes = list(hyperslabs(first, last, datasets[STATUS].shape))
+    for name, dataset in datasets.items():
+        place = 0
+        for box in boxes:
+            extent = [side.stop - side.start for side in box]
+            piece = arrays[name][place : place + math.prod(extent)]
+            dataset[box] = piece.reshape(*extent, *piece.shape[1:])
+            place += len(piece)
+
+
 def hyperslabs(first: int, last: int, shape: Sequence[int]) -> Iterator[tuple[slice, ...]]:
     """Cut the lanes first to last - 1 of an array in C order into boxes, in their order."""
     row = math.prod(shape[1:])
-    # Whole rows in the middle, and what precedes and follows them in rows of their own.
+    # Whole rows in the middle, and incomplete rows before and after them.
     inner = [edge for edge in (-(-first // row) * row, last // row * row) if first < edge < last]
     for begin, end in pairwise(sorted({first, *inner, last})):
         number = begin // row
@@ -107,10 +126,10 @@ def hyperslabs(first: int, last: int, shape: Sequence[int]) -> Iterator[tuple[sl
 
 
 class Sink(FileIO):
-    """A file that is emptied and open for writing, and remembers its first failure.
+    """A file for writing that stores its first failure instead of raising it.
 
-    The HDF5 library ends the process with a segmentation fault when the disk turns out to be full
-    while it closes a file. So it is never told: it writes into a sink, whose error is raised later.
+    The HDF5 library crashes the process if the disk is full while it closes a file. It therefore
+    writes into a sink that never fails, and the stored error is raised afterwards.
     """
 
     def __init__(self, path: Path) -> None:
@@ -121,7 +140,7 @@ class Sink(FileIO):
     def __exit__(self, *fault: Any) -> None:
         with self._remembering():
             self.close()
-        # An error that HDF5 has met in what it reads back is but a consequence of ours.
+        # An error that HDF5 raises about data it reads back follows from the stored failure.
         if fault[0] is None or issubclass(fault[0], Exception):
             self.check()
 
@@ -131,7 +150,7 @@ class Sink(FileIO):
             raise self._error
 
     def write(self, data: Any) -> int:
-        """Write all of it, or nothing once something has failed."""
+        """Write all data, or nothing after a failure."""
         with self._remembering():
             left = memoryview(data).cast("B")
             while left and self._error is None:
@@ -139,7 +158,7 @@ class Sink(FileIO):
         return len(data)
 
     def truncate(self, size: int | None = None) -> int:
-        """Set the size, unless something has failed."""
+        """Set the size, except after a failure."""
         with self._remembering():
             if self._error is None:
                 super().truncate(size)
@@ -150,14 +169,14 @@ class Sink(FileIO):
         try:
             yield
         except BaseException as error:
-            # An interrupt, too, must not reach the library.
+            # Also an interrupt: no exception may reach the library.
             self._error = self._error or error
 
 
 def _write_metadata(file: h5py.File, metadata: Metadata) -> None:
     for name, value in metadata.items():
         if isinstance(value, str) and len(content := _plain(value)) > _LONGEST_ATTRIBUTE:
-            # As ASCII, which Octave insists on.
+            # As ASCII of fixed length, which Octave requires.
             text = file.create_dataset(name, data=np.bytes_(content), track_order=True)
             _describe(text, {"units": "1", "long_name": name})
         else:
@@ -168,6 +187,23 @@ def _harmonics(parameters: Mapping[str, Variable]) -> list[Variable]:
     rows = (np.size(p.values) for p in parameters.values() if p.dims == (HARMONIC,))
     numbers = np.arange(1, next(rows, 0) + 1)
     return GENERIC.variables((), {HARMONICS: numbers.size > 0}, Details({HARMONIC: numbers}))
+
+
+def _create_all(
+    file: h5py.File, variables: Sequence[Variable], parameters: Mapping[str, Variable]
+) -> dict[str, h5py.Dataset]:
+    """Create the datasets of all variables and parameters.
+
+    Returns the datasets of the variables of the lanes, which have no values yet.
+    """
+    sizes = {v.name: len(v.values) for v in variables if v.values is not None and v.dims}
+    for variable in variables:
+        _create(file, variable, tuple(sizes[dim] for dim in variable.dims))
+    for variable in variables:
+        _attach_scales(file, variable.name, variable.dims)
+    _write_parameters(file, parameters)
+    # Kept open: HDF5 compresses a chunk again each time its dataset is closed.
+    return {v.name: file[v.name] for v in variables if v.values is None}
 
 
 def _create(file: h5py.File, variable: Variable, shape: tuple[int, ...]) -> None:
@@ -182,7 +218,7 @@ def _create(file: h5py.File, variable: Variable, shape: tuple[int, ...]) -> None
 
 
 def _chunks(shape: tuple[int, ...], itemsize: int) -> tuple[int, ...]:
-    """Give chunks of half a MiB that follow the C order."""
+    """Return the shape of chunks of half a MiB that follow the C order."""
     room, chunks = _CHUNK_BYTES // itemsize, []
     for size in reversed(shape):
         chunks.append(min(size, max(1, room)))
@@ -216,5 +252,5 @@ def _describe(item: h5py.HLObject, notes: Mapping[str, Any]) -> None:
 
 
 def _plain(text: str) -> bytes:
-    """Replace what an HDF5 string cannot hold: NUL, and the lone surrogates of odd file names."""
+    """Replace characters that an HDF5 string cannot hold: NUL, and surrogates in file names."""
     return text.encode("utf-8", "replace").replace(b"\0", "\ufffd".encode())

@@ -1,4 +1,4 @@
-"""Reading and verifying a result file, and refusing with one sentence whatever is not one."""
+"""Reading and verifying a result file; any other file is refused with one sentence."""
 
 import os
 import stat
@@ -26,26 +26,38 @@ Contents = tuple[
 ]
 """Variables, data, parameters and metadata, as for `Result`."""
 
-SOON_HASHED = 1 << 30  # Bytes whose checksum takes about a second.
+SOON_HASHED = 1 << 30  # Bytes; their checksum takes about a second.
 
 LONGEST_SYMBOL = 60
-MOST_PRINTED = 1000  # Characters of a symbol, and of a text on the terminal.
+MOST_PRINTED = 1000  # Characters of a text that is shown.
 
 
 def read_result(path: str | os.PathLike[str], *, rows: bool = True) -> Contents:
-    """Read a whole result file, or all but what makes it large.
+    """Read a result file.
 
-    Links to other files are not followed, and nothing larger than what the file can hold is
-    allocated. Without ``rows`` the values of variables with dimensions beside the axes are left
-    out, and the checksum of a file above 1 GiB is left unchecked. Raises FileError if the file is
-    missing, damaged, of another kind or of another major format version.
+    Links to other files are not followed. No more memory is allocated than the size of the file
+    allows.
+
+    Parameters
+    ----------
+    path : path-like
+        Name of the file.
+    rows : bool
+        False: leave out the values of variables with dimensions beside the axes, and do not check
+        the checksum of a file above 1 GiB.
+
+    Raises
+    ------
+    FileError
+        If the file is missing or damaged, if it is no result, or if its format has another major
+        version.
     """
     with _opened(path, in_full=rows) as (file, _):
         return _read(file, rows)
 
 
 def verify(path: str | os.PathLike[str]) -> list[str]:
-    """Read all of a result file, piece by piece, and say what was found sound, a phrase each.
+    """Read a whole result file piece by piece, and return a phrase for each check it has passed.
 
     Raises FileError if anything is damaged or contradicts the format.
     """
@@ -65,7 +77,7 @@ def verify(path: str | os.PathLike[str]) -> list[str]:
 
 @contextmanager
 def _opened(path: str | os.PathLike[str], in_full: bool) -> Iterator[tuple[h5py.File, bool | None]]:
-    """Open a file, with whether its checksum fits, and word what goes wrong with it."""
+    """Open a file, with whether its checksum fits; turn every error into a FileError."""
     name, fits = os.fspath(path), None
     try:
         found = Path(name).stat()
@@ -85,7 +97,7 @@ def _opened(path: str | os.PathLike[str], in_full: bool) -> Iterator[tuple[h5py.
     except UnfitError as error:
         raise FileError(f"{name}: {printable(str(error))}") from error
     except Exception as error:
-        # Damage surfaces in h5py as nearly any kind of exception.
+        # h5py raises nearly any kind of exception for a damaged file.
         if not h5py.is_hdf5(name):
             remedy = "give the name of a result, which a sweep of a configuration writes"
             raise FileError(f"{name}: is not an HDF5 file; {remedy}") from error
@@ -94,13 +106,13 @@ def _opened(path: str | os.PathLike[str], in_full: bool) -> Iterator[tuple[h5py.
 
 
 def fixed_coordinates(metadata: Mapping[str, Any]) -> dict[str, float]:
-    """Read the root attribute ``fixed``, such as ``start=1.0``; ValueError if it is none."""
+    """Read the root attribute ``fixed``, such as ``start=1.0``; ValueError if it is malformed."""
     pairs = (entry.rpartition("=") for entry in str(metadata.get("fixed", "")).split())
     return {name: float(value) for name, _, value in pairs}
 
 
 def printable(text: str) -> str:
-    """Return a text of a file, if long its start, without what acts on a terminal."""
+    """Return a text of a file, shortened, without characters that act on a terminal."""
     text = text if len(text) <= MOST_PRINTED else f"{text[:MOST_PRINTED]}..."
     return "".join(c if c.isprintable() else "\N{REPLACEMENT CHARACTER}" for c in text)
 
@@ -156,7 +168,7 @@ def _words(notes: Mapping[str, Any], name: str) -> tuple[str, ...]:
 def _wording(notes: Mapping[str, Any]) -> dict[str, Any]:
     wording = {key: str(notes.get(key, ""))[:MOST_PRINTED] for key in ("units", "long_name")}
     symbol = str(notes.get("symbol", ""))
-    # In a long formula, matplotlib would come to the end of its recursion.
+    # A long formula would exceed matplotlib's limit of recursion.
     return wording | {"symbol": symbol if len(symbol) <= LONGEST_SYMBOL else ""}
 
 
@@ -178,7 +190,7 @@ def _check_schema(metadata: Mapping[str, Any]) -> None:
 def _check_variables(
     axes: tuple[str, ...], found: Mapping[str, Variable], data: Mapping[str, Array]
 ) -> None:
-    """Compare what a sweep must yield with what there is; more than that is welcome."""
+    """Check that a file has all variables it must have; further ones are allowed."""
     if not axes or len(set(axes)) < len(axes):
         raise UnfitError("does not name its axes, each once")
     for name, dims, dtype in due(axes, found):

@@ -1,7 +1,8 @@
-"""What is read of a file that may hold anything: plain numbers and texts in it, within bounds.
+"""Reading plain numbers and texts of a file that may hold anything, within bounds of memory.
 
-The global heap, where HDF5 keeps what has no fixed length and over which its library can walk for
-ever, is read for texts of other programs only: those of our own files have a fixed length.
+HDF5 keeps data without a fixed length in its global heap. Its library can loop forever in the heap
+of a damaged file. The heap is read for texts of other programs only, since texts of our own files
+have a fixed length.
 """
 
 import math
@@ -17,31 +18,31 @@ from gearchaos.results.files.result_file import DIMS, PARAMETERS
 
 _DTYPES = {"f8": "float64", "i4": "int32", "u1": "uint8"}
 _PACKED, _ROOM = 128, 1 << 20
-"""A file may declare so many bytes for each of its own and of this room: sections of lanes that
-have come to rest are packed to a twentieth, labels to a thousandth."""
+"""A file may declare `_PACKED` bytes for each byte of its size plus `_ROOM`. Constant sections
+compress 20:1, labels 1000:1."""
 
 _MOST_NAMES, _LONGEST = 1000, 1 << 16
 NO_COORDINATE = "This is a netCDF dimension but not a netCDF variable"
-"""What the name of a dimension scale without values begins with: netCDF makes them for others."""
+"""Beginning of the name of a dimension scale without values, which netCDF makes."""
 _LEAST_PIECE = 4096
-"""Bytes for which a chunk counts at least: each costs time, even one that nobody has written."""
+"""Smallest number of bytes that a chunk counts for, since every chunk takes time to read."""
 
 
 class UnfitError(Exception):
-    """What is wrong with the file, in words; becomes a FileError, by default with one remedy."""
+    """A fault of the file in words, with a remedy; the reader turns it into a FileError."""
 
     def __init__(self, fault: str, remedy: str = "run the sweep again") -> None:
         super().__init__(f"{fault}; {remedy}")
 
 
 def datasets_of(file: h5py.File) -> dict[str, h5py.Dataset]:
-    """Open all that is ever read of a result file, by name, ``parameters/load`` for a parameter.
+    """Open all datasets of a result file, by name; ``parameters/load`` is a parameter.
 
-    Raises UnfitError unless all of it are arrays in this file, which may have so many bytes.
+    Raises UnfitError if an entry is no array of this file, or if they declare too many bytes.
     """
-    # h5py 3.11 lists a file by name, and its root group in the order of creation.
+    # From the root group: h5py 3.11 lists a file by name, but the group in the order of creation.
     names = _names(file["/"])
-    # Whoever copies the root group alone leaves the parameters behind.
+    # Optional: a copy of the root group alone has no parameters.
     if PARAMETERS in names:
         names.remove(PARAMETERS)
         if not isinstance(_hard_linked(file, PARAMETERS), h5py.Group):
@@ -55,13 +56,13 @@ def datasets_of(file: h5py.File) -> dict[str, h5py.Dataset]:
             raise UnfitError(f"keeps {name} outside of itself or not as an array")
         chunk = dataset.chunks or dataset.shape
         pieces = (-(-size // max(1, side)) for size, side in zip(dataset.shape, chunk, strict=True))
-        # What has no fixed length may be as long as the file.
+        # An item without a fixed length may be as long as the file.
         item = whole if dataset.dtype.hasobject else dataset.dtype.itemsize
         piece = max(_LEAST_PIECE, math.prod(chunk) * item)
         left -= math.prod(pieces) * piece
         if left < 0:
             raise UnfitError(f"declares more than a file of its size holds, in {name}")
-        # Of a chunk of no bytes the library dies; one of too many swells beyond what is declared.
+        # The library crashes on an empty chunk; a chunk too large would exceed the declared size.
         if dataset.chunks and dataset.id.chunk_iter(
             lambda chunk, most=2 * piece: None if 0 < chunk.size <= most else chunk
         ):
@@ -85,8 +86,8 @@ def _names(of: Any) -> list[str]:
 def dims_of(
     name: str, dataset: h5py.Dataset, notes: Mapping[str, Any], sizes: dict[str, int]
 ) -> tuple[str, ...]:
-    """Name the dimensions of a dataset; their sizes are those met before, or noted."""
-    # A coordinate is a dimension of its own.
+    """Return the dimensions of a dataset; check their sizes against ``sizes``, and add new ones."""
+    # A dataset without the attribute is a coordinate, whose dimension has its own name.
     dims = tuple(str(notes.get(DIMS, name if dataset.shape else "")).split())
     if len(dims) != dataset.ndim or any(
         sizes.setdefault(dim, size) != size for dim, size in zip(dims, dataset.shape, strict=True)
@@ -96,7 +97,7 @@ def dims_of(
 
 
 def dtype_of(name: str, dataset: h5py.Dataset) -> str:
-    """Name the type of a dataset as a variable does."""
+    """Return the type of a dataset as the name that a variable has for it."""
     if dataset.dtype.str[1:] not in _DTYPES:
         raise UnfitError(f"holds {name} as {dataset.dtype}, which no variable is")
     return _DTYPES[dataset.dtype.str[1:]]
@@ -111,7 +112,7 @@ def values_of(name: str, dataset: h5py.Dataset, piece: Any = ...) -> Array:
 
 
 def text_of(dataset: h5py.Dataset) -> str | None:
-    """Read a dataset that is one text, or one of its bytes a row; None if it is none."""
+    """Read a dataset that is one text or a row of its bytes; None if it is neither."""
     if dataset.dtype == "S1" and dataset.ndim == 1:
         return str(_plain(dataset[()].tobytes()))
     if dataset.shape or h5py.check_string_dtype(dataset.dtype) is None:
@@ -120,14 +121,14 @@ def text_of(dataset: h5py.Dataset) -> str | None:
 
 
 def scalars_of(item: h5py.HLObject) -> dict[str, Any]:
-    """Give the attributes that are a text or a number, and leave the bookkeeping of HDF5."""
+    """Return the attributes that are a text or a number; others are bookkeeping of HDF5."""
     scalars = {}
     for name in _names(item.attrs):
         stored = item.attrs.get_id(name)
         known = stored.dtype.kind in "iuf" or h5py.check_string_dtype(stored.dtype)
         if known and stored.shape in ((), (1,)):
             value = _plain(np.ravel(item.attrs[name])[0])
-            # Many names may share one text of the global heap.
+            # Shortened: many names may share one long text of the global heap.
             scalars[name] = value[:_LONGEST] if isinstance(value, str) else value
     return scalars
 

@@ -13,33 +13,42 @@ from gearchaos.records.wilson import wilson_interval
 from gearchaos.results.reading.result import Result
 from gearchaos.results.reading.stage_table import label_text, require_labels
 
-BOX = 5  # Starts along each side of a box of which `basin_entropy` asks how mixed it is.
+BOX = 5  # Starts along each side of a box of `basin_entropy`.
 
 
 class Counted(NamedTuple):
-    """How many lanes of each value have a property: ``counts`` of ``lanes``, both (values,)."""
+    """Lanes of each value that have a property: ``counts`` out of ``lanes``, both (values,)."""
 
     counts: Integers
     lanes: Integers
 
     @property
     def shares(self) -> Floats:
-        """Shares (values,), not a number where there is no lane."""
+        """Shares (values,), NaN where there is no lane."""
         return self.counts / np.where(self.lanes > 0, self.lanes, np.nan)
 
     @property
     def intervals(self) -> Floats:
-        """Their confidence intervals of 95 %, see `wilson_interval`, (values, 2)."""
+        """Confidence intervals of 95 % of the shares (values, 2), see `wilson_interval`."""
         return wilson_interval(self.counts, self.lanes)
 
 
 class Shares(NamedTuple):
-    """Motions over one swept parameter, all gear pairs and starts of a value taken together.
+    """Motions over one swept parameter; all drawn systems and starts of a value are counted.
 
-    ``values`` (values,) of the parameter; ``motions``: such as "period 2" or "chaotic", the columns
-    of ``counts`` (values, motions); ``other``: lanes that do not move with period 1, those diverged
-    or unresolved among them; ``apart``: lanes whose teeth lose contact, of those that did not
-    diverge, None where the result does not tell.
+    Attributes
+    ----------
+    values : array, shape (values,)
+        Values of the parameter.
+    motions : tuple of str
+        Kinds of motion, such as "period 2" or "chaotic".
+    counts : array of int, shape (values, motions)
+        Number of lanes of each kind.
+    other : Counted
+        Lanes that do not have period 1, including diverged and unresolved ones.
+    apart : Counted or None
+        Lanes that lose contact, out of those that did not diverge. None if the result has no
+        crossings.
     """
 
     values: Floats
@@ -50,10 +59,10 @@ class Shares(NamedTuple):
 
 
 def motion_kinds(result: Result) -> tuple[Counts, list[str]]:
-    """Number the kinds of motion: period 1, 2, 3, 4 or more, then those without a period.
+    """Number the kinds of motion: period 1, 2, 3, 4 or more, then motions without a period.
 
-    Returns the number of each lane's kind, of the shape of the axes, and the names of 0, 1, ...
-    Raises FileError if the result has no labels.
+    Returns the number of the kind of each lane, of the shape of the axes, and the names of the
+    kinds 0, 1, ... Raises FileError if the result has no labels.
     """
     require_labels(result)
     names = ["period 1", "period 2", "period 3", "period 4 or more"]
@@ -63,10 +72,23 @@ def motion_kinds(result: Result) -> tuple[Counts, list[str]]:
 
 
 def motion_shares(result: Result) -> Shares:
-    """Count the motions of each value of the one swept parameter of a result.
+    """Count the motions at each value of the swept parameter of a result.
 
-    Raises FileError if it has no labels, ConfigurationError if it has not one swept parameter, or
-    neither several gear pairs nor several starts.
+    Parameters
+    ----------
+    result : Result
+        A result with labels, one swept parameter, and several drawn systems or starts.
+
+    Returns
+    -------
+    Shares
+
+    Raises
+    ------
+    FileError
+        If the result has no labels.
+    ConfigurationError
+        If it has other axes.
     """
     kinds, names = motion_kinds(result)
     if len(result.axes) < 2 or sum(axis not in REPEATS for axis in result.axes) != 1:
@@ -90,13 +112,33 @@ def motion_shares(result: Result) -> Shares:
 class Basin(NamedTuple):
     """The starts that lead to one attractor at one value of the parameter, or to none.
 
-    ``number`` of the attractor, the same at all values, minus the code of the motion where there is
-    none; ``motion``: such as "period 2", "chaotic" or "diverged"; ``multiplier``: largest modulus
-    of the Floquet multipliers, not a number where the motion is not periodic; ``exponent``: largest
-    Lyapunov exponent, that of the orbit or a mean over the starts; ``starts``: how many, with their
-    share and its confidence interval; ``contact``: the kind of contact on the attractor, that of
-    the first of them, by variable; ``means`` of other variables of the result over all of them;
-    ``section`` (points, states): points of the attractor, once an excitation period.
+    Attributes
+    ----------
+    value : float
+        Value of the parameter.
+    number : int
+        Number of the attractor, the same at all values. Where the starts lead to no attractor,
+        minus the code of the motion.
+    motion : str
+        Label such as "period 2", "chaotic" or "diverged".
+    period : int
+        Period in periods of the excitation, 0 where the motion is not periodic.
+    multiplier : float
+        Largest modulus of the Floquet multipliers, NaN where the motion is not periodic.
+    exponent : float
+        Largest Lyapunov exponent: that of the orbit, or the mean over the starts.
+    starts : int
+        Number of starts.
+    share : float
+        Share of all starts at this value.
+    share_95_percent : tuple of float
+        Confidence interval of the share.
+    contact : dict of str to str
+        Kind of contact of the first start, by variable.
+    means : dict of str to float
+        Means of other variables of the result over the starts.
+    section : array, shape (points, states)
+        Points of the attractor, one per excitation period.
     """
 
     value: float
@@ -116,9 +158,22 @@ class Basin(NamedTuple):
 class Basins(NamedTuple):
     """All basins of a result.
 
-    ``parameter``: name of the axis of the ``values`` (values,); ``numbers`` (values, starts) of the
-    basin that each start is in; ``grid``: start values by state where the starts are a grid, in C
-    order; ``entropy`` of every value, see `basin_entropy`, none without a grid.
+    Attributes
+    ----------
+    result : Result
+        The result that the basins are found in.
+    parameter : str
+        Name of the axis of the values.
+    values : array, shape (values,)
+        Values of the parameter.
+    numbers : array of int, shape (values, starts)
+        Number of the basin of each start.
+    basins : list of Basin
+        All basins of all values.
+    grid : dict of str to array
+        Start values along the grid by state, in C order; empty if the starts are no grid.
+    entropy : list of tuple
+        `basin_entropy` at each value; empty if the starts are no grid.
     """
 
     result: Result
@@ -131,22 +186,34 @@ class Basins(NamedTuple):
 
 
 def in_order(numbers: Iterable[int]) -> list[int]:
-    """Sort the numbers of basins, each once: those without an attractor come last."""
+    """Sort distinct numbers of basins; those without an attractor come last."""
     return sorted({*numbers}, key=lambda number: (number < 0, abs(number)))
 
 
 def basin_entropy(attractors: NDArray[np.integer], box: int = BOX) -> tuple[float, float]:
-    r"""Return the basin entropy of starts on a grid, and that of the boundary of basins alone.
+    r"""Return the basin entropy of starts on a grid, and the entropy of the basin boundary.
 
-    The grid is cut into boxes with ``box`` starts along each side; in each, with p_ij the share of
-    starts that lead to attractor j::
+    Parameters
+    ----------
+    attractors : array of int
+        Number of the attractor of each start, over one dimension or several.
+    box : int
+        Starts along each side of a box.
+
+    Returns
+    -------
+    tuple of float
+        S_b and S_bb; both are NaN if the grid is smaller than a box.
+
+    Notes
+    -----
+    The grid is cut into N boxes; starts beyond the last whole box are left out. With p_ij the share
+    of starts in box i that lead to attractor j (Daza, Wagemakers, Georgeot, Guery-Odelin, Sanjuan
+    2016)::
 
         S_i = -sum_j p_ij ln p_ij,   S_b = sum_i S_i / N,   S_bb = sum_i S_i / N_b
 
-    over all N boxes, and over those N_b that hold several attractors (0 where none does). What is
-    left of the grid beyond whole boxes does not count. ``attractors``: a number for each start, of
-    one dimension or several; not a number where the grid holds no box. (Daza, Wagemakers, Georgeot,
-    Guery-Odelin, Sanjuan 2016.)
+    N_b is the number of boxes that hold several attractors; S_bb is 0 where there are none.
     """
     whole = attractors[tuple(slice(size // box * box) for size in attractors.shape)]
     if not whole.size:

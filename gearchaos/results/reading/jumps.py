@@ -1,8 +1,8 @@
-"""What labels do not show: jumps to a motion of the same period, crises, directions that differ.
+"""Changes that labels do not show: jumps between motions of one period, crises, hysteresis.
 
-In an interior crisis a chaotic set collides with an unstable orbit and bursts out into what lies
-beyond it (Grebogi, Ott, Yorke 1982). Close to it the bursts are rare, so that a section of some
-hundred points may miss them: the lane beside the crisis is told from what several lanes visit.
+In an interior crisis a chaotic set collides with an unstable orbit and suddenly grows (Grebogi,
+Ott, Yorke 1982). Close to the crisis, bursts are rare and a section of some hundred points may miss
+them. The lane beside the crisis is therefore found from the sections of several lanes.
 """
 
 from typing import NamedTuple
@@ -17,16 +17,16 @@ from gearchaos.results.reading.result import Result, section_variables
 from gearchaos.results.reading.stage_table import labelled_lanes
 
 STEEPEST = 5.0
-"""Neighbouring lanes lie this many times farther apart than those beside them where they jump."""
+"""At a jump, neighbouring lanes are farther apart than the lanes beside them by this factor."""
 
 SMALLEST = 0.02  # Smallest jump, relative to the size of the section over the sweep.
-BESIDE = 8  # Lanes on either side of a crisis that are compared.
-FEWEST = 3  # Lanes that there must be on either side, two of them chaotic.
-SMALLEST_GROWTH = 0.15  # Growth of the extent that counts, relative to the largest one before.
+BESIDE = 8  # Number of lanes on either side of a crisis that are compared.
+FEWEST = 3  # Fewest lanes on either side of a crisis; two of them must be chaotic.
+SMALLEST_GROWTH = 0.15  # Smallest growth of the extent, relative to the largest one before.
 
 
 class Jump(NamedTuple):
-    """Two neighbouring values with the same label and motions far apart."""
+    """Two neighbouring values, ``below`` and ``above``, with the same label but distant motions."""
 
     below: float
     above: float
@@ -34,10 +34,16 @@ class Jump(NamedTuple):
 
 
 class Crisis(NamedTuple):
-    """Two neighbouring values of the swept parameter between which chaos grows or shrinks at once.
+    """Two neighbouring swept values between which a chaotic set suddenly grows or shrinks.
 
-    ``section`` is the variable in which it does so most; the four others are the smallest and
-    largest value that it takes on the eight lanes below and above.
+    Attributes
+    ----------
+    below, above : float
+        The two values.
+    section : str
+        The section variable whose extent changes most.
+    lowest_below, highest_below, lowest_above, highest_above : float
+        Extremes of that variable over the eight lanes below and the eight lanes above.
     """
 
     below: float
@@ -50,12 +56,19 @@ class Crisis(NamedTuple):
 
 
 class Apart(NamedTuple):
-    """Neighbouring values at which both directions come to different motions.
+    """A stretch of swept values in which the upward and the downward sweep differ.
 
-    ``first``, ``last``: the numbers of its outermost lanes; ``start``, ``end``: their values;
-    ``lower``, ``upper``: halfway to the lanes beside them, where the sweep downwards and the one
-    upwards jump, or where the sweep ends; ``motion_upwards``, ``motion_downwards``: the labels of
-    the motions, in the order of the values.
+    Attributes
+    ----------
+    first, last : int
+        Numbers of its outermost lanes.
+    start, end : float
+        Swept values of these lanes.
+    lower, upper : float
+        Halfway to the lanes beside them, or the end of the sweep. The downward sweep jumps at
+        ``lower``, the upward sweep at ``upper``.
+    motion_upwards, motion_downwards : str
+        Labels of the motions in the order of the values.
     """
 
     first: int
@@ -71,12 +84,18 @@ class Apart(NamedTuple):
 def jumps(result: Result) -> list[Jump]:
     """Find where a sweep jumps from one motion to another of the same period.
 
-    On one branch the points of the section move little from lane to lane, and steadily so: towards
-    a fold, where they move fastest, each step is less than three times the one before. The result
-    has one axis and labels; without a section nothing is found.
+    Parameters
+    ----------
+    result : Result
+        A result with one axis and labels. Without a section no jump is found.
+
+    Notes
+    -----
+    On one branch the points of a section move by similar steps from lane to lane. They move fastest
+    towards a fold; even there each step is less than three times the one before.
     """
     lanes = labelled_lanes(result)
-    # A lane still on its way to its orbit lies anywhere.
+    # A lane that has not converged to its orbit may be at any distance.
     arrived = ~(result["return_distance"] > TOLERANCE)
     sections = sections_of(result)
     period = np.where(arrived, lanes.period, 0)
@@ -88,14 +107,14 @@ def jumps(result: Result) -> list[Jump]:
 
 
 def sections_of(result: Result) -> Floats:
-    """Return all sections along one axis, a point for each excitation period.
+    """Return all sections along one axis, one point per excitation period.
 
-    Shape (lanes, points, states), with no states where there is no section.
+    Shape (lanes, points, states); without a section there are no points and no states.
     """
     names = section_variables(result)
     if not names:
         return np.zeros((result[result.axis].size, 0, 0))
-    # Neighbours may be an excitation period apart on their orbit, but never a part of one.
+    # Neighbouring lanes may differ by whole excitation periods along their orbit, not by parts.
     every = excitation_of(result.metadata).excitation_period
     return np.stack([result[name][:, ::-every][:, ::-1] for name in names], axis=2)
 
@@ -109,27 +128,38 @@ def size_of(sections: Floats) -> Floats:
 def jump_sizes(
     period: Counts, section: Floats, cells: Floats | float = 1.0, alone: float = np.nan
 ) -> Floats:
-    """Return how far neighbouring lanes move apart where they jump, else 0, shape (lanes - 1,).
+    """Return the distance of neighbouring lanes at a jump, 0 elsewhere, shape (lanes - 1,).
 
-    Lanes of the same period, that is, that move on different branches. ``period`` (lanes,) is 0
-    where the motion is not periodic; ``section`` (lanes, points, states) is relative to the size of
-    each state over the sweep; ``cells`` (lanes - 1,): distances of the swept values; ``alone``: how
-    far apart lanes of different motions count, so that with 0 two that have no others beside them
-    may jump.
+    A jump leads from one branch to another one of the same period.
+
+    Parameters
+    ----------
+    period : array of int, shape (lanes,)
+        Period of each motion, 0 where it is not periodic.
+    section : array, shape (lanes, points, states)
+        Sections relative to the size of each state over the sweep.
+    cells : array, shape (lanes - 1,)
+        Distances of the swept values.
+    alone : float
+        Distance that is assumed between lanes of different periods. With 0, two lanes without
+        comparable lanes beside them may count as a jump.
     """
     enough = (period[1:] > 0) & (period[1:] <= section.shape[1])
     common = np.where(enough & (period[1:] == period[:-1]), period[1:], 0).astype(np.int32)
     apart = section_distance(section[:-1], section[1:], common)
-    # Where one side is missing, or another stage begins there, the other side must do.
+    # fmax: beside the end of a stage, only the other side can be compared.
     rate = np.pad(np.where(np.isnan(apart), alone, apart) / cells, 1, constant_values=alone)
     beside = np.fmax(rate[:-2], rate[2:]) * cells
     return np.where((apart > SMALLEST) & (apart > STEEPEST * beside), apart, 0.0)
 
 
 def crises(result: Result) -> list[Crisis]:
-    """Find where a sweep has a crisis, see `grows_at`, with the parameter growing or falling.
+    """Find the crises of a sweep, see `grows_at`, for a rising and for a falling parameter.
 
-    The result has one axis and labels; without a section nothing is found.
+    Parameters
+    ----------
+    result : Result
+        A result with one axis and labels. Without a section no crisis is found.
     """
     lanes = labelled_lanes(result)
     chaotic = lanes.labels == "chaotic"
@@ -151,13 +181,24 @@ def crises(result: Result) -> list[Crisis]:
 
 
 def grows_at(extent: Floats, chaotic: Mask) -> Integers:
-    """Return the lanes at which the extent of chaotic sections grows at once, in ascending order.
+    """Return the lanes at which the extent of chaotic sections suddenly grows, in ascending order.
 
-    ``extent`` (lanes,) of the section in one coordinate, in the order of the swept value;
-    ``chaotic`` (lanes,). Such a lane is chaotic, and extends by 15 % more than any of the eight
-    before it, half of the eight from it on do by something; these are level among themselves, their
-    largest extent nearer to the median than to that of the lane. Lanes before it may belong to
-    periodic windows.
+    Parameters
+    ----------
+    extent : array, shape (lanes,)
+        Extent of the section in one coordinate, in the order of the swept value.
+    chaotic : array of bool, shape (lanes,)
+        Whether a lane is chaotic.
+
+    Notes
+    -----
+    A lane counts if it is chaotic and all of these hold:
+
+    - its extent exceeds that of each of the eight lanes before it by 15 %;
+    - the median extent of the eight lanes from it on exceeds that of each lane before it;
+    - the largest extent before it is nearer to the median extent before it than to its own.
+
+    Lanes before it may belong to periodic windows.
     """
     found: list[int] = []
     for lane in np.flatnonzero(chaotic):
@@ -168,25 +209,34 @@ def grows_at(extent: Floats, chaotic: Mask) -> Integers:
         grown = extent[lane] > (1.0 + SMALLEST_GROWTH) * largest
         lasting = np.nanmedian(extent[after]) > largest
         level = extent[lane] - largest > largest - usual
-        # The next lanes may show still more of what the same crisis has opened.
+        # Later lanes may visit more of the region that the same crisis has opened.
         if grown and lasting and level and not (found and lane - found[-1] < BESIDE):
             found.append(int(lane))
     return np.array(found, dtype=np.intp)
 
 
 def directions_of(result: Result) -> list[Result]:
-    """Return the results of both directions, or the result itself where there are not two."""
+    """Return the results of both directions, or the result itself if it has no direction."""
     both = DIRECTION in result.axes and result.axis != DIRECTION
     return [result.sel(direction=way) for way in WAYS] if both else [result]
 
 
 def apart(result: Result, narrowest: float = 0.0) -> list[Apart]:
-    """Find the stretches in which both directions of a result with labels differ.
+    """Find the stretches in which the upward and the downward sweep differ.
 
-    They do in their labels, or in sections or, of period 1, end states farther apart than the
-    smallest jump that is told. Chaos and quasi-periodic motions of one label count as one motion.
-    Stretches narrower than ``narrowest`` are left out; without directions, or with several starts
-    or gear pairs, there are none.
+    Parameters
+    ----------
+    result : Result
+        A result with labels. Without directions, or with several starts or drawn systems, nothing
+        is found.
+    narrowest : float
+        Narrower stretches, in units of the swept parameter, are left out.
+
+    Notes
+    -----
+    Two motions differ if their labels differ, or if their sections are farther apart than
+    `SMALLEST`; of motions of period 1, the end states are compared as well. Motions without a
+    period are the same if their labels are.
     """
     ways = directions_of(result)
     if len(ways) == 1 or len(ways[0].axes) > 1:
@@ -194,7 +244,7 @@ def apart(result: Result, narrowest: float = 0.0) -> list[Apart]:
     lanes = [labelled_lanes(one) for one in ways]
     differ = lanes[0].labels != lanes[1].labels
     period = np.where(differ, 0, lanes[0].period)
-    # Branches may cross in the states of a section, but not in all; the end state is one point.
+    # Branches may cross in the recorded states, but not in all; the end state is one point of it.
     ends = (one["end_state"][:, np.newaxis] for one in ways)
     for one, other in map(sections_of, ways), ends:
         size = size_of(np.concatenate([one, other]))

@@ -1,4 +1,4 @@
-"""What a result file says about itself: plain numbers, texts, lists, and a page for a terminal."""
+"""Summary of a result file: plain numbers, texts and lists, and a page for a terminal."""
 
 import math
 import os
@@ -25,34 +25,44 @@ ERRORS = {
         "one standard error of the finite record; orbits of periodic lanes have none",
     ),
 }
-"""Variables that are errors, with what they are of, and from what they come."""
+"""Variables that measure an error: the label of the error, and where it comes from."""
 
 ELSEWHERE = ("title", "notes", "configuration", "configuration_resolved")
-"""Metadata that have their own place on a page."""
+"""Metadata that are shown in other sections of the page."""
 
-MOST_STAGES = 20  # Of more stages, the first and the last ones are shown.
+MOST_STAGES = 20  # If there are more stages, only the first and the last ones are shown.
 
 WIDTH = 80
 _LABEL = 18
 
 
 def overview(path: str | os.PathLike[str]) -> dict[str, Any]:
-    """Sum up a result file without reading more than one number of each lane and variable.
+    """Summarise a result file; at most one number of each lane and variable is read.
 
-    Axes, parameters, counts and variables are by name; ``errors`` are the measured ones, ``stages``
-    those of the first slice along the swept parameter. What is not finite is None.
+    Parameters
+    ----------
+    path : path-like
+        Name of the file.
 
-    Raises FileError if the file is missing, damaged, of another kind or another major version.
+    Returns
+    -------
+    dict
+        Values that JSON can hold; numbers that are not finite are None. Axes, parameters, counts
+        and variables are by name. ``errors`` are the measured errors, ``stages`` the stages of the
+        first slice along the swept parameter.
+
+    Raises
+    ------
+    FileError
+        If the file is missing or damaged, if it is no result, or if its format has another major
+        version.
     """
     variables, data, parameters, metadata = read_result(path, rows=False)
     read = [variable for variable in variables if variable.name in data]
     result = Result(str(metadata["axes"]).split(), read, data, parameters, metadata)
     of_axes = [result.variables[axis] for axis in result.axes]
-    # What bears a known name may be something else in a file that others have changed.
+    # The dimensions are checked: another program may have put other data under a known name.
     of_lanes = [v for v in read if v.dims == result.axes and v.name not in result.axes]
-    errors = {v.name: data[v.name] for v in of_lanes if v.name in ERRORS}
-    # The exponents of orbits have no standard error.
-    recorded = {name: errors[name] > 0.0 for name in errors if name.endswith(known.STANDARD_ERROR)}
     summary: dict[str, Any] = {
         "file": os.fspath(path),
         "bytes": Path(path).stat().st_size,
@@ -63,12 +73,8 @@ def overview(path: str | os.PathLike[str]) -> dict[str, Any]:
         },
         "metadata": metadata,
         "parameters": {name: _parameter(entry) for name, entry in parameters.items()},
-        "counts": {
-            v.name: dict(zip(v.flags, _counted(data[v.name], len(v.flags)), strict=False))
-            for v in of_lanes
-            if v.flags and v.dtype == "uint8"
-        },
-        "errors": {name: _spread(errors[name][recorded.get(name, ...)]) for name in errors},
+        "counts": {v.name: _counts(v, data[v.name]) for v in of_lanes if _is_code(v)},
+        "errors": {v.name: _error(v.name, data[v.name]) for v in of_lanes if v.name in ERRORS},
         "variables": {v.name: {"dims": v.dims, "dtype": v.dtype, **_wording(v)} for v in variables},
         "slice": {},
         "stages": [],
@@ -81,7 +87,7 @@ def overview(path: str | os.PathLike[str]) -> dict[str, Any]:
 
 
 def plain(value: Any) -> Any:
-    """Make of records and complex numbers what JSON has; what is not finite is None."""
+    """Turn records and complex numbers into values of JSON; infinities and NaN become None."""
     value = value._asdict() if hasattr(value, "_asdict") else value
     if isinstance(value, Mapping):
         return {name: plain(entry) for name, entry in value.items()}
@@ -94,19 +100,30 @@ def plain(value: Any) -> Any:
 
 def _parameter(parameter: Variable) -> dict[str, Any]:
     value = np.asarray(parameter.values)
-    # What differs from lane to lane may be a million numbers.
+    # A parameter that varies over lanes may have a million values, so only its range is given.
     along_axes = parameter.dims not in ((), (known.HARMONIC,))
     content = _spread(value) if along_axes else {"value": value.tolist()}
     return {"origin": parameter.origin, **content, **_wording(parameter)}
+
+
+def _error(name: str, values: Array) -> dict[str, Any]:
+    """Return the spread of an error; exponents of orbits have a standard error of 0, left out."""
+    return _spread(values[values > 0.0] if name.endswith(known.STANDARD_ERROR) else values)
 
 
 def _wording(entry: Variable) -> dict[str, str]:
     return {"units": entry.units, "long_name": entry.long_name}
 
 
-def _counted(values: Array, flags: int) -> list[int]:
-    counts: list[int] = np.bincount(values.ravel(), minlength=flags).tolist()
-    return counts
+def _is_code(variable: Variable) -> bool:
+    """Whether a variable is an enumeration; a foreign file may give flags to any variable."""
+    return bool(variable.flags) and variable.dtype == "uint8"
+
+
+def _counts(variable: Variable, values: Array) -> dict[str, int]:
+    """Return how many lanes have each value of an enumeration, by the meaning of the value."""
+    counts = np.bincount(values.ravel(), minlength=len(variable.flags)).tolist()
+    return dict(zip(variable.flags, counts, strict=False))
 
 
 def _spread(values: Array) -> dict[str, Any]:
@@ -118,7 +135,7 @@ def _spread(values: Array) -> dict[str, Any]:
 def overview_page(
     overview: Mapping[str, Any], settings: Iterable[str], verified: Iterable[str]
 ) -> str:
-    """Write an overview as text, with the keys of the configuration and what fits, a line each."""
+    """Write an overview as text; each setting of the configuration and each check is one line."""
     sections = {
         "": _file(overview),
         "Errors": _errors(overview["errors"]),
@@ -145,7 +162,7 @@ def overview_page(
 
 
 def slice_lines(facts: Mapping[str, float]) -> list[str]:
-    """Word what `slice_facts` tells, one line per axis."""
+    """Return a line for each axis of `slice_facts`."""
     return [
         f"slice {name} = {known.coordinate_text(name, value, 6)}; others with --at {name}=VALUE"
         for name, value in facts.items()

@@ -17,9 +17,18 @@ from gearchaos.results.reading.result import Result
 class LabelledLanes(NamedTuple):
     """Lanes in ascending order of the swept value, one per value.
 
-    ``values``, ``exponent`` (lanes,): not a number where no exponent is known; ``labels`` (lanes,):
-    such as "period 3" or "chaotic"; ``period`` (lanes,) in mesh periods, 0 where not periodic;
-    ``bands`` (lanes,): 0 where the motion has none, or nobody has counted them.
+    Attributes
+    ----------
+    values : array, shape (lanes,)
+        Swept values.
+    labels : array of str, shape (lanes,)
+        Labels such as "period 3" or "chaotic".
+    period : array of int, shape (lanes,)
+        Period in periods of the excitation, 0 where the motion is not periodic.
+    exponent : array, shape (lanes,)
+        Largest Lyapunov exponent, NaN where it is unknown.
+    bands : array of int, shape (lanes,)
+        Number of bands, 0 where the motion has none or they are unknown.
     """
 
     values: Floats
@@ -32,9 +41,22 @@ class LabelledLanes(NamedTuple):
 class Stage(NamedTuple):
     """A stretch of the swept parameter with one kind of motion.
 
-    ``first``, ``last``: the numbers of its outermost lanes; ``start``, ``end``: their values;
-    ``lanes``: their number, those of narrower stages among them; the exponents, and ``bands``,
-    which counts lanes by the number of their bands, are those of the lanes with its own label.
+    Attributes
+    ----------
+    first, last : int
+        Numbers of its outermost lanes.
+    start, end : float
+        Swept values of these lanes.
+    label : str
+        Label of the motion.
+    period : int
+        Period in periods of the excitation, 0 where the motion is not periodic.
+    lowest_exponent, highest_exponent : float
+        Range of the largest Lyapunov exponent over the lanes with this label, NaN if unknown.
+    lanes : int
+        Number of lanes, including those of narrower stages that were merged into it.
+    bands : dict of int to int
+        Number of lanes with this label by their number of bands.
     """
 
     first: int
@@ -50,7 +72,7 @@ class Stage(NamedTuple):
 
 
 class _Stretch(NamedTuple):
-    """First lane, the lane after its last one, a lane that has its label."""
+    """First lane of a stretch, the lane after its last one, and a lane that has its label."""
 
     first: int
     after: int
@@ -58,7 +80,7 @@ class _Stretch(NamedTuple):
 
 
 def require_labels(result: Result, name: str = "the result") -> None:
-    """Raise a FileError that calls a result by a name if it has no labels of the motion."""
+    """Raise a FileError if a result has no labels of the motion; messages use this name."""
     if not all(label in result for label in LABELS):
         raise FileError(
             f"{name}: holds no labels of the motion; run the sweep again with outputs.motion = true"
@@ -68,11 +90,24 @@ def require_labels(result: Result, name: str = "the result") -> None:
 def labelled_lanes(
     result: Result, *, name: str = "the result", repeats: bool = False
 ) -> LabelledLanes:
-    """Take the labels out of a result with one axis, which messages call by a name.
+    """Return the labels of a result with one axis.
 
-    With ``repeats`` it may have several pairs and starts too; where their labels differ, the motion
-    is "several motions", without a period, an exponent or bands. Raises FileError if the result has
-    no labels, ConfigurationError if it has not one axis.
+    Parameters
+    ----------
+    result : Result
+        A result with labels of the motion.
+    name : str
+        How messages call the result.
+    repeats : bool
+        Whether the result may also have several drawn pairs and starts. Where their labels differ,
+        the label is "several motions", without a period, an exponent or bands.
+
+    Raises
+    ------
+    FileError
+        If the result has no labels.
+    ConfigurationError
+        If it does not have exactly one axis.
     """
     require_labels(result, name)
     one = result.sel(**{axis: result[axis][0] for axis in REPEATS if repeats and axis in result})
@@ -98,9 +133,9 @@ def labelled_lanes(
 
 
 def one_axis(result: Result, kept: Sequence[str] = (), /, **coordinates: float) -> Result:
-    """Take the slice of a result along one swept parameter, at the coordinates nearest to these.
+    """Return the slice of a result along one swept parameter, at the coordinates nearest to these.
 
-    Other axes are fixed at their first value, but for those that are ``kept``. Raises
+    All other axes are fixed at their first value, except those in ``kept``. Raises
     ConfigurationError if there is no such axis or value, or if no swept parameter is left.
     """
     part = result.sel("within", **coordinates)
@@ -111,21 +146,30 @@ def one_axis(result: Result, kept: Sequence[str] = (), /, **coordinates: float) 
 
 
 def slice_facts(result: Result, part: Result) -> dict[str, float]:
-    """Tell of each axis that a slice lacks at which value it was fixed."""
+    """Return the value at which each axis is fixed that a slice lacks, by name."""
     return {name: part.fixed[name] for name in result.axes if name not in part.axes}
 
 
 def label_text(meaning: str, period: int) -> str:
-    """Word a label: "period 3", "quasi-periodic", "chaotic"."""
+    """Return a label as text: "period 3", "quasi-periodic", "chaotic"."""
     return f"period {period}" if period > 0 else meaning.replace("_", "-")
 
 
 def stage_table(lanes: LabelledLanes, narrowest: float = 0.0) -> list[Stage]:
     """List the stages of a sweep in ascending order.
 
-    Stages narrower than ``narrowest`` go into what surrounds them: the narrowest first, into both
-    neighbours where these are alike and otherwise into the wider one; of two alike the lower one. A
-    stage reaches halfway to the lanes beside it.
+    Parameters
+    ----------
+    lanes : LabelledLanes
+        Labels of the lanes.
+    narrowest : float
+        Stages narrower than this, in units of the swept parameter, are merged into their
+        neighbours, beginning with the narrowest one.
+
+    Notes
+    -----
+    A stage reaches halfway to the lanes beside it. A merged stage joins both neighbours where these
+    have the same label. Otherwise it joins the wider one, or the lower one of two equal widths.
     """
     changes = np.flatnonzero(lanes.labels[1:] != lanes.labels[:-1]) + 1
     edges = [0, *changes.tolist(), lanes.values.size]
@@ -142,7 +186,7 @@ def stage_table(lanes: LabelledLanes, narrowest: float = 0.0) -> list[Stage]:
     while len(by_first) > 1 and heap[0][0] < narrowest:
         _, stretch = heappop(heap)
         if by_first.get(stretch.first) is not stretch:
-            continue  # It has become part of another one since.
+            continue  # Merged into another stage since it was put on the heap.
         beside = by_after.get(stretch.first), by_first.get(stretch.after)
         there = [neighbour for neighbour in beside if neighbour is not None]
         label = lanes.labels[max(there, key=width).own]

@@ -15,14 +15,14 @@ if TYPE_CHECKING:
 
 
 _IMPORTING = RLock()
-"""Held while filters of warnings, which are those of the whole process, are set aside."""
+"""Held while the filters of warnings are changed, which belong to the whole process."""
 
 
 def needed(package: str, extra: str = "export") -> Any:
-    """Import a package of an extra of gearchaos; raises FileError if it is missing."""
+    """Import a package of an extra of gearchaos; raise FileError if it is missing."""
     try:
         with _IMPORTING, warnings.catch_warnings():
-            # What it has to say of other packages is not for who uses it here.
+            # Warnings about other packages do not concern users of gearchaos.
             warnings.simplefilter("ignore")
             return import_module(package)
     except ImportError as error:
@@ -31,9 +31,16 @@ def needed(package: str, extra: str = "export") -> Any:
 
 
 def to_xarray(result: "Result") -> Any:
-    """Give an `xarray.Dataset` of everything, as `xarray.open_dataset` does of the file.
+    """Return an `xarray.Dataset` of all variables, as `xarray.open_dataset` does of the file.
 
-    Raises FileError if xarray is not installed.
+    Returns
+    -------
+    xarray.Dataset
+
+    Raises
+    ------
+    FileError
+        If xarray is not installed.
     """
     xarray = needed("xarray")
     arrays = {
@@ -45,17 +52,31 @@ def to_xarray(result: "Result") -> Any:
 
 
 def to_dataframe(result: "Result", *along: str) -> Any:
-    """Give a `pandas.DataFrame` with a row per lane, or per lane and, say, "section_point".
+    """Return a `pandas.DataFrame` with a row per lane, or per lane and point along a dimension.
 
-    Flags are words; ``attrs["units"]`` has the units of index and columns by their names. Raises
-    ConfigurationError if nothing runs along it, FileError if pandas is not installed.
+    Parameters
+    ----------
+    *along : str
+        Further dimension of the rows, such as ``"section_point"``.
+
+    Returns
+    -------
+    pandas.DataFrame
+        Enumerations are categories; ``attrs["units"]`` holds the units of index and columns.
+
+    Raises
+    ------
+    ConfigurationError
+        If no variable has these dimensions.
+    FileError
+        If pandas is not installed.
     """
     pandas, dims = needed("pandas"), (*result.axes, *along)
     columns: dict[str, Any] = {}
     for name in (name for name in result if result.dims(name) == dims and name not in dims):
         columns[name], flags = result[name].ravel(), result.variables[name].flags
         if flags:
-            # Signed: -1 is what pandas takes for missing, and flags are stored unsigned.
+            # Signed, since flags are stored unsigned and pandas takes -1 for a missing value.
             codes = columns[name].astype(np.int64)
             codes[(codes < 0) | (codes >= len(flags))] = -1
             columns[name] = pandas.Categorical.from_codes(codes, flags)
