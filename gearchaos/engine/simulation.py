@@ -153,20 +153,20 @@ class Simulation:
         model = self.lanes.model
         signals = (*outputs.states, *model.signals[:1])
         parts: dict[Part, bool | Sequence[str]] = {
-            catalogue.SECTION_POINTS: bool(outputs.section),
-            catalogue.SECTION: outputs.section,
-            catalogue.LYAPUNOV: outputs.lyapunov,
-            catalogue.MOTION: outputs.motion,
-            catalogue.RECORD: outputs.motion and outputs.lyapunov,
-            catalogue.EXPONENTS: outputs.exponents,
-            catalogue.CROSSINGS: self._splits_steps,
-            catalogue.CONTACT: self._elements if touched else (),
+            catalogue.SECTION_POINTS_PART: bool(outputs.section),
+            catalogue.SECTION_PART: outputs.section,
+            catalogue.LYAPUNOV_PART: outputs.lyapunov,
+            catalogue.MOTION_PART: outputs.motion,
+            catalogue.RECORD_PART: outputs.motion and outputs.lyapunov,
+            catalogue.EXPONENTS_PART: outputs.exponents,
+            catalogue.CROSSINGS_PART: self._splits_steps,
+            catalogue.CONTACT_PART: self._elements if touched else (),
             **(for_each(model.load_parts, self._elements) if self.plan.loads else {}),
-            catalogue.EXTREMES: outputs.states,
-            catalogue.ORDERS: bool(self.plan.orders),
-            catalogue.AMPLITUDES: signals if self.plan.orders else (),
-            catalogue.CHECK: self.config.integration.error_check > 0.0,
-            catalogue.EVERY_SWEEP: True,
+            catalogue.EXTREMES_PART: outputs.states,
+            catalogue.ORDERS_PART: bool(self.plan.orders),
+            catalogue.AMPLITUDES_PART: signals if self.plan.orders else (),
+            catalogue.CHECK_PART: self.config.integration.error_check > 0.0,
+            catalogue.EVERY_SWEEP_PART: True,
         }
         values = {
             names.SECTION_POINT: np.arange(outputs.section_points),

@@ -5,7 +5,7 @@ A model adds its own parts and wordings; that of the gear pair is
 """
 
 from gearchaos.outputs import names
-from gearchaos.outputs.entries import LANES, Kind, Output, Part, numbers
+from gearchaos.outputs.entries import LANE_AXES, Kind, Output, Part, numbers
 from gearchaos.outputs.scales import Quantity
 
 CONTACTS = ("apart", "driving_flank", "back_flank")
@@ -33,11 +33,11 @@ DIRECTION_AXIS = Part(
         ),
     ),
 )
-HARMONICS = Part(
+HARMONICS_PART = Part(
     "with parameters that have a value for each harmonic",
     (numbers(names.HARMONIC, "harmonic of the mesh frequency in the mesh stiffness", "$n$"),),
 )
-SECTION_POINTS = Part(
+SECTION_POINTS_PART = Part(
     "with sections",
     (
         numbers(
@@ -46,21 +46,21 @@ SECTION_POINTS = Part(
         ),
     ),
 )
-SECTION = Part(
+SECTION_PART = Part(
     "with sections, for each of their states",
     (
         Output(
             f"{names.SECTION}@",
             "@ at the stroboscopic section",
             "@",
-            dims=(LANES, names.SECTION_POINT),
+            dims=(LANE_AXES, names.SECTION_POINT),
             scale=None,
             errors=("section_error",),
         ),
     ),
     repeated_for=(Kind.STATE,),
 )
-LYAPUNOV = Part(
+LYAPUNOV_PART = Part(
     "with the largest Lyapunov exponent",
     (
         Output(
@@ -79,7 +79,7 @@ LYAPUNOV = Part(
         ),
     ),
 )
-MOTION = Part(
+MOTION_PART = Part(
     "with labels of the motions",
     (
         Output("motion", "kind of motion", dtype="uint8", fill_value=None),
@@ -102,7 +102,7 @@ MOTION = Part(
         ),
     ),
 )
-RECORD = Part(
+RECORD_PART = Part(
     "with labels of the motions and the largest Lyapunov exponent",
     (
         Output(
@@ -113,7 +113,7 @@ RECORD = Part(
         ),
     ),
 )
-EXPONENTS = Part(
+EXPONENTS_PART = Part(
     "with all Lyapunov exponents",
     (
         numbers(names.EXPONENT_NUMBER, "number of the Lyapunov exponent, the largest first", "$i$"),
@@ -121,14 +121,14 @@ EXPONENTS = Part(
             "lyapunov_exponents",
             "all Lyapunov exponents",
             r"$\lambda_i$",
-            dims=(LANES, names.EXPONENT_NUMBER),
+            dims=(LANE_AXES, names.EXPONENT_NUMBER),
             scale=Quantity.GROWTH_RATE,
             errors=(f"lyapunov_exponents{names.STANDARD_ERROR}",),
         ),
         Output(
             f"lyapunov_exponents{names.STANDARD_ERROR}",
             "standard error of each Lyapunov exponent",
-            dims=(LANES, names.EXPONENT_NUMBER),
+            dims=(LANE_AXES, names.EXPONENT_NUMBER),
             scale=Quantity.GROWTH_RATE,
         ),
         Output(
@@ -139,7 +139,7 @@ EXPONENTS = Part(
         ),
     ),
 )
-CROSSINGS = Part(
+CROSSINGS_PART = Part(
     "if steps are split where an element is met or left",
     (
         Output(names.CROSSINGS, "clearance boundaries crossed per mesh period"),
@@ -156,7 +156,7 @@ CROSSINGS = Part(
         ),
     ),
 )
-CONTACT = Part(
+CONTACT_PART = Part(
     "with the contact of elements, for each element",
     (
         Output("time_driving_@", "share of the recorded time on the driving flank, @"),
@@ -172,7 +172,7 @@ CONTACT = Part(
     ),
     repeated_for=(Kind.ELEMENT,),
 )
-EXTREMES = Part(
+EXTREMES_PART = Part(
     "for each state whose extremes are kept",
     (
         Output("@_smallest", "smallest @", scale=None),
@@ -181,24 +181,24 @@ EXTREMES = Part(
     ),
     repeated_for=(Kind.STATE,),
 )
-ORDERS = Part(
+ORDERS_PART = Part(
     "with amplitudes",
     (Output(names.ORDER, "frequency over mesh frequency", dims=(names.ORDER,), fill_value=None),),
 )
-AMPLITUDES = Part(
+AMPLITUDES_PART = Part(
     "with amplitudes, for each state whose extremes are kept and each signal",
     (
         Output(
             f"{names.AMPLITUDE}@",
             "amplitude of the @",
             "@",
-            dims=(LANES, names.ORDER),
+            dims=(LANE_AXES, names.ORDER),
             scale=None,
         ),
     ),
     repeated_for=(Kind.STATE, Kind.SIGNAL),
 )
-CHECK = Part(
+CHECK_PART = Part(
     "with an error check",
     (
         Output(
@@ -219,7 +219,7 @@ CHECK = Part(
         ),
     ),
 )
-EVERY_SWEEP = Part(
+EVERY_SWEEP_PART = Part(
     "always",
     (
         Output(names.STATUS, "status of the lane", dtype="uint8", fill_value=None),
@@ -230,12 +230,12 @@ EVERY_SWEEP = Part(
             fill_value=-1,
         ),
         numbers(names.STATE, "number of the state variable, which its meaning names"),
-        Output("start_state", "state at the start of the lane", dims=(LANES, names.STATE)),
-        Output("end_state", "state at the end of the lane", dims=(LANES, names.STATE)),
+        Output("start_state", "state at the start of the lane", dims=(LANE_AXES, names.STATE)),
+        Output("end_state", "state at the end of the lane", dims=(LANE_AXES, names.STATE)),
     ),
     required=True,
 )
-TIME = Part(
+TIME_PART = Part(
     "in a response",
     (
         Output(
@@ -254,19 +254,19 @@ TIME = Part(
     ),
     in_time=True,
 )
-MOTION_IN_TIME = Part(
+MOTION_IN_TIME_PART = Part(
     "in a response, for each state and each acceleration",
-    (Output("@", "@", "@", dims=(LANES, names.TIME), scale=None),),
+    (Output("@", "@", "@", dims=(LANE_AXES, names.TIME), scale=None),),
     repeated_for=(Kind.STATE, Kind.ACCELERATION),
     in_time=True,
 )
-CONTACT_IN_TIME = Part(
+CONTACT_IN_TIME_PART = Part(
     "in a response, for each element",
     (
         Output(
             "contact_@",
             "contact, @",
-            dims=(LANES, names.TIME),
+            dims=(LANE_AXES, names.TIME),
             dtype="uint8",
             fill_value=NO_CONTACT,
             meanings=CONTACTS,
@@ -280,25 +280,27 @@ PARTS = (
     REALISATION_AXIS,
     START_AXIS,
     DIRECTION_AXIS,
-    HARMONICS,
-    SECTION_POINTS,
-    SECTION,
-    LYAPUNOV,
-    MOTION,
-    RECORD,
-    EXPONENTS,
-    CROSSINGS,
-    CONTACT,
-    EXTREMES,
-    ORDERS,
-    AMPLITUDES,
-    CHECK,
-    EVERY_SWEEP,
-    TIME,
-    MOTION_IN_TIME,
-    CONTACT_IN_TIME,
+    HARMONICS_PART,
+    SECTION_POINTS_PART,
+    SECTION_PART,
+    LYAPUNOV_PART,
+    MOTION_PART,
+    RECORD_PART,
+    EXPONENTS_PART,
+    CROSSINGS_PART,
+    CONTACT_PART,
+    EXTREMES_PART,
+    ORDERS_PART,
+    AMPLITUDES_PART,
+    CHECK_PART,
+    EVERY_SWEEP_PART,
+    TIME_PART,
+    MOTION_IN_TIME_PART,
+    CONTACT_IN_TIME_PART,
 )
 """All generic parts in the order of a file."""
 
-AXES = {part.outputs[0].name: part for part in (REALISATION_AXIS, START_AXIS, DIRECTION_AXIS)}
+UNSWEPT_AXES = {
+    part.outputs[0].name: part for part in (REALISATION_AXIS, START_AXIS, DIRECTION_AXIS)
+}
 """Parts of the axes along which no parameter is swept, by the name of the axis."""

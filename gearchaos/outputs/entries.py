@@ -12,7 +12,7 @@ from gearchaos.outputs.scales import Quantity
 
 SUBJECT = "@"
 """Stands for the name, the wording or the symbol of the subject in the texts of an output."""
-LANES = "lanes"
+LANE_AXES = "lanes"
 """Stands for all axes of a result in the dimensions of an output."""
 
 Dtype: TypeAlias = Literal["float64", "int32", "uint8"]
@@ -62,7 +62,7 @@ class Output:
     long_name, symbol : str
         Wording for people, and mathtext for axis labels. `SUBJECT` stands for those of the subject.
     dims : tuple of str
-        Dimensions; `LANES` stands for all axes of the result.
+        Dimensions; `LANE_AXES` stands for all axes of the result.
     dtype : str
         ``"float64"``, ``"int32"`` or ``"uint8"``.
     scale : Quantity, optional
@@ -79,7 +79,7 @@ class Output:
     name: str
     long_name: str
     symbol: str = ""
-    dims: tuple[str, ...] = (LANES,)
+    dims: tuple[str, ...] = (LANE_AXES,)
     dtype: Dtype = "float64"
     scale: Quantity | None = Quantity.NONE
     fill_value: float | int | None = np.nan
@@ -98,7 +98,7 @@ class Output:
 
     def dims_over(self, axes: Sequence[str]) -> tuple[str, ...]:
         """Return the dimensions of the output in a result with these axes."""
-        return tuple(name for dim in self.dims for name in (axes if dim == LANES else (dim,)))
+        return tuple(name for dim in self.dims for name in (axes if dim == LANE_AXES else (dim,)))
 
 
 def numbers(name: str, long_name: str, symbol: str = "", meanings: tuple[str, ...] = ()) -> Output:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from gearchaos.arrays import Floats
-from gearchaos.outputs.catalogue import AXES, MOTION_IN_TIME, PARTS
+from gearchaos.outputs.catalogue import MOTION_IN_TIME_PART, PARTS, UNSWEPT_AXES
 from gearchaos.outputs.entries import NO_SUBJECT, SUBJECT, Kind, Output, Part, Subject
 from gearchaos.outputs.names import TIME, UNSWEPT, acceleration_of, rate_of
 from gearchaos.outputs.scales import PURE, Quantity, Scale
@@ -68,7 +68,7 @@ class Catalogue:
     ...     subjects={Kind.STATE: (x, x_rate), Kind.ACCELERATION: (x_acceleration,)},
     ... )
     >>> axes = [oscillator.axis("start", [0, 1])]
-    >>> listed = oscillator.variables(axes, {catalogue.MOTION_IN_TIME: ["x"]})
+    >>> listed = oscillator.variables(axes, {catalogue.MOTION_IN_TIME_PART: ["x"]})
     >>> [(variable.name, variable.long_name) for variable in listed[1:]]
     [('x', 'displacement of the mass')]
     """
@@ -97,7 +97,7 @@ class Catalogue:
         numbers : array of int, shape (values,)
             Its values, ascending.
         """
-        return self.variables((), {AXES[name]: True}, Details({name: numbers}))[0]
+        return self.variables((), {UNSWEPT_AXES[name]: True}, Details({name: numbers}))[0]
 
     def variables(
         self,
@@ -151,7 +151,7 @@ class Catalogue:
         """
         in_time = [part for part in self.parts if part.in_time]
         parts = for_each(in_time, elements)
-        parts[MOTION_IN_TIME] = [
+        parts[MOTION_IN_TIME_PART] = [
             name for one in states[::2] for name in (one, rate_of(one), acceleration_of(one))
         ]
         return self.variables(axes, parts, Details({TIME: instants}))[len(axes) :]

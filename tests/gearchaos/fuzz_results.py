@@ -10,7 +10,7 @@ from typing import Any
 import h5py
 import numpy as np
 
-from gearchaos.models.gear_pair.outputs import CATALOGUE, STATES
+from gearchaos.models.gear_pair.outputs import CATALOGUE, STATE_SUBJECTS
 from gearchaos.outputs.variable import Variable, coordinate
 from gearchaos.results.files.atomic_file import append_checksum
 from gearchaos.results.reading.result import Result
@@ -30,7 +30,7 @@ GOOD_AXES = ((LOAD,), (ERRORS, LOAD, SEVERAL[0]), (ERRORS, LOAD), (LOAD, SEVERAL
 
 def good_result(path: Path, axes: tuple[Variable, ...] = GOOD_AXES[0]) -> None:
     """Write a sound result file with every kind of variable that a sweep has."""
-    states = [one.name for one in STATES[:2]]
+    states = [one.name for one in STATE_SUBJECTS[:2]]
     variables = sweep_variables(
         axes,
         states=states,

@@ -6,7 +6,12 @@ from fractions import Fraction
 import numpy as np
 from numpy.typing import ArrayLike
 
-from gearchaos.models.gear_pair.outputs import CATALOGUE, FORCES, LOADS, TRANSMISSION_ERROR
+from gearchaos.models.gear_pair.outputs import (
+    CATALOGUE,
+    FORCES_PART,
+    LOADS_PART,
+    TRANSMISSION_ERROR,
+)
 from gearchaos.outputs import catalogue
 from gearchaos.outputs.entries import Part
 from gearchaos.outputs.listing import Details
@@ -61,21 +66,21 @@ def sweep_variables(
     """
     kept = section if section_points > 0 else ()
     parts: dict[Part, bool | Sequence[str]] = {
-        catalogue.SECTION_POINTS: bool(kept),
-        catalogue.SECTION: kept,
-        catalogue.LYAPUNOV: lyapunov,
-        catalogue.MOTION: bool(motion_meanings),
-        catalogue.RECORD: bool(record_meanings),
-        catalogue.EXPONENTS: exponents,
-        catalogue.CROSSINGS: crossings,
-        catalogue.CONTACT: contact,
-        FORCES: loads,
-        LOADS: bool(loads),
-        catalogue.EXTREMES: chosen,
-        catalogue.ORDERS: bool(orders),
-        catalogue.AMPLITUDES: (*chosen, TRANSMISSION_ERROR) if orders else (),
-        catalogue.CHECK: bool(check_meanings),
-        catalogue.EVERY_SWEEP: True,
+        catalogue.SECTION_POINTS_PART: bool(kept),
+        catalogue.SECTION_PART: kept,
+        catalogue.LYAPUNOV_PART: lyapunov,
+        catalogue.MOTION_PART: bool(motion_meanings),
+        catalogue.RECORD_PART: bool(record_meanings),
+        catalogue.EXPONENTS_PART: exponents,
+        catalogue.CROSSINGS_PART: crossings,
+        catalogue.CONTACT_PART: contact,
+        FORCES_PART: loads,
+        LOADS_PART: bool(loads),
+        catalogue.EXTREMES_PART: chosen,
+        catalogue.ORDERS_PART: bool(orders),
+        catalogue.AMPLITUDES_PART: (*chosen, TRANSMISSION_ERROR) if orders else (),
+        catalogue.CHECK_PART: bool(check_meanings),
+        catalogue.EVERY_SWEEP_PART: True,
     }
     values: dict[str, ArrayLike] = {
         SECTION_POINT: np.arange(section_points),

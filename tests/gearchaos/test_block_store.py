@@ -37,10 +37,10 @@ values = [1.0, 2.0]
 
 def of_a_sweep(axes: Sequence[Variable]) -> list[Variable]:
     parts = {
-        catalogue.SECTION_POINTS: True,
-        catalogue.SECTION: ["delta_5"],
-        catalogue.LYAPUNOV: True,
-        catalogue.EVERY_SWEEP: True,
+        catalogue.SECTION_POINTS_PART: True,
+        catalogue.SECTION_PART: ["delta_5"],
+        catalogue.LYAPUNOV_PART: True,
+        catalogue.EVERY_SWEEP_PART: True,
     }
     values = {"section_point": np.arange(POINTS), "state": np.arange(2)}
     meanings = {"status": ["ok", "diverged"], "state": ["delta_5", "delta_5_rate"]}
@@ -417,11 +417,11 @@ from gearchaos.outputs import catalogue
 from gearchaos.outputs.listing import Details
 from gearchaos.outputs.variable import coordinate
 points, size, count = 500, 250, 80
-every, section = catalogue.EVERY_SWEEP, catalogue.SECTION
+every, section = catalogue.EVERY_SWEEP_PART, catalogue.SECTION_PART
 values = {"section_point": np.arange(points), "state": np.arange(1)}
 variables = CATALOGUE.variables(
     [coordinate("load", "1", "load", "", np.arange(float(size * count)))],
-    {catalogue.SECTION_POINTS: True, section: ["delta_5"], every: True},
+    {catalogue.SECTION_POINTS_PART: True, section: ["delta_5"], every: True},
     Details(values, {"status": ["ok"], "state": ["delta_5"]}),
 )
 random = np.random.default_rng(0)

@@ -387,7 +387,7 @@ def test_the_effects_decide_the_states(effects, states):
 
 
 def test_states_and_effects_are_those_of_the_files_and_the_groups():
-    assert tuple(one.name for one in gear_pair.STATES) == STATES
+    assert tuple(one.name for one in gear_pair.STATE_SUBJECTS) == STATES
     assert set().union(*(row.effects for row in GROUP_TABLE)) == set(EFFECTS)
 
 

@@ -8,7 +8,7 @@ import pytest
 
 from gearchaos.engine.running import result_of
 from gearchaos.errors import ConfigurationError
-from gearchaos.models.gear_pair.outputs import CATALOGUE, FORCES, LOADS
+from gearchaos.models.gear_pair.outputs import CATALOGUE, FORCES_PART, LOADS_PART
 from gearchaos.outputs import catalogue, listing
 from gearchaos.outputs.entries import Kind, Output, Part, Subject, motion_of, rearranged
 from gearchaos.outputs.listing import Catalogue, Details
@@ -22,14 +22,14 @@ from .listed_variables import parameter
 from .short_sweeps import unlabelled
 from .test_block_store import CONFIGURATION, LANES, PARAMETERS, SOFTWARE, VARIABLES, sweep
 
-EVERY = {catalogue.EVERY_SWEEP: True}
+EVERY = {catalogue.EVERY_SWEEP_PART: True}
 AXIS = coordinate("force", "1", "amplitude of the force", "$F$", np.array([1.0, 2.0]))
 X = motion_of("x", "x", "{} of the mass")
 PUSH = Part(
     "with pushes", (Output("push_@", "push on the @", scale=Quantity.FORCE),), (Kind.ELEMENT,)
 )
 OSCILLATOR = Catalogue(
-    parts=rearranged(catalogue.PARTS, {catalogue.CONTACT: (catalogue.CONTACT, PUSH)}),
+    parts=rearranged(catalogue.PARTS, {catalogue.CONTACT_PART: (catalogue.CONTACT_PART, PUSH)}),
     subjects={
         Kind.STATE: X[:2],
         Kind.ACCELERATION: X[2:],
@@ -45,15 +45,15 @@ OSCILLATOR = Catalogue(
 def oscillator_result() -> Result:
     parts = {
         **EVERY,
-        catalogue.SECTION_POINTS: True,
-        catalogue.SECTION: ["x", "x_rate"],
-        catalogue.LYAPUNOV: True,
-        catalogue.CONTACT: ["stop"],
+        catalogue.SECTION_POINTS_PART: True,
+        catalogue.SECTION_PART: ["x", "x_rate"],
+        catalogue.LYAPUNOV_PART: True,
+        catalogue.CONTACT_PART: ["stop"],
         PUSH: ["stop"],
-        catalogue.EXTREMES: ["x"],
-        catalogue.MOTION_IN_TIME: ["x_acceleration"],
-        catalogue.TIME: True,
-        catalogue.CONTACT_IN_TIME: ["stop"],
+        catalogue.EXTREMES_PART: ["x"],
+        catalogue.MOTION_IN_TIME_PART: ["x_acceleration"],
+        catalogue.TIME_PART: True,
+        catalogue.CONTACT_IN_TIME_PART: ["stop"],
     }
     values = {"section_point": np.arange(3), "state": [0, 1], "time": np.arange(4) / 2.0}
     meanings = {
@@ -97,24 +97,28 @@ def test_details_of_an_unknown_output_are_refused(details, unknown):
 def test_details_of_outputs_that_a_result_lacks_are_ignored():
     details = Details({"order": np.arange(2)}, {"motion": ["chaotic"]}, {"period": "periods"})
     found = CATALOGUE.variables((), EVERY, details)
-    assert [one.name for one in found] == [one.name for one in catalogue.EVERY_SWEEP.outputs]
+    assert [one.name for one in found] == [one.name for one in catalogue.EVERY_SWEEP_PART.outputs]
 
 
 def test_a_part_of_another_model_is_refused():
     with pytest.raises(ValueError, match=r"^push_@: has no entry"):
         CATALOGUE.variables((), {PUSH: ["tangential"]})
     with pytest.raises(ValueError, match=r"^load_factor_largest: has no entry"):
-        OSCILLATOR.variables((), {LOADS: True})
+        OSCILLATOR.variables((), {LOADS_PART: True})
 
 
 @pytest.mark.parametrize(
     ("part", "subjects", "said"),
     [
-        (catalogue.SECTION, ["delta_5", "delta_9"], "delta_9 is not the name of a known state"),
-        (catalogue.SECTION, ["tangential"], "tangential is not the name of a known state"),
-        (FORCES, ["delta_5"], "delta_5 is not .* element; there are tangential, axial"),
-        (catalogue.AMPLITUDES, ["x"], "x is not the name of a known state or signal"),
-        (catalogue.CONTACT, True, "True is not the name of a known element"),
+        (
+            catalogue.SECTION_PART,
+            ["delta_5", "delta_9"],
+            "delta_9 is not the name of a known state",
+        ),
+        (catalogue.SECTION_PART, ["tangential"], "tangential is not the name of a known state"),
+        (FORCES_PART, ["delta_5"], "delta_5 is not .* element; there are tangential, axial"),
+        (catalogue.AMPLITUDES_PART, ["x"], "x is not the name of a known state or signal"),
+        (catalogue.CONTACT_PART, True, "True is not the name of a known element"),
     ],
 )
 def test_a_subject_that_the_model_lacks_is_refused(part, subjects, said):
@@ -123,15 +127,18 @@ def test_a_subject_that_the_model_lacks_is_refused(part, subjects, said):
 
 
 def test_a_long_name_without_its_wording_is_refused():
-    assert names_of(catalogue.MOTION, wordings={"period": "mesh periods"})[1] == "period"
+    assert names_of(catalogue.MOTION_PART, wordings={"period": "mesh periods"})[1] == "period"
     with pytest.raises(ValueError, match=r"^period: lacks the wording"):
-        names_of(catalogue.MOTION)
+        names_of(catalogue.MOTION_PART)
 
 
 @pytest.mark.parametrize(
     ("wrong", "message"),
     [
-        ({"parts": (*catalogue.PARTS, catalogue.ORDERS)}, "^order: is the name of two outputs"),
+        (
+            {"parts": (*catalogue.PARTS, catalogue.ORDERS_PART)},
+            "^order: is the name of two outputs",
+        ),
         # The motion of a state has its name in a response.
         (
             {"subjects": {Kind.STATE: (Subject("time", "time"),)}},

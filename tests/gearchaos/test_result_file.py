@@ -15,8 +15,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from gearchaos.models.gear_pair.outputs import CATALOGUE
-from gearchaos.models.gear_pair.outputs import STATES as ALL_STATES
+from gearchaos.models.gear_pair.outputs import CATALOGUE, STATE_SUBJECTS
 from gearchaos.outputs.names import axis_name
 from gearchaos.outputs.variable import Variable, coordinate
 from gearchaos.results.reading.result import Result, open_result
@@ -354,7 +353,7 @@ def test_what_has_an_error_names_where_it_is_told(path: Path) -> None:
 
 
 def test_every_state_has_a_wording_of_its_own() -> None:
-    assert len({(one.long_name, one.symbol) for one in ALL_STATES}) == len(ALL_STATES) == 10
+    assert len({(one.long_name, one.symbol) for one in STATE_SUBJECTS}) == len(STATE_SUBJECTS) == 10
 
 
 def test_the_documented_variables_are_those_that_are_written() -> None:

@@ -30,11 +30,11 @@ from gearchaos.outputs.listing import Details
 from gearchaos.outputs.variable import coordinate
 
 def result(lanes):
-    every, section = catalogue.EVERY_SWEEP, catalogue.SECTION
+    every, section = catalogue.EVERY_SWEEP_PART, catalogue.SECTION_PART
     values = {"section_point": np.arange(100), "state": np.arange(1)}
     variables = CATALOGUE.variables(
         [coordinate("load", "1", "static load", "$f_n$", np.arange(float(lanes)))],
-        {catalogue.SECTION_POINTS: True, section: ["delta_5"], every: True},
+        {catalogue.SECTION_POINTS_PART: True, section: ["delta_5"], every: True},
         Details(values, {"status": ["ok", "diverged"], "state": ["delta_5"]}),
     )
     sizes = {"section_point": 100, "state": 1}

@@ -23,8 +23,8 @@ from gearchaos.models.gear_pair.loads import loads_told
 from gearchaos.models.gear_pair.outputs import (
     CATALOGUE,
     DIRECTIONS,
-    FORCES,
-    LOADS,
+    FORCES_PART,
+    LOADS_PART,
     MESH_ERROR,
     MESH_FORCE,
     TRANSMISSION_ERROR,
@@ -39,7 +39,7 @@ class GearPairModel(Model):
     """A helical gear pair with pitch error (Pan 2021, eq. 13)."""
 
     catalogue = CATALOGUE
-    load_parts = (FORCES, LOADS)
+    load_parts = (FORCES_PART, LOADS_PART)
     signals = (TRANSMISSION_ERROR,)
     contact_words = "mean mesh stiffness, teeth in contact"
     deflection_words = "of the mesh under the static load, along the transverse line of action"

@@ -3,7 +3,7 @@
 from gearchaos.models.gear_pair.derivation import FREQUENCY, LENGTH, SCALES, STIFFNESS
 from gearchaos.outputs import catalogue, names
 from gearchaos.outputs.entries import (
-    LANES,
+    LANE_AXES,
     Kind,
     Output,
     Part,
@@ -26,17 +26,20 @@ _COORDINATES = [
     motion_of("delta_3", r"\delta_3", "axial {} of the driving gear"),
     motion_of("delta_4", r"\delta_4", "axial {} of the driven gear"),
 ]
-STATES = tuple(
+STATE_SUBJECTS = tuple(
     subject for displacement, rate, _ in _COORDINATES for subject in (displacement, rate)
 )
 """All states in their order; a scene lacks those of the effects that it does not list."""
-DEFAULT_VARIABLE = f"{names.SECTION}{STATES[0].name}"
+DEFAULT_VARIABLE = f"{names.SECTION}{STATE_SUBJECTS[0].name}"
 """The output that a diagram shows where none is chosen."""
-ELEMENTS = (Subject("tangential", "tangential", "$N_y$"), Subject("axial", "axial", "$N_z$"))
+ELEMENT_SUBJECTS = (
+    Subject("tangential", "tangential", "$N_y$"),
+    Subject("axial", "axial", "$N_z$"),
+)
 """Directions in which the teeth have a clearance."""
-DIRECTIONS = tuple(element.name for element in ELEMENTS)
+DIRECTIONS = tuple(element.name for element in ELEMENT_SUBJECTS)
 
-FORCES = Part(
+FORCES_PART = Part(
     "with loads, for each direction",
     (
         Output(f"{MESH_FORCE}largest_@", "largest mesh force, @", scale=Quantity.FORCE),
@@ -46,7 +49,7 @@ FORCES = Part(
     ),
     repeated_for=(Kind.ELEMENT,),
 )
-LOADS = Part(
+LOADS_PART = Part(
     "with loads",
     (
         Output("load_factor_largest", "largest tangential mesh force over the static one"),
@@ -66,30 +69,30 @@ LOADS = Part(
         ),
     ),
 )
-MESH_IN_TIME = Part(
+MESH_IN_TIME_PART = Part(
     "in a response",
     (
         Output(
             MESH_ERROR,
             "pitch error of the mesh",
             "$e$",
-            dims=(LANES, names.TIME),
+            dims=(LANE_AXES, names.TIME),
             scale=Quantity.LENGTH,
         ),
     ),
     in_time=True,
 )
-FORCES_IN_TIME = Part(
+FORCES_IN_TIME_PART = Part(
     "in a response, for each direction",
     (
         Output(
             f"{MESH_FORCE}@",
             "@ mesh force",
             "@",
-            dims=(LANES, names.TIME),
+            dims=(LANE_AXES, names.TIME),
             scale=Quantity.FORCE,
         ),
-        *catalogue.CONTACT_IN_TIME.outputs,
+        *catalogue.CONTACT_IN_TIME_PART.outputs,
     ),
     repeated_for=(Kind.ELEMENT,),
     in_time=True,
@@ -99,14 +102,14 @@ CATALOGUE = Catalogue(
     parts=rearranged(
         catalogue.PARTS,
         {
-            catalogue.CONTACT: (catalogue.CONTACT, FORCES, LOADS),
-            catalogue.CONTACT_IN_TIME: (MESH_IN_TIME, FORCES_IN_TIME),
+            catalogue.CONTACT_PART: (catalogue.CONTACT_PART, FORCES_PART, LOADS_PART),
+            catalogue.CONTACT_IN_TIME_PART: (MESH_IN_TIME_PART, FORCES_IN_TIME_PART),
         },
     ),
     subjects={
-        Kind.STATE: STATES,
+        Kind.STATE: STATE_SUBJECTS,
         Kind.ACCELERATION: tuple(acceleration for *_, acceleration in _COORDINATES),
-        Kind.ELEMENT: ELEMENTS,
+        Kind.ELEMENT: ELEMENT_SUBJECTS,
         Kind.SIGNAL: (Subject(TRANSMISSION_ERROR, "transmission error", scale=Quantity.LENGTH),),
     },
     scales=scales_of(

@@ -14,7 +14,7 @@ import numpy as np
 
 from gearchaos.arrays import Array
 from gearchaos.interrupts import check
-from gearchaos.outputs.catalogue import HARMONICS
+from gearchaos.outputs.catalogue import HARMONICS_PART
 from gearchaos.outputs.listing import GENERIC, Details
 from gearchaos.outputs.names import HARMONIC, STATUS, diagram_axis
 from gearchaos.outputs.variable import Variable, lane_axes, require_listed
@@ -64,10 +64,8 @@ def write_result(
     blocks : iterable of (int, int, mapping of str to array)
         First lane, last lane (excluded), and an array of shape (lanes, own dimensions) for each
         variable without values of its own. Lanes are in C order over the axes.
-    parameters : mapping of str to Variable
-        Parameters of the model.
-    metadata : mapping of str to str, int or float
-        Root attributes.
+    parameters, metadata : mapping
+        Parameters of the model and root attributes, by name.
     overwrite : bool
         Whether an existing file is replaced.
     scratch : path-like, optional
@@ -186,7 +184,7 @@ def _write_metadata(file: h5py.File, metadata: Metadata) -> None:
 def _harmonics(parameters: Mapping[str, Variable]) -> list[Variable]:
     rows = (np.size(p.values) for p in parameters.values() if p.dims == (HARMONIC,))
     numbers = np.arange(1, next(rows, 0) + 1)
-    return GENERIC.variables((), {HARMONICS: numbers.size > 0}, Details({HARMONIC: numbers}))
+    return GENERIC.variables((), {HARMONICS_PART: numbers.size > 0}, Details({HARMONIC: numbers}))
 
 
 def _create_all(

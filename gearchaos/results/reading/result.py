@@ -25,7 +25,7 @@ from gearchaos.results.files.result_reader import fixed_coordinates, read_result
 from gearchaos.results.reading import tables
 from gearchaos.results.reading.physical_units import in_physical_units
 from gearchaos.results.reading.selection import (
-    Method,
+    Matching,
     number_on,
     parameters_at,
     part_of,
@@ -164,7 +164,7 @@ class Result:
         grid = np.meshgrid(*(self[name] for name in self.axes), indexing="ij")
         return np.ravel(grid[self.axes.index(axis)])
 
-    def sel(self, method: Method = None, **coordinates: float | str) -> Result:
+    def sel(self, method: Matching = None, **coordinates: float | str) -> Result:
         """Fix axes at one of their values each.
 
         Parameters

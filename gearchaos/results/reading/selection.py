@@ -12,10 +12,10 @@ from gearchaos.arrays import Array
 from gearchaos.errors import ConfigurationError
 from gearchaos.outputs.variable import Variable
 
-Method: TypeAlias = Literal["nearest", "within"] | None
+Matching: TypeAlias = Literal["nearest", "within"] | None
 
 
-def number_on(axis: Variable, wanted: float | str, method: Method) -> int:
+def number_on(axis: Variable, wanted: float | str, method: Matching) -> int:
     """Return the number of the value of an axis that was wanted.
 
     ``method`` is that of `Result.sel`. Raises ConfigurationError if there is no such value.
