@@ -1,66 +1,87 @@
-"""Measure error and time of step sizes on some lanes of a sweep.
+"""Measure the error and the time of step sizes on some lanes of a sweep.
 
-RK4 with plain and with resolved steps, and flow maps, which need few steps. The truth is what fine
-flow maps find. Errors are those that 95 % of the periodic lanes do not exceed. The table goes to
-stdout, everything else to stderr; a figure (PNG and PDF) is written under the name in --output.
+The command compares RK4 with plain steps, RK4 with resolved steps, and flow maps, which need few
+steps. The reference solution is computed with fine flow maps. The printed error is the one that
+95 % of the periodic lanes do not exceed.
+
+The table goes to stdout, everything else to stderr. A figure (PNG and PDF) is written under the
+name given by --output.
 """
 
 import time
-from argparse import Namespace
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 from gearchaos.command_line import Command
 from gearchaos.errors import ConfigurationError
 from gearchaos.interrupts import check
+from gearchaos.options import ConfigFile, Option, Overwrite, Settings, Threads
 from gearchaos.progress import notice, say
 
 if TYPE_CHECKING:
+    from gearchaos.models import Configuration
     from gearchaos.engine.simulation import Simulation
     from gearchaos.engine.steps import Candidate
 
 MODES = {"plain": (False, "rk4"), "resolved": (True, "rk4"), "flow map": (True, "flow_map")}
-"""Each with its setting of `Plan`: resolved, method."""
+"""Settings of `Plan` for each mode: ``resolved`` and ``method``."""
 FLOW_MAP_STEPS = (6, 12, 24, 48, 96, 192)
 TRUTH_STEPS = 384
 ROUNDS = 3
 WANTED = (1e-4, 1e-6, 1e-8)
 
 
-def _accuracy(options: Namespace) -> None:
-    import numpy as np
+class AccuracyOptions(NamedTuple):
+    """Options of ``gearchaos accuracy``."""
 
-    from gearchaos.engine.lanes import Lanes
+    config: ConfigFile
+    steps: Annotated[
+        tuple[int, ...],
+        Option(
+            "steps per mesh period (default: %(default)s)",
+            "N,N,...",
+            low=1,
+            high=1600,
+            joined=True,
+        ),
+    ] = (50, 100, 200, 400, 800)
+    lanes: Annotated[int, Option("number of lanes (default: %(default)s)", "N", low=1)] = 64
+    output: Annotated[
+        str | None,
+        Option(
+            "name of the figure, without its ending (default: that of the configuration, with "
+            "_accuracy)",
+            "NAME",
+            ("-o", "--output"),
+        ),
+    ] = None
+    overwrite: Overwrite = False
+    threads: Threads = None
+    settings: Settings = ()
+
+
+def _accuracy(options: AccuracyOptions) -> None:
+    from gearchaos.models import load_config
     from gearchaos.engine.running import choose_threads
     from gearchaos.engine.simulation import Simulation
     from gearchaos.figures.page import FORMATS, save_figure
     from gearchaos.figures.work_precision import work_precision_page
-    from gearchaos.models import load_config
     from gearchaos.results.files.atomic_file import check_output
 
-    steps = options.steps
-    config = load_config(options.config, options.set)
+    config = load_config(options.config, options.settings)
     stem = options.output or f"{Path(options.config).stem}_accuracy"
     targets = [f"{stem}.{ending}" for ending in FORMATS]
     for target in targets:
         check_output(target, options.overwrite)
     choose_threads(options.threads)
-    if refusal := Lanes(config).system_of(np.arange(1)).refuses_maps():
-        raise ConfigurationError(
-            f"{config.source}: the truth comes from flow maps, and {refusal}; measure errors with "
-            "integration.error_check"
-        )
-    config = config.replace("integration.method", "rk4")
-    # What a sweep could not measure is refused as it would refuse it, and too few steps, too.
-    fewest = {"unstable": "refuse", "steps_per_period": steps[0], "error_check": 1.0}
-    Simulation(config.replace("integration", {**config.tables()["integration"], **fewest}))
-    settings = measure(Simulation(config), steps, options.lanes)
+    config = _measurable(config, options.steps[0])
+    settings = measure(Simulation(config), options.steps, options.lanes)
     print("\n".join(table(settings)))
     if not any(setting.error > 0.0 for setting in settings):
         raise ConfigurationError(
-            f"{config.source}: none of the lanes that were tried moves periodically, so that no "
-            "error can be measured; try more with --lanes, or others with --set"
+            f"{config.source}: no error can be measured, because none of the tried lanes moves "
+            "periodically; try more lanes with --lanes, or others with --set"
         )
     print("\n".join(recommendation(settings, error) for error in WANTED))
     points = {m: [(s.steps, s.seconds, s.error) for s in settings if s.mode == m] for m in MODES}
@@ -70,10 +91,33 @@ def _accuracy(options: Namespace) -> None:
     say(f"written: {', '.join(targets)}")
 
 
-def measure(simulation: "Simulation", steps: Sequence[int], lanes: int) -> "list[Candidate]":
-    """Measure error and time of every number of steps per mesh period, plain and resolved.
+def _measurable(config: "Configuration", fewest: int) -> "Configuration":
+    """Return the configuration with RK4.
 
-    Beside them those of `FLOW_MAP_STEPS`. So many lanes are tried, spread evenly over the sweep.
+    Raises ConfigurationError if no error can be measured, or if the fewest steps are unstable.
+    """
+    import numpy as np
+
+    from gearchaos.engine.lanes import Lanes
+    from gearchaos.engine.simulation import Simulation
+
+    if refusal := Lanes(config).system_of(np.arange(1)).refuses_maps():
+        raise ConfigurationError(
+            f"{config.source}: the reference solution comes from flow maps, and {refusal}; "
+            "measure errors with integration.error_check"
+        )
+    config = config.replace("integration.method", "rk4")
+    # A sweep with an error check raises the same errors for what cannot be measured.
+    checks = {"unstable": "refuse", "steps_per_period": fewest, "error_check": 1.0}
+    Simulation(config.replace("integration", {**config.tables()["integration"], **checks}))
+    return config
+
+
+def measure(simulation: "Simulation", steps: Sequence[int], lanes: int) -> "list[Candidate]":
+    """Return error and time of each number of RK4 steps per mesh period, plain and resolved.
+
+    Flow maps are measured with `FLOW_MAP_STEPS`. ``lanes`` is the number of lanes, which are spread
+    evenly over the sweep.
     """
     from statistics import median
 
@@ -85,7 +129,7 @@ def measure(simulation: "Simulation", steps: Sequence[int], lanes: int) -> "list
         _, solution = pilot(simulation.lanes, simulation.plan, lanes, TRUTH_STEPS)
         for setting in MODES.values():
             solution(steps[0], *setting)
-    with notice(f"computing the truth with {TRUTH_STEPS} flow maps per period"):
+    with notice(f"computing the reference solution with {TRUTH_STEPS} flow maps per period"):
         truth = solution(TRUTH_STEPS, *MODES["flow map"])
     settings = []
     tried = [(mode, count) for mode in ("plain", "resolved") for count in steps]
@@ -103,7 +147,7 @@ def measure(simulation: "Simulation", steps: Sequence[int], lanes: int) -> "list
 
 
 def table(settings: "Sequence[Candidate]") -> list[str]:
-    """Word the measurement as lines of a table."""
+    """Return the measurement as lines of a table."""
     cheapest = min(setting.seconds for setting in settings)
     return [
         "steps  mode      section error  exponent error  changed  seconds   cost",
@@ -116,7 +160,7 @@ def table(settings: "Sequence[Candidate]") -> list[str]:
 
 
 def recommendation(settings: "Sequence[Candidate]", error: float) -> str:
-    """Name the cheapest setting that reaches an error."""
+    """Return a sentence with the cheapest setting that reaches an error."""
     enough = [setting for setting in settings if setting.error <= error]
     if not enough:
         return f"For an error of {error:.0e}: none of these; give finer --steps."
@@ -124,4 +168,4 @@ def recommendation(settings: "Sequence[Candidate]", error: float) -> str:
     return f"For an error of {error:.0e}: {best.steps} {best.mode} steps per mesh period."
 
 
-main = Command("accuracy", __doc__, _accuracy).start(__name__)
+main = Command("accuracy", __doc__, AccuracyOptions, _accuracy).start(__name__)

@@ -1,22 +1,57 @@
-"""Find the attractors of a sweep from many starts, and which share of the starts leads to each.
+"""Find the attractors of a sweep from many starts, and the share of the starts that leads to each.
 
-Attractors keep their numbers along the sweep. The table goes to stdout, everything else to stderr.
+An attractor keeps its number along the sweep. The table goes to stdout, everything else to stderr.
+
+With --output, the command also draws a figure: the basins of one value over the two states of a
+grid of starts, or the shares of several values.
 """
 
 import json
 import math
 import textwrap
-from argparse import Namespace
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
-from gearchaos.command_line import Command, coordinates
+from gearchaos.command_line import Command
+from gearchaos.options import Option, Overwrite, Place, Threads, coordinates
 
 if TYPE_CHECKING:
     from gearchaos.results.reading.ensembles import Basins
 
 
-def _basins(options: Namespace) -> None:
+class BasinsOptions(NamedTuple):
+    """Options of ``gearchaos basins``."""
+
+    result: Annotated[
+        str,
+        Option(
+            "result file of a sweep from several starts", "RESULT.h5", positional=True, file=True
+        ),
+    ]
+    output: Annotated[
+        Path | None,
+        Option(
+            "draw the basins or their shares into this file, such as basins.png or basins.pdf",
+            "FIGURE",
+            ("-o", "--output"),
+            file=True,
+        ),
+    ] = None
+    at: Annotated[
+        tuple[Place, ...],
+        Option(
+            "use the nearest value of this axis; may be repeated (default: the first value of each "
+            "axis but the first swept parameter)",
+            "NAME=VALUE",
+        ),
+    ] = ()
+    json: Annotated[bool, Option("print JSON, with sections and means of all variables")] = False
+    overwrite: Overwrite = False
+    threads: Threads = None
+
+
+def _basins(options: BasinsOptions) -> None:
     from gearchaos.engine.basins import find_basins
     from gearchaos.engine.running import compiling
     from gearchaos.figures import basins_page
@@ -36,22 +71,31 @@ def _basins(options: Namespace) -> None:
         found = find_basins(part, options.result, options.threads)
     where = slice_facts(whole, part)
     if options.json:
-        facts = {"parameter": found.parameter, "slice": where, "starts": found.numbers.shape[1]}
-        basins = [one._asdict() for one in found.basins]
-        for one in basins:
-            # That of a motion without a period would be a thousand points.
-            one["section"] = one["section"].tolist() if one["period"] else None
-            one["number"] = one["number"] if one["number"] > 0 else None
-        facts |= {"basins": basins, "entropy": found.entropy}
-        print(json.dumps(plain(facts), indent=1))
+        print(json.dumps(plain(_facts(found, where)), indent=1))
     else:
         print("\n".join([*table(found, slice_lines(where))]))
     if options.output:
         save_figure(basins_page(found), options.output)
 
 
+def _facts(found: "Basins", where: Any) -> dict[str, Any]:
+    """Return what --json prints."""
+    basins = [one._asdict() for one in found.basins]
+    for one in basins:
+        # The section of a motion without a period would have a thousand points.
+        one["section"] = one["section"].tolist() if one["period"] else None
+        one["number"] = one["number"] if one["number"] > 0 else None
+    return {
+        "parameter": found.parameter,
+        "slice": where,
+        "starts": found.numbers.shape[1],
+        "basins": basins,
+        "entropy": found.entropy,
+    }
+
+
 def table(found: "Basins", where: list[str]) -> Iterator[str]:
-    """Word the basins as lines of a table, no longer than 80 characters."""
+    """Return the basins as lines of a table, each of at most 80 characters."""
     yield f"basins over {found.parameter}, {found.numbers.shape[1]} starts at each value"
     yield from where
     head = f"{'value':>10}  {'no':>3}  {'motion':15}{'multiplier':>10}  {'exponent':>9}"
@@ -72,4 +116,4 @@ def table(found: "Basins", where: list[str]) -> Iterator[str]:
             yield from textwrap.wrap(text, 80, subsequent_indent="   ")
 
 
-main = Command("basins", __doc__, _basins).start(__name__)
+main = Command("basins", __doc__, BasinsOptions, _basins).start(__name__)

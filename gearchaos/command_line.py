@@ -1,21 +1,18 @@
-"""The frame of every command: common options, lines on stderr, faults turned into exit codes."""
+"""What all commands have in common: they read options, run a body and return an exit code."""
 
-import math
 import os
-import re
 import sys
-import tomllib
-from argparse import ArgumentParser, ArgumentTypeError, Namespace
 from collections.abc import Callable, Sequence
-from functools import partial
 from io import TextIOWrapper
 from pathlib import Path
-from typing import Any, NamedTuple, Self
+from typing import TYPE_CHECKING, Generic, NamedTuple, Self, TypeVar
 
-from gearchaos.errors import ConfigurationError, FileError, GearchaosError
+from gearchaos.errors import FileError, GearchaosError
 from gearchaos.interrupts import Termination, check, heeded
 from gearchaos.progress import complain, discard, speaking, standing_streams
-from gearchaos.version import software_version
+
+if TYPE_CHECKING:
+    from gearchaos.argument_parser import OptionParser
 
 OK = 0
 USAGE = 2
@@ -24,40 +21,46 @@ CANNOT_READ_OR_WRITE = FileError.exit_code
 INTERRUPTED = 130
 CLOSED_PIPE = 141
 TERMINATED = 143
-EXIT_CODES = (
-    "Exit codes: 0 done, 2 the command line or the configuration asks for what cannot be, 3 done, "
-    "but more lanes diverged than outputs.allowed_diverged_share, 4 a file cannot be read or "
-    "written, is damaged or lacks something, or a package is missing, 130 interrupted, "
-    "143 terminated."
-)
+EXIT_CODES = """\
+Exit codes:
+
+  0    done
+  2    the command line or the configuration is wrong
+  3    done, but more lanes diverged than outputs.allowed_diverged_share
+  4    a file cannot be read or written or is damaged, or a package is missing
+  130  interrupted
+  143  terminated"""
+"""The end of every --help."""
 
 _PACKAGE = Path(__file__).resolve().parent
-_TABLE = tomllib.loads((_PACKAGE / "commands.toml").read_text("utf-8"))
-
-COMMANDS: dict[str, dict[str, Any]] = _TABLE["command"]
-"""Summary and options of every command by its name, as commands.toml explains them."""
 
 SWEEPS, *_ = filter(Path.is_dir, (_PACKAGE / "sweeps", _PACKAGE.parent / "sweeps", _PACKAGE))
 """Folder of the configurations that come with gearchaos: of the installed package, or the clone."""
 
+Options = TypeVar("Options")
 
-class Command(NamedTuple):
-    """A command: called with arguments, by default those of this process, it returns its exit code.
 
-    That is what the body returns, 0 for nothing, or with which argparse exits. A fault a user can
-    cause becomes lines on stderr, its notes after it, and a code: that of a GearchaosError, 4 for
-    an operating system error that nobody has worded or a lack of memory or of a package and, as the
-    shell says, 130 for an interrupt, 143 for SIGTERM, 141 when the reader of the output has gone.
+class Command(NamedTuple, Generic[Options]):
+    """A command. Called with arguments, by default those of the process, it returns an exit code.
 
-    ``name`` is that of `COMMANDS`; ``text`` is what --help says before the options and, from the
-    first empty line on, after them, where the exit codes follow. ``body`` does it, with the options
-    and, as their `arguments`, what was given; it imports what is heavy, so that --help answers at
-    once.
+    The exit code is what the body returns, 0 for None, or the code of a SystemExit. A fault that a
+    user can cause becomes lines on stderr, followed by its notes, and one of these codes: the code
+    of a GearchaosError; 4 for another operating system error, for a lack of memory and for a
+    missing package; and, as shells have it, 130 for an interrupt, 143 for SIGTERM, and 141 when the
+    reader of the output has gone.
+
+    ``name`` is a key of `COMMANDS`. ``text`` is the text of --help: its first paragraph comes
+    before the options, the others after them, followed by the exit codes. ``options`` is the type
+    of the options, see `gearchaos.options`. ``body`` runs the command with them. It imports heavy
+    packages itself, so that --help answers at once. A command that ``writes`` is interrupted
+    between two pieces of work; any other command ends at once.
     """
 
     name: str
     text: str
-    body: Callable[[Namespace], int | None]
+    options: type[Options]
+    body: Callable[[Options], int | None]
+    writes: bool = True
 
     def __call__(self, arguments: Sequence[str] | None = None) -> int:
         """Run the command and return its exit code."""
@@ -67,10 +70,10 @@ class Command(NamedTuple):
     def _ended(self, arguments: list[str]) -> int:
         """Run the command, report any fault, and return the exit code."""
         if isinstance(sys.stdout, TextIOWrapper):
-            # Paths that are not Unicode go out byte for byte, as they came in.
+            # Paths that are not Unicode are written byte for byte as they were read.
             sys.stdout.reconfigure(errors="surrogateescape")
         try:
-            with heeded(at_once=not COMMANDS[self.name].get("writes", True)):
+            with heeded(at_once=not self.writes):
                 code = self._code(arguments)
                 check()
             sys.stdout.flush()
@@ -86,131 +89,33 @@ class Command(NamedTuple):
             return CLOSED_PIPE
         except (OSError, MemoryError, ImportError) as error:
             text = str(error) or "out of memory"
-            if isinstance(error, ImportError):  # Such as Numba, of a newer NumPy.
+            if isinstance(error, ImportError):  # Such as Numba with a NumPy that is too new.
                 text += "; a package is missing or does not fit, install gearchaos again"
             return _report(error, [f"error: {text}"], CANNOT_READ_OR_WRITE)
 
     def start(self, module: str) -> Self:
-        """Run it as a process where its module, by ``__name__``, is what was started."""
+        """Run the command and exit if its module, given by ``__name__``, is the main program."""
         if module == "__main__":
             sys.exit(self())
         return self
 
     def _code(self, arguments: list[str]) -> int:
+        """Read the options, run the body, and return the exit code."""
         try:
-            # Of negative numbers, argparse takes those with an exponent for options.
-            given = [re.sub(r"^-(?=[\d.]+[eE][-+]?\d+$)", " -", text) for text in arguments]
-            options = self.parser().parse_args(given, Namespace(arguments=arguments))
-            # Matplotlib would refuse to be imported where the environment names an unknown backend.
+            options, quiet = self.parser().read(arguments)
+            # Importing matplotlib fails if this variable names an unknown backend.
             os.environ["MPLBACKEND"] = "agg"
-            with speaking(quiet=options.quiet):
+            with speaking(quiet=quiet):
                 return self.body(options) or OK
         except SystemExit as leaving:
             return leaving.code if isinstance(leaving.code, int) else OK
 
-    def parser(self) -> ArgumentParser:
-        """Return what reads the command's arguments."""
-        description, _, epilog = self.text.partition("\n\n")
-        parser = ArgumentParser(
-            prog=f"gearchaos {self.name}",
-            description=description,
-            epilog=f"{epilog}\n{EXIT_CODES}".strip(),
-            allow_abbrev=False,
-        )
-        own = COMMANDS[self.name]
-        common = (*own.get("common", ()), "-q --quiet")
-        for flags, rules in {
-            **own.get("options", {}),
-            **{flags: _TABLE["common"][flags] for flags in common},
-        }.items():
-            known = {key: rule for key, rule in rules.items() if key not in ("low", "high")}
-            if "type" in rules:
-                bounds = {key: rules[key] for key in ("low", "high") if key in rules}
-                reader = READERS[rules["type"]]
-                known["type"] = partial(reader, **bounds) if bounds else reader
-            parser.add_argument(*flags.split(), **known)
-        parser.add_argument("--version", action="version", version=version_text())
-        return parser
+    def parser(self) -> "OptionParser[Options]":
+        """Return the parser of the command's arguments."""
+        from gearchaos.argument_parser import OptionParser
 
-
-def number(text: str, low: float = -math.inf, high: float = math.inf) -> float:
-    """Read a finite number within bounds off the command line."""
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
-    if not math.isfinite(value):
-        raise ArgumentTypeError(f"{text!r} is not a finite number")
-    if not low <= value <= high:
-        raise ArgumentTypeError(f"{text} is not between {low:g} and {high:g}")
-    return value
-
-
-def whole_number(text: str, low: float, high: float = math.inf) -> int:
-    """Read a whole number within bounds off the command line."""
-    value = number(text, low, high)
-    if value % 1.0:
-        raise ArgumentTypeError(f"{text} is not a whole number")
-    return int(value)
-
-
-def whole_numbers(text: str, low: float, high: float) -> list[int]:
-    """Read whole numbers within bounds, with commas between them, in ascending order."""
-    return sorted({whole_number(one, low, high) for one in text.split(",")})
-
-
-def place(text: str) -> tuple[str, float]:
-    """Read NAME=VALUE off the command line, or a VALUE, which has an empty name.
-
-    A way, such as "upwards", needs none.
-    """
-    from gearchaos.outputs.names import DIRECTION, WAYS
-
-    name, _, value = text.rpartition("=")
-    if name.strip() in ("", DIRECTION) and value in WAYS:
-        return DIRECTION, float(WAYS.index(value))
-    return name.strip(), number(value)
-
-
-READERS: dict[str, Callable[..., Any]] = {
-    "int": int,
-    "path": Path,
-    "number": number,
-    "whole number": whole_number,
-    "whole numbers": whole_numbers,
-    "place": place,
-    "pitch error": lambda text: ("pitch_error", number(text)),
-}
-"""What an option may hold, by its name in commands.toml."""
-
-
-def coordinates(
-    places: Sequence[tuple[str, float]], axes: Sequence[str], free: str = "", option: str = "--at"
-) -> dict[str, float]:
-    """Name the axis of each place of an option; a bare value lies on the one beside ``free``.
-
-    Raises ConfigurationError if that is not one, or an axis comes twice.
-    """
-    from gearchaos.outputs.names import axis_name
-
-    others = [axis for axis in axes if axis != free]
-    found: dict[str, float] = {}
-    for name, value in places:
-        axis = axis_name(name) or (others[0] if len(others) == 1 else "")
-        if not axis or axis in found:
-            raise ConfigurationError(
-                f"{option} {name}{'=' if name else ''}{value:g}: must be NAME=VALUE, each of the "
-                f"axes {', '.join(axes)} once"
-            )
-        found[axis] = value
-    return found
-
-
-def version_text() -> str:
-    """Return the one line that --version prints: gearchaos, Python and the platform."""
-    from platform import python_version
-
-    return f"gearchaos {software_version()} (Python {python_version()}, {sys.platform})"
+        text = f"{self.text.strip()}\n\n{EXIT_CODES}"
+        return OptionParser(f"gearchaos {self.name}", text, self.options)
 
 
 def _report(fault: BaseException, texts: list[str], code: int) -> int:

@@ -1,30 +1,46 @@
-"""Open a local page on a result: its diagram to zoom into, and the motion of any lane at a click.
+"""Open a local page to explore a result: zoom into its diagram, click a lane to see its motion.
 
-The page is served to this machine alone, at the address that goes to stdout, until Ctrl-C; the
-address in the browser is a link to what the page shows. Needs pip install gearchaos[explore].
+Only this machine can open the page. Its address goes to stdout, and Ctrl-C ends the command. The
+address in the browser is a link to the current view.
+
+Needs pip install gearchaos[explore].
 """
 
-from argparse import Namespace
 from collections.abc import Sequence
 from contextlib import redirect_stderr, redirect_stdout
 from io import StringIO
-from typing import Any
+from typing import Annotated, Any, NamedTuple
 
 from gearchaos import plot
 from gearchaos.command_line import Command
 from gearchaos.errors import ConfigurationError, FigureError, FileError
+from gearchaos.options import Option, ResultFile
 from gearchaos.progress import say
 
 PACKAGES = ("panel", "holoviews", "datashader")
 
 
-def _explore(options: Namespace) -> None:
+class ExploreOptions(NamedTuple):
+    """Options of ``gearchaos explore``."""
+
+    result: ResultFile
+    port: Annotated[
+        int,
+        Option(
+            "port of the page; 0 takes any free port (default: %(default)s)",
+            "N",
+            low=0,
+            high=65535,
+        ),
+    ] = 5006
+    no_browser: Annotated[bool, Option("print the address, but do not open a browser")] = False
+
+
+def _explore(options: ExploreOptions) -> None:
     import webbrowser
-    from socket import create_server
 
     from gearchaos.explorer import HOST
     from gearchaos.figures.response import is_response
-    from gearchaos.results.files.atomic_file import reason
     from gearchaos.results.reading.result import open_result
     from gearchaos.results.reading.tables import needed
 
@@ -33,13 +49,8 @@ def _explore(options: Namespace) -> None:
         raise ConfigurationError(
             f"{options.result}: is a response; python -m gearchaos.plot draws it"
         )
-    try:
-        with create_server((HOST, options.port)) as free:
-            port = free.getsockname()[1]
-    except OSError as error:
-        rule = f"{reason(error)}; choose another port, or 0 for any that is free"
-        raise ConfigurationError(f"--port {options.port}: {rule}") from error
-    # Before datashader makes Numba ready: for which processor is then settled for all code.
+    port = _free_port(HOST, options.port)
+    # Must be imported before datashader uses Numba, which settles the processor for all code.
     import gearchaos_kernels  # noqa: F401
 
     panel, *_ = (needed(package, "explore") for package in PACKAGES)
@@ -65,21 +76,37 @@ def _explore(options: Namespace) -> None:
     server.io_loop.start()
 
 
-def application(server: Any) -> Any:
-    """Return the tornado application of a bokeh server, which bokeh keeps to itself.
+def _free_port(host: str, wanted: int) -> int:
+    """Return the wanted port, or any free one for 0; raise ConfigurationError if it is taken."""
+    from socket import create_server
 
-    Raises FileError where there is none: a page that cannot be protected is not served.
+    from gearchaos.results.files.atomic_file import reason
+
+    try:
+        with create_server((host, wanted)) as free:
+            port: int = free.getsockname()[1]
+    except OSError as error:
+        rule = f"{reason(error)}; choose another port, or 0 for any that is free"
+        raise ConfigurationError(f"--port {wanted}: {rule}") from error
+    return port
+
+
+def application(server: Any) -> Any:
+    """Return the tornado application of a bokeh server, a private attribute of it.
+
+    Raises FileError if it is missing: a page that cannot be protected is not served.
     """
     from bokeh import __version__
 
     try:
         return server._tornado
     except AttributeError:
-        text = "does not tell how requests of other sites are refused; install an older one"
+        text = "gives no way to refuse requests of other sites; install an older version"
         raise FileError(f"bokeh {__version__} {text}") from None
 
 
 def _draw(arguments: Sequence[str]) -> None:
+    """Run the plot command; raise a FigureError with its messages if it fails."""
     said = StringIO()
     with redirect_stdout(StringIO()), redirect_stderr(said):
         code = plot.main([*arguments, "--quiet"])
@@ -87,4 +114,4 @@ def _draw(arguments: Sequence[str]) -> None:
         raise FigureError(said.getvalue())
 
 
-main = Command("explore", __doc__, _explore).start(__name__)
+main = Command("explore", __doc__, ExploreOptions, _explore, writes=False).start(__name__)

@@ -1,22 +1,50 @@
-"""Write a result as a table, .csv or .parquet, or as arrays for MATLAB and Octave, .mat.
+"""Write a result as a table (.csv, .parquet) or as arrays for MATLAB and Octave (.mat).
 
-A table has a row per lane, and a column for each number of a lane; with --along section_point a row
-per section point. CSV has units in brackets behind the headings, Parquet in the attributes that
-pandas reads. Needs pip install gearchaos[export].
+A table has one row per lane and one column for each variable that has one number per lane. With
+--along section_point it has one row per section point. CSV files give the units in brackets in the
+headings; Parquet files give them in the attributes that pandas reads.
+
+The path of the file goes to stdout. Needs pip install gearchaos[export].
 """
 
-from argparse import Namespace
-from typing import Any
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 from gearchaos.command_line import Command
 from gearchaos.errors import ConfigurationError
+from gearchaos.options import Option, Overwrite, Units
+
+if TYPE_CHECKING:
+    from gearchaos.results.reading.result import Result
 
 ENDINGS = (".csv", ".parquet", ".mat")
 
 
-def _export(options: Namespace) -> None:
-    import numpy as np
+class ExportOptions(NamedTuple):
+    """Options of ``gearchaos export``."""
 
+    result: Annotated[
+        str,
+        Option("result file of a sweep or a response", "RESULT.h5", positional=True, file=True),
+    ]
+    output: Annotated[
+        str,
+        Option(
+            f"file to write, ending in {', '.join(ENDINGS)}", "PATH", positional=True, file=True
+        ),
+    ]
+    along: Annotated[
+        tuple[str, ...],
+        Option(
+            "write one row per point of this dimension too, such as section_point, state or time; "
+            "may be repeated",
+            "NAME",
+        ),
+    ] = ()
+    overwrite: Overwrite = False
+    units: Units = "dimensionless"
+
+
+def _export(options: ExportOptions) -> None:
     from gearchaos.results.files.atomic_file import check_output, replacing
     from gearchaos.results.reading.result import open_result
     from gearchaos.results.reading.tables import needed
@@ -29,11 +57,7 @@ def _export(options: Namespace) -> None:
     check_output(options.output, options.overwrite)
     with replacing(options.output, overwrite=options.overwrite) as partial:
         if kind == "mat":
-            flags = {v.name: v.flags for v in result.variables.values() if v.flags}
-            words = {f"{name}_meanings": np.array(flags[name], dtype=object) for name in flags}
-            arrays: dict[str, Any] = {name: result[name] for name in result}
-            arrays |= {**words, "metadata": result.metadata}
-            needed("scipy.io").savemat(partial, arrays, appendmat=False)
+            needed("scipy.io").savemat(partial, _arrays(result), appendmat=False)
         elif kind == "csv":
             frame = result.to_dataframe(*options.along)
             pure, units = ("", "1"), frame.attrs["units"]
@@ -45,4 +69,14 @@ def _export(options: Namespace) -> None:
     print(options.output, flush=True)
 
 
-main = Command("export", __doc__, _export).start(__name__)
+def _arrays(result: "Result") -> dict[str, Any]:
+    """Return the arrays of a result by name, the words of their flags, and the metadata."""
+    import numpy as np
+
+    flags = {v.name: v.flags for v in result.variables.values() if v.flags}
+    words = {f"{name}_meanings": np.array(flags[name], dtype=object) for name in flags}
+    arrays = {name: result[name] for name in result}
+    return {**arrays, **words, "metadata": result.metadata}
+
+
+main = Command("export", __doc__, ExportOptions, _export).start(__name__)

@@ -1,7 +1,6 @@
-"""How a command that computes names its output, and how it ends."""
+"""The name of the result of a command that computes, and its exit code."""
 
 import os
-from argparse import Namespace
 from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -15,27 +14,26 @@ if TYPE_CHECKING:
     from gearchaos.engine.simulation import Simulation
 
 
-def output_of(options: Namespace, suffix: str = ".h5") -> str:
-    """Return the result file to be: that of --output, or one named after the configuration.
+def output_of(output: str | None, config: str, suffix: str = ".h5") -> str:
+    """Return the path of the result: that of --output, or one named after the configuration.
 
-    Raises FileError if it is the input itself, or no file at all.
+    Raises FileError if this is the configuration itself, or a stream instead of a file.
     """
-    if (options.output or options.config) == "-":
+    if (output or config) == "-":
         raise FileError("-: a result is a file, not a stream, and needs a name; give --output PATH")
-    # A text, not a Path, which would drop the slash that tells a folder from a file.
-    output: str = options.output
-    if options.output is None:
-        output = f"{Path(options.config).stem}{suffix}"
-    with suppress(OSError, ValueError):  # One of them is not there.
-        if os.path.samefile(output, options.config):
+    # Text and not a Path, which would drop the slash at the end of a folder.
+    if output is None:
+        output = f"{Path(config).stem}{suffix}"
+    with suppress(OSError, ValueError):  # One of the two does not exist.
+        if os.path.samefile(output, config):
             raise FileError(f"{output}: is the input itself; choose another --output")
     return output
 
 
 def ending(simulation: "Simulation", output: str, diverged: int, *said: str) -> int:
-    """Print the path of the result, say these lines, and return the exit code.
+    """Print the path of the result and these lines, and return the exit code.
 
-    Complains if too many lanes diverged.
+    Too many diverged lanes give a warning and an exit code of their own.
     """
     print(output, flush=True)
     say(*said)
@@ -52,10 +50,9 @@ def ending(simulation: "Simulation", output: str, diverged: int, *said: str) -> 
 
 
 def complete_already(simulation: "Simulation", output: str) -> int | None:
-    """Go on with a sweep whose result exists: nothing is left to be done.
+    """Return the exit code of a sweep whose complete result exists, or None.
 
-    Returns the exit code that the sweep had, None if the file is no undamaged result. Raises
-    FileError if it is the result of another configuration or of another gearchaos.
+    Raises FileError if the result belongs to another configuration or version of gearchaos.
     """
     from gearchaos.engine.provenance import SOFTWARE
     from gearchaos.engine.store_filling import open_store
@@ -65,14 +62,14 @@ def complete_already(simulation: "Simulation", output: str) -> int | None:
     found = completed(output)
     if found is None:
         return None
-    # A file that another program has changed may not say who computed it.
+    # Another program may have removed the software's version from the file.
     now = {key: fact for key, fact in SOFTWARE._asdict().items() if key in found.metadata}
     now["configuration"] = simulation.config.resolved_toml()
     resolved = str(found.metadata.get("configuration_resolved", ""))
     earlier = {**found.metadata, "configuration": resolved}
     require_same(f"{output}: is the result", earlier, now, "replace it with --overwrite")
     if folder_of(output).is_dir():
-        # A process that was killed while it tidied up has left its blocks.
+        # A process that was killed during the removal has left its blocks.
         with suppress(FileError), open_store(simulation, output, resume=True) as store:
             store.remove()
     diverged = int((found["status"] != 0).sum())

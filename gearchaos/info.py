@@ -1,20 +1,29 @@
-"""Show what a result file holds: what was computed, with which parameters, how accurately, and on
-what. Only the file is read.
+"""Show the contents of a result file: the computed variables, the parameters, the accuracy, and the
+software and machine that computed it.
 
---verify reads all of the file and tries every checksum in it.
+The command reads nothing but the file. With --verify it also reads every array and compares it with
+its checksum.
 """
 
 import json
 import sys
-from argparse import Namespace
 from collections.abc import Mapping
-from typing import Any
+from typing import Annotated, Any, NamedTuple
 
 from gearchaos.command_line import Command
+from gearchaos.options import Option, ResultFile
 
 
-def _info(options: Namespace) -> None:
-    # Imported only now: --help and --version answer at once, and an interrupt is caught.
+class InfoOptions(NamedTuple):
+    """Options of ``gearchaos info``."""
+
+    result: ResultFile
+    verify: Annotated[bool, Option("read all data and check every checksum")] = False
+    json: Annotated[bool, Option("print JSON")] = False
+
+
+def _info(options: InfoOptions) -> None:
+    # Imported here: --help and --version answer at once, and an interrupt is caught.
     from gearchaos.progress import notice
     from gearchaos.results.files.result_reader import verify
     from gearchaos.results.reading.overview import overview, overview_page
@@ -28,17 +37,17 @@ def _info(options: Namespace) -> None:
         text = json.dumps({**summary, "verified": verified}, indent=1)
     else:
         text = overview_page(summary, _settings(summary["metadata"]), verified)
-    # Where the terminal knows few characters, a title must not become a traceback.
+    # A title with characters that the terminal lacks must not become a traceback.
     encoding = getattr(sys.stdout, "encoding", None) or "utf-8"
     print(text.encode(encoding, "replace").decode(encoding))
 
 
 def _settings(metadata: Mapping[str, Any]) -> list[str]:
-    """Word the keys of the configuration, and where those that were not written come from."""
+    """Return a line for each key of the configuration, with the origin of an unwritten value."""
+    from gearchaos.models import Configuration
     from gearchaos.configuration.messages import shown
     from gearchaos.configuration.toml_text import flat_tables, tables_from_toml
     from gearchaos.errors import ConfigurationError
-    from gearchaos.models import Configuration
 
     text = str(metadata.get("configuration", ""))
     resolved = str(metadata.get("configuration_resolved", ""))
@@ -47,11 +56,11 @@ def _settings(metadata: Mapping[str, Any]) -> list[str]:
         written, by_itself, ran = (
             flat_tables(tables_from_toml(toml, "configuration")) for toml in (text, alone, resolved)
         )
-    except ConfigurationError:  # Not ours to judge here: the numbers are there all the same.
+    except ConfigurationError:  # The numbers are readable without a valid configuration.
         return []
     origins = {key: "" if key in written else " (by default)" for key in ran}
     origins |= {key: " (set for this run)" for key in ran if by_itself.get(key) != ran[key]}
     return [f"{key} = {shown(value)}{origins[key]}" for key, value in ran.items()]
 
 
-main = Command("info", __doc__, _info).start(__name__)
+main = Command("info", __doc__, InfoOptions, _info, writes=False).start(__name__)

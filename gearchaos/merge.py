@@ -1,28 +1,43 @@
 """Join the shards that sweeps with --shard i/N have computed into one result file.
 
-All that is needed lies beside the output: the blocks and the configuration to which they belong.
-They are verified, and removed once the result is there. The path of the result goes to stdout,
-everything else to stderr. Where shards are missing they are named, and everything stays as it is.
+The blocks and their configuration are in a folder next to the result file. They are verified, and
+removed once the result is written. If shards are missing, the command names them and changes
+nothing. The path of the result goes to stdout, everything else to stderr.
 """
 
-from argparse import Namespace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 from gearchaos.command_line import OK, Command
 from gearchaos.errors import FileError
 from gearchaos.finishing import complete_already, ending
+from gearchaos.options import Option, Overwrite
 
 if TYPE_CHECKING:
     from gearchaos.models import Configuration
     from gearchaos.results.files.block_store import BlockStore, Finished
 
 MANY_LANES = 2**17
-"""Lanes of a sweep that are looked at in less than a second."""
+"""The lanes of a sweep with fewer lanes are prepared in less than a second."""
 
 
-def _merge(options: Namespace) -> int:
-    output: str = options.output
+class MergeOptions(NamedTuple):
+    """Options of ``gearchaos merge``."""
+
+    output: Annotated[
+        str,
+        Option(
+            "result file to write, the --output of the sweeps",
+            "sweep.h5",
+            positional=True,
+            file=True,
+        ),
+    ]
+    overwrite: Overwrite = False
+
+
+def _merge(options: MergeOptions) -> int:
+    output = options.output
     from gearchaos.results.files.atomic_file import check_output
     from gearchaos.results.files.block_folder import folder_of, read_manifest, require_same
     from gearchaos.results.reading.result import completed
@@ -39,7 +54,7 @@ def _merge(options: Namespace) -> int:
     from gearchaos.engine.store_filling import open_store
     from gearchaos.models import Configuration
 
-    # Another gearchaos may have other keys.
+    # Another version of gearchaos may have other keys.
     require_same(f"{folder}: holds blocks", manifest, SOFTWARE._asdict())
     config = Configuration.from_toml(manifest["configuration"], f"{folder}: configuration")
     _require_some(config, folder)
@@ -54,7 +69,7 @@ def _merge(options: Namespace) -> int:
         found = store.finished(tally.add)
         _require_all(store, found, manifest.get("shards"))
         facts = {**metadata(simulation, 0.0), "configuration": manifest["text"] or config.text}
-        # Who computed for how long is known to the shards alone.
+        # Only the shards know their threads and how long they took.
         del facts["threads"], facts["wall_time_seconds"]
         told = simulation.variables, simulation.lanes.parameters, facts
         store.merge(*told, overwrite=options.overwrite, found=found)
@@ -63,9 +78,9 @@ def _merge(options: Namespace) -> int:
 
 
 def _require_some(config: "Configuration", folder: Path) -> None:
-    """Refuse blocks that are far too small for a large sweep, before its lanes are looked at.
+    """Raise a FileError for far too small blocks of a large sweep, before lanes are prepared.
 
-    A manifest may declare millions of lanes. Every lane takes more than a byte in its block.
+    A manifest may declare millions of lanes, and every lane takes more than a byte in its block.
     """
     from gearchaos.engine.lanes import Lanes
 
@@ -79,7 +94,7 @@ def _require_some(config: "Configuration", folder: Path) -> None:
 
 
 def _require_all(store: "BlockStore", found: "Finished", shards: object) -> None:
-    """Name the shards of which blocks are missing, as far as it is known how many there are."""
+    """Raise a FileError for missing blocks; name their shards if the number of shards is known."""
     from gearchaos.engine.store_filling import shared_blocks
     from gearchaos.results.files.block_store import uncovered
 
@@ -92,4 +107,4 @@ def _require_all(store: "BlockStore", found: "Finished", shards: object) -> None
     store.require_all(found, remedy)
 
 
-main = Command("merge", __doc__, _merge).start(__name__)
+main = Command("merge", __doc__, MergeOptions, _merge).start(__name__)

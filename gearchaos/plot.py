@@ -1,20 +1,29 @@
-"""Draw a result file as PNG and PDF beside it: of a sweep the bifurcation diagram over the Lyapunov
-chart, of two parameters maps of motion, exponent and contact, of a response one page for each lane,
+"""Draw a result file as PNG and PDF next to it.
+
+A sweep of one parameter becomes its bifurcation diagram above its Lyapunov chart. A sweep of two
+parameters becomes maps of motion, exponent and contact. A response becomes one page for each lane,
 with time history, phase portrait, Poincare section and amplitude spectrum.
 
-A figure that this command drew before is replaced, so that it can be run again and again; any
-other file of that name is kept unless --overwrite is given. The paths of the figures go to
-stdout.
+--variable names what is drawn. For a sweep it is a section variable (default: section_delta_5), any
+variable with one number per lane, or an amplitude such as amplitude_transmission_error. For a map
+it is any variable with one number per lane. For a response it is a coordinate (default: delta_5) or
+another variable over time, such as mesh_force_tangential.
+
+--stages omits stages that are narrower than a 150th of the axis: they are merged into the
+surrounding stage, or into a stage of several motions.
+
+The paths of the figures go to stdout. A figure that this command drew before is replaced, so that
+the command can be repeated; any other file of that name is kept unless --overwrite is given.
 """
 
-from argparse import Namespace
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
-from gearchaos.command_line import Command, coordinates
+from gearchaos.command_line import Command
 from gearchaos.errors import FigureError
+from gearchaos.options import Option, Overwrite, Place, Units, coordinates
 from gearchaos.progress import progress, say
 
 if TYPE_CHECKING:
@@ -22,27 +31,110 @@ if TYPE_CHECKING:
     from gearchaos.results.reading.result import Result
 
     Sheet = tuple[str, Callable[[], Page]]
-    """One page: what its name says beside that of the result, and how it is drawn."""
+    """One page: the end of its name, after that of the result, and the function that draws it."""
 
 RESULT_ENDINGS = (".h5", ".hdf5", ".nc")
-OTHER_PICTURES = ("avif", "gif")  # Endings that matplotlib knows from 3.11 on.
+OTHER_PICTURES = ("avif", "gif")  # Endings that matplotlib supports from version 3.11.
 
 
-def _plot(options: Namespace) -> None:
+class PlotOptions(NamedTuple):
+    """Options of ``gearchaos plot``."""
+
+    results: Annotated[
+        tuple[Path, ...],
+        Option(
+            "result file of a sweep or a response; several sweeps are drawn into one diagram",
+            "RESULT.h5",
+            positional=True,
+            file=True,
+        ),
+    ]
+    output: Annotated[
+        str | None,
+        Option(
+            "folder of the figures, or name of the figure; an ending such as .pdf selects the "
+            "format",
+            "PATH",
+            ("-o", "--output"),
+            file=True,
+        ),
+    ] = None
+    formats: Annotated[
+        str | None,
+        Option(
+            "formats of the figures: png, pdf, svg, eps or tiff, with commas between them "
+            "(default: the ending of --output, or png,pdf)",
+            "FORMATS",
+            ("--format",),
+        ),
+    ] = None
+    variable: Annotated[
+        str | None, Option("variable to draw (default and choices: see below)", "NAME")
+    ] = None
+    low: Annotated[
+        float | None, Option("lowest value of the parameter to show", "VALUE", ("--from",))
+    ] = None
+    high: Annotated[
+        float | None, Option("highest value of the parameter to show", "VALUE", ("--to",))
+    ] = None
+    at: Annotated[
+        tuple[Place, ...],
+        Option(
+            "draw the slice nearest to this value of a second parameter or of start; may be "
+            "repeated; VALUE is enough for a single axis",
+            "NAME=VALUE",
+        ),
+    ] = ()
+    mark: Annotated[
+        tuple[Place, ...],
+        Option(
+            "mark this value of a swept parameter by a line across a map or a tick in a diagram; "
+            "may be repeated; VALUE is enough for a single axis",
+            "NAME=VALUE",
+        ),
+    ] = ()
+    stages: Annotated[bool, Option("shade the stages behind the diagram of a sweep")] = False
+    shares: Annotated[
+        bool,
+        Option(
+            "draw the share of gear pairs and starts that settles on each motion, at each value"
+        ),
+    ] = False
+    width: Annotated[
+        float | None,
+        Option(
+            "width of the page (default: 85, one column of a journal; for a response 180, two "
+            "columns)",
+            "MM",
+            low=60,
+            high=1000,
+        ),
+    ] = None
+    height: Annotated[
+        float | None,
+        Option("height of the page (default: follows from the width)", "MM", low=70, high=1000),
+    ] = None
+    dpi: Annotated[int, Option("pixels per inch (default: %(default)s)", low=50, high=1200)] = 300
+    overwrite: Overwrite = False
+    units: Units = "dimensionless"
+
+
+def _plot(options: PlotOptions) -> None:
     from gearchaos.figures.page import check_figures, save_figure
     from gearchaos.figures.response import is_response
 
-    results = [_opened(path, options.at) for path in options.result]
+    results = [_opened(path, options.at) for path in options.results]
     if options.units == "physical":
         results = [one.physical() for one in results]
     responses = [is_response(one) for one in results]
     if any(responses):
-        _draws_alone("a response", options, "stages", "shares", "mark")
+        flags = {"--stages": options.stages, "--shares": options.shares, "--mark": options.mark}
+        _draws_alone("a response", options, flags)
     sheets = (_response_sheets if responses[0] else _sweep_sheets)(results, options)
     if options.units == "physical":
         sheets = [(f"{name}_physical", draw) for name, draw in sheets]
     targets = [_targets(options, name, len(sheets) == 1) for name, _ in sheets]
-    check_figures([path for paths in targets for path in paths], options.result, options.overwrite)
+    check_figures([path for paths in targets for path in paths], options.results, options.overwrite)
     with progress(len(sheets), unit="pages") as bar:
         for (_, draw), paths in zip(sheets, targets, strict=True):
             figure = draw()
@@ -55,59 +147,80 @@ def _plot(options: Namespace) -> None:
     say(f"{'; '.join(map(_lanes_in_words, results))}, {size}")
 
 
-def _draws_alone(page: str, options: Namespace, *others: str) -> None:
-    """Refuse several results on a page other than a diagram, and the options that it lacks."""
-    faults = {f"--{name}": "have it" for name in others if getattr(options, name)}
-    faults |= {str(path): "are drawn over each other" for path in options.result[1:]}
+def _draws_alone(page: str, options: PlotOptions, flags: Mapping[str, object]) -> None:
+    """Raise a FigureError for what only diagrams of sweeps support: several results, some flags.
+
+    ``flags`` are the values of these flags.
+    """
+    faults = {flag: "have it" for flag, value in flags.items() if value}
+    faults |= {str(path): "are drawn over each other" for path in options.results[1:]}
     for fault, rule in faults.items():
-        rule = f"only diagrams of sweeps {rule}, and here is {page}; leave it out"
-        raise FigureError(f"{fault}: {rule}")
+        raise FigureError(
+            f"{fault}: only diagrams of sweeps {rule}, and here is {page}; leave it out"
+        )
 
 
 def _titles(results: "Sequence[Result]", paths: Sequence[Path]) -> list[str]:
-    """Name results by their titles, or by their files where these do not tell them apart."""
+    """Return the titles of results, or the names of their files if two titles are the same."""
     titles = [str(one.metadata.get("title", "")) for one in results]
     return titles if all(titles) and len({*titles}) == len(paths) else [one.stem for one in paths]
 
 
-def _sweep_sheets(results: "Sequence[Result]", options: Namespace) -> "list[Sheet]":
+def _sweep_sheets(results: "Sequence[Result]", options: PlotOptions) -> "list[Sheet]":
+    """Return the page of one or several sweeps."""
     from gearchaos.figures import bifurcation_page, map_page, shares_page
-    from gearchaos.figures.labels import in_a_name, in_words
+    from gearchaos.figures.labels import in_words
     from gearchaos.figures.lanes import swept_axes
     from gearchaos.figures.style import SINGLE_COLUMN_MM
+
+    name = _detail(results[0], options)
+    marked = _marked(options, swept_axes(results[0]))
+    width, height = options.width or SINGLE_COLUMN_MM, options.height
+    between = (options.low, options.high)
+    if options.shares:
+        flags = {"--variable": options.variable, "--stages": options.stages}
+        _draws_alone("a figure of shares", options, flags)
+        return [(f"{name}_shares", partial(shares_page, results[0], between, width, height))]
+    size: dict[str, Any] = {"between": between, "width_mm": width, "height_mm": height}
+    maps = [axes for axes in map(swept_axes, results) if len(axes) > 1]
+    if maps:
+        page = f"a map, of which --at {maps[0][0]}=VALUE makes a diagram"
+        _draws_alone(page, options, {"--stages": options.stages})
+        draw = partial(map_page, results[0], options.variable, marked=marked, **size)
+        return [(name, draw)]
+    name += "_stages" if options.stages else ""
+    shown: dict[str, Any] = {"stages": options.stages, "labels": _titles(results, options.results)}
+    if marked:
+        shown["marked"] = (in_words(results[0], marked), [*marked.values()])
+    return [(name, partial(bifurcation_page, results, options.variable, **shown, **size))]
+
+
+def _detail(result: "Result", options: PlotOptions) -> str:
+    """Return the end of a figure's name: a detail must not replace the figure of the whole."""
+    from gearchaos.figures.labels import in_a_name
     from gearchaos.models.gear_pair.outputs import DEFAULT_VARIABLE
 
-    # A detail does not take the place of the whole.
-    name = in_a_name(results[0].fixed, digits=6)
+    name = in_a_name(result.fixed, digits=6)
     if options.variable not in (None, DEFAULT_VARIABLE):
         name += f"_{options.variable}"
     for word, end in (("from", options.low), ("to", options.high)):
         name += "" if end is None else f"_{word}_{end:g}"
-    swept = swept_axes(results[0])
+    return name
+
+
+def _marked(options: PlotOptions, swept: Sequence[str]) -> dict[str, float]:
+    """Return the value of --mark for each axis; raise a FigureError if an axis is not swept."""
     marked = coordinates(options.mark, swept, option="--mark")
     if unknown := [axis for axis in marked if axis not in swept]:
-        rule = f"no swept parameter of the figure, which are {', '.join(swept)}"
-        raise FigureError(f"--mark {unknown[0]}: is {rule}")
-    if options.shares:
-        _draws_alone("a figure of shares", options, "variable", "stages")
-        width = options.width or SINGLE_COLUMN_MM
-        drawn = (options.low, options.high), width, options.height
-        return [(f"{name}_shares", partial(shares_page, results[0], *drawn))]
-    size = {"width_mm": options.width or SINGLE_COLUMN_MM, "height_mm": options.height}
-    shown: dict[str, Any] = {"between": (options.low, options.high)}
-    maps = [axes for axes in map(swept_axes, results) if len(axes) > 1]
-    if maps:
-        _draws_alone(f"a map, of which --at {maps[0][0]}=VALUE makes a diagram", options, "stages")
-        draw = partial(map_page, results[0], options.variable, marked=marked, **shown, **size)
-        return [(name, draw)]
-    name += "_stages" if options.stages else ""
-    shown |= {"stages": options.stages, "labels": _titles(results, options.result)}
-    if marked:
-        shown |= {"marked": (in_words(results[0], marked), [*marked.values()])}
-    return [(name, partial(bifurcation_page, results, options.variable, **shown, **size))]
+        raise FigureError(
+            f"--mark {unknown[0]}: is no swept parameter of the figure, which are "
+            f"{', '.join(swept)}"
+        )
+    return marked
 
 
-def _response_sheets(results: "Sequence[Result]", options: Namespace) -> "list[Sheet]":
+def _response_sheets(results: "Sequence[Result]", options: PlotOptions) -> "list[Sheet]":
+    """Return a page for each lane of a response that did not diverge."""
     from gearchaos.figures import response_page
     from gearchaos.figures.labels import in_a_name, place_of
     from gearchaos.figures.lanes import select_lanes
@@ -117,22 +230,27 @@ def _response_sheets(results: "Sequence[Result]", options: Namespace) -> "list[S
     (result,) = results
     lanes = select_lanes(result, (options.low, options.high))
     if lanes.diverged.all():
-        raise FigureError(f"{options.result[0]}: nothing to draw: every lane diverged")
+        raise FigureError(f"{options.results[0]}: nothing to draw: every lane diverged")
     coordinate = "" if options.variable in (None, COORDINATE) else f"_{options.variable}"
-    size = {"width_mm": options.width or DOUBLE_COLUMN_MM, "height_mm": options.height}
-    draw = partial(response_page, result, coordinate=options.variable, **size)
+    draw = partial(
+        response_page,
+        result,
+        coordinate=options.variable,
+        width_mm=options.width or DOUBLE_COLUMN_MM,
+        height_mm=options.height,
+    )
     return [
         (f"{in_a_name(place_of(result, lane))}{coordinate}", partial(draw, lane))
         for lane in lanes.numbers[~lanes.diverged].tolist()
     ]
 
 
-def _opened(path: Path, at: Sequence[tuple[str, float]]) -> "Result":
-    """Read a result, its sections too unless it is a map, with the axes fixed that --at names."""
+def _opened(path: Path, at: Sequence[Place]) -> "Result":
+    """Read a result at the places that --at names; of a map, leave out the sections."""
     from gearchaos.figures.lanes import swept_axes
     from gearchaos.results.reading.result import open_result
 
-    for rows in (False, True):  # Sections are most of a file.
+    for rows in (False, True):  # Sections are the largest part of a file.
         result = open_result(path, rows=rows)
         fixed = coordinates(at, result.axes, result.axis)
         left = {*swept_axes(result)} - {*fixed}
@@ -147,16 +265,18 @@ def _opened(path: Path, at: Sequence[tuple[str, float]]) -> "Result":
     return result
 
 
-def _targets(options: Namespace, name: str, alone: bool) -> list[Path]:
+def _targets(options: PlotOptions, name: str, alone: bool) -> list[Path]:
+    """Return the path of a page in each format; ``alone``: it is the only page."""
     from matplotlib.backend_bases import FigureCanvasBase
 
     from gearchaos.figures.page import ENDINGS, FORMATS
 
-    path: Path = options.result[0]
+    path = options.results[0]
     output, asked = path.parent if options.output is None else Path(options.output), FORMATS
     if options.output is None or output.is_dir() or options.output.endswith(("/", "\\")):
         stems = (
-            one.stem if one.suffix.lower() in RESULT_ENDINGS else one.name for one in options.result
+            one.stem if one.suffix.lower() in RESULT_ENDINGS else one.name
+            for one in options.results
         )
         output /= f"{'_and_'.join(stems)}{name}"
     else:
@@ -164,7 +284,8 @@ def _targets(options: Namespace, name: str, alone: bool) -> list[Path]:
         if ending in {*FigureCanvasBase.filetypes, *OTHER_PICTURES}:
             output, asked = output.with_suffix(""), (ending,)
         output = output.with_name(f"{output.name}{'' if alone else name}")
-    asked = asked if options.format is None else options.format.split(",")
+    if options.formats is not None:
+        asked = tuple(options.formats.split(","))
     formats = dict.fromkeys(kind.strip().lower() for kind in asked)
     if unknown := [repr(kind) for kind in formats if kind not in ENDINGS]:
         raise FigureError(f"{', '.join(unknown)}: a figure is written as {', '.join(ENDINGS)}")
@@ -172,6 +293,7 @@ def _targets(options: Namespace, name: str, alone: bool) -> list[Path]:
 
 
 def _lanes_in_words(result: "Result") -> str:
+    """Return a phrase with the number of lanes and what they run over."""
     from gearchaos.figures.lanes import swept_axes
 
     lanes = result.along(result.axis).size
@@ -181,4 +303,4 @@ def _lanes_in_words(result: "Result") -> str:
     return f"{words}, {diverged} of them diverged" if diverged else words
 
 
-main = Command("plot", __doc__, _plot).start(__name__)
+main = Command("plot", __doc__, PlotOptions, _plot).start(__name__)

@@ -1,20 +1,38 @@
-"""Compute and draw everything that a paper shows, and compare every number it prints with ours.
+"""Compute and draw all results of a paper, and compare every printed number with the computed one.
 
-The folder gets the figures (PNG and PDF), the results (HDF5) and a report with the comparison,
-report.md. The path of report.md goes to stdout, everything else to stderr.
+The output folder receives the figures (PNG and PDF), the results (HDF5) and the report with the
+comparison, report.md. The path of the report goes to stdout, everything else to stderr.
 """
 
 import time
-from argparse import Namespace
 from pathlib import Path
+from typing import Annotated, Literal, NamedTuple
 
 from gearchaos.command_line import SWEEPS, Command
+from gearchaos.options import Option, Overwrite, Threads
 from gearchaos.progress import say
 
 
-def _reproduce(options: Namespace) -> None:
-    from gearchaos.engine.running import choose_threads
+class ReproduceOptions(NamedTuple):
+    """Options of ``gearchaos reproduce``."""
+
+    paper: Annotated[Literal["pan2021"], Option("paper to reproduce", positional=True)]
+    output: Annotated[
+        str | None,
+        Option(
+            "folder of the results (default: the name of the paper)",
+            "DIR",
+            ("-o", "--output"),
+            file=True,
+        ),
+    ] = None
+    overwrite: Overwrite = False
+    threads: Threads = None
+
+
+def _reproduce(options: ReproduceOptions) -> None:
     from gearchaos.models import load_config
+    from gearchaos.engine.running import choose_threads
     from gearchaos.paper.computation import compute
     from gearchaos.paper.gallery import check_folder, write_gallery
 
@@ -29,4 +47,4 @@ def _reproduce(options: Namespace) -> None:
     say(f"done in {time.monotonic() - began:.0f} s")
 
 
-main = Command("reproduce", __doc__, _reproduce).start(__name__)
+main = Command("reproduce", __doc__, ReproduceOptions, _reproduce).start(__name__)

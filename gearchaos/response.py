@@ -1,31 +1,80 @@
-"""Compute the motion of some pitch errors, or of some values of the swept parameter, at every step
-of the last mesh periods: displacements, velocities, accelerations, mesh forces and contact. Of a
-result, the motion goes on from where one of its lanes ended, with no transient, or is computed
-again from where the lane started.
+"""Compute the motion at every step of the last mesh periods: displacements, velocities,
+accelerations, mesh forces and contact.
 
-The path of the result goes to stdout, everything else to stderr; python -m gearchaos.plot draws
+With a configuration, the motion of each given value of the swept parameter is computed. With a
+result, the motion of one of its lanes continues from the end of the lane, without a transient;
+--begin start computes the lane again from its start.
+
+The path of the new result goes to stdout, everything else to stderr; python -m gearchaos.plot draws
 it.
 """
 
 import os
-from argparse import Namespace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple
 
-from gearchaos.command_line import Command, coordinates
+from gearchaos.command_line import Command
 from gearchaos.errors import ConfigurationError
 from gearchaos.finishing import ending, output_of
+from gearchaos.options import (
+    Option,
+    Output,
+    Overwrite,
+    Place,
+    Settings,
+    Threads,
+    coordinates,
+)
 
 if TYPE_CHECKING:
     from gearchaos.models import Configuration
 
     Asked = tuple[Configuration, str, list[str], Any]
-    """What to compute, the configuration as it was written, what to say of it, and its place."""
+    """What to compute, the configuration as it was written, notes, and the fixed axes."""
 
 
-def _respond(options: Namespace) -> int:
+class ResponseOptions(NamedTuple):
+    """Options of ``gearchaos response``."""
+
+    config: Annotated[
+        str,
+        Option(
+            "configuration, or result with the lane to continue",
+            "config.toml|RESULT.h5",
+            positional=True,
+            file=True,
+        ),
+    ]
+    pitch_error: Annotated[
+        tuple[float, ...], Option("multiple of the pitch error; may be repeated", "P")
+    ] = ()
+    at: Annotated[
+        tuple[Place, ...],
+        Option(
+            "value of the swept parameter; may be repeated. For a result, the nearest lane; with "
+            "several axes, NAME=VALUE for each of them",
+            "VALUE",
+        ),
+    ] = ()
+    begin: Annotated[
+        Literal["end", "start"],
+        Option("for a result: continue from the end of the lane (default) or repeat it"),
+    ] = "end"
+    periods: Annotated[int | None, Option("mesh periods to keep (default: 32)", "N")] = None
+    output: Output = None
+    overwrite: Overwrite = False
+    threads: Threads = None
+    settings: Settings = ()
+
+    @property
+    def places(self) -> tuple[Place, ...]:
+        """All given values."""
+        return (*self.at, *(Place("pitch_error", value) for value in self.pitch_error))
+
+
+def _respond(options: ResponseOptions) -> int:
     from h5py import is_hdf5
 
-    # HDF5 would take the beginning out of a pipe.
+    # Looking into a pipe would remove its first bytes.
     of_result = os.path.isfile(options.config) and is_hdf5(options.config)
     config, text, note, fixed = (_lane if of_result else _configuration)(options)
     from gearchaos.configuration.methods import METHODS
@@ -37,7 +86,7 @@ def _respond(options: Namespace) -> int:
     choose_threads(options.threads)
     periods = DEFAULT_PERIODS if options.periods is None else options.periods
     simulation = prepared(config, periods)
-    output = output_of(options, "_response.h5")
+    output = output_of(options.output, options.config, "_response.h5")
     check_output(output, options.overwrite)
     simulation.notes += note
     prepare(simulation, history_periods=1)
@@ -53,16 +102,16 @@ def _respond(options: Namespace) -> int:
     return ending(simulation, output, diverged, text)
 
 
-def _lane(options: Namespace) -> "Asked":
-    """Go on from where one lane of a result ended."""
+def _lane(options: ResponseOptions) -> "Asked":
+    """Continue one lane of a result, or repeat it."""
     from gearchaos.engine.recomputing import continued, stored_text
     from gearchaos.results.reading.result import open_result
 
-    if options.set:
-        rule = "is a result, and goes on with its own configuration; leave --set out"
+    if options.settings:
+        rule = "is a result, and continues with its own configuration; leave --set out"
         raise ConfigurationError(f"{options.config}: {rule}")
     result = open_result(options.config)
-    lane = result.sel("within", **coordinates(options.at, result.axes))
+    lane = result.sel("within", **coordinates(options.places, result.axes))
     if lane.axes:
         rest = " and ".join(f"--at {axis}=VALUE" for axis in lane.axes)
         raise ConfigurationError(f"{options.config}: name one lane, with {rest} as well")
@@ -72,23 +121,23 @@ def _lane(options: Namespace) -> "Asked":
     return config, text, [note], lane.metadata["fixed"]
 
 
-def _configuration(options: Namespace) -> "Asked":
-    """Take the place of what a configuration sweeps."""
-    from gearchaos.configuration.toml_text import text_of_file, toml_literal
+def _configuration(options: ResponseOptions) -> "Asked":
+    """Replace the sweep of a configuration by the given values."""
     from gearchaos.models import Configuration
+    from gearchaos.configuration.toml_text import text_of_file, toml_literal
 
     text = text_of_file(options.config)
 
     def configured(*more: str) -> Configuration:
         folder = os.path.dirname(options.config) or "."
-        return Configuration.from_toml(text, options.config, [*options.set, *more], folder)
+        return Configuration.from_toml(text, options.config, [*options.settings, *more], folder)
 
-    names = {name or configured().sweep.parameter for name, _ in options.at}
+    names = {name or configured().sweep.parameter for name, _ in options.places}
     if len(names) != 1:
         rule = f"name one parameter, not {' and '.join(sorted(names)) or 'none'}"
         raise ConfigurationError(f"--at: {rule}; replace other keys with --set")
-    # Repeating a value is no mistake worth a message.
-    values = sorted({value for _, value in options.at})
+    # A repeated value is computed once.
+    values = sorted({value for _, value in options.places})
     sweep = {"parameter": min(names), "values": values}
     try:
         config = configured(f"sweep={toml_literal(sweep)}")
@@ -98,17 +147,17 @@ def _configuration(options: Namespace) -> "Asked":
             raise
         key = swept if "." in swept else f"groups.{swept}"
         hint = (
-            f"values of {min(names)} take the place of the sweep over {swept}: give one of it with "
-            f"--set {key}=VALUE, or several with --at"
+            f"values of {min(names)} replace the sweep over {swept}: give one value of {swept} "
+            f"with --set {key}=VALUE, or several with --at"
         )
         raise ConfigurationError([hint, *error.problems]) from error
     if config.start.carry != "none":
         raise ConfigurationError(
-            f'{options.config}: start.carry = "{config.start.carry}": a lane goes on from the one '
-            "before it, and values by themselves have none; run the sweep, then: gearchaos "
-            "response RESULT.h5 --at VALUE"
+            f'{options.config}: start.carry = "{config.start.carry}": a lane starts where the lane '
+            "before it ends, which single values lack; run the sweep, then: gearchaos response "
+            "RESULT.h5 --at VALUE"
         )
     return config, config.text, [], ""
 
 
-main = Command("response", __doc__, _respond).start(__name__)
+main = Command("response", __doc__, ResponseOptions, _respond).start(__name__)

@@ -1,11 +1,21 @@
-"""Print the JSON Schema of a configuration file, for completion in editors, or all of its keys."""
+"""Print the JSON Schema of a configuration file, which editors use to complete and check its keys.
 
-from argparse import Namespace
+With --keys, print Markdown tables of all keys instead.
+"""
+
+from typing import Annotated, NamedTuple
 
 from gearchaos.command_line import Command
+from gearchaos.options import Option
 
 
-def _describe(options: Namespace) -> None:
+class SchemaOptions(NamedTuple):
+    """Options of ``gearchaos schema``."""
+
+    keys: Annotated[bool, Option("print Markdown tables of all keys")] = False
+
+
+def _schema(options: SchemaOptions) -> None:
     import json
 
     from gearchaos.configuration.schema import json_schema, key_tables
@@ -15,4 +25,4 @@ def _describe(options: Namespace) -> None:
     print(key_tables(kind) if options.keys else json.dumps(json_schema(kind), indent=2))
 
 
-main = Command("schema", __doc__, _describe).start(__name__)
+main = Command("schema", __doc__, SchemaOptions, _schema, writes=False).start(__name__)

@@ -1,4 +1,10 @@
-"""List the stages of a sweep: stretches of the swept parameter in which the motion keeps its label.
+"""List the stages of a sweep: intervals of the swept parameter in which the motion keeps its label.
+
+--refine bisects every boundary between two stages. It computes lanes again, with the configuration
+in the file, and reports how the orbit next to the boundary is lost. For a sweep in both directions
+it follows the orbits to the values where each direction jumps. For two parameters without --at it
+refines the boundaries along the first one in every row, including those that only a neighbouring
+row shows.
 
 The table goes to stdout, everything else to stderr.
 """
@@ -6,12 +12,12 @@ The table goes to stdout, everything else to stderr.
 import json
 import math
 import textwrap
-from argparse import Namespace
 from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
-from gearchaos.command_line import Command, coordinates
+from gearchaos.command_line import Command
 from gearchaos.errors import ConfigurationError
+from gearchaos.options import Option, Place, ResultFile, Threads, coordinates
 
 if TYPE_CHECKING:
     from gearchaos.engine.recomputing import Survival
@@ -24,67 +30,146 @@ if TYPE_CHECKING:
 WIDTH = 80  # Columns of a terminal.
 
 
-def _stages(options: Namespace) -> None:
-    from gearchaos.outputs.names import DIRECTION, RECORD, REPEATS, UNSWEPT
-    from gearchaos.results.reading.excitation import excitation_of
-    from gearchaos.results.reading.jumps import apart, crises, jumps
-    from gearchaos.results.reading.overview import plain, slice_lines
+class StagesOptions(NamedTuple):
+    """Options of ``gearchaos stages``."""
+
+    result: ResultFile
+    refine: Annotated[
+        float | None,
+        Option("bisect every boundary between two stages to this width", "WIDTH", low=1e-12),
+    ] = None
+    at: Annotated[
+        tuple[Place, ...],
+        Option(
+            "use the nearest value of this axis; may be repeated (default: the first value of a "
+            "second parameter, all starts and gear pairs)",
+            "NAME=VALUE",
+        ),
+    ] = ()
+    survival: Annotated[
+        int | None,
+        Option(
+            "continue up to 25 chaotic lanes for this number of records, and report the share that "
+            "is still chaotic",
+            "RECORDS",
+            low=1,
+            high=1000,
+        ),
+    ] = None
+    json: Annotated[bool, Option("print JSON instead of a table")] = False
+    threads: Threads = None
+
+
+class Listing(NamedTuple):
+    """The stages of a sweep along one axis, and what else the command reports of them.
+
+    ``result``: the sweep along this axis, with any pairs and starts; ``where``: values of the fixed
+    axes; ``apart``: intervals where the two directions differ, None for a sweep in one direction;
+    ``boundaries`` and ``survival``: None if they were not requested.
+    """
+
+    result: "Result"
+    where: dict[str, float]
+    stages: "list[Stage]"
+    apart: "list[Apart] | None"
+    boundaries: "list[Boundary] | None"
+    jumps: "list[Jump]"
+    crises: "list[Crisis]"
+    survival: "Survival | None"
+
+
+def _stages(options: StagesOptions) -> None:
+    from gearchaos.results.reading.overview import plain
     from gearchaos.results.reading.result import open_result
-    from gearchaos.results.reading.stage_table import (
-        labelled_lanes,
-        one_axis,
-        slice_facts,
-        stage_table,
-    )
+    from gearchaos.results.reading.stage_table import one_axis, require_labels
+    from gearchaos.outputs.names import DIRECTION, REPEATS, UNSWEPT
 
     whole = open_result(options.result)
-    # What is computed again is that of one pair and one start.
+    # Lanes are computed again for one pair and one start.
     kept = REPEATS if options.refine is None and options.survival is None else ()
     places = coordinates(options.at, whole.axes, whole.axis)
     part = one_axis(whole, (*kept, DIRECTION), **places)
-    result, both = one_axis(part, kept), DIRECTION in part.axes
-    where = slice_facts(whole, result)
-    lanes = labelled_lanes(result, name=options.result, repeats=True)
+    require_labels(whole, options.result)
     if options.refine is not None and not options.at and {*whole.axes} - {whole.axis, *UNSWEPT}:
-        _map_boundaries(whole, options)
+        _map_boundaries(whole, options, options.refine)
         return
-    stages = stage_table(lanes)
+    listing = _listing(whole, part, kept, options)
+    if options.json:
+        print(json.dumps(plain(_facts(listing)), indent=1))
+    else:
+        print(_text(listing))
+
+
+def _listing(
+    whole: "Result", part: "Result", kept: Sequence[str], options: StagesOptions
+) -> Listing:
+    """List the stages of a slice, and compute what --refine and --survival request.
+
+    ``part`` is the slice of the whole result, in all directions; ``kept`` are the axes beside the
+    swept parameter.
+    """
+    from gearchaos.results.reading.jumps import apart, crises, jumps
+    from gearchaos.results.reading.stage_table import labelled_lanes, one_axis, slice_facts, stage_table
+    from gearchaos.outputs.names import DIRECTION, REPEATS
+
+    result, both = one_axis(part, kept), DIRECTION in part.axes
+    stages = stage_table(labelled_lanes(result, name=options.result, repeats=True))
     stretches = apart(part)
     boundaries, outlasting = _computed_again(part, result, stages, stretches, options)
     for at, boundary in enumerate([] if both else boundaries or []):
         stages[at] = stages[at]._replace(end=boundary.below)
         stages[at + 1] = stages[at + 1]._replace(start=boundary.above)
-    several = [axis for axis in result.axes if axis in REPEATS]
-    jumping, bursting = ([], []) if several else (jumps(result), crises(result))
-    if options.json:
-        refined = {} if boundaries is None else {"boundaries": boundaries}
-        facts = {
-            "parameter": result.axis,
-            "slice": where,
-            "stages": stages,
-            **({"directions_apart": stretches} if both else {}),
-            **refined,
-            "jumps": jumping,
-            "crises": bursting,
-            "survival": outlasting,
-        }
-        print(json.dumps(plain(facts), indent=1))
-        return
-    mixed = int((result[RECORD] == 1).sum()) if RECORD in result else 0
-    told = [*band_lines(stages), *remarks(jumping, bursting, mixed), *directions_apart(stretches)]
-    told += [outlasting.text] if outlasting else []
+    several = any(axis in REPEATS for axis in result.axes)
+    return Listing(
+        result,
+        slice_facts(whole, result),
+        stages,
+        stretches if both else None,
+        boundaries,
+        [] if several else jumps(result),
+        [] if several else crises(result),
+        outlasting,
+    )
+
+
+def _facts(listing: Listing) -> dict[str, Any]:
+    """Return what --json prints."""
+    return {
+        "parameter": listing.result.axis,
+        "slice": listing.where,
+        "stages": listing.stages,
+        **({} if listing.apart is None else {"directions_apart": listing.apart}),
+        **({} if listing.boundaries is None else {"boundaries": listing.boundaries}),
+        "jumps": listing.jumps,
+        "crises": listing.crises,
+        "survival": listing.survival,
+    }
+
+
+def _text(listing: Listing) -> str:
+    """Return the table of the stages, then remarks, then boundaries."""
+    from gearchaos.results.reading.overview import slice_lines
+    from gearchaos.results.reading.excitation import excitation_of
+    from gearchaos.outputs.names import RECORD, REPEATS
+
+    result = listing.result
     head = [
-        f"all {result[axis].size} values of {axis}, of which --at {axis}=VALUE chooses one"
-        for axis in several
+        f"all {result[axis].size} values of {axis}; --at {axis}=VALUE chooses one"
+        for axis in result.axes
+        if axis in REPEATS
     ]
-    head += [*slice_lines(where), excitation_of(result.metadata).in_words]
-    first = table(result.axis, stages, [*filter(None, head)])
-    parts = map("\n".join, (first, told, boundary_list(boundaries or ())))
-    print("\n\n".join(filter(None, parts)))
+    head += [*slice_lines(listing.where), excitation_of(result.metadata).in_words]
+    mixed = int((result[RECORD] == 1).sum()) if RECORD in result else 0
+    below = [*band_lines(listing.stages), *remarks(listing.jumps, listing.crises, mixed)]
+    below += directions_apart(listing.apart or ())
+    below += [listing.survival.text] if listing.survival else []
+    first = table(result.axis, listing.stages, [*filter(None, head)])
+    parts = map("\n".join, (first, below, boundary_list(listing.boundaries or ())))
+    return "\n\n".join(filter(None, parts))
 
 
-def _map_boundaries(result: "Result", options: Namespace) -> None:
-    """Find the boundaries in all rows of a map, and tell what that saves."""
+def _map_boundaries(result: "Result", options: StagesOptions, width: float) -> None:
+    """Print the boundaries in all rows of a map, and how many lanes that took."""
     from gearchaos.engine.recomputing import refinable
     from gearchaos.engine.refinement import refined_map
     from gearchaos.engine.running import choose_threads, compiling
@@ -94,15 +179,15 @@ def _map_boundaries(result: "Result", options: Namespace) -> None:
     config = refinable(result, options.result)
     if len(result.axes) > 2 or options.survival is not None:
         raise ConfigurationError(
-            f"--refine: {options.result} runs over {', '.join(result.axes)}; only two swept "
-            "parameters are refined as a whole, without --survival: choose a slice with --at "
+            f"--refine: {options.result} runs over {', '.join(result.axes)}; without --at only two "
+            "swept parameters can be refined, and without --survival: choose a slice with --at "
             "NAME=VALUE"
         )
     with compiling():
-        rows, lanes = refined_map(config, result, options.refine)
+        rows, lanes = refined_map(config, result, width)
     second, first = result.axes
     reach = float(result[first][-1] - result[first][0])
-    fine = result[second].size * (math.ceil(reach / options.refine) + 1)
+    fine = result[second].size * (math.ceil(reach / width) + 1)
     if options.json:
         facts = {
             "parameter": first,
@@ -123,11 +208,11 @@ def _computed_again(
     result: "Result",
     stages: "list[Stage]",
     stretches: "list[Apart]",
-    options: Namespace,
+    options: StagesOptions,
 ) -> "tuple[list[Boundary] | None, Survival | None]":
-    """Compute what --refine and --survival ask for, None where they do not."""
+    """Compute the boundaries for --refine and the survival for --survival, None without them."""
     if options.refine is None and options.survival is None:
-        # Reading a file needs no compiler.
+        # Without them the command needs no compiler, which takes long to import.
         return None, None
     from gearchaos.engine.recomputing import computable, refinable, survival
     from gearchaos.engine.refinement import refined_boundaries, refined_jumps
@@ -148,7 +233,7 @@ def _computed_again(
 
 
 def table(axis: str, stages: "Sequence[Stage]", where: Sequence[str]) -> Iterator[str]:
-    """Word the stages of a slice as lines of a table, no longer than 80 characters."""
+    """Return the stages of a slice as lines of a table, each of at most 80 characters."""
     yield f"stages over {axis}"
     yield from where
     yield f"{'from':>10}  {'to':>10}  {'motion':15}{'lanes':>6}  {'exponent':>20}"
@@ -161,7 +246,7 @@ def table(axis: str, stages: "Sequence[Stage]", where: Sequence[str]) -> Iterato
 
 
 def band_lines(stages: "Sequence[Stage]") -> Iterator[str]:
-    """Word on how many bands the sections of a stage lie, where any lies on several."""
+    """Return a line for each stage with sections on several bands."""
     for stage in stages:
         several = [f"{lanes} on {bands}" for bands, lanes in stage.bands.items() if bands > 1]
         if several:
@@ -171,7 +256,7 @@ def band_lines(stages: "Sequence[Stage]") -> Iterator[str]:
 
 
 def remarks(jumping: "Sequence[Jump]", bursting: "Sequence[Crisis]", mixed: int) -> Iterator[str]:
-    """Word what the table does not show: jumps and crises in a stage, chaos that came to rest."""
+    """Return lines for what the table omits: jumps, crises, and records with two motions."""
     for jump in jumping:
         yield f"{jump.below:.6g} to {jump.above:.6g}: jumps to another motion of {jump.label}"
     for crisis in bursting:
@@ -179,19 +264,19 @@ def remarks(jumping: "Sequence[Jump]", bursting: "Sequence[Crisis]", mixed: int)
         below = f"{crisis.lowest_below:.3g} to {crisis.highest_below:.3g} below"
         yield f"{below}, {crisis.lowest_above:.3g} to {crisis.highest_above:.3g} above"
     if mixed:
-        yield f"{mixed} periodic lanes came to rest within their record, which holds another"
-        yield "motion before; integration.transient_periods leaves it out"
+        yield f"{mixed} periodic lanes settled within their record, which begins with another"
+        yield "motion; raise integration.transient_periods to leave it out"
 
 
 def directions_apart(stretches: "Sequence[Apart]") -> Iterator[str]:
-    """Word where a sweep comes to other motions upwards than downwards."""
+    """Return lines for the intervals where the upward and the downward sweep differ."""
     for one in stretches:
         line = f"{one.start:.6g} to {one.end:.6g}: other motions upwards ({one.motion_upwards}) "
         yield from textwrap.wrap(f"{line}than downwards ({one.motion_downwards})", WIDTH)
 
 
 def boundary_list(boundaries: "Sequence[Boundary]") -> Iterator[str]:
-    """Word the refined boundaries, each with what the orbit beside it does."""
+    """Return the refined boundaries, each with the loss of the orbit next to it."""
     for boundary in boundaries:
         between = f"{boundary.label_below} | {boundary.label_above}"
         jumps = f", jumps {boundary.direction}" if boundary.direction else ""
@@ -203,4 +288,4 @@ def boundary_list(boundaries: "Sequence[Boundary]") -> Iterator[str]:
             yield f"    multiplier {boundary.multiplier if pair else boundary.multiplier.real:.4f}"
 
 
-main = Command("stages", __doc__, _stages).start(__name__)
+main = Command("stages", __doc__, StagesOptions, _stages).start(__name__)

@@ -1,30 +1,70 @@
-"""Compute the sweep that a TOML file describes and write it to an HDF5 file.
+"""Compute the sweep that a configuration file describes, and write it to an HDF5 file.
 
-The path of the result goes to stdout, everything else to stderr. Interrupted or terminated,
-finished blocks are kept and --resume goes on from them.
+The path of the result goes to stdout, everything else to stderr. If the sweep is interrupted or
+terminated, its finished blocks are kept, and --resume continues from them.
+
+--dask computes on a cluster, --shard in the jobs of a batch system; docs/scale-out.md explains
+both.
 """
 
 import sys
 import time
-from argparse import Namespace
 from contextlib import suppress
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 from gearchaos.command_line import OK, Command
 from gearchaos.errors import ConfigurationError, ExecutionError, FileError
 from gearchaos.finishing import complete_already, ending, output_of
+from gearchaos.options import (
+    Arguments,
+    Option,
+    Output,
+    Overwrite,
+    Settings,
+    Threads,
+)
 from gearchaos.progress import say
 
 if TYPE_CHECKING:
+    from gearchaos.models import Configuration
     from gearchaos.engine.simulation import Simulation
     from gearchaos.engine.store_filling import Shard
-    from gearchaos.models import Configuration
+    from gearchaos.results.files.block_store import BlockStore
 
 
-def _sweep(options: Namespace) -> int:
+class SweepOptions(NamedTuple):
+    """Options of ``gearchaos sweep``."""
+
+    config: Annotated[
+        str,
+        Option(
+            "configuration file; - reads it from stdin", "config.toml", positional=True, file=True
+        ),
+    ]
+    resume: Annotated[bool, Option("continue from the finished blocks of a stopped sweep")] = False
+    dask: Annotated[
+        str | None,
+        Option("compute on the dask cluster of this scheduler, or on local:N processes", "ADDRESS"),
+    ] = None
+    shard: Annotated[
+        str | None,
+        Option("compute only the i-th of N shards; python -m gearchaos.merge joins them", "i/N"),
+    ] = None
+    dry_run: Annotated[bool, Option("estimate time and memory, describe the sweep, and stop")] = (
+        False
+    )
+    json: Annotated[bool, Option("with --dry-run: print the estimate as JSON")] = False
+    output: Output = None
+    overwrite: Overwrite = False
+    threads: Threads = None
+    settings: Settings = ()
+    arguments: Arguments = ()
+
+
+def _sweep(options: SweepOptions) -> int:
     from gearchaos.models import load_config
 
-    config = load_config(options.config, options.set)
+    config = load_config(options.config, options.settings)
     from gearchaos.engine.running import choose_threads, prepare
     from gearchaos.engine.simulation import Simulation
     from gearchaos.engine.store_filling import Shard
@@ -33,9 +73,9 @@ def _sweep(options: Namespace) -> int:
     _check_sharing(options, config)
     choose_threads(options.threads)
     simulation = Simulation(config)
-    output = output_of(options)
+    output = output_of(options.output, options.config)
     if options.json and not options.dry_run:
-        raise ConfigurationError("--json: only what --dry-run tells is JSON; a sweep is HDF5")
+        raise ConfigurationError("--json: needs --dry-run; the result of a sweep is an HDF5 file")
     if options.dry_run:
         from gearchaos.dry_run import describe
 
@@ -48,29 +88,30 @@ def _sweep(options: Namespace) -> int:
     return _compute(simulation, output, shard, options) if code is None else code
 
 
-def _check_sharing(options: Namespace, config: "Configuration") -> None:
-    """Refuse what --dask and --shard cannot do."""
+def _check_sharing(options: SweepOptions, config: "Configuration") -> None:
+    """Raise a ConfigurationError if --dask or --shard cannot compute this sweep."""
     from gearchaos.results.reading.tables import needed
 
-    for flag in ("dask", "shard"):
-        if getattr(options, flag) is not None and config.start.carry != "none":
+    for flag, value in (("--dask", options.dask), ("--shard", options.shard)):
+        if value is not None and config.start.carry != "none":
             raise ConfigurationError(
-                f'--{flag}: with start.carry = "{config.start.carry}" one value is computed after '
-                f'the other; set start.carry = "none" or leave out --{flag}'
+                f'{flag}: with start.carry = "{config.start.carry}" one value is computed after '
+                f'the other; set start.carry = "none" or leave out {flag}'
             )
     if options.dask is None:
         return
     if options.threads is not None and not options.dask.startswith("local:"):
         raise ConfigurationError(
-            f"--threads {options.threads}: the workers of a cluster use the cores that they have; "
-            "start them with the variable NUMBA_NUM_THREADS to use fewer"
+            f"--threads {options.threads}: has no effect on the workers of a cluster; to use fewer "
+            "cores, start them with the variable NUMBA_NUM_THREADS"
         )
     needed("distributed", "dask")
 
 
 def _compute(
-    simulation: "Simulation", output: str, shard: "Shard | None", options: Namespace
+    simulation: "Simulation", output: str, shard: "Shard | None", options: SweepOptions
 ) -> int:
+    """Compute the sweep, or one shard of it, and return the exit code."""
     from gearchaos.engine.running import metadata, prepare
     from gearchaos.engine.store_filling import fill, open_store
     from gearchaos.results.files.atomic_file import check_output
@@ -78,7 +119,7 @@ def _compute(
     check_output(output, options.overwrite)
     began = time.monotonic()
     with open_store(simulation, output, resume=options.resume, shard=shard) as store:
-        # Workers compile for themselves: this may be another kind of machine.
+        # Workers compile for themselves: they may run on another kind of machine.
         prepare(simulation, compile_now=options.dask is None)
         try:
             tally, performed_by = fill(simulation, store, options.dask)
@@ -89,26 +130,37 @@ def _compute(
                 order = simulation.lanes.computed_at if simulation.carried else None
                 store.merge(*told, overwrite=options.overwrite, computed_at=order)
         except (KeyboardInterrupt, FileError, ExecutionError, OSError) as fault:
-            kept = sum(last - first for first, last in store.finished().bounds)
-            fault.add_note(f"{kept} of {store.own_lanes} lanes are kept")
-            again = [argument for argument in options.arguments if argument != "--resume"]
-            # With this it begins, and may be refused at once.
-            with suppress(FileError):
-                check_output(output, options.overwrite)
-                fault.add_note(f"go on with: {_command('sweep', *again, '--resume')}")
+            _add_remedy(fault, store, output, options)
             raise
     said = [f"{store.own_lanes} lanes, {tally.diverged} diverged, {seconds:.1f} s", *tally.remarks]
     if shard is None:
         return ending(simulation, output, tally.diverged, *said)
     print(store.folder, flush=True)
-    say(*said, f"this was shard {options.shard}; once all are there: {_command('merge', output)}")
+    join = _command("merge", output)
+    say(*said, f"this was shard {options.shard}; when all are computed, join them with: {join}")
     return OK
 
 
+def _add_remedy(
+    fault: BaseException, store: "BlockStore", output: str, options: SweepOptions
+) -> None:
+    """Add notes to a fault: how many lanes are kept, and the command that continues the sweep."""
+    from gearchaos.results.files.atomic_file import check_output
+
+    kept = sum(last - first for first, last in store.finished().bounds)
+    fault.add_note(f"{kept} of {store.own_lanes} lanes are kept")
+    again = [argument for argument in options.arguments if argument != "--resume"]
+    # No note if the continued sweep would be refused by this check too.
+    with suppress(FileError):
+        check_output(output, options.overwrite)
+        fault.add_note(f"continue with: {_command('sweep', *again, '--resume')}")
+
+
 def _command(name: str, *arguments: str) -> str:
+    """Return a command line to copy, with the same Python."""
     from shlex import join
 
     return join([sys.orig_argv[0], "-m", f"gearchaos.{name}", *arguments])
 
 
-main = Command("sweep", __doc__, _sweep).start(__name__)
+main = Command("sweep", __doc__, SweepOptions, _sweep).start(__name__)

@@ -13,11 +13,19 @@ import resource
 import sys
 import time
 import traceback
-from argparse import Namespace
 from collections.abc import Callable
 from pathlib import Path
+from typing import Annotated, NamedTuple
+
+from gearchaos.options import Option
 
 MEMORY = 1 << 30
+
+
+class Paths(NamedTuple):
+    """Options of the commands that load a configuration."""
+
+    paths: Annotated[tuple[str, ...], Option("configuration", positional=True)]
 
 
 def main() -> None:
@@ -59,16 +67,15 @@ def _main(command: str) -> Callable[[list[str]], int]:
     if command not in ("load_config", "run"):
         return importlib.import_module(f"gearchaos.{command}").main
     import gearchaos
-    from gearchaos.command_line import COMMANDS, OK, Command
+    from gearchaos.command_line import OK, Command
 
-    def body(options: Namespace) -> int:
+    def body(options: Paths) -> int:
         config = gearchaos.load_config(*options.paths)
         if command == "run":
             gearchaos.run(config)
         return OK
 
-    COMMANDS[command] = {"options": {"paths": {"nargs": "*"}}}
-    return Command(command, "Load a configuration.", body)
+    return Command(command, "Load a configuration.", Paths, body)
 
 
 if __name__ == "__main__":

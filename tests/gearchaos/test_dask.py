@@ -231,7 +231,7 @@ def test_an_address_that_can_be_none_is_refused_and_nothing_goes_on_from_it(
     ended = sweep(tmp_path, "--dask", address)
     assert (ended.code, ended.out) == (2, "")
     assert re.search(rf"--dask {address}: cannot be .* here \({reason}", ended.err)
-    assert "go on with" not in ended.err
+    assert "continue with" not in ended.err
     assert names_in(tmp_path) == ["gears.toml"]
 
 
@@ -290,14 +290,17 @@ def test_an_interrupt_does_not_wait_for_workers_that_are_gone(tmp_path):
             ["--dask", "local:1", "--set", "start.carry=upwards"],
             '--dask: with start.carry = "upwards" one value is computed after the other',
         ),
-        (["--dask", "tcp://node:1", "--threads", "1"], "--threads 1: the workers of a cluster use"),
+        (
+            ["--dask", "tcp://node:1", "--threads", "1"],
+            "--threads 1: has no effect on the workers of",
+        ),
     ],
 )
 def test_what_a_cluster_cannot_do_is_code_2(tmp_path, arguments, message):
     ended = sweep(tmp_path, *arguments)
     assert (ended.code, ended.out) == (2, "")
     assert message in ended.err
-    assert "go on with" not in ended.err  # It would be refused again.
+    assert "continue with" not in ended.err  # It would be refused again.
     assert names_in(tmp_path) == ["gears.toml"]
 
 

@@ -212,7 +212,7 @@ class TestASearchThatWasStopped:
                 interrupted.setattr(searching, "check", check)
                 ended = command(tmp_path, "--resume")
                 assert ended.code == 130
-                assert "candidates in targets.csv are kept; go on with --resume" in ended.err
+                assert "candidates in targets.csv are kept; continue with --resume" in ended.err
                 assert len(numbers(tmp_path / "targets.csv")) == 1 + 40 + 8 * 12
         ended = command(tmp_path, "--resume")
         assert (ended.code, ended.out) == (0, identified.out)

@@ -3,11 +3,13 @@
 import os
 import subprocess
 import sys
+from typing import NamedTuple
 
 import pytest
 
-from gearchaos.command_line import Command, version_text
+from gearchaos.command_line import Command
 from gearchaos.errors import ConfigurationError, FileError
+from gearchaos.version import version_text
 
 
 def raising(fault: BaseException):
@@ -17,8 +19,12 @@ def raising(fault: BaseException):
     return body
 
 
+class NoOptions(NamedTuple):
+    """A command without options of its own."""
+
+
 def run(body) -> int:
-    return Command("schema", "Turn a gear.", body)([])
+    return Command("schema", "Turn a gear.", NoOptions, body)([])
 
 
 @pytest.mark.parametrize(
@@ -55,12 +61,15 @@ def test_the_codes_of_the_body_and_of_argparse_are_kept():
 def test_a_reader_that_goes_away_ends_the_command_quietly():
     code = """
 import sys
+from typing import NamedTuple
 from gearchaos.command_line import Command
 def body(options):
     sys.stdin.read()
     print("a path")
     return 0
-sys.exit(Command("schema", "Turn a gear.", body)())
+class NoOptions(NamedTuple):
+    pass
+sys.exit(Command("schema", "Turn a gear.", NoOptions, body)())
 """
     with subprocess.Popen(
         [sys.executable, "-c", code],

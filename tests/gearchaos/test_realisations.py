@@ -101,7 +101,7 @@ def test_commands_take_a_gear_pair_by_its_number(result, tmp_path):
 
     where, small = ("--at", "realisation=1", "--at", "start=0"), ("--format", "png", "--dpi", "50")
     assert "slice realisation = 1" in run("stages", "drawn.h5", *where)
-    assert "all 3 values of realisation, of which --at" in run("stages", "drawn.h5")
+    assert "all 3 values of realisation; --at" in run("stages", "drawn.h5")
     assert "realisation (realisation) int32" in run("info", "drawn.h5")
     assert "drawn_realisation_1" in run("plot", "drawn.h5", "--at", "realisation=1", *small)
     run("plot", "drawn.h5", "--stages", *small)
@@ -129,7 +129,7 @@ def test_the_truth_of_flow_maps_is_not_asked_for(tmp_path):
     (tmp_path / "gears.toml").write_text(text_of(DRAWN, "[21, 38]"))
     ended = run_module("gearchaos.accuracy", "gears.toml", cwd=tmp_path)
     assert (ended.code, ended.out) == (2, "")
-    assert 'pitch_error.kind = "grade": the truth comes from flow maps' in ended.err
+    assert 'pitch_error.kind = "grade": the reference solution comes from flow maps' in ended.err
 
 
 def test_a_response_holds_all_gear_pairs(tmp_path):

@@ -241,8 +241,8 @@ def test_diverged_lanes_are_kept_and_told(tmp_path, capsys):
         (["--at", "lode=1"], "did you mean `load`?"),
         (
             ["--at", "1", "--set", "start.carry=upwards"],
-            f'{FULL}: start.carry = "upwards": a lane goes on from the one before it, and values '
-            "by themselves have none; run the sweep, then: gearchaos response RESULT.h5 --at VALUE",
+            f'{FULL}: start.carry = "upwards": a lane starts where the lane before it ends, which '
+            "single values lack; run the sweep, then: gearchaos response RESULT.h5 --at VALUE",
         ),
         (["--pitch-error", "nan"], "'nan' is not a finite number"),
         (["--pitch-error", "1", "--periods", "7"], "integration.recorded_periods = 6"),
@@ -264,9 +264,9 @@ def test_a_pitch_error_in_a_sweep_over_something_else_needs_a_value_of_that(tmp_
     asked = [str(FULL.with_name("spur_pair.toml")), "--pitch-error", "1", "-o", str(output)]
     assert main(asked) == 2
     assert capsys.readouterr().err.startswith(
-        "gearchaos response: error: values of pitch_error take the place of the sweep over "
-        "mesh_frequency: give one of it with --set groups.mesh_frequency=VALUE, or several "
-        "with --at\n"
+        "gearchaos response: error: values of pitch_error replace the sweep over "
+        "mesh_frequency: give one value of mesh_frequency with --set groups.mesh_frequency=VALUE, "
+        "or several with --at\n"
     )
     assert not output.exists()
 

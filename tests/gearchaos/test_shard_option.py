@@ -66,7 +66,7 @@ def test_a_shard_says_what_is_next_and_is_not_computed_twice(tmp_path):
     first = sweep(tmp_path, *told)
     assert first.code == 0
     assert "488 lanes, 0 diverged" in first.err
-    assert "this was shard 2/2; once all are there: " in first.err
+    assert "this was shard 2/2; when all are computed, join them with: " in first.err
     assert first.err.endswith("-m gearchaos.merge gears.h5\n")
     refused = sweep(tmp_path, *told)
     assert refused.code == 4

@@ -179,7 +179,7 @@ def test_a_slice_is_named_and_the_first_one_is_not_all(several, tmp_path):
     assert ended.code == 0
     assert ended.out.splitlines()[:3] == [
         "stages over pitch_error",
-        "all 2 values of start, of which --at start=VALUE chooses one",
+        "all 2 values of start; --at start=VALUE chooses one",
         "slice load = 0.1; others with --at load=VALUE",
     ]
     facts = listed(tmp_path)

@@ -141,7 +141,7 @@ def test_a_dry_run_tells_a_scheduler_as_json_what_one_shard_takes(tmp_path):
     assert facts["memory_bytes"] > 5e7
     ended = sweep(tmp_path, "--json")
     assert (ended.code, ended.out) == (2, "")
-    assert "--json: only what --dry-run tells is JSON" in ended.err
+    assert "--json: needs --dry-run; the result of a sweep is an HDF5 file" in ended.err
 
 
 def test_a_dry_run_counts_the_memory_of_maps_of_every_lane(tmp_path):

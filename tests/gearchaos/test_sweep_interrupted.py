@@ -76,7 +76,7 @@ def test_the_command_printed_after_an_interrupt_gives_the_undisturbed_result(
     assert stopped == f"gearchaos sweep: {word}"
     lanes = int(re.fullmatch(r"gearchaos sweep: (\d+) of 1000 lanes are kept", kept)[1])
     assert 0 < lanes < 1000
-    command = shlex.split(how.removeprefix("gearchaos sweep: go on with: "))
+    command = shlex.split(how.removeprefix("gearchaos sweep: continue with: "))
     assert command.count("--resume") == 1
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
     assert (done.returncode, done.stdout) == (0, "gears.h5\n")
@@ -95,7 +95,7 @@ def test_a_killed_sweep_leaves_nothing_that_looks_like_a_result_and_can_be_resum
     # Neither lost by accident nor mixed with another sweep.
     refused = sweep(tmp_path, *LONG)
     assert refused.code == 4
-    assert "go on with: " not in refused.err
+    assert "continue with: " not in refused.err
     assert re.search(r"holds \d finished blocks? of an earlier run; continue it with", refused.err)
     other = sweep(tmp_path, *LONG, "--resume", "--set", "groups.damping_ratio=0.06")
     assert other.code == 4
@@ -306,7 +306,7 @@ def test_the_same_command_is_not_recommended_where_it_must_fail_again(tmp_path):
     assert process.returncode == 4
     assert "gears.h5: exists already; replace it with --overwrite" in err
     assert "1000 of 1000 lanes are kept" in err
-    assert "go on with" not in err
+    assert "continue with" not in err
     assert (tmp_path / "gears.h5").read_bytes() == b"precious"
 
 
