@@ -45,7 +45,7 @@ class OptionParser(ArgumentParser, Generic[Options]):
         self.add_argument(
             "-q", "--quiet", action="store_true", help="print only errors and warnings on stderr"
         )
-        self.add_argument("--version", action=_Version, nargs=0, help="print the version and exit")
+        self.add_argument("--version", action="version", help="print the version and exit")
 
     def _add(self, name: str, held: Any, option: Option) -> None:
         """Add the option of one field, which holds values of a type."""
@@ -103,6 +103,11 @@ class OptionParser(ArgumentParser, Generic[Options]):
         near = get_close_matches(unknown.partition("=")[0], self._flags, 1)
         return near[0] if near and unknown.startswith("--") else None
 
+    @property
+    def version(self) -> str:
+        """What --version prints; looking it up takes as long as reading all options."""
+        return version_text()
+
     def error(self, message: str) -> NoReturn:
         """Raise a ConfigurationError: one line instead of the whole usage."""
         raise ConfigurationError(f"{message}; see {self.prog} --help")
@@ -120,14 +125,6 @@ class OptionParser(ArgumentParser, Generic[Options]):
         ]
         self.description, self.epilog = paragraphs[0], "\n\n".join(paragraphs[1:])
         return super().format_help()
-
-
-class _Version(Action):
-    """Print the version; asking the installation for it takes longer than reading all options."""
-
-    def __call__(self, parser: ArgumentParser, *_: object) -> None:
-        print(version_text())
-        parser.exit()
 
 
 def _element(held: Any) -> tuple[Any, bool]:

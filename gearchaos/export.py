@@ -4,7 +4,7 @@ A table has one row per lane and one column for each variable that has one numbe
 --along section_point it has one row per section point. CSV files give the units in brackets in the
 headings; Parquet files give them in the attributes that pandas reads.
 
-The path of the file goes to stdout. Needs pip install gearchaos[export].
+The path of the file goes to stdout. Needs more packages: pip install gearchaos[export].
 """
 
 from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
@@ -29,7 +29,7 @@ class ExportOptions(NamedTuple):
     output: Annotated[
         str,
         Option(
-            f"file to write, ending in {', '.join(ENDINGS)}", "PATH", positional=True, file=True
+            "file to write, ending in .csv, .parquet or .mat", "PATH", positional=True, file=True
         ),
     ]
     along: Annotated[

@@ -6,8 +6,8 @@ with time history, phase portrait, Poincare section and amplitude spectrum.
 
 --variable names what is drawn. For a sweep it is a section variable (default: section_delta_5), any
 variable with one number per lane, or an amplitude such as amplitude_transmission_error. For a map
-it is any variable with one number per lane. For a response it is a coordinate (default: delta_5) or
-another variable over time, such as mesh_force_tangential.
+it is any variable with one number per lane (default: motion, exponent and contact). For a response
+it is a coordinate (default: delta_5) or another variable over time, such as mesh_force_tangential.
 
 --stages omits stages that are narrower than a 150th of the axis: they are merged into the
 surrounding stage, or into a stage of several motions.
@@ -69,7 +69,7 @@ class PlotOptions(NamedTuple):
         ),
     ] = None
     variable: Annotated[
-        str | None, Option("variable to draw (default and choices: see below)", "NAME")
+        str | None, Option("variable to draw; the end of --help describes the choices", "NAME")
     ] = None
     low: Annotated[
         float | None, Option("lowest value of the parameter to show", "VALUE", ("--from",))

@@ -57,7 +57,9 @@ class ResponseOptions(NamedTuple):
     ] = ()
     begin: Annotated[
         Literal["end", "start"],
-        Option("for a result: continue from the end of the lane (default) or repeat it"),
+        Option(
+            "for a result: continue the lane from its end (default) or repeat it from its start"
+        ),
     ] = "end"
     periods: Annotated[int | None, Option("mesh periods to keep (default: 32)", "N")] = None
     output: Output = None
