@@ -109,7 +109,12 @@ def _listing(
     swept parameter.
     """
     from gearchaos.results.reading.jumps import apart, crises, jumps
-    from gearchaos.results.reading.stage_table import labelled_lanes, one_axis, slice_facts, stage_table
+    from gearchaos.results.reading.stage_table import (
+        labelled_lanes,
+        one_axis,
+        slice_facts,
+        stage_table,
+    )
     from gearchaos.outputs.names import DIRECTION, REPEATS
 
     result, both = one_axis(part, kept), DIRECTION in part.axes
