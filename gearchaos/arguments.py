@@ -1,4 +1,4 @@
-"""Arguments of the public functions, checked: what is wrong becomes an error with a sentence."""
+"""Checks of the arguments of public functions; a wrong argument raises an error with a sentence."""
 
 import math
 import os
@@ -12,7 +12,7 @@ from gearchaos.errors import ConfigurationError, FileError
 
 
 def path_text(path: Any, what: str) -> str:
-    """Return a path as text; FileError if it is none, or cannot be one."""
+    """Return a path as text; raise FileError if the value is no path."""
     try:
         return os.fsdecode(path)
     except TypeError:
@@ -21,7 +21,7 @@ def path_text(path: Any, what: str) -> str:
 
 
 def whole_number(name: str, value: Any, least: float = -math.inf) -> int:
-    """Return a whole number that is at least so large; ConfigurationError if it is none."""
+    """Return a whole number of at least ``least``; raise ConfigurationError for any other value."""
     whole = isinstance(value, int | np.integer) and not isinstance(value, bool)
     if whole and value >= least:
         return int(value)
@@ -30,7 +30,7 @@ def whole_number(name: str, value: Any, least: float = -math.inf) -> int:
 
 
 def finite_number(name: str, value: Any) -> float:
-    """Return a number as a float; ConfigurationError if it is none, or not finite."""
+    """Return a finite number as a float; raise ConfigurationError for any other value."""
     try:
         number = math.nan if isinstance(value, str) else float(value)
     except (OverflowError, TypeError, ValueError):
@@ -41,7 +41,7 @@ def finite_number(name: str, value: Any) -> float:
 
 
 def coordinates(name: str, values: Any) -> dict[str, float]:
-    """Return numbers by name; ConfigurationError if it is no such mapping."""
+    """Return a mapping of names to finite numbers; raise ConfigurationError for any other value."""
     if not isinstance(values, Mapping) or not all(isinstance(one, str) for one in values):
         remedy = 'such as {"operation.speed_rpm": 12000.0}'
         raise ConfigurationError(f"{name} = {_shown(values)}: must be numbers by name, {remedy}")
@@ -49,7 +49,7 @@ def coordinates(name: str, values: Any) -> dict[str, float]:
 
 
 def state(name: str, value: Any, states: Sequence[str]) -> Floats:
-    """Return a state, shape (1, states); ConfigurationError if it is not one finite number each."""
+    """Return a state, shape (1, states); raise ConfigurationError if a finite number is missing."""
     try:
         numbers = np.asarray(value, dtype=np.float64)
     except (TypeError, ValueError):
@@ -63,7 +63,7 @@ def state(name: str, value: Any, states: Sequence[str]) -> Floats:
 
 
 def texts(name: str, values: Any) -> list[str]:
-    """Return a list of texts; ConfigurationError if it is none, or a single text."""
+    """Return a list of texts; raise ConfigurationError for any other value, also a single text."""
     listed = isinstance(values, Iterable) and not isinstance(values, str)
     found = list(values) if listed else [values]
     if not (listed and all(isinstance(one, str) for one in found)):
@@ -72,14 +72,14 @@ def texts(name: str, values: Any) -> list[str]:
 
 
 def one_of(name: str, value: Any, choices: Sequence[Any]) -> None:
-    """Raise a ConfigurationError unless a value is one of these."""
+    """Raise a ConfigurationError unless the value is one of the choices."""
     if not any(value is one or (isinstance(one, str) and value == one) for one in choices):
         there = ", ".join(map(repr, choices))
         raise ConfigurationError(f"{name} = {_shown(value)}: must be one of {there}")
 
 
 def instance(name: str, value: Any, kind: type, remedy: str) -> None:
-    """Raise a ConfigurationError unless a value is of this type."""
+    """Raise a ConfigurationError unless the value has this type."""
     if not isinstance(value, kind):
         article = f"must be a {kind.__name__}, not {_kind(value)}"
         raise ConfigurationError(f"{name} = {_shown(value)}: {article}; {remedy}")

@@ -1,4 +1,4 @@
-"""What ``--dry-run`` tells: what a sweep would compute, and how much time and memory that takes."""
+"""What ``sweep --dry-run`` prints: the lanes of a sweep, and the time and memory it would take."""
 
 import json
 import math
@@ -9,6 +9,7 @@ from contextlib import suppress
 from copy import copy
 from datetime import timedelta
 from pathlib import Path
+from typing import NamedTuple
 
 import numba
 import numpy as np
@@ -26,32 +27,70 @@ from gearchaos.results.files.block_store import PIECE_BYTES, lanes_and_record
 from gearchaos.results.files.result_file import CACHE_BYTES
 
 SAMPLE_STEPS = 500
-"""Steps per period of a sample, if they are stable: several times as many as most sweeps take."""
+"""Steps per period of a sample, if they are stable; most sweeps take fewer."""
 
 SAMPLE_PERIODS = 1000
-"""Mesh periods of a sample: over much fewer, labels cost more than their share."""
+"""Mesh periods of a sample; with far fewer, labelling would take too large a share of the time."""
+
+
+class Estimate(NamedTuple):
+    """What a run, or one shard of it, takes.
+
+    ``lanes`` is their number, ``every`` that of the whole sweep. ``steps`` counts those of all
+    lanes. ``file_bytes`` is the size before compression, ``memory_bytes`` the peak of the process.
+    """
+
+    lanes: int
+    every: int
+    steps: int
+    seconds: float
+    threads: int
+    file_bytes: int
+    memory_bytes: int
 
 
 def describe(simulation: Simulation, output: str, shard: Shard | None, as_json: bool) -> None:
-    """Say what a run, or one shard of it, would compute, judged by a sample of its lanes."""
-    config, lanes, threads = simulation.config, simulation.lanes, numba.get_num_threads()
-    every, record = lanes_and_record(simulation.variables)
-    own = every if shard is None else sum(last - first for first, last in shard.blocks(every))
-    seconds = own * _seconds_per_lane(simulation)
-    bytes_kept, kept = own * record.itemsize, [record[name] for name in record.names or ()]
-    memory = _memory(simulation) + sum(min(CACHE_BYTES, every * one.itemsize) for one in kept)
-    memory += min(PIECE_BYTES, bytes_kept) if simulation.carried else 0
-    # What HDF5 and the allocator keep while a file is written is not known beforehand.
-    memory += memory // 20
-    plan, resonant = simulation.plan, resonances(lanes)
-    steps = own * (plan.transient_periods + plan.recorded_periods) * plan.steps_per_period
+    """Print what a run, or one shard of it, would compute, and an estimate of time and memory."""
+    estimate, resonant = _estimated(simulation, shard), resonances(simulation.lanes)
     if as_json:
-        facts = {"output": output, "exists": os.path.exists(output), "states": len(lanes.states)}
-        facts |= {"lanes": own, "steps": steps, "seconds": seconds, "threads": threads}
-        facts |= {"file_bytes": bytes_kept, "memory_bytes": memory, **resonant.facts}
-        facts["steps_per_period"] = plan.steps_per_period
+        facts = {
+            "output": output,
+            "exists": os.path.exists(output),
+            "states": len(simulation.lanes.states),
+            "lanes": estimate.lanes,
+            "steps": estimate.steps,
+            "seconds": estimate.seconds,
+            "threads": estimate.threads,
+            "file_bytes": estimate.file_bytes,
+            "memory_bytes": estimate.memory_bytes,
+            **resonant.facts,
+            "steps_per_period": simulation.plan.steps_per_period,
+        }
         print(json.dumps(facts, indent=1))
         return
+    first = {"output": f"{output}{' (exists)' if os.path.exists(output) else ''}"}
+    for key, value in {**first, **resonant.texts, **_words(simulation, estimate)}.items():
+        sys.stderr.write(f"{key + ':':12}{value}\n")
+
+
+def _estimated(simulation: Simulation, shard: Shard | None) -> Estimate:
+    """Estimate what a run, or one shard of it, takes, from a sample of its lanes."""
+    plan, (every, record) = simulation.plan, lanes_and_record(simulation.variables)
+    own = every if shard is None else sum(last - first for first, last in shard.blocks(every))
+    seconds = own * _seconds_per_lane(simulation)
+    file_bytes, kept = own * record.itemsize, [record[name] for name in record.names or ()]
+    memory = _memory(simulation) + sum(min(CACHE_BYTES, every * one.itemsize) for one in kept)
+    memory += min(PIECE_BYTES, file_bytes) if simulation.carried else 0
+    # An allowance: the memory of HDF5 and the allocator during writing is not known beforehand.
+    memory += memory // 20
+    steps = own * (plan.transient_periods + plan.recorded_periods) * plan.steps_per_period
+    threads = numba.get_num_threads()
+    return Estimate(own, every, steps, seconds, threads, file_bytes, memory)
+
+
+def _words(simulation: Simulation, estimate: Estimate) -> dict[str, str]:
+    """Return the lines about effects, states, lanes and the estimate, each with its heading."""
+    config, lanes, seconds = simulation.config, simulation.lanes, estimate.seconds
     duration = f"{seconds:.1f} s" if seconds < 100 else str(timedelta(seconds=round(seconds)))
     spans = [
         f"{axis.values.size} values of {axis.name} from {axis.values[0]:g} to {axis.values[-1]:g}"
@@ -63,25 +102,25 @@ def describe(simulation: Simulation, output: str, shard: Shard | None, as_json: 
     if lanes.directions > 1:
         spans.append("in both directions")
     unused = ", ".join(name for name in config.scene.effects if name not in lanes.effects)
-    unused = f" (nothing that is kept needs {unused})" if unused else ""
-    for key, value in {
-        "output": f"{output}{' (exists)' if os.path.exists(output) else ''}",
-        **resonant.texts,
+    unused = f" (no requested output needs {unused})" if unused else ""
+    of_all = "" if estimate.lanes == estimate.every else f" of {estimate.every}"
+    threads = f"{estimate.threads} thread{'s' if estimate.threads > 1 else ''}"
+    return {
         "effects": ", ".join(config.scene.effects) or "none",
         "states": f"{len(lanes.states)}{unused}",
-        "lanes": f"{own}{'' if shard is None else f' of {every}'} ({', '.join(spans)})",
-        "steps": f"{steps:.3g} ({plan.steps_per_period} per period)",
-        "file": f"about {tqdm.format_sizeof(bytes_kept, 'B')} before compression",
-        "memory": f"about {tqdm.format_sizeof(memory, 'B')} at the peak of the process",
-        "time": f"about {duration} with {threads} thread{'s' if threads > 1 else ''}",
-    }.items():
-        sys.stderr.write(f"{key + ':':12}{value}\n")
+        "lanes": f"{estimate.lanes}{of_all} ({', '.join(spans)})",
+        "steps": f"{estimate.steps:.3g} ({simulation.plan.steps_per_period} per period)",
+        "file": f"about {tqdm.format_sizeof(estimate.file_bytes, 'B')} before compression",
+        "memory": f"about {tqdm.format_sizeof(estimate.memory_bytes, 'B')} at the peak of the "
+        "process",
+        "time": f"about {duration} with {threads}",
+    }
 
 
 def _seconds_per_lane(simulation: Simulation) -> float:
-    """Compute a block of lanes from all over the sweep, as long as it takes to label them.
+    """Measure the time of a block of lanes from all over the sweep, and scale it to all periods.
 
-    A whole block: what is checked, or looked at again, is computed in vectors of lanes.
+    It is a whole block, because lanes that are checked or extended are computed in vectors too.
     """
     sample, plan = copy(simulation), simulation.plan
     block = simulation.block_lanes(numba.get_num_threads())
@@ -89,9 +128,9 @@ def _seconds_per_lane(simulation: Simulation) -> float:
     steps = _sampled_steps(simulation, places)
     finer = plan.steps_per_period / steps
     periods, whole = plan.transient_periods + plan.recorded_periods, simulation.lanes.repeats_after
-    with notice("computing some lanes, to tell how long all take"):
-        # The first time, little is computed, and the kernels are loaded. It takes a step more, so
-        # that flow maps are still to be made the second time: once, for however many periods.
+    with notice("computing some lanes to estimate the time"):
+        # The first, short round loads the kernels. It takes one step more per period, so that the
+        # second round has to make its own flow maps, whose time does not grow with the periods.
         for more, length in (1, min(1.0, 8.0 / periods)), (0, min(1.0, SAMPLE_PERIODS / periods)):
             transient, recorded = (
                 whole * math.ceil(length * every / whole)
@@ -99,7 +138,7 @@ def _seconds_per_lane(simulation: Simulation) -> float:
             )
             sample.plan = plan._replace(
                 steps_per_period=steps + more,
-                # As large a share of the flow maps is kept as in the whole run.
+                # The share of flow maps that are kept is that of the whole run.
                 map_bytes=int(plan.map_bytes / finer),
                 transient_periods=transient,
                 recorded_periods=recorded,
@@ -116,10 +155,10 @@ def _seconds_per_lane(simulation: Simulation) -> float:
 
 
 def _sampled_steps(simulation: Simulation, places: Integers) -> int:
-    """Return the steps per period of a sample: the time grows with them in proportion.
+    """Return the steps per period of a sample; the time is proportional to them.
 
-    So few that a sample takes seconds, and as many as a step of RK4 needs to be stable, and a flow
-    map not to be divided.
+    They are few, so that a sample takes seconds, but enough for RK4 to be stable and for no flow
+    map to be divided.
     """
     steps = simulation.plan.steps_per_period
     if steps <= SAMPLE_STEPS:
@@ -130,10 +169,10 @@ def _sampled_steps(simulation: Simulation, places: Integers) -> int:
 
 
 def some_places(simulation: Simulation, count: int) -> Integers:
-    """Return about so many places in the order of computation, from all over the sweep.
+    """Return about ``count`` places in the order of computation, from all over the sweep.
 
-    Neighbours behave alike, which a vector of lanes profits from. Those of a carried sweep, where
-    one lane goes on from another, are all from its middle.
+    They are in runs of neighbours, which behave alike and so are fast in one vector. In a carried
+    sweep, where a lane starts from another, all are from the middle.
     """
     lanes = simulation.lanes
     run = min(len(lanes), count if simulation.carried else LANES)
@@ -143,10 +182,10 @@ def some_places(simulation: Simulation, count: int) -> Integers:
 
 
 def _memory(simulation: Simulation) -> int:
-    """Return about how many bytes the process takes at most: as many as so far, and a block."""
+    """Return about how many bytes the process takes at most: its peak so far, and one block."""
     block = simulation.block_memory(numba.get_num_threads())
     with suppress(OSError):
-        # Linux counts for getrusage what the process that began this one took.
+        # On Linux, getrusage includes the peak of the parent process.
         status = Path("/proc/self/status").read_text("utf-8")
         return block + 1024 * int(status.partition("VmHWM:")[2].split()[0])
     try:

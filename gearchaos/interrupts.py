@@ -1,8 +1,8 @@
-"""Ctrl-C and SIGTERM, taken note of at any moment and acted upon between two pieces of work.
+"""Ctrl-C and SIGTERM: noted when they arrive, and acted upon between two pieces of work.
 
-An exception raised wherever a signal happens to arrive can get lost in a callback of the
-interpreter, or surface in a library as damage to a file. A command that writes therefore asks
-at moments of its own choice; one that only reads has nothing to put in order and just ends.
+An exception that is raised wherever a signal arrives can get lost in a callback of the interpreter,
+or interrupt a library that then damages a file. A command that writes therefore calls `check` at
+safe moments. A command that only reads ends at once.
 """
 
 import os
@@ -18,19 +18,19 @@ _arrived: list[int] = []
 
 
 class Termination(KeyboardInterrupt):
-    """SIGTERM, with which batch systems end a job: the command stops as after Ctrl-C."""
+    """SIGTERM, which batch systems send to end a job: the command stops as after Ctrl-C."""
 
 
 @contextmanager
 def heeded(*, at_once: bool) -> Iterator[None]:
-    """Let Ctrl-C and SIGTERM end the process at once, or take note of them for `check`.
+    """Let Ctrl-C and SIGTERM end the process at once, or note them for `check`.
 
-    A second one ends it at once in any case.
+    A second signal ends the process at once in both cases.
     """
     if threading.current_thread() is not threading.main_thread():
         yield
         return
-    # What runs in the background may have been told to ignore Ctrl-C.
+    # Shells let processes in the background ignore Ctrl-C; that stays so.
     before = {n: signal.getsignal(n) for n in _SIGNALS if signal.getsignal(n) != signal.SIG_IGN}
     for number in before:
         signal.signal(number, signal.SIG_DFL if at_once else _take_note)
@@ -43,9 +43,9 @@ def heeded(*, at_once: bool) -> Iterator[None]:
 
 
 def check() -> None:
-    """Raise what has arrived, a KeyboardInterrupt after Ctrl-C and a `Termination` after SIGTERM.
+    """Raise KeyboardInterrupt if Ctrl-C has arrived, or `Termination` if SIGTERM has.
 
-    Only the main thread is interrupted.
+    This happens only in the main thread.
     """
     if _arrived and threading.current_thread() is threading.main_thread():
         raise Termination if _arrived[0] == signal.SIGTERM else KeyboardInterrupt
@@ -54,6 +54,6 @@ def check() -> None:
 def _take_note(number: int, _frame: FrameType | None) -> None:
     _arrived.append(number)
     signal.signal(number, signal.SIG_DFL)
-    # Not through sys.stderr, which may be in the middle of a line of its own.
+    # Not through sys.stderr: the signal may have interrupted its write.
     with suppress(OSError):
         os.write(2, _ENDING)

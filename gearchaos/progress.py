@@ -1,4 +1,4 @@
-"""What is said on stderr while a command runs, and how far a sweep has come."""
+"""Messages and progress on stderr while a command runs, and standard streams that are closed."""
 
 import os
 import sys
@@ -13,14 +13,14 @@ from typing import Any, TextIO
 SECONDS_BETWEEN_LINES = 30.0
 SECONDS_BEFORE_NOTICE = 0.5
 
-# Who speaks, and whether only complaints are to be heard: as a library, nothing is said unasked.
+# The name before every line, and whether only warnings are printed: the library itself is quiet.
 _name = ContextVar("name", default="gearchaos")
 _quiet = ContextVar("quiet", default=True)
 
 
 @contextmanager
 def speaking(name: str | None = None, *, quiet: bool = False) -> Iterator[None]:
-    """Let every line begin with a name, by default the one there is, or let none be said."""
+    """Set the name that begins every line, by default the current one, and whether to be quiet."""
     named, hushed = _name.set(name or _name.get()), _quiet.set(quiet)
     try:
         yield
@@ -33,8 +33,8 @@ def speaking(name: str | None = None, *, quiet: bool = False) -> Iterator[None]:
 def standing_streams() -> Iterator[None]:
     """Connect every standard stream that is closed to the null device.
 
-    A file opened later would get the number of the closed stream, and then receive what libraries
-    print there. A stream that the interpreter lacks is replaced within the context.
+    Otherwise a file that is opened later would get the number of the closed stream, and receive
+    what libraries print to it. A stream that the interpreter lacks is replaced within the context.
     """
     while (descriptor := os.open(os.devnull, os.O_RDWR)) <= 2:
         os.set_inheritable(descriptor, True)
@@ -48,8 +48,8 @@ def standing_streams() -> Iterator[None]:
 
 
 def print_error(text: str) -> None:
-    """Print text on stderr; if stderr is closed or full, the text is lost and the work goes on."""
-    # Without this test, print would write to stdout.
+    """Print text on stderr; if stderr is closed or full, the text is lost without an error."""
+    # With file=None, print would write to stdout.
     if sys.stderr is None:
         return
     try:
@@ -61,7 +61,7 @@ def print_error(text: str) -> None:
 def discard(stream: TextIO) -> None:
     """Connect a stream that cannot be written to the null device.
 
-    The interpreter flushes once more when it exits, and would replace the exit code.
+    Otherwise the interpreter would flush it at exit, fail, and replace the exit code.
     """
     with suppress(OSError, ValueError):
         sink = os.open(os.devnull, os.O_WRONLY)
@@ -70,19 +70,19 @@ def discard(stream: TextIO) -> None:
 
 
 def complain(*texts: str) -> None:
-    """Print lines on stderr, also where it is quiet."""
+    """Print warnings or errors on stderr, one per line, also with --quiet."""
     print_error("\n".join(f"{_name.get()}: {text}" for text in texts))
 
 
 def say(*texts: str) -> None:
-    """Print lines on stderr unless it is quiet."""
+    """Print lines on stderr, but not with --quiet."""
     if texts and not _quiet.get():
         complain(*texts)
 
 
 @contextmanager
 def notice(text: str) -> Iterator[None]:
-    """Say something if what follows takes longer than a moment."""
+    """Print a line if the body of the context takes longer than a moment."""
     timer = threading.Timer(SECONDS_BEFORE_NOTICE, copy_context().run, [say, text])
     timer.daemon = True
     timer.start()
@@ -93,29 +93,28 @@ def notice(text: str) -> Iterator[None]:
 
 
 def progress(total: int, done: int = 0, unit: str = "lanes") -> Any:
-    """Print how many of so many lanes or pages are done.
+    """Return a tqdm bar that prints how many units of ``total`` are done.
 
-    On a terminal that is a bar, elsewhere a plain line now and then, and one at the end.
+    On a terminal this is a bar; elsewhere, a plain line every half minute and one at the end.
     """
     bar, lines = _bars()
-    # Of one there is nothing to tell but that it is done.
-    told: dict[str, Any] = {"total": total, "initial": done, "unit": f" {unit}"}
-    told["disable"] = _quiet.get() or total < 2
+    # The progress of a single unit is of no interest.
+    disable = _quiet.get() or total < 2
+    common: dict[str, Any] = {"total": total, "initial": done, "unit": f" {unit}"}
+    common |= {"disable": disable, "miniters": 1}
     if sys.stderr is not None and sys.stderr.isatty():
-        return bar(**told, dynamic_ncols=True, miniters=1)
+        return bar(**common, dynamic_ncols=True)
     text = "{n} of {total}{unit}, {rate_noinv_fmt}, {remaining} left"
-    return lines(
-        **told, mininterval=SECONDS_BETWEEN_LINES, miniters=1, bar_format=text, file=StringIO()
-    )
+    return lines(**common, mininterval=SECONDS_BETWEEN_LINES, bar_format=text, file=StringIO())
 
 
 @cache
 def _bars() -> tuple[Any, Any]:
-    """Return the classes of bars and of plain lines, made with the first of them."""
+    """Return the classes of bars and of plain lines; tqdm is imported with the first of them."""
     from tqdm import tqdm
 
     class Bar(tqdm):  # type: ignore[misc]
-        # No thread that looks after bars: it outlives them, and every update is looked at anyway.
+        # No monitor thread: it would outlive the bar, and every update is checked anyway.
         monitor_interval = 0
 
     class Lines(Bar):
