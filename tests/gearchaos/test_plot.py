@@ -210,7 +210,7 @@ def test_a_file_that_is_no_result_is_named_and_nothing_is_written(result_file, k
         (["--variable", "section_delta5"], "did you mean section_delta_5?"),
         (["--from", "5"], "the result has 0 to 1"),
         (["--from", "nan"], "not a finite number"),
-        (["--width", "1"], "not between 60 and 1000"),
+        (["--width", "1"], "1 must be between 60 and 1000"),
         (["--dpi", "99.5"], "not a whole number"),
         (["--format", "png,gif"], "'gif': a figure is written as png, pdf, svg, eps, tiff"),
         (["--output", "fig.jpg"], "'jpg': a figure is written as png, pdf, svg, eps, tiff"),
