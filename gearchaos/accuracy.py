@@ -20,9 +20,9 @@ from gearchaos.options import ConfigFile, Option, Overwrite, Settings, Threads
 from gearchaos.progress import notice, say
 
 if TYPE_CHECKING:
-    from gearchaos.models import Configuration
     from gearchaos.engine.simulation import Simulation
     from gearchaos.engine.steps import Candidate
+    from gearchaos.models import Configuration
 
 MODES = {"plain": (False, "rk4"), "resolved": (True, "rk4"), "flow map": (True, "flow_map")}
 """Settings of `Plan` for each mode: ``resolved`` and ``method``."""
@@ -62,11 +62,11 @@ class AccuracyOptions(NamedTuple):
 
 
 def _accuracy(options: AccuracyOptions) -> None:
-    from gearchaos.models import load_config
     from gearchaos.engine.running import choose_threads
     from gearchaos.engine.simulation import Simulation
     from gearchaos.figures.page import FORMATS, save_figure
     from gearchaos.figures.work_precision import work_precision_page
+    from gearchaos.models import load_config
     from gearchaos.results.files.atomic_file import check_output
 
     config = load_config(options.config, options.settings)

@@ -44,10 +44,10 @@ def _info(options: InfoOptions) -> None:
 
 def _settings(metadata: Mapping[str, Any]) -> list[str]:
     """Return a line for each key of the configuration, with the origin of an unwritten value."""
-    from gearchaos.models import Configuration
     from gearchaos.configuration.messages import shown
     from gearchaos.configuration.toml_text import flat_tables, tables_from_toml
     from gearchaos.errors import ConfigurationError
+    from gearchaos.models import Configuration
 
     text = str(metadata.get("configuration", ""))
     resolved = str(metadata.get("configuration_resolved", ""))

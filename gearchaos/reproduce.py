@@ -31,8 +31,8 @@ class ReproduceOptions(NamedTuple):
 
 
 def _reproduce(options: ReproduceOptions) -> None:
-    from gearchaos.models import load_config
     from gearchaos.engine.running import choose_threads
+    from gearchaos.models import load_config
     from gearchaos.paper.computation import compute
     from gearchaos.paper.gallery import check_folder, write_gallery
 

@@ -125,8 +125,8 @@ def _lane(options: ResponseOptions) -> "Asked":
 
 def _configuration(options: ResponseOptions) -> "Asked":
     """Replace the sweep of a configuration by the given values."""
-    from gearchaos.models import Configuration
     from gearchaos.configuration.toml_text import text_of_file, toml_literal
+    from gearchaos.models import Configuration
 
     text = text_of_file(options.config)
 

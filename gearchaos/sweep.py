@@ -26,9 +26,9 @@ from gearchaos.options import (
 from gearchaos.progress import say
 
 if TYPE_CHECKING:
-    from gearchaos.models import Configuration
     from gearchaos.engine.simulation import Simulation
     from gearchaos.engine.store_filling import Shard
+    from gearchaos.models import Configuration
     from gearchaos.results.files.block_store import BlockStore
 
 

@@ -58,6 +58,21 @@ def test_commands_start_light(statement):
     assert not imported_by(f"import gearchaos; {statement}") & HEAVY
 
 
+@pytest.mark.parametrize(
+    "arguments",
+    [["--help"], ["swep"], ["sweep", "--help"], ["plot", "a.h5", "--dpi", "x"], ["info", "--al"]],
+)
+def test_help_and_wrong_arguments_import_nothing_heavy(arguments):
+    statement = f"""
+from contextlib import redirect_stderr, redirect_stdout
+from io import StringIO
+from gearchaos.__main__ import main
+with redirect_stdout(StringIO()), redirect_stderr(StringIO()):
+    main({arguments})
+"""
+    assert not imported_by(statement) & HEAVY
+
+
 def test_the_kernels_know_nothing_of_the_layers_above():
     above = {"gearchaos", "h5py", "matplotlib", "pydantic", "tqdm"}
     assert not imported_by("import gearchaos_kernels") & above

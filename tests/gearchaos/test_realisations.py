@@ -129,7 +129,11 @@ def test_the_truth_of_flow_maps_is_not_asked_for(tmp_path):
     (tmp_path / "gears.toml").write_text(text_of(DRAWN, "[21, 38]"))
     ended = run_module("gearchaos.accuracy", "gears.toml", cwd=tmp_path)
     assert (ended.code, ended.out) == (2, "")
-    assert 'pitch_error.kind = "grade": the reference solution comes from flow maps' in ended.err
+    told = (
+        "gears.toml: the reference solution comes from flow maps, and flow maps know pitch errors"
+    )
+    assert told in ended.err
+    assert "measure errors with integration.error_check" in ended.err
 
 
 def test_a_response_holds_all_gear_pairs(tmp_path):
