@@ -24,7 +24,7 @@ class Every(NamedTuple):
     text: Annotated[str | None, Option("a text", flags=("-t", "--text"))] = None
     two_words: Annotated[str, Option("a text (default: %(default)s)")] = "both"
     number: Annotated[float | None, Option("a number", low=-10.0, high=10.0)] = None
-    count: Annotated[int, Option("a whole number", low=2)] = 3
+    count: Annotated[int, Option("a whole number", low=2, high=9)] = 3
     counts: Annotated[tuple[int, ...], Option("numbers (%(default)s)", low=1, joined=True)] = (5, 7)
     texts: Annotated[tuple[str, ...], Option("repeated texts")] = ()
     at: Annotated[tuple[Place, ...], Option("repeated places")] = ()
@@ -87,7 +87,8 @@ def test_a_direction_is_named_by_its_value(way):
         (("a", "--number", "nan"), "argument --number: 'nan' is not a finite number"),
         (("a", "--number", "-1e2"), "argument --number: -1e2 must be between -10 and 10"),
         (("a", "--count", "2.5"), "argument --count: 2.5 is not a whole number"),
-        (("a", "--count", "1"), "argument --count: 1 must be at least 2"),
+        (("a", "--count", "1"), "argument --count: 1 must be between 2 and 9"),
+        (("a", "--count", "10"), "argument --count: 10 must be between 2 and 9"),
         (("a", "--counts", "3,0"), "argument --counts: 0 must be at least 1"),
         (("a", "--at", "load=x"), "argument --at: 'x' is not a finite number"),
         (("a", "--text"), "argument -t/--text: expected one argument"),
