@@ -17,8 +17,10 @@ import numba
 from machine import machine_facts, print_machine
 
 from gearchaos import load_config
+from gearchaos.engine.computing import block_lanes, rehearse
+from gearchaos.engine.computing import blocks as blocks_of
 from gearchaos.engine.executors import LocalExecutor, compute_blocks
-from gearchaos.engine.simulation import Simulation
+from gearchaos.engine.run_plan import RunPlan, plan_run
 
 SWEEP = Path(__file__).parent.parent / "sweeps" / "pan2021.toml"
 SWEEPS = (2, 16, 64, 128)
@@ -40,7 +42,7 @@ def main() -> None:
     }
     lanes: dict[tuple[int, str], list[float]] = {key: [] for key in simulations}
     for one in simulations.values():
-        one.rehearse()
+        rehearse(one)
         one.compute(0, 1)
     for _ in range(options.rounds):
         for key, one in simulations.items():
@@ -57,17 +59,17 @@ def main() -> None:
         options.output.write_text(json.dumps(facts, indent=1), encoding="utf-8")
 
 
-def simulation(sweeps: int, carry: str) -> Simulation:
+def simulation(sweeps: int, carry: str) -> RunPlan:
     """Sweep the pitch error at several damping ratios, twice as many where nothing is carried."""
     lines = sweeps // 2 if carry == "both" else sweeps
     second = f'{{parameter="damping_ratio", from=0.04, to=0.06, count={lines}}}'
     steps = [f"second_sweep={second}", f"sweep.count={STEPS}", f"start.carry={carry}"]
-    return Simulation(load_config(SWEEP, steps))
+    return plan_run(load_config(SWEEP, steps))
 
 
-def lanes_per_second(simulation: Simulation) -> float:
+def lanes_per_second(simulation: RunPlan) -> float:
     """Compute all lanes in blocks as a run does."""
-    blocks = simulation.blocks(simulation.block_lanes(numba.get_num_threads()))
+    blocks = blocks_of(simulation, block_lanes(simulation, numba.get_num_threads()))
     with LocalExecutor(simulation) as executor:
         began = time.perf_counter()
         compute_blocks(executor, blocks, {}.__setitem__)

@@ -18,9 +18,11 @@ import numpy as np
 from gearchaos_kernels import integrate
 from machine import print_machine
 
+from gearchaos.engine.choosing import with_chosen_steps
+
 sys.path.insert(0, str(Path(__file__).parent.parent))
 
-from gearchaos.engine.simulation import Simulation
+from gearchaos.engine.run_plan import RunPlan, plan_run
 from gearchaos.errors import ConfigurationError
 from gearchaos.models import Configuration
 from tests.gearchaos.random_pairs import random_configuration
@@ -44,11 +46,11 @@ def main() -> int:
         config = Configuration.from_toml(random_configuration(number, options.steps), f"{number}")
         began = time.perf_counter()
         try:
-            simulation = Simulation(config)
+            simulation = plan_run(config)
         except ConfigurationError:
             refused += 1
             continue
-        simulation.choose_steps()
+        simulation = with_chosen_steps(simulation)
         seconds.append(time.perf_counter() - began)
         taken[simulation.plan.steps_per_period] += 1
         error = error_of(simulation)
@@ -63,7 +65,7 @@ def main() -> int:
     return 1 if silent else 0
 
 
-def error_of(simulation: Simulation) -> float:
+def error_of(simulation: RunPlan) -> float:
     """Return the error of the only lane after the last period."""
     first = np.arange(1)
     system, start = simulation.lanes.system_of(first), simulation.lanes.start_of(first)

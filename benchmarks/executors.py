@@ -19,9 +19,10 @@ import numba
 from machine import machine_facts, print_machine
 
 from gearchaos import load_config
+from gearchaos.engine.computing import blocks, rehearse
 from gearchaos.engine.dask_executor import DaskExecutor
 from gearchaos.engine.executors import BlockExecutor, LocalExecutor, compute_blocks
-from gearchaos.engine.simulation import Simulation
+from gearchaos.engine.run_plan import RunPlan, plan_run
 from gearchaos.engine.store_filling import open_store
 
 SWEEP = Path(__file__).parent.parent / "sweeps" / "pan2021.toml"
@@ -38,8 +39,8 @@ def main() -> None:
     options = parser.parse_args()
     print_machine()
     numba.set_num_threads(numba.config.NUMBA_NUM_THREADS)
-    simulation = Simulation(load_config(SWEEP, [f"sweep.count={options.lanes}", *SHORT]))
-    simulation.rehearse()
+    simulation = plan_run(load_config(SWEEP, [f"sweep.count={options.lanes}", *SHORT]))
+    rehearse(simulation)
     began = time.perf_counter()
     with (
         LocalExecutor(simulation) as here,
@@ -63,14 +64,16 @@ def main() -> None:
         options.output.write_text(json.dumps(facts, indent=1), encoding="utf-8")
 
 
-def seconds_of(simulation: Simulation, executor: BlockExecutor, size: int) -> float:
+def seconds_of(simulation: RunPlan, executor: BlockExecutor, size: int) -> float:
     """Compute the sweep in blocks of so many lanes, to the last block on the disk."""
     with tempfile.TemporaryDirectory() as folder:
         output = str(Path(folder) / "sweep.h5")
         with open_store(simulation, output, resume=False) as store:
             began = time.perf_counter()
             compute_blocks(
-                executor, simulation.blocks(size), lambda block, arrays: store.write(*block, arrays)
+                executor,
+                blocks(simulation, size),
+                lambda block, arrays: store.write(*block, arrays),
             )
             return time.perf_counter() - began
 

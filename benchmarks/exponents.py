@@ -19,7 +19,7 @@ from gearchaos_kernels import Plan, integrate
 from machine import machine_facts, print_machine
 
 import gearchaos
-from gearchaos.engine.simulation import Simulation
+from gearchaos.engine.run_plan import plan_run
 from gearchaos.records.label import CHAOTIC as CHAOTIC_LABEL
 from gearchaos.records.lyapunov import largest_exponent
 
@@ -84,7 +84,7 @@ def bounded(file: str, overrides: list[str], steps: int) -> dict[str, float]:
     )
     coarse = gearchaos.run(config)
     # From the end of each lane, so that it stays on its motion.
-    fine = Simulation(config.replace("integration.steps_per_period", TRUTH_STEPS))
+    fine = plan_run(config.replace("integration.steps_per_period", TRUTH_STEPS))
     numbers = np.arange(len(fine.lanes))
     system = fine.lanes.system_of(numbers)
     plan = fine.recording._replace(transient_periods=0, recorded_periods=60, section_points=60)
@@ -121,7 +121,7 @@ def coverage(file: str, overrides: list[str], value: float) -> float:
             "start.spread=0.3",
         ],
     )
-    lanes = Simulation(config).lanes
+    lanes = plan_run(config).lanes
     numbers = np.arange(STARTS)
     plan = Plan(100, 1000, PERIODS, section_points=0, tangent=True, resolved=True)
     system = lanes.system_of(numbers)

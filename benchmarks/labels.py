@@ -30,7 +30,7 @@ from machine import machine_facts, print_machine
 
 import gearchaos
 from gearchaos.dynamics.orbits import polish
-from gearchaos.engine.simulation import Simulation
+from gearchaos.engine.run_plan import RunPlan, plan_run
 from gearchaos.records.label import MEANINGS
 
 SWEEPS = Path(__file__).parent.parent / "sweeps"
@@ -319,7 +319,7 @@ def judged(config: gearchaos.Configuration) -> Judged:
     result = gearchaos.run(config)
     seconds = time.perf_counter() - began
     steps = FINER * config.integration.steps_per_period
-    simulation = Simulation(config.replace("integration.steps_per_period", steps))
+    simulation = plan_run(config.replace("integration.steps_per_period", steps))
     truths, true_periods = told(simulation, result["end_state"])
     return Judged(
         result[result.axis],
@@ -331,7 +331,7 @@ def judged(config: gearchaos.Configuration) -> Judged:
     )
 
 
-def told(simulation: Simulation, start: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def told(simulation: RunPlan, start: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Tell the motion of every lane from a long run at fine steps."""
     numbers = np.arange(len(simulation.lanes))
     system, recorded = simulation.lanes.system_of(numbers), simulation.plan.recorded_periods

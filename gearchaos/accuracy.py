@@ -20,7 +20,7 @@ from gearchaos.options import ConfigFile, Option, Overwrite, Settings, Threads
 from gearchaos.progress import notice, say
 
 if TYPE_CHECKING:
-    from gearchaos.engine.simulation import Simulation
+    from gearchaos.engine.run_plan import RunPlan
     from gearchaos.engine.steps import Candidate
     from gearchaos.models import Configuration
 
@@ -62,8 +62,8 @@ class AccuracyOptions(NamedTuple):
 
 
 def _accuracy(options: AccuracyOptions) -> None:
+    from gearchaos.engine.run_plan import plan_run
     from gearchaos.engine.running import choose_threads
-    from gearchaos.engine.simulation import Simulation
     from gearchaos.figures.page import FORMATS, save_figure
     from gearchaos.figures.work_precision import work_precision_page
     from gearchaos.models import load_config
@@ -76,7 +76,7 @@ def _accuracy(options: AccuracyOptions) -> None:
         check_output(target, options.overwrite)
     choose_threads(options.threads)
     config = _measurable(config, options.steps[0])
-    settings = measure(Simulation(config), options.steps, options.lanes)
+    settings = measure(plan_run(config), options.steps, options.lanes)
     print("\n".join(table(settings)))
     if not any(setting.error > 0.0 for setting in settings):
         raise ConfigurationError(
@@ -99,7 +99,7 @@ def _measurable(config: "Configuration", fewest: int) -> "Configuration":
     import numpy as np
 
     from gearchaos.engine.lanes import Lanes
-    from gearchaos.engine.simulation import Simulation
+    from gearchaos.engine.run_plan import plan_run
 
     if refusal := Lanes(config).system_of(np.arange(1)).refuses_maps():
         raise ConfigurationError(
@@ -109,11 +109,11 @@ def _measurable(config: "Configuration", fewest: int) -> "Configuration":
     config = config.replace("integration.method", "rk4")
     # A sweep with an error check raises the same errors for what cannot be measured.
     checks = {"unstable": "refuse", "steps_per_period": fewest, "error_check": 1.0}
-    Simulation(config.replace("integration", {**config.tables()["integration"], **checks}))
+    plan_run(config.replace("integration", {**config.tables()["integration"], **checks}))
     return config
 
 
-def measure(simulation: "Simulation", steps: Sequence[int], lanes: int) -> "list[Candidate]":
+def measure(run: "RunPlan", steps: Sequence[int], lanes: int) -> "list[Candidate]":
     """Return error and time of each number of RK4 steps per mesh period, plain and resolved.
 
     Flow maps are measured with `FLOW_MAP_STEPS`. ``lanes`` is the number of lanes, which are spread
@@ -126,7 +126,7 @@ def measure(simulation: "Simulation", steps: Sequence[int], lanes: int) -> "list
     from gearchaos.records.difference import difference
 
     with compiling():
-        _, solution = pilot(simulation.lanes, simulation.plan, lanes, TRUTH_STEPS)
+        _, solution = pilot(run.lanes, run.plan, lanes, TRUTH_STEPS)
         for setting in MODES.values():
             solution(steps[0], *setting)
     with notice(f"computing the reference solution with {TRUTH_STEPS} flow maps per period"):

@@ -1,5 +1,6 @@
 """Types of arrays by what they hold; a docstring gives the shape of one in brackets."""
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -7,6 +8,8 @@ from numpy.typing import NDArray
 
 Array = NDArray[Any]
 Floats = NDArray[np.float64]
+Arrays = Mapping[str, Array]
+"""Arrays by the name of their variable."""
 Complex = NDArray[np.complex128]
 Mask = NDArray[np.bool_]
 

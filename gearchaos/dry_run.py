@@ -6,7 +6,7 @@ import os
 import sys
 import time
 from contextlib import suppress
-from copy import copy
+from dataclasses import replace
 from datetime import timedelta
 from pathlib import Path
 from typing import NamedTuple
@@ -18,8 +18,10 @@ from tqdm import tqdm
 
 from gearchaos.arrays import Integers
 from gearchaos.dynamics.stability import fewest_stable_steps
+from gearchaos.engine.computing import block_lanes, block_memory, integrate
+from gearchaos.engine.kept import arrays_of, variables_of
 from gearchaos.engine.resonances import resonances
-from gearchaos.engine.simulation import Simulation
+from gearchaos.engine.run_plan import RunPlan
 from gearchaos.engine.store_filling import Shard
 from gearchaos.outputs.names import DIRECTION, START
 from gearchaos.progress import notice
@@ -49,14 +51,14 @@ class Estimate(NamedTuple):
     memory_bytes: int
 
 
-def describe(simulation: Simulation, output: str, shard: Shard | None, as_json: bool) -> None:
+def describe(run: RunPlan, output: str, shard: Shard | None, as_json: bool) -> None:
     """Print what a run, or one shard of it, would compute, and an estimate of time and memory."""
-    estimate, resonant = _estimated(simulation, shard), resonances(simulation.lanes)
+    estimate, resonant = _estimated(run, shard), resonances(run.lanes)
     if as_json:
         facts = {
             "output": output,
             "exists": os.path.exists(output),
-            "states": len(simulation.lanes.states),
+            "states": len(run.lanes.states),
             "lanes": estimate.lanes,
             "steps": estimate.steps,
             "seconds": estimate.seconds,
@@ -64,23 +66,23 @@ def describe(simulation: Simulation, output: str, shard: Shard | None, as_json: 
             "file_bytes": estimate.file_bytes,
             "memory_bytes": estimate.memory_bytes,
             **resonant.facts,
-            "steps_per_period": simulation.plan.steps_per_period,
+            "steps_per_period": run.plan.steps_per_period,
         }
         print(json.dumps(facts, indent=1))
         return
     first = {"output": f"{output}{' (exists)' if os.path.exists(output) else ''}"}
-    for key, value in {**first, **resonant.texts, **_words(simulation, estimate)}.items():
+    for key, value in {**first, **resonant.texts, **_words(run, estimate)}.items():
         sys.stderr.write(f"{key + ':':12}{value}\n")
 
 
-def _estimated(simulation: Simulation, shard: Shard | None) -> Estimate:
+def _estimated(run: RunPlan, shard: Shard | None) -> Estimate:
     """Estimate what a run, or one shard of it, takes, from a sample of its lanes."""
-    plan, (every, record) = simulation.plan, lanes_and_record(simulation.variables)
+    plan, (every, record) = run.plan, lanes_and_record(variables_of(run))
     own = every if shard is None else sum(last - first for first, last in shard.blocks(every))
-    seconds = own * _seconds_per_lane(simulation)
+    seconds = own * _seconds_per_lane(run)
     file_bytes, kept = own * record.itemsize, [record[name] for name in record.names or ()]
-    memory = _memory(simulation) + sum(min(CACHE_BYTES, every * one.itemsize) for one in kept)
-    memory += min(PIECE_BYTES, file_bytes) if simulation.carried else 0
+    memory = _memory(run) + sum(min(CACHE_BYTES, every * one.itemsize) for one in kept)
+    memory += min(PIECE_BYTES, file_bytes) if run.carried else 0
     # An allowance: the memory of HDF5 and the allocator during writing is not known beforehand.
     memory += memory // 20
     steps = own * (plan.transient_periods + plan.recorded_periods) * plan.steps_per_period
@@ -88,9 +90,9 @@ def _estimated(simulation: Simulation, shard: Shard | None) -> Estimate:
     return Estimate(own, every, steps, seconds, threads, file_bytes, memory)
 
 
-def _words(simulation: Simulation, estimate: Estimate) -> dict[str, str]:
+def _words(run: RunPlan, estimate: Estimate) -> dict[str, str]:
     """Return the lines about effects, states, lanes and the estimate, each with its heading."""
-    config, lanes, seconds = simulation.config, simulation.lanes, estimate.seconds
+    config, lanes, seconds = run.config, run.lanes, estimate.seconds
     duration = f"{seconds:.1f} s" if seconds < 100 else str(timedelta(seconds=round(seconds)))
     spans = [
         f"{axis.values.size} values of {axis.name} from {axis.values[0]:g} to {axis.values[-1]:g}"
@@ -109,7 +111,7 @@ def _words(simulation: Simulation, estimate: Estimate) -> dict[str, str]:
         "effects": ", ".join(config.scene.effects) or "none",
         "states": f"{len(lanes.states)}{unused}",
         "lanes": f"{estimate.lanes}{of_all} ({', '.join(spans)})",
-        "steps": f"{estimate.steps:.3g} ({simulation.plan.steps_per_period} per period)",
+        "steps": f"{estimate.steps:.3g} ({run.plan.steps_per_period} per period)",
         "file": f"about {tqdm.format_sizeof(estimate.file_bytes, 'B')} before compression",
         "memory": f"about {tqdm.format_sizeof(estimate.memory_bytes, 'B')} at the peak of the "
         "process",
@@ -117,17 +119,17 @@ def _words(simulation: Simulation, estimate: Estimate) -> dict[str, str]:
     }
 
 
-def _seconds_per_lane(simulation: Simulation) -> float:
+def _seconds_per_lane(run: RunPlan) -> float:
     """Measure the time of a block of lanes from all over the sweep, and scale it to all periods.
 
     It is a whole block, because lanes that are checked or extended are computed in vectors too.
     """
-    sample, plan = copy(simulation), simulation.plan
-    block = simulation.block_lanes(numba.get_num_threads())
-    places = some_places(simulation, block // 8 if simulation.carried else block)
-    steps = _sampled_steps(simulation, places)
+    plan = run.plan
+    block = block_lanes(run, numba.get_num_threads())
+    places = some_places(run, block // 8 if run.carried else block)
+    steps = _sampled_steps(run, places)
     finer = plan.steps_per_period / steps
-    periods, whole = plan.transient_periods + plan.recorded_periods, simulation.lanes.repeats_after
+    periods, whole = plan.transient_periods + plan.recorded_periods, run.lanes.repeats_after
     with notice("computing some lanes to estimate the time"):
         # The first, short round loads the kernels. It takes one step more per period, so that the
         # second round has to make its own flow maps, whose time does not grow with the periods.
@@ -136,7 +138,7 @@ def _seconds_per_lane(simulation: Simulation) -> float:
                 whole * math.ceil(length * every / whole)
                 for every in (plan.transient_periods, plan.recorded_periods)
             )
-            sample.plan = plan._replace(
+            shorter = plan._replace(
                 steps_per_period=steps + more,
                 # The share of flow maps that are kept is that of the whole run.
                 map_bytes=int(plan.map_bytes / finer),
@@ -144,46 +146,47 @@ def _seconds_per_lane(simulation: Simulation) -> float:
                 recorded_periods=recorded,
                 section_points=min(plan.section_points, recorded),
             )
+            sample = replace(run, plan=shorter)
             began = time.perf_counter()
-            sample.integrate(places, sample.plan._replace(transient_periods=0, recorded_periods=0))
+            integrate(sample, places, shorter._replace(transient_periods=0, recorded_periods=0))
             made = time.perf_counter()
-            found = sample.integrate(places, sample.recording)
-            sample.arrays(sample.lanes.computed_at(places), *found)
+            found = integrate(sample, places, sample.recording)
+            arrays_of(sample, sample.lanes.computed_at(places), *found)
             scale = periods / (transient + recorded)
             seconds = (made - began + scale * (time.perf_counter() - made)) / places.size
     return finer * seconds
 
 
-def _sampled_steps(simulation: Simulation, places: Integers) -> int:
+def _sampled_steps(run: RunPlan, places: Integers) -> int:
     """Return the steps per period of a sample; the time is proportional to them.
 
     They are few, so that a sample takes seconds, but enough for RK4 to be stable and for no flow
     map to be divided.
     """
-    steps = simulation.plan.steps_per_period
+    steps = run.plan.steps_per_period
     if steps <= SAMPLE_STEPS:
         return steps
-    system = simulation.lanes.system_of(simulation.lanes.computed_at(places))
+    system = run.lanes.system_of(run.lanes.computed_at(places))
     needed = int(fewest_stable_steps(system).max()) + 2 * system.harmonics()
     return min(steps, max(SAMPLE_STEPS, needed))
 
 
-def some_places(simulation: Simulation, count: int) -> Integers:
+def some_places(run: RunPlan, count: int) -> Integers:
     """Return about ``count`` places in the order of computation, from all over the sweep.
 
     They are in runs of neighbours, which behave alike and so are fast in one vector. In a carried
     sweep, where a lane starts from another, all are from the middle.
     """
-    lanes = simulation.lanes
-    run = min(len(lanes), count if simulation.carried else LANES)
-    runs = -(-min(count, len(lanes)) // run)
-    first = np.linspace(0, len(lanes) // run - 1, runs + 2)[1:-1].round().astype(np.intp)
-    return np.add.outer(run * np.unique(first), np.arange(run)).ravel()
+    lanes = run.lanes
+    length = min(len(lanes), count if run.carried else LANES)
+    runs = -(-min(count, len(lanes)) // length)
+    first = np.linspace(0, len(lanes) // length - 1, runs + 2)[1:-1].round().astype(np.intp)
+    return np.add.outer(length * np.unique(first), np.arange(length)).ravel()
 
 
-def _memory(simulation: Simulation) -> int:
+def _memory(run: RunPlan) -> int:
     """Return about how many bytes the process takes at most: its peak so far, and one block."""
-    block = simulation.block_memory(numba.get_num_threads())
+    block = block_memory(run, numba.get_num_threads())
     with suppress(OSError):
         # On Linux, getrusage includes the peak of the parent process.
         status = Path("/proc/self/status").read_text("utf-8")

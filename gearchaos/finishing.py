@@ -6,12 +6,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from gearchaos.command_line import OK, TOO_MANY_DIVERGED
-from gearchaos.configuration.methods import METHODS
 from gearchaos.errors import FileError
 from gearchaos.progress import complain, say
 
 if TYPE_CHECKING:
-    from gearchaos.engine.simulation import Simulation
+    from gearchaos.engine.run_plan import RunPlan
 
 
 def output_of(output: str | None, config: str, suffix: str = ".h5") -> str:
@@ -30,26 +29,28 @@ def output_of(output: str | None, config: str, suffix: str = ".h5") -> str:
     return output
 
 
-def ending(simulation: "Simulation", output: str, diverged: int, *said: str) -> int:
+def ending(run: "RunPlan", output: str, diverged: int, *said: str) -> int:
     """Print the path of the result and these lines, and return the exit code.
 
     Too many diverged lanes give a warning and an exit code of their own.
     """
     print(output, flush=True)
     say(*said)
-    allowed = simulation.config.outputs.allowed_diverged_share
-    if diverged <= allowed * len(simulation.lanes):
+    from gearchaos.configuration.methods import METHODS
+
+    allowed = run.config.outputs.allowed_diverged_share
+    if diverged <= allowed * len(run.lanes):
         return OK
     complain(
-        f"{diverged} of {len(simulation.lanes)} lanes diverged"
-        f"{' or were too fast' if METHODS[simulation.plan.method].shares_maps else ''}, more than "
+        f"{diverged} of {len(run.lanes)} lanes diverged"
+        f"{' or were too fast' if METHODS[run.plan.method].shares_maps else ''}, more than "
         f"outputs.allowed_diverged_share = {allowed:g} allows; the file marks them: "
         "raise integration.steps_per_period, or check the load and the start state"
     )
     return TOO_MANY_DIVERGED
 
 
-def complete_already(simulation: "Simulation", output: str) -> int | None:
+def complete_already(run: "RunPlan", output: str) -> int | None:
     """Return the exit code of a sweep whose complete result exists, or None.
 
     Raises FileError if the result belongs to another configuration or version of gearchaos.
@@ -64,14 +65,14 @@ def complete_already(simulation: "Simulation", output: str) -> int | None:
         return None
     # Another program may have removed the software's version from the file.
     now = {key: fact for key, fact in SOFTWARE._asdict().items() if key in found.metadata}
-    now["configuration"] = simulation.config.resolved_toml()
+    now["configuration"] = run.config.resolved_toml()
     resolved = str(found.metadata.get("configuration_resolved", ""))
     earlier = {**found.metadata, "configuration": resolved}
     require_same(f"{output}: is the result", earlier, now, "replace it with --overwrite")
     if folder_of(output).is_dir():
         # A process that was killed during the removal has left its blocks.
-        with suppress(FileError), open_store(simulation, output, resume=True) as store:
+        with suppress(FileError), open_store(run, output, resume=True) as store:
             store.remove()
     diverged = int((found["status"] != 0).sum())
     text = f"complete already: {found['status'].size} lanes, {diverged} diverged"
-    return ending(simulation, output, diverged, text)
+    return ending(run, output, diverged, text)

@@ -48,9 +48,10 @@ def _merge(options: MergeOptions) -> int:
         return OK
     manifest = read_manifest(folder)
     from gearchaos.engine.error_check import Tally
+    from gearchaos.engine.kept import variables_of
     from gearchaos.engine.provenance import SOFTWARE
+    from gearchaos.engine.run_plan import plan_run
     from gearchaos.engine.running import metadata, prepare
-    from gearchaos.engine.simulation import Simulation
     from gearchaos.engine.store_filling import open_store
     from gearchaos.models import Configuration
 
@@ -58,23 +59,23 @@ def _merge(options: MergeOptions) -> int:
     require_same(f"{folder}: holds blocks", manifest, SOFTWARE._asdict())
     config = Configuration.from_toml(manifest["configuration"], f"{folder}: configuration")
     _require_some(config, folder)
-    simulation = Simulation(config)
-    code = None if options.overwrite else complete_already(simulation, output)
+    run = plan_run(config)
+    code = None if options.overwrite else complete_already(run, output)
     if code is not None:
         return code
     check_output(output, options.overwrite)
-    with open_store(simulation, output, resume=True) as store:
-        prepare(simulation, compile_now=False)
-        tally = Tally(simulation.lanes.repeats_after)
+    with open_store(run, output, resume=True) as store:
+        run = prepare(run, compile_now=False)
+        tally = Tally(run.lanes.repeats_after)
         found = store.finished(tally.add)
         _require_all(store, found, manifest.get("shards"))
-        facts = {**metadata(simulation, 0.0), "configuration": manifest["text"] or config.text}
+        facts = {**metadata(run, 0.0), "configuration": manifest["text"] or config.text}
         # Only the shards know their threads and how long they took.
         del facts["threads"], facts["wall_time_seconds"]
-        told = simulation.variables, simulation.lanes.parameters, facts
+        told = variables_of(run), run.lanes.parameters, facts
         store.merge(*told, overwrite=options.overwrite, found=found)
     text = f"{store.lanes} lanes, {tally.diverged} diverged"
-    return ending(simulation, output, tally.diverged, text, *tally.remarks)
+    return ending(run, output, tally.diverged, text, *tally.remarks)
 
 
 def _require_some(config: "Configuration", folder: Path) -> None:

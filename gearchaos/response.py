@@ -87,21 +87,20 @@ def _respond(options: ResponseOptions) -> int:
 
     choose_threads(options.threads)
     periods = DEFAULT_PERIODS if options.periods is None else options.periods
-    simulation = prepared(config, periods)
+    run = prepared(config, periods).with_notes(*note)
     output = output_of(options.output, options.config, "_response.h5")
     check_output(output, options.overwrite)
-    simulation.notes += note
-    prepare(simulation, history_periods=1)
-    result = compute_response(simulation, periods, text, fixed)
+    run = prepare(run, history_periods=1)
+    result = compute_response(run, periods, text, fixed)
     result.save(output, overwrite=options.overwrite)
-    diverged, lanes = int((result["status"] != 0).sum()), len(simulation.lanes)
-    fast = " or too fast" if METHODS[simulation.plan.method].shares_maps else ""
+    diverged, lanes = int((result["status"] != 0).sum()), len(run.lanes)
+    fast = " or too fast" if METHODS[run.plan.method].shares_maps else ""
     text = (
         f"{lanes} lane{'s' if lanes != 1 else ''} over {' by '.join(result.axes)}, "
-        f"{periods} mesh periods of {simulation.plan.steps_per_period} steps, "
+        f"{periods} mesh periods of {run.plan.steps_per_period} steps, "
         f"{diverged} diverged{fast}"
     )
-    return ending(simulation, output, diverged, text)
+    return ending(run, output, diverged, text)
 
 
 def _lane(options: ResponseOptions) -> "Asked":

@@ -79,10 +79,10 @@ class Listing(NamedTuple):
 
 
 def _stages(options: StagesOptions) -> None:
+    from gearchaos.outputs.names import DIRECTION, REPEATS, UNSWEPT
     from gearchaos.results.reading.overview import plain
     from gearchaos.results.reading.result import open_result
     from gearchaos.results.reading.stage_table import one_axis, require_labels
-    from gearchaos.outputs.names import DIRECTION, REPEATS, UNSWEPT
 
     whole = open_result(options.result)
     # Lanes are computed again for one pair and one start.
@@ -108,6 +108,7 @@ def _listing(
     ``part`` is the slice of the whole result, in all directions; ``kept`` are the axes beside the
     swept parameter.
     """
+    from gearchaos.outputs.names import DIRECTION, REPEATS
     from gearchaos.results.reading.jumps import apart, crises, jumps
     from gearchaos.results.reading.stage_table import (
         labelled_lanes,
@@ -115,7 +116,6 @@ def _listing(
         slice_facts,
         stage_table,
     )
-    from gearchaos.outputs.names import DIRECTION, REPEATS
 
     result, both = one_axis(part, kept), DIRECTION in part.axes
     stages = stage_table(labelled_lanes(result, name=options.result, repeats=True))
@@ -153,9 +153,9 @@ def _facts(listing: Listing) -> dict[str, Any]:
 
 def _text(listing: Listing) -> str:
     """Return the table of the stages, then remarks, then boundaries."""
-    from gearchaos.results.reading.overview import slice_lines
-    from gearchaos.results.reading.excitation import excitation_of
     from gearchaos.outputs.names import RECORD, REPEATS
+    from gearchaos.results.reading.excitation import excitation_of
+    from gearchaos.results.reading.overview import slice_lines
 
     result = listing.result
     head = [

@@ -26,7 +26,7 @@ from gearchaos.options import (
 from gearchaos.progress import say
 
 if TYPE_CHECKING:
-    from gearchaos.engine.simulation import Simulation
+    from gearchaos.engine.run_plan import RunPlan
     from gearchaos.engine.store_filling import Shard
     from gearchaos.models import Configuration
     from gearchaos.results.files.block_store import BlockStore
@@ -65,27 +65,26 @@ def _sweep(options: SweepOptions) -> int:
     from gearchaos.models import load_config
 
     config = load_config(options.config, options.settings)
+    from gearchaos.engine.run_plan import plan_run
     from gearchaos.engine.running import choose_threads, prepare
-    from gearchaos.engine.simulation import Simulation
     from gearchaos.engine.store_filling import Shard
 
     shard = None if options.shard is None else Shard.from_text(options.shard)
     _check_sharing(options, config)
     choose_threads(options.threads)
-    simulation = Simulation(config)
+    run = plan_run(config)
     output = output_of(options.output, options.config)
     if options.json and not options.dry_run:
         raise ConfigurationError("--json: needs --dry-run; the result of a sweep is an HDF5 file")
     if options.dry_run:
         from gearchaos.dry_run import describe
 
-        prepare(simulation)
-        describe(simulation, output, shard, options.json)
+        describe(prepare(run), output, shard, options.json)
         return OK
     code = None
     if options.resume and not options.overwrite:
-        code = complete_already(simulation, output)
-    return _compute(simulation, output, shard, options) if code is None else code
+        code = complete_already(run, output)
+    return _compute(run, output, shard, options) if code is None else code
 
 
 def _check_sharing(options: SweepOptions, config: "Configuration") -> None:
@@ -108,33 +107,32 @@ def _check_sharing(options: SweepOptions, config: "Configuration") -> None:
     needed("distributed", "dask")
 
 
-def _compute(
-    simulation: "Simulation", output: str, shard: "Shard | None", options: SweepOptions
-) -> int:
+def _compute(run: "RunPlan", output: str, shard: "Shard | None", options: SweepOptions) -> int:
     """Compute the sweep, or one shard of it, and return the exit code."""
+    from gearchaos.engine.kept import variables_of
     from gearchaos.engine.running import metadata, prepare
     from gearchaos.engine.store_filling import fill, open_store
     from gearchaos.results.files.atomic_file import check_output
 
     check_output(output, options.overwrite)
     began = time.monotonic()
-    with open_store(simulation, output, resume=options.resume, shard=shard) as store:
+    with open_store(run, output, resume=options.resume, shard=shard) as store:
         # Workers compile for themselves: they may run on another kind of machine.
-        prepare(simulation, compile_now=options.dask is None)
+        run = prepare(run, compile_now=options.dask is None)
         try:
-            tally, performed_by = fill(simulation, store, options.dask)
+            tally, performed_by = fill(run, store, options.dask)
             seconds = time.monotonic() - began
             if shard is None:
-                facts = {**metadata(simulation, seconds), **performed_by}
-                told = simulation.variables, simulation.lanes.parameters, facts
-                order = simulation.lanes.computed_at if simulation.carried else None
+                facts = {**metadata(run, seconds), **performed_by}
+                told = variables_of(run), run.lanes.parameters, facts
+                order = run.lanes.computed_at if run.carried else None
                 store.merge(*told, overwrite=options.overwrite, computed_at=order)
         except (KeyboardInterrupt, FileError, ExecutionError, OSError) as fault:
             _add_remedy(fault, store, output, options)
             raise
     said = [f"{store.own_lanes} lanes, {tally.diverged} diverged, {seconds:.1f} s", *tally.remarks]
     if shard is None:
-        return ending(simulation, output, tally.diverged, *said)
+        return ending(run, output, tally.diverged, *said)
     print(store.folder, flush=True)
     join = _command("merge", output)
     say(*said, f"this was shard {options.shard}; when all are computed, join them with: {join}")

@@ -28,10 +28,11 @@ from gearchaos.dynamics.orbits import Orbits, polish
 from gearchaos.dynamics.plans import plan_of
 from gearchaos.dynamics.stability import fewest_stable_steps
 from gearchaos.dynamics.stability_loss import STABILITY_LOSS_TEXTS, StabilityLoss
+from gearchaos.engine.choosing import with_chosen_steps
 from gearchaos.engine.lanes import Lanes, start_states
 from gearchaos.engine.recomputing import computable
 from gearchaos.engine.response import respond
-from gearchaos.engine.simulation import Simulation
+from gearchaos.engine.run_plan import plan_run
 from gearchaos.engine.steps import stable_steps
 from gearchaos.errors import ConfigurationError
 from gearchaos.models import Given, axis_values, configuration_of, swept_values
@@ -271,9 +272,7 @@ class System:
         if self.config.integration.steps_per_period is not None:
             return self._first_steps
         # As `run` of this configuration chooses them.
-        simulation = Simulation(self.config)
-        simulation.choose_steps()
-        return simulation.plan.steps_per_period
+        return with_chosen_steps(plan_run(self.config)).plan.steps_per_period
 
     @property
     def _plan(self) -> Plan:

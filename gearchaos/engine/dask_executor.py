@@ -16,8 +16,10 @@ import distributed
 import numba
 from dask.utils import parse_timedelta
 
+from gearchaos.arrays import Arrays
+from gearchaos.engine.computing import Bounds, EndStates, compute
 from gearchaos.engine.provenance import SOFTWARE
-from gearchaos.engine.simulation import Arrays, Bounds, Chosen, Simulation
+from gearchaos.engine.run_plan import Chosen, RunPlan, plan_run
 from gearchaos.errors import ConfigurationError, ExecutionError
 from gearchaos.interrupts import check
 from gearchaos.models import Configuration
@@ -39,29 +41,28 @@ _IGNORE_INTERRUPTS = "import signal; signal.signal(signal.SIGINT, signal.SIG_IGN
 class DaskExecutor(ExitStack):
     """Hands blocks to the workers of a cluster; blocks of a lost worker are run again.
 
-    The simulation is not carried and its number of steps has been chosen; the address is that of a
+    The run is not carried and its number of steps has been chosen; the address is that of a
     scheduler, such as ``tcp://node7:8786``, or ``local:N`` for N processes here. Raises
     ConfigurationError if N is no number of workers, ExecutionError if no scheduler answers.
     """
 
-    def __init__(self, simulation: Simulation, address: str) -> None:
+    def __init__(self, run: RunPlan, address: str) -> None:
         super().__init__()
         self._address = address
-        self._recipe = simulation.config.resolved_toml(), simulation.chosen
+        self._recipe = run.config.resolved_toml(), run.chosen
         for name in ("distributed", "distributed.client"):
             # What goes wrong comes as an exception.
             logging.getLogger(name).setLevel(logging.CRITICAL)
         with ExitStack() as stack:
             self._client: Any = stack.enter_context(_connected(stack, address))
-            workers = self.workers
+            workers = self.count_workers()
             self._require_software()
             self._executor = self._client.get_executor(pure=False)
             self.callback(stack.pop_all().close)
         say(f"{workers} dask worker{'s' if workers > 1 else ''} at {address}")
 
-    @property
-    def workers(self) -> int:
-        """How many workers there are; waits for one where none is left."""
+    def count_workers(self) -> int:
+        """Ask the cluster how many workers there are; wait for one where none is left."""
         client, hours = self._client, _HOURS_WITHOUT_WORKERS
         try:
             while not (workers := len(_answer(client.nthreads, _patience()))):
@@ -75,10 +76,9 @@ class DaskExecutor(ExitStack):
             raise self._worded(error) from None
         return workers
 
-    @property
-    def width(self) -> int:
-        """How many blocks to hand out at a time."""
-        return BLOCKS_PER_WORKER * self.workers
+    def count_blocks(self) -> int:
+        """Ask the cluster how many blocks to hand out at a time."""
+        return BLOCKS_PER_WORKER * self.count_workers()
 
     def submit(self, block: Bounds) -> Future[Arrays]:
         """Hand a block to the cluster and return the future of its arrays."""
@@ -131,17 +131,16 @@ def compute_block(
     with _ONE_AT_A_TIME:
         tasks, most = distributed.get_worker().state.nthreads, numba.config.NUMBA_NUM_THREADS
         numba.set_num_threads(min(tasks, most) if tasks > 1 else most)
-        return _simulation(configuration, chosen).compute(*block)
+        run = _run_plan(configuration, chosen)
+        return compute(run, block, EndStates(run).before(0))
 
 
 _ONE_AT_A_TIME = Lock()
 
 
 @lru_cache(maxsize=1)
-def _simulation(configuration: str, chosen: Chosen) -> Simulation:
-    simulation = Simulation(Configuration.from_toml(configuration, "<client>"))
-    simulation.plan = simulation.plan._replace(**chosen._asdict())
-    return simulation
+def _run_plan(configuration: str, chosen: Chosen) -> RunPlan:
+    return plan_run(Configuration.from_toml(configuration, "<client>")).with_choice(chosen)
 
 
 def _patience() -> float:

@@ -1,8 +1,9 @@
 """Where blocks of lanes are computed: ``submit(block)`` gives a future, and one loop waits for it.
 
 A `BlockExecutor` is used as those of `concurrent.futures` are: leaving its context ends what it has
-started. Its ``width`` is how many blocks to hand out at a time, so that nobody waits for the next
-one. The loop neither knows nor cares whether a block is computed in this process or on a cluster.
+started. Its ``count_blocks`` returns how many blocks to hand out at a time, so that nobody waits
+for the next one. The loop does not know whether a block is computed in this process or on a
+cluster.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -12,8 +13,10 @@ from typing import TYPE_CHECKING, TypeAlias
 
 import numba
 
+from gearchaos.arrays import Arrays
+from gearchaos.engine.computing import Bounds, EndStates, compute
 from gearchaos.engine.error_check import Tally
-from gearchaos.engine.simulation import Arrays, Bounds, Simulation
+from gearchaos.engine.run_plan import RunPlan
 from gearchaos.errors import GearchaosError
 from gearchaos.interrupts import check
 from gearchaos.progress import progress
@@ -30,15 +33,14 @@ SECONDS_BETWEEN_LOOKS = 1.0
 class LocalExecutor(ExitStack):
     """Computes in this process, one block at a time: all threads work within a block.
 
-    The thread of its own leaves the main one free to write what is finished, and an interrupt,
-    which the main thread receives, does not cost the block that is running.
+    ``ends``: end states of the lanes of a carried sweep that are computed already; those of the
+    other lanes are kept there. A thread of its own leaves the main one free to write finished
+    blocks, and an interrupt, which the main thread receives, does not cost the running block.
     """
 
-    width = 2
-
-    def __init__(self, simulation: Simulation) -> None:
+    def __init__(self, run: RunPlan, ends: EndStates | None = None) -> None:
         super().__init__()
-        self._simulation = simulation
+        self._run, self._ends = run, ends or EndStates(run)
         threads = (numba.get_num_threads(),)
         self._pool = ThreadPoolExecutor(1, initializer=numba.set_num_threads, initargs=threads)
         self.callback(self._pool.shutdown, cancel_futures=True)
@@ -48,7 +50,16 @@ class LocalExecutor(ExitStack):
 
         Its `cancel` succeeds until the block runs.
         """
-        return self._pool.submit(self._simulation.compute, *block)
+        return self._pool.submit(self._compute, block)
+
+    def count_blocks(self) -> int:
+        """Return how many blocks to hand out at a time: one that runs, and one that waits."""
+        return 2
+
+    def _compute(self, block: Bounds) -> Arrays:
+        arrays = compute(self._run, block, self._ends.before(block[0]))
+        self._ends.keep(block[0], arrays["end_state"])
+        return arrays
 
 
 def compute_blocks(
@@ -77,7 +88,7 @@ def compute_blocks(
 
         try:
             while waiting or futures:
-                while waiting and len(futures) < executor.width:
+                while waiting and len(futures) < executor.count_blocks():
                     block = waiting.pop()
                     futures[executor.submit(block)] = block
                 for future in _ended(executor, futures):
@@ -100,5 +111,5 @@ def _ended(
 ) -> set[Future[Arrays]]:
     """Wait until some blocks have ended, as long as the executor has somebody to compute them."""
     while not (ended := wait(futures, SECONDS_BETWEEN_LOOKS, FIRST_COMPLETED).done):
-        _ = executor.width
+        executor.count_blocks()
     return ended

@@ -14,8 +14,9 @@ from gearchaos.dynamics.following import Followed, follow
 from gearchaos.dynamics.labelling import LOOKS, labels_of
 from gearchaos.dynamics.plans import plan_of
 from gearchaos.dynamics.stability_loss import STABILITY_LOSS_TEXTS, StabilityLoss
+from gearchaos.engine.computing import block_lanes
 from gearchaos.engine.lanes import start_states
-from gearchaos.engine.simulation import Simulation
+from gearchaos.engine.run_plan import RunPlan, plan_run
 from gearchaos.interrupts import check
 from gearchaos.models import Configuration, swept_values
 from gearchaos.models.registry import system_of
@@ -63,7 +64,7 @@ def refined_boundaries(
     """
     if len(stages) < 2:
         return []
-    simulation, every = Simulation(config), _edges_of(result)
+    run, every = plan_run(config), _edges_of(result)
     below = every[[stage.last for stage in stages[:-1]]]
     above = every[[stage.first for stage in stages[1:]]]
     spacing = above["value"] - below["value"]
@@ -73,7 +74,7 @@ def refined_boundaries(
         wide = np.flatnonzero(wide & (above["value"] - below["value"] > width))
         if not wide.size:
             break
-        tried = _computed(simulation, {config.sweep.parameter: middle[wide]})
+        tried = _computed(run, {config.sweep.parameter: middle[wide]})
         same = tried["label"] == below["label"][wide]
         below[wide[same]], above[wide[~same]] = tried[same], tried[~same]
     losses = _losses(config, below, above, spacing)
@@ -94,7 +95,7 @@ def refined_map(
     second parameter that has any, and the number of lanes that this takes. ``config`` is from
     `refinable`, the axes of the result are its two sweeps.
     """
-    simulation = Simulation(config)
+    run = plan_run(config)
     first, second = (sweep.parameter for sweep in config.sweeps.values())
     values, rows = result[result.axis].tolist(), result[result.axes[0]]
     labels = _edges_of(result)["label"].reshape(rows.size, -1).tolist()
@@ -118,7 +119,7 @@ def refined_map(
         if not halved:
             break
         places = {first: np.array([*halved.values()]), second: rows[[row for row, _ in halved]]}
-        tried = _computed(simulation, places)[["value", "label"]].tolist()
+        tried = _computed(run, places)[["value", "label"]].tolist()
         computed += len(tried)
         last, stretches = stretches, {}
         for (row, n), half in zip(halved, tried, strict=True):
@@ -183,15 +184,15 @@ def _edges(
     return edges
 
 
-def _computed(simulation: Simulation, values: Mapping[str, Floats]) -> Array:
+def _computed(run: RunPlan, values: Mapping[str, Floats]) -> Array:
     """Compute lanes at values of the swept parameters, the first one first, as the sweep would."""
-    config, plan = simulation.config, simulation.recording
+    config, plan = run.config, run.recording
     (axis, *_), found = values.values(), []
-    size = simulation.block_lanes(numba.get_num_threads())
+    size = block_lanes(run, numba.get_num_threads())
     for first in range(0, axis.size, size):
         check()
         some = {name: value[first : first + size] for name, value in values.items()}
-        system = system_of(config, some, simulation.lanes.effects)
+        system = system_of(config, some, run.lanes.effects)
         start = start_states(config, system, np.zeros(system.lanes, dtype=np.intp))
         labels, state = labels_of(system, integrate(system, start, plan), plan)
         found.append((labels.motion, labels.period, state))

@@ -7,8 +7,11 @@ from gearchaos_kernels import LaneSystem, Outcome, Plan, Status
 
 from gearchaos.arguments import whole_number
 from gearchaos.arrays import Array
+from gearchaos.engine.choosing import with_chosen_steps
+from gearchaos.engine.computing import integrate
+from gearchaos.engine.kept import arrays_of
+from gearchaos.engine.run_plan import RunPlan, plan_run
 from gearchaos.engine.running import choose_threads, metadata, require_memory, result_of
-from gearchaos.engine.simulation import Simulation
 from gearchaos.errors import ConfigurationError
 from gearchaos.models import Configuration, Given, configuration_of
 from gearchaos.models.protocol import Model
@@ -29,13 +32,12 @@ def respond(config: Given, periods: int = DEFAULT_PERIODS, threads: int | None =
     """
     choose_threads(threads)
     config, periods = configuration_of(config), whole_number("periods", periods)
-    simulation = prepared(config, periods)
-    simulation.choose_steps()
-    return compute_response(simulation, periods, config.text)
+    run = with_chosen_steps(prepared(config, periods))
+    return compute_response(run, periods, config.text)
 
 
-def prepared(config: Configuration, periods: int) -> Simulation:
-    """Return the simulation of a response, of which the step may still be chosen.
+def prepared(config: Configuration, periods: int) -> RunPlan:
+    """Return the run of a response, of which the steps may still be chosen.
 
     Raises ConfigurationError if fewer periods are recorded.
     """
@@ -47,42 +49,42 @@ def prepared(config: Configuration, periods: int) -> Simulation:
         )
     # A scene whose axial pair acts on nothing that a sweep keeps is computed as a whole here.
     whole = config.replace("outputs.section", config.scene.states)
-    return Simulation(whole.replace("outputs.section_points", recorded))
+    return plan_run(whole.replace("outputs.section_points", recorded))
 
 
-def compute_response(simulation: Simulation, periods: int, text: str, fixed: str = "") -> Result:
-    """Compute all lanes of a simulation from `prepared`; keep the last so many mesh periods.
+def compute_response(run: RunPlan, periods: int, text: str, fixed: str = "") -> Result:
+    """Compute all lanes of a run from `prepared`; keep the last so many mesh periods.
 
     ``text``: the configuration as it was written; ``fixed``: as in the metadata of the lane that
     goes on. Raises ConfigurationError if the motion does not fit into memory.
     """
-    plan, states, lanes = simulation.recording, len(simulation.lanes.states), len(simulation.lanes)
+    plan, states, lanes = run.recording, len(run.lanes.states), len(run.lanes)
     plan = plan._replace(history_periods=periods)
     size = 8 * lanes * states * (3 * periods * plan.steps_per_period + plan.section_points)
     what = f"the response of {lanes} lanes over {periods} mesh periods of {plan.steps_per_period} "
-    require_memory(simulation, size, f"{what}steps", "ask for fewer periods or values")
+    require_memory(run, size, f"{what}steps", "ask for fewer periods or values")
     began = time.monotonic()
-    places = simulation.lanes.computed_at(np.arange(lanes))
-    start, outcome = simulation.integrate(np.arange(lanes), plan)
-    system = simulation.lanes.system_of(places)
+    places = run.lanes.computed_at(np.arange(lanes))
+    start, outcome = integrate(run, np.arange(lanes), plan)
+    system = run.lanes.system_of(places)
     arrays = {
-        **simulation.arrays(places, start, outcome),
+        **arrays_of(run, places, start, outcome),
         MESH_PERIOD: system.mesh_period,
-        **_motion(simulation.lanes.model, system, outcome, plan),
+        **_motion(run.lanes.model, system, outcome, plan),
     }
-    model = simulation.lanes.model
+    model = run.lanes.model
     instants = np.arange(periods * plan.steps_per_period + 1) / plan.steps_per_period
     variables = model.catalogue.motion(
-        simulation.lanes.axes, instants, system.states, model.elements(simulation.lanes.effects)
+        run.lanes.axes, instants, system.states, model.elements(run.lanes.effects)
     )
     facts = {
-        **metadata(simulation, time.monotonic() - began),
+        **metadata(run, time.monotonic() - began),
         "kind": "response",
         "response_periods": periods,
         "configuration": text,
         "fixed": fixed,
     }
-    return result_of(simulation, [arrays], facts, variables)
+    return result_of(run, [arrays], facts, variables)
 
 
 def _motion(model: Model, system: LaneSystem, outcome: Outcome, plan: Plan) -> dict[str, Array]:

@@ -13,11 +13,15 @@ import numpy as np
 from gearchaos_kernels.compilation import on_compilation
 
 from gearchaos.arguments import whole_number
+from gearchaos.arrays import Arrays
 from gearchaos.configuration.methods import METHODS
+from gearchaos.engine.choosing import with_chosen_steps
+from gearchaos.engine.computing import Bounds, block_lanes, block_memory, blocks, rehearse
 from gearchaos.engine.error_check import Tally
 from gearchaos.engine.executors import LocalExecutor, compute_blocks
+from gearchaos.engine.kept import variables_of
 from gearchaos.engine.provenance import provenance
-from gearchaos.engine.simulation import Arrays, Bounds, Simulation
+from gearchaos.engine.run_plan import RunPlan, plan_run
 from gearchaos.errors import ConfigurationError
 from gearchaos.interrupts import check
 from gearchaos.models import Given, configuration_of
@@ -46,21 +50,20 @@ def run(config: Given, threads: int | None = None, progress: bool = False) -> Re
     """
     choose_threads(threads)
     with speaking(quiet=not progress):
-        simulation = Simulation(configuration_of(config))
-        prepare(simulation)
+        run = prepare(plan_run(configuration_of(config)))
         began = time.monotonic()
-        blocks: dict[Bounds, Arrays] = {}
-        every = simulation.blocks(simulation.block_lanes(numba.get_num_threads()))
-        with LocalExecutor(simulation) as executor:
-            tally = Tally(simulation.lanes.repeats_after)
-            compute_blocks(executor, every, blocks.__setitem__, tally)
+        found: dict[Bounds, Arrays] = {}
+        every = blocks(run, block_lanes(run, numba.get_num_threads()))
+        with LocalExecutor(run) as executor:
+            tally = Tally(run.lanes.repeats_after)
+            compute_blocks(executor, every, found.__setitem__, tally)
         say(*tally.remarks)
-        in_order = [blocks[block] for block in sorted(blocks)]
-        return result_of(simulation, in_order, metadata(simulation, time.monotonic() - began))
+        in_order = [found[block] for block in sorted(found)]
+        return result_of(run, in_order, metadata(run, time.monotonic() - began))
 
 
 def result_of(
-    simulation: Simulation,
+    run: RunPlan,
     blocks: Sequence[Arrays],
     facts: Mapping[str, Any],
     more: Sequence[Variable] = (),
@@ -70,45 +73,46 @@ def result_of(
     ``more``: what the blocks hold beside the variables of the sweep. Raises ValueError if they hold
     anything else.
     """
-    lanes = simulation.lanes
-    order = np.argsort(lanes.computed_at(np.arange(len(lanes)))) if simulation.carried else ...
+    lanes = run.lanes
+    order = np.argsort(lanes.computed_at(np.arange(len(lanes)))) if run.carried else ...
     data = {name: np.concatenate([arrays[name] for arrays in blocks])[order] for name in blocks[0]}
     axes = [axis.name for axis in lanes.axes]
-    variables = [*simulation.variables, *more]
+    variables = [*variables_of(run), *more]
     require_listed(data, [variable.name for variable in variables])
     return Result(axes, variables, data, lanes.parameters, facts)
 
 
-def prepare(simulation: Simulation, *, compile_now: bool = True, history_periods: int = 0) -> None:
-    """Compile the kernel, choose the steps where a tolerance is wanted, and say what was found.
+def prepare(run: RunPlan, *, compile_now: bool = True, history_periods: int = 0) -> RunPlan:
+    """Compile the kernel, choose transient and steps, say the notes, and return the chosen run.
 
     Raises ConfigurationError if a block of lanes, where they are computed here, does not fit into
     memory.
     """
     check()  # Imports take a while.
     if compile_now:
-        plan, wanted = simulation.plan, simulation.block_memory(numba.get_num_threads())
+        plan, wanted = run.plan, block_memory(run, numba.get_num_threads())
         what = f"integration.recorded_periods = {plan.recorded_periods}, outputs.section_points = "
         what += f"{plan.section_points}: a block of lanes"
         fewer = ", take fewer steps" if METHODS[plan.method].shares_maps else ""
         remedy = f"record fewer periods, keep fewer points{fewer}"
-        require_memory(simulation, wanted, what, remedy)
+        require_memory(run, wanted, what, remedy)
         with compiling():
-            simulation.rehearse(history_periods)
+            rehearse(run, history_periods)
         check()
     with compiling():
-        simulation.choose_steps()
-    say(*simulation.notes)
+        run = with_chosen_steps(run)
+    say(*run.notes)
+    return run
 
 
-def require_memory(simulation: Simulation, wanted: int, what: str, remedy: str) -> None:
+def require_memory(run: RunPlan, wanted: int, what: str, remedy: str) -> None:
     """Raise a ConfigurationError if what is computed takes more bytes than this machine has."""
     # Windows does not tell.
     known = hasattr(os, "sysconf")
     memory = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE") if known else math.inf
     if wanted > memory:
         raise ConfigurationError(
-            f"{simulation.config.source}: {what} takes {wanted:.3g} bytes, more than the "
+            f"{run.config.source}: {what} takes {wanted:.3g} bytes, more than the "
             f"{memory:.3g} of this machine; {remedy}"
         )
 
@@ -125,21 +129,21 @@ def choose_threads(threads: int | None) -> None:
     numba.set_num_threads(most if threads is None else threads)
 
 
-def metadata(simulation: Simulation, seconds: float) -> Mapping[str, Any]:
+def metadata(run: RunPlan, seconds: float) -> Mapping[str, Any]:
     """Return what a result says of itself beside its arrays, after so many seconds of wall time."""
-    config, repeats = simulation.config, simulation.lanes.repeats_after
+    config, repeats = run.config, run.lanes.repeats_after
     return {
         "title": config.title,
         "effects": " ".join(config.scene.effects),
         "start": config.start.kind,
         "carry": config.start.carry,
         **config.integration.tables(),
-        "steps_per_period": simulation.plan.steps_per_period,
-        "transient_periods": simulation.plan.transient_periods,
-        "recorded_periods": simulation.plan.recorded_periods,
+        "steps_per_period": run.plan.steps_per_period,
+        "transient_periods": run.plan.transient_periods,
+        "recorded_periods": run.plan.recorded_periods,
         "excitation_period": repeats,
-        **simulation.lanes.model.facts(config, repeats),
-        "notes": "\n".join(simulation.notes),
+        **run.lanes.model.facts(config, repeats),
+        "notes": "\n".join(run.notes),
         **provenance(seconds),
         "configuration": config.text,
         "configuration_resolved": config.resolved_toml(),

@@ -6,10 +6,12 @@ from typing import NamedTuple, Self
 import numba
 from gearchaos_kernels import LANES
 
+from gearchaos.engine.computing import Bounds, EndStates, block_lanes
 from gearchaos.engine.error_check import Tally
 from gearchaos.engine.executors import BlockExecutor, LocalExecutor, compute_blocks
+from gearchaos.engine.kept import variables_of
 from gearchaos.engine.provenance import SOFTWARE
-from gearchaos.engine.simulation import Bounds, Simulation
+from gearchaos.engine.run_plan import RunPlan
 from gearchaos.errors import ConfigurationError
 from gearchaos.progress import complain
 from gearchaos.results.files.block_store import BlockStore
@@ -57,47 +59,46 @@ def shared_block_lanes(lanes: int, shards: int) -> int:
 
 
 def open_store(
-    simulation: Simulation, output: str, *, resume: bool, shard: Shard | None = None
+    run: RunPlan, output: str, *, resume: bool, shard: Shard | None = None
 ) -> BlockStore:
     """Open the store of a sweep, see `BlockStore`; it needs not be compiled for that."""
     return BlockStore(
         output,
-        simulation.variables,
-        simulation.config.resolved_toml(),
+        variables_of(run),
+        run.config.resolved_toml(),
         SOFTWARE,
-        text=simulation.config.text,
+        text=run.config.text,
         resume=resume,
-        blocks=shard and shard.blocks(len(simulation.lanes)),
+        blocks=shard and shard.blocks(len(run.lanes)),
         shards=shard and shard.of,
     )
 
 
-def fill(
-    simulation: Simulation, store: BlockStore, cluster: str | None
-) -> tuple[Tally, dict[str, int]]:
+def fill(run: RunPlan, store: BlockStore, cluster: str | None) -> tuple[Tally, dict[str, int]]:
     """Compute the blocks that are missing, and keep each of them as soon as it is there.
 
-    The simulation is compiled and its number of steps chosen; ``cluster`` says where dask workers
+    The kernel is compiled and its number of steps chosen; ``cluster`` says where dask workers
     are, see `DaskExecutor`, and None computes in this process. Returns the tally of all own blocks,
     the finished ones too, and what the result file says about who has computed.
     """
-    tally = Tally(simulation.lanes.repeats_after)
+    tally = Tally(run.lanes.repeats_after)
     finished, problems = store.finished(tally.add)
     for problem in problems:
         complain(f"{problem}; it is computed again")
     done = sum(last - first for first, last in finished)
     performed_by = {}
     if cluster is None:
-        size = simulation.block_lanes(numba.get_num_threads())
-        for block in finished if simulation.carried else ():
-            simulation.ended[slice(*block)] = store.read(*block)["end_state"]
-        executor: BlockExecutor = LocalExecutor(simulation)
+        size, ends = block_lanes(run, numba.get_num_threads()), EndStates(run)
+        for block in finished if run.carried else ():
+            ends.keep(block[0], store.read(*block)["end_state"])
+        executor: BlockExecutor = LocalExecutor(run, ends)
     else:
         from gearchaos.engine.dask_executor import DaskExecutor
 
-        executor = DaskExecutor(simulation, cluster)
-        size = shared_block_lanes(len(simulation.lanes), executor.workers)
-        performed_by = {"threads": 1, "workers": executor.workers}
+        executor = DaskExecutor(run, cluster)
+        workers = executor.count_workers()
+        size = shared_block_lanes(len(run.lanes), workers)
+        performed_by = {"threads": 1, "workers": workers}
     missing = store.missing(finished, size)
     with executor:
         compute_blocks(executor, missing, lambda at, arrays: store.write(*at, arrays), tally, done)

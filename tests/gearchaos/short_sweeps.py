@@ -5,8 +5,10 @@ from pathlib import Path
 import numpy as np
 from gearchaos_kernels import integrate
 
+from gearchaos.engine.computing import EndStates
+from gearchaos.engine.computing import blocks as blocks_of
 from gearchaos.engine.executors import LocalExecutor, compute_blocks
-from gearchaos.engine.simulation import Simulation
+from gearchaos.engine.run_plan import RunPlan, plan_run
 from gearchaos.models import load_config
 
 PAN2021 = Path(__file__).resolve().parents[2] / "sweeps" / "pan2021_first.toml"
@@ -38,34 +40,34 @@ METHODS = ("rk4", "flow_map")
 RANDOM = ("start.kind=random", "start.seed=5", "start.count=3", "start.spread=0.7")
 
 
-def simulation(*overrides: str) -> Simulation:
-    return Simulation(load_config(PAN2021, (*SHORT, *overrides)))
+def simulation(*overrides: str) -> RunPlan:
+    return plan_run(load_config(PAN2021, (*SHORT, *overrides)))
 
 
-def unlabelled(*overrides: str) -> Simulation:
+def unlabelled(*overrides: str) -> RunPlan:
     """Return a short sweep whose motions are not told, for which lanes are followed on and on."""
     return simulation("outputs.motion=false", *overrides)
 
 
-def blocks(sweep: Simulation, values: int) -> list[tuple[int, int]]:
+def blocks(sweep: RunPlan, values: int) -> list[tuple[int, int]]:
     """Return the bounds of blocks of as many lanes as so many swept values have."""
-    return sweep.blocks(values * sweep.lanes.repeats)
+    return blocks_of(sweep, values * sweep.lanes.repeats)
 
 
-def computed(sweep: Simulation, values: int = 13) -> dict[str, np.ndarray]:
+def computed(sweep: RunPlan, values: int = 13) -> dict[str, np.ndarray]:
     """Compute a whole sweep in blocks and join their arrays in the order of the lanes."""
     return joined(sweep, computed_blocks(sweep, blocks(sweep, values)))
 
 
-def computed_blocks(sweep: Simulation, bounds: list) -> dict:
-    """Compute some blocks."""
+def computed_blocks(sweep: RunPlan, bounds: list, ends: EndStates | None = None) -> dict:
+    """Compute some blocks, a carried sweep from these end states on."""
     kept: dict = {}
-    with LocalExecutor(sweep) as executor:
+    with LocalExecutor(sweep, ends) as executor:
         compute_blocks(executor, bounds, kept.__setitem__)
     return kept
 
 
-def joined(sweep: Simulation, found: dict) -> dict[str, np.ndarray]:
+def joined(sweep: RunPlan, found: dict) -> dict[str, np.ndarray]:
     """Join the blocks of a whole sweep in the order of its lanes."""
     blocks = [found[bounds] for bounds in sorted(found)]
     order = np.argsort(sweep.lanes.computed_at(np.arange(len(sweep.lanes))))
@@ -78,22 +80,22 @@ def assert_same(one: dict[str, np.ndarray], other: dict[str, np.ndarray]) -> Non
         assert np.array_equal(array, other[name], equal_nan=True), name
 
 
-def starts_of(sweep: Simulation, first: int = 0, last: int | None = None) -> np.ndarray:
+def starts_of(sweep: RunPlan, first: int = 0, last: int | None = None) -> np.ndarray:
     return sweep.lanes.start_of(np.arange(first, len(sweep.lanes) if last is None else last))
 
 
-def kernel(sweep: Simulation, lane: int, start: np.ndarray) -> np.ndarray:
+def kernel(sweep: RunPlan, lane: int, start: np.ndarray) -> np.ndarray:
     """Integrate one lane of the sweep by hand and return its end state."""
     system = sweep.lanes.system_of(np.array([lane]))
     return integrate(system, start[np.newaxis], sweep.plan).end_state[0]
 
 
-def values_of(sweep: Simulation) -> np.ndarray:
+def values_of(sweep: RunPlan) -> np.ndarray:
     """Return the value of the swept parameter in every lane."""
     return sweep.lanes.values_of(np.arange(len(sweep.lanes)))[sweep.config.sweep.parameter]
 
 
-def listing(folder: Path, parameter: str, values: list[float], *overrides: str) -> Simulation:
+def listing(folder: Path, parameter: str, values: list[float], *overrides: str) -> RunPlan:
     """Sweep listed values of another parameter of the same pair."""
     head, tail = PAN2021.read_text().split("[sweep]")
     rest = tail[tail.index("[integration]") :]
@@ -101,4 +103,4 @@ def listing(folder: Path, parameter: str, values: list[float], *overrides: str) 
     file = folder / "listing.toml"
     file.write_text(head + sweep + rest)
     without_count = [override for override in SHORT if not override.startswith("sweep.")]
-    return Simulation(load_config(file, (*without_count, *overrides)))
+    return plan_run(load_config(file, (*without_count, *overrides)))

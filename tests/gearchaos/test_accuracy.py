@@ -7,7 +7,7 @@ import pytest
 
 import gearchaos
 from gearchaos.accuracy import FLOW_MAP_STEPS, TRUTH_STEPS, measure, recommendation
-from gearchaos.engine.simulation import Simulation
+from gearchaos.engine.run_plan import plan_run
 from gearchaos.engine.steps import Candidate, pilot
 
 from ..kernels.reference import SOLUTIONS
@@ -61,7 +61,7 @@ def test_senseless_steps_are_refused(tmp_path, steps):
 
 def test_resolved_errors_fall_with_order_four_and_lie_below_plain_ones():
     overrides = ["integration.transient_periods=150", "sweep.to=10.0", *AXIAL]
-    simulation = Simulation(gearchaos.load_config(PAN2021, overrides))
+    simulation = plan_run(gearchaos.load_config(PAN2021, overrides))
     found = {(s.mode, s.steps): s for s in measure(simulation, [100, 200, 400], 6)}
     errors = [found["resolved", steps].section_error for steps in (100, 200, 400)]
     order = -np.polyfit(np.log([100, 200, 400]), np.log(errors), 1)[0]
@@ -109,7 +109,7 @@ def test_the_truth_is_that_of_the_stored_orbits():
         if orbit["scene"] == "no_axial" and orbit["pitch_error"] in (5.86, 10.75)
     }
     values = f"sweep={{parameter='pitch_error', values={[*stored]}}}"
-    sweep = Simulation(gearchaos.load_config(PAN2021, [values]))
+    sweep = plan_run(gearchaos.load_config(PAN2021, [values]))
     _, motion = pilot(sweep.lanes, sweep.plan, 2, TRUTH_STEPS)
     truth = motion(TRUTH_STEPS, True, "flow_map")
     for lane, orbit in enumerate(stored.values()):

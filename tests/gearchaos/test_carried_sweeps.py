@@ -4,6 +4,9 @@ import numpy as np
 import pytest
 from gearchaos_kernels import Status
 
+from gearchaos.engine.computing import EndStates
+from gearchaos.engine.computing import blocks as blocks_of
+
 from .short_sweeps import (
     METHODS,
     RANDOM,
@@ -45,7 +48,7 @@ def test_carried_sweep_does_not_depend_on_the_size_of_its_blocks(direction, over
     for values in (1, 4):
         assert_same(computed(sweep, values), whole)
     # Blocks may end between lanes that are side by side.
-    odd = computed_blocks(sweep, sweep.blocks(sweep.lanes.side_by_side + 1))
+    odd = computed_blocks(sweep, blocks_of(sweep, sweep.lanes.side_by_side + 1))
     assert_same(joined(sweep, odd), whole)
 
 
@@ -62,12 +65,13 @@ def test_both_directions_at_once_are_the_two_sweeps_bit_for_bit(overrides):
 @pytest.mark.parametrize("direction", ["upwards", "both"])
 def test_carried_sweep_goes_on_from_a_finished_block(direction):
     sweep = unlabelled(f"start.carry={direction}", *RANDOM)
-    bounds = sweep.blocks(8)
+    bounds = blocks_of(sweep, 8)
     everything = computed_blocks(sweep, bounds)
     resumed = unlabelled(f"start.carry={direction}", *RANDOM)
+    ends = EndStates(resumed)
     for block in bounds[:2]:
-        resumed.ended[slice(*block)] = everything[block]["end_state"]
-    rest = computed_blocks(resumed, bounds[2:])
+        ends.keep(block[0], everything[block]["end_state"])
+    rest = computed_blocks(resumed, bounds[2:], ends)
     for block, arrays in rest.items():
         assert_same(arrays, everything[block])
 

@@ -9,8 +9,10 @@ from gearchaos.dynamics.modes import hidden_decay, memory
 from gearchaos.dynamics.orbits import polish
 from gearchaos.dynamics.remainders import remainders
 from gearchaos.dynamics.stability import fewest_stable_steps
-from gearchaos.engine.dask_executor import _simulation
+from gearchaos.engine.choosing import with_chosen_steps
+from gearchaos.engine.dask_executor import _run_plan
 from gearchaos.engine.error_check import CHANGED, NOT_CHECKED, SAME, Tally
+from gearchaos.engine.run_plan import Chosen
 from gearchaos.engine.steps import solution_of
 from gearchaos.errors import ConfigurationError
 from gearchaos.records.difference import difference
@@ -108,7 +110,7 @@ def test_a_lane_labelled_by_a_longer_record_is_claimed_to_be_off_by_what_its_own
 
 def test_a_tolerance_is_kept_behind_a_longer_transient():
     sweep = simulation(*SLOW, "integration.tolerance=1e-8")
-    sweep.choose_steps()
+    sweep = with_chosen_steps(sweep)
     note = next(text for text in sweep.notes if "transient" in text)
     raised = sweep.plan.transient_periods
     assert note.startswith(f"integration.transient_periods raised from 200 to {raised} for ")
@@ -122,15 +124,15 @@ def test_a_tolerance_is_kept_behind_a_longer_transient():
 
 def test_workers_of_a_cluster_take_the_transient_that_was_chosen():
     sweep = simulation(*SLOW, "integration.tolerance=1e-8")
-    sweep.plan = sweep.plan._replace(transient_periods=777, steps_per_period=123)
-    _simulation.cache_clear()
-    assert _simulation(sweep.config.resolved_toml(), sweep.chosen).plan == sweep.plan
+    sweep = sweep.with_choice(Chosen(steps_per_period=123, transient_periods=777))
+    _run_plan.cache_clear()
+    assert _run_plan(sweep.config.resolved_toml(), sweep.chosen).plan == sweep.plan
 
 
 def test_a_tolerance_raises_the_transient_however_few_points_are_kept():
     kept = "outputs.motion=false", "outputs.section_points=1"
     sweep = simulation(*SLOW, *kept, "integration.tolerance=1e-8")
-    sweep.choose_steps()
+    sweep = with_chosen_steps(sweep)
     assert sweep.plan.transient_periods > 300
 
 
@@ -139,7 +141,7 @@ def test_a_tolerance_is_kept_where_both_grids_damp_the_mode_that_decides():
     stiff = *STIFF, low, "groups.transverse_damping_p=0.002", "integration.tolerance=1e-3"
     limit = fewest_stable_steps(simulation(*stiff, *MAPS).lanes.system_of(np.arange(2))).max()
     sweep = simulation(*stiff, f"integration.steps_per_period={limit}")
-    sweep.choose_steps()
+    sweep = with_chosen_steps(sweep)
     found = computed(sweep)["lyapunov_exponent"]
     exact = computed(simulation(*stiff, *MAPS))["lyapunov_exponent"]
     assert (np.abs(found - exact) < 1e-3).all()
@@ -150,19 +152,19 @@ def test_a_tolerance_that_no_transient_within_reach_keeps_is_refused_with_the_re
     sweep = simulation(*SLOW, *short, "integration.tolerance=1e-10", "sweep.values=[0.5]")
     told = r"tolerance = 1e-10: after .* which no number of steps changes; set"
     with pytest.raises(ConfigurationError, match=told) as refused:
-        sweep.choose_steps()
+        sweep = with_chosen_steps(sweep)
     wanted = int(str(refused.value).split("transient_periods to ")[1].split()[0])
     assert wanted > 16 * 24
     enough = simulation(
         *SLOW, "integration.tolerance=1e-10", f"integration.transient_periods={wanted}"
     )
-    enough.choose_steps()
+    enough = with_chosen_steps(enough)
     assert enough.plan.transient_periods < 2 * wanted
 
 
 def test_a_transient_that_is_long_enough_stays():
     sweep = simulation(*SLOW, "integration.tolerance=1e-1", "integration.transient_periods=500")
-    sweep.choose_steps()
+    sweep = with_chosen_steps(sweep)
     assert sweep.plan.transient_periods == 500
     assert not any("transient" in note for note in sweep.notes)
 

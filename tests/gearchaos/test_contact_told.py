@@ -7,6 +7,7 @@ from matplotlib.figure import Figure
 
 import gearchaos
 from gearchaos import load_config
+from gearchaos.engine.kept import variables_of
 from gearchaos.figures import bifurcation
 from gearchaos.records.contact import CONTACT_STATES, contact_told
 
@@ -58,7 +59,7 @@ def test_a_sweep_tells_the_contact_of_both_directions_and_its_file_keeps_it(tmp_
     told = [name for name in result.variables if not name.startswith(("mesh_force", "load_f"))]
     names = [name for name in told if name.endswith("_tangential")]
     assert len(names) == len([name for name in told if name.endswith("_axial")]) == 8
-    without = [variable.name for variable in simulation("outputs.contact=true").variables]
+    without = [variable.name for variable in variables_of(simulation("outputs.contact=true"))]
     assert {*names} < {*without} and not any(name.endswith("_axial") for name in without)
     shares = sum(result[f"time_{where}_tangential"] for where in ("driving", "back", "apart"))
     assert shares == pytest.approx(1.0)

@@ -7,8 +7,11 @@ from gearchaos_kernels import Plan, Status
 from gearchaos.dynamics.exponents import period_jacobian
 from gearchaos.dynamics.largest_exponents import MIXED
 from gearchaos.dynamics.orbits import polish
+from gearchaos.engine.computing import block_memory
+from gearchaos.engine.computing import integrate as integrate_lanes
 from gearchaos.engine.error_check import Tally
-from gearchaos.engine.simulation import Simulation
+from gearchaos.engine.kept import variables_of
+from gearchaos.engine.run_plan import RunPlan, plan_run
 from gearchaos.models import load_config
 from gearchaos.records.label import (
     CHAOTIC,
@@ -42,7 +45,7 @@ LONG = (
 )
 
 
-def lanes_at(*values: float, overrides: tuple[str, ...] = ()) -> Simulation:
+def lanes_at(*values: float, overrides: tuple[str, ...] = ()) -> RunPlan:
     return simulation(f"sweep={{parameter='pitch_error', values={[*values]}}}", *LONG, *overrides)
 
 
@@ -82,7 +85,7 @@ def test_an_orbit_that_hardly_attracts_is_found_by_a_longer_record(multiplier, m
         "outputs.section_points=60",
     )
     lanes = np.arange(2)
-    _, outcome = sweep.integrate(lanes, sweep.recording)
+    _, outcome = integrate_lanes(sweep, lanes, sweep.recording)
     record = Record(outcome.section, outcome.growth, lanes < 0, lanes < 0)
     assert label(record).motion.tolist() == [UNRESOLVED] * 2
     arrays = computed(sweep, 2)
@@ -95,9 +98,9 @@ SLOW_TORI = "sweep={parameter='mesh_frequency', values=[1.121, 1.15, 1.424]}"
 
 
 def test_a_rotation_slower_than_its_record_is_resolved_by_a_longer_one():
-    sweep = Simulation(load_config(SPEEDS, (SLOW_TORI, *SOFT_BEARINGS)))
+    sweep = plan_run(load_config(SPEEDS, (SLOW_TORI, *SOFT_BEARINGS)))
     lanes = np.arange(3)
-    _, outcome = sweep.integrate(lanes, sweep.recording)
+    _, outcome = integrate_lanes(sweep, lanes, sweep.recording)
     record = Record(outcome.section, outcome.growth, lanes < 0, lanes >= 0)
     assert label(record).motion.tolist() == [UNRESOLVED, QUASI_PERIODIC, UNRESOLVED]
     arrays = computed(sweep, 3)
@@ -160,7 +163,7 @@ PARAMETRIC = (
 
 
 def test_a_linear_scene_grows_or_settles_and_is_never_chaotic():
-    sweep = Simulation(load_config(PAN2021.with_name("pan2021_full.toml"), PARAMETRIC))
+    sweep = plan_run(load_config(PAN2021.with_name("pan2021_full.toml"), PARAMETRIC))
     arrays = computed(sweep, 41)
     system, once = sweep.lanes.system_of(np.arange(41)), Plan(200, 0, 1, 0, tangent=True)
     multipliers = np.linalg.eigvals(period_jacobian(system, np.zeros((41, 10)), once))
@@ -176,7 +179,7 @@ def test_slow_growth_of_a_linear_scene_is_growth():
     """At the edge of a tongue, where the largest multipliers are 0.9987 to 1.0027."""
     near = "sweep={parameter='mesh_frequency', values=[1.708, 1.709, 1.710, 1.711]}"
     file = PAN2021.with_name("pan2021_full.toml")
-    sweep = Simulation(load_config(file, [*PARAMETRIC, near]))
+    sweep = plan_run(load_config(file, [*PARAMETRIC, near]))
     system, once = sweep.lanes.system_of(np.arange(4)), Plan(200, 0, 1, 0, tangent=True)
     multipliers = np.linalg.eigvals(period_jacobian(system, np.zeros((4, 10)), once))
     size = np.max(np.abs(multipliers), axis=1)
@@ -205,10 +208,10 @@ def test_a_lane_too_fast_for_its_flow_maps_is_no_diverged_one(tmp_path):
 
 
 def test_the_meanings_of_the_labels_are_in_the_result():
-    (motion,) = [v for v in simulation().variables if v.name == "motion"]
+    (motion,) = [v for v in variables_of(simulation()) if v.name == "motion"]
     assert motion.flags == MEANINGS
     assert motion.flags[PERIODIC] == "periodic"
 
 
 def test_the_memory_of_a_block_counts_what_the_labels_need():
-    assert simulation().block_memory(2) > simulation("outputs.motion=false").block_memory(2)
+    assert block_memory(simulation(), 2) > block_memory(simulation("outputs.motion=false"), 2)

@@ -6,7 +6,7 @@ import pytest
 import gearchaos
 from gearchaos.dynamics.eigenfrequencies import eigenfrequencies
 from gearchaos.engine.lanes import Lanes
-from gearchaos.engine.simulation import Simulation
+from gearchaos.engine.run_plan import plan_run
 from gearchaos.export import main as export
 from gearchaos.figures.labels import unit_of
 from gearchaos.plot import main as plot
@@ -39,7 +39,7 @@ def result(path):
 def test_what_a_mistaken_unit_makes_of_a_pair_is_told(tmp_path):
     def notes(*overrides: str) -> str:
         given = (*ASKED, "integration.unstable=raise", *overrides)
-        return " ".join(Simulation(gearchaos.load_config(small_config(tmp_path), given)).notes)
+        return " ".join(plan_run(gearchaos.load_config(small_config(tmp_path), given)).notes)
 
     assert "unlikely" not in notes()
     told = notes("pair.face_width_mm=0.02", "pitch_error.amplitude_um=8000.0", "sweep.to=1.0")

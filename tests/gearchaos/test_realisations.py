@@ -5,7 +5,8 @@ import pytest
 
 import gearchaos
 from gearchaos import figures
-from gearchaos.engine.simulation import Simulation
+from gearchaos.engine.computing import block_lanes
+from gearchaos.engine.run_plan import plan_run
 from gearchaos.engine.steps import stable_steps
 from gearchaos.errors import ConfigurationError
 
@@ -36,7 +37,7 @@ def test_the_axes_are_swept_parameter_gear_pair_and_start(result):
     attributes = result.attributes("realisation")
     assert (attributes["units"], attributes["long_name"]) == ("1", "drawn gear pair")
     second = configured("second_sweep={parameter='pitch_error.grade', values=[6.0, 8.0]}")
-    names = [axis.name for axis in Simulation(second).lanes.axes]
+    names = [axis.name for axis in plan_run(second).lanes.axes]
     assert names == ["pitch_error_grade", "pitch_error", "realisation"]
 
 
@@ -69,7 +70,7 @@ def test_a_file_keeps_the_axis(result, tmp_path):
 @pytest.mark.parametrize("carry", ["upwards", "downwards"])
 def test_every_gear_pair_is_carried_for_itself(carry):
     overrides = (*STARTS, f"start.carry={carry}")
-    every = Simulation(configured(*overrides))
+    every = plan_run(configured(*overrides))
     found = computed(every, 4)
     assert_same(found, computed(every, 1))
     ends = found["end_state"].reshape(*every.lanes.shape, 10)
@@ -78,17 +79,17 @@ def test_every_gear_pair_is_carried_for_itself(carry):
         (slice(1, None), slice(-1)) if carry == "upwards" else (slice(-1), slice(1, None))
     )
     assert np.array_equal(starts[later], ends[earlier])
-    assert every.block_lanes(1) % 6 == 0
+    assert block_lanes(every, 1) % 6 == 0
 
 
 def test_stability_is_that_of_all_gear_pairs():
-    fine = Simulation(configured("integration.unstable=raise"))
+    fine = plan_run(configured("integration.unstable=raise"))
     _, note = stable_steps(fine.lanes, 2)
     assert note.endswith("of 12 of 12 lanes")
     with pytest.raises(
         ConfigurationError, match=r"for 12 of 12 lanes \(pitch_error from \S+ to \S+\)"
     ):
-        stable_steps(Simulation(configured()).lanes, 2)
+        stable_steps(plan_run(configured()).lanes, 2)
 
 
 def test_commands_take_a_gear_pair_by_its_number(result, tmp_path):

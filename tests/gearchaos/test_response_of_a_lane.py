@@ -7,7 +7,7 @@ import pytest
 from gearchaos_kernels import integrate
 
 from gearchaos import Result, load_config, open_result, run
-from gearchaos.engine.simulation import Simulation
+from gearchaos.engine.run_plan import plan_run
 from gearchaos.figures.labels import in_words, place_of
 from gearchaos.response import main
 
@@ -40,7 +40,7 @@ def test_the_motion_goes_on_bit_for_bit_on_the_branch_of_the_lane(tmp_path, carr
     found = going_on(tmp_path, result, f"pitch_error={value}")
     assert found["pitch_error"].tolist() == [value]
     np.testing.assert_array_equal(found["start_state"][0], result["end_state"][LANE])
-    sweep = Simulation(swept)
+    sweep = plan_run(swept)
     lane, start = np.array([LANE]), result["end_state"][LANE : LANE + 1]
     plan = sweep.plan._replace(transient_periods=0, section_points=RECORDED)
     onwards = integrate(sweep.lanes.system_of(lane), start, plan)

@@ -3,6 +3,9 @@
 import numpy as np
 import pytest
 
+from gearchaos.engine.computing import block_lanes, compute
+from gearchaos.engine.kept import variables_of
+
 from .short_sweeps import (
     RANDOM,
     SHORT,
@@ -13,6 +16,9 @@ from .short_sweeps import (
     simulation,
     unlabelled,
 )
+
+NO_ENDS = np.zeros((0, 0))
+"""End states of a sweep that is not carried."""
 
 
 @pytest.mark.parametrize(
@@ -48,14 +54,14 @@ def test_blocks_need_not_hold_whole_values_where_nothing_is_carried():
 
 @pytest.mark.parametrize("threads", [1, 3, 64])
 def test_blocks_feed_every_thread_and_carried_ones_hold_whole_steps(threads):
-    assert unlabelled(*RANDOM).block_lanes(threads) >= 32 * threads
-    carried = unlabelled(*RANDOM, "start.carry=both").block_lanes(threads)
+    assert block_lanes(unlabelled(*RANDOM), threads) >= 32 * threads
+    carried = block_lanes(unlabelled(*RANDOM, "start.carry=both"), threads)
     assert carried >= 32 * threads
     assert carried % 6 == 0
     # Where more lanes are side by side than a block holds, a step is divided.
     many = unlabelled(*RANDOM, "start.carry=both", "start.count=5000")
     assert many.lanes.side_by_side == 10_000
-    assert many.block_lanes(1) < 5000
+    assert block_lanes(many, 1) < 5000
 
 
 def test_all_lines_of_a_carried_sweep_are_computed_side_by_side():
@@ -73,28 +79,28 @@ def test_all_lines_of_a_carried_sweep_are_computed_side_by_side():
 
 def test_every_array_of_a_block_is_a_variable_of_the_sweep():
     sweep = simulation(*RANDOM)
-    arrays = sweep.compute(3, 10)
+    arrays = compute(sweep, (3, 10), NO_ENDS)
     assert {name: array.shape[0] for name, array in arrays.items()} == dict.fromkeys(arrays, 7)
     axes = tuple(axis.name for axis in sweep.lanes.axes)
-    assert {*arrays} == {v.name for v in sweep.variables if v.dims[: len(axes)] == axes}
-    without = unlabelled("outputs.lyapunov=false").compute(0, 2)
+    assert {*arrays} == {v.name for v in variables_of(sweep) if v.dims[: len(axes)] == axes}
+    without = compute(unlabelled("outputs.lyapunov=false"), (0, 2), NO_ENDS)
     assert not [name for name in without if "lyapunov" in name]
 
 
 def test_all_exponents_come_with_the_sum_that_the_damping_gives():
     sweep = unlabelled("outputs.exponents=true", "integration.steps_per_period=800")
-    arrays = sweep.compute(0, 3)
+    arrays = compute(sweep, (0, 3), NO_ENDS)
     assert arrays["lyapunov_exponents"].shape == (3, len(sweep.lanes.states))
     total = arrays["lyapunov_exponents"].sum(axis=1)
     assert np.allclose(total, arrays["lyapunov_sum"], rtol=0.0, atol=1e-6)
 
 
 def test_a_mesh_stiffness_below_zero_is_noted():
-    assert unlabelled().notes == []
+    assert unlabelled().notes == ()
     (note,) = unlabelled("groups.stiffness_variation_scale=9").notes
     assert "the mesh stiffness falls to -0.034 of its mean" in note
     without = 'scene.effects=["pitch_error", "backlash"]'
-    assert unlabelled(without).notes == []
+    assert unlabelled(without).notes == ()
 
 
 TWO = ('second_sweep={parameter="mesh_frequency", values=[0.8, 0.9, 1.0]}', "sweep.count=4")

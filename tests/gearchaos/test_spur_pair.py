@@ -9,7 +9,7 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 from gearchaos.engine.lanes import Lanes
-from gearchaos.engine.simulation import Simulation
+from gearchaos.engine.run_plan import plan_run
 from gearchaos.errors import ConfigurationError
 from gearchaos.models import Configuration, axis_values, load_config
 from gearchaos.models.gear_pair.tables import groups_at
@@ -64,7 +64,7 @@ class Oscillator:
 
 
 def simulation(*overrides):
-    return Simulation(load_config(SPUR_PAIR, overrides))
+    return plan_run(load_config(SPUR_PAIR, overrides))
 
 
 def oscillator(sweep):
@@ -263,7 +263,7 @@ def test_a_resonance_that_outgrows_the_clearance_is_told_from_chaos():
         f"groups.damping_ratio={damping}",
         "groups.half_backlash=0.02",
     )
-    lanes = computed(Simulation(load_config(SPUR_PAIR, changes)))
+    lanes = computed(plan_run(load_config(SPUR_PAIR, changes)))
     assert lanes["motion"].tolist() == [GROWS, PERIODIC]
     # Where the clearance is nothing beside the motion, it grows as the linear equation does.
     assert lanes["lyapunov_exponent"][0] == pytest.approx(np.log(multiplier) / period, rel=1e-6)

@@ -7,7 +7,8 @@ import pytest
 from gearchaos_kernels import Plan, integrate
 
 import gearchaos
-from gearchaos.engine.simulation import Simulation
+from gearchaos.engine.choosing import with_chosen_steps
+from gearchaos.engine.run_plan import RunPlan, plan_run
 from gearchaos.engine.step_choice import (
     AMPLIFIED,
     PERIODS,
@@ -30,14 +31,12 @@ UNSTABLE = [14, 64, 284]  # Pairs for which 200 steps are too few to be stable.
 ORDINARY = [0, 1, 2, 30, 31, 32]
 
 
-def prepared(number: int, steps: int | None = None) -> Simulation:
+def prepared(number: int, steps: int | None = None) -> RunPlan:
     config = Configuration.from_toml(random_configuration(number, steps))
-    simulation = Simulation(config)
-    simulation.choose_steps()
-    return simulation
+    return with_chosen_steps(plan_run(config))
 
 
-def error_with(simulation: Simulation, steps: int) -> float:
+def error_with(simulation: RunPlan, steps: int) -> float:
     """Return the error after the last period against eight times the steps that were chosen."""
     lane = np.arange(1)
     system, start = simulation.lanes.system_of(lane), simulation.lanes.start_of(lane)
@@ -51,7 +50,7 @@ def error_with(simulation: Simulation, steps: int) -> float:
     return float(np.max(np.abs(found[-1] - truth[-1]) / np.max(np.abs(truth), axis=0)))
 
 
-def told(simulation: Simulation, words: str) -> list[str]:
+def told(simulation: RunPlan, words: str) -> list[str]:
     return [note for note in simulation.notes if words in note]
 
 
@@ -81,7 +80,7 @@ def test_a_given_number_that_is_too_coarse_is_told_with_one_that_is_not(number):
 
 @pytest.mark.parametrize("number", ORDINARY[:3])
 def test_a_given_number_that_is_fine_enough_is_not_spoken_of(number):
-    assert prepared(number, 800).notes == []
+    assert prepared(number, 800).notes == ()
 
 
 @pytest.mark.parametrize("number", [104, 149])
@@ -116,8 +115,8 @@ def test_chaos_is_told_and_does_not_ask_for_ever_more_steps():
 
 def test_flow_maps_have_their_own_number():
     config = Configuration.from_toml(random_configuration(104))
-    simulation = Simulation(config.replace("integration", {"method": "flow_map"}))
-    simulation.choose_steps()
+    simulation = plan_run(config.replace("integration", {"method": "flow_map"}))
+    simulation = with_chosen_steps(simulation)
     assert simulation.plan.steps_per_period == 24
     assert not told(simulation, "chosen") and not told(simulation, "coarse")
 
@@ -127,7 +126,7 @@ def test_a_motion_at_rest_has_no_error_to_judge():
     config = Configuration.from_toml(random_configuration(0))
     for key, value in still.items():
         config = config.replace(key, value)
-    simulation = Simulation(config)
+    simulation = plan_run(config)
     assert Trial(simulation.lanes, simulation.plan).verdict(200).error.tolist() == [0.0]
 
 
@@ -139,7 +138,7 @@ def test_the_lane_with_the_fastest_mode_is_tried_wherever_it_is():
         "groups.pitch_error=1.0",
     )
     config = gearchaos.load_config(PAN2021, swept)
-    simulation = Simulation(config.replace("integration.steps_per_period", None))
+    simulation = plan_run(config.replace("integration.steps_per_period", None))
     fastest = 4 * 101
     assert fastest not in simulation.lanes.spread(48)
     trial = Trial(simulation.lanes, simulation.plan)

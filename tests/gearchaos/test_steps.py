@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import gearchaos
+from gearchaos.engine.choosing import with_chosen_steps
 from gearchaos.engine.steps import choose_steps
 from gearchaos.errors import ConfigurationError
 from gearchaos.records.difference import Solution
@@ -61,7 +62,7 @@ def test_steps_that_are_exact_are_measured_once():
     with pytest.raises(ConfigurationError, match=r"is not reached, but 1.0e-02 with 10 steps"):
         choose_steps(method_of_order_four, 10, 1e-4, "x.toml", finest=40)
     sweep = simulation(*SHORT, "integration.method=flow_map", "integration.tolerance=1e-11")
-    sweep.choose_steps()
+    sweep = with_chosen_steps(sweep)
     assert tried_steps(sweep.notes) == [25] == [sweep.plan.steps_per_period]
 
 
@@ -97,7 +98,7 @@ def test_the_choice_follows_from_the_configuration_alone():
     chosen = []
     for _ in range(2):
         sweep = simulation(*SHORT, "integration.tolerance=1e-5")
-        sweep.choose_steps()
+        sweep = with_chosen_steps(sweep)
         chosen.append((sweep.plan, sweep.notes))
     assert chosen[0] == chosen[1]
     assert chosen[0][1]
@@ -105,6 +106,6 @@ def test_the_choice_follows_from_the_configuration_alone():
 
 def test_without_a_tolerance_nothing_is_tried():
     sweep = simulation(*SHORT)
-    sweep.choose_steps()
+    sweep = with_chosen_steps(sweep)
     assert sweep.plan.steps_per_period == 25
     assert not tried_steps(sweep.notes)

@@ -13,7 +13,8 @@ import pytest
 
 import gearchaos
 from gearchaos.dry_run import some_places
-from gearchaos.engine.simulation import Simulation
+from gearchaos.engine.computing import block_memory
+from gearchaos.engine.run_plan import plan_run
 from gearchaos.models import Configuration, load_config
 
 from .commands import (
@@ -158,21 +159,21 @@ def test_a_dry_run_counts_the_memory_of_maps_of_every_lane(tmp_path):
         assert (facts["lanes"], facts["states"], facts["steps"]) == (256, 2, 256 * 100 * 15)
         assert facts["seconds"] > 0.0
         config = load_config(tmp_path / "gears.toml", [*LINEAR[1::2], *flags[1::2]])
-        told[parameter] = facts["memory_bytes"], Simulation(config).block_memory(1)
+        told[parameter] = facts["memory_bytes"], block_memory(plan_run(config), 1)
     (shared, shared_block), (own, own_block) = told.values()
     assert own - shared > own_block - shared_block > 1e7
 
 
 def test_what_a_dry_run_computes_are_lanes_from_all_over_the_sweep():
     second = 'second_sweep={parameter="load", from=0.2, to=0.3, count=30}'
-    every = Simulation(load_config(PAN2021, ["start.kind=random", "start.count=9", second]))
+    every = plan_run(load_config(PAN2021, ["start.kind=random", "start.count=9", second]))
     some = some_places(every, 256)
     # In vectors of 32 neighbours, no end before the other.
     assert some.size == np.unique(some).size == 256
     assert set(np.diff(some.reshape(-1, 32)).ravel()) == {1}
     assert some[0] == pytest.approx(len(every.lanes) - some[-1], rel=0.01)
     # Of a carried one those of some neighbouring values, in the middle.
-    some = some_places(Simulation(load_config(PAN2021, ["start.carry=upwards"])), 100)
+    some = some_places(plan_run(load_config(PAN2021, ["start.carry=upwards"])), 100)
     assert np.array_equal(some, np.arange(700, 800))
 
 

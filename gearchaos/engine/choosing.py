@@ -1,0 +1,77 @@
+"""Transient and steps of a run, chosen by trials before it begins."""
+
+from collections.abc import Iterator, Sequence
+
+from gearchaos.configuration.methods import METHODS
+from gearchaos.engine.run_plan import Chosen, RunPlan
+from gearchaos.engine.step_choice import judged_steps
+from gearchaos.engine.steps import MOST_STEPS, PILOT_LANES, Candidate, choose_steps, pilot
+from gearchaos.engine.transient import settled
+from gearchaos.records.label import MOST_POINTS
+
+
+def with_chosen_steps(run: RunPlan) -> RunPlan:
+    """Return a run with the transient and the steps that its tolerance or its scene needs.
+
+    They change where a tolerance or no number of steps is configured. Where a number is configured
+    that is too coarse, the notes say so.
+
+    Parameters
+    ----------
+    run : RunPlan
+        The run, with steps that are stable.
+
+    Returns
+    -------
+    RunPlan
+        The run with what was chosen, and with notes about it.
+
+    Raises
+    ------
+    ConfigurationError
+        If the tolerance cannot be reached.
+    """
+    if run.config.integration.tolerance is not None:
+        return _within_tolerance(run, run.config.integration.tolerance)
+    if METHODS[run.plan.method].exact:
+        return run
+    plan, note = judged_steps(run.lanes, run.plan)
+    return run.with_choice(Chosen(plan.steps_per_period, plan.transient_periods), note)
+
+
+def _within_tolerance(run: RunPlan, tolerance: float) -> RunPlan:
+    """Return a run with a transient and steps that reach a tolerance on lanes that are tried."""
+    recording, coarsest = run.recording, run.plan.steps_per_period
+    # As many points as show a period, however few the file keeps.
+    enough = min(MOST_POINTS * run.lanes.repeats_after, recording.recorded_periods)
+    recording = recording._replace(section_points=max(recording.section_points, enough))
+    kept = run.plan.section_points
+    transient, left, note = settled(run.lanes, recording, kept, tolerance, PILOT_LANES)
+    run = run.with_choice(Chosen(coarsest, transient), note)
+    lanes, solution = pilot(run.lanes, run.plan, PILOT_LANES, 4 * coarsest)
+    resolved, method = run.plan.resolved, run.plan.method
+    candidates = choose_steps(
+        lambda steps: solution(steps, resolved, method, hidden=True),
+        coarsest,
+        tolerance,
+        run.config.source,
+        # Finer steps of an exact method are no more exact.
+        4 * coarsest if METHODS[method].exact else MOST_STEPS,
+        left,
+    )
+    chosen = Chosen(candidates[-1].steps, transient)
+    return run.with_choice(chosen, *_texts(candidates, lanes, tolerance, run.plan.tangent))
+
+
+def _texts(
+    candidates: Sequence[Candidate], lanes: int, tolerance: float, tangent: bool
+) -> Iterator[str]:
+    """Yield what was measured for each number of steps on some lanes."""
+    for tried in candidates:
+        exponent = f", their exponent by {tried.exponent_error:.1e}" if tangent else ""
+        yield (
+            f"{tried.steps} steps per period: {tried.periodic_share * lanes:.0f} of {lanes} lanes "
+            f"move periodically, their section is off by {tried.section_error:.1e}"
+            f"{exponent}, wanted is {tolerance:g}; "
+            f"{tried.changed_share * lanes:.0f} settle on a different motion with finer steps"
+        )

@@ -1,0 +1,157 @@
+"""The lanes of a run computed, block by block."""
+
+from typing import Any
+
+import gearchaos_kernels as kernels
+import numpy as np
+
+from gearchaos.arrays import Floats, Integers
+from gearchaos.configuration.methods import METHODS
+from gearchaos.dynamics.labelling import LOOK_BYTES, LOOKS
+from gearchaos.dynamics.stability import fewest_stable_steps
+from gearchaos.engine.kept import arrays_of
+from gearchaos.engine.run_plan import RunPlan
+from gearchaos.interrupts import check
+
+Bounds = tuple[int, int]
+"""First lane of a block and the one behind its last, in the order of computation."""
+
+
+class EndStates:
+    """The states in which the lanes of a carried sweep ended, in the order of computation.
+
+    Lanes that are not known have NaN. Of any other sweep nothing is kept.
+    """
+
+    def __init__(self, run: RunPlan) -> None:
+        lanes = len(run.lanes) if run.carried else 0
+        self._ends = np.full((lanes, len(run.lanes.states)), np.nan)
+        self._side_by_side = run.lanes.side_by_side
+
+    def before(self, first: int) -> Floats:
+        """Return the end states from which the lanes from ``first`` on start, (lanes, states)."""
+        return self._ends[max(0, first - self._side_by_side) : first]
+
+    def keep(self, first: int, ends: Floats) -> None:
+        """Keep the end states (lanes, states) of the lanes from ``first`` on."""
+        if self._ends.size:
+            self._ends[first : first + len(ends)] = ends
+
+
+def rehearse(run: RunPlan, periods: int = 0) -> None:
+    """Integrate the first lane, and some mesh periods of it step by step.
+
+    This compiles the kernel of the scene, or loads it from the cache.
+    """
+    plan = run.plan._replace(transient_periods=0, section_points=0)
+    plan = plan._replace(recorded_periods=periods, history_periods=periods)
+    first = np.arange(1)
+    kernels.integrate(run.lanes.system_of(first), run.lanes.start_of(first), plan)
+
+
+def block_memory(run: RunPlan, threads: int) -> int:
+    """Return about how many bytes the arrays of one block take while it is computed."""
+    states, lanes = len(run.lanes.states), min(len(run.lanes), block_lanes(run, threads))
+    numbers, looked = (run.recording.section_points + 4) * states, 0
+    if run.plan.tangent:
+        numbers += run.plan.recorded_periods
+        if run.config.outputs.motion:
+            # Doubtful lanes are integrated again, a share at a time, but a whole lane at least.
+            longest = 8 * numbers * LOOKS[-1]
+            looked = max(8 * numbers * lanes, longest, min(longest * lanes, LOOK_BYTES))
+    if run.config.outputs.exponents:
+        numbers += run.plan.recorded_periods * states
+    return 8 * lanes * numbers + looked + _maps_memory(run, lanes)
+
+
+def _maps_memory(run: RunPlan, lanes: int) -> int:
+    """Return about how many bytes the maps of a block of lanes take, 0 without maps."""
+    if not METHODS[run.plan.method].shares_maps:
+        return 0
+    every = len(run.lanes)
+    blocks = np.arange(lanes), np.arange(every - lanes, every)
+    systems = [run.lanes.system_of(block) for block in blocks]
+    return max(
+        kernels.maps_memory(system, run.plan, fewest_stable_steps(system)) for system in systems
+    )
+
+
+def block_lanes(run: RunPlan, threads: int) -> int:
+    """Return how many lanes make a block: work for every thread, and progress to be seen."""
+    lanes = kernels.LANES * max(8, 2 * threads)
+    # What is left over of lanes side by side would fill no vector.
+    return lanes - lanes % min(lanes, run.lanes.side_by_side)
+
+
+def blocks(run: RunPlan, size: int) -> list[Bounds]:
+    """Cut a run into blocks of this number of lanes, in the order in which they are computed."""
+    lanes = len(run.lanes)
+    return [(n, min(n + size, lanes)) for n in range(0, lanes, size)]
+
+
+def compute(run: RunPlan, block: Bounds, before: Floats) -> dict[str, Any]:
+    """Compute a block of lanes.
+
+    Parameters
+    ----------
+    run : RunPlan
+        The run, whose steps have been chosen.
+    block : tuple of int
+        Bounds of the block, see `Bounds`.
+    before : array, shape (lanes, states)
+        End states of the lanes from which a carried sweep starts, see `EndStates.before`.
+
+    Returns
+    -------
+    dict of str to array, shape (lanes, ...)
+        Every variable by its name.
+    """
+    places = np.arange(*block)
+    start, outcome = integrate(run, places, run.recording, before)
+    return arrays_of(run, run.lanes.computed_at(places), start, outcome)
+
+
+def integrate(
+    run: RunPlan, places: Integers, plan: kernels.Plan, before: Floats | None = None
+) -> tuple[Floats, kernels.Outcome]:
+    """Integrate some lanes of a run by a plan.
+
+    Parameters
+    ----------
+    run : RunPlan
+        The run.
+    places : array of int, shape (lanes,)
+        Places of the lanes in the order of computation; those of a carried sweep are consecutive.
+    plan : gearchaos_kernels.Plan
+        How they are integrated.
+    before : array, shape (lanes, states), optional
+        As in `compute`; without it a carried sweep begins anew.
+
+    Returns
+    -------
+    start : array, shape (lanes, states)
+        Start states.
+    outcome : gearchaos_kernels.Outcome
+        Outcome of all lanes.
+    """
+    check()
+    many, starts, outcomes = run.lanes.side_by_side, [], []
+    earlier = np.zeros((0, len(run.lanes.states))) if before is None else before
+    if run.carried:
+        missing = np.full((many - len(earlier), len(run.lanes.states)), np.nan)
+        earlier = np.concatenate([missing, earlier])
+    for some in np.split(places, range(many, places.size, many)):
+        lanes = run.lanes.computed_at(some)
+        starts.append(run.lanes.start_of(lanes))
+        if run.carried:
+            ends = earlier[: some.size]
+            # A lane that diverged hands nothing on: its successor begins anew.
+            on = np.isfinite(ends).all(axis=1)
+            starts[-1][on] = ends[on]
+        outcomes.append(kernels.integrate(run.lanes.system_of(lanes), starts[-1], plan))
+        if run.carried:
+            earlier = np.concatenate([earlier, outcomes[-1].end_state])[some.size :]
+    if len(outcomes) == 1:
+        return starts[0], outcomes[0]
+    every: Any = map(np.concatenate, zip(*outcomes, strict=True))
+    return np.concatenate(starts), kernels.Outcome(*every)

@@ -1,0 +1,178 @@
+"""What a run keeps of integrated lanes: the variables of its result, and their arrays."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import gearchaos_kernels as kernels
+import numpy as np
+
+from gearchaos.arrays import Array, Floats, Integers
+from gearchaos.dynamics.exponents import exponents, sum_of_exponents
+from gearchaos.dynamics.labelling import Told, labels_of
+from gearchaos.dynamics.largest_exponents import MEANINGS as RECORD_MEANINGS
+from gearchaos.dynamics.largest_exponents import largest_exponents
+from gearchaos.engine import error_check
+from gearchaos.engine.claims import completed
+from gearchaos.engine.run_plan import RunPlan
+from gearchaos.engine.steps import solution_of
+from gearchaos.outputs import catalogue, names
+from gearchaos.outputs.entries import Part
+from gearchaos.outputs.listing import Details, for_each
+from gearchaos.outputs.variable import Variable
+from gearchaos.records.contact import CONTACT_STATES, contact_told
+from gearchaos.records.difference import difference
+from gearchaos.records.label import MEANINGS as MOTION_MEANINGS
+
+
+def variables_of(run: RunPlan) -> list[Variable]:
+    """Return the variables of a sweep, in the order of the file."""
+    outputs, repeats = run.config.outputs, run.lanes.repeats_after
+    of_teeth = f"periods of the excitation, {repeats} mesh periods each,"
+    touched = run.plan.contact and run.splits_steps
+    model = run.lanes.model
+    signals = (*outputs.states, *model.signals[:1])
+    parts: dict[Part, bool | Sequence[str]] = {
+        catalogue.SECTION_POINTS_PART: bool(outputs.section),
+        catalogue.SECTION_PART: outputs.section,
+        catalogue.LYAPUNOV_PART: outputs.lyapunov,
+        catalogue.MOTION_PART: outputs.motion,
+        catalogue.RECORD_PART: outputs.motion and outputs.lyapunov,
+        catalogue.EXPONENTS_PART: outputs.exponents,
+        catalogue.CROSSINGS_PART: run.splits_steps,
+        catalogue.CONTACT_PART: run.elements if touched else (),
+        **(for_each(model.load_parts, run.elements) if run.plan.loads else {}),
+        catalogue.EXTREMES_PART: outputs.states,
+        catalogue.ORDERS_PART: bool(run.plan.orders),
+        catalogue.AMPLITUDES_PART: signals if run.plan.orders else (),
+        catalogue.CHECK_PART: run.config.integration.error_check > 0.0,
+        catalogue.EVERY_SWEEP_PART: True,
+    }
+    values = {
+        names.SECTION_POINT: np.arange(outputs.section_points),
+        names.EXPONENT_NUMBER: np.arange(1, len(run.lanes.states) + 1),
+        names.ORDER: np.array([float(order) for order in run.plan.orders]),
+        names.STATE: np.arange(len(run.lanes.states)),
+    }
+    meanings = {
+        "motion": MOTION_MEANINGS,
+        names.RECORD: RECORD_MEANINGS,
+        "contact_state_@": CONTACT_STATES,
+        "motion_changed": error_check.MEANINGS,
+        names.STATUS: [status.name.lower() for status in kernels.STATUS_TEXTS],
+        names.STATE: run.lanes.states,
+    }
+    wordings = {"period": of_teeth if repeats > 1 else "mesh periods"}
+    return model.catalogue.variables(run.lanes.axes, parts, Details(values, meanings, wordings))
+
+
+def arrays_of(
+    run: RunPlan, lanes: Integers, start: Floats, outcome: kernels.Outcome
+) -> dict[str, Any]:
+    """Return what is kept of integrated lanes, by the name of the variable."""
+    system, plan, outputs = run.lanes.system_of(lanes), run.plan, run.config.outputs
+    sound = outcome.status == kernels.Status.OK
+    arrays: dict[str, Any] = {
+        "status": outcome.status,
+        "diverged_period": outcome.diverged_period,
+        "start_state": start,
+        "end_state": outcome.end_state,
+    }
+    if run.splits_steps:
+        crossings = outcome.crossings / plan.recorded_periods
+        arrays["crossings_per_period"] = np.where(sound, crossings, np.nan)
+        slowest = np.where(outcome.crossings > 0, outcome.slowest_crossing, np.nan)
+        arrays["slowest_crossing"] = np.where(sound, slowest, np.nan)
+        arrays["unsplit_steps"] = outcome.overflows
+    arrays |= _told_of_elements(run, system, outcome)
+    for name in outputs.section:
+        points = outcome.section[:, -plan.section_points :, system.states.index(name)]
+        # A copy: a view would keep alive all that was recorded.
+        arrays[f"section_{name}"] = points.copy()
+    told = labels_of(system, outcome, run.recording) if outputs.motion else None
+    if told is not None:
+        arrays |= told.labels._asdict()
+    largest = None
+    if plan.tangent:
+        period = told.labels.period if told else np.zeros(lanes.size, dtype=np.int32)
+        state = told.state if told else outcome.end_state
+        largest = largest_exponents(system, outcome, run.recording, period, state)
+        arrays["lyapunov_exponent"] = largest.values
+        arrays["lyapunov_exponent_standard_error"] = largest.standard_errors
+        if told is not None:
+            arrays["record"] = largest.record
+    if outputs.exponents:
+        spectrum = exponents(system, start, plan)
+        if largest is not None:
+            spectrum = spectrum.given(largest.of_orbit)
+        arrays["lyapunov_exponents"] = spectrum.values
+        arrays["lyapunov_exponents_standard_error"] = spectrum.standard_errors
+        arrays["lyapunov_sum"] = sum_of_exponents(system)
+    if run.config.integration.error_check > 0.0:
+        arrays |= _check(run, lanes, start, outcome, told)
+    return arrays
+
+
+def _told_of_elements(
+    run: RunPlan, system: kernels.LaneSystem, outcome: kernels.Outcome
+) -> dict[str, Array]:
+    """Return what is kept of contact, loads and states; of lanes that diverged none of it."""
+    told: dict[str, Array] = {}
+    if run.plan.contact and run.splits_steps:
+        for number, way in enumerate(run.elements):
+            found = contact_told(outcome.contact[:, number], run.plan.recorded_periods)
+            told |= {f"{name}_{way}": values for name, values in found.items()}
+    if run.plan.loads:
+        told |= run.lanes.model.loads(outcome.loads, system)
+    told |= states_told(outcome, run.plan, run.lanes.model.signals[:1])
+    for values in told.values():
+        if values.dtype != np.uint8:
+            values[outcome.status != kernels.Status.OK] = np.nan
+    return told
+
+
+def _check(
+    run: RunPlan, lanes: Integers, start: Floats, outcome: kernels.Outcome, told: Told | None
+) -> dict[str, Array]:
+    """Integrate and label the checked lanes of a block again with half the step, and compare.
+
+    Compared is what the labels know: the file may keep fewer section points. Added is what half
+    the step does not show.
+    """
+    plan, kept = run.recording, run.config.outputs.section
+    share = run.config.integration.error_check
+    checked = error_check.checked_lanes(lanes // run.lanes.directions, share)
+    section, exponent = np.full((2, lanes.size), np.nan)
+    motion = np.full(lanes.size, error_check.NOT_CHECKED, dtype=np.uint8)
+    if checked.size:
+        half = plan._replace(steps_per_period=2 * plan.steps_per_period)
+        system = run.lanes.system_of(lanes[checked])
+        finer = kernels.integrate(system, start[checked], half)
+        some = told and labels_of(system, finer, half)
+        fine = solution_of(system, finer, half, kept, some)
+        some = told and Told(told.labels.of(checked), told.state[checked])
+        theirs: Any = (array[checked] for array in outcome)
+        ended = kernels.Outcome(*theirs)
+        coarse = solution_of(system, ended, plan, kept, some)
+        coarse = completed(coarse, system, ended, plan, kept, some)
+        found = difference(coarse, fine)
+        section[checked], exponent[checked] = found.section_error, found.exponent_error
+        motion[checked] = np.where(found.changed, error_check.CHANGED, error_check.SAME)
+    return dict(zip(error_check.CHECKED, (section, exponent, motion), strict=True))
+
+
+def states_told(
+    outcome: kernels.Outcome, plan: kernels.Plan, signals: Sequence[str]
+) -> dict[str, Floats]:
+    """Return extremes of the states of a plan, and amplitudes at its orders, by name.
+
+    ``signals``: name of the observed signal of which there are amplitudes.
+    """
+    told: dict[str, Floats] = {}
+    for number, state in enumerate(plan.states):
+        smallest, largest = outcome.extremes[:, number].T
+        ends = smallest, largest, largest - smallest
+        told |= {f"{state}_{name}": end for name, end in zip(names.EXTREMES, ends, strict=True)}
+    if plan.orders:
+        amplitudes = (f"{names.AMPLITUDE}{one}" for one in (*plan.states, *signals))
+        told |= zip(amplitudes, np.moveaxis(outcome.amplitudes, 1, 0), strict=True)
+    return told

@@ -1,0 +1,124 @@
+"""What a run computes: the lanes of a configured sweep, and the plan of their integration."""
+
+from dataclasses import dataclass, replace
+from typing import NamedTuple, Self
+
+import gearchaos_kernels as kernels
+
+from gearchaos.dynamics.plans import plan_of
+from gearchaos.engine.excitation import remarks, whole_lengths
+from gearchaos.engine.lanes import Lanes
+from gearchaos.engine.step_choice import steps_for_exponents
+from gearchaos.engine.steps import coarse_steps, needless_maps, stable_steps
+from gearchaos.models import Configuration
+from gearchaos.records.label import MOST_POINTS
+from gearchaos.records.period import POINTS_NEEDED
+
+
+class Chosen(NamedTuple):
+    """The part of a plan that trials choose before a sweep begins."""
+
+    steps_per_period: int
+    transient_periods: int
+
+
+@dataclass(frozen=True)
+class RunPlan:
+    """What a run computes. It cannot be changed: choosing its steps gives another one.
+
+    Attributes
+    ----------
+    config : Configuration
+        The configuration.
+    lanes : Lanes
+        The lanes of its sweep.
+    plan : gearchaos_kernels.Plan
+        Method, steps and periods, with the section that is kept.
+    notes : tuple of str
+        What a user should know before the run begins.
+    """
+
+    config: Configuration
+    lanes: Lanes
+    plan: kernels.Plan
+    notes: tuple[str, ...]
+
+    @property
+    def chosen(self) -> Chosen:
+        """The part of the plan that trials choose, for all processes that compute lanes of it."""
+        return Chosen(self.plan.steps_per_period, self.plan.transient_periods)
+
+    @property
+    def carried(self) -> bool:
+        """Whether each value starts from the end state of its neighbour."""
+        return self.config.start.carry != "none"
+
+    @property
+    def recording(self) -> kernels.Plan:
+        """The plan with everything that is recorded: what is kept, and what labels are read off."""
+        checked = POINTS_NEEDED if self.config.integration.error_check > 0.0 else 0
+        wanted = MOST_POINTS if self.config.outputs.motion else checked
+        enough = min(wanted * self.lanes.repeats_after, self.plan.recorded_periods)
+        return self.plan._replace(section_points=max(self.plan.section_points, enough))
+
+    @property
+    def splits_steps(self) -> bool:
+        """Whether steps are split at the boundaries of a clearance."""
+        return self.plan.resolved and self.lanes.clearance
+
+    @property
+    def elements(self) -> tuple[str, ...]:
+        """Names of the clearance elements."""
+        return self.lanes.model.elements(self.lanes.effects)
+
+    def with_choice(self, chosen: Chosen, *notes: str) -> Self:
+        """Return it with what trials have chosen, and with further notes; empty ones are none."""
+        plan = self.plan._replace(**chosen._asdict())
+        return replace(self, plan=plan, notes=(*self.notes, *filter(None, notes)))
+
+    def with_notes(self, *notes: str) -> Self:
+        """Return it with further notes; empty ones are none."""
+        return self.with_choice(self.chosen, *notes)
+
+
+def plan_run(config: Configuration) -> RunPlan:
+    """Return what a configured run computes, with steps that are stable in every lane.
+
+    `gearchaos.engine.choosing.with_chosen_steps` makes them fine enough.
+
+    Parameters
+    ----------
+    config : Configuration
+        The configuration.
+
+    Returns
+    -------
+    RunPlan
+        The lanes, the plan and notes.
+
+    Raises
+    ------
+    ConfigurationError
+        If the number of steps per period is unstable and may not be raised, or if the excitation
+        or the record does not suit the outputs.
+    """
+    lanes, integration, outputs = Lanes(config), config.integration, config.outputs
+    steps, note = stable_steps(lanes, integration.steps_per_period)
+    judged = outputs.lyapunov and integration.tolerance is None
+    if judged and integration.steps_per_period is None:
+        steps = steps_for_exponents(lanes, steps)
+    lengths = whole_lengths(lanes)
+    plan = plan_of(
+        config,
+        steps_per_period=steps,
+        **lengths,
+        section_points=outputs.section_points if outputs.section else 0,
+        tangent=outputs.lyapunov,
+        contact=outputs.contact,
+        loads=outputs.loads,
+        states=outputs.states,
+        orders=outputs.mesh_orders,
+    )
+    coarse = coarse_steps(lanes, steps) if judged else ""
+    notes = [note, coarse, needless_maps(lanes, plan), *remarks(lanes, lengths)]
+    return RunPlan(config, lanes, plan, tuple(text for text in notes if text))
