@@ -6,7 +6,7 @@ import pytest
 import gearchaos
 from gearchaos import load_config
 from gearchaos.engine.kept import variables_of
-from gearchaos.records.contact import loads_told
+from gearchaos.models.gear_pair.loads import loads_told
 
 from .commands import run_module
 from .short_sweeps import PAN2021, SHORT, simulation

@@ -21,13 +21,13 @@ from gearchaos.results.reading.result import Result, open_result, section_variab
 from .listed_variables import parameter, sweep_variables
 
 POINTS = 6
-LOADS_PART = coordinate("load", "1", "static load", "$f_n$", np.linspace(0.1, 0.5, 3))
+LOADS = coordinate("load", "1", "static load", "$f_n$", np.linspace(0.1, 0.5, 3))
 ERRORS = coordinate("pitch_error", "1", "pitch error", "$P$", np.linspace(0.0, 3.0, 7))
 AXES = {
     "one start": (ERRORS,),
     "several starts": (ERRORS, CATALOGUE.axis("start", np.arange(4))),
-    "two parameters": (LOADS_PART, ERRORS),
-    "two parameters, several starts": (LOADS_PART, ERRORS, CATALOGUE.axis("start", np.arange(2))),
+    "two parameters": (LOADS, ERRORS),
+    "two parameters, several starts": (LOADS, ERRORS, CATALOGUE.axis("start", np.arange(2))),
 }
 
 
@@ -68,7 +68,7 @@ def result_over(axes: tuple[Variable, ...]) -> Result:
         if axis.name != "start":
             parameters[axis.name] = parameter(axis.name, axis.values, "swept", dims=(axis.name,))
     if len(axes) > 1 and axes[1].name == "pitch_error":
-        both = np.outer(LOADS_PART.values, ERRORS.values)
+        both = np.outer(LOADS.values, ERRORS.values)
         parameters["both"] = parameter("both", both, "swept", dims=("load", "pitch_error"))
     names = [axis.name for axis in axes]
     data = flat_arrays(variables, axes)
@@ -170,8 +170,8 @@ def test_all_axes_fixed_leave_the_rest_of_the_shape(result, tmp_path) -> None:
 
 def test_what_was_fixed_is_kept_in_the_file_of_a_slice(tmp_path) -> None:
     result = result_over(AXES["two parameters, several starts"])
-    part = result.sel(load=LOADS_PART.values[1]).sel(start=1)
-    assert part.fixed == {"load": LOADS_PART.values[1], "start": 1.0}
+    part = result.sel(load=LOADS.values[1]).sel(start=1)
+    assert part.fixed == {"load": LOADS.values[1], "start": 1.0}
     part.save(tmp_path / "part.h5")
     assert open_result(tmp_path / "part.h5").fixed == part.fixed
     with h5py.File(tmp_path / "part.h5", "r+") as file:
