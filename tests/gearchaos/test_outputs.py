@@ -1,6 +1,8 @@
 """The catalogue of outputs is complete: what has no entry is refused, not left out."""
 
 import doctest
+import re
+from pathlib import Path
 
 import h5py
 import numpy as np
@@ -250,6 +252,17 @@ def test_a_file_of_an_unknown_model_is_read_with_the_units_that_it_names(tmp_pat
     changed = open_result(tmp_path / "raw.h5").physical("section_x")
     assert changed.variables["section_x"].units == "mm"
     assert (changed["section_x"] == 1.0).all()
+
+
+def test_the_page_on_the_file_format_names_every_output():
+    page = (Path(__file__).parents[2] / "docs" / "file-format.md").read_text(encoding="utf-8")
+    documented = {name.replace("COORDINATE", "STATE") for name in re.findall(r"`(\w+)`", page)}
+    subjects = {Kind.STATE: "STATE", Kind.ACCELERATION: "STATE_acceleration"}
+    subjects |= {Kind.ELEMENT: "tangential", Kind.SIGNAL: "transmission_error"}
+    for part in CATALOGUE.parts:
+        for subject in [subjects[kind] for kind in part.repeated_for] or [""]:
+            named = {output.name.replace("@", subject) for output in part.outputs}
+            assert named <= documented
 
 
 def test_the_example_of_the_catalogue_is_true():
