@@ -202,6 +202,31 @@ def test_a_result_with_an_array_too_many_is_not_made():
         result_of(found, [{**arrays, "noise": np.zeros(2)}], {})
 
 
+UNITS = {
+    "um": "delta_5 section_delta_5 amplitude_delta_1 delta_3_peak_to_peak mesh_error "
+    "amplitude_transmission_error transmission_error_mean transmission_error_peak_to_peak "
+    "transmission_error_rms",
+    "m/s": "delta_5_rate section_delta_2_rate delta_4_rate_largest approach_mean_tangential "
+    "approach_largest_axial slowest_crossing",
+    "m/s^2": "delta_5_acceleration delta_4_acceleration",
+    "N": "mesh_force_tangential mesh_force_largest_axial mesh_force_smallest_axial "
+    "mesh_force_mean_tangential mesh_force_rms_tangential",
+    "s^-1": "lyapunov_exponent lyapunov_exponent_standard_error lyapunov_exponents lyapunov_sum "
+    "lyapunov_exponents_standard_error exponent_step_error",
+    "Hz": "mesh_frequency",
+    "1": "status period time mesh_period return_distance section_error start_state end_state "
+    "crossings_per_period time_driving_axial impacts_back_axial load_factor_rms order exponent "
+    "load_factor_largest contact_tangential damping_ratio nothing_of_the_kind",
+}
+"""Some outputs and parameters of each physical unit, separated by spaces."""
+
+
+@pytest.mark.parametrize("units", UNITS)
+def test_outputs_of_a_gear_pair_have_the_units_of_what_they_measure(units):
+    found = {name: CATALOGUE.scale_of(name).units for name in UNITS[units].split()}
+    assert set(found.values()) == {units}, found
+
+
 def test_another_model_uses_the_generic_outputs():
     result = oscillator_result()
     assert [name for name in result if name.endswith("_stop")] == [
@@ -249,9 +274,12 @@ def test_a_file_of_an_unknown_model_is_read_with_the_units_that_it_names(tmp_pat
         raw.physical("lyapunov_exponent")
     with h5py.File(tmp_path / "raw.h5", "r+") as file:
         file["section_x"].attrs["units"] = "mm"
-    changed = open_result(tmp_path / "raw.h5").physical("section_x")
-    assert changed.variables["section_x"].units == "mm"
+        file["lyapunov_exponent"].attrs["units"] = "h^-1"
+    names = "section_x", "lyapunov_exponent"
+    changed = open_result(tmp_path / "raw.h5").physical(*names)
+    assert [changed.variables[name].units for name in names] == ["mm", "h^-1"]
     assert (changed["section_x"] == 1.0).all()
+    assert (changed["lyapunov_exponent"] == 1.0).all()
 
 
 def test_the_page_on_the_file_format_names_every_output():
