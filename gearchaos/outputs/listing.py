@@ -201,7 +201,7 @@ class Catalogue:
                     yield part, output, subject
 
     def _possible(self, part: Part) -> Sequence[Subject]:
-        """Return all subjects of a part, or none that has a name where it is not repeated."""
+        """Return all subjects of a part; one without a name if the part is not repeated."""
         if not part.repeated_for:
             return [NO_SUBJECT]
         return [one for kind in part.repeated_for for one in self.subjects.get(kind, ())]

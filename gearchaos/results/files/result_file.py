@@ -22,7 +22,7 @@ from gearchaos.results.files.atomic_file import append_checksum, replacing
 
 SCHEMA = "gearchaos-sweep"
 SCHEMA_VERSION = "3.2"
-CONVENTIONS = "CF-1.9"  # The first one that knows uint8.
+CONVENTIONS = "CF-1.9"  # The first version with uint8.
 PARAMETERS = "parameters"
 DIMS = "dims"
 """Attribute with the names of dimensions. HDF5's own list is in the global heap, which is slow and
