@@ -34,6 +34,8 @@ def ending(run: "RunPlan", output: str, diverged: int, *said: str) -> int:
 
     Too many diverged lanes give a warning and an exit code of their own.
     """
+    from gearchaos.configuration.methods import METHODS
+
     print(output, flush=True)
     say(*said)
     from gearchaos.configuration.methods import METHODS
