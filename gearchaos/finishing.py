@@ -38,7 +38,6 @@ def ending(run: "RunPlan", output: str, diverged: int, *said: str) -> int:
 
     print(output, flush=True)
     say(*said)
-
     allowed = run.config.outputs.allowed_diverged_share
     if diverged <= allowed * len(run.lanes):
         return OK
