@@ -1,5 +1,7 @@
 """The cache of compiled code: a second process compiles nothing, and runs only what fits."""
 
+import atexit
+import functools
 import json
 import os
 import shutil
@@ -9,6 +11,7 @@ import subprocess
 import sys
 from collections.abc import Sequence
 from pathlib import Path
+from tempfile import NamedTemporaryFile
 
 import gearchaos_kernels
 import numpy as np
@@ -75,25 +78,35 @@ def compute(
     It says nothing on stderr, or one line that contains the complaint. ``without``: names that
     Numba lacks, such as ``numba.core.codegen.JITCodeLibrary``, or of a class ``module:Class.name``.
     """
-    environment = {**os.environ, "PYTHONPATH": str(package.parent), "PYTHONDONTWRITEBYTECODE": "1"}
-    environment |= {"NUMBA_CACHE_DIR": str(cache), **variables}
-    command = [sys.executable, "-W", "error", "-c", PROGRAM]
-    done = subprocess.run(
-        [*command, json.dumps([largest_file, *expressions]), *without],
-        env=environment,
-        capture_output=True,
-        text=True,
-        timeout=1800,
-        check=False,
-    )
-    assert done.returncode == 0, done.stderr
-    if complaint is None:
-        assert done.stderr == ""
-    else:
-        assert done.stderr.startswith("gearchaos: ")
-        assert complaint in done.stderr
-        assert done.stderr.count("\n") == 1
-    return json.loads(done.stdout)
+    arguments = [json.dumps([largest_file, *expressions]), *without]
+    environment = {"NUMBA_CACHE_DIR": str(cache), **variables}
+    with NamedTemporaryFile("r") as out, NamedTemporaryFile("r") as err:
+        words = [PROGRAM, arguments, environment, str(package.parent), out.name, err.name]
+        code, said = _code_of(words), err.read()
+        assert code == 0, said
+        if complaint is None:
+            assert said == ""
+        else:
+            assert said.startswith("gearchaos: ")
+            assert complaint in said
+            assert said.count("\n") == 1
+        return json.load(out)
+
+
+def _code_of(words: list) -> int:
+    """Let `numba_server` run a program, and return its exit code."""
+    server = _server()
+    server.stdin.write(json.dumps(words) + "\n")
+    server.stdin.flush()
+    return int(server.stdout.readline())
+
+
+@functools.cache
+def _server() -> subprocess.Popen[str]:
+    script, pipe = Path(__file__).with_name("numba_server.py"), subprocess.PIPE
+    server = subprocess.Popen([sys.executable, str(script)], stdin=pipe, stdout=pipe, text=True)
+    atexit.register(server.communicate)
+    return server
 
 
 @pytest.fixture(scope="module")
