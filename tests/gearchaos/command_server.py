@@ -1,22 +1,27 @@
 """A process that has imported what commands import, and forks to run each of them as a process.
 
-It reads one JSON list a line: the number of the request, module, arguments, folder, the files for
-stdin, stdout and stderr, more variables of the environment, and the size of the largest file that
-may be written, or null. It answers with the number of the process, and then with its exit code,
-each on a line after the number of the request: of a request that nobody waited for, the answers are
-known as such. Everything but the imports happens as in a process of its own.
+Its arguments name more modules to import. It reads one JSON list a line: the number of the request,
+module, arguments, folder, the files for stdin, stdout and stderr, more variables of the
+environment, and the size of the largest file that may be written, or null. It answers with the
+number of the process, and when that has ended with its exit code, each on a line after the number
+of the request: several commands may run at the same time. Everything but the imports happens as in
+a process of its own.
 """
 
 import atexit
 import gc
+import importlib
 import json
 import os
 import resource
 import runpy
 import signal
 import sys
+from contextlib import suppress
+from typing import Any, NoReturn
 
 import matplotlib.pyplot as plt  # noqa: F401
+import numba
 from numba.core.registry import cpu_target
 
 import gearchaos.engine.refinement
@@ -31,24 +36,40 @@ LONGEST = 3600
 
 def main() -> None:
     """Serve until the input ends."""
+    for name in sys.argv[1:]:
+        importlib.import_module(name)
     # What Numba would import in every process before it loads the first kernel.
     cpu_target.typing_context.refresh()
     cpu_target.target_context.refresh()
     # A collection would write to every object of this process, and so copy its memory.
     gc.freeze()
     for line in sys.stdin:
-        request, *command = json.loads(line)
-        process = os.fork()
-        if process == 0:
-            run(*command)
-        answer(request, process)
-        answer(request, os.waitstatus_to_exitcode(os.waitpid(process, 0)[1]))
+        bury()
+        if os.fork() == 0:
+            keep(*json.loads(line))
+    bury()
+
+
+def bury() -> None:
+    """Take note of processes that have ended, so that the system forgets them."""
+    with suppress(ChildProcessError):
+        while os.waitpid(-1, os.WNOHANG)[0]:
+            pass
+
+
+def keep(request: int, *command: Any) -> NoReturn:
+    """Fork once more to run a command, and answer when it begins and when it has ended."""
+    process = os.fork()
+    if process == 0:
+        run(*command)
+    answer(request, process)
+    answer(request, os.waitstatus_to_exitcode(os.waitpid(process, 0)[1]))
+    os._exit(0)
 
 
 def answer(request: int, number: int) -> None:
-    """Write a line."""
-    sys.stdout.write(f"{request} {number}\n")
-    sys.stdout.flush()
+    """Write a line at once, so that those of several processes do not mix."""
+    os.write(1, f"{request} {number}\n".encode())
 
 
 def run(
@@ -67,6 +88,10 @@ def run(
     for descriptor, name in enumerate(files):
         os.dup2(os.open(name, os.O_RDWR), descriptor)
     os.environ.update(variables)
+    if "NUMBA_NUM_THREADS" in variables:
+        numba.config.NUMBA_NUM_THREADS = int(variables["NUMBA_NUM_THREADS"])
+    if "dask" in sys.modules:
+        sys.modules["dask"].config.refresh()
     if largest_file is not None:
         resource.setrlimit(resource.RLIMIT_FSIZE, (largest_file, largest_file))
     sys.argv[1:] = arguments

@@ -132,18 +132,22 @@ def begin(
     stdin: str = "",
     variables: dict[str, str] | None = None,
     largest_file: int | None = None,
+    beside: bool = False,
+    imported: Sequence[str] = (),
 ) -> tuple[int, Callable[[], Ended]]:
     """Begin a command that need not import what it needs; return its process, and how to wait.
 
-    A command that was begun before and not waited for, as of a test that has failed, is killed.
+    The latter has a function ``said``, which returns what has been written to stderr by now.
+    A command that was begun before and not waited for, as of a test that has failed, is killed,
+    unless this one runs ``beside`` it. ``imported``: modules that only some commands import.
     """
-    server, folder = _server(), Path(mkdtemp(dir=_folder().name))
+    server, folder = _server(*imported), Path(mkdtemp(dir=_folder().name))
     files = [folder / name for name in ("in", "out", "err")]
     for file, text in zip(files, (stdin, "", ""), strict=True):
         file.write_text(text)
     _, out, err = files
     words = [module, arguments, str(cwd), [*map(str, files)], variables or {}, largest_file]
-    request, process = server.begin(words)
+    request, process = server.begin(words, beside)
 
     def ended() -> Ended:
         ended = Ended(server.end(request), out.read_text(), err.read_text())
@@ -151,6 +155,7 @@ def begin(
         assert "Traceback" not in ended.err, ended.err
         return ended
 
+    ended.said = err.read_text
     return process, ended
 
 
@@ -163,46 +168,64 @@ def _folder() -> TemporaryDirectory:
 
 
 class Server:
-    """The process of `command_server`, which runs one command at a time."""
+    """The process of `command_server`, which runs commands."""
 
-    def __init__(self) -> None:
-        """Start it."""
+    def __init__(self, *modules: str) -> None:
+        """Start it, with more modules to import."""
         pipe, script = subprocess.PIPE, Path(__file__).with_name("command_server.py")
-        command = [sys.executable, str(script)]
+        command = [sys.executable, str(script), *modules]
         # Without a buffer: what has been answered and not read can then be seen.
         self._process = subprocess.Popen(command, stdin=pipe, stdout=pipe, bufsize=0)
         atexit.register(self._process.communicate)
-        self._requests, self._running = 0, 0
+        self._requests = 0
+        self._running: dict[int, int] = {}
+        self._codes: dict[int, int] = {}
 
-    def begin(self, words: list) -> tuple[int, int]:
-        """Begin a command, and return the number of the request and that of its process."""
-        if self._running and not select([self._process.stdout], [], [], 0.0)[0]:
-            with suppress(ProcessLookupError):
-                os.kill(self._running, signal.SIGKILL)
+    def begin(self, words: list, beside: bool = False) -> tuple[int, int]:
+        """Begin a command, and return the number of the request and that of its process.
+
+        Others that run are killed, unless it runs beside them.
+        """
+        while select([self._process.stdout], [], [], 0.0)[0]:
+            self._read()
+        if not beside:
+            for process in filter(None, self._running.values()):
+                with suppress(ProcessLookupError):
+                    os.kill(process, signal.SIGKILL)
+            self._running, self._codes = {}, {}
         self._requests += 1
         with suppress(BrokenPipeError):
             self._process.stdin.write(json.dumps([self._requests, *words]).encode() + b"\n")
-        self._running = self._answer(self._requests)
-        return self._requests, self._running
+        request = self._requests
+        self._running[request] = 0
+        while not self._running[request]:
+            self._read()
+        return request, self._running[request]
 
     def end(self, request: int) -> int:
-        """Wait for the end of a command, the latest one, and return its exit code."""
-        assert request == self._requests, "killed when another command was begun"
-        code, self._running = self._answer(request), 0
-        return code
+        """Wait for the end of a command and return its exit code."""
+        known = request in self._running or request in self._codes
+        assert known, "killed when another command was begun"
+        while request not in self._codes:
+            self._read()
+        return self._codes.pop(request)
 
-    def _answer(self, request: int) -> int:
-        for line in self._process.stdout:
-            number, answer = map(int, line.split())
-            if number == request:
-                return answer
-        _server.cache_clear()  # The next command gets another one.
-        raise RuntimeError(f"the command server has ended with {self._process.wait()}")
+    def _read(self) -> None:
+        """Wait for an answer: the number of a process first, then its exit code."""
+        line = self._process.stdout.readline()
+        if not line:
+            _server.cache_clear()  # The next command gets another one.
+            raise RuntimeError(f"the command server has ended with {self._process.wait()}")
+        request, answer = map(int, line.split())
+        if self._running.get(request) == 0:
+            self._running[request] = answer
+        elif self._running.pop(request, None):
+            self._codes[request] = answer
 
 
 @cache
-def _server() -> Server:
-    return Server()
+def _server(*modules: str) -> Server:
+    return Server(*modules)
 
 
 def sweep(folder: Path, *arguments: str, **options) -> Ended:

@@ -6,7 +6,7 @@ import time
 
 import pytest
 
-from .commands import Server, begin, is_running, run_module
+from .commands import _server, begin, is_running, run_module
 
 FOREVER = ("-n", "1", "-r", "1", "import time; time.sleep(10_000)")
 """Arguments of timeit that take longer than anybody waits."""
@@ -17,6 +17,19 @@ def test_a_command_that_nobody_waited_for_is_killed_and_the_next_gets_its_own_co
     assert run_module("gearchaos.sweep", "none.toml", cwd=tmp_path).code == 4
     assert not is_running(process)
     assert run_module("gearchaos.sweep", "--version", cwd=tmp_path).code == 0
+
+
+def test_commands_beside_each_other_have_their_own_codes_and_end_with_the_next(tmp_path):
+    process, _ = begin("timeit", FOREVER, tmp_path)
+    one, other = (
+        begin("gearchaos.sweep", [word], tmp_path, beside=True)[1]
+        for word in ("none.toml", "--version")
+    )
+    assert is_running(process)
+    assert (other().code, one().code) == (0, 4)
+    assert run_module("gearchaos.sweep", "--version", cwd=tmp_path).code == 0
+    while is_running(process):  # It is killed, and somebody else has to notice.
+        time.sleep(0.005)
 
 
 def test_the_answer_of_an_ended_command_is_not_that_of_the_next(tmp_path):
@@ -30,7 +43,7 @@ def test_the_answer_of_an_ended_command_is_not_that_of_the_next(tmp_path):
 
 def test_a_server_that_has_died_says_so_and_is_not_asked_again(tmp_path):
     words = ["timeit", ["-n", "1", "-r", "1"], str(tmp_path), [os.devnull] * 3, {}, None]
-    server = Server()
+    server = _server()
     request, _ = server.begin(words)
     assert server.end(request) == 0
     os.kill(server._process.pid, signal.SIGKILL)

@@ -9,7 +9,7 @@ import subprocess
 import sys
 import threading
 import time
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 
 import numba
 import psutil
@@ -17,7 +17,8 @@ import pytest
 
 import gearchaos
 
-from .commands import HANGS, LINEAR, begin, is_running, names_in, same_data, small_config, sweep
+from . import commands
+from .commands import HANGS, LINEAR, begin, is_running, names_in, same_data, small_config
 
 pytest.importorskip("distributed")
 
@@ -27,8 +28,14 @@ LONG = ("--set", "sweep.count=2000", "--set", "integration.transient_periods=250
 LONG += ("--set", "outputs.motion=false")
 # Many more of them, for what is not waited for: a busy machine does not finish them meanwhile.
 ENDLESS = ("--set", "sweep.count=100000")
-SCHEDULER = "from distributed.cli.dask_scheduler import main; main()"
-WORKER = "from distributed.cli.dask_worker import main; main()"
+SCHEDULER, WORKER = "distributed.cli.dask_scheduler", "distributed.cli.dask_worker"
+# What all processes import, and that they run beside each other.
+TOGETHER = {"imported": (SCHEDULER, WORKER), "beside": True}
+
+
+def sweep(folder, *arguments, **options):
+    """Run the sweep command on the small sweep in a folder."""
+    return commands.sweep(folder, *arguments, **TOGETHER, **options)
 
 
 @pytest.fixture(scope="module")
@@ -39,37 +46,60 @@ def undisturbed(tmp_path_factory):
 
 
 @contextmanager
-def python(code, *arguments, cwd, **options):
-    """Run a Python program for as long as the context lasts."""
-    with subprocess.Popen(
-        [sys.executable, "-c", code, *arguments],
-        cwd=cwd,
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.DEVNULL,
-        **options,
-    ) as process:
-        try:
-            yield process
-        finally:
-            process.kill()
+def running(module, *arguments, cwd, **options):
+    """Run a module of dask for as long as the context lasts, and yield how to kill it."""
+    process, ended = begin(module, arguments, cwd, **TOGETHER, **options)
+    try:
+        yield lambda: killed(process)
+    finally:
+        killed(process)
+        ended()
+
+
+def killed(process):
+    with suppress(ProcessLookupError):
+        os.kill(process, signal.SIGKILL)
+
+
+@contextmanager
+def mortal_scheduler(folder):
+    """Run a scheduler, and yield its address and how to kill it."""
+    file = folder / "scheduler.json"
+    flags = ("--scheduler-file", str(file), "--host", "127.0.0.1", "--port", "0", "--no-dashboard")
+    with running(SCHEDULER, *flags, cwd=folder) as kill:
+        while not (file.exists() and file.read_text()):
+            time.sleep(0.05)
+        yield json.loads(file.read_text())["address"], kill
 
 
 @contextmanager
 def scheduler(folder):
     """Run a scheduler and yield its address."""
-    file = folder / "scheduler.json"
-    flags = ("--scheduler-file", str(file), "--host", "127.0.0.1", "--port", "0", "--no-dashboard")
-    with python(SCHEDULER, *flags, cwd=folder) as process:
-        while process.poll() is None and not (file.exists() and file.read_text()):
-            time.sleep(0.05)
-        yield json.loads(file.read_text())["address"]
+    with mortal_scheduler(folder) as (address, _):
+        yield address
 
 
-def worker(address, folder, before=""):
-    """Run a worker, without a nanny that would start it again once it is killed."""
-    environment = {**os.environ, "NUMBA_NUM_THREADS": "1"}
-    flags = ("--no-nanny", "--nthreads", "1", "--no-dashboard")
-    return python(f"{before}\n{WORKER}", address, *flags, cwd=folder, env=environment)
+# A worker has no nanny that would start it again once it is killed.
+WORKS = ("--no-nanny", "--nthreads", "1", "--no-dashboard")
+ALONE = {"NUMBA_NUM_THREADS": "1"}
+
+
+def worker(address, folder):
+    """Run a worker and yield how to kill it."""
+    return running(WORKER, address, *WORKS, cwd=folder, variables=ALONE)
+
+
+@contextmanager
+def odd_worker(address, folder, before):
+    """Run a worker that executes a line before it imports anything."""
+    code = f"{before}\nfrom {WORKER} import main; main()"
+    command = [sys.executable, "-c", code, address, *WORKS]
+    silent = dict.fromkeys(("stdout", "stderr"), subprocess.DEVNULL)
+    with subprocess.Popen(command, cwd=folder, env=os.environ | ALONE, **silent) as process:
+        try:
+            yield
+        finally:
+            process.kill()
 
 
 def timeout(seconds):
@@ -82,10 +112,14 @@ def begun(folder, *arguments):
     """Start the long sweep and yield its process, and its end, once a block is finished."""
     small_config(folder)
     words = ("gears.toml", *LONG, *arguments)
-    process, ended = begin("gearchaos.sweep", words, folder, variables=timeout("60s"))
-    while is_running(process) and not list((folder / BLOCKS).glob("*.block")):
-        time.sleep(0.005)
-    yield process, ended
+    variables = timeout("60s")
+    process, ended = begin("gearchaos.sweep", words, folder, variables=variables, **TOGETHER)
+    try:
+        while is_running(process) and not list((folder / BLOCKS).glob("*.block")):
+            time.sleep(0.005)
+        yield process, ended
+    finally:
+        killed(process)
 
 
 @pytest.mark.slow
@@ -94,11 +128,11 @@ def test_the_blocks_of_a_killed_worker_are_run_again(tmp_path, undisturbed):
     cluster.mkdir()
     with (
         scheduler(cluster) as address,
-        worker(address, cluster) as victim,
+        worker(address, cluster) as kill_one,
         worker(address, cluster),
         begun(tmp_path, "--dask", address) as (_, ended),
     ):
-        victim.kill()
+        kill_one()
         code, out, err = ended()
     assert (code, out) == (0, "gears.h5\n"), err
     assert "2000 of 2000 lanes" in err
@@ -154,7 +188,7 @@ def test_flow_maps_that_workers_make_give_the_bits_of_those_made_here(tmp_path):
     ids=["other version", "none"],
 )
 def test_a_worker_with_other_software_is_refused(tmp_path, before, message):
-    with scheduler(tmp_path) as address, worker(address, tmp_path, before):
+    with scheduler(tmp_path) as address, odd_worker(address, tmp_path, before):
         ended = sweep(tmp_path, "--dask", address)
     assert (ended.code, ended.out) == (4, "")
     assert re.search(message, ended.err)
@@ -176,13 +210,11 @@ def test_a_scheduler_that_goes_away_costs_nothing_that_is_finished(tmp_path):
 @contextmanager
 def begun_and_lost(cluster, folder):
     with (
-        scheduler(cluster) as address,
+        mortal_scheduler(cluster) as (address, kill),
         worker(address, cluster),
         begun(folder, "--dask", address, *ENDLESS) as (_, ended),
     ):
-        for each in psutil.Process().children():
-            if "dask_scheduler" in " ".join(each.cmdline()):
-                each.kill()
+        kill()
         yield ended
 
 
@@ -237,18 +269,13 @@ def test_an_address_that_can_be_none_is_refused_and_nothing_goes_on_from_it(
 
 def signalled_while_it_waits(folder, address, number):
     small_config(folder)
-    with subprocess.Popen(
-        [sys.executable, "-m", "gearchaos.sweep", "gears.toml", "--dask", address],
-        cwd=folder,
-        stderr=subprocess.PIPE,
-        text=True,
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
-    ) as process:
-        said = process.stderr.readline()
-        process.send_signal(number)
-        _, err = process.communicate(timeout=HANGS)
-    assert "Traceback" not in err
-    return process.returncode, said
+    words = ("gears.toml", "--dask", address)
+    process, ended = begin("gearchaos.sweep", words, folder, **TOGETHER)
+    while is_running(process) and "\n" not in ended.said():
+        time.sleep(0.005)
+    os.kill(process, number)
+    code, _, err = ended()
+    return code, err.splitlines(keepends=True)[0]
 
 
 def test_a_port_that_is_silent_is_waited_for_until_a_signal_comes(tmp_path):
@@ -270,10 +297,10 @@ def test_an_interrupt_does_not_wait_for_workers_that_are_gone(tmp_path):
     cluster.mkdir()
     with (
         scheduler(cluster) as address,
-        worker(address, cluster) as only,
+        worker(address, cluster) as kill_the_only_one,
         begun(tmp_path, "--dask", address, *ENDLESS) as (process, ended),
     ):
-        only.kill()
+        kill_the_only_one()
         os.kill(process, signal.SIGINT)
         code, out, err = ended()
     assert (code, out) == (130, ""), err
