@@ -15,7 +15,7 @@ from gearchaos.outputs.variable import Variable, coordinate
 from gearchaos.results.files.atomic_file import append_checksum
 from gearchaos.results.reading.result import Result
 
-from .commands import SMALL
+from .fuzz_configurations import SMALL
 from .listed_variables import parameter, sweep_variables
 
 Random = random.Random

@@ -175,7 +175,7 @@ def linear_pair(**groups):
 
 def linear_orbit(system) -> np.ndarray:
     """The fixed point of the affine map of one period, in closed form."""
-    once = Plan(24, 0, 1, 1, method="flow_map")
+    once = Plan(24, 0, 1, 1, tangent=True, method="flow_map")
     states = len(system.states)
     columns = [
         integrate(system, np.tile(unit, (system.lanes, 1)), once).end_state
@@ -195,7 +195,7 @@ def of_linear(system, section, kept=1):
 
 def test_the_distance_from_the_orbit_of_a_linear_pair_is_exact():
     system = linear_pair(transverse_damping_g=0.0005)
-    record = Plan(24, 60, 8, 8, method="flow_map")
+    record = Plan(24, 60, 8, 8, tangent=True, method="flow_map")
     section = integrate(system, np.zeros((2, 6)), record).section
     apart = np.max(np.abs(section - linear_orbit(system)[:, np.newaxis]), axis=2)
     found = of_linear(system, section, kept=8)
@@ -299,7 +299,7 @@ def test_a_hidden_mode_gives_the_error_with_and_without_flow_maps(teeth):
     period = np.ones(2, dtype=np.int32)
     orbits = polish(system, np.zeros((2, 6)), period, plan)
     if not orbits.converged.all():
-        settled = integrate(system, np.zeros((2, 6)), Plan(steps, 600, 6, 0)).end_state
+        settled = integrate(system, np.zeros((2, 6)), Plan(steps, 600, 6, 0, True)).end_state
         orbits = polish(system, settled, period, plan)
     exponent = np.log(np.abs(orbits.multipliers[:, 0])) / system.excitation_period
     modes = np.linalg.eigvals(jacobian(system, np.ones((2, system.elements))))

@@ -37,6 +37,8 @@ needs_browser = pytest.mark.skipif(CHROMIUM is None, reason="there is no chromiu
 OPTIONS = "--headless --no-sandbox --disable-gpu --no-first-run --disable-background-networking"
 OPTIONS += " --disable-component-update --disable-sync"
 ASKED = ("start.carry='both'", "sweep.count=20", "outputs.section_points=10")
+# Without a phase, for which loops are compiled once more.
+ASKED += ("pitch_error.phase_deg=0.0",)
 HOSTILE = '<img src="x" onerror="document.hacked = 1"> $$\\href{javascript:0}{x}$$'
 PERIODS = 10
 LINES = "one => one.center.filter(line => line.type == 'Span').map(line => line.location)"
