@@ -6,7 +6,6 @@ import re
 import shlex
 import shutil
 import signal
-import subprocess
 import sys
 import time
 from pathlib import Path
@@ -19,7 +18,6 @@ import gearchaos
 from gearchaos.results.files.block_folder import LOCK, folder_of
 
 from .commands import (
-    HANGS,
     LINEAR,
     begin,
     is_running,
@@ -78,8 +76,9 @@ def test_the_command_printed_after_an_interrupt_gives_the_undisturbed_result(
     assert 0 < lanes < 1000
     command = shlex.split(how.removeprefix("gearchaos sweep: continue with: "))
     assert command.count("--resume") == 1
-    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
-    assert (done.returncode, done.stdout) == (0, "gears.h5\n")
+    assert command[:2] == [sys.executable, "-m"]
+    done = run_module(*command[2:], cwd=tmp_path)
+    assert (done.code, done.out) == (0, "gears.h5\n")
     assert names_in(tmp_path) == ["gears.h5", "gears.toml"]
     assert same_data(gearchaos.open_result(tmp_path / "gears.h5"), undisturbed)
 
@@ -150,17 +149,16 @@ def test_resume_without_an_earlier_run_simply_computes(tmp_path):
 
 def test_two_sweeps_do_not_write_to_the_same_output(tmp_path):
     small_config(tmp_path)
-    command = [sys.executable, "-m", "gearchaos.sweep", "gears.toml", *LONG]
-    with subprocess.Popen(command, cwd=tmp_path, stderr=subprocess.DEVNULL) as first:
-        while first.poll() is None and not list((tmp_path / BLOCKS).glob("*.block")):
-            time.sleep(0.005)
-        first.send_signal(signal.SIGSTOP)  # It shall not end before.
-        second = sweep(tmp_path, *LONG, "--resume")
-        first.send_signal(signal.SIGCONT)
-        assert second.code == 4
-        assert "gears.h5: another sweep is writing to it; wait for its end" in second.err
-        first.terminate()
-    assert first.returncode == 143
+    first, ended = begin("gearchaos.sweep", ("gears.toml", *LONG), tmp_path)
+    while is_running(first) and not list((tmp_path / BLOCKS).glob("*.block")):
+        time.sleep(0.005)
+    os.kill(first, signal.SIGSTOP)  # It shall not end before.
+    second = sweep(tmp_path, *LONG, "--resume", beside=True)
+    os.kill(first, signal.SIGTERM)
+    os.kill(first, signal.SIGCONT)
+    assert second.code == 4
+    assert "gears.h5: another sweep is writing to it; wait for its end" in second.err
+    assert ended().code == 143
     assert names_in(tmp_path) == [BLOCKS, "gears.toml"]
 
 
@@ -244,16 +242,14 @@ def test_damaged_foreign_and_ill_dated_blocks_are_told_and_computed_again(tmp_pa
 def test_an_output_folder_that_is_removed_meanwhile_is_code_4(tmp_path):
     small_config(tmp_path)
     (tmp_path / "results").mkdir()
-    command = [sys.executable, "-m", "gearchaos.sweep", "gears.toml", *LONG]
-    command += ["--output", "results/gears.h5"]
-    with subprocess.Popen(command, cwd=tmp_path, stderr=subprocess.PIPE, text=True) as process:
-        while process.poll() is None and not list((tmp_path / "results" / BLOCKS).glob("*.block")):
-            time.sleep(0.005)
-        while (tmp_path / "results").exists():
-            shutil.rmtree(tmp_path / "results", ignore_errors=True)
-        _, err = process.communicate(timeout=HANGS)
-    assert process.returncode == 4
-    assert "Traceback" not in err
+    words = ("gears.toml", *LONG, "--output", "results/gears.h5")
+    process, ended = begin("gearchaos.sweep", words, tmp_path)
+    while is_running(process) and not list((tmp_path / "results" / BLOCKS).glob("*.block")):
+        time.sleep(0.005)
+    while (tmp_path / "results").exists():
+        shutil.rmtree(tmp_path / "results", ignore_errors=True)
+    code, _, err = ended()
+    assert code == 4
     assert "cannot be written: No such file or directory; create the folder first" in err
 
 
@@ -297,13 +293,12 @@ def test_a_pipe_in_the_place_of_the_result_is_refused_at_once(tmp_path):
 
 def test_the_same_command_is_not_recommended_where_it_must_fail_again(tmp_path):
     small_config(tmp_path)
-    command = [sys.executable, "-m", "gearchaos.sweep", "gears.toml", *LONG]
-    with subprocess.Popen(command, cwd=tmp_path, stderr=subprocess.PIPE, text=True) as process:
-        while process.poll() is None and not (tmp_path / BLOCKS / "manifest.json").exists():
-            time.sleep(0.005)
-        (tmp_path / "gears.h5").write_bytes(b"precious")
-        _, err = process.communicate(timeout=HANGS)
-    assert process.returncode == 4
+    process, ended = begin("gearchaos.sweep", ("gears.toml", *LONG), tmp_path)
+    while is_running(process) and not (tmp_path / BLOCKS / "manifest.json").exists():
+        time.sleep(0.005)
+    (tmp_path / "gears.h5").write_bytes(b"precious")
+    code, _, err = ended()
+    assert code == 4
     assert "gears.h5: exists already; replace it with --overwrite" in err
     assert "1000 of 1000 lanes are kept" in err
     assert "continue with" not in err
