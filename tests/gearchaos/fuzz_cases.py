@@ -48,6 +48,10 @@ USERS = (
 """Commands that need most of what a result file holds."""
 
 
+WORDINGS = ("units", "long_name", "symbol", "origin", "ancillary_variables")
+"""Attributes of a dataset that say what it is to people."""
+
+
 class Case(NamedTuple):
     """One bad input and the command it is given to.
 
@@ -212,18 +216,23 @@ def result_cases(numbers: Iterable[int], folder: Path) -> Iterator[Case]:
 def lacking_cases(folder: Path) -> Iterator[Case]:
     """Remove each dataset and attribute of a sound result in turn, and give it to its readers.
 
-    Datasets, attributes of the file and meanings of flags go to every command, other attributes of
-    a dataset to the commands in turn, and wordings to the one that draws figures.
+    Datasets, attributes of the file and meanings of flags go to every command, and other attributes
+    of a dataset to the commands in turn. Wordings of one kind are removed from all datasets at
+    once, and go to the command that draws figures.
     """
     good, path = _good_results(folder)[0], folder / "lacking.h5"
-    for number, part in enumerate(parts_of(good)):
-        wording = part[1] in ("units", "long_name", "symbol", "origin", "ancillary_variables")
-        without(part, good, path)
-        decisive = part[0] == "/" or part[1] in ("", "flag_meanings")
-        users = USERS if decisive else USERS[3:4] if wording else [USERS[number % len(USERS)]]
-        for command, *options in map(str.split, users):
+    parts = parts_of(good)
+    worded = {key: [part for part in parts if part[1] == key] for key in WORDINGS}
+    removed = [(" ".join(part), [part]) for part in parts if part[1] not in WORDINGS]
+    removed += [(f"every {key}", found) for key, found in worded.items()]
+    for number, (kind, lacking) in enumerate(removed):
+        without(lacking, good, path)
+        name, key = lacking[0]
+        decisive = name == "/" or key in ("", "flag_meanings")
+        one = USERS[3:4] if key in WORDINGS else [USERS[number % len(USERS)]]
+        for command, *options in map(str.split, USERS if decisive else one):
             arguments = [str(path), *(str(folder / one) if "." in one else one for one in options)]
-            yield Case(" ".join(part), number, command, arguments, path)
+            yield Case(kind, number, command, arguments, path)
     path.unlink()
 
 

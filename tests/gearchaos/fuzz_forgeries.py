@@ -3,7 +3,7 @@
 import io
 import re
 import zlib
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 
 import h5py
@@ -35,15 +35,15 @@ def parts_of(good: bytes) -> list[tuple[str, str]]:
     return parts
 
 
-def without(part: tuple[str, str], good: bytes, path: Path) -> None:
-    """Write a sound result file without one of its datasets or attributes."""
+def without(parts: Iterable[tuple[str, str]], good: bytes, path: Path) -> None:
+    """Write a sound result file without some of its datasets or attributes."""
     path.write_bytes(good[:-CHECKSUM_LINE])
-    name, key = part
     with h5py.File(path, "r+") as file:
-        if key:
-            del file[name].attrs[key]
-        else:
-            del file[name]
+        for name, key in parts:
+            if key:
+                del file[name].attrs[key]
+            else:
+                del file[name]
 
 
 def _damaged_heaps(content: bytes) -> bytes:

@@ -7,6 +7,7 @@ import h5py
 import pytest
 
 from .fuzz_cases import (
+    WORDINGS,
     Case,
     Watch,
     configuration_cases,
@@ -72,6 +73,9 @@ def test_whatever_a_result_lacks_ends_in_a_sentence(tmp_path):
         assert said[part, command].code == 4, part
         assert words in said[part, command].said, part
     assert said["/ title", "response"].code == 0
+    # Else the first lack would hide the others; only one of the datasets here has an origin.
+    codes = {key: said[f"every {key}", "plot"].code for key in WORDINGS}
+    assert codes == {**dict.fromkeys(WORDINGS, 0), "origin": 4}
 
 
 def test_a_case_is_made_again_by_its_number(tmp_path):

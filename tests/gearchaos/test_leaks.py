@@ -16,7 +16,7 @@ from .test_figures import logistic_sweep
 from .test_maps import RESULT as MAP
 from .tiny_sweep import configuration
 
-RUNS, PAGES = 200, 60
+RUNS, PAGES = 200, 30
 
 SELF = Path("/proc/self")
 MEGABYTE = 1 << 20
