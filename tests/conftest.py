@@ -14,11 +14,18 @@ settings.register_profile(
 )
 settings.load_profile("repeatable")
 
-FIRST = ("vectorisation", "flow_map", "explore", "oracle", "shard_option", "dask", "loads")
-FIRST += ("hard_groups", "swept_parameters", "sweep_interrupted", "teeth_linear")
-FIRST += ("accuracy", "teeth")
-"""Files that run first, in this order: none of them shall be the last that runs, and what they
-compile shall be in the cache before another process asks for it.
+FIRST = ("vectorisation", "flow_map", "dask", "explore", "oracle", "second_model", "claims")
+FIRST += (
+    "fuzz",
+    "sweep_interrupted",
+    "chosen",
+    "teeth_flanks",
+    "notebook",
+    "teeth_linear",
+    "teeth",
+)
+FIRST += ("twin", "leaks", "threads", "hard_groups", "swept_parameters", "shard_option", "accuracy")
+"""Files that run first, in this order: they take longest, or compile what many others need.
 
 The first one compiles its scenes whatever is in the cache.
 """
@@ -47,6 +54,13 @@ def pytest_collection_modifyitems(items):
     items.sort(key=lambda item: places.get(item.path.stem, len(FIRST)))
 
 
-def pytest_collection_finish():
-    """Take what is imported out of the garbage collector's sight: it stays to the end."""
+def pytest_collection_finish(session):
+    """Take what is imported out of the garbage collector's sight: it stays to the end.
+
+    Where several processes run tests, let none compile what another one is compiling.
+    """
+    if hasattr(session.config, "workerinput"):
+        from .gearchaos.compiled_once import install
+
+        install()
     gc.freeze()

@@ -20,6 +20,7 @@ import sys
 from contextlib import suppress
 from typing import Any, NoReturn
 
+import compiled_once
 import matplotlib.pyplot as plt  # noqa: F401
 import numba
 from numba.core.registry import cpu_target
@@ -38,6 +39,7 @@ def main() -> None:
     """Serve until the input ends."""
     for name in sys.argv[1:]:
         importlib.import_module(name)
+    compiled_once.install()
     # What Numba would import in every process before it loads the first kernel.
     cpu_target.typing_context.refresh()
     cpu_target.target_context.refresh()
