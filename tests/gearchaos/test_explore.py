@@ -255,7 +255,11 @@ def test_a_zoom_is_drawn_anew_a_link_brings_it_back_and_a_command_its_figure(
     sizes: list[int] = []
     page.on("websocket", lambda one: one.on("framereceived", lambda sent: sizes.append(len(sent))))
     look(page, address)
-    page.wait_for_timeout(1000)
+    # On a busy machine a picture may be under way for longer than a second.
+    shown = -1
+    while shown != len(sizes):
+        shown = len(sizes)
+        page.wait_for_timeout(1000)
     sizes.clear()
     zoom(page)
     assert_counted_anew(page, path, sizes)
