@@ -1,8 +1,7 @@
-"""From the dimensionless groups to the numbers the inner loop reads.
+"""From the dimensionless groups of Pan 2021 to the coefficients that the inner loop reads.
 
-This is the only place that knows both the notation of Pan 2021 and the scaled coordinates of
-`equations`: the groups come in as they are printed in eqs 8-13, and leave as coefficients per
-step. With a step of 1 they are those per unit of tau.
+Groups are in the notation of eqs 8-13; coefficients belong to the scaled coordinates of `equations`
+and are per step. With a step of 1 they are per unit of tau. No other file knows both.
 """
 
 from collections import namedtuple
@@ -26,20 +25,21 @@ Lane = namedtuple(
     "axial_error_mean axial_error_amplitude axial_error_rate "
     "cos_phase sin_phase cosine tangential_speed axial_speed",
 )
-"""Coefficients of one lane (numbers) or of many (arrays), per step; see `lane_coefficients`."""
+"""Coefficients of one lane (numbers) or of all lanes (arrays), per step; `lane_coefficients`
+has their definitions."""
 
 BEARING_DAMPING = [name for name in Groups._fields if "_damping_" in name]
 BEARING_STIFFNESS = [name for name in Groups._fields if "_stiffness_" in name]
 
 
 def state_scales(system: "GearPairs", step: Floats) -> Floats:
-    """Return what turns scaled states into those of eq. 13, shape (lanes, states).
+    """Return the factors from scaled states to those of eq. 13, shape (lanes, states).
 
-    ``step``, shape (lanes,), is the length of a step in units of tau.
+    ``step``: length of a step in units of tau, shape (lanes,).
     """
     groups, effects = system.groups, system.effects
     cosine, sine = np.cos(groups.base_helix_angle), np.sin(groups.base_helix_angle)
-    # A spur pair has no axial mesh force: any non-zero scale serves its axial bearings.
+    # A spur pair has no axial mesh force, so the scale of its axial bearings is arbitrary.
     sine = np.where(sine == 0.0, 1.0, sine)
     displacements = [cosine]
     for present, way in ((effects.transverse, cosine), (effects.axial, sine)):
@@ -51,14 +51,17 @@ def state_scales(system: "GearPairs", step: Floats) -> Floats:
 
 
 def lane_coefficients(system: "GearPairs", step: Floats) -> Floats:
-    """Return the coefficients of every lane, shape (lanes, number of fields of `Lane`)."""
+    """Return the coefficients of every lane, shape (lanes, number of fields of `Lane`).
+
+    ``step``: length of a step in units of tau, shape (lanes,).
+    """
     groups = system.groups
     cosine, sine = np.cos(groups.base_helix_angle), np.sin(groups.base_helix_angle)
     # y_1 = q - e cos(beta_b) as printed in eq. 6, or q + e - e cos(beta_b) as eq. 1 gives.
     share = 1.0 - 1.0 / cosine if system.physical else np.ones_like(cosine)
     share_z = 2.0 * np.ones_like(cosine)
     if system.physical and system.teeth is not None:
-        # Deviations of teeth lie in the transverse plane: y_1 = q - e, with q itself.
+        # Deviations of teeth are measured in the transverse plane: y_1 = q - e.
         share, share_z = 1.0 / cosine, 2.0 / cosine
     phase_step = groups.mesh_frequency * step
     lane = Lane(
@@ -91,12 +94,12 @@ def lane_coefficients(system: "GearPairs", step: Floats) -> Floats:
 def growth_rates(system: "GearPairs") -> Floats:
     """Return a bound on how fast a tangent vector grows or decays, per unit of tau, shape (lanes,).
 
-    The bound follows from the damping and the square root of the largest stiffness of the mesh in
-    one direction; bearings only exchange energy and dissipate it.
+    The bound is the damping plus the square root of the largest mesh stiffness in one direction.
+    Bearings need no term of their own: they only exchange and dissipate energy.
     """
     groups = system.groups
     bearings = np.maximum.reduce([getattr(groups, name) for name in BEARING_DAMPING])
-    # How much a unit of mesh force accelerates the approach of the gears in one direction.
+    # Acceleration of the approach of the gears in one direction per unit of mesh force.
     mobility = 1.0 + groups.mass_ratio_p + groups.mass_ratio_g
     damping = 2.0 * groups.damping_ratio * mobility + 2.0 * bearings
     bound: Floats = damping + np.sqrt(mobility * (1.0 + np.abs(groups.stiffness_variation_scale)))

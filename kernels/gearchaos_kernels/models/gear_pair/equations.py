@@ -1,25 +1,25 @@
 """Equations of motion of one lane (Pan 2021, eq. 13) and their linearisation, as plain formulas.
 
-Everything is in scaled coordinates, such that the mesh force enters every equation with coefficient
--1 (beta_b: base helix angle, mu: mass ratio)::
+Coordinates are scaled such that the mesh force enters every equation with coefficient -1 (beta_b:
+base helix angle, mu: mass ratio)::
 
     torsion = delta_5 / cos(beta_b)
     transverse_p = delta_1 / (mu_p cos(beta_b))    transverse_g = -delta_2 / (mu_g cos(beta_b))
     axial_p = delta_3 / (mu_p sin(beta_b))         axial_g = -delta_4 / (mu_g sin(beta_b))
 
-displacements dimensionless and rates, accelerations and forces per step and per step squared. There
-(with q = approach of the two gears)::
+Displacements are dimensionless; rates are per step, accelerations and forces per step squared. With
+q for the approach of the two gears, the gaps are::
 
     gap_y = q - e,            y_1 = cos(beta_b) gap_y
     gap_z = p - gap_y - 2 e,  y_2 = sin(beta_b) gap_z,   p = mu_p axial_p + mu_g axial_g
 
-for the published formulation; the physical one multiplies the first e by 1 - 1/cos(beta_b) and
-leaves the second line as it is. The clearance of both directions is then the same half backlash.
+in the published formulation. The physical one multiplies the first e by 1 - 1/cos(beta_b) and
+leaves the second line as it is. In these coordinates the clearance of both directions is the same
+half backlash.
 
-Deviations of teeth in the physical formulation lie along the transverse line of action: both e
-become e / cos(beta_b), and the equations are those of a torsion that is measured from rest, without
--e (`from_kept`). The error of a tooth is constant, so that the damper sees the rates of q and of
-p - q.
+In the physical formulation, deviations of teeth act along the transverse line of action: both e
+become e / cos(beta_b). The torsion is then measured from rest instead of from e (`from_kept`). The
+error of a tooth is constant, so the damper acts on the rates of q and of p - q.
 """
 
 from typing import NamedTuple
@@ -31,7 +31,7 @@ from gearchaos_kernels.models.protocol import Element, Gap
 
 
 class Coordinates(NamedTuple):
-    """One number for each of the five scaled coordinates; 0 for those a scene leaves out."""
+    """One number for each of the five scaled coordinates; 0 for those that a scene leaves out."""
 
     torsion: float
     transverse_p: float
@@ -42,7 +42,7 @@ class Coordinates(NamedTuple):
 
 @scalar
 def approach(values, lane, scene):
-    """Return delta_1 - delta_2 + delta_5 (eq. 6) over cos(beta_b), or its rate from rates."""
+    """Return (delta_1 - delta_2 + delta_5) / cos(beta_b) (eq. 6), or its rate from rates."""
     if scene.model.transverse is None:
         return values.torsion
     return (
@@ -54,16 +54,16 @@ def approach(values, lane, scene):
 
 @scalar
 def axial_approach(values, lane):
-    """Return delta_3 - delta_4 (eq. 7) over sin(beta_b), or its rate from rates."""
+    """Return (delta_3 - delta_4) / sin(beta_b) (eq. 7), or its rate from rates."""
     return lane.mass_ratio_p * values.axial_p + lane.mass_ratio_g * values.axial_g
 
 
 @scalar
 def gaps_at(state, lane, forcing, scene):
-    """Return y_1 over cos(beta_b) and, with an axial pair, y_2 over sin(beta_b) (eqs 6, 7)."""
+    """Return y_1 / cos(beta_b) and, with axial motion, y_2 / sin(beta_b) (eqs 6, 7)."""
     gap = approach(state.position, lane, scene) - forcing.error
     rate = approach(state.rate, lane, scene) - forcing.error_rate
-    # The same in both directions: e' and 2 e' of the axial gap less e' of the tangential one.
+    # Both gaps close faster by e': the axial one contains 2 e' - e'.
     moved = forcing.error_rate if scene.model.undamped is not None else 0.0
     if scene.model.axial is None:
         return (Gap(gap, rate, rate + moved),)
@@ -74,10 +74,11 @@ def gaps_at(state, lane, forcing, scene):
 
 @scalar
 def from_kept(state, forcing, scene):
-    """Return a state with a torsion that is measured from rest, where e is that of teeth.
+    """Return a state whose torsion is measured from rest, if the errors are those of teeth.
 
-    In this coordinate the error acts on the mesh springs alone. In that of eq. 13 e'' drives the
-    pair as well, of which a step sees nothing where teeth take their load in less than a step.
+    In this coordinate the error acts on the mesh springs only. With delta_5 of eq. 13, measured
+    from e, e'' drives the pair as well; a step does not resolve e'' where a tooth takes up its load
+    within less than a step.
     """
     if scene.model.undamped is None:
         return state
@@ -88,7 +89,7 @@ def from_kept(state, forcing, scene):
 
 @scalar
 def to_kept(state, forcing, scene):
-    """Return a state with a torsion that is measured from e again, as delta_5 is."""
+    """Return a state whose torsion is measured from e again, as delta_5 of eq. 13 is."""
     if scene.model.undamped is None:
         return state
     return State(
@@ -106,7 +107,7 @@ def kept_accelerations(changes, lane, point, scene):
 
 @scalar
 def with_torsion(values, more):
-    """Return coordinates with more torsion."""
+    """Return coordinates with a number added to the torsion."""
     return Coordinates(
         values.torsion + more,
         values.transverse_p,
@@ -118,7 +119,7 @@ def with_torsion(values, more):
 
 @scalar
 def elements_at(lane, forcing, scene):
-    """Return the mesh as elements: tangential and, with an axial pair, axial (eqs 2, 4)."""
+    """Return the elements of the mesh: tangential and, with axial motion, axial (eqs 2, 4)."""
     b = lane.half_backlash
     tangential = Element(forcing.stiffness, lane.mesh_damping, b)
     if scene.model.axial is None:
@@ -137,7 +138,7 @@ def half_clearances(lane, scene):
 
 @scalar
 def gap_speeds(lane, scene):
-    """Return what turns the rate of each gap per step into that of y_1 and y_2 per unit of tau."""
+    """Return the factors from gap rates per step to rates of y_1 and y_2 per unit of tau."""
     if scene.model.axial is None:
         return (lane.tangential_speed,)
     return lane.tangential_speed, lane.axial_speed
@@ -145,13 +146,13 @@ def gap_speeds(lane, scene):
 
 @scalar
 def accelerations(state, pushes, forcing, lane, scene):
-    """Return the rows of eq. 13: what mesh forces, drive and bearings make of a state."""
+    """Return the accelerations of eq. 13, from mesh forces, drive, bearings and state."""
     y, w = state
     transverse_p = 0.0
     transverse_g = 0.0
     axial_p = 0.0
     axial_g = 0.0
-    # The mesh force comes last in each row: it is known last.
+    # The mesh force is subtracted last in each row, because it is computed last.
     force = pushes[0].force
     if scene.model.transverse is not None:
         transverse_p = (
@@ -176,7 +177,7 @@ def accelerations(state, pushes, forcing, lane, scene):
 
 @scalar
 def observed_at(state, lane, point, scene):
-    """Return the transmission error delta_5 + e: delta_5 is measured from e."""
+    """Return the transmission error delta_5 + e; in eq. 13 delta_5 is measured from e."""
     error = lane.cosine * state.position.torsion
     if scene.model.pitch_error is not None and scene.model.undamped is None:
         error += pitch_error_at(lane, point, scene)

@@ -16,11 +16,42 @@ from gearchaos_kernels.plan import Floats
 def mesh_motion(
     system: GearPairs, states: Floats, steps_per_period: int, first_period: int = 0
 ) -> MeshMotion:
-    """Return forces, contact and accelerations along a motion (eqs 6, 7, 13, 22 and 23).
+    """Return mesh forces, contact, accelerations and pitch error along a motion.
 
-    Without clearance teeth never part, and the sign of the gap decides the flank. ``states``
-    (lanes, samples, states): one step apart, the first one at mesh phase 0, after ``first_period``
-    mesh periods that the teeth have turned.
+    Parameters
+    ----------
+    system : GearPairs
+        The gear pairs.
+    states : array, shape (lanes, samples, states)
+        States in the units of eq. 13. Samples are one step apart; the first one is at mesh phase 0.
+    steps_per_period : int
+        Samples per mesh period.
+    first_period : int, optional
+        Mesh periods that the teeth have turned before the first sample.
+
+    Returns
+    -------
+    MeshMotion
+        Dimensionless, as in eq. 13.
+
+    Raises
+    ------
+    ValueError
+        If more than seven tooth pairs are in mesh at once.
+
+    Notes
+    -----
+    The gaps are those of eqs 6 and 7, the mesh forces those of eqs 2 and 4 with the clearance
+    function of eqs 22 and 23. Without clearance teeth never separate, and the sign of the gap
+    decides the flank.
+
+    Examples
+    --------
+    With the states of a run that has recorded its history::
+
+        outcome = integrate(pairs, start, Plan(200, 100, 10, 1, history_periods=2))
+        motion = mesh_motion(pairs, outcome.history, 200)
+        separated = motion.contact_tangential == 0
     """
     found = evaluation.evaluate(system, states, steps_per_period, first_period)
     error = np.zeros(states.shape[:2])
@@ -47,7 +78,7 @@ def mesh_motion(
 
 @evaluator
 def _follow_error(coefficients, tables, half_steps, first, error, scene):
-    """Evaluate the pitch error at every sample, lane by lane."""
+    """Write the pitch error e at every sample into ``error``, shape (lanes, samples)."""
     memory = aligned_memory(rows(scene).total)
     for index in range(error.shape[0]):
         lane = fill_lane(memory, 0, coefficients[index], scene)

@@ -1,9 +1,9 @@
-"""What acts on a lane at one instant: mesh stiffness, load and pitch error.
+"""Forcing of a lane at one instant: mesh stiffness, load and pitch error.
 
-The pitch error here is the sine of eq. 14; `teeth` has the one that teeth share. With a fixed
-number of steps per mesh period, every period meets the same phases, so that all of it comes from
-one table: the inner loop evaluates no trigonometric function. Between the points of the table the
-series about the nearest one is as exact as the table itself.
+The pitch error here is the sine of eq. 14; `teeth` has pitch errors tooth by tooth. With a fixed
+number of steps per mesh period, the same mesh phases recur in every period. The inner loop
+therefore reads a table and evaluates no trigonometric function. Between the rows of the table the
+Taylor series about the nearest row is as accurate as the table itself.
 """
 
 import math
@@ -29,7 +29,8 @@ _MOST_TERMS = 40
 class Phase(NamedTuple):
     """A mesh phase: stiffness variation relative to the mean, and a pitch error of amplitude 1.
 
-    Of the error its value, and its first and second derivative by the phase in radians.
+    ``value``, ``slope``, ``curvature``: the error and its first and second derivative by the mesh
+    phase in radians.
     """
 
     variation: float
@@ -39,7 +40,10 @@ class Phase(NamedTuple):
 
 
 class Forcing(NamedTuple):
-    """What acts on a lane at one instant, per step; what a scene leaves out is the constant 0."""
+    """Mesh stiffness, drive and pitch errors at one instant, per step.
+
+    Fields of effects that a scene leaves out are the constant 0.
+    """
 
     stiffness: float
     drive: float
@@ -49,16 +53,16 @@ class Forcing(NamedTuple):
     axial_error_rate: float
 
 
-@lru_cache(maxsize=8)  # Made anew it would be half of what a call costs beforehand.
+@lru_cache(maxsize=8)  # Computing it takes half of the time that a call needs before its loop.
 def phase_table(
     cosine: tuple[float, ...], sine: tuple[float, ...], steps_per_period: int
 ) -> NDArray[np.float64]:
     """Return sine, cosine and stiffness variation at every half step of a mesh period.
 
-    From the Fourier coefficients of the mesh stiffness relative to its mean (eq. 19), as an array
-    of shape (2 steps + 1, 2 + terms). The last row repeats the first: the phase begins anew with
-    every period. The terms are the variation and its further Taylor coefficients in the mesh phase,
-    as many as it takes to reach halfway to the next row.
+    ``cosine``, ``sine``: Fourier coefficients of the mesh stiffness relative to its mean (eq. 19).
+    The shape is (2 steps + 1, 2 + terms); the last row repeats the first. The terms are the Taylor
+    coefficients of the variation by the mesh phase. Their number is chosen such that the series is
+    exact to rounding halfway to the next row.
     """
     half_steps = np.arange(2 * steps_per_period + 1) % (2 * steps_per_period)
     angle = np.pi * half_steps / steps_per_period
@@ -78,7 +82,8 @@ def phase_table(
 def wave_series(system: "GearPairs", steps: int, terms: int) -> Floats:
     """Return Taylor coefficients about the middle of every step, shape (3, terms, steps).
 
-    Of the stiffness variation relative to the mean (eq. 19), and of sine and cosine of the phase.
+    They are those of the stiffness variation relative to the mean (eq. 19), then of sine and cosine
+    of the mesh phase.
     """
     half = np.pi / steps
     middle = (2 * np.arange(steps) + 1) * half
@@ -95,7 +100,7 @@ def wave_series(system: "GearPairs", steps: int, terms: int) -> Floats:
 
 @scalar
 def phase_on_grid(table, row):
-    """Return one row of the table."""
+    """Return the mesh phase at one row of the table."""
     sine = table[row, SINE]
     return Phase(table[row, VARIATION], sine, table[row, COSINE], -sine)
 
@@ -138,7 +143,7 @@ def forcing_at(lane, point, scene):
     if scene.model.pitch_error is not None:
         point = shifted(lane, point, scene)
         if scene.model.undamped is None:
-            # -e'' drives delta_5, which is measured from e (eq. 13).
+            # delta_5 is measured from e, so -e'' drives it (eq. 13).
             drive = lane.load - lane.error_inertia * point.curvature
         error = lane.error_mean + lane.error_amplitude * point.value
         error_rate = lane.error_rate * point.slope
@@ -150,13 +155,16 @@ def forcing_at(lane, point, scene):
 
 @scalar
 def unforced(lane, scene):
-    """Return a mesh of mean stiffness with nothing else acting."""
+    """Return the forcing of a mesh of mean stiffness without load and pitch error."""
     return Forcing(lane.mean_stiffness, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 @scalar
 def pitch_error_at(lane, point, scene):
-    """Return e at a mesh phase: half of what the axial gap has, whatever the form of the gaps."""
+    """Return e at a mesh phase.
+
+    The axial gap contains 2 e in every formulation of the gaps; its coefficients are used here.
+    """
     value = lane.axial_error_amplitude * shifted(lane, point, scene).value
     if scene.model.undamped is not None:
         return 0.5 * lane.cosine * (lane.axial_error_mean + value)
@@ -165,7 +173,7 @@ def pitch_error_at(lane, point, scene):
 
 @scalar
 def shifted(lane, point, scene):
-    """Return a mesh phase with the sine of the error shifted by the phase that a lane gives it."""
+    """Return a mesh phase whose error is shifted by the phase of the lane (phi of eq. 14)."""
     if scene.model.phase is None:
         return point
     value = lane.cos_phase * point.value + lane.sin_phase * point.slope

@@ -7,11 +7,11 @@ import numpy as np
 from gearchaos_kernels.plan import Floats
 
 STATES = tuple(f"delta_{n}{kind}" for n in (5, 1, 2, 3, 4) for kind in ("", "_rate"))
-"""The states of eq. 13 of Pan 2021 in their one order; a scene has those of its effects."""
+"""All states of eq. 13 of Pan 2021, in the order used everywhere; see `Effects.states`."""
 
 
 class Effects(NamedTuple):
-    """Which effects act; what is off is absent from the compiled loop.
+    """Which effects act. Effects that are off are absent from the compiled loop.
 
     Attributes
     ----------
@@ -22,7 +22,12 @@ class Effects(NamedTuple):
     backlash : bool
         The teeth have clearance (eqs 22, 23).
     transverse, axial : bool
-        The bearings give way in the transverse and in the axial direction.
+        The bearings are flexible in the transverse and in the axial direction.
+
+    Examples
+    --------
+    >>> Effects(transverse=False, axial=False).states
+    ('delta_5', 'delta_5_rate')
     """
 
     pitch_error: bool = True
@@ -33,41 +38,49 @@ class Effects(NamedTuple):
 
     @property
     def states(self) -> tuple[str, ...]:
-        """The states that there are, in the order of `STATES`."""
+        """Names of the states of a pair with these effects, in the order of `STATES`."""
         present = np.repeat([True, self.transverse, self.axial], [2, 4, 4])
         return tuple(name for name, there in zip(STATES, present, strict=True) if there)
 
 
 class Groups(NamedTuple):
-    """Dimensionless groups of eqs 8-13 of Pan 2021, each an array of shape (lanes,).
+    """Dimensionless groups of eqs 8-13 of Pan 2021.
 
-    Groups of an effect that is off are ignored; 1 is a safe filling for the mass ratios and 0 for
-    everything else. Subscripts p and g: driving and driven gear.
+    Every field is an array of shape (lanes,). The subscripts p and g stand for the driving and the
+    driven gear. Groups of an effect that is off do not enter the equations; fill them with 1 for
+    mass ratios and with 0 otherwise.
 
     Attributes
     ----------
-    mesh_frequency
-        Omega, angular mesh frequency per unit of tau.
-    load
+    mesh_frequency : array
+        Omega, angular mesh frequency in rad per unit of tau.
+    load : array
         f_n, static load.
-    damping_ratio
-        xi, of the mesh.
-    base_helix_angle
+    damping_ratio : array
+        xi, damping ratio of the mesh.
+    base_helix_angle : array
         beta_b in rad.
-    half_backlash
+    half_backlash : array
         b, half the clearance.
-    error_mean, error_amplitude
+    error_mean, error_amplitude : array
         P e_0 and P e_r in units of b' (eq. 14).
-    error_phase
-        phi in rad.
-    stiffness_variation_scale
-        Factor of the harmonics of the mesh stiffness.
-    mass_ratio_p, mass_ratio_g
+    error_phase : array
+        phi in rad (eq. 14).
+    stiffness_variation_scale : array
+        Factor of the harmonics of the mesh stiffness (eq. 19).
+    mass_ratio_p, mass_ratio_g : array
         m_e / m_p and m_e / m_g.
-    transverse_stiffness_p, transverse_stiffness_g, axial_stiffness_p, axial_stiffness_g
-        k_11, k_21, k_12 and k_22, of the bearings.
-    transverse_damping_p, transverse_damping_g, axial_damping_p, axial_damping_g
-        eta_11, eta_21, eta_12 and eta_22, of the bearings.
+    transverse_stiffness_p, transverse_stiffness_g, axial_stiffness_p, axial_stiffness_g : array
+        k_11, k_21, k_12 and k_22, stiffnesses of the bearings.
+    transverse_damping_p, transverse_damping_g, axial_damping_p, axial_damping_g : array
+        eta_11, eta_21, eta_12 and eta_22, damping ratios of the bearings.
+
+    Examples
+    --------
+    Two lanes that differ in the amplitude of the pitch error::
+
+        groups = Groups(**{name: np.full(2, value) for name, value in values.items()})
+        groups = groups._replace(error_amplitude=np.array([5.0, 10.0]))
     """
 
     mesh_frequency: Floats

@@ -1,4 +1,4 @@
-"""The gear pair as a model: its flags, and what it gives the engine."""
+"""The gear pair as a model: its flags and its entries in the model protocol."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -16,17 +16,20 @@ from gearchaos_kernels.scene import implement
 
 @dataclass(frozen=True)
 class GearPair:
-    """What the compiled loop of a gear pair has: True, or None where it is left out.
+    """Flags of a gear pair: True for what the compiled loop contains, None for what it leaves out.
 
     Attributes
     ----------
-    pitch_error, stiffness_variation, transverse, axial
-        The effects of these names.
-    phase
-        A pitch error (eq. 14) that has a phase.
-    teeth, undamped, wide
-        Pitch errors tooth by tooth, those that act on the springs of the mesh alone, and with more
-        than four pairs in mesh.
+    pitch_error, stiffness_variation, transverse, axial : True or None
+        The effects of these names; see `Effects`.
+    phase : True or None
+        The pitch error of eq. 14 has a phase.
+    teeth : True or None
+        Every tooth has its own pitch error.
+    undamped : True or None
+        These errors act on the springs of the mesh and not on its damper.
+    wide : True or None
+        More than four tooth pairs are in mesh at once.
     """
 
     pitch_error: Any
@@ -49,18 +52,21 @@ def _elements(flags: GearPair) -> int:
 
 
 def _inputs(flags: GearPair) -> NDArray[Any]:
-    """Load, then as far as there are: sine and cosine part of the pitch error."""
+    """Return how the inputs force a pair: the load, then sine and cosine part of the pitch error.
+
+    See `MapFormulas.inputs`. A scene without pitch error, or without its phase, has fewer inputs.
+    """
     inputs = np.zeros((3, 3, 3))
     inputs[0, 0, 0] = 1.0
-    # sin and cos of the phase feed its sine and its cosine, those shifted by a quarter of a turn
-    # its cosine and its negative sine.
+    # The first part is sin(phase), with the derivative cos(phase). The second part is a quarter of
+    # a turn ahead: cos(phase), with the derivative -sin(phase).
     inputs[1, 1, 1] = inputs[1, 2, 2] = 1.0
     inputs[2, 1, 2], inputs[2, 2, 1] = 1.0, -1.0
     return inputs[: 1 + bool(flags.pitch_error) + bool(flags.pitch_error and flags.phase)]
 
 
 def _apart(flags: GearPair) -> tuple[frozenset[int], frozenset[int]]:
-    """The axial pair: eq. 13 drives it one way."""
+    """Return the axial states and the axial element, which do not act on the others (eq. 13)."""
     if not flags.axial:
         return frozenset(), frozenset()
     states = 2 * sum(_coordinates_of(flags))
@@ -94,7 +100,7 @@ def _point_of_waves(waves, scene):
 
 @scalar
 def _unit_forcing(lane, drive, waves, scene):
-    """Return what a drive and these values of sine and cosine do."""
+    """Return the forcing of a lane of unit inputs by a drive, and by this sine and cosine."""
     acting = forcing_at(lane, _point_of_waves(waves, scene), scene)
     return Forcing(
         acting.stiffness,
@@ -108,7 +114,7 @@ def _unit_forcing(lane, drive, waves, scene):
 
 @scalar
 def _mobility_forces(lane, scene):
-    """Return the share that each direction has of the mesh stiffness."""
+    """Return the stiffness of each direction relative to the mesh stiffness."""
     if scene.model.axial is None:
         return (1.0,)
     return 1.0, lane.axial_share
@@ -116,7 +122,7 @@ def _mobility_forces(lane, scene):
 
 @scalar
 def _inputs_of(lane, scene):
-    """Return load, and both parts of the pitch error."""
+    """Return the load and the amplitudes of both parts of the pitch error."""
     amplitude = 0.5 * lane.axial_error_amplitude
     if scene.model.pitch_error is None:
         return (lane.load,)
@@ -127,7 +133,7 @@ def _inputs_of(lane, scene):
 
 @scalar
 def _mean_gaps(lane, scene):
-    """Return what the mean pitch error takes from the gaps."""
+    """Return by how much the mean pitch error reduces each gap."""
     tangential, axial = 0.0, 0.0
     if scene.model.pitch_error is not None:
         tangential, axial = lane.error_mean, lane.axial_error_mean - lane.error_mean

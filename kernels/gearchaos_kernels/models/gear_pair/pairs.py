@@ -1,4 +1,4 @@
-"""Gear pairs with pitch error, one in every lane: the right-hand side of eq. 13 of Pan 2021."""
+"""A batch of gear pairs with pitch error, one per lane: the right-hand side of eq. 13."""
 
 import math
 from dataclasses import dataclass
@@ -21,28 +21,28 @@ from gearchaos_kernels.models.lane_system import LaneSystem
 from gearchaos_kernels.plan import Floats
 from gearchaos_kernels.scene import flag
 
-_UNIT = {
+_UNIT_GROUPS = {
     "load": 0.0,
     "half_backlash": 0.0,
     "error_mean": 0.0,
     "error_amplitude": 1.0,
     "error_phase": 0.0,
 }
-"""Groups on which flow maps do not depend, with their values for inputs of one."""
+"""Groups on which flow maps do not depend, with their values in a system of unit inputs."""
 
-_BEYOND_MEASURE = 1e150
-"""Groups are cut short of it where the modes of a pair are computed: products do not overflow."""
+_LARGEST_GROUP = 1e150
+"""Groups are clipped to it before modes are computed, so that products do not overflow."""
 
 _POINTS_PER_WAVE = 64
-"""Points at which extremes of the mesh stiffness are sought, per period of its last harmonic."""
+"""Points per period of the highest stiffness harmonic at which its extremes are sought."""
 
-_OWN = [name for name in Groups._fields if name not in _UNIT]
+_MAP_GROUPS = [name for name in Groups._fields if name not in _UNIT_GROUPS]
 """Groups on which the flow maps of a lane depend."""
 
 
 @dataclass(frozen=True, eq=False)
 class GearPairs(LaneSystem):
-    """Everything that defines the right-hand side of eq. 13 for a batch of lanes.
+    """A batch of gear pairs: all that defines the right-hand side of eq. 13.
 
     Attributes
     ----------
@@ -53,10 +53,27 @@ class GearPairs(LaneSystem):
     stiffness_cosine, stiffness_sine : array, shape (harmonics,)
         Fourier coefficients of the mesh stiffness relative to its mean (eq. 19).
     physical : bool
-        Whether delta_5 + e enters the gaps, as eq. 1 gives, instead of delta_5 as eqs 6 and 7 are
-        printed.
+        Whether the gaps contain delta_5 + e, as follows from eq. 1, or delta_5 alone, as printed in
+        eqs 6 and 7.
     teeth : Teeth or None
-        Pitch errors tooth by tooth in place of the sine of eq. 14.
+        Pitch errors tooth by tooth, in place of the sine of eq. 14.
+
+    Notes
+    -----
+    The equations of motion are eq. 13 of Pan 2021, with the gaps of eqs 6 and 7::
+
+        y_1 = delta_1 - delta_2 + delta_5 - e cos(beta_b)        (+ e if physical)
+        y_2 = delta_3 - delta_4 - tan(beta_b) y_1 - 2 e sin(beta_b)
+
+    The module `equations` has all of them in scaled coordinates.
+
+    Examples
+    --------
+    ::
+
+        pairs = GearPairs(Effects(axial=False), groups, cosine, sine)
+        start = np.zeros((pairs.lanes, len(pairs.states)))
+        outcome = integrate(pairs, start, Plan(200, 300, 100, 100))
     """
 
     effects: Effects
@@ -68,7 +85,7 @@ class GearPairs(LaneSystem):
 
     @property
     def states(self) -> tuple[str, ...]:
-        """The states that there are, in the order of `STATES`."""
+        """Names of the states, in the order of `STATES`."""
         return self.effects.states
 
     @property
@@ -78,7 +95,7 @@ class GearPairs(LaneSystem):
 
     @property
     def repeats_after(self) -> int:
-        """Mesh periods after which the excitation repeats: 1, or until the same teeth meet."""
+        """Mesh periods after which the excitation repeats; with teeth, until the same two meet."""
         if self.teeth is None or not self.effects.pitch_error:
             return 1
         return math.lcm(self.teeth.driving.shape[1], self.teeth.driven.shape[1])
@@ -89,7 +106,7 @@ class GearPairs(LaneSystem):
         return self.effects.backlash
 
     def flags(self) -> GearPair:
-        """Return what the compiled loop has of the model."""
+        """Return which parts of the model the compiled loop contains."""
         effects = self.effects
         teeth = self.teeth if effects.pitch_error else None
         phase = effects.pitch_error and teeth is None and bool(np.any(self.groups.error_phase))
@@ -109,11 +126,11 @@ class GearPairs(LaneSystem):
         return lane_coefficients(self, step)
 
     def scales(self, step: Floats) -> Floats:
-        """Return what turns scaled states into those of eq. 13, shape (lanes, states)."""
+        """Return the factors from scaled states to those of eq. 13, shape (lanes, states)."""
         return state_scales(self, step)
 
     def tables(self, steps_per_period: int) -> Tables:
-        """Return what acts on all lanes over a mesh period, on a grid of half steps."""
+        """Return the tables over one mesh period, on a grid of half steps."""
         return tables_of(self, steps_per_period)
 
     def growth_rates(self) -> Floats:
@@ -121,20 +138,21 @@ class GearPairs(LaneSystem):
         return growth_rates(self)
 
     def linearised(self) -> Self:
-        """Return it without excitation and clearance, which are no part of its linearisation."""
+        """Return the system without excitation and clearance, which a linearisation leaves out."""
         effects = Effects(False, False, False, self.effects.transverse, self.effects.axial)
         return self.replace(effects=effects)
 
     def measurable(self) -> Self:
-        """Return it with groups cut short of overflow."""
-        clipped = (np.clip(group, -_BEYOND_MEASURE, _BEYOND_MEASURE) for group in self.groups)
+        """Return the system with groups clipped, so that their products do not overflow."""
+        clipped = (np.clip(group, -_LARGEST_GROUP, _LARGEST_GROUP) for group in self.groups)
         return self.replace(groups=Groups(*clipped))
 
     def branch_stiffnesses(self) -> Floats:
-        """Return kappa f' on the branches, (branches, lanes, elements).
+        """Return kappa f' on each contact branch, shape (branches, lanes, elements).
 
-        In contact at the extremes of the mesh stiffness, and 0 out of contact. The axial motion
-        acts on nothing else: both directions in contact or apart are all branches that count.
+        The branches are: contact at the smallest and at the largest mesh stiffness, and no contact.
+        Both directions are on the same branch: the axial motion does not act back on the rest, so
+        combinations add no further exponents.
         """
         values = [np.ones(self.lanes)]
         if self.effects.stiffness_variation:
@@ -148,7 +166,7 @@ class GearPairs(LaneSystem):
         return np.repeat(np.stack(values)[..., np.newaxis], self.elements, axis=2)
 
     def contact_state(self) -> Floats:
-        """Return the clearance taken up towards the load, and the deflection f_n at stiffness 1."""
+        """Return the state at rest under the load: half the backlash plus the deflection f_n."""
         groups, state = self.groups, np.zeros((self.lanes, len(self.states)))
         clearance = np.zeros(self.lanes)
         if self.effects.backlash:
@@ -159,22 +177,22 @@ class GearPairs(LaneSystem):
     def static_force(self) -> Floats:
         """Return N_y at rest and mean stiffness: eq. 13 gives cos(beta_b) N_y = f_n.
 
-        The gap y_1 less its clearance b cos(beta_b) is as large.
+        It equals the deflection, the gap y_1 less its clearance b cos(beta_b).
         """
         force: Floats = self.groups.load / np.cos(self.groups.base_helix_angle)
         return force
 
     def of_unit_inputs(self) -> Self:
-        """Return it forced by inputs of one, from which flow maps are made."""
-        unit = {name: np.full(self.lanes, value) for name, value in _UNIT.items()}
+        """Return the system with unit inputs, from which flow maps are computed."""
+        unit = {name: np.full(self.lanes, value) for name, value in _UNIT_GROUPS.items()}
         return self.replace(groups=self.groups._replace(**unit))
 
     def owned(self) -> Floats:
         """Return all numbers on which the flow maps of a lane depend, shape (lanes, numbers)."""
-        return np.array([getattr(self.groups, name) for name in _OWN]).T.copy()
+        return np.array([getattr(self.groups, name) for name in _MAP_GROUPS]).T.copy()
 
     def shared(self) -> tuple[object, ...]:
-        """Return all else on which flow maps depend, the same for all lanes."""
+        """Return what else the flow maps depend on, the same for all lanes."""
         return self.physical, self.stiffness_cosine.tobytes(), self.stiffness_sine.tobytes()
 
     def harmonics(self) -> int:
@@ -184,7 +202,8 @@ class GearPairs(LaneSystem):
     def wave_series(self, steps: int, terms: int) -> Floats:
         """Return Taylor coefficients about the middle of every step, shape (3, terms, steps).
 
-        Of the stiffness variation relative to the mean (eq. 19), and of sine and cosine.
+        They are those of the stiffness variation relative to the mean (eq. 19), of the sine and of
+        the cosine of the mesh phase.
         """
         return wave_series(self, steps, terms)
 
@@ -193,7 +212,7 @@ class GearPairs(LaneSystem):
         return np.stack([np.sin(phase), np.cos(phase)], axis=1)
 
     def refuses_maps(self) -> str:
-        """Return why flow maps cannot integrate it, or an empty text."""
+        """Return why flow maps cannot integrate the system, or an empty text."""
         if self.effects.pitch_error and self.teeth is not None:
             return "flow maps know pitch errors that are a sine, not those of teeth"
         return ""
@@ -206,13 +225,19 @@ class GearPairs(LaneSystem):
 
 
 class MeshMotion(NamedTuple):
-    """Forces, contact and accelerations along a motion.
+    """Mesh forces, contact, accelerations and pitch error along a motion, dimensionless.
 
-    ``force_tangential``, ``force_axial`` (lanes, samples): N_y and N_z of eq. 13;
-    ``contact_tangential``, ``contact_axial`` (lanes, samples): 0 apart, 1 on the driving flank, 2
-    on the back flank; ``accelerations`` (lanes, samples, coordinates): delta_5'' and, where the
-    system has them, delta_1'' to delta_4''; ``pitch_error`` (lanes, samples): e. Without an axial
-    pair its force and contact are 0.
+    Attributes
+    ----------
+    force_tangential, force_axial : array, shape (lanes, samples)
+        N_y and N_z of eq. 13; N_z is 0 in a scene without axial motion.
+    contact_tangential, contact_axial : array of int, shape (lanes, samples)
+        0 without contact, 1 on the driving flank, 2 on the back flank; the axial one is 0 in a
+        scene without axial motion.
+    accelerations : array, shape (lanes, samples, coordinates)
+        delta_5'', then delta_1'' to delta_4'' as far as the scene has them.
+    pitch_error : array, shape (lanes, samples)
+        e.
     """
 
     force_tangential: Floats

@@ -1,12 +1,13 @@
-"""The pitch error of a pair whose teeth each have their own: shared by the tooth pairs in mesh.
+"""The pitch error of a pair in which every tooth has its own error.
 
-Pair j, one more every mesh period, is too far apart by eps_j, the error of its driven tooth less
-that of its driving one. With the contact lines l of all pairs in mesh side by side, the mesh sees
+Tooth pair j comes into mesh in mesh period j. Its flanks are too far apart by eps_j, the error of
+its driven tooth less that of its driving tooth. The pairs in mesh act in parallel, each with a
+contact line of length l, so that the error of the mesh is
 
     e = sum_j w_j eps_j,    w_j = l_j / sum_i l_i,
 
-in place of the sine of eq. 14. The shares w belong to the mesh phase alone, and come in tables; a
-lane keeps the errors of the few pairs in mesh, which move on by one pair every mesh period.
+in place of the sine of eq. 14. The shares w depend on the mesh phase only and are tabulated. A lane
+keeps the errors of the few pairs in mesh; they shift by one pair every mesh period.
 """
 
 from functools import lru_cache
@@ -31,28 +32,28 @@ if TYPE_CHECKING:
     from gearchaos_kernels.models.gear_pair.pairs import GearPairs
 
 NARROW, MOST_PAIRS = 4, 7
-"""Tooth pairs in mesh at once: with more than the first the loop is another one."""
+"""Tooth pairs in mesh at once: a faster loop serves up to `NARROW`; `MOST_PAIRS` is the limit."""
 
 ROWS = MOST_PAIRS + len(Phase._fields)
-"""Rows of a block: the errors of the pairs, then the mesh phase where the last step ended."""
+"""Rows of a block: the errors of the pairs, then the mesh phase at the end of the last step."""
 
 NO_TEETH = Teeth(np.zeros((1, 1)), np.zeros((1, 1)), np.zeros(1, np.intp), np.zeros(1), 1, 0.0)
-"""Stands where the pitch error is that of eq. 14."""
+"""Placeholder of a system whose pitch error is that of eq. 14."""
 
 
 class Tables(NamedTuple):
-    """What acts on all lanes over a mesh period, on a grid of half steps; see `forcing`.
+    """Tables over one mesh period on a grid of half steps, the same for all lanes.
 
     Attributes
     ----------
-    phases : array (2 steps + 1, columns)
+    phases : array, shape (2 steps + 1, columns)
         See `phase_table`.
-    shares : array (2 steps + 1, 3, pairs)
+    shares : array, shape (2 steps + 1, 3, pairs - 1)
         See `share_table`.
     driving, driven, profile : arrays
         See `Teeth`.
     ahead : int
-        Number of the last pair to come into mesh in a mesh period less that of the period.
+        See `Teeth.ahead`.
     """
 
     phases: Floats
@@ -64,7 +65,7 @@ class Tables(NamedTuple):
 
 
 def tables_of(system: "GearPairs", steps_per_period: int) -> Tables:
-    """Return the tables of a system. Raises ValueError with too many pairs in mesh."""
+    """Return the tables of a system; raise ValueError with too many tooth pairs in mesh."""
     waves = tuple(system.stiffness_cosine), tuple(system.stiffness_sine)
     phases = phase_table(*waves, steps_per_period)
     teeth = system.teeth if system.effects.pitch_error and system.teeth is not None else NO_TEETH
@@ -80,10 +81,11 @@ def tables_of(system: "GearPairs", steps_per_period: int) -> Tables:
 
 
 def share_table(teeth: Teeth, steps_per_period: int) -> Floats:
-    """Return the shares of the pairs in mesh at every half step, shape (2 steps + 1, 3, pairs).
+    """Return the shares of the pairs in mesh at every half step, shape (2 steps + 1, 3, pairs - 1).
 
-    The share and its first and second derivative by the mesh phase in radians. The newest pair is
-    left out: it takes the rest. Unused columns are zero. Raises ValueError with too many in mesh.
+    The second axis has the share and its first and second derivative by the mesh phase in radians.
+    The newest pair is left out, since all shares add up to 1. Unused columns are zero. Raises
+    ValueError with too many tooth pairs in mesh.
     """
     if teeth is NO_TEETH:
         return np.zeros((1, 3, NARROW - 1))
@@ -98,6 +100,7 @@ def share_table(teeth: Teeth, steps_per_period: int) -> Floats:
 
 @lru_cache(maxsize=8)
 def _table(share: bytes, cells_per_period: int, begins: float, pairs: int, steps: int) -> Floats:
+    """Return the table of `share_table`; ``share``: the bytes of its cells, which can be hashed."""
     cells = np.frombuffer(share)
     phase = np.arange(2 * steps + 1)[:, np.newaxis] / (2 * steps)
     place = cells_per_period * (phase + np.arange(pairs) - begins)
@@ -114,7 +117,7 @@ def _table(share: bytes, cells_per_period: int, begins: float, pairs: int, steps
 
 
 def _basis(x: Floats, derivative: int, degree: int = SPLINE_DEGREE) -> Floats:
-    """Return the spline of unit knots that is not zero from 0 to its degree + 1."""
+    """Return the B-spline with knots 0, 1, ..., degree + 1 or a derivative of it, at places x."""
     if derivative:
         below = _basis(x, derivative - 1, degree - 1), _basis(x - 1.0, derivative - 1, degree - 1)
         return below[0] - below[1]
@@ -127,13 +130,13 @@ def _basis(x: Floats, derivative: int, degree: int = SPLINE_DEGREE) -> Floats:
 
 @scalar
 def begin_period(memory, slot, index, period, tables, scene):
-    """Bring the tooth pairs of a mesh period into mesh, if the teeth have errors of their own."""
+    """Store the errors of the tooth pairs that are in mesh in a mesh period."""
     if scene.model.teeth is not None:
         profile = tables.profile[index]
         driving = tables.driving[profile]
         driven = tables.driven[profile]
         first = rows(scene).model
-        # The error of the last pair to come, and those of the rest less that.
+        # The error of the newest pair, then those of the others relative to it.
         newest = 0.0
         for place in range(MOST_PAIRS):
             pair = period + tables.ahead - place
@@ -145,7 +148,7 @@ def begin_period(memory, slot, index, period, tables, scene):
 
 @scalar
 def shares_at(shares, row, scene):
-    """Return one row of the table as numbers that every slot reads, None without teeth."""
+    """Return one row of the table of shares as tuples of numbers, None without teeth."""
     if scene.model.teeth is None:
         return None
     near = three(shares[row], 0)
@@ -156,7 +159,7 @@ def shares_at(shares, row, scene):
 
 @scalar
 def three(shares, first):
-    """Return the shares of three pairs with their derivatives."""
+    """Return the shares of three pairs, and their first and second derivatives."""
     return (
         (shares[0, first], shares[0, first + 1], shares[0, first + 2]),
         (shares[1, first], shares[1, first + 1], shares[1, first + 2]),
@@ -166,19 +169,19 @@ def three(shares, first):
 
 @scalar
 def grid_at(tables, row, scene):
-    """Return the mesh phase at a row of both tables, and the shares of the teeth there."""
+    """Return the mesh phase and the shares of the tooth pairs at a row of the tables."""
     return phase_on_grid(tables.phases, row), shares_at(tables.shares, row, scene)
 
 
 @scalar
 def grid_within(tables, number, fraction, scene):
-    """Return the mesh phase at a fraction of a step, where teeth have no errors of their own."""
+    """Return the mesh phase at a fraction of a step, for scenes without errors tooth by tooth."""
     return phase_within(tables.phases, number, fraction), None
 
 
 @scalar
 def point_at(memory, slot, grid, scene):
-    """Return a mesh phase with the error that the teeth share, if they have their own."""
+    """Return the mesh phase of a lane: with teeth, its error is the weighted sum over the pairs."""
     point, shares = grid
     if scene.model.teeth is None:
         return point
@@ -195,7 +198,7 @@ def point_at(memory, slot, grid, scene):
 
 @scalar
 def first_point(memory, slot, grid, scene):
-    """Return the mesh phase at which a step begins: with teeth, that which `keep_point` kept."""
+    """Return the mesh phase at the beginning of a step; with teeth, the one that was kept."""
     if scene.model.teeth is None:
         point, _ = grid
         return point
@@ -204,7 +207,7 @@ def first_point(memory, slot, grid, scene):
 
 @scalar
 def keep_point(memory, slot, point, scene):
-    """Keep the mesh phase at which a step ends and the next one begins, if it is the lane's own."""
+    """With teeth, keep the mesh phase at the end of a step, where the next one begins."""
     if scene.model.teeth is not None:
         store(memory, rows(scene).model + MOST_PAIRS, slot, point)
 
@@ -225,7 +228,7 @@ def point_within(memory, slot, tables, number, fraction, scene):
 
 @scalar
 def weigh(memory, slot, first, shares):
-    """Weigh the errors of three pairs, which are kept from a row on."""
+    """Return the weighted errors of three pairs and two derivatives; ``first``: their row."""
     e1 = memory[first * STRIDE + slot]
     e2 = memory[(first + 1) * STRIDE + slot]
     e3 = memory[(first + 2) * STRIDE + slot]
@@ -239,11 +242,11 @@ def weigh(memory, slot, first, shares):
 
 @scalar
 def between(begin, end, t, width, point):
-    """Return a mesh phase with the error at a fraction of the width between two half steps."""
-    # The polynomial of order 5 through value, slope and curvature at both.
+    """Return a mesh phase with the error interpolated at fraction t between two half steps."""
+    # Quintic Hermite interpolation: value, slope and curvature at both ends.
     c1 = width * begin.slope
     c2 = 0.5 * width * width * begin.curvature
-    # What the parabola at the beginning leaves of value, slope and curvature at the end.
+    # Value, slope and curvature at the end, less those of the parabola from the beginning.
     value = end.value - begin.value - c1 - c2
     slope = width * end.slope - c1 - 2.0 * c2
     curvature = 0.5 * width * width * end.curvature - c2

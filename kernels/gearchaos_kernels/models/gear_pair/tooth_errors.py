@@ -1,4 +1,4 @@
-"""The errors of teeth that each have their own."""
+"""Pitch errors of single teeth: the input of `teeth`."""
 
 import math
 from typing import NamedTuple
@@ -9,18 +9,30 @@ from numpy.typing import NDArray
 from gearchaos_kernels.plan import Floats
 
 SPLINE_DEGREE = 5
-"""Of the splines between the shares: e'' then has the derivatives that order 4 asks for."""
+"""Degree of the splines through the shares: a method of order 4 needs two derivatives of e''."""
 
 
 class Teeth(NamedTuple):
-    """Pitch errors tooth by tooth, in place of the sine of eq. 14; see `teeth`.
+    """Pitch errors tooth by tooth, in place of the sine of eq. 14.
 
-    ``driving`` (profiles, teeth of the driving gear), ``driven`` (profiles, teeth of the driven
-    one): the errors in the order in which teeth come into mesh, positive where the flank lies
-    ahead in the direction of rotation, in units of `Groups.error_amplitude`; ``profile`` (lanes,):
-    which of these a lane has. ``share`` (cells,): mean share of one tooth pair in the mesh force
-    over each cell, of which a mesh period has ``cells_per_period``, from its coming into mesh on:
-    pair j, of the teeth j of both gears, comes into mesh at mesh phase j + ``entry``, in periods.
+    Errors are in units of `Groups.error_amplitude`, in the order in which the teeth come into mesh,
+    and positive where the flank lies ahead in the direction of rotation. Tooth pair j consists of
+    the teeth j of both gears, each counted modulo its number of teeth.
+
+    Attributes
+    ----------
+    driving : array, shape (profiles, teeth of the driving gear)
+        Errors of the driving gear.
+    driven : array, shape (profiles, teeth of the driven gear)
+        Errors of the driven gear.
+    profile : array of int, shape (lanes,)
+        Which profile each lane has.
+    share : array, shape (cells,)
+        Mean share of one tooth pair in the mesh force over each cell, from its coming into mesh on.
+    cells_per_period : int
+        Cells per mesh period.
+    entry : float
+        Pair j comes into mesh at mesh phase j + ``entry``, in mesh periods.
     """
 
     driving: Floats
@@ -32,28 +44,28 @@ class Teeth(NamedTuple):
 
     @property
     def begins(self) -> float:
-        """Mesh phase, in periods, at which pair 0 begins to take load.
+        """Mesh phase in periods at which pair 0 begins to take load.
 
-        The spline of a cell is centred on it and reaches beyond, so that this may lie before 0.
+        The spline of a cell extends beyond the cell on both sides, so this may be negative.
         """
         return self.entry - SPLINE_DEGREE / (2.0 * self.cells_per_period)
 
     @property
     def ahead(self) -> int:
-        """How many pairs beyond the one of its number begin to take load in a mesh period."""
+        """Number of the last pair that begins to take load in mesh period n, less n."""
         return -math.floor(self.begins)
 
     @property
     def most_at_once(self) -> int:
-        """Most tooth pairs that share the load at the same time."""
+        """Largest number of tooth pairs that share the load at the same time."""
         return math.ceil(self._reach)
 
     @property
     def _reach(self) -> float:
-        """Mesh periods in which a pair has a share."""
+        """Number of mesh periods during which a pair has a share."""
         return (self.share.size + SPLINE_DEGREE) / self.cells_per_period
 
     @property
     def pairs_in_mesh(self) -> int:
-        """Most tooth pairs that have a share in the same mesh period."""
+        """Largest number of tooth pairs that have a share within one mesh period."""
         return math.ceil(self._reach + self.begins + self.ahead)
