@@ -32,7 +32,7 @@ from gearchaos_kernels.methods.protocol import (
     take_step,
     workspace,
 )
-from gearchaos_kernels.models.protocol import (
+from gearchaos_kernels.models.interfaces import (
     begin_period,
     forcing_at,
     from_kept,

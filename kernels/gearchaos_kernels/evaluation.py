@@ -23,8 +23,7 @@ from gearchaos_kernels.memory.block_memory import (
 )
 from gearchaos_kernels.memory.rows import STATE, State, rows
 from gearchaos_kernels.memory.tuples import each
-from gearchaos_kernels.models.lane_system import LaneSystem
-from gearchaos_kernels.models.protocol import (
+from gearchaos_kernels.models.interfaces import (
     accelerations,
     begin_period,
     elements_at,
@@ -38,6 +37,7 @@ from gearchaos_kernels.models.protocol import (
     point_at,
     unforced,
 )
+from gearchaos_kernels.models.lane_system import LaneSystem
 from gearchaos_kernels.plan import Floats, Plan
 from gearchaos_kernels.scene import provider_of
 

@@ -4,20 +4,20 @@ import numpy as np
 import pytest
 from gearchaos_kernels import Plan, integrate
 
-from .oscillator import System
+from .oscillator import Oscillators
 
 ZETA, LOAD, HALF_CLEARANCE = 0.05, 0.1, 1.0
 RECORDED = {"tangent": True, "contact": True, "loads": True}
 """What all tests record: one loop of each method then serves them."""
 
 
-def oscillators(frequency: np.ndarray, amplitude: float) -> System:
+def oscillators(frequency: np.ndarray, amplitude: float) -> Oscillators:
     """Return lanes of x'' + 2 zeta x' + D(x; 1) = 0.1 + amplitude W^2 cos(W tau)."""
     alike = (np.full(frequency.size, value) for value in (ZETA, HALF_CLEARANCE, LOAD))
-    return System(frequency, *alike, amplitude * frequency**2)
+    return Oscillators(frequency, *alike, amplitude * frequency**2)
 
 
-def linear_response(system: System) -> np.ndarray:
+def linear_response(system: Oscillators) -> np.ndarray:
     """Return x and x' at tau = 0 of the motion that never leaves the flank, in closed form."""
     w = system.frequency
     wave = system.amplitude / (1.0 - w**2 + 2j * ZETA * w)

@@ -13,7 +13,7 @@ from gearchaos_kernels.contact.leaving import may_leave
 from gearchaos_kernels.memory.block_memory import store
 from gearchaos_kernels.memory.rows import BRANCH, STRIDE, Branch, rows
 from gearchaos_kernels.memory.tuples import as_mask, each
-from gearchaos_kernels.models.protocol import gap_speeds, half_clearances
+from gearchaos_kernels.models.interfaces import gap_speeds, half_clearances
 from gearchaos_kernels.recorders.protocol import record_crossing
 
 

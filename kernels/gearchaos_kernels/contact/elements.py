@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from gearchaos_kernels.compilation import scalar
 from gearchaos_kernels.memory.tuples import each
-from gearchaos_kernels.models.protocol import elements_at, gaps_at, unforced
+from gearchaos_kernels.models.interfaces import elements_at, gaps_at, unforced
 
 
 class Push(NamedTuple):

@@ -124,7 +124,7 @@ def take(memory, row, slot, scale, target):
 def _coordinates(scene: Any, number: Any) -> tuple[Any, list[int | None]]:
     """Return the type of the coordinates of a scene, and the place of each among its states."""
     model = provider_of(scene.scene.model)
-    there = model.coordinates_of(scene.scene.model)
+    there = model.present(scene.scene.model)
     places = [2 * sum(there[:field]) if there[field] else None for field in range(len(there))]
     return types.NamedUniTuple(number, len(there), model.coordinates), places
 

@@ -99,7 +99,7 @@ class Rows(NamedTuple):
 def rows_of(scene: Scene) -> Rows:
     """Return the first rows of what a block holds of a scene."""
     model = provider_of(scene.model)
-    states = 2 * sum(model.coordinates_of(scene.model))
+    states = model.states(scene.model)
     elements = model.elements(scene.model)
     sizes = {
         "state": states,

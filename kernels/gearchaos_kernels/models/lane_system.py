@@ -1,12 +1,18 @@
-"""What the engine needs of the lanes of a model: their parameters, and what follows from them."""
+"""A batch of lanes of one model: their parameters, and what the engine derives from them."""
 
 from abc import ABC, abstractmethod
+from collections.abc import Mapping
 from dataclasses import fields, replace
-from typing import Any, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
+from gearchaos_kernels.models.mesh_phase import (
+    half_step_angles,
+    harmonic_series,
+    sine_and_cosine,
+)
 from gearchaos_kernels.plan import Floats
 from gearchaos_kernels.scene import provider_of
 
@@ -16,16 +22,40 @@ _Chosen = slice | NDArray[np.intp] | list[int]
 class LaneSystem(ABC):
     """The equations of motion of a batch of lanes.
 
-    A model derives a frozen dataclass from it. Fields that are arrays of shape (lanes, ...) hold
-    the parameters of the lanes; a model with other fields overrides `of`. Methods that flow maps
-    alone need are those from `of_unit_inputs` on.
+    A model derives a frozen dataclass from it, which has to define `mesh_period`, `flags`,
+    `coefficients` and `growth_rates`. The other methods have defaults. They serve models whose
+    fields are arrays of shape (lanes, ...), one parameter each, and whose excitation consists of
+    sine and cosine of the mesh phase.
 
+    Attributes
+    ----------
+    unit_inputs : mapping of str to float
+        Fields on which flow maps do not depend, such as loads and clearances, with their values in
+        a system of unit inputs. Only `of_unit_inputs` and `map_parameters` read it.
+
+    Examples
+    --------
+    A linear oscillator with a clearance and a load, whose model is registered for ``Flags``::
+
+        @dataclass(frozen=True)
+        class Oscillators(LaneSystem):
+            frequency: np.ndarray
+            half_clearance: np.ndarray
+            load: np.ndarray
+            flags: ClassVar = Flags
+
+            @property
+            def mesh_period(self):
+                return 2.0 * np.pi / self.frequency
+
+            def coefficients(self, step):
+                return np.stack([step**2, self.half_clearance, self.load * step**2], axis=1)
+
+            def growth_rates(self):
+                return np.ones(self.lanes)
     """
 
-    @property
-    @abstractmethod
-    def states(self) -> tuple[str, ...]:
-        """Names of the states, each coordinate followed by its rate."""
+    unit_inputs: ClassVar[Mapping[str, float]] = {}
 
     @property
     @abstractmethod
@@ -34,24 +64,42 @@ class LaneSystem(ABC):
 
     @abstractmethod
     def flags(self) -> Any:
-        """Return what the compiled loop has of the model, a frozen dataclass of flags."""
+        """Return which parts of the model the compiled loop contains; see `scene.implement`."""
 
     @abstractmethod
     def coefficients(self, step: Floats) -> Floats:
-        """Return the coefficients of every lane for steps of these lengths, (lanes, fields)."""
+        """Return the coefficients of every lane, shape (lanes, fields of `Model.lane`).
 
-    @abstractmethod
-    def tables(self, steps_per_period: int) -> Any:
-        """Return what acts on all lanes over a mesh period, on a grid of half steps."""
+        ``step``: length of a step in units of tau, shape (lanes,).
+        """
 
     @abstractmethod
     def growth_rates(self) -> Floats:
-        """Return a bound on how fast a tangent vector grows or decays, per unit of tau."""
+        """Return a bound on the rate at which tangent vectors grow or decay, shape (lanes,).
+
+        It is per unit of tau. Tangent vectors are scaled often enough for it.
+        """
+
+    @property
+    def states(self) -> tuple[str, ...]:
+        """Names of the states: each coordinate, followed by its rate."""
+        flags = self.flags()
+        model = provider_of(flags)
+        named = zip(model.coordinates._fields, model.present(flags), strict=True)
+        return tuple(name + kind for name, there in named if there for kind in ("", "_rate"))
+
+    def tables(self, steps_per_period: int) -> Any:
+        """Return what acts on all lanes over a mesh period, on a grid of half steps.
+
+        By default sine and cosine of the mesh phase, shape (2 steps + 1, 2).
+        """
+        return sine_and_cosine(half_step_angles(steps_per_period))
 
     def scales(self, step: Floats) -> Floats:
-        """Return the factors from scaled states to those of the equations, (lanes, states).
+        """Return the factors from scaled states to those of the equations, shape (lanes, states).
 
-        By default displacements are not scaled, and rates are per step.
+        ``step``: length of a step in units of tau, shape (lanes,). By default displacements are not
+        scaled, and rates are per step.
         """
         scales = np.ones((step.size, len(self.states)))
         scales[:, 1::2] /= step[:, np.newaxis]
@@ -70,12 +118,12 @@ class LaneSystem(ABC):
 
     @property
     def clearance(self) -> bool:
-        """Whether the elements have clearance."""
+        """Whether the elements have clearance, by default True."""
         return True
 
     @property
     def repeats_after(self) -> int:
-        """Mesh periods after which the excitation repeats."""
+        """Number of mesh periods after which the excitation repeats, by default 1."""
         return 1
 
     @property
@@ -85,81 +133,93 @@ class LaneSystem(ABC):
 
     @property
     def independent_states(self) -> tuple[str, ...]:
-        """States that act on no other state."""
+        """Names of the states that act on no other state."""
         flags = self.flags()
         maps = provider_of(flags).maps
         numbers = maps.apart(flags)[0] if maps else frozenset()
         return tuple(name for number, name in enumerate(self.states) if number in numbers)
 
     def linearised(self) -> Self:
-        """Return it without what is no part of its linearisation: excitation and clearance."""
+        """Return the system without what a linearisation leaves out: excitation and clearance."""
         return self
 
     def measurable(self) -> Self:
-        """Return it with parameters cut short of overflow; by default none is."""
+        """Return the system with parameters clipped, so that products of them do not overflow."""
         return self
 
     def branch_stiffnesses(self) -> Floats:
-        """Return stiffnesses of the elements on the branches, relative to their mean.
+        """Return stiffnesses of the elements on contact branches, relative to their mean.
 
-        Shape (branches, lanes, elements): all in contact, at the extremes of the stiffness, and all
-        apart.
+        Shape (branches, lanes, elements). The branches are: all elements in contact, once for each
+        extreme of the stiffness, and none in contact.
         """
         contact = np.ones((self.lanes, self.elements))
         return np.stack([contact, 0.0 * contact] if self.clearance else [contact])
 
     def contact_state(self) -> Floats:
-        """Return a state near rest on the flank that the load presses on, shape (lanes, states)."""
+        """Return a state near rest in contact under the load, shape (lanes, states)."""
         return np.zeros((self.lanes, len(self.states)))
 
     def static_force(self) -> Floats:
-        """Return the force of the first element under the load at rest, shape (lanes,).
+        """Return the force of the first element at rest under the load, shape (lanes,).
 
-        It is relative to the mean stiffness, so that it is the static deflection as well.
+        It is relative to the mean stiffness, so it equals the static deflection. By default it is
+        unknown (NaN).
         """
         return np.full(self.lanes, np.nan)
 
     def of(self, lanes: _Chosen) -> Self:
-        """Return the system of some lanes, in the order given."""
-        chosen = {field.name: getattr(self, field.name)[lanes] for field in fields(self)}  # type: ignore[arg-type]
-        return self.replace(**chosen)
+        """Return the system of some lanes, in the given order."""
+        return self.replace(**{field: getattr(self, field)[lanes] for field in self._fields()})
 
     def replace(self, **changes: Any) -> Self:
-        """Return it with other values of some fields."""
+        """Return the system with other values of some fields."""
         return replace(self, **changes)  # type: ignore[type-var]
 
     def repeated(self, times: int) -> Self:
         """Return the system with every lane n times in a row."""
         return self.of(np.repeat(np.arange(self.lanes), times))
 
-    def of_unit_inputs(self) -> Self:
-        """Return it forced by inputs of one, from which flow maps are made."""
-        raise NotImplementedError
+    def _fields(self) -> list[str]:
+        """Return the names of the parameters of the lanes."""
+        return [field.name for field in fields(self)]  # type: ignore[arg-type]
 
-    def owned(self) -> Floats:
+    # Flow maps use all of the following.
+
+    def refuses_maps(self) -> str:
+        """Return why flow maps cannot integrate the system, or an empty text."""
+        flags = self.flags()
+        return "" if provider_of(flags).maps else "the model has no formulas for flow maps"
+
+    def of_unit_inputs(self) -> Self:
+        """Return the system with unit inputs, from which flow maps are computed."""
+        return self.replace(
+            **{name: np.full(self.lanes, value) for name, value in self.unit_inputs.items()}
+        )
+
+    def map_parameters(self) -> Floats:
         """Return all numbers on which the flow maps of a lane depend, shape (lanes, numbers)."""
-        raise NotImplementedError
+        names = [name for name in self._fields() if name not in self.unit_inputs]
+        return np.stack([getattr(self, name) for name in names], axis=1)
+
+    def map_constants(self) -> tuple[object, ...]:
+        """Return what else the flow maps depend on, the same for all lanes."""
+        return ()
 
     def wave_series(self, steps: int, terms: int) -> Floats:
         """Return Taylor coefficients about the middle of every step, (1 + waves, terms, steps).
 
-        Of the stiffness variation relative to the mean, and of the waves that excite the model.
+        They are those of the stiffness variation relative to the mean and of the waves that excite
+        the model, in a variable that is -1 and 1 at the ends of a step. By default the stiffness is
+        constant, and the waves are sine and cosine of the mesh phase.
         """
-        raise NotImplementedError
+        wave = harmonic_series(1, steps, terms)
+        return np.stack([np.zeros((terms, steps)), wave.imag, wave.real])
 
     def wave_values(self, phase: Floats) -> Floats:
         """Return the waves at mesh phases in rad, shape (phases, waves)."""
-        raise NotImplementedError
-
-    def shared(self) -> tuple[object, ...]:
-        """Return all else on which flow maps depend, the same for all lanes."""
-        return ()
+        return sine_and_cosine(phase)
 
     def harmonics(self) -> int:
-        """Return the highest harmonic of the mesh frequency in the coefficients."""
+        """Return the highest harmonic of the mesh frequency in the coefficients, by default 0."""
         return 0
-
-    def refuses_maps(self) -> str:
-        """Return why flow maps cannot integrate it, or an empty text."""
-        flags = self.flags()
-        return "" if provider_of(flags).maps else "the model has no formulas for flow maps"

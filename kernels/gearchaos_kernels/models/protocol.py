@@ -1,25 +1,37 @@
 """What a model is: the equations of motion of a system with clearance elements.
 
-A model has coordinates, each with a rate, and elements that act on them. Everything is in scaled
-coordinates per step: displacements as the model scales them, rates, accelerations and forces per
-step and per step squared.
+A model has coordinates, each with a rate, and elements that act on them. All formulas are in scaled
+coordinates per step: displacements in a scale that the model chooses, rates per step, accelerations
+and forces per step squared.
+
+Entries that a model leaves out are those of `defaults` and `mesh_phase`.
 """
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
 from typing import Any, NamedTuple
 
+import numpy as np
 from numpy.typing import NDArray
 
 from gearchaos_kernels.compilation import scalar
-from gearchaos_kernels.scene import Interface
+from gearchaos_kernels.models import defaults, mesh_phase
+from gearchaos_kernels.plan import Floats
 
 
 class Gap(NamedTuple):
-    """The gap that an element sees, per step.
+    """The gap of an element, in scaled coordinates.
 
-    ``rate``: its rate; ``closing``: the rate at which its flanks approach, which the damper sees.
-    The two differ where the excitation moves the gap without moving the flanks.
+    Attributes
+    ----------
+    value : float
+        The gap.
+    rate : float
+        Its rate per step.
+    closing : float
+        Rate at which the flanks approach, per step; the damper acts on it. It differs from ``rate``
+        where the excitation changes the gap without moving the flanks.
     """
 
     value: float
@@ -28,10 +40,16 @@ class Gap(NamedTuple):
 
 
 class Element(NamedTuple):
-    """A spring behind a clearance with a damper beside both, per step.
+    """A clearance element: a spring behind a clearance, and a damper that always acts.
 
-    ``stiffness``: of the spring now; ``damping``: of the damper, which always acts;
-    ``half_clearance``: the gap at which the spring is met.
+    Attributes
+    ----------
+    stiffness : float
+        Stiffness of the spring at this instant, per step squared.
+    damping : float
+        Damping coefficient, per step.
+    half_clearance : float
+        The gap at which the spring comes into contact.
     """
 
     stiffness: float
@@ -39,109 +57,94 @@ class Element(NamedTuple):
     half_clearance: float
 
 
-@scalar
-def prepare_nothing(memory, slot, index, period, tables, scene):
-    """Prepare nothing for a mesh period."""
-
-
-@scalar
-def shared_point(memory, slot, grid, scene):
-    """Return the mesh phase of all lanes."""
-    return grid
-
-
-@scalar
-def keep_nothing(memory, slot, point, scene):
-    """Keep no mesh phase of its own for a lane."""
-
-
-@scalar
-def same_state(state, forcing, scene):
-    """Return a state that is kept as the equations of motion take it."""
-    return state
-
-
-@scalar
-def same_accelerations(changes, lane, point, scene):
-    """Return the accelerations of a state that is kept as the equations of motion take it."""
-    return changes
+@cache
+def _compiled(formula: Callable[..., Any]) -> Any:
+    """Return a formula compiled, if it is a plain Python function."""
+    return formula if hasattr(formula, "py_func") else scalar(formula)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Model:
-    """One model: what the engine has to know of it, and its compiled formulas.
+    """One model: what the engine needs to know about it, and its compiled formulas.
 
-    Functions of ``flags`` take the model's part of a scene; all other functions are compiled. Those
-    with a default serve models whose lanes share the mesh phase and whose states are kept as the
-    equations of motion take them.
+    Entries with an argument ``flags`` are Python functions; they receive the model's part of a
+    scene. All other functions are formulas that compiled code calls: functions compiled by
+    `scalar`, or plain Python functions, which are compiled on their first use.
 
     Attributes
     ----------
     coordinates : type
         Named tuple of the coordinates.
-    coordinates_of : callable
-        ``coordinates_of(flags)``: for each of them whether a scene has it.
+    coordinates_of : callable, optional
+        ``coordinates_of(flags)``: for each coordinate whether a scene has it; by default it has
+        all.
     lane : type
         Named tuple of the coefficients of one lane.
-    elements : callable
-        ``elements(flags)``: number of clearance elements.
-    rows : callable
-        ``rows(flags)``: rows of a block that the model keeps for itself.
+    elements : callable, optional
+        ``elements(flags)``: number of clearance elements, 1 by default.
+    rows : callable, optional
+        ``rows(flags)``: rows of a block that the model uses for itself, 0 by default.
     observed : tuple of str
         Names of the signals that `observed_at` returns.
     begin_period(memory, slot, index, period, tables, scene)
-        Prepares a lane for a mesh period.
+        Prepares a lane for a mesh period; does nothing by default.
     grid_at(tables, row, scene), grid_within(tables, number, fraction, scene)
-        What all lanes share at a row of the grid of half steps, and at a fraction of a step.
+        What all lanes share at a row of the grid of half steps, and at a fraction of step
+        ``number``. By default a `MeshPhase` from the tables of `LaneSystem.tables`.
     first_point(memory, slot, grid, scene), keep_point(memory, slot, point, scene)
-        The mesh phase at which a step begins, and keeping that at which the last one ended.
+        The mesh phase of a lane at the beginning of a step; storing that at the end of a step for
+        the next one. By default lanes share the mesh phase, and nothing is stored.
     point_at(memory, slot, grid, scene)
-        The mesh phase of a lane on the grid.
+        The mesh phase of a lane on the grid, by default the shared one.
     point_within(memory, slot, tables, number, fraction, scene)
-        The mesh phase of a lane at a fraction of a step.
+        The mesh phase of a lane at a fraction of a step, by default a `MeshPhase`.
     forcing_at(lane, point, scene), unforced(lane, scene)
-        What acts on a lane at a mesh phase, and nothing but a constant mean stiffness.
+        What acts on a lane at a mesh phase; the same without excitation and with mean stiffness. By
+        default the forcing is one number, the drive, and 0 if unforced.
     from_kept(state, forcing, scene), to_kept(state, forcing, scene)
-        A state as the equations of motion take it, from one as it is kept, and back.
+        A state in the coordinates of the equations from one as it is stored, and back. By default
+        both are the same.
     kept_accelerations(changes, lane, point, scene)
-        The accelerations of the state that is kept, from those of the equations.
+        The accelerations of the stored coordinates from those of the equations.
     elements_at(lane, forcing, scene)
-        The elements, a tuple of `Element`. Only the stiffness may depend on the forcing, and half
-        clearances are those of `half_clearances`.
-    half_clearances(lane, scene), gap_speeds(lane, scene)
-        Tuples of the half clearance of each element, and of what turns the rate of its gap into a
-        speed per unit of tau.
+        The elements, a tuple of `Element`. Only the stiffness may depend on the forcing.
+    half_clearances(lane, scene)
+        The half clearance of each element, a tuple; by default those of `elements_at`.
+    gap_speeds(lane, scene)
+        Factor from the rate of each gap per step to its speed per unit of tau, a tuple. By default
+        the coefficient ``speed`` of the lane.
     gaps_at(state, lane, forcing, scene)
         The gaps, a tuple of `Gap`.
     accelerations(state, pushes, forcing, lane, scene)
-        The equations of motion: accelerations from the forces of the elements.
+        The equations of motion: accelerations of the coordinates, from the forces of the elements
+        (`Push`), the forcing and the state.
     observed_at(state, lane, point, scene)
-        Tuple of further signals that can be recorded, of a state as the equations take it.
+        The observed signals of a state in the coordinates of the equations, a tuple.
     maps : MapFormulas or None
-        What flow maps need besides; None if the model has none.
+        What flow maps need in addition; None if they cannot integrate the model.
     """
 
     coordinates: Any
-    coordinates_of: Callable[[Any], tuple[bool, ...]]
+    coordinates_of: Callable[[Any], tuple[bool, ...]] | None = None
     lane: Any
-    elements: Callable[[Any], int]
+    elements: Callable[[Any], int] = lambda _flags: 1
     rows: Callable[[Any], int] = lambda _flags: 0
     observed: tuple[str, ...]
-    begin_period: Any = prepare_nothing
-    grid_at: Any
-    grid_within: Any
-    first_point: Any = shared_point
-    keep_point: Any = keep_nothing
-    point_at: Any = shared_point
-    point_within: Any
+    begin_period: Any = defaults.prepare_nothing
+    grid_at: Any = mesh_phase.grid_at
+    grid_within: Any = mesh_phase.grid_within
+    first_point: Any = defaults.shared_point
+    keep_point: Any = defaults.keep_nothing
+    point_at: Any = defaults.shared_point
+    point_within: Any = mesh_phase.point_within
     forcing_at: Any
-    unforced: Any
-    from_kept: Any = same_state
-    to_kept: Any = same_state
-    kept_accelerations: Any = same_accelerations
+    unforced: Any = defaults.no_drive
+    from_kept: Any = defaults.same_state
+    to_kept: Any = defaults.same_state
+    kept_accelerations: Any = defaults.same_accelerations
     elements_at: Any
-    half_clearances: Any
-    gap_speeds: Any
+    half_clearances: Any = defaults.clearances_of_elements
+    gap_speeds: Any = defaults.speeds_of_lane
     gaps_at: Any
     accelerations: Any
     observed_at: Any
@@ -149,72 +152,80 @@ class Model:
 
     def function(self, name: str, _scene: Any) -> Any:
         """Return a compiled formula by its name."""
-        return getattr(self.maps if name in MapFormulas.__annotations__ else self, name)
+        owner = self.maps if name in MapFormulas.__annotations__ else self
+        return _compiled(getattr(owner, name))
+
+    def present(self, flags: Any) -> tuple[bool, ...]:
+        """Return for each coordinate whether a scene with these flags has it."""
+        if self.coordinates_of is None:
+            return (True,) * len(self.coordinates._fields)
+        return self.coordinates_of(flags)
+
+    def states(self, flags: Any) -> int:
+        """Return the number of states of a scene with these flags."""
+        return 2 * sum(self.present(flags))
+
+    def gap_columns(self, flags: Any) -> list[int]:
+        """Return the places of the coefficients of a lane on which its gaps depend."""
+        named = self.maps and self.maps.gap_coefficients
+        names = named(flags) if named else self.lane._fields
+        return [self.lane._fields.index(name) for name in names]
+
+    def stiffness(self, coefficients: Floats) -> Floats:
+        """Return mean and variation of the stiffness of every lane, shape (lanes, 2)."""
+        stiffness = np.zeros((len(coefficients), 2))
+        for number, name in enumerate(self.maps.stiffness if self.maps else ()):
+            stiffness[:, number] = coefficients[:, self.lane._fields.index(name)]
+        return stiffness
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class MapFormulas:
     """What flow maps need of a model whose excitation is a sum of waves.
 
     Attributes
     ----------
-    waves : tuple of str
-        The functions of the mesh phase that excite the model.
-    inputs : callable
+    waves : tuple of str, optional
+        Names of the functions of the mesh phase that excite the model; sine and cosine by default.
+    inputs : callable, optional
         ``inputs(flags)``: array of shape (inputs, functions, 1 + waves). An input is a number of a
-        lane that forces it: steadily through the drive, or through waves. Entry (i, f, w): share of
-        wave w (0: the constant 1) in what input i feeds into function f of `unit_forcing`. The
-        first input is the steady one.
-    apart : callable
-        ``apart(flags)``: states and elements that act on nothing but themselves, two sets.
-    gap_coefficients : callable
-        ``gap_coefficients(flags)``: names of the coefficients of a lane on which gaps depend.
-    stiffness : callable
-        ``stiffness(coefficients)``: mean and variation of the stiffness of a lane, per step.
+        lane that forces it, either steadily or through waves. The functions are the arguments of
+        `unit_forcing`: the drive, then the waves. Entry (i, f, w) is the share of wave w (0: the
+        constant 1) that input i contributes to function f. The first input is the steady one. By
+        default the inputs are a load and the amplitude of a harmonic.
+    apart : callable, optional
+        ``apart(flags)``: numbers of the states and of the elements that act on nothing but
+        themselves, two sets; both are empty by default.
+    gap_coefficients : callable, optional
+        ``gap_coefficients(flags)``: names of the coefficients of a lane on which its gaps depend,
+        all by default.
+    stiffness : tuple of str, optional
+        Names of the coefficients that are mean and variation of the stiffness that all elements
+        share; only ``stiffness``, which is constant, by default.
     point_of_waves(waves, scene)
-        The mesh phase at which the waves have these values.
+        The mesh phase at which the waves have these values, by default a `MeshPhase`.
     unit_forcing(lane, drive, waves, scene)
-        What a drive and these values of the waves do to a lane of unit inputs.
+        The forcing of a lane of unit inputs by a drive and these values of the waves. By default
+        both add up.
     mobility_forces(lane, scene)
-        The force of each element per unit of what its spring and half clearance share: a tuple.
+        Stiffness of each element relative to the shared one, a tuple; 1 by default.
     inputs_of(lane, scene)
-        The inputs of a lane, a tuple.
+        The inputs of a lane, a tuple: the steady one per step squared, as the drive, and the others
+        relative to those of `LaneSystem.of_unit_inputs`.
     mean_gaps(lane, scene)
-        What constant parts of the excitation take from the gaps, a tuple.
+        By how much constant parts of the excitation reduce each gap, a tuple; 0 by default.
     """
 
-    waves: tuple[str, ...]
-    inputs: Callable[[Any], NDArray[Any]]
-    apart: Callable[[Any], tuple[frozenset[int], frozenset[int]]]
-    gap_coefficients: Callable[[Any], tuple[str, ...]]
-    stiffness: Callable[[Any], Any]
-    point_of_waves: Any
-    unit_forcing: Any
-    mobility_forces: Any
+    waves: tuple[str, ...] = mesh_phase.MeshPhase._fields
+    inputs: Callable[[Any], NDArray[Any]] = defaults.load_and_harmonic
+    apart: Callable[[Any], tuple[frozenset[int], frozenset[int]]] = lambda _flags: (
+        frozenset(),
+        frozenset(),
+    )
+    gap_coefficients: Callable[[Any], tuple[str, ...]] | None = None
+    stiffness: tuple[str, ...] = ("stiffness",)
+    point_of_waves: Any = mesh_phase.point_of_waves
+    unit_forcing: Any = defaults.drive_with_waves
+    mobility_forces: Any = defaults.equal_shares
     inputs_of: Any
-    mean_gaps: Any
-
-
-begin_period = Interface("model", "begin_period")
-grid_at = Interface("model", "grid_at")
-grid_within = Interface("model", "grid_within")
-first_point = Interface("model", "first_point")
-keep_point = Interface("model", "keep_point")
-point_at = Interface("model", "point_at")
-point_within = Interface("model", "point_within")
-forcing_at = Interface("model", "forcing_at")
-unforced = Interface("model", "unforced")
-from_kept = Interface("model", "from_kept")
-to_kept = Interface("model", "to_kept")
-kept_accelerations = Interface("model", "kept_accelerations")
-elements_at = Interface("model", "elements_at")
-half_clearances = Interface("model", "half_clearances")
-gap_speeds = Interface("model", "gap_speeds")
-gaps_at = Interface("model", "gaps_at")
-accelerations = Interface("model", "accelerations")
-observed_at = Interface("model", "observed_at")
-point_of_waves = Interface("model", "point_of_waves")
-unit_forcing = Interface("model", "unit_forcing")
-mobility_forces = Interface("model", "mobility_forces")
-inputs_of = Interface("model", "inputs_of")
-mean_gaps = Interface("model", "mean_gaps")
+    mean_gaps: Any = defaults.no_mean_gaps

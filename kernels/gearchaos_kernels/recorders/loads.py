@@ -29,7 +29,7 @@ from gearchaos_kernels.memory.block_memory import (
 from gearchaos_kernels.memory.rows import LANES, STRIDE, State, constants
 from gearchaos_kernels.memory.tuples import along, each
 from gearchaos_kernels.methods.protocol import grids_of
-from gearchaos_kernels.models.protocol import (
+from gearchaos_kernels.models.interfaces import (
     elements_at,
     forcing_at,
     from_kept,

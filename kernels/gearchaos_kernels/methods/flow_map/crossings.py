@@ -20,7 +20,8 @@ from gearchaos_kernels.methods.flow_map.layout import Crossing, aside_rows, layo
 from gearchaos_kernels.methods.flow_map.moments import find_moments
 from gearchaos_kernels.methods.flow_map.steps import gaps_at_ends, store_offsets
 from gearchaos_kernels.methods.flow_map.vectors import VECTOR
-from gearchaos_kernels.models.protocol import Gap, half_clearances
+from gearchaos_kernels.models.interfaces import half_clearances
+from gearchaos_kernels.models.protocol import Gap
 
 MOST_CROSSINGS = 16
 """Crossings of one step; a step with more continues with its last branches and is counted."""

@@ -94,7 +94,7 @@ def _padded(count: int) -> int:
 def layout_of(scene: Scene) -> Layout:
     """Return the layout of the maps of a scene."""
     model = provider_of(scene.model)
-    states = 2 * sum(model.coordinates_of(scene.model))
+    states = model.states(scene.model)
     elements = model.elements(scene.model)
     inputs = len(model.maps.inputs(scene.model))
     waves = len(model.maps.waves)

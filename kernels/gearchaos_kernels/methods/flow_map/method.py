@@ -21,7 +21,7 @@ from gearchaos_kernels.methods.flow_map.store import (
 )
 from gearchaos_kernels.methods.flow_map.vectors import VECTOR
 from gearchaos_kernels.methods.protocol import Method, Share, cut
-from gearchaos_kernels.models.protocol import grid_within
+from gearchaos_kernels.models.interfaces import grid_within
 from gearchaos_kernels.plan import Plan
 from gearchaos_kernels.scene import Scene, implement
 

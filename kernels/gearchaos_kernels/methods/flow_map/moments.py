@@ -14,7 +14,7 @@ from gearchaos_kernels.memory.block_memory import read_branches, read_lane
 from gearchaos_kernels.memory.rows import STRIDE, rows
 from gearchaos_kernels.methods.flow_map.layout import TERMS, aside_rows, fourth_derivative
 from gearchaos_kernels.methods.flow_map.vectors import VECTOR
-from gearchaos_kernels.models.protocol import half_clearances, mean_gaps
+from gearchaos_kernels.models.interfaces import half_clearances, mean_gaps
 
 largest_bend = scalar(fourth_derivative)
 

@@ -20,7 +20,7 @@ from gearchaos_kernels.memory.block_memory import (
 from gearchaos_kernels.memory.rows import STATE, STRIDE, State, rows
 from gearchaos_kernels.memory.tuples import each
 from gearchaos_kernels.methods.flow_map.layout import TERMS, fourth_derivative, layout, waves_at
-from gearchaos_kernels.models.protocol import (
+from gearchaos_kernels.models.interfaces import (
     accelerations,
     elements_at,
     gaps_at,

@@ -14,7 +14,7 @@ from gearchaos_kernels.memory.tuples import each
 from gearchaos_kernels.methods.flow_map import vectors
 from gearchaos_kernels.methods.flow_map.layout import layout, method_rows, waves_at
 from gearchaos_kernels.methods.flow_map.vectors import VECTOR
-from gearchaos_kernels.models.protocol import (
+from gearchaos_kernels.models.interfaces import (
     forcing_at,
     gaps_at,
     half_clearances,

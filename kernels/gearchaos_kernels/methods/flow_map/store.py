@@ -59,7 +59,7 @@ def fewest_steps(plan: Plan) -> int:
 
 def sharing(system: Any) -> NDArray[np.intp]:
     """Return the number of the group of lanes with the same maps of every lane, shape (lanes,)."""
-    rows = system.owned()
+    rows = system.map_parameters()
     if (rows == rows[:1]).all():
         return np.zeros(len(rows), dtype=np.intp)
     _, number = np.unique(rows, axis=0, return_inverse=True)
@@ -130,8 +130,8 @@ def maps_of(
     """
     global _kept
     scene = scene.bare()
-    name = (steps, type(scene.model), scene.model, scene.resolved, system.shared())
-    names = [(name, row.tobytes()) for row in system.owned()]
+    name = (steps, type(scene.model), scene.model, scene.resolved, system.map_constants())
+    names = [(name, row.tobytes()) for row in system.map_parameters()]
     done, together = 0, 1
     while done < len(names):
         some = range(done, min(done + together, len(names)))
@@ -159,8 +159,8 @@ def _make(system: Any, steps: int, scene: Scene) -> list[Floats]:
 
     A motion so fast that no steps resolve it has maps that are not a number.
     """
-    place, formulas = layout_of(scene), provider_of(scene.model).maps
-    inputs = np.ascontiguousarray(formulas.inputs(scene.model))
+    place, model = layout_of(scene), provider_of(scene.model)
+    inputs = np.ascontiguousarray(model.maps.inputs(scene.model))
     system = system.of_unit_inputs()
     made = [np.full((steps, place.step_size), np.nan)] * system.lanes
     left, count = np.arange(system.lanes), steps
@@ -173,7 +173,7 @@ def _make(system: Any, steps: int, scene: Scene) -> list[Floats]:
         width = place.states + 1 + place.waves + place.elements
         matrices = np.zeros((left.size, place.states + place.elements, width))
         differentiate(coefficients, matrices, scene)
-        stiffness = np.ascontiguousarray(formulas.stiffness(coefficients))
+        stiffness = model.stiffness(coefficients)
         forcing = system.wave_series(count, ORDER)
         make_maps(matrices, stiffness, inputs, forcing, tables, tails, place)
         for number in np.flatnonzero(tails < TAIL):

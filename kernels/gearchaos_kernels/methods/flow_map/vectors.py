@@ -309,11 +309,10 @@ def copy_lane(_typing, memory, slot, aside, n, scene):
     """Copy what a lane that crosses needs of itself to a place aside."""
     place, at, forced = layout_of(scene.scene), rows_of(scene.scene), method_rows_of(scene.scene)
     model = provider_of(scene.scene.model)
-    used = model.maps.gap_coefficients(scene.scene.model)
     copied = [*range(at.state_before, at.state_before + place.states)]
     if scene.scene.tangent is not None:
         copied += range(at.tangent_before, at.tangent_before + place.states)
-    copied += [at.coefficients + model.lane._fields.index(name) for name in used]
+    copied += [at.coefficients + column for column in model.gap_columns(scene.scene.model)]
     copied += range(at.branches, at.branches + BRANCH * place.elements)
     copied += [at.suspect]
     copied += range(forced.inputs, forced.inputs + place.columns - place.states)

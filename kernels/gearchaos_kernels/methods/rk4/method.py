@@ -20,7 +20,7 @@ from gearchaos_kernels.methods.protocol import Method, Share, cut
 from gearchaos_kernels.methods.rk4 import steps as rk4
 from gearchaos_kernels.methods.rk4.splitting import split_step
 from gearchaos_kernels.methods.rk4.stability import amplification, stable_reach
-from gearchaos_kernels.models.protocol import (
+from gearchaos_kernels.models.interfaces import (
     first_point,
     forcing_at,
     from_kept,

@@ -20,7 +20,7 @@ from gearchaos_kernels.memory.block_memory import (
 from gearchaos_kernels.memory.rows import STATE, STRIDE, rows
 from gearchaos_kernels.memory.tuples import each
 from gearchaos_kernels.methods.rk4 import steps as rk4
-from gearchaos_kernels.models.protocol import (
+from gearchaos_kernels.models.interfaces import (
     forcing_at,
     from_kept,
     gaps_at,

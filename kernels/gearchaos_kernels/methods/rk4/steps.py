@@ -17,7 +17,7 @@ from gearchaos_kernels.compilation import scalar
 from gearchaos_kernels.contact.elements import pushes_of, tangent_pushes
 from gearchaos_kernels.memory.rows import State
 from gearchaos_kernels.memory.tuples import along
-from gearchaos_kernels.models.protocol import accelerations, elements_at, gaps_at, unforced
+from gearchaos_kernels.models.interfaces import accelerations, elements_at, gaps_at, unforced
 
 
 @scalar

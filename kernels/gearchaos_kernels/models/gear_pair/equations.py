@@ -129,14 +129,6 @@ def elements_at(lane, forcing, scene):
 
 
 @scalar
-def half_clearances(lane, scene):
-    """Return the half backlash of each direction of the mesh."""
-    if scene.model.axial is None:
-        return (lane.half_backlash,)
-    return lane.half_backlash, lane.half_backlash
-
-
-@scalar
 def gap_speeds(lane, scene):
     """Return the factors from gap rates per step to rates of y_1 and y_2 per unit of tau."""
     if scene.model.axial is None:

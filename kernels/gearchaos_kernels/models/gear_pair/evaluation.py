@@ -9,7 +9,7 @@ from gearchaos_kernels.memory.block_memory import aligned_memory, fill_lane
 from gearchaos_kernels.memory.rows import rows
 from gearchaos_kernels.models.gear_pair.forcing import pitch_error_at
 from gearchaos_kernels.models.gear_pair.pairs import GearPairs, MeshMotion
-from gearchaos_kernels.models.protocol import begin_period, grid_at, point_at
+from gearchaos_kernels.models.interfaces import begin_period, grid_at, point_at
 from gearchaos_kernels.plan import Floats
 
 

@@ -14,6 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gearchaos_kernels.compilation import scalar
+from gearchaos_kernels.models.mesh_phase import (
+    half_step_angles,
+    harmonic_series,
+    nearest_row,
+    sine_and_cosine,
+    turned,
+)
 from gearchaos_kernels.plan import Floats
 
 if TYPE_CHECKING:
@@ -64,8 +71,7 @@ def phase_table(
     coefficients of the variation by the mesh phase. Their number is chosen such that the series is
     exact to rounding halfway to the next row.
     """
-    half_steps = np.arange(2 * steps_per_period + 1) % (2 * steps_per_period)
-    angle = np.pi * half_steps / steps_per_period
+    angle = half_step_angles(steps_per_period)
     order = np.arange(1, len(cosine) + 1)
     amplitude = np.array(cosine) - 1j * np.array(sine)
     reach = order * np.pi / (2 * steps_per_period)
@@ -76,7 +82,7 @@ def phase_table(
         coefficients.append(np.sum(waves.real, axis=1))
         if np.sum(np.abs(amplitude) * reach**term) < _SERIES_ERROR * math.factorial(term):
             break
-    return np.stack([np.sin(angle), np.cos(angle), *coefficients], axis=1)
+    return np.column_stack([sine_and_cosine(angle), *coefficients])
 
 
 def wave_series(system: "GearPairs", steps: int, terms: int) -> Floats:
@@ -85,17 +91,12 @@ def wave_series(system: "GearPairs", steps: int, terms: int) -> Floats:
     They are those of the stiffness variation relative to the mean (eq. 19), then of sine and cosine
     of the mesh phase.
     """
-    half = np.pi / steps
-    middle = (2 * np.arange(steps) + 1) * half
-    term = np.arange(terms)[:, np.newaxis]
-    factor = half**term / np.cumprod(np.maximum(term, 1.0))[:, np.newaxis]
-    turn = np.exp(1j * middle) * 1j**term * factor
-    variation = np.zeros(turn.shape)
+    variation = np.zeros((terms, steps))
     if system.effects.stiffness_variation:
-        for number, amplitude in enumerate(system.stiffness_cosine - 1j * system.stiffness_sine, 1):
-            waves = amplitude * np.exp(1j * number * middle) * (1j * number) ** term * factor
-            variation += waves.real
-    return np.stack([variation, turn.imag, turn.real])
+        for order, amplitude in enumerate(system.stiffness_cosine - 1j * system.stiffness_sine, 1):
+            variation += harmonic_series(order, steps, terms, amplitude).real
+    wave = harmonic_series(1, steps, terms)
+    return np.stack([variation, wave.imag, wave.real])
 
 
 @scalar
@@ -108,25 +109,12 @@ def phase_on_grid(table, row):
 @scalar
 def phase_within(table, number, fraction):
     """Return the mesh phase at a fraction of a step, from the series about the nearest row."""
-    nearest = int(2.0 * fraction + 0.5)
-    row = 2 * number + nearest
-    angle = (2.0 * fraction - nearest) * (2.0 * math.pi / (table.shape[0] - 1))
-    square = angle * angle
-    sine = angle * (
-        1.0
-        - square
-        * (1.0 / 6.0 - square * (1.0 / 120.0 - square * (1.0 / 5040.0 - square / 362880.0)))
-    )
-    cosine = 1.0 - square * (
-        0.5
-        - square
-        * (1.0 / 24.0 - square * (1.0 / 720.0 - square * (1.0 / 40320.0 - square / 3628800.0)))
-    )
+    row, angle = nearest_row(number, fraction, table.shape[0])
     variation = 0.0
     for term in range(table.shape[1] - 1, VARIATION - 1, -1):
         variation = variation * angle + table[row, term]
-    value = table[row, SINE] * cosine + table[row, COSINE] * sine
-    return Phase(variation, value, table[row, COSINE] * cosine - table[row, SINE] * sine, -value)
+    sine, cosine = turned(table[row, SINE], table[row, COSINE], angle)
+    return Phase(variation, sine, cosine, -sine)
 
 
 @scalar

@@ -86,11 +86,6 @@ def _gap_coefficients(flags: GearPair) -> tuple[str, ...]:
     return tuple(names)
 
 
-def _stiffness(coefficients: NDArray[Any]) -> NDArray[Any]:
-    columns = [Lane._fields.index(name) for name in ("mean_stiffness", "stiffness_variation")]
-    return coefficients[:, columns]
-
-
 @scalar
 def _point_of_waves(waves, scene):
     """Return the mesh phase with this sine and cosine."""
@@ -143,11 +138,10 @@ def _mean_gaps(lane, scene):
 
 
 MAPS = MapFormulas(
-    waves=("sine", "cosine"),
     inputs=_inputs,
     apart=_apart,
     gap_coefficients=_gap_coefficients,
-    stiffness=_stiffness,
+    stiffness=("mean_stiffness", "stiffness_variation"),
     point_of_waves=_point_of_waves,
     unit_forcing=_unit_forcing,
     mobility_forces=_mobility_forces,
@@ -175,7 +169,6 @@ MODEL = Model(
     to_kept=equations.to_kept,
     kept_accelerations=equations.kept_accelerations,
     elements_at=equations.elements_at,
-    half_clearances=equations.half_clearances,
     gap_speeds=equations.gap_speeds,
     gaps_at=equations.gaps_at,
     accelerations=equations.accelerations,

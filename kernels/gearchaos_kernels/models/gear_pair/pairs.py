@@ -187,11 +187,11 @@ class GearPairs(LaneSystem):
         unit = {name: np.full(self.lanes, value) for name, value in _UNIT_GROUPS.items()}
         return self.replace(groups=self.groups._replace(**unit))
 
-    def owned(self) -> Floats:
+    def map_parameters(self) -> Floats:
         """Return all numbers on which the flow maps of a lane depend, shape (lanes, numbers)."""
         return np.array([getattr(self.groups, name) for name in _MAP_GROUPS]).T.copy()
 
-    def shared(self) -> tuple[object, ...]:
+    def map_constants(self) -> tuple[object, ...]:
         """Return what else the flow maps depend on, the same for all lanes."""
         return self.physical, self.stiffness_cosine.tobytes(), self.stiffness_sine.tobytes()
 
@@ -206,10 +206,6 @@ class GearPairs(LaneSystem):
         the cosine of the mesh phase.
         """
         return wave_series(self, steps, terms)
-
-    def wave_values(self, phase: Floats) -> Floats:
-        """Return sine and cosine of mesh phases in rad, shape (phases, 2)."""
-        return np.stack([np.sin(phase), np.cos(phase)], axis=1)
 
     def refuses_maps(self) -> str:
         """Return why flow maps cannot integrate the system, or an empty text."""

@@ -1,0 +1,27 @@
+"""The formulas of a model, as compiled code calls them; `protocol` describes each."""
+
+from gearchaos_kernels.scene import Interface
+
+begin_period = Interface("model", "begin_period")
+grid_at = Interface("model", "grid_at")
+grid_within = Interface("model", "grid_within")
+first_point = Interface("model", "first_point")
+keep_point = Interface("model", "keep_point")
+point_at = Interface("model", "point_at")
+point_within = Interface("model", "point_within")
+forcing_at = Interface("model", "forcing_at")
+unforced = Interface("model", "unforced")
+from_kept = Interface("model", "from_kept")
+to_kept = Interface("model", "to_kept")
+kept_accelerations = Interface("model", "kept_accelerations")
+elements_at = Interface("model", "elements_at")
+half_clearances = Interface("model", "half_clearances")
+gap_speeds = Interface("model", "gap_speeds")
+gaps_at = Interface("model", "gaps_at")
+accelerations = Interface("model", "accelerations")
+observed_at = Interface("model", "observed_at")
+point_of_waves = Interface("model", "point_of_waves")
+unit_forcing = Interface("model", "unit_forcing")
+mobility_forces = Interface("model", "mobility_forces")
+inputs_of = Interface("model", "inputs_of")
+mean_gaps = Interface("model", "mean_gaps")
