@@ -6,6 +6,7 @@ from numpy.typing import NDArray
 
 from gearchaos_kernels.block import Batch, integrate_block
 from gearchaos_kernels.compilation import count_up, driver
+from gearchaos_kernels.methods.protocol import Share
 from gearchaos_kernels.methods.registry import METHODS
 from gearchaos_kernels.models.lane_system import LaneSystem
 from gearchaos_kernels.plan import Floats, Outcome, Plan, Schedule, Status
@@ -19,15 +20,19 @@ LARGEST_GROWTH = 200.0
 
 
 @driver
-def _integrate_blocks(threads, taken, batch, tables, plan, outcome, scene):
-    # Every thread takes the next block when it has done one: some blocks cross boundaries far more
-    # often than others, and another program may be using a core. The number of threads is an
-    # argument: code that reads it holds an address of this process, and cannot be kept.
+def _integrate_blocks(threads, next_block, batch, tables, plan, outcome, scene):
+    """Integrate all blocks; ``next_block``, shape (1,), counts those that threads have taken.
+
+    Every thread takes the next block when it has finished one. Blocks take different times: some
+    cross clearance boundaries far more often, and another program may be using a core.
+    """
+    # The number of threads is an argument: code that reads it itself contains an address of this
+    # process and cannot be cached.
     for _ in prange(threads):
-        number = count_up(taken)
+        number = count_up(next_block)
         while number < batch.blocks.shape[0]:
             integrate_block(number, batch, tables, plan, outcome, scene)
-            number = count_up(taken)
+            number = count_up(next_block)
 
 
 def scene_of(system: LaneSystem, plan: Plan) -> Scene:
@@ -60,63 +65,88 @@ def integrate(
     plan : Plan
         Method, steps, periods, and what is recorded.
     tangent_start : array, shape (lanes, states), optional
-        Tangent vectors at tau = 0; by default an equal share of every state.
+        Tangent vectors at tau = 0; by default all components are equal and the length is 1.
 
     Returns
     -------
     Outcome
-        Identical bit for bit for any number of threads, any split and any order of the lanes.
+        It is identical bit for bit for any number of threads and any split or order of the lanes.
 
     Raises
     ------
     ValueError
-        If the method cannot integrate the system, such as flow maps with pitch errors tooth by
-        tooth, or too many pairs are in mesh.
+        If the method cannot integrate the system (flow maps with pitch errors tooth by tooth), if
+        amplitudes are requested of a model without observed signals, or if more tooth pairs are in
+        mesh than the model supports.
+
+    Examples
+    --------
+    ::
+
+        start = np.zeros((pairs.lanes, len(pairs.states)))
+        outcome = integrate(pairs, start, Plan(200, 300, 100, 100, tangent=True))
+        exponents = outcome.growth.mean(axis=1) / pairs.mesh_period
     """
     lanes, states = start.shape[0], len(system.states)
-    steps = plan.steps_per_period
     if tangent_start is None:
         tangent_start = np.full((lanes, states), 1.0 / np.sqrt(states))
     scene = scene_of(system, plan)
     if plan.orders and not provider_of(scene.model).observed:
-        raise ValueError("amplitudes need a model that has a signal observed")
-    outcome = _allocated(lanes, states, plan, scene)
-    columns = [system.states.index(name) for name in plan.states]
-    chosen = np.array([*columns, _observed_row(scene)], dtype=np.intp)
+        raise ValueError("amplitudes need a model with an observed signal")
+    outcome, steps_taken = _allocated(lanes, states, plan, scene), np.empty(lanes, dtype=np.intp)
+    for share in METHODS[plan.method].prepare(system, plan, scene):
+        steps_taken[share.order] = share.steps[share.order]
+        _integrate_share(system, share, (start, tangent_start), plan, outcome, scene)
+    return _per_tau(system, plan, outcome, steps_taken, scene)
+
+
+def _integrate_share(
+    system: LaneSystem,
+    share: Share,
+    starts: tuple[Floats, Floats],
+    plan: Plan,
+    outcome: Outcome,
+    scene: Scene,
+) -> None:
+    """Integrate some lanes and write what is recorded of them into an outcome.
+
+    ``starts``: states and tangent vectors at tau = 0, both of shape (lanes, states).
+    """
+    start, tangent_start = (np.ascontiguousarray(one, dtype=np.float64) for one in starts)
+    chosen = np.array([*_columns(system, plan), _observed_row(scene)], dtype=np.intp)
     orders = np.array([float(order) for order in plan.orders])
-    half = chosen.size - 1 + chosen.size * orders.size
+    phases = 2.0 * np.pi * orders / share.steps[:, np.newaxis]
+    step = system.mesh_period / share.steps
+    batch = Batch(
+        system.coefficients(step),
+        system.scales(step),
+        start,
+        tangent_start,
+        steps_between_scalings(system, share.steps),
+        share.order,
+        share.blocks,
+        share.maps,
+        chosen,
+        np.stack([np.cos(phases), np.sin(phases)], axis=2),
+    )
     schedule = Schedule(
         plan.steps_per_period,
         plan.transient_periods,
         plan.recorded_periods,
         plan.first_period,
-        more_rows=2 * half,
+        more_rows=2 * (chosen.size - 1 + chosen.size * orders.size),
     )
-    tables = system.tables(steps)
-    steps_taken = np.full(lanes, steps)
-    for share in METHODS[plan.method].prepare(system, plan, scene):
-        step = system.mesh_period / share.steps
-        steps_taken[share.order] = share.steps[share.order]
-        phases = 2.0 * np.pi * orders / share.steps[:, np.newaxis]
-        batch = Batch(
-            system.coefficients(step),
-            system.scales(step),
-            np.ascontiguousarray(start, dtype=np.float64),
-            np.ascontiguousarray(tangent_start, dtype=np.float64),
-            steps_between_scalings(system, share.steps),
-            share.order,
-            share.blocks,
-            share.maps,
-            chosen,
-            np.stack([np.cos(phases), np.sin(phases)], axis=2),
-        )
-        taken = np.zeros(1, dtype=np.intp)
-        _integrate_blocks(get_num_threads(), taken, batch, tables, schedule, outcome, scene)
-        if share.maps.size:
-            unmapped = np.isnan(share.maps[share.blocks[:, 3]])
-            lost = np.repeat(unmapped, share.blocks[:, 1])
-            outcome.status[share.order[lost]] = Status.TOO_FAST
-    return _per_tau(system, plan, outcome, steps_taken, scene)
+    tables, next_block = system.tables(plan.steps_per_period), np.zeros(1, dtype=np.intp)
+    _integrate_blocks(get_num_threads(), next_block, batch, tables, schedule, outcome, scene)
+    if share.maps.size:
+        unmapped = np.isnan(share.maps[share.blocks[:, 3]])
+        lost = np.repeat(unmapped, share.blocks[:, 1])
+        outcome.status[share.order[lost]] = Status.TOO_FAST
+
+
+def _columns(system: LaneSystem, plan: Plan) -> list[int]:
+    """Return the numbers of the states of a plan."""
+    return [system.states.index(name) for name in plan.states]
 
 
 def _allocated(lanes: int, states: int, plan: Plan, scene: Scene) -> Outcome:
@@ -154,7 +184,7 @@ def _per_tau(
     system: LaneSystem, plan: Plan, outcome: Outcome, steps_taken: NDArray[np.intp], scene: Scene
 ) -> Outcome:
     """Turn what was recorded per step into the units of the equations."""
-    columns = [system.states.index(name) for name in plan.states]
+    columns = _columns(system, plan)
     sums = outcome.amplitudes.reshape(len(steps_taken), len(columns) + 1, len(plan.orders))
     if not outcome.loads.size:
         return outcome._replace(amplitudes=sums)

@@ -112,10 +112,24 @@ def held_at(element, share):
 def evaluate(
     system: LaneSystem, states: Floats, steps_per_period: int, first_period: int = 0
 ) -> Motion:
-    """Return forces, contact and accelerations along a motion.
+    """Return forces, contact, accelerations and observed signals along a motion.
 
-    ``states`` (lanes, samples, states): one step apart, the first one at mesh phase 0, after
-    ``first_period`` mesh periods.
+    Parameters
+    ----------
+    system : LaneSystem
+        The equations of motion of every lane.
+    states : array, shape (lanes, samples, states)
+        States in the units of the equations. Samples are one step apart; the first one is at mesh
+        phase 0.
+    steps_per_period : int
+        Samples per mesh period.
+    first_period : int, optional
+        Number of mesh periods before the first sample.
+
+    Returns
+    -------
+    Motion
+        In the units of the equations.
     """
     lanes, samples, count = states.shape
     step = system.mesh_period / steps_per_period
@@ -131,40 +145,41 @@ def evaluate(
     _follow(
         system.coefficients(step),
         system.scales(step),
-        step,
         system.tables(steps_per_period),
-        2 * steps_per_period,
+        steps_per_period,
         first_period,
         np.ascontiguousarray(states, dtype=np.float64),
         motion,
         scene,
     )
-    return motion
+    steps = step[:, np.newaxis, np.newaxis]
+    # Scaled forces are per step squared, and changes of rates per step.
+    return motion._replace(
+        forces=motion.forces / steps**2, accelerations=motion.accelerations / steps
+    )
 
 
 @evaluator
-def _follow(coefficients, scales, steps, tables, half_steps, first, states, motion, scene):
-    """Evaluate the equations at every sample, lane by lane."""
+def _follow(coefficients, scales, tables, steps, first_period, states, motion, scene):
+    """Evaluate the equations at every sample, lane by lane, and write a `Motion` per step."""
     memory = aligned_memory(rows(scene).total)
     change = np.empty(scales.shape[1])
     for index in range(states.shape[0]):
-        step = steps[index]
         lane = fill_lane(memory, 0, coefficients[index], scene)
         clearances = half_clearances(lane, scene)
         for sample in range(states.shape[1]):
             fill(memory, STATE, 0, scales[index], states[index, sample])
             kept = state_of(memory, 0, scene)
-            row = 2 * sample % half_steps
+            row = 2 * (sample % steps)
             if row == 0:
-                begin_period(memory, 0, index, first + 2 * sample // half_steps, tables, scene)
+                begin_period(memory, 0, index, first_period + sample // steps, tables, scene)
             point = point_at(memory, 0, grid_at(tables, row, scene), scene)
             forcing = forcing_at(lane, point, scene)
             state = from_kept(kept, forcing, scene)
             gaps = gaps_at(state, lane, forcing, scene)
             pushes = pushes_of(gaps, elements_at(lane, forcing, scene), None, scene)
             for element in range(len(gaps)):
-                # Scaled forces enter the equations with coefficient -1, and per step squared.
-                motion.forces[index, sample, element] = pushes[element].force / step**2
+                motion.forces[index, sample, element] = pushes[element].force
                 half_clearance = 0.0 if scene.clearance is None else clearances[element]
                 motion.contact[index, sample, element] = flank_at(
                     gaps[element].value, half_clearance
@@ -176,4 +191,4 @@ def _follow(coefficients, scales, steps, tables, half_steps, first, states, moti
             acceleration = kept_accelerations(acceleration, lane, point, scene)
             write_state(memory, STATE, 0, State(state.rate, acceleration), scene)
             take(memory, STATE, 0, scales[index], change)
-            motion.accelerations[index, sample] = change[1::2] / step
+            motion.accelerations[index, sample] = change[1::2]

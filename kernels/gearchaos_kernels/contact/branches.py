@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 from gearchaos_kernels.compilation import scalar
 from gearchaos_kernels.contact.leaving import may_leave
-from gearchaos_kernels.memory.block_memory import store
+from gearchaos_kernels.memory.block_memory import read_branches, store
 from gearchaos_kernels.memory.rows import BRANCH, STRIDE, Branch, rows
 from gearchaos_kernels.memory.tuples import as_mask, each
 from gearchaos_kernels.models.interfaces import gap_speeds, half_clearances
@@ -89,9 +89,9 @@ def next_branch(branch, gap, half_clearance):
 
 
 @scalar
-def leave(memory, slot, element, gap, branches, lane, moment, recorded, scene):
-    """Put a lane on the branch that follows where a gap leaves one, and record the crossing."""
-    branch = branches[element]
+def leave(memory, slot, element, gap, lane, moment, recorded, scene):
+    """Put a lane on the next branch where the gap of an element leaves one; record the crossing."""
+    branch = read_branches(memory, slot, scene)[element]
     following = next_branch(branch, gap.value, half_clearances(lane, scene)[element])
     store(memory, rows(scene).branches + BRANCH * element, slot, following)
     if recorded:

@@ -17,8 +17,11 @@ from numba.extending import intrinsic
 
 from gearchaos_kernels.scene import Scene, provider_of
 
-LANES = 32
-"""Lanes of one block: a few vectors wide, small enough for the first-level cache."""
+VECTOR = 8
+"""Lanes of one vector: a cache line of numbers, which the widest registers hold."""
+
+LANES = 4 * VECTOR
+"""Slots of one block: a few vectors wide, small enough for the first-level cache."""
 
 STRIDE = LANES + 8
 """Distance between rows: no two rows fall on the same cache set at a distance of 4096 bytes."""

@@ -14,12 +14,11 @@ from gearchaos_kernels.compilation import scalar
 from gearchaos_kernels.contact.branches import branches_at, leave, next_branch
 from gearchaos_kernels.contact.leaving import may_leave
 from gearchaos_kernels.memory.block_memory import read_branches, read_lane, store, write_branches
-from gearchaos_kernels.memory.rows import BRANCH, STATE, STRIDE, Branch, rows
+from gearchaos_kernels.memory.rows import BRANCH, STATE, STRIDE, VECTOR, Branch, rows
 from gearchaos_kernels.methods.flow_map import vectors
 from gearchaos_kernels.methods.flow_map.layout import Crossing, aside_rows, layout, method_rows
 from gearchaos_kernels.methods.flow_map.moments import find_moments
 from gearchaos_kernels.methods.flow_map.steps import gaps_at_ends, store_offsets
-from gearchaos_kernels.methods.flow_map.vectors import VECTOR
 from gearchaos_kernels.models.interfaces import half_clearances
 from gearchaos_kernels.models.protocol import Gap
 
@@ -121,8 +120,7 @@ def record_crossing_of(memory, slot, aside, n, at, scene):
     lane = read_lane(memory, slot, scene)
     moment = at.number + 0.5 * (1.0 + aside[place.after * STRIDE + n])
     crossed = crossed_at(aside, n, element, scene)
-    branches = read_branches(memory, slot, scene)
-    leave(memory, slot, element, crossed, branches, lane, moment, at.recorded, scene)
+    leave(memory, slot, element, crossed, lane, moment, at.recorded, scene)
     store_offsets(memory, slot, lane, read_branches(memory, slot, scene), scene)
 
 

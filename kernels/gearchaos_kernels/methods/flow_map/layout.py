@@ -150,6 +150,28 @@ class Crossing(NamedTuple):
     element: float
 
 
+class GapSearch(NamedTuple):
+    """Where a gap crosses, and how it is searched, in rows behind those of its terms.
+
+    Attributes
+    ----------
+    crossed, slope : float
+        The gap where it crosses, and its slope there.
+    side : float
+        The side from which the gap is seen: 1 or -1.
+    distance : float
+        By how much the gap, seen from there, is raised: it then falls below zero at the crossing.
+    bend : float
+        A bound on its fourth derivative along the step.
+    """
+
+    crossed: float
+    slope: float
+    side: float
+    distance: float
+    bend: float
+
+
 class Aside(NamedTuple):
     """First rows of a lane that has been taken aside, behind those of a block.
 

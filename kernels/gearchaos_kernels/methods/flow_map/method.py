@@ -8,7 +8,7 @@ import numpy as np
 
 from gearchaos_kernels.compilation import part, scalar
 from gearchaos_kernels.memory.block_memory import aligned_memory
-from gearchaos_kernels.memory.rows import LANES
+from gearchaos_kernels.memory.rows import LANES, VECTOR
 from gearchaos_kernels.methods.flow_map.crossings import resolve
 from gearchaos_kernels.methods.flow_map.layout import Work, aside_rows, layout, rows_needed
 from gearchaos_kernels.methods.flow_map.steps import begin_lane, move_block
@@ -19,7 +19,6 @@ from gearchaos_kernels.methods.flow_map.store import (
     maps_of,
     sharing,
 )
-from gearchaos_kernels.methods.flow_map.vectors import VECTOR
 from gearchaos_kernels.methods.protocol import Method, Share, cut
 from gearchaos_kernels.models.interfaces import grid_within
 from gearchaos_kernels.plan import Plan

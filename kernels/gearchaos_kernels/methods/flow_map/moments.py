@@ -10,10 +10,14 @@ import math
 
 from gearchaos_kernels.compilation import part, scalar
 from gearchaos_kernels.contact.leaving import LAST_CORRECTION, NEVER, falling_root
-from gearchaos_kernels.memory.block_memory import read_branches, read_lane
-from gearchaos_kernels.memory.rows import STRIDE, rows
-from gearchaos_kernels.methods.flow_map.layout import TERMS, aside_rows, fourth_derivative
-from gearchaos_kernels.methods.flow_map.vectors import VECTOR
+from gearchaos_kernels.memory.block_memory import read_branches, read_lane, store
+from gearchaos_kernels.memory.rows import STRIDE, VECTOR, rows
+from gearchaos_kernels.methods.flow_map.layout import (
+    TERMS,
+    GapSearch,
+    aside_rows,
+    fourth_derivative,
+)
 from gearchaos_kernels.models.interfaces import half_clearances, mean_gaps
 
 largest_bend = scalar(fourth_derivative)
@@ -39,9 +43,9 @@ def find_moments(aside, element, lanes, scene):
 
 @scalar
 def find_side_by_side(aside, element, scene):
-    """Find the crossings of gaps that fall all the way from the beginning of the step.
+    """Find the crossings of gaps that decrease monotonically from the beginning of the step.
 
-    Returns of how many lanes it is still unknown.
+    Returns the number of lanes whose crossing is still unknown.
     """
     at_rows = aside_rows(scene)
     unknown = 0
@@ -50,18 +54,12 @@ def find_side_by_side(aside, element, scene):
         lane = read_lane(aside, n, scene)
         branch = read_branches(aside, n, scene)[element]
         aside[first] -= mean_gaps(lane, scene)[element]
-        even, odd, even_slope, odd_slope, bend = 0.0, 0.0, 0.0, 0.0, 0.0
-        for term in range(0, TERMS, 2):
-            a, b = aside[first + term * STRIDE], aside[first + (term + 1) * STRIDE]
-            even += a
-            odd += b
-            even_slope += term * a
-            odd_slope += (term + 1) * b
-            bend += largest_bend(term) * abs(a) + largest_bend(term + 1) * abs(b)
-        # A flank is left to the middle; between the flanks, most likely to where the step ends.
+        even, odd, even_slope, odd_slope, bend = sums_of_terms(aside, first)
+        # A flank is left towards the middle; a lane between the flanks most likely meets the one
+        # on the side where the step ends.
         side = math.copysign(1.0, branch.offset if branch.engaged != 0.0 else -even - odd)
         distance = half_clearances(lane, scene)[element] * (1.0 - 2.0 * branch.engaged)
-        # What begins where the last step ended, at the boundary, begins on the right side of it.
+        # A step that begins at the boundary, where the last one ended, begins on its right side.
         value_left = max(side * (even - odd) + distance, 0.0)
         slope_left = side * (odd_slope - even_slope)
         value_right = side * (even + odd) + distance
@@ -69,35 +67,57 @@ def find_side_by_side(aside, element, scene):
         ends = value_left, slope_left, value_right, slope_right
         lowest, highest, steepest = bounds_of(ends, 2.0, bend)
         stays = lowest >= 0.0 and value_right >= 0.0
-        # From the other side: a lane between the flanks may meet either.
+        # A lane between the flanks may meet either: this one must be out of reach of the other.
         one_way = distance < 0.0 or max(highest, value_right) <= 2.0 * distance
         falls = steepest < 0.0 and value_right < 0.0
-        guess = guess_fall(ends, 2.0)
-        at = min(max(guess - 1.0, -1.0), 1.0)
-        # From a cubic's guess by Chebyshev's method to nearly all of the place, by Newton's to it.
-        value, slope, curvature = gap_along(aside, first, at)
-        inverse = 1.0 / slope
-        shift = (value + side * distance) * inverse
-        at -= shift + shift * shift * curvature * inverse
-        value, slope, _ = gap_along(aside, first, at)
-        correction = (value + side * distance) / slope
-        at -= correction
+        at = min(max(guess_fall(ends, 2.0) - 1.0, -1.0), 1.0)
+        at, correction, value, slope = refined_fall(aside, first, side * distance, at)
         found = falls and abs(correction) < LAST_CORRECTION and -1.0 <= at <= 1.0
         moment = NEVER if stays else at
         known = one_way and (stays or found) and aside[at_rows.after * STRIDE + n] == -1.0
-        # Of the sum of 2**element over the suspects, the bit of this one.
+        # The suspects are a sum of 2**element; this is the bit of the element.
         suspects = int(aside[rows(scene).suspect * STRIDE + n])
         looked_at = (suspects >> element) & 1 == 1
         unknown += 1 if looked_at and not known else 0
         if not known:
             moment = UNKNOWN
         aside[first + at_rows.moment * STRIDE] = moment if looked_at else NEVER
-        aside[first + at_rows.crossed * STRIDE] = value
-        aside[first + (at_rows.crossed + 1) * STRIDE] = slope
-        aside[first + at_rows.side * STRIDE] = side
-        aside[first + at_rows.distance * STRIDE] = distance
-        aside[first + at_rows.bend * STRIDE] = bend
+        found_of_gap = GapSearch(value, slope, side, distance, bend)
+        store(aside, element * at_rows.gap_rows + at_rows.gaps + at_rows.crossed, n, found_of_gap)
     return unknown
+
+
+@scalar
+def sums_of_terms(aside, first):
+    """Return sums over the terms of a gap: even, odd, their slopes at 1, and a bound on the bend.
+
+    The bound is that of the fourth derivative from -1 to 1.
+    """
+    even, odd, even_slope, odd_slope, bend = 0.0, 0.0, 0.0, 0.0, 0.0
+    for term in range(0, TERMS, 2):
+        a, b = aside[first + term * STRIDE], aside[first + (term + 1) * STRIDE]
+        even += a
+        odd += b
+        even_slope += term * a
+        odd_slope += (term + 1) * b
+        bend += largest_bend(term) * abs(a) + largest_bend(term + 1) * abs(b)
+    return even, odd, even_slope, odd_slope, bend
+
+
+@scalar
+def refined_fall(aside, first, raised, at):
+    """Return a place where a gap plus a number is zero, from the guess of a cubic.
+
+    One step of Chebyshev's method removes nearly all of the error, and one of Newton's method the
+    rest. Returns the place, the last correction, and the gap before it with its slope.
+    """
+    value, slope, curvature = gap_along(aside, first, at)
+    inverse = 1.0 / slope
+    shift = (value + raised) * inverse
+    at -= shift + shift * shift * curvature * inverse
+    value, slope, _ = gap_along(aside, first, at)
+    correction = (value + raised) / slope
+    return at - correction, correction, value, slope
 
 
 @scalar

@@ -148,18 +148,45 @@ def fill_maps(matrix, stiffness, inputs, forcing, table, place):
 def fill_steps(matrix, engaged, inputs, forcing, table, place):
     """Fill the maps of some steps on all sets of branches; return the truncation error.
 
-    In every array the last numbers are those of these steps, one set of branches after the other.
+    The last axis of every array is that of these steps, one set of branches after the other.
     Elements are written in loops: for an assignment of slices Numba also compiles an error message
     for shapes that differ.
     """
     states, columns, elements = place.states, place.columns, place.elements
+    width = engaged.shape[1]
     functions = 1 + place.waves
     rates = matrix[:states, : states + functions].copy()
     gaps = matrix[states:, : states + functions].copy()
     mobility = matrix[:states, states + functions :].copy()
-    width = engaged.shape[1]
+    psi, gap = motion_series((rates, mobility, gaps), engaged, inputs, forcing, place)
+    backward = np.ascontiguousarray(rates[:, :states].T), gaps.T.copy(), mobility.T.copy()
+    inverse, switch = inverse_series(backward, engaged, forcing[0], place)
 
-    # The motion by column with drive and waves below it, the gaps, and the forces times K.
+    # Both ends of the step: it is 2 long in s.
+    ends = combined(_ENDS, psi).reshape((2, states + functions, columns, width))
+    back = combined(_ENDS, inverse).reshape((2, states, states, width))[0]
+    from_beginning, first = at_beginning(ends[0], back, place)
+    end = multiplied(ends[1, :states], from_beginning)
+    along, tail = economised(gap)
+    along = multiplied(along.reshape((TERMS * elements, columns, width)), from_beginning)
+    traced, lost = economised(switch)
+    traced = multiplied(traced.reshape((TERMS * elements, states, width)), first)
+    for left in (lost, largest(psi[ORDER, :states]), largest(inverse[ORDER])):
+        tail = np.maximum(tail, left)
+    write_maps(end, along, traced, table, place)
+    return tail
+
+
+@part
+def motion_series(matrices, engaged, inputs, forcing, place):
+    """Return the series of the motion and of the gaps about the middle of some steps, by column.
+
+    Shapes: (ORDER + 1, states + functions, columns * width), where drive and waves follow the
+    states, and (ORDER, elements, columns * width).
+    """
+    states, columns, elements = place.states, place.columns, place.elements
+    functions = 1 + place.waves
+    width = engaged.shape[1]
     psi = np.zeros((ORDER + 1, states + functions, columns * width))
     gap = np.zeros((ORDER, elements, columns * width))
     force = np.zeros((ORDER, elements, columns * width))
@@ -178,48 +205,62 @@ def fill_steps(matrix, engaged, inputs, forcing, table, place):
                         for at in range(width):
                             value = share * forcing[wave, k, at]
                             psi[k, states + function, column * width + at] += value
-    # An offset is no part of the gap, but less deflection.
+    # An offset reduces the deflection, but is no part of the gap: it is added for `solve` alone.
     for element in range(elements):
         gap[0, element, (states + 1 + element) * width : (states + 2 + element) * width] = -1.0
-    solve(0.5, (rates, mobility, gaps), forcing[0], engaged, psi, gap, force)
+    solve(0.5, matrices, forcing[0], engaged, psi, gap, force)
     for element in range(elements):
         for at in range((states + 1 + element) * width, (states + 2 + element) * width):
             gap[0, element, at] += 1.0
+    return psi, gap
 
-    # The inverse flow, transposed, and what it makes of the mobilities, with K.
+
+@part
+def inverse_series(matrices, engaged, stiffness, place):
+    """Return the series of the inverse flow, transposed, and of its product with K and mobilities.
+
+    Shapes: (ORDER + 1, states, states * width) and (ORDER, elements, states * width).
+    """
+    states, width = place.states, engaged.shape[1]
     inverse = np.zeros((ORDER + 1, states, states * width))
-    moved = np.zeros((ORDER, elements, states * width))
-    switch = np.zeros((ORDER, elements, states * width))
+    moved = np.zeros((ORDER, place.elements, states * width))
+    switch = np.zeros((ORDER, place.elements, states * width))
     for line in range(states):
         inverse[0, line, line * width : (line + 1) * width] = 1.0
-    backward = np.ascontiguousarray(rates[:, :states].T), gaps.T.copy(), mobility.T.copy()
-    solve(-0.5, backward, forcing[0], engaged, inverse, moved, switch)
+    solve(-0.5, matrices, stiffness, engaged, inverse, moved, switch)
+    return inverse, switch
 
-    # From the middle of the step to its beginning; a step is 2 long in s.
-    ends = combined(_ENDS, psi).reshape((2, states + functions, columns, width))
-    back = combined(_ENDS, inverse).reshape((2, states, states, width))[0]
+
+@part
+def at_beginning(begin, back, place):
+    """Return what turns columns of the middle of a step into those of its beginning.
+
+    ``begin`` (states + functions, columns, width): the motion at the beginning; ``back`` (states,
+    states, width): the inverse flow there, transposed. Also returns half of the flow from the
+    middle to the beginning, transposed, which the `SWITCH` terms contain.
+    """
+    states, columns, width = place.states, place.columns, begin.shape[2]
     from_beginning = np.zeros((columns, columns, width))
     first = np.zeros((states, states, width))
     for at in range(width):
         for line in range(states):
             for source in range(states):
                 from_beginning[line, source, at] = back[source, line, at]
-                first[source, line, at] = 0.5 * ends[0, line, source, at]
+                first[source, line, at] = 0.5 * begin[line, source, at]
         for column in range(states, columns):
             from_beginning[column, column, at] = 1.0
             for line in range(states):
                 for source in range(states):
-                    begin = ends[0, source, column, at]
-                    from_beginning[line, column, at] -= back[source, line, at] * begin
-    end = multiplied(ends[1, :states], from_beginning)
-    along, tail = economised(gap)
-    along = multiplied(along.reshape((TERMS * elements, columns, width)), from_beginning)
-    traced, lost = economised(switch)
-    traced = multiplied(traced.reshape((TERMS * elements, states, width)), first)
-    for left in (lost, largest(psi[ORDER, :states]), largest(inverse[ORDER])):
-        tail = np.maximum(tail, left)
+                    value = begin[source, column, at]
+                    from_beginning[line, column, at] -= back[source, line, at] * value
+    return from_beginning, first
 
-    for at in range(width):
+
+@part
+def write_maps(end, along, traced, table, place):
+    """Write maps, gaps and switches of some steps into a table, and how much the gaps bend."""
+    states, columns, elements = place.states, place.columns, place.elements
+    for at in range(end.shape[2]):
         number, step = divmod(at, table.shape[0])
         row = table[step]
         piece = row[place.header + number * place.size :]
@@ -239,7 +280,6 @@ def fill_steps(matrix, engaged, inputs, forcing, table, place):
                 for line in range(states):
                     value = traced[term * elements + element, line, at]
                     piece[place.switch + (element * TERMS + term) * place.width + line] = value
-    return tail
 
 
 @part

@@ -9,11 +9,10 @@ import math
 from gearchaos_kernels.compilation import scalar
 from gearchaos_kernels.contact.branches import suspects_of
 from gearchaos_kernels.memory.block_memory import read_branches, read_lane, state_before, state_of
-from gearchaos_kernels.memory.rows import LANES, STATE, STRIDE, Branch, rows
+from gearchaos_kernels.memory.rows import LANES, STATE, STRIDE, VECTOR, Branch, rows
 from gearchaos_kernels.memory.tuples import each
 from gearchaos_kernels.methods.flow_map import vectors
 from gearchaos_kernels.methods.flow_map.layout import layout, method_rows, waves_at
-from gearchaos_kernels.methods.flow_map.vectors import VECTOR
 from gearchaos_kernels.models.interfaces import (
     forcing_at,
     gaps_at,

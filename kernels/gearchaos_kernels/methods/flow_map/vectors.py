@@ -13,12 +13,9 @@ from numba import types
 from numba.extending import intrinsic
 
 from gearchaos_kernels.compilation import FASTMATH, first_element
-from gearchaos_kernels.memory.rows import BRANCH, STATE, STRIDE, rows_of
+from gearchaos_kernels.memory.rows import BRANCH, STATE, STRIDE, VECTOR, rows_of
 from gearchaos_kernels.methods.flow_map.layout import TERMS, aside_of, layout_of, method_rows_of
 from gearchaos_kernels.scene import Scene, provider_of
-
-VECTOR = 8
-"""Lanes of a vector."""
 
 _DOUBLE, _INTEGER, _INDEX = ir.DoubleType(), ir.IntType(types.intp.bitwidth), ir.IntType(32)
 _FLAGS = tuple(sorted(FASTMATH))

@@ -66,13 +66,12 @@ def split_step(memory, slot, at, tables, scene):
         crossing = forcing_within(memory, slot, lane, tables, number, done, scene)
         during = begin, middle, middle, crossing
         state, pushes = rk4.advance(rk4.motion, state, piece, lane, during, branches, scene)
-        if scene.tangent is not None:
-            tangent, _ = rk4.advance(rk4.tangent, tangent, piece, lane, pushes, None, scene)
+        tangent = advance_tangent(tangent, piece, lane, pushes, scene)
         begin = crossing
         crossings += 1
         gaps = gaps_at(state, lane, begin, scene)
         moment = number + done
-        leave(memory, slot, element, gaps[element], branches, lane, moment, at.recorded, scene)
+        leave(memory, slot, element, gaps[element], lane, moment, at.recorded, scene)
         branches = read_branches(memory, slot, scene)
 
         left = 1.0 - done
@@ -81,12 +80,21 @@ def split_step(memory, slot, at, tables, scene):
         after, pushes = rk4.advance(rk4.motion, state, left, lane, during, branches, scene)
         write_state(memory, STATE, slot, to_kept(after, end, scene), scene)
         if scene.tangent is not None:
-            tangent_after, _ = rk4.advance(rk4.tangent, tangent, left, lane, pushes, None, scene)
+            tangent_after = advance_tangent(tangent, left, lane, pushes, scene)
             write_state(memory, rows(scene).tangent, slot, tangent_after, scene)
     if crossings > 0:
         write_branches(memory, slot, branches_at(gaps_after, lane, scene), scene)
     if fraction <= 1.0:
         memory[(rows(scene).crossings + 2) * STRIDE + slot] += 1.0
+
+
+@scalar
+def advance_tangent(tangent, fraction, lane, pushes, scene):
+    """Return a tangent vector a fraction of a step later, unchanged if the scene has none."""
+    if scene.tangent is None:
+        return tangent
+    after, _ = rk4.advance(rk4.tangent, tangent, fraction, lane, pushes, None, scene)
+    return after
 
 
 @scalar

@@ -23,7 +23,7 @@ def mesh_motion(
     system : GearPairs
         The gear pairs.
     states : array, shape (lanes, samples, states)
-        States in the units of eq. 13. Samples are one step apart; the first one is at mesh phase 0.
+        States in the units of eq. 13, one step apart; the first one is at mesh phase 0.
     steps_per_period : int
         Samples per mesh period.
     first_period : int, optional
@@ -41,9 +41,8 @@ def mesh_motion(
 
     Notes
     -----
-    The gaps are those of eqs 6 and 7, the mesh forces those of eqs 2 and 4 with the clearance
-    function of eqs 22 and 23. Without clearance teeth never separate, and the sign of the gap
-    decides the flank.
+    Gaps are those of eqs 6 and 7, mesh forces those of eqs 2 and 4 with the clearance function of
+    eqs 22 and 23. Without clearance teeth never separate; the sign of the gap decides the flank.
 
     Examples
     --------
@@ -54,7 +53,23 @@ def mesh_motion(
         separated = motion.contact_tangential == 0
     """
     found = evaluation.evaluate(system, states, steps_per_period, first_period)
-    error = np.zeros(states.shape[:2])
+    axial = system.effects.axial
+    nothing = np.zeros(states.shape[:2])
+    return MeshMotion(
+        force_tangential=found.forces[:, :, 0].copy(),
+        force_axial=found.forces[:, :, 1].copy() if axial else nothing,
+        contact_tangential=found.contact[:, :, 0].copy(),
+        contact_axial=found.contact[:, :, 1].copy() if axial else nothing.astype(np.uint8),
+        accelerations=found.accelerations,
+        pitch_error=_pitch_error(system, nothing.shape, steps_per_period, first_period),
+    )
+
+
+def _pitch_error(
+    system: GearPairs, shape: tuple[int, ...], steps_per_period: int, first_period: int
+) -> Floats:
+    """Return the pitch error e at every sample of every lane, shape (lanes, samples)."""
+    error = np.zeros(shape)
     if system.effects.pitch_error:
         _follow_error(
             system.coefficients(system.mesh_period / steps_per_period),
@@ -64,16 +79,7 @@ def mesh_motion(
             error,
             scene_of(system, evaluation.ALONE),
         )
-    axial = system.effects.axial
-    nothing = np.zeros(error.shape)
-    return MeshMotion(
-        force_tangential=found.forces[:, :, 0].copy(),
-        force_axial=found.forces[:, :, 1].copy() if axial else nothing,
-        contact_tangential=found.contact[:, :, 0].copy(),
-        contact_axial=found.contact[:, :, 1].copy() if axial else nothing.astype(np.uint8),
-        accelerations=found.accelerations,
-        pitch_error=error,
-    )
+    return error
 
 
 @evaluator
