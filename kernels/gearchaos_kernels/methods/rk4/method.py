@@ -15,7 +15,7 @@ from gearchaos_kernels.memory.block_memory import (
     state_of,
     write_state,
 )
-from gearchaos_kernels.memory.rows import LANES, STATE, STRIDE, rows
+from gearchaos_kernels.memory.rows import LANES, STATE, STRIDE, VECTOR, rows
 from gearchaos_kernels.methods.protocol import Method, Share, cut
 from gearchaos_kernels.methods.rk4 import steps as rk4
 from gearchaos_kernels.methods.rk4.splitting import split_step
@@ -72,7 +72,7 @@ def step(memory, lanes, at, given, scene):
     final = grid_at(given.tables, 2 * at.number + 2, scene)
     # A sum of integers, which the compiler vectorises; it does not vectorise a flag.
     suspects = 0
-    for slot in range(LANES):
+    for slot in range(slots_of(lanes)):
         lane = read_lane(memory, slot, scene)
         state = state_of(memory, slot, scene)
         begin = forcing_at(lane, first_point(memory, slot, start, scene), scene)
@@ -102,6 +102,14 @@ def step(memory, lanes, at, given, scene):
             tangent, _ = rk4.advance(rk4.tangent, tangent, 1.0, lane, pushes, None, scene)
             write_state(memory, rows(scene).tangent, slot, tangent, scene)
     return suspects
+
+
+@scalar
+def slots_of(lanes):
+    """Return the number of slots in as many whole vectors as the lanes of a block need."""
+    vectors = (lanes + VECTOR - 1) // VECTOR
+    # The mask changes no value. It bounds the loop over slots, which is not vectorised otherwise.
+    return VECTOR * (1 + ((vectors - 1) & (LANES // VECTOR - 1)))
 
 
 @scalar
