@@ -35,11 +35,6 @@ class Scene(Table):
 
     effects: tuple[str, ...] = ()
 
-    @property
-    def states(self) -> tuple[str, ...]:
-        """States of the scene, each coordinate followed by its rate."""
-        raise NotImplementedError
-
 
 class Start(Table, Generic[State]):
     """The state in which the lanes start."""

@@ -85,12 +85,12 @@ class Tables(Titled):
     @property
     def states(self) -> tuple[str, ...]:
         """States of the scene, each coordinate followed by its rate."""
-        return self.scene.states
+        raise NotImplementedError
 
     def states_of(self, effects: Collection[str]) -> tuple[str, ...]:
         """Return the states of a scene with some of the effects; by default all there are."""
         del effects
-        return self.scene.states
+        return self.states
 
     @property
     def needed_effects(self) -> tuple[str, ...]:

@@ -24,8 +24,8 @@ def whole_lengths(lanes: Lanes) -> dict[str, int]:
     integration, repeats = lanes.config.integration, lanes.repeats_after
     if repeats > LONGEST_EXCITATION:
         raise ConfigurationError(
-            f"{lanes.config.source}: the {lanes.model.excitation_words} only after {repeats} mesh "
-            f"periods, more than {LONGEST_EXCITATION}; {lanes.model.shorter_excitation}"
+            f"{lanes.config.source}: the {lanes.model.excitation_words} after {repeats} mesh "
+            f"periods only, more than {LONGEST_EXCITATION}; {lanes.model.shorter_excitation}"
         )
     least = {"transient_periods": 0, "recorded_periods": 1 if repeats == 1 else RETURNS}
     lengths = {

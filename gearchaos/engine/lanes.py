@@ -172,12 +172,12 @@ def start_states(config: Configuration, system: LaneSystem, numbers: Integers) -
             values[name] = np.linspace(*bounds, count)[at]
         box = {**config.start.drawn}
     elif kind == "random" and not box:
-        box = dict.fromkeys(config.scene.states, (-spread, spread))
+        box = dict.fromkeys(config.states, (-spread, spread))
     if box:
         runs = np.split(numbers, np.flatnonzero(np.diff(numbers) != 1) + 1)
         draws = np.concatenate([_draws(config.start.seed, run) for run in runs])
         for name, (low, high) in box.items():
-            place = draws[:, config.scene.states.index(name)]
+            place = draws[:, config.states.index(name)]
             values[name] = (low + high) / 2.0 + (high - low) / 2.0 * place
     # What starts in a state that nothing kept depends on is not computed.
     columns = [np.broadcast_to(values[name], system.lanes) for name in system.states]

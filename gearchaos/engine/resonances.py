@@ -101,6 +101,8 @@ def resonances(lanes: Lanes) -> Resonances:
 
 def _ends(values: Floats) -> Floats:
     """Return the smallest and the largest value over the lanes, (..., 2)."""
+    if np.isnan(values).all():
+        return np.full((*values.shape[1:], 2), np.nan)
     return np.stack([np.nanmin(values, axis=0), np.nanmax(values, axis=0)], axis=-1)
 
 

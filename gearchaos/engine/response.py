@@ -48,7 +48,7 @@ def prepared(config: Configuration, periods: int) -> RunPlan:
             f"integration.recorded_periods = {recorded}; ask for fewer or record more"
         )
     # A scene whose axial pair acts on nothing that a sweep keeps is computed as a whole here.
-    whole = config.replace("outputs.section", config.scene.states)
+    whole = config.replace("outputs.section", config.states)
     return plan_run(whole.replace("outputs.section_points", recorded))
 
 

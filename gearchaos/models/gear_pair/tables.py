@@ -125,6 +125,11 @@ class GearPairTables(Tables, PhysicalTables):
     start: Start = key("the state in which the lanes start", default=Start())
     outputs: Outputs = key("what is kept of every lane", default=Outputs())
 
+    @property
+    def states(self) -> tuple[str, ...]:
+        """States of the scene, 2, 6 or 10, in the order of `STATES`."""
+        return self.scene.states
+
     def states_of(self, effects: Collection[str]) -> tuple[str, ...]:
         """Return the states of a scene with these effects, in the order of `STATES`."""
         return states_of(effects)
