@@ -1,4 +1,9 @@
-"""The compiled layer: arrays and numbers in, arrays out."""
+"""Compiled integration of many lanes: arrays and numbers in, arrays out.
+
+`integrate` integrates a batch of lanes (`GearPairs` or another `LaneSystem`) as a `Plan` says and
+returns an `Outcome`. `jacobian`, `evaluate` and `mesh_motion` evaluate the equations on given
+states. Everything is in the units of the equations; time is the dimensionless tau.
+"""
 
 from gearchaos_kernels.batch import integrate, maps_are_kept, maps_memory
 from gearchaos_kernels.compilation import CACHE_FOLDER, source_hash

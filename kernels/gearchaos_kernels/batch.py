@@ -1,4 +1,4 @@
-"""The batch driver: splits lanes into blocks, runs them side by side, returns arrays."""
+"""Integrate a batch: split lanes into blocks, run the blocks in parallel, return arrays."""
 
 import numpy as np
 from numba import get_num_threads, prange
@@ -16,7 +16,7 @@ from gearchaos_kernels.recorders.registry import RECORDERS, Recorded
 from gearchaos_kernels.scene import Scene, flag, provider_of
 
 LARGEST_GROWTH = 200.0
-"""Natural logarithm of the growth or decay allowed between scalings; numbers end near 700."""
+"""Logarithm of the growth or decay allowed between two scalings; numbers overflow near 700."""
 
 
 @driver
@@ -36,7 +36,7 @@ def _integrate_blocks(threads, next_block, batch, tables, plan, outcome, scene):
 
 
 def scene_of(system: LaneSystem, plan: Plan) -> Scene:
-    """Return what the compiled loop has for a system and a plan."""
+    """Return the scene that a system and a plan need."""
     method = METHODS[plan.method]
     resolved = system.clearance and (plan.resolved or method.always_resolved)
     wanted = [one for one in RECORDERS if one.wanted(plan, resolved)]
@@ -150,12 +150,12 @@ def _columns(system: LaneSystem, plan: Plan) -> list[int]:
 
 
 def _allocated(lanes: int, states: int, plan: Plan, scene: Scene) -> Outcome:
-    """Return arrays for what is recorded."""
+    """Return an outcome whose arrays have the shapes of what is recorded."""
     elements = provider_of(scene.model).elements(scene.model)
     kept, loads = plan.history_periods, scene.recorders.loads
     in_contact = elements if scene.recorders.contact else 0
     return Outcome(
-        # Every element is written by the threads, so zero-filling would be wasted.
+        # The threads write every element, so zero-filling would be wasted.
         section=np.empty((lanes, plan.section_points, states)),
         growth=np.empty((lanes, plan.recorded_periods if plan.tangent else 0)),
         end_state=np.empty((lanes, states)),
@@ -174,7 +174,7 @@ def _allocated(lanes: int, states: int, plan: Plan, scene: Scene) -> Outcome:
 
 
 def _observed_row(scene: Scene) -> int:
-    """Return the row of the first signal that the model has observed."""
+    """Return the row of the first observed signal of the model."""
     elements: int = provider_of(scene.model).elements(scene.model)
     row: int = provider_of(scene.recorders).first_row("loads", scene)
     return row + elements
@@ -183,7 +183,7 @@ def _observed_row(scene: Scene) -> int:
 def _per_tau(
     system: LaneSystem, plan: Plan, outcome: Outcome, steps_taken: NDArray[np.intp], scene: Scene
 ) -> Outcome:
-    """Turn what was recorded per step into the units of the equations."""
+    """Return an outcome in the units of the equations, from one that is recorded per step."""
     columns = _columns(system, plan)
     sums = outcome.amplitudes.reshape(len(steps_taken), len(columns) + 1, len(plan.orders))
     if not outcome.loads.size:
@@ -191,14 +191,14 @@ def _per_tau(
     step = system.mesh_period / steps_taken
     samples = (steps_taken * max(1, plan.recorded_periods))[:, np.newaxis, np.newaxis]
     elements = provider_of(scene.model).elements(scene.model)
-    # Forces come per step squared, and the sums of Simpson's rule.
+    # Forces are per step squared; means are sums of Simpson's rule, six times too large.
     outcome.loads[:, :, 2:] /= 6.0 * samples
     outcome.loads[:, :elements] /= step[:, np.newaxis, np.newaxis] ** 2
     outcome.loads[:, :elements, 3] /= step[:, np.newaxis] ** 2
     scales = np.pad(system.scales(step)[:, columns], ((0, 0), (0, 1)), constant_values=1.0)
     scales = scales[..., np.newaxis]
     return outcome._replace(
-        # A scaled state may have the other sign.
+        # A negative scale swaps minimum and maximum.
         extremes=np.sort(outcome.extremes * scales[:, :-1], axis=2),
         amplitudes=np.abs(scales) * sums * (2.0 / samples),
     )
@@ -207,7 +207,7 @@ def _per_tau(
 def steps_between_scalings(
     system: LaneSystem, steps_per_period: int | NDArray[np.intp]
 ) -> NDArray[np.intp]:
-    """Return after how many steps each tangent vector is scaled back to length 1, shape (lanes,).
+    """Return the number of steps between two scalings of a tangent vector, shape (lanes,).
 
     Between two scalings it must neither overflow nor vanish.
     """
@@ -218,13 +218,52 @@ def steps_between_scalings(
 
 
 def maps_memory(system: LaneSystem, plan: Plan, stable: NDArray[np.int64]) -> int:
-    """Return about how many bytes a method prepares for lanes that are integrated together.
+    """Estimate the memory of what a method prepares for lanes that are integrated together.
 
-    ``stable`` (lanes,): steps per period with which RK4 is stable.
+    Parameters
+    ----------
+    system : LaneSystem
+        The lanes.
+    plan : Plan
+        How they are integrated.
+    stable : array of int, shape (lanes,)
+        Steps per period with which RK4 is stable.
+
+    Returns
+    -------
+    int
+        Bytes; 0 for RK4.
+
+    Examples
+    --------
+    ::
+
+        stable = np.full(pairs.lanes, 60)
+        maps_memory(pairs, Plan(12, 300, 100, 100, method="flow_map"), stable)
     """
     return METHODS[plan.method].memory(system, plan, scene_of(system, plan), stable)
 
 
 def maps_are_kept(system: LaneSystem, plan: Plan) -> bool:
-    """Return whether what a method prepares for all lanes stays in memory from call to call."""
+    """Return whether all that a method prepares for a system stays in memory between calls.
+
+    Parameters
+    ----------
+    system : LaneSystem
+        The lanes.
+    plan : Plan
+        How they are integrated.
+
+    Returns
+    -------
+    bool
+        Always True for RK4; for flow maps, whether those of all lanes fit into the memory.
+
+    Examples
+    --------
+    ::
+
+        if maps_are_kept(pairs, plan):
+            integrate(pairs, start, plan)  # the flow maps of the last call are used again
+    """
     return METHODS[plan.method].is_kept(system, plan, scene_of(system, plan))

@@ -1,8 +1,8 @@
-"""One block of lanes through all its mesh periods, on one thread.
+"""Integrate one block of lanes through all mesh periods, on one thread.
 
-The method of the scene takes one step in every slot, and counts the lanes that may have left a
-contact branch; those it resolves. Recorders are called at fixed moments. What is done once per mesh
-period (check for divergence, scaling of the tangent vectors) happens here.
+The method of the scene takes one step in every slot and counts the lanes that may have left a
+contact branch; it then resolves the step of those. Recorders are called at fixed moments. The check
+for divergence and the scaling of tangent vectors happen here.
 """
 
 import math
@@ -45,7 +45,7 @@ from gearchaos_kernels.plan import Status
 from gearchaos_kernels.recorders.protocol import (
     Block,
     Clock,
-    Place,
+    LaneAt,
     Records,
     begin_record,
     finish_record,
@@ -55,35 +55,32 @@ from gearchaos_kernels.recorders.protocol import (
 )
 
 LARGEST_STATE = 1e100
-"""A state beyond this has left every length scale: the lane is stopped as diverged."""
+"""A lane with a larger state is stopped as diverged."""
 
-LOST = 1e-150
-"""A part of a tangent vector of length 1 that is smaller is 0: its square is hardly a number."""
+NEGLIGIBLE = 1e-150
+"""Smaller components of a tangent vector of length 1 are set to 0: their squares underflow."""
 
 _OK = int(Status.OK)
 _DIVERGED = int(Status.DIVERGED)
 
 
 class Batch(NamedTuple):
-    """What the blocks read, lanes first.
+    """Arrays that the blocks read; the first axis is that of all lanes.
 
     Attributes
     ----------
     coefficients : array, shape (lanes, coefficients)
-        The coefficients of each lane, in the order of the model's record.
-    scales, start, tangent_start : arrays, shape (lanes, states)
-        What turns scaled states into those of the model's equations; state and tangent vector at
-        tau = 0, in the units of the equations.
+        The coefficients of each lane, in the order of `Model.lane`.
+    scales : array, shape (lanes, states)
+        Factors from scaled states to those of the equations.
+    start, tangent_start : array, shape (lanes, states)
+        State and tangent vector at tau = 0, in the units of the equations.
     steps_between_scalings : array of int, shape (lanes,)
-        Steps after which a tangent vector is scaled back to length 1.
-    order : array of int, shape (lanes of the share,)
-        Numbers of the lanes.
-    blocks : array of int, shape (blocks, 4)
+        Steps between two scalings of a tangent vector to length 1.
+    order, blocks, maps : array
         See `methods.protocol.Share`.
-    maps : array
-        What the method has prepared.
     chosen : array of int, shape (states + 1,)
-        Rows of the states of which extremes are recorded, then that of the observed signal.
+        Rows of the states of which extremes are recorded, then the row of the observed signal.
     turns : array, shape (lanes, orders, 2)
         Cosine and sine of the phase by which a mesh order advances in a step.
     """
@@ -102,19 +99,19 @@ class Batch(NamedTuple):
 
 @part
 def integrate_block(number_of_block, batch, tables, plan, outcome, scene):
-    """Integrate the lanes of a block, and write what was recorded of them."""
+    """Integrate the lanes of a block, and write what is recorded of them into the outcome."""
     align_stack()
     first, lanes, steps, maps_at = batch.blocks[number_of_block]
     memory = aligned_memory(rows(scene).total + plan.more_rows)
     given = Given(tables, batch.maps, workspace(scene))
     records = Records(given, batch, outcome)
     block = Block(first, lanes)
-    every = steps // plan.steps_per_period
+    substeps = steps // plan.steps_per_period
     interval = begin(memory, block, batch, tables, plan.first_period, scene)
     periods = plan.transient_periods + plan.recorded_periods
     for period in range(periods):
         recorded = period - plan.transient_periods
-        clock = Clock(period, 0, steps, every, recorded, periods - 1 - period)
+        clock = Clock(period, 0, steps, substeps, recorded, periods - 1 - period)
         begin_record(memory, block, clock, records, scene)
         for number in range(steps):
             at = StepAt(number, maps_at + number * maps_per_step(scene), recorded >= 0)
@@ -122,22 +119,22 @@ def integrate_block(number_of_block, batch, tables, plan, outcome, scene):
             if scene.resolved is not None:
                 if suspects > 0:
                     resolve(memory, lanes, at, given, scene)
-            clock = Clock(period, number, steps, every, recorded, periods - 1 - period)
+            clock = Clock(period, number, steps, substeps, recorded, periods - 1 - period)
             record_step(memory, block, clock, records, scene)
             if scene.tangent is not None:
                 last = number == steps - 1
                 if (number + 1) % interval == 0 or last:
                     scale_tangents(memory, block, batch, number + 1, last, scene)
-        clock = Clock(period, steps, steps, every, recorded, periods - 1 - period)
+        clock = Clock(period, steps, steps, substeps, recorded, periods - 1 - period)
         end_period(memory, block, clock, records, scene)
         start_period(memory, block, batch, tables, plan.first_period + period + 1, scene)
-    clock = Clock(periods, steps, steps, every, plan.recorded_periods, 0)
+    clock = Clock(periods, steps, steps, substeps, plan.recorded_periods, 0)
     end(memory, block, clock, records, scene)
 
 
 @scalar
 def start_period(memory, block, batch, tables, period, scene):
-    """Prepare every lane for a mesh period."""
+    """Prepare every slot for a mesh period."""
     for slot in range(LANES):
         index = batch.order[block.first + min(slot, block.lanes - 1)]
         begin_period(memory, slot, index, period, tables, scene)
@@ -146,22 +143,22 @@ def start_period(memory, block, batch, tables, period, scene):
 @scalar
 def begin(memory, block, batch, tables, period, scene):
     """Fill the memory of a block; return the shortest interval between scalings of a tangent."""
-    # A scaling interval belongs to a lane, whatever its neighbours need.
+    # Scaling at the shortest interval of the block is only a check: each lane keeps its own one.
     interval = batch.steps_between_scalings[batch.order[block.first]]
-    place = rows(scene)
+    row_of = rows(scene)
     for slot in range(LANES):
-        # A block that is not full repeats the last lane, and nothing of that is stored.
+        # Empty slots repeat the last lane. Nothing of theirs is stored.
         index = batch.order[block.first + min(slot, block.lanes - 1)]
         interval = min(interval, batch.steps_between_scalings[index])
         lane = fill_lane(memory, slot, batch.coefficients[index], scene)
         scale = batch.scales[index]
         fill(memory, STATE, slot, scale, batch.start[index])
-        # For the neighbours of a lone lane nothing else writes it, and denormal numbers are slow.
-        fill(memory, place.state_before, slot, scale, batch.start[index])
-        fill(memory, place.tangent, slot, scale, batch.tangent_start[index])
-        memory[place.growth * STRIDE + slot] = 0.0
-        store(memory, place.crossings, slot, (0.0, math.inf, 0.0))
-        for row in range(place.recorders, place.total):
+        # Methods leave empty slots out; uninitialised memory there may hold slow denormal numbers.
+        fill(memory, row_of.state_before, slot, scale, batch.start[index])
+        fill(memory, row_of.tangent, slot, scale, batch.tangent_start[index])
+        memory[row_of.growth * STRIDE + slot] = 0.0
+        store(memory, row_of.crossings, slot, (0.0, math.inf, 0.0))
+        for row in range(row_of.recorders, row_of.total):
             memory[row * STRIDE + slot] = 0.0
         begin_period(memory, slot, index, period, tables, scene)
         point = point_at(memory, slot, grid_at(tables, 0, scene), scene)
@@ -177,8 +174,8 @@ def begin(memory, block, batch, tables, period, scene):
 
 @scalar
 def scale_tangents(memory, block, batch, steps_done, last, scene):
-    """Scale tangent vectors that are due to length 1; keep the logarithm of their growth."""
-    # Those of repeated lanes, too: denormal numbers would cost all others their speed.
+    """Scale the tangent vectors that are due to length 1, and add the logarithm of their growth."""
+    # In empty slots as well: denormal numbers there would slow down the whole vector.
     first = rows(scene).tangent
     for slot in range(LANES):
         index = batch.order[block.first + min(slot, block.lanes - 1)]
@@ -192,19 +189,19 @@ def scale_tangents(memory, block, batch, steps_done, last, scene):
         for column in range(scale.shape[0]):
             part = memory[(first + column) * STRIDE + slot] / length
             # Flush tiny components before they become denormal.
-            memory[(first + column) * STRIDE + slot] = part if abs(part) > LOST else 0.0
+            memory[(first + column) * STRIDE + slot] = part if abs(part) > NEGLIGIBLE else 0.0
         memory[rows(scene).growth * STRIDE + slot] += math.log(length)
 
 
 @scalar
 def end_period(memory, block, clock, records, scene):
-    """Record the period of every lane, and stop those that have diverged."""
+    """Record the mesh period of every lane, and stop the lanes that have diverged."""
     batch, outcome = records.batch, records.outcome
     for slot in range(block.lanes):
         index = batch.order[block.first + slot]
         if outcome.status[index] != _OK:
             continue
-        place = Place(slot, index)
+        lane_at = LaneAt(slot, index)
         sound = within_range(memory, slot, batch.scales[index])
         if scene.tangent is not None:
             sound = sound and math.isfinite(memory[rows(scene).growth * STRIDE + slot])
@@ -213,14 +210,14 @@ def end_period(memory, block, clock, records, scene):
             outcome.diverged_period[index] = clock.period
             for row in range(rows(scene).coefficients):
                 memory[row * STRIDE + slot] = math.nan
-            record_stop(memory, place, clock, records, scene)
+            record_stop(memory, lane_at, clock, records, scene)
             continue
-        record_period(memory, place, clock, records, scene)
+        record_period(memory, lane_at, clock, records, scene)
 
 
 @scalar
 def end(memory, block, clock, records, scene):
-    """Write the last state and tangent vector of every lane, and what was recorded."""
+    """Write the last state and tangent vector of every lane, and what recorders accumulated."""
     batch, outcome = records.batch, records.outcome
     for slot in range(block.lanes):
         index = batch.order[block.first + slot]
@@ -231,12 +228,12 @@ def end(memory, block, clock, records, scene):
         outcome.crossings[index] = int(memory[crossings])
         outcome.slowest_crossing[index] = memory[crossings + STRIDE]
         outcome.overflows[index] = int(memory[crossings + 2 * STRIDE])
-        finish_record(memory, Place(slot, index), clock, records, scene)
+        finish_record(memory, LaneAt(slot, index), clock, records, scene)
 
 
 @scalar
 def within_range(memory, slot, scale):
-    """Return whether every state of a lane is a number of sensible size."""
+    """Return whether every state of a lane is a number and below `LARGEST_STATE`."""
     for column in range(scale.shape[0]):
         if not abs(memory[(STATE + column) * STRIDE + slot] * scale[column]) < LARGEST_STATE:
             return False

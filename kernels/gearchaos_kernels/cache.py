@@ -1,8 +1,8 @@
-"""Compiled code on disk: kept where nobody else can write, loaded only as it was written.
+"""Compiled code on disk: stored where only the user can write, loaded only if unchanged.
 
-What is loaded is executed. Numba's own cache believes every file that it finds, and its index can
-end up with the names of files that another process has just written for another signature. Here
-each signature has a file of its own, which begins with a checksum of its name and of the rest.
+Loaded code is executed, so it must be trusted. Numba's own cache trusts every file that it finds,
+and its index can name files that another process has just written for another signature. Here each
+signature has its own file, which begins with a checksum of its name and content.
 """
 
 import atexit
@@ -22,7 +22,7 @@ from typing import Any
 import numba
 from numba import config
 
-# What Numba keeps to itself: where a version lacks it, every process compiles anew.
+# Private parts of Numba. In a version without them, every process compiles anew.
 try:
     from numba.core.caching import NullCache
     from numba.core.compiler import CompileResult
@@ -35,21 +35,21 @@ try:
 except ImportError:
 
     def user_cache_dir(name: str) -> str:
-        """Return the user's cache folder of Linux, a relative one where none is set."""
+        """Return the user's cache folder on Linux; a relative path if none is set."""
         return os.path.join(os.environ.get("XDG_CACHE_HOME", ""), name)
 
 
 def cache_folder(name: str) -> Path:
-    """Return a writable folder of this name for compiled code that nobody else can write.
+    """Return a folder of this name for compiled code that only the user can write.
 
-    Numba's own setting (``NUMBA_CACHE_DIR``) is the parent folder where it is set, otherwise the
-    user's cache folder. Where that cannot be written, or others can write it or put another folder
-    in its place, a line says so and a private temporary folder serves one process.
+    The parent folder is ``NUMBA_CACHE_DIR`` if it is set, otherwise the user's cache folder. If the
+    folder is not writable, or others can write or replace it, a message says so and a temporary
+    folder is used for this process.
     """
     folder = Path(config.CACHE_DIR or user_cache_dir("gearchaos"), name)
     try:
         if not (config.CACHE_DIR or folder.is_absolute()):
-            # XDG_CACHE_HOME counts as unset where it is empty or relative.
+            # XDG_CACHE_HOME counts as unset if it is empty or relative.
             folder = Path("~/.cache/gearchaos", name).expanduser()
         folder = folder.resolve()
         for path in (*reversed(folder.parents), folder):
@@ -58,7 +58,7 @@ def cache_folder(name: str) -> Path:
         with tempfile.TemporaryFile(dir=folder):
             return folder
     except (OSError, RuntimeError) as error:  # RuntimeError: there is no home folder.
-        _tell(
+        _warn(
             f"{folder} is not used for compiled code, every process compiles anew ({error}); "
             "set NUMBA_CACHE_DIR to a folder that only you can write"
         )
@@ -68,7 +68,7 @@ def cache_folder(name: str) -> Path:
 
 
 def _require_ours(path: Path, sticky: bool) -> None:
-    """Raise OSError where others may write; in a sticky folder nobody moves what is ours."""
+    """Raise OSError if others may write a folder; a sticky one protects what it contains."""
     if not hasattr(os, "geteuid"):  # Windows.
         return
     about = path.stat()
@@ -80,42 +80,44 @@ def _require_ours(path: Path, sticky: bool) -> None:
 
 
 @functools.cache
-def _tell(text: str) -> None:
-    """Say it once: as a line on stderr, unless the process has set up logging."""
+def _warn(text: str) -> None:
+    """Log a warning once; without a logging configuration it appears on stderr."""
     logging.getLogger("gearchaos").warning("gearchaos: %s", text)
 
 
 def keep_compiled(dispatcher: Any, folder: Path) -> None:
-    """Keep the compiled code of a dispatcher in a folder, if this version of Numba lets it."""
+    """Cache the compiled code of a dispatcher in a folder, if this version of Numba permits it."""
     if CompileResult is None or not hasattr(dispatcher, "_cache"):
-        _tell_unfit("it has another cache")
+        _warn_unfit("it has another cache")
     else:
         dispatcher._cache = KernelCache(dispatcher.py_func, folder)
 
 
-def _tell_unfit(fault: object) -> None:
-    _tell(
+def _warn_unfit(fault: object) -> None:
+    """Warn that this version of Numba cannot use the cache."""
+    _warn(
         f"compiled code cannot be kept with Numba {numba.__version__} ({fault}), every process "
         "compiles anew; install an older version of Numba"
     )
 
 
 class KernelCache(NullCache):  # type: ignore[misc]
-    """The compiled code of one function in a folder, one file for each signature."""
+    """The compiled code of one function in a folder, with one file per signature."""
 
     def __init__(self, function: Callable[..., Any], folder: Path) -> None:
-        """Read and write nothing yet."""
+        """Remember function and folder; nothing is read or written yet."""
         self._function, self._folder = function, folder
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
-        """Return the code that was kept for a signature, or None where it has to be compiled."""
+        """Return the cached code of a signature, or None if it has to be compiled."""
         try:
             return self._load(sig, target_context)
-        except Exception as error:  # Whatever another version of Numba raises.
-            _tell_unfit(f"{type(error).__name__}: {error}")
+        except Exception as error:  # Other versions of Numba may raise anything.
+            _warn_unfit(f"{type(error).__name__}: {error}")
             return None
 
     def _load(self, sig: Any, target_context: Any) -> Any:
+        """Return the cached code of a signature, or None; the errors are those of Numba."""
         target_context.refresh()
         path = self._path(sig, target_context.codegen())
         try:
@@ -126,12 +128,12 @@ class KernelCache(NullCache):  # type: ignore[misc]
             content = b""
         data = content[hashlib.sha256().digest_size :]
         if content != _sealed(path, data):
-            _tell(f"{self._folder}: damaged compiled code is not used, but compiled and kept anew")
+            _warn(f"{self._folder}: damaged compiled code is not used, but compiled and kept anew")
             return None
         return CompileResult._rebuild(target_context, *pickle.loads(data))
 
     def save_overload(self, sig: Any, data: Any) -> None:
-        """Keep code for later processes; where that fails, a line says what to do about it."""
+        """Store code for later processes; if that fails, a warning names the remedy."""
         try:
             if data.library.has_dynamic_globals:  # Addresses in this process.
                 return
@@ -142,19 +144,23 @@ class KernelCache(NullCache):  # type: ignore[misc]
                 written.write_bytes(_sealed(path, dumps(data._reduce())))
                 written.replace(path)
         except OSError as error:
-            _tell(
+            _warn(
                 f"{self._folder}: cannot keep compiled code, every process compiles anew "
                 f"({error.strerror}); free space there or set NUMBA_CACHE_DIR to another folder"
             )
-        except Exception as error:  # Whatever another version of Numba raises.
-            _tell_unfit(f"{type(error).__name__}: {error}")
+        except Exception as error:  # Other versions of Numba may raise anything.
+            _warn_unfit(f"{type(error).__name__}: {error}")
 
     def _path(self, sig: Any, codegen: Any) -> Path:
-        """Name a file after all that decides what is in it; the folder stands for the sources."""
+        """Return the file of a signature, named after everything that determines its content.
+
+        The kernel sources are not part of the name: they determine the folder.
+        """
         name = f"{self._function.__module__}.{self._function.__qualname__}"
         key = f"{name} {sig} {codegen.magic_tuple()} {sys.version}"
         return self._folder / f"{name}-{hashlib.sha256(key.encode()).hexdigest()[:32]}.nbc"
 
 
 def _sealed(path: Path, data: bytes) -> bytes:
+    """Return data after a checksum of the name of its file and of itself."""
     return hashlib.sha256(path.name.encode() + data).digest() + data

@@ -1,13 +1,13 @@
-"""How the kernels are compiled: flags, vector width, stack alignment and what is cached.
+"""How the kernels are compiled: flags, vector width, stack alignment and caching.
 
-Every flag is named here and nowhere else. Three facts about Numba shape this file:
+All flags are set here. Three properties of Numba and LLVM shape this file:
 
-* a cached caller contains the code of its callees, and would keep it when one is edited in another
-  file. The cache folder is therefore named after a hash of all kernel sources;
+* Cached code of a function contains the code of all functions that it calls. Numba does not notice
+  an edit in another file. The cache folder is therefore named after a hash of all kernel sources.
 * Numba optimises every function on its own, and again in every function that it is linked into:
-  five times for the block of lanes. Here only functions that Python calls are optimised;
+  five times for the block of lanes. Here only functions that Python calls are optimised.
 * LLVM prefers 256-bit vectors on some AVX-512 processors, and it spills vector registers to an
-  unaligned stack. Both cost up to half of the speed of the lane loop.
+  unaligned stack. Each costs up to half of the speed of the lane loop.
 """
 
 import hashlib
@@ -27,7 +27,7 @@ from gearchaos_kernels.cache import cache_folder, keep_compiled
 from gearchaos_kernels.compiler import PartCompiler
 from gearchaos_kernels.turns import in_turn
 
-# Numba keeps these to itself; kernels of a version without them compile or run more slowly.
+# Private parts of Numba. In a version without them, kernels compile or run more slowly.
 try:
     from gearchaos_kernels.linking import DriverCompiler
 except (ImportError, AttributeError):
@@ -41,8 +41,8 @@ try:
 except ImportError:
     event = None
 
-# OpenMP reads this when it is loaded, with the first parallel loop. Waiting threads then sleep
-# instead of spinning, which leaves cores to other processes between many short calls.
+# OpenMP reads this variable when the first parallel loop loads it. Waiting threads then sleep
+# instead of spinning, which leaves the cores to other processes between short calls.
 os.environ.setdefault("OMP_WAIT_POLICY", "passive")
 
 FASTMATH = {"contract", "nsz"}
@@ -54,7 +54,18 @@ CACHE_LINE = 64  # Bytes that one aligned 512-bit vector occupies.
 
 
 def source_hash() -> str:
-    """Return a hash of every source file of this package and of Numba's version."""
+    """Return a hash of all source files of this package and of Numba's version.
+
+    Returns
+    -------
+    str
+        16 hexadecimal digits. Equal hashes mean equal compiled code on the same processor.
+
+    Examples
+    --------
+    >>> len(source_hash())
+    16
+    """
     digest = hashlib.sha256(numba.__version__.encode())
     for source in sorted(Path(__file__).parent.rglob("*.py")):
         digest.update(str(source.relative_to(Path(__file__).parent)).encode())
@@ -69,10 +80,10 @@ if getattr(config, "CPU_FEATURES", "") is None:
 
 
 def _decorate(function: Callable[..., Any], *, how: dict[str, Any], **optional: bool) -> Any:
-    """Compile a function with options of `numba.njit`, and flags where Numba knows them."""
+    """Compile a function with options of `numba.njit`, and with flags that this version has."""
     flags = {flag: on for flag, on in optional.items() if hasattr(CPUTargetOptions, flag)}
     dispatcher = numba.njit(fastmath=FASTMATH, error_model="numpy", **how, **flags)(function)
-    # Numba would compile for every constant argument anew; LLVM knows them all the same.
+    # Otherwise Numba compiles anew for every constant argument; LLVM propagates constants anyway.
     if template := getattr(dispatcher, "get_call_template", None):
         dispatcher.get_call_template = lambda args, kws: template(
             tuple(map(types.unliteral, args)), kws
@@ -81,18 +92,18 @@ def _decorate(function: Callable[..., Any], *, how: dict[str, Any], **optional: 
 
 
 def scalar(function: Callable[..., Any]) -> Any:
-    """Compile a formula of plain numbers that is inlined wherever it is used."""
+    """Compile a formula that only compiled code calls; it is inlined into every caller."""
     flags = {"no_cfunc_wrapper": True, "no_cpython_wrapper": True, "_nrt": False}
     return _decorate(function, how=PART, forceinline=True, **flags)
 
 
 def part(function: Callable[..., Any]) -> Any:
-    """Compile a function that only compiled code calls, and calls rather than copies."""
+    """Compile a function that only compiled code calls; it is not forced into its callers."""
     return _decorate(function, how=PART, no_cfunc_wrapper=True, no_cpython_wrapper=True)
 
 
 def dispatcher_of(function: Callable[..., Any], parallel: bool = True) -> Any:
-    """Compile a function that only splits, calls and merges, in parallel and cached on disk."""
+    """Compile a function that Python calls, in parallel by default; cache it on disk."""
     how = {"pipeline_class": DriverCompiler, "parallel": parallel, "nogil": True}
     dispatcher = _decorate(function, how=how, no_cfunc_wrapper=True)
     keep_compiled(dispatcher, CACHE_FOLDER)
@@ -100,21 +111,21 @@ def dispatcher_of(function: Callable[..., Any], parallel: bool = True) -> Any:
 
 
 def driver(function: Callable[..., Any]) -> Any:
-    """Compile a function as `dispatcher_of` does; threads of Python enter it one at a time."""
+    """Compile a parallel function that Python calls; threads of Python enter it one at a time."""
     return in_turn(dispatcher_of(function))
 
 
 def evaluator(function: Callable[..., Any]) -> Any:
-    """Compile a function that visits lanes one after the other, cached on disk."""
+    """Compile a sequential function that Python calls; cache it on disk."""
     return dispatcher_of(function, parallel=False)
 
 
 @intrinsic
 def align_stack(_typing_context: Any) -> Any:
-    """Align the caller's stack frame to a cache line, so that spilled vectors do not straddle two.
+    """Align the caller's stack frame to a cache line, so that no spilled vector straddles two.
 
-    LLVM realigns a frame only if it holds an over-aligned variable before registers are allocated:
-    this one is it. The empty assembly keeps it from being optimised away.
+    LLVM realigns a frame only if it contains an over-aligned variable before registers are
+    allocated. This variable serves that purpose only; the empty assembly keeps it alive.
     """
 
     def generate(context: Any, builder: Any, _signature: Any, _arguments: Any) -> Any:
@@ -129,13 +140,13 @@ def align_stack(_typing_context: Any) -> Any:
 
 
 def first_element(context: Any, builder: Any, kind: Any, array: Any) -> Any:
-    """Return, within an intrinsic, the address of the first element of an array of this type."""
+    """Return the address of the first element of an array, within an intrinsic."""
     return context.make_array(kind)(context, builder, array).data
 
 
 @intrinsic
 def count_up(_typing_context: Any, counter: Any) -> Any:
-    """Add one to a number that threads share, shape (1,), and return what it was."""
+    """Add 1 to a number that threads share, shape (1,), atomically; return its old value."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         address = first_element(context, builder, signature.args[0], arguments[0])
@@ -147,7 +158,7 @@ def count_up(_typing_context: Any, counter: Any) -> Any:
 
 @contextmanager
 def on_compilation(announce: Callable[[], None]) -> Iterator[None]:
-    """Call a function whenever something begins to be compiled, if Numba lets that be known."""
+    """Call a function whenever a compilation begins, if this version of Numba reports that."""
     with ExitStack() as stack:
         if event is not None:
 

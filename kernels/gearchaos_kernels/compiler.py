@@ -1,7 +1,7 @@
-"""Compile for a scene: a pass that replaces what the type of a scene decides.
+"""A compiler pass that specialises functions for the scene among their arguments.
 
-Numba documents how passes are written and added; that this one corrects the definitions of names
-has no other way, which is why the versions of Numba are bounded above.
+Numba documents how to write and add passes. This one also changes the definitions of names, for
+which Numba has no public function. That is why the supported versions of Numba have an upper bound.
 """
 
 from typing import Any
@@ -17,25 +17,25 @@ from gearchaos_kernels.scene import Interface, SceneType
 
 @register_pass(mutates_CFG=False, analysis_only=False)
 class KnownScene(FunctionPass):  # type: ignore[misc]
-    """Replace flags of a scene by constants, and interfaces by the functions that it names.
+    """Replace flags of a scene by constants, and interfaces by the implementations of the scene.
 
-    Numba removes the branches of an argument that is None before it compiles anything.
+    Numba then removes branches on constants that are None before it infers types.
     """
 
     _name = "known_scene"
 
     def __init__(self) -> None:
-        """Keep nothing between functions."""
+        """Create the pass, which has no state."""
 
     def run_pass(self, state: Any) -> bool:
-        """Replace ``scene.part.flag`` by None or True, and each `Interface`."""
+        """Replace ``scene.part.flag`` by None or True, and every `Interface` by a function."""
         known = []
-        for part in state.func_ir.blocks.values():
-            for assignment in part.find_insts(numba_ir.Assign):
+        for block in state.func_ir.blocks.values():
+            for assignment in block.find_insts(numba_ir.Assign):
                 value = _known(state, assignment.value)
                 if value is not None:
                     known.append((assignment, value))
-        # All of them at once: a part of a scene is found through the part that it belongs to.
+        # Replaced only now: the search above follows unchanged definitions back to the scene.
         for assignment, value in known:
             assignment.value = value
             state.func_ir._definitions[assignment.target.name] = [value]
@@ -51,13 +51,13 @@ def _known(state: Any, value: Any) -> Any:
         found = guard(_part_of_scene, state, value)
         if found is not None:
             (part,) = found
-            # A record of flags is not needed any more where its flags are known.
+            # A record of flags becomes None as well: nothing reads it once its flags are constants.
             return numba_ir.Const(True if part is True else None, value.loc)
     return None
 
 
 def _part_of_scene(state: Any, value: Any) -> tuple[Any] | None:
-    """Return a scene that is an argument, or a part of it, in a tuple; None if it is neither."""
+    """Return the scene or the part of a scene that a value is, in a tuple, or None."""
     if isinstance(value, numba_ir.Arg):
         kind = state.args[value.index]
         return (kind.scene,) if isinstance(kind, SceneType) else None
@@ -68,10 +68,10 @@ def _part_of_scene(state: Any, value: Any) -> tuple[Any] | None:
 
 
 class PartCompiler(CompilerBase):  # type: ignore[misc]
-    """Numba's own passes, and `KnownScene` before it removes branches."""
+    """Numba's passes, with `KnownScene` before the one that removes branches."""
 
     def define_pipelines(self) -> list[Any]:
-        """Return the one list of passes."""
+        """Return the list of passes."""
         passes = DefaultPassBuilder.define_nopython_pipeline(self.state)
         passes.add_pass_after(KnownScene, RewriteSemanticConstants)
         passes.finalize()

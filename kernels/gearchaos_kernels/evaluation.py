@@ -1,6 +1,6 @@
-"""The equations of motion on given states: their Jacobian, and forces along a motion.
+"""Evaluate the equations of motion on given states: Jacobian, and forces along a motion.
 
-Both call the formulas that the steps of the methods call.
+Both use the same compiled formulas as the methods of integration.
 """
 
 from typing import NamedTuple
@@ -39,10 +39,10 @@ from gearchaos_kernels.models.interfaces import (
 )
 from gearchaos_kernels.models.lane_system import LaneSystem
 from gearchaos_kernels.plan import Floats, Plan
-from gearchaos_kernels.scene import provider_of
+from gearchaos_kernels.scene import Scene, provider_of
 
-ALONE = Plan(1, 0, 0, 0, resolved=False)
-"""No loop: nothing is split and no tangent vector integrated."""
+WITHOUT_LOOP = Plan(1, 0, 0, 0, resolved=False)
+"""The plan of a scene without a loop: no resolved crossings, no tangent vector, no recorders."""
 
 
 class Motion(NamedTuple):
@@ -53,12 +53,12 @@ class Motion(NamedTuple):
     forces : array, shape (lanes, samples, elements)
         Forces of the elements.
     contact : array of int, shape (lanes, samples, elements)
-        0 apart, 1 on the driving flank, 2 on the back flank. Without clearance an element never
-        parts, and the sign of its gap decides the flank.
+        0 without contact, 1 on the driving flank, 2 on the back flank. An element without clearance
+        is always in contact, and the sign of its gap decides the flank.
     accelerations : array, shape (lanes, samples, coordinates)
-        Second derivatives of the coordinates of the scene.
+        Second derivatives of the coordinates of the scene, by tau.
     observed : array, shape (lanes, samples, signals)
-        The signals that the model has observed.
+        The observed signals of the model.
     """
 
     forces: Floats
@@ -68,16 +68,37 @@ class Motion(NamedTuple):
 
 
 def jacobian(system: LaneSystem, stiffnesses: Floats) -> Floats:
-    """Return the Jacobian of the equations per unit of tau, shape (lanes, states, states).
+    """Return the Jacobian of the equations of motion on one contact branch.
 
-    On one contact branch of every element: ``stiffnesses`` (lanes, elements) are those of the
-    elements relative to their mean, 0 without contact.
+    Parameters
+    ----------
+    system : LaneSystem
+        The equations of motion of every lane.
+    stiffnesses : array, shape (lanes, elements)
+        Stiffness of each element relative to its mean; 0 without contact.
+
+    Returns
+    -------
+    array, shape (lanes, states, states)
+        d(x')/dx per unit of tau, in the units of the equations.
+
+    Notes
+    -----
+    On a contact branch the equations x' = f(x, tau) are linear in x, so the Jacobian is exact. Its
+    columns come from the variational equation, applied to unit vectors.
+
+    Examples
+    --------
+    Natural frequencies per unit of tau, with every element in contact at mean stiffness::
+
+        in_contact = np.ones((system.lanes, system.elements))
+        frequencies = np.abs(np.linalg.eigvals(jacobian(system, in_contact)).imag)
     """
     per_tau = np.ones(system.lanes)
     scales = system.scales(per_tau)
     result = np.empty((*scales.shape, scales.shape[1]))
-    # What excites the system is not part of its linearisation: it need not be compiled.
-    scene = scene_of(system.linearised(), ALONE)
+    # Without excitation: it is no part of the linearisation and would only be compiled in vain.
+    scene = scene_of(system.linearised(), WITHOUT_LOOP)
     slopes = np.ascontiguousarray(stiffnesses, dtype=np.float64)
     _differentiate(system.coefficients(per_tau), scales, slopes, result, scene)
     return result
@@ -85,13 +106,13 @@ def jacobian(system: LaneSystem, stiffnesses: Floats) -> Floats:
 
 @evaluator
 def _differentiate(coefficients, scales, slopes, result, scene):
-    """Apply the tangent formula to the unit vector of every state, lane by lane."""
+    """Apply the variational equation to the unit vector of every state, lane by lane."""
     memory = aligned_memory(rows(scene).total)
     for index in range(scales.shape[0]):
         scale = scales[index]
         lane = fill_lane(memory, 0, coefficients[index], scene)
         elements = elements_at(lane, unforced(lane, scene), scene)
-        held = each(held_at, elements, numbers_of_elements(slopes[index], 0, scene))
+        held = each(push_of_share, elements, numbers_of_elements(slopes[index], 0, scene))
         for column in range(scale.shape[0]):
             unit = np.zeros(scale.shape[0])
             unit[column] = 1.0
@@ -104,8 +125,8 @@ def _differentiate(coefficients, scales, slopes, result, scene):
 
 
 @scalar
-def held_at(element, share):
-    """Return a push with the slope of an element at a share of its mean stiffness."""
+def push_of_share(element, share):
+    """Return a push whose slope is a share of the mean stiffness of an element."""
     return Push(0.0, element.stiffness * share)
 
 
@@ -130,18 +151,17 @@ def evaluate(
     -------
     Motion
         In the units of the equations.
+
+    Examples
+    --------
+    ::
+
+        outcome = integrate(system, start, Plan(200, 100, 10, 1, history_periods=2))
+        largest_forces = evaluate(system, outcome.history, 200).forces.max(axis=1)
     """
-    lanes, samples, count = states.shape
     step = system.mesh_period / steps_per_period
-    scene = scene_of(system, ALONE)
-    model = provider_of(scene.model)
-    elements = model.elements(scene.model)
-    motion = Motion(
-        np.zeros((lanes, samples, elements)),
-        np.zeros((lanes, samples, elements), dtype=np.uint8),
-        np.zeros((lanes, samples, count // 2)),
-        np.zeros((lanes, samples, len(model.observed))),
-    )
+    scene = scene_of(system, WITHOUT_LOOP)
+    motion = _zero_motion(states, scene)
     _follow(
         system.coefficients(step),
         system.scales(step),
@@ -156,6 +176,19 @@ def evaluate(
     # Scaled forces are per step squared, and changes of rates per step.
     return motion._replace(
         forces=motion.forces / steps**2, accelerations=motion.accelerations / steps
+    )
+
+
+def _zero_motion(states: Floats, scene: Scene) -> Motion:
+    """Return a motion of zeros for states of shape (lanes, samples, states)."""
+    lanes, samples, count = states.shape
+    model = provider_of(scene.model)
+    elements = model.elements(scene.model)
+    return Motion(
+        np.zeros((lanes, samples, elements)),
+        np.zeros((lanes, samples, elements), dtype=np.uint8),
+        np.zeros((lanes, samples, count // 2)),
+        np.zeros((lanes, samples, len(model.observed))),
     )
 
 

@@ -1,6 +1,5 @@
-"""How a batch is integrated, and what comes of it: the records that go in and out."""
+"""Input and output of an integration: the plan and the outcome."""
 
-from collections import namedtuple
 from enum import IntEnum
 from fractions import Fraction
 from typing import NamedTuple, Self
@@ -11,39 +10,51 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 
 
+MAP_BYTES = 2**27
+"""Bytes of flow maps that are kept in memory by default."""
+
+
 class Plan(NamedTuple):
-    """How long and how finely a batch is integrated, and what is recorded of it.
+    """How long and how finely lanes are integrated, and what is recorded.
 
     Attributes
     ----------
     steps_per_period : int
-        Steps per mesh period.
+        Steps per mesh period. Flow maps take a multiple of it where one step is too long for them.
     transient_periods, recorded_periods : int
-        Mesh periods before the record, and of the record.
+        Mesh periods of the transient and of the record that follows it.
     section_points : int
-        The section is kept at the end of the last ``section_points`` mesh periods.
+        Number of section points: the states at the end of the last mesh periods.
     tangent : bool
         Whether a tangent vector is integrated with every lane.
     resolved : bool
-        Whether steps that cross a clearance boundary are resolved there; otherwise they are plain
-        ones. Flow maps resolve every crossing.
+        Whether steps that cross a clearance boundary are resolved there. Flow maps resolve every
+        crossing, whatever this says.
     history_periods : int
-        Of the last ``history_periods`` mesh periods every step is kept.
+        Number of mesh periods at the end of which every step is recorded.
     method : str
         Name of the method: "rk4" or "flow_map".
     first_period : int
-        Mesh periods that have passed before tau = 0.
+        Number of mesh periods before tau = 0, for pitch errors tooth by tooth.
     contact : bool
-        Whether the contact of every element is recorded, where crossings are resolved.
+        Whether contact times and impacts of every element are recorded; needs resolved crossings.
     loads : bool
         Whether the forces of the elements and the observed signals are recorded.
     states : tuple of str
-        States of which the extremes are recorded.
+        Names of the states of which extremes are recorded.
     orders : tuple of Fraction
         Mesh orders at which amplitudes of these states and of the first observed signal are
-        recorded; the record has whole cycles of each.
+        recorded. The record must contain whole cycles of each.
     map_bytes : int
-        Memory in which flow maps are kept, unless those of one group of lanes take more.
+        Bytes of flow maps that are kept in memory. The maps of one lane are always kept.
+
+    Examples
+    --------
+    200 steps per mesh period, 300 periods of transient, 100 recorded ones, all in the section:
+
+    >>> plan = Plan(200, 300, 100, 100, tangent=True)
+    >>> plan._replace(method="flow_map", steps_per_period=12).resolved
+    True
     """
 
     steps_per_period: int
@@ -59,23 +70,34 @@ class Plan(NamedTuple):
     loads: bool = False
     states: tuple[str, ...] = ()
     orders: tuple[Fraction, ...] = ()
-    map_bytes: int = 2**27
+    map_bytes: int = MAP_BYTES
 
     @property
     def records_steps(self) -> bool:
-        """Whether recorders read every step; flow maps then take short ones."""
+        """Whether recorders read every step; flow maps then take shorter steps."""
         return bool(self.loads or self.states or self.orders)
 
 
-Schedule = namedtuple(
-    "Schedule",
-    "steps_per_period transient_periods recorded_periods first_period more_rows",
-)
-"""What the compiled loop over the periods has to know of a plan."""
+class Schedule(NamedTuple):
+    """The part of a plan that the compiled loop over the periods reads.
+
+    Attributes
+    ----------
+    steps_per_period, transient_periods, recorded_periods, first_period : int
+        See `Plan`.
+    more_rows : int
+        Rows of a block beyond those of the scene, for extremes and amplitudes.
+    """
+
+    steps_per_period: int
+    transient_periods: int
+    recorded_periods: int
+    first_period: int
+    more_rows: int
 
 
 class Status(IntEnum):
-    """Outcome of the integration of one lane; the values are those of the result file."""
+    """How the integration of a lane ended; the values are those of the result file."""
 
     OK = 0
     DIVERGED = 1
@@ -90,7 +112,9 @@ STATUS_TEXTS = {
 
 
 class Outcome(NamedTuple):
-    """What a batch yields; states are those of the system.
+    """The result of integrating a batch, in the units of the equations.
+
+    Arrays of what the plan does not request have an axis of length 0.
 
     Attributes
     ----------
@@ -103,25 +127,25 @@ class Outcome(NamedTuple):
     status : array of `Status`, shape (lanes,)
         How each lane ended.
     diverged_period : array of int, shape (lanes,)
-        Number of the period in which a lane diverged, or -1.
+        Number of the mesh period in which a lane diverged, or -1.
     crossings : array of int, shape (lanes,)
-        Clearance boundaries crossed in the recorded periods; 0 where steps are plain.
+        Number of clearance boundaries crossed in the recorded periods; 0 without resolution.
     slowest_crossing : array, shape (lanes,)
-        Smallest speed of a gap at one of them per unit of tau, or infinity.
+        Smallest speed of a gap at a crossing per unit of tau, or infinity.
     overflows : array of int, shape (lanes,)
-        Steps that crossed more often than they were split, in all periods.
+        Number of steps in which not all crossings were resolved, in all periods.
     contact : array, shape (lanes, elements, 6) or (lanes, 0, 6)
-        Of each element in the recorded periods: mesh periods on the driving flank and impacts
-        there, the same of the back flank, sum and largest of the speeds of approach.
+        For each element in the recorded periods: mesh periods on the driving flank, impacts on it,
+        both for the back flank, sum and maximum of the impact speeds per unit of tau.
     loads : array, shape (lanes, signals, 4) or (lanes, 0, 4)
-        Largest and smallest value, mean and mean square of the forces of all elements and then of
-        the observed signals, in the recorded periods.
+        Maximum, minimum, mean and mean square in the recorded periods, of the forces of all
+        elements and then of the observed signals.
     extremes : array, shape (lanes, states of the plan, 2)
-        Smallest and largest value of each of these states.
+        Minimum and maximum of each of these states in the recorded periods.
     amplitudes : array, shape (lanes, states of the plan + 1, orders)
-        Amplitudes of these states and of the first observed signal.
+        Amplitudes of these states and then of the first observed signal.
     history : array, shape (lanes, history periods times steps + 1, states) or (lanes, 0, states)
-        The state at every step of the last periods.
+        The state at every step of the last mesh periods.
     """
 
     section: Floats
@@ -140,5 +164,5 @@ class Outcome(NamedTuple):
     history: Floats
 
     def every(self, periods: int) -> Self:
-        """Return it with the section once every so many mesh periods, up to the end."""
+        """Return the outcome with every n-th section point, counted back from the last one."""
         return self._replace(section=self.section[:, ::-periods][:, ::-1])

@@ -1,10 +1,10 @@
-"""What a compiled loop is made of, and how its parts find each other.
+"""Scenes: which model, method and recorders a compiled loop consists of.
 
-A scene names a model, a method and recorders. Each is a record of flags, True for what the compiled
-loop contains and None for what it leaves out; its class says which implementation it is. The loop
-itself calls interfaces, such as ``gaps_at``. While a function is compiled, every interface in it
-is replaced by the implementation that the scene among its arguments names, so that nothing is
-looked up at run time.
+A scene names a model, a method and recorders. Each is a record of flags: True for what the compiled
+loop contains, None for what it leaves out. The class of the record identifies the implementation.
+The loop calls interfaces, such as ``gaps_at``. When a function is compiled, the implementation that
+belongs to the scene among its arguments replaces every interface, so that nothing is looked up at
+run time.
 """
 
 import inspect
@@ -21,13 +21,13 @@ from numba.extending import NativeValue, models, register_model, typeof_impl, un
 
 @dataclass(frozen=True)
 class Scene:
-    """What a compiled loop has; a flag is True where it does, and None where it does not.
+    """What a compiled loop contains. A flag is True if it is contained, otherwise None.
 
     Attributes
     ----------
     model, method, recorders : records of flags
-        Their classes, frozen dataclasses, name the implementations; see `implement`. Named tuples
-        would be equal to those of other classes.
+        Their classes, frozen dataclasses, identify the implementations; see `implement`. Named
+        tuples do not serve: those of different classes can be equal.
     clearance : True or None
         Whether some element has a clearance.
     resolved : True or None
@@ -47,13 +47,13 @@ class Scene:
     before: Any
 
     def bare(self) -> "Scene":
-        """Return the scene without tangent vector and recorders, for what does not need them."""
+        """Return the scene without tangent vector and recorders, on which flow maps depend not."""
         recorders = type(self.recorders)()
         return replace(self, tangent=None, before=None, recorders=recorders)
 
 
 class SceneType(types.Opaque):  # type: ignore[misc]
-    """The Numba type of one scene: every scene is compiled for itself."""
+    """The Numba type of one scene: every scene has its own type and its own compiled code."""
 
     def __init__(self, scene: Scene) -> None:
         self.scene = scene
@@ -61,20 +61,20 @@ class SceneType(types.Opaque):  # type: ignore[misc]
 
     @property
     def key(self) -> Scene:
-        """Scenes are equal only if the classes of their parts are; their names may be alike."""
+        """The scene itself, since scenes of different classes may have equal names."""
         return self.scene
 
 
 def _sources_of(scene: Scene) -> str:
-    """Return hashes of the implementations outside this package that a scene names."""
+    """Return hashes of those implementations of a scene that are outside this package."""
     parts = type(scene.model), type(scene.method), type(scene.recorders)
     return "".join(_SOURCES[part] for part in parts)
 
 
 def _hash_of(flags: type) -> str:
-    """Return a hash of the sources beside a class outside this package, empty within it.
+    """Return a hash of the Python files beside a class outside this package, "" within it.
 
-    Cached code is then not used after they change.
+    It is part of the scene's type, so that cached code is not used after an edit.
     """
     if flags.__module__.partition(".")[0] == __package__:
         return ""
@@ -83,7 +83,7 @@ def _hash_of(flags: type) -> str:
         for source in sorted(Path(inspect.getfile(flags)).parent.glob("*.py")):
             digest.update(source.read_bytes())
     except (TypeError, OSError):
-        # Made at a prompt: code that another process keeps is never the same.
+        # Defined at a prompt: a random hash keeps code of other processes from being used.
         digest.update(uuid4().bytes)
     return f" {flags.__module__} {digest.hexdigest()}"
 
@@ -102,34 +102,34 @@ def _typeof_scene(scene: Scene, _context: Any) -> SceneType:
 
 @unbox(SceneType)
 def _unbox_scene(_kind: Any, _scene: Any, c: Any) -> NativeValue:
-    # A scene has no data at run time: its type says everything.
+    # A scene has no data at run time; its type contains everything.
     return NativeValue(c.context.get_dummy_value())
 
 
 class Interface:
-    """A function that one part of the scene implements.
+    """A function that a part of the scene implements.
 
     Parameters
     ----------
     part : {"model", "method", "recorders"}
         The part of the scene that implements it.
     name : str
-        Under which name.
+        Name of the function in the implementation.
 
     Notes
     -----
-    It can only be called in compiled code, by functions that have an argument ``scene``.
+    Only compiled functions with an argument ``scene`` can call it.
     """
 
     def __init__(self, part: str, name: str) -> None:
         self.part, self.name = part, name
 
     def __call__(self, *_arguments: Any) -> Any:
-        """Refuse calls from Python: without compilation nothing knows the scene's type."""
+        """Raise TypeError: only the compiler knows the scene that selects the implementation."""
         raise TypeError(f"{self.name} is an interface for compiled code")
 
     def of(self, scene: Scene) -> Any:
-        """Return the implementation that a scene names."""
+        """Return the implementation for a scene."""
         return _implementation(self.part, self.name, scene)
 
 
@@ -138,25 +138,25 @@ _SOURCES: dict[type, str] = {}
 
 
 def implement(flags: type, provider: Any) -> None:
-    """Register what implements the interfaces of scenes that hold flags of this class.
+    """Register the implementation of scenes that contain flags of a class.
 
     Parameters
     ----------
     flags : type
         Class of the flags, a frozen dataclass.
     provider : object
-        Has a method ``function(name, scene)`` that returns the compiled function of this name.
+        Its method ``function(name, scene)`` returns the compiled function of an interface.
 
     Raises
     ------
     TypeError
-        If the class is no frozen dataclass, as named tuples equal those of other classes, or is
-        defined within a function, as its name does not tell it from others.
+        If the class is not a frozen dataclass, or is defined within a function and therefore has
+        no unique name.
 
     Notes
     -----
-    Compiled code is kept between processes. It is found again by a hash of all Python files in the
-    folder of the class, taken now; keep what a model is made of there.
+    Compiled code is cached between processes under a hash of all Python files in the folder of the
+    class. Keep all sources of a model there: an edit elsewhere is not noticed.
     """
     if not (is_dataclass(flags) and flags.__dataclass_params__.frozen):  # type: ignore[attr-defined]
         raise TypeError(f"{flags.__qualname__}: flags have to be a frozen dataclass")
@@ -166,7 +166,7 @@ def implement(flags: type, provider: Any) -> None:
 
 
 def provider_of(flags: Any) -> Any:
-    """Return what implements the interfaces for these flags."""
+    """Return the implementation for flags."""
     return _IMPLEMENTATIONS[type(flags)]
 
 
@@ -177,4 +177,5 @@ def flag(present: object) -> bool | None:
 
 @cache
 def _implementation(part: str, name: str, scene: Scene) -> Any:
+    """Return the function that implements an interface for a scene, always the same one."""
     return provider_of(getattr(scene, part)).function(name, scene)

@@ -1,9 +1,10 @@
-"""Parallel kernels run for one thread at a time, and not in a process forked after their use.
+"""Parallel kernels run for one Python thread at a time, and not in a process forked after use.
 
-Each of them uses all cores, so waiting costs nothing. Two calls at once would fill the store of
-flow maps at the same place, and Numba's threading layer "workqueue" ends the process if two
-threads enter it. GNU OpenMP, the layer "omp" on Linux, keeps threads that a fork does not copy:
-Numba ends a forked process that enters it, and a pool of processes starts another one for ever.
+Each kernel uses all cores, so taking turns costs no time. Two calls at once would write to the same
+place in the store of flow maps, and Numba's threading layer "workqueue" terminates the process if
+two threads enter it. GNU OpenMP, the layer "omp" on Linux, owns threads that a fork does not copy.
+Numba terminates a forked process that enters it, and a process pool then starts another one,
+without end.
 """
 
 import os
@@ -20,24 +21,33 @@ _Returned = TypeVar("_Returned")
 
 
 class ForkedProcessError(RuntimeError):
-    """This process was forked from one whose threads it would need."""
+    """Raised in a process that was forked from one in which kernels had already run.
+
+    Examples
+    --------
+    Start worker processes anew instead of forking them::
+
+        context = multiprocessing.get_context("spawn")
+        with ProcessPoolExecutor(mp_context=context) as pool:
+            ...
+    """
 
 
 class _Turns:
-    """The lock of this process, and whether it was forked without the threads of its kernels."""
+    """The lock of this process, and whether a fork left it without the threads of its kernels."""
 
     def __init__(self) -> None:
         self.lock = RLock()
         self.forked = False
 
     def begin_in_fork(self) -> None:
-        """Replace the lock, which another thread may hold that a fork does not copy."""
+        """Replace the lock: a thread that the fork did not copy may hold the old one."""
         self.lock = RLock()
         self.forked = self.forked or (sys.platform == "linux" and _threading_layer() == "omp")
 
 
 def _threading_layer() -> str:
-    """Return the name of Numba's threading layer, "" before the first parallel kernel."""
+    """Return the name of Numba's threading layer, or "" before the first parallel kernel."""
     try:
         return str(numba.threading_layer())
     except ValueError:
@@ -50,7 +60,13 @@ if hasattr(os, "register_at_fork"):
 
 
 def require_threads() -> None:
-    """Raise ForkedProcessError in a process that was forked after kernels had run."""
+    """Check that kernels can run in this process.
+
+    Raises
+    ------
+    ForkedProcessError
+        If the process was forked from one in which kernels had already run with OpenMP.
+    """
     if _turns.forked:
         raise ForkedProcessError(
             f"process {os.getpid()} was forked from a process that had computed before, and "
@@ -61,9 +77,9 @@ def require_threads() -> None:
 
 
 def in_turn(function: Callable[_Given, _Returned]) -> Callable[_Given, _Returned]:
-    """Let threads call a function one after the other; raises ForkedProcessError."""
+    """Return a function that threads call one after the other; it may raise ForkedProcessError."""
 
-    # Without its attributes: those of a compiled function are of no use apart from it.
+    # The attributes of a compiled function are not copied: they make no sense on another one.
     @wraps(function, updated=())
     def alone(*given: _Given.args, **named: _Given.kwargs) -> _Returned:
         require_threads()

@@ -42,7 +42,7 @@ def test_nothing_overlaps_whatever_the_number_of_terms(terms):
     bounds = [(place.bounds + n * place.bound_size, place.columns) for n in range(place.elements)]
     assert_apart([(0, 2 * place.waves), *bounds], place.header)
     numbers = [(0, place.columns), (place.tangent_inputs, place.states)]
-    assert_apart([*numbers, (place.result, place.width)], place.own)
+    assert_apart([*numbers, (place.result, place.width)], place.workspace)
     polynomials = [(place.gap, place.elements * place.columns * terms)]
     switches = [(place.switch, place.elements * terms * place.width)]
     assert_apart([(0, place.columns * place.width), *polynomials, *switches], place.size)

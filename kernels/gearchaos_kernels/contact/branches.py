@@ -1,8 +1,8 @@
-"""Contact branches of a clearance, and what happens where a gap leaves one.
+"""Contact branches of a clearance, and the transition from one to the next.
 
 On one branch the clearance function (eqs 22, 23) is linear, f(x) = engaged x - offset: engaged is 1
-on a flank and 0 between the flanks, offset is +b, -b or 0. A step that stays on its branch meets a
-smooth field, so that the method keeps its order; one that leaves it has to be split where it does.
+on a flank and 0 between the flanks, offset is +b, -b or 0. Within a branch the field is smooth, and
+a method keeps its order. A step that leaves its branch is split where it leaves it.
 """
 
 import math
@@ -16,6 +16,9 @@ from gearchaos_kernels.memory.tuples import as_mask, each
 from gearchaos_kernels.models.interfaces import gap_speeds, half_clearances
 from gearchaos_kernels.recorders.protocol import record_crossing
 
+MOST_CROSSINGS = 16
+"""Crossings that are resolved in one step; a step with more continues without and is counted."""
+
 
 class Crossing(NamedTuple):
     """A gap that leaves its branch.
@@ -23,17 +26,17 @@ class Crossing(NamedTuple):
     Attributes
     ----------
     element : int
-        The element whose gap it is.
+        Number of the element.
     moment : float
-        In steps since the mesh period began.
+        Steps since the beginning of the mesh period.
     closing : float
         Rate at which the flanks approach, per step.
     offset : float
-        Of the flank that is met or left.
+        Offset of the flank that comes into contact or separates.
     meets : float
-        1 where a flank is met, 0 where one is left.
+        1 at the beginning of a contact, 0 at its end.
     speed : float
-        Size of the closing rate per unit of tau.
+        Absolute value of the closing rate, per unit of tau.
     """
 
     element: int
@@ -46,7 +49,7 @@ class Crossing(NamedTuple):
 
 @scalar
 def branch_at(gap, half_clearance):
-    """Return the branch on which a gap lies."""
+    """Return the branch of a gap, given as a number."""
     if half_clearance == 0.0:
         return Branch(1.0, 0.0, -math.inf, math.inf)
     if gap >= half_clearance:
@@ -58,19 +61,19 @@ def branch_at(gap, half_clearance):
 
 @scalar
 def branches_at(gaps, lane, scene):
-    """Return the branches on which the gaps of a lane lie."""
+    """Return the branches of the gaps of a lane."""
     return each(branch_of, gaps, half_clearances(lane, scene))
 
 
 @scalar
 def branch_of(gap, half_clearance):
-    """Return the branch of a gap with its rate."""
+    """Return the branch of a `Gap`."""
     return branch_at(gap.value, half_clearance)
 
 
 @scalar
 def flank_at(gap, half_clearance):
-    """Return 0 between the flanks, 1 on the driving flank and 2 on the back flank."""
+    """Return 0 between the flanks, 1 on the driving flank, 2 on the back flank."""
     if gap > half_clearance:
         return 1
     return 2 if gap < -half_clearance else 0
@@ -78,7 +81,7 @@ def flank_at(gap, half_clearance):
 
 @scalar
 def next_branch(branch, gap, half_clearance):
-    """Return the branch that follows where a gap leaves one."""
+    """Return the branch after the one that a gap leaves."""
     # Branch-free: the direction is unpredictable.
     meets = 1.0 - branch.engaged
     offset = meets * math.copysign(half_clearance, gap)
@@ -99,7 +102,7 @@ def leave(memory, slot, element, gap, lane, moment, recorded, scene):
         at = rows(scene).crossings * STRIDE + slot
         memory[at] += 1.0
         memory[at + STRIDE] = min(memory[at + STRIDE], scale * abs(gap.rate))
-        # One of the two offsets is that of the flank, the other one 0.
+        # One of the two offsets is that of the flank, the other is 0.
         offset = branch.offset + following.offset
         speed = scale * abs(gap.closing)
         crossing = Crossing(element, moment, gap.closing, offset, following.engaged, speed)
@@ -108,5 +111,5 @@ def leave(memory, slot, element, gap, lane, moment, recorded, scene):
 
 @scalar
 def suspects_of(begin, end, branches, margins, scene):
-    """Return the elements whose gaps may leave their branches in a step: the sum of 2**element."""
+    """Return the sum of 2**element over the elements whose gaps may leave their branches."""
     return as_mask(each(may_leave, begin, end, branches, margins))

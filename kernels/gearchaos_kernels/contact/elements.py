@@ -1,6 +1,6 @@
-"""The force of a clearance element, and what a tangent vector adds to it.
+"""The force of a clearance element, and its variation along a tangent vector.
 
-An element sees a gap. Its force is that of a spring behind a clearance and of a damper beside both.
+An element consists of a spring behind a clearance, and of a damper in parallel to both.
 """
 
 from typing import NamedTuple
@@ -11,7 +11,7 @@ from gearchaos_kernels.models.interfaces import elements_at, gaps_at, unforced
 
 
 class Push(NamedTuple):
-    """The force of an element, and its slope d(force)/d(gap)."""
+    """The force of an element per step squared, and its slope d(force)/d(gap)."""
 
     force: float
     slope: float
@@ -19,7 +19,7 @@ class Push(NamedTuple):
 
 @scalar
 def pushes_of(gaps, elements, branches, scene):
-    """Return the push of each element, on branches if they are given."""
+    """Return the push of each element; ``branches``: its contact branches, or None if unknown."""
     if branches is not None:
         return each(push_on, gaps, elements, branches)
     if scene.clearance is not None:
@@ -37,7 +37,7 @@ def push_on(gap, element, branch):
 
 @scalar
 def push_across(gap, element):
-    """Return the push of an element on the branch on which its gap lies (eqs 22, 23)."""
+    """Return the push of an element on the branch of its gap (eqs 22, 23)."""
     b = element.half_clearance
     deflection = gap.value - min(max(gap.value, -b), b)
     slope = element.stiffness if deflection != 0.0 else 0.0
@@ -53,10 +53,10 @@ def push_without_clearance(gap, element):
 
 @scalar
 def tangent_pushes(tangent, lane, pushes, scene):
-    """Return what a tangent vector adds to the forces where they have the slopes of these pushes.
+    """Return the variation of the forces along a tangent vector, with the slopes of these pushes.
 
-    The field is continuous across a clearance boundary, so the variational equation needs no jump
-    matrix there: its Jacobian is that of the active branch.
+    The field is continuous across a clearance boundary. The variational equation therefore needs no
+    jump matrix there: its Jacobian is that of the active branch.
     """
     forcing = unforced(lane, scene)
     gaps = gaps_at(tangent, lane, forcing, scene)
@@ -65,5 +65,5 @@ def tangent_pushes(tangent, lane, pushes, scene):
 
 @scalar
 def tangent_push(gap, element, push):
-    """Return what a tangent vector adds to the force of an element."""
+    """Return the variation of the force of an element along a tangent vector."""
     return Push(push.slope * gap.value + element.damping * gap.closing, push.slope)

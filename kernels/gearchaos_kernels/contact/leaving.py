@@ -1,25 +1,25 @@
-"""Where a gap leaves its contact branch within a step, as the cubic through both ends tells."""
+"""Where a gap leaves its contact branch within a step, from the cubic through both ends."""
 
 import math
 
 from gearchaos_kernels.compilation import scalar
 
 NEVER = 2.0
-"""Fraction of a step returned where the step does not leave its branch: beyond its end."""
+"""Fraction of a step that stands for no crossing: it is beyond the end of the step."""
 
 _THIRD = 1.0 / 3.0
 _ITERATIONS = 60
 LAST_CORRECTION = 1e-6
-"""Newton's method squares the error: after so small a correction hardly anything is left of it."""
+"""Newton's method ends after a smaller correction: it squares the error, down to rounding."""
 
 
 @scalar
 def may_leave(begin, end, branch, margin=0.0):
-    """Return whether a step may leave its branch, be it for a moment only.
+    """Return whether a gap may leave its branch within a step, even for a moment.
 
     Rates are per step. The cubic through both ends lies between the smallest and the largest of its
-    Bezier points; a step that begins on a branch, and whose other points lie there, stays there.
-    Where the gap is no cubic, those in the middle have a margin.
+    Bezier points. If it begins on a branch and its other Bezier points lie there, it stays there.
+    ``margin`` widens the middle points by how far the gap may deviate from the cubic.
     """
     point1 = begin.value + _THIRD * begin.rate
     point2 = end.value - _THIRD * end.rate
@@ -31,11 +31,11 @@ def may_leave(begin, end, branch, margin=0.0):
 @scalar
 def leaving_fraction(begin, end, length, branch, half_clearance):
     """Return the fraction of a piece, ``length`` steps long, at which a gap leaves its branch."""
-    # The gap is the cubic through its values and rates at both ends. The field is continuous, so
-    # that an error of the moment moves the state by its square only.
+    # The gap is taken as the cubic through its values and rates at both ends. The field is
+    # continuous, so an error of the moment changes the state by its square only.
     if half_clearance == 0.0:
         return NEVER
-    # One formula for a motion and its mirror image: the compiler then rounds both alike.
+    # One formula for a motion and its mirror image, so that both are rounded alike.
     if branch.engaged != 0.0:
         side = math.copysign(1.0, branch.offset)
         return first_fall_of(begin, end, length, side, -half_clearance)
@@ -48,7 +48,7 @@ def leaving_fraction(begin, end, length, branch, half_clearance):
 
 @scalar
 def first_fall_of(begin, end, length, side, distance):
-    """Return where a gap, seen from one side and raised by a distance, first falls below zero."""
+    """Return where side * gap + distance first falls below zero."""
     return first_fall(
         side * begin.value + distance,
         side * length * begin.rate,
@@ -59,8 +59,8 @@ def first_fall_of(begin, end, length, side, distance):
 
 @scalar
 def first_fall(d0, r0, d1, r1):
-    """Return where a cubic, given by values and slopes at 0 and 1, first falls below zero."""
-    # A step that begins where the last one ended at the boundary begins on the right side of it.
+    """Return where a cubic, given by values d and slopes r at 0 and 1, first falls below zero."""
+    # A step may begin at the boundary, where the last one ended; it begins on its right side.
     d0 = max(d0, 0.0)
     if d1 >= 0.0 and d0 + _THIRD * r0 >= 0.0 and d1 - _THIRD * r1 >= 0.0:
         return NEVER
@@ -73,7 +73,7 @@ def first_fall(d0, r0, d1, r1):
         discriminant = c2 * c2 - 3.0 * c3 * r0
         if discriminant > 0.0:
             root = math.sqrt(discriminant)
-            # Of the two forms of each turning point, the one in which nothing cancels.
+            # Each turning point has two formulas; the one without cancellation is used.
             lowest = (root - c2) / (3.0 * c3) if c2 < 0.0 else -r0 / (c2 + root)
             if 0.0 < lowest < 1.0:
                 value = d0 + lowest * (r0 + lowest * (c2 + lowest * c3))
@@ -96,14 +96,17 @@ def first_fall(d0, r0, d1, r1):
 
 @scalar
 def cubic(coefficients, at):
-    """Return a cubic and its slope."""
+    """Return the value and the slope of a cubic."""
     d0, r0, c2, c3 = coefficients
     return d0 + at * (r0 + at * (c2 + at * c3)), r0 + at * (2.0 * c2 + at * 3.0 * c3)
 
 
 @scalar
 def falling_root(polynomial, given, low, high, at):
-    """Return where a polynomial that falls between two places passes zero, from a guess."""
+    """Return where a decreasing polynomial is zero between two places, starting from a guess.
+
+    Newton's method, safeguarded by bisection.
+    """
     for _ in range(_ITERATIONS):
         value, slope = polynomial(given, at)
         if value > 0.0:
@@ -121,9 +124,9 @@ def falling_root(polynomial, given, low, high, at):
 
 @scalar
 def may_turn(r0, r1, change):
-    """Tell whether a cubic with slopes r0 and r1 at its ends may turn around in between.
+    """Return whether a cubic with slopes r0 and r1 at its ends may turn around in between.
 
-    It does not if both have the sign of its change and are at most three times as large (Fritsch
-    and Carlson 1980).
+    It is monotonic if both slopes have the sign of its change and are at most three times as large
+    (Fritsch and Carlson 1980).
     """
     return not min(r0 * (3.0 * change - r0), r1 * (3.0 * change - r1)) > 0.0

@@ -1,4 +1,4 @@
-"""A block of lanes in memory, and how compiled code reads and writes it; see `rows`."""
+"""Read and write the memory of a block in compiled code; `rows` has its layout."""
 
 from collections.abc import Callable
 from typing import Any
@@ -17,7 +17,7 @@ _ITEM = np.dtype(np.float64).itemsize
 
 @part
 def aligned_memory(count):
-    """Return memory for so many rows of one block that starts on a cache line."""
+    """Return uninitialised memory for n rows of one block, which starts on a cache line."""
     size = count * STRIDE
     memory = np.empty(size + CACHE_LINE // _ITEM)
     misfit = (CACHE_LINE - memory.ctypes.data % CACHE_LINE) % CACHE_LINE // _ITEM
@@ -25,7 +25,7 @@ def aligned_memory(count):
 
 
 def _pointer(context: Any, builder: Any, kind: Any, memory: Any, at: tuple[Any, Any, int]) -> Any:
-    """Return the address of a row of a slot: a first row, the slot, and so many rows further."""
+    """Return the address of a number: ``at`` is a row, a slot, and a number of further rows."""
     first, slot, further = at
     data = first_element(context, builder, kind, memory)
     row = builder.add(first, ir.Constant(first.type, further))
@@ -52,7 +52,7 @@ def load(_typing_context: Any, memory: Any, row: Any, slot: Any, record: Any) ->
 
 @intrinsic
 def load_like(_typing_context: Any, memory: Any, row: Any, slot: Any, like: Any) -> Any:
-    """Return a tuple of numbers, as many as in another one, from consecutive rows of one slot."""
+    """Return a tuple as long as another one from consecutive rows of one slot."""
     loaded = types.UniTuple(memory.dtype, len(like))
 
     def generate(context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
@@ -82,7 +82,7 @@ def store(_typing_context: Any, memory: Any, row: Any, slot: Any, record: Any) -
 
 @intrinsic
 def read_lane(_typing_context: Any, memory: Any, slot: Any, scene: Any) -> Any:
-    """Return the coefficients of a lane, a record of the model."""
+    """Return the coefficients of a lane, a `Model.lane`."""
     lane = provider_of(scene.scene.model).lane
     loaded = types.NamedUniTuple(memory.dtype, len(lane._fields), lane)
     at = rows_of(scene.scene).coefficients
@@ -101,7 +101,7 @@ def read_lane(_typing_context: Any, memory: Any, slot: Any, scene: Any) -> Any:
 
 @scalar
 def fill_lane(memory, slot, coefficients, scene):
-    """Store the coefficients of a lane, shape (coefficients,), and return them."""
+    """Store the coefficients of a lane, shape (coefficients,), and return them as a record."""
     for column in range(coefficients.shape[0]):
         memory[(rows(scene).coefficients + column) * STRIDE + slot] = coefficients[column]
     return read_lane(memory, slot, scene)
@@ -109,20 +109,20 @@ def fill_lane(memory, slot, coefficients, scene):
 
 @scalar
 def fill(memory, row, slot, scale, source):
-    """Store a state or tangent vector, shape (states,), in the units of the equations."""
+    """Store a state or tangent vector, given in the units of the equations, shape (states,)."""
     for column in range(scale.shape[0]):
         memory[(row + column) * STRIDE + slot] = source[column] / scale[column]
 
 
 @scalar
 def take(memory, row, slot, scale, target):
-    """Write a state or tangent vector, in the units of the equations, into an array (states,)."""
+    """Write a state or tangent vector into an array (states,), in the units of the equations."""
     for column in range(scale.shape[0]):
         target[column] = memory[(row + column) * STRIDE + slot] * scale[column]
 
 
 def _coordinates(scene: Any, number: Any) -> tuple[Any, list[int | None]]:
-    """Return the type of the coordinates of a scene, and the place of each among its states."""
+    """Return the type of the coordinates of a scene, and the number of each among its states."""
     model = provider_of(scene.scene.model)
     there = model.present(scene.scene.model)
     places = [2 * sum(there[:field]) if there[field] else None for field in range(len(there))]
@@ -131,7 +131,7 @@ def _coordinates(scene: Any, number: Any) -> tuple[Any, list[int | None]]:
 
 @intrinsic
 def read_state(_typing_context: Any, memory: Any, first: Any, slot: Any, scene: Any) -> Any:
-    """Return a state from the rows from ``first`` on; an absent coordinate is the constant 0."""
+    """Return a state from consecutive rows; an absent coordinate is the constant 0."""
     kind, places = _coordinates(scene, memory.dtype)
     state = types.NamedUniTuple(kind, 2, State)
 
@@ -157,7 +157,7 @@ def read_state(_typing_context: Any, memory: Any, first: Any, slot: Any, scene: 
 def write_state(
     _typing_context: Any, memory: Any, first: Any, slot: Any, state: Any, scene: Any
 ) -> Any:
-    """Store what the scene has of a state into the rows from ``first`` on."""
+    """Store the coordinates of a state that the scene has, in consecutive rows."""
     _, places = _coordinates(scene, memory.dtype)
 
     def generate(context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
@@ -214,14 +214,15 @@ def state_of(memory, slot, scene):
 
 @scalar
 def state_before(memory, slot, scene):
-    """Return the state of a lane as it was before the step."""
+    """Return the state of a lane before the step."""
     return read_state(memory, rows(scene).state_before, slot, scene)
 
 
 def numbers_of(count: Callable[[Scene], int]) -> Any:
-    """Return an intrinsic that reads as many numbers as a scene has of something, as a tuple.
+    """Return an intrinsic that reads consecutive numbers of an array as a tuple.
 
-    Its arguments are an array, the place of the first number, and the scene.
+    ``count(scene)``: their number. The arguments of the intrinsic are the array, the place of the
+    first number, and the scene.
     """
 
     @intrinsic
@@ -243,4 +244,4 @@ def numbers_of(count: Callable[[Scene], int]) -> Any:
 
 
 numbers_of_elements = numbers_of(lambda scene: provider_of(scene.model).elements(scene.model))
-"""A number of each element from a place of an array on: array, place, scene."""
+"""Read one number per element; arguments: array, place of the first one, scene."""

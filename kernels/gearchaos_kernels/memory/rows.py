@@ -1,11 +1,11 @@
-"""What a block of lanes holds, and which row holds which number.
+"""The layout of a block of lanes in memory: which row contains which number.
 
-A lane is one point of the batch. A block holds ``LANES`` of them, each in a *slot*, as a structure
-of arrays: one flat array in which row r of a slot is element ``r * STRIDE + slot``. With one base
-pointer and constant distances the compiler can prove that the loop over slots vectorises.
+A lane is one point of the batch. A block contains up to ``LANES`` lanes, each in its *slot*. It is
+a structure of arrays: in one flat array, row r of a slot is element ``r * STRIDE + slot``. With one
+base pointer and constant distances, the compiler can prove that the loop over slots vectorises.
 
-States are displacements and rates in turn, one row each, in the scaled coordinates of the model;
-rates are displacements per step (h times d/d tau).
+Displacements and rates of a state alternate, one row each, in the scaled coordinates of the model.
+Rates are per step (h times d/d tau).
 """
 
 from functools import cache
@@ -24,7 +24,7 @@ LANES = 4 * VECTOR
 """Slots of one block: a few vectors wide, small enough for the first-level cache."""
 
 STRIDE = LANES + 8
-"""Distance between rows: no two rows fall on the same cache set at a distance of 4096 bytes."""
+"""Distance between rows, such that rows are not a multiple of 4096 bytes apart (cache sets)."""
 
 
 class State(NamedTuple):
@@ -35,9 +35,16 @@ class State(NamedTuple):
 
 
 class Branch(NamedTuple):
-    """One linear piece of a clearance function, and the gaps between which it holds.
+    """One linear piece of a clearance function: deflection = engaged * gap - offset.
 
-    There the deflection is ``engaged * gap - offset``.
+    Attributes
+    ----------
+    engaged : float
+        1 on a flank, 0 between the flanks.
+    offset : float
+        The gap at which the flank is met, with its sign; 0 between the flanks.
+    floor, ceiling : float
+        The gaps between which the piece is valid.
     """
 
     engaged: float
@@ -54,27 +61,27 @@ STATE = 0
 
 
 class Rows(NamedTuple):
-    """First rows of what a block holds of a scene.
+    """First rows of the parts of a block.
 
     Attributes
     ----------
     tangent : int
-        Of the tangent vector; the state begins at row 0.
+        Tangent vector; the state begins at row 0.
     state_before, tangent_before : int
-        Of both as they were before the step, `before` rows further on.
+        State and tangent vector before the step, each `before` rows further.
     coefficients : int
-        Of the lane's coefficients.
+        Coefficients of the lane.
     branches : int
-        Of the active branch of each element.
+        Active branch of each element, `BRANCH` rows each.
     suspect : int
-        The elements that may have left their branches in a step: the sum of 2**element.
+        Sum of 2**element over the elements that may have left their branches in the step.
     growth : int
-        Logarithm of the growth of the tangent vector since the period began.
+        Logarithm of the growth of the tangent vector since the beginning of the mesh period.
     crossings : int
-        Clearance boundaries crossed while recorded; then the smallest speed at one of them, then
-        the steps with too many.
+        Number of recorded crossings, the smallest speed at one of them, and the number of steps
+        with more than `MOST_CROSSINGS`.
     model, method, recorders : int
-        Of what each of them keeps for itself.
+        Rows that the model, the method and the recorders use for themselves.
     total : int
         Number of rows.
     """
@@ -94,13 +101,13 @@ class Rows(NamedTuple):
 
     @property
     def before(self) -> int:
-        """Distance from a row of state or tangent vector to that before the step."""
+        """Distance from a row of state or tangent vector to its value before the step."""
         return self.state_before
 
 
 @cache
 def rows_of(scene: Scene) -> Rows:
-    """Return the first rows of what a block holds of a scene."""
+    """Return the first rows of the parts of a block of a scene."""
     model = provider_of(scene.model)
     states = model.states(scene.model)
     elements = model.elements(scene.model)
@@ -127,7 +134,7 @@ def rows_of(scene: Scene) -> Rows:
 
 
 def constants(record: Any) -> Any:
-    """Return an intrinsic that gives a record of whole numbers which the scene decides."""
+    """Return an intrinsic that returns a record of integers that depend on the scene only."""
 
     @intrinsic
     def constant(_typing_context: Any, scene: Any) -> Any:
@@ -144,4 +151,4 @@ def constants(record: Any) -> Any:
 
 
 rows = constants(rows_of)
-"""The first rows of a scene, as constants of compiled code."""
+"""`Rows` of a scene, as constants of compiled code."""

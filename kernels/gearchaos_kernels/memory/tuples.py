@@ -1,4 +1,4 @@
-"""Arithmetic of records and tuples whose length the scene decides, unrolled as it is compiled."""
+"""Arithmetic of records and tuples whose length depends on the scene, unrolled when compiled."""
 
 from typing import Any
 
@@ -14,10 +14,10 @@ _DOUBLE = ir.DoubleType()
 
 @intrinsic
 def each(typing_context: Any, function: Any, *given: Any) -> Any:
-    """Call a compiled function for each element of the tuples given, and return a tuple.
+    """Call a compiled function with each element of the given tuples, and return a tuple.
 
-    Plain tuples are taken element by element; everything else, such as a number or a named tuple,
-    goes into every call.
+    Plain tuples are passed element by element. Everything else, such as a number or a named tuple,
+    is passed to every call.
     """
     mapped = [isinstance(kind, types.BaseAnonymousTuple) for kind in given]
     count = next(len(kind) for kind, maps in zip(given, mapped, strict=True) if maps)
@@ -69,7 +69,7 @@ def along(_typing_context: Any, a: Any, factor: Any, b: Any) -> Any:
 
 @intrinsic
 def as_mask(_typing_context: Any, conditions: Any) -> Any:
-    """Return a tuple of conditions as a number: the sum of 2**n over those that hold."""
+    """Return the sum of 2**n over the conditions n of a tuple that are true."""
 
     def generate(_context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
         mask = None

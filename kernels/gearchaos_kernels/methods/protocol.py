@@ -1,4 +1,4 @@
-"""What a method of integration is: how lanes take a step, and what is prepared for that."""
+"""What a method of integration is: how lanes take a step, and what it prepares before."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -15,19 +15,19 @@ Integers = NDArray[np.intp]
 
 
 class Share(NamedTuple):
-    """Lanes that are integrated in one call of the compiled driver.
+    """Lanes that one call of the compiled driver integrates.
 
     Attributes
     ----------
     order : array of int, shape (lanes of the share,)
-        Their numbers.
+        Numbers of the lanes, block after block.
     blocks : array of int, shape (blocks, 4)
-        Of each block the place of its first lane in ``order``, its number of lanes, its steps per
-        period and where its maps begin.
-    maps : array
-        What the method has prepared for them; empty if nothing.
+        For each block: the place of its first lane in ``order``, its number of lanes, its steps per
+        mesh period, and the place where its maps begin in ``maps``.
+    maps : array, shape (numbers,)
+        What the method has prepared for these lanes; empty if nothing.
     steps : array of int, shape (lanes,)
-        Steps per period of every lane, also of those of other shares.
+        Steps per mesh period of every lane, including those of other shares.
     """
 
     order: Integers
@@ -38,23 +38,23 @@ class Share(NamedTuple):
 
 @dataclass(frozen=True)
 class Method:
-    """One method.
+    """One method of integration. Entries from `maps_per_step` on are compiled functions.
 
     Attributes
     ----------
     name : str
-        As in configurations.
+        Name of the method in plans and configurations.
     flags : type
-        Frozen dataclass without fields; stands for the method in a scene.
+        Frozen dataclass without fields that identifies the method in a scene.
     always_resolved : bool
-        Whether it resolves every crossing, whatever the plan says.
+        Whether the method resolves every crossing, whatever the plan says.
     rows : callable
-        ``rows(scene)``: rows of a block that the method keeps for itself.
+        ``rows(scene)``: rows of a block that the method uses for itself.
     prepare : callable
-        ``prepare(system, plan, scene)`` yields the `Share` in which lanes are integrated. Raises
-        ValueError if the method cannot integrate the system.
+        ``prepare(system, plan, scene)`` yields every `Share` in which lanes are integrated. It
+        raises ValueError if the method cannot integrate the system.
     memory : callable
-        ``memory(system, plan, scene, stable)``: about how many bytes that takes; ``stable``
+        ``memory(system, plan, scene, stable)``: estimated bytes of what is prepared; ``stable``
         (lanes,): steps per period with which RK4 is stable.
     amplification : callable
         ``amplification(z)``: by how much one step multiplies the size of a mode, z being step
@@ -63,20 +63,20 @@ class Method:
         ``stable_reach(angles)``: length of the longest stable z on rays from 0 at these angles,
         between pi/2 and pi; None if every step is stable.
     is_kept : callable
-        ``is_kept(system, plan, scene)``: whether all of it stays in memory from call to call.
+        ``is_kept(system, plan, scene)``: whether all of that stays in memory between calls.
     maps_per_step(scene)
-        Returns the numbers that are prepared for one step.
+        Returns how many numbers are prepared for one step.
     workspace(scene)
         Returns what one block needs besides its memory.
     begin_lane(memory, slot, lane, scene)
         Prepares a lane before its first step.
     step(memory, lanes, at, given, scene)
-        Takes one step in every slot; returns how many lanes may have left a branch. ``at``: the
-        `StepAt`, ``given``: `Given`.
+        Takes one step in every slot; returns how many lanes may have left a contact branch.
+        ``lanes``: number of lanes of the block; ``at``: the `StepAt`; ``given``: the `Given`.
     resolve(memory, lanes, at, given, scene)
         Repeats the step of the lanes that may have left a branch, from crossing to crossing.
     grids(clock, given, scene)
-        Returns what all lanes share at the beginning of the step, in its middle and at its end.
+        Returns what all lanes share at the beginning, in the middle and at the end of a step.
     """
 
     name: str
@@ -101,7 +101,17 @@ class Method:
 
 
 class StepAt(NamedTuple):
-    """A step: its number in the mesh period, where its maps begin, and if it is recorded."""
+    """A step of a block.
+
+    Attributes
+    ----------
+    number : int
+        Number of the step within its mesh period.
+    maps_at : int
+        Where the maps of the step begin.
+    recorded : bool
+        Whether the step belongs to the recorded periods.
+    """
 
     number: int
     maps_at: int
@@ -109,7 +119,17 @@ class StepAt(NamedTuple):
 
 
 class Given(NamedTuple):
-    """What the steps of a block read: tables of the model, maps of the method, and workspace."""
+    """What the steps of a block read.
+
+    Attributes
+    ----------
+    tables
+        See `LaneSystem.tables`.
+    maps : array
+        See `Share`.
+    work
+        What `Method.workspace` returns.
+    """
 
     tables: Any
     maps: Any
@@ -124,16 +144,16 @@ resolve = Interface("method", "resolve")
 grids_of = Interface("method", "grids")
 
 
-def cut(lanes: Integers, steps: Integers, maps_at: Integers) -> Integers:
+def cut(counts: Integers, steps: Integers, maps_at: Integers) -> Integers:
     """Cut groups of lanes into blocks, shape (blocks, 4); see `Share`.
 
-    ``lanes``: the size of each group; ``steps``: its steps per period; ``maps_at``: where its maps
+    ``counts``: lanes of each group; ``steps``: its steps per period; ``maps_at``: where its maps
     begin.
     """
-    first = np.cumsum(lanes) - lanes
+    first = np.cumsum(counts) - counts
     blocks = [
         (begin + at, min(LANES, count - at), number, place)
-        for begin, count, number, place in zip(first, lanes, steps, maps_at, strict=True)
+        for begin, count, number, place in zip(first, counts, steps, maps_at, strict=True)
         for at in range(0, count, LANES)
     ]
     return np.array(blocks, dtype=np.intp).reshape(-1, 4)

@@ -168,9 +168,9 @@ class LaneSystem(ABC):
         """
         return np.full(self.lanes, np.nan)
 
-    def of(self, lanes: _Chosen) -> Self:
+    def of(self, chosen: _Chosen) -> Self:
         """Return the system of some lanes, in the given order."""
-        return self.replace(**{field: getattr(self, field)[lanes] for field in self._fields()})
+        return self.replace(**{field: getattr(self, field)[chosen] for field in self._fields()})
 
     def replace(self, **changes: Any) -> Self:
         """Return the system with other values of some fields."""

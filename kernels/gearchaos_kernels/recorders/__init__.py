@@ -1,1 +1,1 @@
-"""What is recorded of every lane while lanes are integrated, each in a file of its own."""
+"""What can be recorded of every lane during an integration, one recorder per file."""

@@ -1,10 +1,12 @@
 """Extremes of chosen states, and amplitudes at chosen mesh orders, while a lane is recorded.
 
-Extremes are those of the cubic through a state and its rate at both ends of a step, and for a rate
-of its derivative. An amplitude is a line of the discrete Fourier transform of the values at the
-ends of all steps: a sum that turns with every step by the phase by which its order advances.
-Largest values and real parts are the first half of the rows, the others the second half: only so
-does the compiler see that those of one loop are apart.
+Extremes of a displacement are those of the cubic through its values and rates at both ends of a
+step; extremes of a rate are those of the cubic's derivative. An amplitude is a line of the discrete
+Fourier transform of the values at the ends of all steps. It is computed as a complex sum that is
+rotated in every step by the phase by which its order advances.
+
+The first half of the rows contains maxima and real parts, the second half minima and imaginary
+parts. Only then does the compiler recognise that the rows of one loop do not overlap.
 """
 
 import math
@@ -26,21 +28,21 @@ class One(NamedTuple):
 
 @scalar
 def one(memory, row, slot):
-    """Return the number of one row: an index may count from the end, for all the compiler knows."""
+    """Return the number of one row; unlike an index, the row is not checked for its sign."""
     return load(memory, row, slot, One).value
 
 
 @scalar
 def half_of(batch):
-    """Return half the number of rows behind those of every block."""
+    """Return half the number of rows that this recorder uses after those of the scene."""
     return batch.chosen.size - 1 + batch.chosen.size * batch.turns.shape[1]
 
 
 @scalar
-def begin(memory, at, block, clock, given, scene):
-    """Begin the record of every slot with its state when the recorded periods begin."""
+def begin(memory, first_row, block, clock, records, scene):
+    """Start the record of every slot with its state, when the recorded periods begin."""
     if clock.recorded == 0:
-        batch, total = given.batch, rows(scene).total
+        batch, total = records.batch, rows(scene).total
         memory[total * STRIDE :] = 0.0
         for number, row in enumerate(batch.chosen[:-1]):
             for slot in range(LANES):
@@ -50,17 +52,17 @@ def begin(memory, at, block, clock, given, scene):
 
 
 @scalar
-def step(memory, at, block, clock, given, scene):
-    """Add a step to the extremes and sums of every slot."""
+def step(memory, first_row, block, clock, records, scene):
+    """Update the extremes and sums of every slot after a step."""
     if clock.recorded >= 0:
-        batch, total = given.batch, rows(scene).total
+        batch, total = records.batch, rows(scene).total
         add_extremes(memory, total, rows(scene).state_before, batch)
         add_waves(memory, total + batch.chosen.size - 1, block, batch)
 
 
 @scalar
 def add_extremes(memory, at, before, batch):
-    """Add the extremes of the cubic through both ends of a step, from a row on."""
+    """Update the extremes of the chosen states, in rows from ``at`` on."""
     half = half_of(batch)
     for row in batch.chosen[:-1]:
         position = row - row % 2
@@ -72,7 +74,7 @@ def add_extremes(memory, at, before, batch):
             change = one(memory, position, slot) - first
             bend = 3.0 * change - 2.0 * rate - last_rate
             twist = rate + last_rate - 2.0 * change
-            # Without a branch, so that one loop serves both.
+            # Branch-free selection of the cubic or its derivative: one loop serves both.
             turn1, turn2 = turns_of(
                 first + of_rate * (rate - first),
                 rate + of_rate * (2.0 * bend - rate),
@@ -88,7 +90,7 @@ def add_extremes(memory, at, before, batch):
 
 @scalar
 def add_waves(memory, at, block, batch):
-    """Add the values at the end of a step to the sums of all orders, from a row on."""
+    """Add the values at the end of a step to the sums of all orders, in rows from ``at`` on."""
     half = half_of(batch)
     turns = batch.turns[batch.order[block.first]]
     for row in batch.chosen:
@@ -104,8 +106,8 @@ def add_waves(memory, at, block, batch):
 
 @scalar
 def turns_of(c0, c1, c2, c3):
-    """Return the values where a cubic turns between 0 and 1, or at an end in place of them."""
-    # Next to a turn the cubic is as high: single precision is enough.
+    """Return the values of a cubic at its turning points, or at an end if they are outside 0..1."""
+    # A small error of the place hardly changes the value there: single precision is enough.
     root = math.sqrt(np.float32(max(0.0, c2 * c2 - 3.0 * c3 * c1)))
     both = np.float32(-c2) - math.copysign(root, np.float32(c2))
     at1 = min(1.0, max(0.0, np.float64(both / np.float32(3.0 * c3))))
@@ -115,20 +117,20 @@ def turns_of(c0, c1, c2, c3):
 
 
 @scalar
-def finish(memory, at, place, clock, given, scene):
-    """Write extremes and the sizes of the sums of a lane."""
+def finish(memory, first_row, lane_at, clock, records, scene):
+    """Write the extremes of a lane, and the absolute values of its sums."""
     if clock.recorded == 0:
-        # Nothing was recorded, and the rows were never filled.
+        # Without recorded periods the rows have never been written.
         return
-    found = memory[rows(scene).total * STRIDE + place.slot :: STRIDE]
-    half = half_of(given.batch)
-    states = given.batch.chosen.size - 1
+    found = memory[rows(scene).total * STRIDE + lane_at.slot :: STRIDE]
+    half = half_of(records.batch)
+    states = records.batch.chosen.size - 1
     for number in range(states):
-        given.outcome.extremes[place.lane, number, 0] = found[number + half]
-        given.outcome.extremes[place.lane, number, 1] = found[number]
+        records.outcome.extremes[lane_at.number, number, 0] = found[number + half]
+        records.outcome.extremes[lane_at.number, number, 1] = found[number]
     for number in range(states, half):
         size = math.hypot(found[number], found[number + half])
-        given.outcome.amplitudes[place.lane, number - states] = size
+        records.outcome.amplitudes[lane_at.number, number - states] = size
 
 
 AMPLITUDES = Recorder(

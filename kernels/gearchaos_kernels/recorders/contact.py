@@ -1,7 +1,7 @@
-"""Contact of every element: time on either flank, impacts, and their speeds.
+"""Contact of every element: time on either flank, impacts, and impact speeds.
 
-Of each element six rows: time on the driving flank in steps and impacts there, the same of the
-back flank, then the sum and the largest of the speeds of impact.
+Each element has six rows: time on the driving flank in steps, number of impacts there, both for the
+back flank, then the sum and the maximum of the impact speeds.
 """
 
 from gearchaos_kernels.compilation import scalar
@@ -11,7 +11,7 @@ from gearchaos_kernels.recorders.protocol import Recorder
 from gearchaos_kernels.scene import Scene, provider_of
 
 ROWS, SPEEDS = 6, 4
-"""Rows of one element, and the first of those of the speeds."""
+"""Number of rows of an element, and the first one of the speeds."""
 
 
 def rows(scene: Scene) -> int:
@@ -21,11 +21,11 @@ def rows(scene: Scene) -> int:
 
 
 @scalar
-def crossing(memory, at, slot, crossing, lane, scene):
-    """Count a crossing: an impact where a flank is met, and the time of contact."""
-    first = at + ROWS * crossing.element
+def crossing(memory, first_row, slot, crossing, lane, scene):
+    """Record a crossing: the contact time, and an impact if a contact begins."""
+    first = first_row + ROWS * crossing.element
     flank = (first + row_of_flank(crossing.offset)) * STRIDE + slot
-    # Time on a flank is the sum of all moments of leaving it less those of meeting it.
+    # The contact time is the sum of the moments of separation less those of impact.
     memory[flank] += crossing.moment * (1.0 - 2.0 * crossing.meets)
     memory[flank + STRIDE] += crossing.meets
     speeds = (first + SPEEDS) * STRIDE + slot
@@ -34,31 +34,31 @@ def crossing(memory, at, slot, crossing, lane, scene):
 
 
 @scalar
-def end_period(memory, at, place, clock, given, scene):
-    """Count the flank on which a recorded period ends until its end."""
+def end_period(memory, first_row, lane_at, clock, records, scene):
+    """Add the end of the period as a moment of separation for every element in contact."""
     if clock.recorded >= 0:
-        branches = read_branches(memory, place.slot, scene)
+        branches = read_branches(memory, lane_at.slot, scene)
         for element in range(len(branches)):
             branch = branches[element]
-            row = at + ROWS * element + row_of_flank(branch.offset)
-            memory[row * STRIDE + place.slot] += clock.steps * branch.engaged
+            row = first_row + ROWS * element + row_of_flank(branch.offset)
+            memory[row * STRIDE + lane_at.slot] += clock.steps * branch.engaged
 
 
 @scalar
 def row_of_flank(offset):
-    """Return the row of the driving flank, and where there is no clearance, or the back flank."""
+    """Return the row of the driving flank (or of an element without clearance) or back flank."""
     return 0 if offset >= 0.0 else SPEEDS // 2
 
 
 @scalar
-def finish(memory, at, place, clock, given, scene):
-    """Write all numbers of a lane, times in mesh periods."""
-    contact = given.outcome.contact
+def finish(memory, first_row, lane_at, clock, records, scene):
+    """Write the record of a lane, with times in mesh periods."""
+    contact = records.outcome.contact
     for element in range(contact.shape[1]):
         for number in range(ROWS):
             unit = clock.steps if number in (0, SPEEDS // 2) else 1
-            row = at + ROWS * element + number
-            contact[place.lane, element, number] = memory[row * STRIDE + place.slot] / unit
+            row = first_row + ROWS * element + number
+            contact[lane_at.number, element, number] = memory[row * STRIDE + lane_at.slot] / unit
 
 
 CONTACT = Recorder(

@@ -8,20 +8,20 @@ from gearchaos_kernels.recorders.protocol import Recorder
 
 
 @scalar
-def end_period(memory, at, place, clock, given, scene):
-    """Write the logarithm of the growth, and begin anew."""
-    row = rows(scene).growth * STRIDE + place.slot
+def end_period(memory, first_row, lane_at, clock, records, scene):
+    """Write the logarithm of the growth in a recorded period, and reset it."""
+    row = rows(scene).growth * STRIDE + lane_at.slot
     if clock.recorded >= 0:
-        given.outcome.growth[place.lane, clock.recorded] = memory[row]
+        records.outcome.growth[lane_at.number, clock.recorded] = memory[row]
     memory[row] = 0.0
 
 
 @scalar
-def stop(memory, at, place, clock, given, scene):
-    """Mark the periods that are left as not a number."""
-    growth = given.outcome.growth
+def stop(memory, first_row, lane_at, clock, records, scene):
+    """Write NaN for the remaining periods."""
+    growth = records.outcome.growth
     for later in range(max(clock.recorded, 0), growth.shape[1]):
-        growth[place.lane, later] = math.nan
+        growth[lane_at.number, later] = math.nan
 
 
 GROWTH = Recorder(

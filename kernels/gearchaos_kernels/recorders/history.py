@@ -9,45 +9,45 @@ from gearchaos_kernels.recorders.protocol import Recorder
 
 
 @scalar
-def begin(memory, at, block, clock, given, scene):
-    """Keep the state with which the first period of the history begins."""
-    if sample_of(clock, given.outcome.history, 0) == 0:
-        keep(memory, block, given, 0)
+def begin(memory, first_row, block, clock, records, scene):
+    """Write the state at the beginning of the first period of the history."""
+    if sample_of(clock, records.outcome.history, 0) == 0:
+        keep(memory, block, records, 0)
 
 
 @scalar
-def step(memory, at, block, clock, given, scene):
-    """Keep the state at the end of a step, if it ends one of those requested."""
+def step(memory, first_row, block, clock, records, scene):
+    """Write the state at the end of a step, if a requested step ends there."""
     done = clock.number + 1
-    if done % clock.every == 0:
-        sample = sample_of(clock, given.outcome.history, done // clock.every)
+    if done % clock.substeps == 0:
+        sample = sample_of(clock, records.outcome.history, done // clock.substeps)
         if sample >= 0:
-            keep(memory, block, given, sample)
+            keep(memory, block, records, sample)
 
 
 @scalar
 def sample_of(clock, history, done):
-    """Return the sample after some requested steps of a period, negative before the history."""
-    return history.shape[1] - 1 - (clock.left + 1) * (clock.steps // clock.every) + done
+    """Return the number of the sample after n requested steps of a period; negative: no sample."""
+    return history.shape[1] - 1 - (clock.left + 1) * (clock.steps // clock.substeps) + done
 
 
 @scalar
-def keep(memory, block, given, sample):
-    """Write the state of every lane into one sample of its history."""
-    history = given.outcome.history
+def keep(memory, block, records, sample):
+    """Write the state of every lane as one sample of its history."""
+    history = records.outcome.history
     for slot in range(block.lanes):
-        index = given.batch.order[block.first + slot]
-        take(memory, STATE, slot, given.batch.scales[index], history[index, sample])
+        index = records.batch.order[block.first + slot]
+        take(memory, STATE, slot, records.batch.scales[index], history[index, sample])
 
 
 @scalar
-def stop(memory, at, place, clock, given, scene):
-    """Mark the state of a lane at the end of the period in which it was stopped."""
-    history = given.outcome.history
-    sample = sample_of(clock, history, clock.steps // clock.every)
+def stop(memory, first_row, lane_at, clock, records, scene):
+    """Write NaN as the state at the end of the period in which a lane is stopped."""
+    history = records.outcome.history
+    sample = sample_of(clock, history, clock.steps // clock.substeps)
     if sample >= 0:
         for column in range(history.shape[2]):
-            history[place.lane, sample, column] = math.nan
+            history[lane_at.number, sample, column] = math.nan
 
 
 HISTORY = Recorder(

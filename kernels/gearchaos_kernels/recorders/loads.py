@@ -1,13 +1,13 @@
-"""Forces of the elements, and the signals that a model has observed, over the recorded periods.
+"""Forces of the elements and observed signals of the model, over the recorded periods.
 
-Of each signal its extremes and the integrals of itself and of its square. A step gives three
-values: at both ends, and in the middle, where the state is on the cubic through both. Integrals
-follow by Simpson's rule, extremes from the parabola through the three. Where an element is met or
-left within a step, its force has a kink. The parabola is then not used; the force at the kink,
-which is that of the damper alone, counts as a fourth value.
+For each signal, its extremes and the integrals of itself and of its square are recorded. A step
+gives three values: at both ends, and in the middle, where the state is that of the cubic through
+both ends. Integrals follow by Simpson's rule, extremes from the parabola through the three values.
+If a contact begins or ends within a step, the force has a kink there. The parabola is then not
+used. Instead the force at the kink, which is that of the damper alone, is a fourth value.
 
-The rows: the signals and the slopes of the forces at the end of the last step, then of each signal
-its largest and smallest value, and the sums over the steps of six times the mean of itself and of
+The rows are: the signals and the slopes of the forces at the end of the last step; then for each
+signal its maximum, its minimum, and the sums over the steps of six times the mean of itself and of
 its square.
 """
 
@@ -43,7 +43,7 @@ from gearchaos_kernels.recorders.protocol import Recorder
 from gearchaos_kernels.scene import Scene, provider_of
 
 SIGNAL_ROWS = 4
-"""Rows of the record of one signal."""
+"""Number of rows of what is accumulated of one signal."""
 
 
 def elements_of(scene: Scene) -> int:
@@ -53,7 +53,7 @@ def elements_of(scene: Scene) -> int:
 
 
 def signals_of(scene: Scene) -> int:
-    """Return the number of signals: the forces, then what the model has observed."""
+    """Return the number of signals: the forces, then the observed signals of the model."""
     return elements_of(scene) + len(provider_of(scene.model).observed)
 
 
@@ -62,22 +62,30 @@ def rows(scene: Scene) -> int:
     return signals_of(scene) * (1 + SIGNAL_ROWS) + elements_of(scene)
 
 
-class Signals(NamedTuple):
-    """Of the rows of a recorder: how far behind its first one the records of signals begin."""
+class Offsets(NamedTuple):
+    """Offsets from the first row of the recorder.
 
-    signals: int
-    records: int
+    Attributes
+    ----------
+    slopes : int
+        Offset of the slopes of the forces; the signals come first.
+    accumulated : int
+        Offset of what is accumulated of every signal.
+    """
+
+    slopes: int
+    accumulated: int
 
 
-signals = constants(
-    lambda scene: Signals(signals_of(scene), signals_of(scene) + elements_of(scene))
+offsets = constants(
+    lambda scene: Offsets(signals_of(scene), signals_of(scene) + elements_of(scene))
 )
-"""`Signals` of a scene, as constants of compiled code."""
+"""`Offsets` of a scene, as constants of compiled code."""
 
 
 @intrinsic
 def numbered(_typing_context: Any, values: Any) -> Any:
-    """Return the numbers of the elements of a tuple, from 0 on, as a tuple."""
+    """Return the tuple 0, 1, 2, ... of the same length as another tuple."""
     count = len(values)
     kind = types.UniTuple(types.intp, count)
 
@@ -102,7 +110,7 @@ def slope_of(push):
 
 @scalar
 def signals_at(state, lane, point, forcing, scene):
-    """Return all signals of a state at a mesh phase, forces per step squared, and the slopes."""
+    """Return all signals of a state, forces per step squared, and the slopes of the forces."""
     gaps = gaps_at(state, lane, forcing, scene)
     pushes = pushes_of(gaps, elements_at(lane, forcing, scene), None, scene)
     values = each(force_of, pushes) + observed_at(state, lane, point, scene)
@@ -110,31 +118,31 @@ def signals_at(state, lane, point, forcing, scene):
 
 
 @scalar
-def begin(memory, at, block, clock, given, scene):
-    """Begin the record of every slot with its signals when the recorded periods begin."""
+def begin(memory, first_row, block, clock, records, scene):
+    """Start the record of every slot with its signals, when the recorded periods begin."""
     if clock.recorded == 0:
         for slot in range(LANES):
             lane = read_lane(memory, slot, scene)
-            point = point_at(memory, slot, grid_at(given.steps.tables, 0, scene), scene)
+            point = point_at(memory, slot, grid_at(records.steps.tables, 0, scene), scene)
             forcing = forcing_at(lane, point, scene)
             state = from_kept(state_of(memory, slot, scene), forcing, scene)
             values, slopes = signals_at(state, lane, point, forcing, scene)
-            store(memory, at, slot, values + slopes)
-            first = at + signals(scene).records
+            store(memory, first_row, slot, values + slopes)
+            first = first_row + offsets(scene).accumulated
             each(begin_signal, memory, first, slot, numbered(values), values)
 
 
 @scalar
 def begin_signal(memory, first, slot, number, value):
-    """Begin the record of one signal."""
+    """Start the record of one signal."""
     store(memory, first + SIGNAL_ROWS * number, slot, (value, value, 0.0, 0.0))
 
 
 @scalar
-def step(memory, at, block, clock, given, scene):
-    """Add a step to the record of every slot."""
+def step(memory, first_row, block, clock, records, scene):
+    """Update the record of every slot after a step."""
     if clock.recorded >= 0:
-        start, middle, end = grids_of(clock, given.steps, scene)
+        start, middle, end = grids_of(clock, records.steps, scene)
         for slot in range(LANES):
             lane = read_lane(memory, slot, scene)
             forcing = forcing_at(lane, point_at(memory, slot, start, scene), scene)
@@ -146,12 +154,12 @@ def step(memory, at, block, clock, given, scene):
             point = point_at(memory, slot, middle, scene)
             forcing = forcing_at(lane, point, scene)
             halves, _ = signals_at(halfway(before, after), lane, point, forcing, scene)
-            firsts = load_like(memory, at, slot, values)
-            slopes_before = load_like(memory, at + signals(scene).signals, slot, slopes)
-            store(memory, at, slot, values + slopes)
+            firsts = load_like(memory, first_row, slot, values)
+            slopes_before = load_like(memory, first_row + offsets(scene).slopes, slot, slopes)
+            store(memory, first_row, slot, values + slopes)
             smooth = each(without_kink, slopes_before, slopes)
             smooth = smooth + each(always_smooth, observed_at(after, lane, last, scene))
-            first, numbers = at + signals(scene).records, numbered(values)
+            first, numbers = first_row + offsets(scene).accumulated, numbered(values)
             each(add_step, memory, first, slot, numbers, firsts, halves, values, smooth)
 
 
@@ -163,7 +171,7 @@ def without_kink(before, after):
 
 @scalar
 def always_smooth(_signal):
-    """Return that a signal that the model has observed has no kink."""
+    """Return True: observed signals have no kinks."""
     return True
 
 
@@ -184,7 +192,8 @@ def add_step(memory, first_row, slot, number, first, half, last, smooth):
     """Add the three values of a step to the record of one signal."""
     bend = first - 2.0 * half + last
     slope = 4.0 * half - 3.0 * first - last
-    # Where the parabola turns, or an end; next to there it is as high: single precision is enough.
+    # The turning point of the parabola, or an end. A small error of the place hardly changes the
+    # value there: single precision is enough.
     at = min(1.0, max(0.0, np.float64(np.float32(slope) / np.float32(-4.0 * bend))))
     turn = first + at * (slope + 2.0 * bend * at) if smooth else half
     row = (first_row + SIGNAL_ROWS * number) * STRIDE + slot
@@ -195,23 +204,23 @@ def add_step(memory, first_row, slot, number, first, half, last, smooth):
 
 
 @scalar
-def crossing(memory, at, slot, crossing, lane, scene):
-    """Enter the force of an element at a crossing: without deflection, it is damping alone."""
+def crossing(memory, first_row, slot, crossing, lane, scene):
+    """Record the force of an element at a crossing, where the damper alone acts."""
     elements = elements_at(lane, unforced(lane, scene), scene)
     force = elements[crossing.element].damping * crossing.closing
-    row = (at + signals(scene).records + SIGNAL_ROWS * crossing.element) * STRIDE + slot
+    row = (first_row + offsets(scene).accumulated + SIGNAL_ROWS * crossing.element) * STRIDE + slot
     memory[row] = max(memory[row], force)
     memory[row + STRIDE] = min(memory[row + STRIDE], force)
 
 
 @scalar
-def finish(memory, at, place, clock, given, scene):
+def finish(memory, first_row, lane_at, clock, records, scene):
     """Write the record of all signals of a lane."""
-    loads = given.outcome.loads
+    loads = records.outcome.loads
     for signal in range(loads.shape[1]):
         for number in range(SIGNAL_ROWS):
-            row = at + signals(scene).records + signal * SIGNAL_ROWS + number
-            loads[place.lane, signal, number] = memory[row * STRIDE + place.slot]
+            row = first_row + offsets(scene).accumulated + signal * SIGNAL_ROWS + number
+            loads[lane_at.number, signal, number] = memory[row * STRIDE + lane_at.slot]
 
 
 LOADS = Recorder(

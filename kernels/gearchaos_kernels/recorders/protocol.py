@@ -1,7 +1,7 @@
-"""What a recorder is: it accumulates something of every lane while lanes are integrated.
+"""What a recorder is: it accumulates something of every lane during an integration.
 
-A recorder has rows of its own in the memory of a block, and is called at fixed moments. A scene
-names its recorders; what it does not name is not compiled.
+A recorder uses rows in the memory of a block and is called at fixed moments. Only the recorders
+that a scene names are compiled.
 """
 
 from collections.abc import Callable, Sequence
@@ -14,74 +14,94 @@ from gearchaos_kernels.scene import Interface, Scene
 
 
 class Clock(NamedTuple):
-    """Where in time a step or a mesh period lies.
+    """The position of a step or mesh period in time.
 
     Attributes
     ----------
     period : int
-        Mesh periods since the start.
+        Number of the mesh period since the start.
     number : int
-        Of the step within its mesh period.
-    steps, every : int
-        Steps of a period, and how many of them make one of those requested.
+        Number of the step within its mesh period.
+    steps : int
+        Steps per mesh period.
+    substeps : int
+        Steps per step of the plan, since a method may take more steps than requested.
     recorded : int
-        Recorded periods before this one; negative during the transient.
+        Number of the recorded period; negative during the transient.
     left : int
-        Periods that follow this one.
+        Number of mesh periods after this one.
     """
 
     period: int
     number: int
     steps: int
-    every: int
+    substeps: int
     recorded: int
     left: int
 
 
 class Block(NamedTuple):
-    """The lanes of a block: the place of the first one in the order of lanes, and their number."""
+    """The lanes of a block.
+
+    Attributes
+    ----------
+    first : int
+        Place of the first lane in `Share.order`.
+    lanes : int
+        Number of lanes.
+    """
 
     first: int
     lanes: int
 
 
-class Place(NamedTuple):
-    """A lane: its slot in the block, and its number among all lanes."""
+class LaneAt(NamedTuple):
+    """Where a lane is.
+
+    Attributes
+    ----------
+    slot : int
+        Its slot in the block.
+    number : int
+        Its number among all lanes.
+    """
 
     slot: int
-    lane: int
+    number: int
 
 
 @dataclass(frozen=True)
 class Recorder:
-    """One recorder. Functions that it leaves out do nothing.
+    """One recorder. Functions that a recorder leaves out do nothing.
 
     Attributes
     ----------
     name : str
-        Its flag among those of the scene's recorders.
+        Name of its flag among the recorders of a scene.
     wanted : callable
-        ``wanted(plan, resolved)``: whether a plan requests it, for a scene that resolves crossings
-        or does not.
+        ``wanted(plan, resolved)``: whether a plan requests the recorder; ``resolved``: whether the
+        scene resolves crossings.
     rows : callable
-        ``rows(scene)``: number of its rows in the memory of a block.
+        ``rows(scene)``: rows of a block that the recorder uses.
     reads_before : bool
         Whether it reads the state before a step.
     begin : compiled function, optional
-        ``begin(memory, at, block, clock, given, scene)``, at the beginning of every mesh period;
-        ``at``: first row of the recorder; ``given``: the `Records` of the block.
+        ``begin(memory, first_row, block, clock, records, scene)``, called at the beginning of every
+        mesh period. ``first_row``: the first row of the recorder; ``block``: the `Block`;
+        ``clock``: the `Clock`; ``records``: the `Records`.
     step : compiled function, optional
-        ``step(memory, at, block, clock, given, scene)``, after every step.
+        ``step(memory, first_row, block, clock, records, scene)``, called after every step.
     crossing : compiled function, optional
-        ``crossing(memory, at, slot, crossing, lane, scene)``, when a lane crosses a boundary in a
-        recorded period.
+        ``crossing(memory, first_row, slot, crossing, lane, scene)``, called when a lane crosses a
+        clearance boundary in a recorded period. ``crossing``: the `Crossing`; ``lane``: the
+        coefficients.
     end_period : compiled function, optional
-        ``end_period(memory, at, place, clock, given, scene)``, after every mesh period of a lane;
-        ``place``: the lane.
+        ``end_period(memory, first_row, lane_at, clock, records, scene)``, called after every mesh
+        period of a lane. ``lane_at``: the `LaneAt`.
     stop : compiled function, optional
-        The same for a lane that has left the range of numbers, once.
+        Called instead of ``end_period``, once, when a lane has diverged.
     finish : compiled function, optional
-        ``finish(memory, at, place, clock, given, scene)``, in the end.
+        ``finish(memory, first_row, lane_at, clock, records, scene)``, called at the end.
     """
 
     name: str
@@ -97,7 +117,17 @@ class Recorder:
 
 
 class Records(NamedTuple):
-    """What recorders read and write: tables of the model, maps, the batch, and the outcome."""
+    """What recorders read and write.
+
+    Attributes
+    ----------
+    steps : Given
+        What the steps of the block read.
+    batch : Batch
+        What the blocks read.
+    outcome : Outcome
+        What is written.
+    """
 
     steps: Any
     batch: Any
@@ -112,26 +142,32 @@ record_stop = Interface("recorders", "stop")
 finish_record = Interface("recorders", "finish")
 
 
-def _then_block(first: Any, at: int, rest: Any) -> Any:
-    def of_block(memory, block, clock, given, scene):
-        first(memory, at, block, clock, given, scene)
-        rest(memory, block, clock, given, scene)
+def _then_block(first: Any, first_row: int, rest: Any) -> Any:
+    """Return a function that calls the one of a recorder, then that of the other recorders."""
+
+    def of_block(memory, block, clock, records, scene):
+        first(memory, first_row, block, clock, records, scene)
+        rest(memory, block, clock, records, scene)
 
     return of_block
 
 
-def _then_crossing(first: Any, at: int, rest: Any) -> Any:
+def _then_crossing(first: Any, first_row: int, rest: Any) -> Any:
+    """Return what `_then_block` returns, with the arguments of ``crossing``."""
+
     def crossing(memory, slot, crossing, lane, scene):
-        first(memory, at, slot, crossing, lane, scene)
+        first(memory, first_row, slot, crossing, lane, scene)
         rest(memory, slot, crossing, lane, scene)
 
     return crossing
 
 
-def _then_lane(first: Any, at: int, rest: Any) -> Any:
-    def of_lane(memory, place, clock, given, scene):
-        first(memory, at, place, clock, given, scene)
-        rest(memory, place, clock, given, scene)
+def _then_lane(first: Any, first_row: int, rest: Any) -> Any:
+    """Return what `_then_block` returns, with the arguments of functions of one lane."""
+
+    def of_lane(memory, lane_at, clock, records, scene):
+        first(memory, first_row, lane_at, clock, records, scene)
+        rest(memory, lane_at, clock, records, scene)
 
     return of_lane
 
@@ -151,7 +187,7 @@ def _nothing_of_five(_a, _b, _c, _d, _e):
 
 
 class Recorders:
-    """Some recorders as one, called one after the other; see `scene.implement`."""
+    """Several recorders, called one after the other; registered by `scene.implement`."""
 
     def __init__(self, recorders: Sequence[Recorder]) -> None:
         self.recorders = tuple(recorders)
@@ -174,7 +210,7 @@ class Recorders:
         return at
 
     def function(self, name: str, scene: Scene) -> Any:
-        """Return a compiled function that calls that of each recorder in turn."""
+        """Return a compiled function that calls the one of each recorder in turn."""
         called = scalar(_nothing_of_five)
         for one in reversed(self.of(scene)):
             function = getattr(one, name)

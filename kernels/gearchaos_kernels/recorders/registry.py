@@ -13,10 +13,10 @@ from gearchaos_kernels.recorders.section import SECTION
 from gearchaos_kernels.scene import implement
 
 RECORDERS = (SECTION, HISTORY, GROWTH, CONTACT, LOADS, AMPLITUDES)
-"""All recorders, in the order in which they are called: amplitudes read what loads keep."""
+"""All recorders in the order of their calls: amplitudes read rows that loads have written."""
 
 Recorded = make_dataclass("Recorded", [(one.name, Any, None) for one in RECORDERS], frozen=True)
 Recorded.__module__ = __name__
-"""Flags of the recorders of a scene."""
+"""Flags of the recorders of a scene, one for each name."""
 
 implement(Recorded, Recorders(RECORDERS))

@@ -7,23 +7,23 @@ from gearchaos_kernels.recorders.protocol import Recorder
 
 
 @scalar
-def end_period(memory, at, place, clock, given, scene):
-    """Write the state of a lane, if the period is one of the last."""
-    section = given.outcome.section
+def end_period(memory, first_row, lane_at, clock, records, scene):
+    """Write the state of a lane as a section point, if the period is one of the last."""
+    section = records.outcome.section
     point = section.shape[1] - 1 - clock.left
     if point >= 0:
-        scale = given.batch.scales[place.lane]
-        take(memory, STATE, place.slot, scale, section[place.lane, point])
+        scale = records.batch.scales[lane_at.number]
+        take(memory, STATE, lane_at.slot, scale, section[lane_at.number, point])
 
 
 @scalar
-def stop(memory, at, place, clock, given, scene):
-    """Write the state at which a lane was stopped into all sections that are left."""
-    section = given.outcome.section
-    # One by one: a slice takes longer to compile.
+def stop(memory, first_row, lane_at, clock, records, scene):
+    """Write the state at which a lane is stopped as all remaining section points."""
+    section = records.outcome.section
+    # In a loop, because a slice takes longer to compile.
     for later in range(max(section.shape[1] - 1 - clock.left, 0), section.shape[1]):
-        scale = given.batch.scales[place.lane]
-        take(memory, STATE, place.slot, scale, section[place.lane, later])
+        scale = records.batch.scales[lane_at.number]
+        take(memory, STATE, lane_at.slot, scale, section[lane_at.number, later])
 
 
 SECTION = Recorder(

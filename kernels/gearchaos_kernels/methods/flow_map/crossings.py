@@ -1,34 +1,31 @@
-"""Crossings within a step that is a map.
+"""Crossings of clearance boundaries within a step by flow maps.
 
-Where a gap leaves its branch at the moment s, the motion after it is one on the next branch b that
-began the step elsewhere:
+A gap leaves its branch a at the moment s. The motion after it is identical to a motion on the next
+branch b that began the step at another state:
 
     x_b = x - int_{-1}^{s} [force on b - force on a, along a] K(r) Phi_b(r -> -1) u / 2 dr.
 
-Everything then repeats itself: the gaps of that motion, the next crossing after s, and its end by
-the map of b. The tangent vector goes the same way, its moments of crossing those of the motion: the
-field is continuous, so that no other term comes from them.
+The same procedure then repeats with x_b: compute its gaps, find the next crossing after s, and
+compute the end of the step by the map of b. The tangent vector is transferred in the same way, at
+the moments of the motion. The field is continuous, so a crossing adds no further term.
 """
 
 from gearchaos_kernels.compilation import scalar
-from gearchaos_kernels.contact.branches import branches_at, leave, next_branch
+from gearchaos_kernels.contact.branches import MOST_CROSSINGS, branches_at, leave, next_branch
 from gearchaos_kernels.contact.leaving import may_leave
 from gearchaos_kernels.memory.block_memory import read_branches, read_lane, store, write_branches
 from gearchaos_kernels.memory.rows import BRANCH, STATE, STRIDE, VECTOR, Branch, rows
 from gearchaos_kernels.methods.flow_map import vectors
-from gearchaos_kernels.methods.flow_map.layout import Crossing, aside_rows, layout, method_rows
+from gearchaos_kernels.methods.flow_map.layout import LastCrossing, aside_rows, layout, method_rows
 from gearchaos_kernels.methods.flow_map.moments import find_moments
 from gearchaos_kernels.methods.flow_map.steps import gaps_at_ends, store_offsets
 from gearchaos_kernels.models.interfaces import half_clearances
 from gearchaos_kernels.models.protocol import Gap
 
-MOST_CROSSINGS = 16
-"""Crossings of one step; a step with more continues with its last branches and is counted."""
-
 
 @scalar
 def resolve(memory, lanes, at, given, scene):
-    """Take the step of the lanes that may have left a branch, eight at a time."""
+    """Repeat the step of the lanes that may have left a branch, eight at a time."""
     slots = given.work.slots
     suspects = 0
     for slot in range(lanes):
@@ -41,53 +38,53 @@ def resolve(memory, lanes, at, given, scene):
 
 @scalar
 def cross_together(memory, slots, at, given, scene):
-    """Take the step of up to eight lanes from crossing to crossing."""
+    """Repeat the step of up to eight lanes from crossing to crossing, in memory aside."""
     place, lanes, aside = layout(scene), slots.shape[0], given.work.aside
-    table, row = given.maps, at.maps_at
+    maps, maps_at = given.maps, at.maps_at
     for n in range(lanes):
         vectors.copy_lane(memory, slots[n], aside, n, scene)
         aside[aside_rows(scene).after * STRIDE + n] = -1.0
     crossings, left = 0, lanes
     while left > 0 and crossings < MOST_CROSSINGS:
         crossings += 1
-        vectors.look_along(aside, 0, table, row, scene)
+        vectors.compute_gaps(aside, 0, maps, maps_at, scene)
         for element in range(place.elements):
             find_moments(aside, element, lanes, scene)
         cross_over(aside, scene)
         for n in range(lanes):
             record_crossing_of(memory, slots[n], aside, n, at, scene)
         vectors.sum_along(aside, scene)
-        vectors.add_switch(aside, 0, table, row, scene)
-        vectors.bound_bends(aside, 0, table, row, scene)
-        vectors.move(aside, 0, table, row, scene)
-        left = count_left(aside, lanes, table, row, scene)
+        vectors.add_switch(aside, 0, maps, maps_at, scene)
+        vectors.bound_bends(aside, 0, maps, maps_at, scene)
+        vectors.move(aside, 0, maps, maps_at, scene)
+        left = count_left(aside, lanes, maps, maps_at, scene)
     for n in range(lanes):
         copy_rows(aside, n, memory, slots[n], STATE, place.states)
         if scene.tangent is not None:
             copy_rows(aside, n, memory, slots[n], rows(scene).tangent, place.states)
         if aside[rows(scene).suspect * STRIDE + n] != 0.0:
-            give_up(memory, slots[n], table, row, scene)
+            give_up(memory, slots[n], maps, maps_at, scene)
 
 
 @scalar
 def copy_rows(memory, slot, other, place, first, count):
-    """Copy some rows of a lane to a place in another memory."""
+    """Copy consecutive rows of a slot to a slot of another memory; ``place``: the latter."""
     for row in range(first, first + count):
         other[row * STRIDE + place] = memory[row * STRIDE + slot]
 
 
 @scalar
 def cross_over(aside, scene):
-    """Choose the next crossing of lanes side by side, and put them on the branches that follow."""
-    place, at = layout(scene), aside_rows(scene)
+    """Choose the next crossing of eight lanes, and put them on the branches after it."""
+    place, at_rows = layout(scene), aside_rows(scene)
     for n in range(VECTOR):
         lane = read_lane(aside, n, scene)
-        moment, first = aside[(at.gaps + at.moment) * STRIDE + n], 0.0
+        moment, first = aside[(at_rows.gaps + at_rows.moment) * STRIDE + n], 0.0
         for element in range(1, place.elements):
-            other = aside[(at.gaps + element * at.gap_rows + at.moment) * STRIDE + n]
+            other = aside[(at_rows.gaps + element * at_rows.gap_rows + at_rows.moment) * STRIDE + n]
             first = first if moment <= other else float(element)
             moment = min(moment, other)
-        # None also where the lane has left the range of numbers.
+        # False as well if the moment is not a number.
         crosses = moment <= 1.0
         factor, edge = 0.0, 0.0
         for element in range(place.elements):
@@ -96,7 +93,7 @@ def cross_over(aside, scene):
             following = next_branch(branch, gap.value, half_clearances(lane, scene)[element])
             here = crosses & (first == element)
             factor = branch.engaged - following.engaged if here else factor
-            # One of the two offsets is that of the flank, the other one 0.
+            # One of the two offsets is that of the flank, the other is 0.
             edge = branch.offset + following.offset if here else edge
             after = Branch(
                 following.engaged if here else branch.engaged,
@@ -106,19 +103,19 @@ def cross_over(aside, scene):
             )
             store(aside, rows(scene).branches + BRANCH * element, n, after)
         store_offsets(aside, n, lane, read_branches(aside, n, scene), scene)
-        moment = moment if crosses else aside[at.after * STRIDE + n]
-        store(aside, at.after, n, Crossing(moment, factor, edge, first))
+        moment = moment if crosses else aside[at_rows.after * STRIDE + n]
+        store(aside, at_rows.after, n, LastCrossing(moment, factor, edge, first))
 
 
 @scalar
 def record_crossing_of(memory, slot, aside, n, at, scene):
-    """Put a lane on the branch that follows its crossing, if there is one, and record that."""
-    place = aside_rows(scene)
-    if aside[place.factor * STRIDE + n] == 0.0:
+    """Put a lane on the branch after its crossing, if it has one, and record the crossing."""
+    at_rows = aside_rows(scene)
+    if aside[at_rows.factor * STRIDE + n] == 0.0:
         return
-    element = int(aside[place.element * STRIDE + n])
+    element = int(aside[at_rows.element * STRIDE + n])
     lane = read_lane(memory, slot, scene)
-    moment = at.number + 0.5 * (1.0 + aside[place.after * STRIDE + n])
+    moment = at.number + 0.5 * (1.0 + aside[at_rows.after * STRIDE + n])
     crossed = crossed_at(aside, n, element, scene)
     leave(memory, slot, element, crossed, lane, moment, at.recorded, scene)
     store_offsets(memory, slot, lane, read_branches(memory, slot, scene), scene)
@@ -126,29 +123,29 @@ def record_crossing_of(memory, slot, aside, n, at, scene):
 
 @scalar
 def crossed_at(aside, n, element, scene):
-    """Return a gap where it crosses, with its rate per step."""
-    at = aside_rows(scene)
-    first = (at.gaps + element * at.gap_rows + at.crossed) * STRIDE + n
-    # The step is 2 long in s.
+    """Return a gap at its crossing, with its rate per step."""
+    at_rows = aside_rows(scene)
+    first = (at_rows.gaps + element * at_rows.gap_rows + at_rows.crossed) * STRIDE + n
+    # Slopes are by s, and a step has length 2 in s.
     rate = 2.0 * aside[first + STRIDE]
     return Gap(aside[first], rate, rate)
 
 
 @scalar
-def count_left(aside, lanes, table, row, scene):
-    """Mark the gaps that may cross once more on the rest of the step; return of how many lanes."""
-    place, at = layout(scene), aside_rows(scene)
+def count_left(aside, lanes, maps, maps_at, scene):
+    """Mark the gaps that may cross again in the rest of the step; return the number of lanes."""
+    place, at_rows = layout(scene), aside_rows(scene)
     left = 0
     for n in range(VECTOR):
         lane = read_lane(aside, n, scene)
         branches = read_branches(aside, n, scene)
-        gaps, gaps_after = gaps_at_ends(aside, n, lane, table, row, scene)
+        gaps, gaps_after = gaps_at_ends(aside, n, lane, maps, maps_at, scene)
         elements = 0.0
         for element in range(place.elements):
-            crosses = aside[at.element * STRIDE + n] == element if place.elements > 1 else True
+            crosses = aside[at_rows.element * STRIDE + n] == element if place.elements > 1 else True
             crossed = crossed_at(aside, n, element, scene)
-            # Of the gap that has crossed only the rest counts.
-            rest = 0.5 * (1.0 - aside[at.after * STRIDE + n]) if crosses else 1.0
+            # For the gap that has crossed, only the rest of the step counts.
+            rest = 0.5 * (1.0 - aside[at_rows.after * STRIDE + n]) if crosses else 1.0
             value = crossed.value if crosses else gaps[element].value
             rate = rest * crossed.rate if crosses else gaps[element].rate
             first = Gap(value, rate, rate)
@@ -157,17 +154,17 @@ def count_left(aside, lanes, table, row, scene):
             margin = aside[(method_rows(scene).margins + element) * STRIDE + n] * rest**4
             leaves = may_leave(first, last, branches[element], margin)
             elements += float(1 << element) if leaves else 0.0
-        elements = elements if aside[at.factor * STRIDE + n] != 0.0 else 0.0
+        elements = elements if aside[at_rows.factor * STRIDE + n] != 0.0 else 0.0
         aside[rows(scene).suspect * STRIDE + n] = elements
         left += 1 if (elements != 0.0) & (n < lanes) else 0
     return left
 
 
 @scalar
-def give_up(memory, slot, table, row, scene):
-    """Continue from the end of a step that is not split any more, and count it."""
+def give_up(memory, slot, maps, maps_at, scene):
+    """Continue from the end of a step with more than `MOST_CROSSINGS`, and count the step."""
     lane = read_lane(memory, slot, scene)
-    _, gaps = gaps_at_ends(memory, slot, lane, table, row, scene)
+    _, gaps = gaps_at_ends(memory, slot, lane, maps, maps_at, scene)
     branches = branches_at(gaps, lane, scene)
     write_branches(memory, slot, branches, scene)
     store_offsets(memory, slot, lane, branches, scene)

@@ -1,4 +1,4 @@
-"""Where numbers are stored: those of flow maps in tables, those of lanes that cross in memory."""
+"""Where numbers are stored: flow maps in their table, lanes that cross in memory aside."""
 
 from functools import cache
 from typing import NamedTuple
@@ -13,7 +13,7 @@ from gearchaos_kernels.plan import Floats
 from gearchaos_kernels.scene import Scene, provider_of
 
 TERMS = 16
-"""Terms of the polynomials along a step."""
+"""Number of terms of the polynomials along a step."""
 
 _VECTOR = CACHE_LINE // np.dtype(np.float64).itemsize
 """Numbers of a vector register, and of a cache line."""
@@ -25,10 +25,16 @@ def fourth_derivative(power: Floats) -> Floats:
 
 
 class Work(NamedTuple):
-    """Memory of the lanes of a block that cross, eight at a time.
+    """Workspace of a block.
 
-    ``aside``: as that of a block; ``slots``: of all that cross, unsigned: a signed index is tested
-    for one that counts from the end; ``numbers``: of a block's only lane.
+    Attributes
+    ----------
+    aside : array
+        Memory of eight lanes that cross, with the rows of a block and those of `Aside`.
+    slots : array of int, shape (LANES,)
+        Slots of all lanes that cross. Unsigned, because a signed index is checked for its sign.
+    numbers : array
+        Factors and result of a map for the only lane of a block; see `Layout`.
     """
 
     aside: Floats
@@ -37,31 +43,31 @@ class Work(NamedTuple):
 
 
 class Layout(NamedTuple):
-    """Where the parts of the maps of one step and one set of branches begin, in numbers.
+    """Where the parts of the maps of one step begin, in numbers.
+
+    The numbers of a step are a header, then the maps of each set of branches.
 
     Attributes
     ----------
     states, inputs, columns : int
-        Number of states x, of inputs of a lane, and of columns of a map: x, then the first input,
-        the offset of each element's flank, the other inputs.
+        Number of states x, of inputs of a lane, and of columns of a map. The columns are x, the
+        first input, the offset of each element's flank, and the other inputs.
     width : int
-        Length of a column of the state, such that it fills vector registers.
+        Length of a column of the state, padded to fill vector registers.
     elements, branches : int
         Number of elements, and of sets of branches that differ in which elements are engaged.
     gap, switch : int
-        Where the gaps of all elements and the `SWITCH` terms of all elements begin within the maps
-        of a set of branches, whose map of the state comes first.
+        Where the gaps and the switch terms of all elements begin within the maps of a set of
+        branches; the map of the state comes first.
     size, step_size : int
-        Numbers of the maps of one set of branches, and of all maps of a step.
-    waves, bounds, header : int
-        Numbers of a step before its maps: the waves at its beginning and at its end, from the
-        start; for each element from ``bounds`` on, ``bound_size`` numbers each, by how much each
-        column may bend its gap beyond a cubic; ``header``: all of them.
-    bound_size : int
-        Numbers of one element among the bounds.
-    tangent_inputs, result, own : int
-        In the workspace of a block's only lane, which begins with its state and inputs: where its
-        tangent vector and the result begin, and its size.
+        Size of the maps of one set of branches, and of all numbers of a step.
+    waves, bounds, bound_size, header : int
+        The header begins with the ``waves`` at the beginning and at the end of the step. From
+        ``bounds`` on it has ``bound_size`` numbers for each element: by how much each column may
+        bend the gap beyond a cubic. ``header`` is its size.
+    tangent_inputs, result, workspace : int
+        In `Work.numbers`, which begins with state and inputs: where the tangent vector and the
+        result begin, and the size.
     """
 
     states: int
@@ -80,11 +86,11 @@ class Layout(NamedTuple):
     header: int
     tangent_inputs: int
     result: int
-    own: int
+    workspace: int
 
 
 def _padded(count: int) -> int:
-    """Return the length of a column: a power of two that fills part of a register, or registers."""
+    """Return the padded length of a column: a power of two below a register, or whole registers."""
     if count >= _VECTOR:
         return -(-count // _VECTOR) * _VECTOR
     return 1 << (count - 1).bit_length()
@@ -126,22 +132,30 @@ def layout_of(scene: Scene) -> Layout:
         header=header,
         tangent_inputs=tangent_inputs,
         result=result,
-        own=result + -(-width // _VECTOR) * _VECTOR,
+        workspace=result + -(-width // _VECTOR) * _VECTOR,
     )
 
 
 layout = constants(layout_of)
-"""The layout of a scene, as constants of compiled code."""
+"""`Layout` of a scene, as constants of compiled code."""
 
 waves_at = numbers_of(lambda scene: layout_of(scene).waves)
-"""The values of the waves from a place of an array on: array, place, scene."""
+"""Read the values of the waves; arguments: array, place of the first one, scene."""
 
 
-class Crossing(NamedTuple):
-    """The last crossing of a lane that has been taken aside, in rows behind those of its gaps.
+class LastCrossing(NamedTuple):
+    """The last crossing of a lane aside, in rows after those of its gaps.
 
-    ``after``: its moment; ``element``: the element that crosses. A deflection begins or ends to act
-    there: ``factor`` is its sign, ``edge`` the gap from which it is measured.
+    Attributes
+    ----------
+    after : float
+        Its moment s, -1 before the first crossing.
+    factor : float
+        1 where a deflection ends, -1 where one begins, 0 without a crossing.
+    edge : float
+        The gap from which that deflection is measured.
+    element : float
+        Number of the element that crosses.
     """
 
     after: float
@@ -151,18 +165,16 @@ class Crossing(NamedTuple):
 
 
 class GapSearch(NamedTuple):
-    """Where a gap crosses, and how it is searched, in rows behind those of its terms.
+    """Where a gap crosses, and the polynomial in which this is searched, in rows after its terms.
 
     Attributes
     ----------
     crossed, slope : float
         The gap where it crosses, and its slope there.
-    side : float
-        The side from which the gap is seen: 1 or -1.
-    distance : float
-        By how much the gap, seen from there, is raised: it then falls below zero at the crossing.
+    side, distance : float
+        side * gap + distance falls below zero at the crossing; ``side`` is 1 or -1.
     bend : float
-        A bound on its fourth derivative along the step.
+        A bound on the fourth derivative of the gap along the step.
     """
 
     crossed: float
@@ -173,20 +185,24 @@ class GapSearch(NamedTuple):
 
 
 class Aside(NamedTuple):
-    """First rows of a lane that has been taken aside, behind those of a block.
+    """First rows of a lane aside, after those of a block.
 
     Attributes
     ----------
-    gaps : int
-        The polynomials of the gaps along the step, ``gap_rows`` for each element: `TERMS` rows of
-        the motion, from ``tangent_terms`` on those of the tangent vector, then the next crossing
-        (``moment``), value and slope there (``crossed``), the side from which the gap is seen
-        (``side``), by what it is raised (``distance``), and more than its fourth derivative
-        (``bend``).
-    crossing : int
-        The `Crossing`; ``after``, ``factor``, ``edge``, ``element``: its rows.
+    gaps, gap_rows : int
+        The gaps along the step, ``gap_rows`` rows for each element: `TERMS` rows of the motion,
+        then the following, whose rows are relative to the first one of the element.
+    tangent_terms : int
+        `TERMS` rows of the tangent vector.
+    moment : int
+        Moment of the next crossing.
+    crossed, side, distance, bend : int
+        The `GapSearch`.
+    after, factor, edge, element : int
+        The `LastCrossing`.
     sums, tangent_sums : int
-        What carries state and tangent vector over a crossing; see `vectors.sum_along`.
+        Integrals that transfer state and tangent vector to the next branch; see
+        `vectors.sum_along`.
     total : int
         Number of rows.
     """
@@ -210,12 +226,12 @@ class Aside(NamedTuple):
 
 @cache
 def aside_of(scene: Scene) -> Aside:
-    """Return the rows of a lane that has been taken aside."""
+    """Return the rows of a lane aside."""
     gaps, elements = rows_of(scene).total, layout_of(scene).elements
     moment = 2 * TERMS
     gap_rows = -(-(moment + 6) // _VECTOR) * _VECTOR
     after = gaps + elements * gap_rows
-    sums = after + len(Crossing._fields)
+    sums = after + len(LastCrossing._fields)
     return Aside(
         gaps=gaps,
         gap_rows=gap_rows,
@@ -236,14 +252,18 @@ def aside_of(scene: Scene) -> Aside:
 
 
 aside_rows = constants(aside_of)
-"""The rows of a lane that has been taken aside, as constants of compiled code."""
+"""`Aside` of a scene, as constants of compiled code."""
 
 
 class MethodRows(NamedTuple):
-    """First rows of what flow maps keep of every lane: what forces it, and the margins of gaps.
+    """First rows of what flow maps store of every lane.
 
-    ``inputs``: the columns of a map behind the state; ``margins``: how far each gap may stray from
-    its cubic in a step.
+    Attributes
+    ----------
+    inputs : int
+        The factors of the map columns after the state: inputs and offsets.
+    margins : int
+        By how much each gap may deviate from its cubic in a step.
     """
 
     inputs: int
@@ -251,16 +271,16 @@ class MethodRows(NamedTuple):
 
 
 def method_rows_of(scene: Scene) -> MethodRows:
-    """Return the rows that flow maps keep of every lane."""
+    """Return the rows that flow maps use in a block."""
     place, first = layout_of(scene), rows_of(scene).method
     return MethodRows(first, first + place.columns - place.states)
 
 
 def rows_needed(scene: Scene) -> int:
-    """Return how many rows that are."""
+    """Return the number of rows that flow maps use in a block."""
     place = layout_of(scene)
     return place.columns - place.states + place.elements
 
 
 method_rows = constants(method_rows_of)
-"""The rows that flow maps keep of every lane, as constants of compiled code."""
+"""`MethodRows` of a scene, as constants of compiled code."""

@@ -1,4 +1,4 @@
-"""Flow maps as a method: exact steps, with maps that lanes share."""
+"""Flow maps as a method: exact steps of piecewise-linear systems, with maps that lanes share."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -27,22 +27,22 @@ from gearchaos_kernels.scene import Scene, implement
 
 @dataclass(frozen=True)
 class FlowMap:
-    """Stands for flow maps in a scene."""
+    """Identifies flow maps in a scene; they have no flags."""
 
 
 def prepare(system: Any, plan: Plan, scene: Scene) -> Iterator[Share]:
-    """Yield lanes in the order in which they share maps, as many as have maps that fit."""
+    """Yield shares of lanes, lanes with the same maps together, as many as have maps that fit."""
     refusal = system.refuses_maps()
     if refusal:
         raise ValueError(refusal)
     lanes, steps, group = system.lanes, fewest_steps(plan), sharing(system)
-    every = np.argsort(group, kind="stable")
-    _, first, counts = np.unique(group[every], return_index=True, return_counts=True)
+    in_groups = np.argsort(group, kind="stable")
+    _, first, counts = np.unique(group[in_groups], return_index=True, return_counts=True)
     done = 0
     while done < first.size:
-        maps, places = maps_of(system.of(every[first[done:]]), steps, scene, plan.map_bytes)
+        maps, places = maps_of(system.of(in_groups[first[done:]]), steps, scene, plan.map_bytes)
         lanes_of = counts[done : done + places.shape[1]]
-        order = every[first[done] : first[done] + lanes_of.sum()]
+        order = in_groups[first[done] : first[done] + lanes_of.sum()]
         steps_of = np.full(lanes, steps)
         steps_of[order] = np.repeat(places[0], lanes_of)
         yield Share(order, cut(lanes_of, *places), maps, steps_of)
@@ -51,34 +51,35 @@ def prepare(system: Any, plan: Plan, scene: Scene) -> Iterator[Share]:
 
 @scalar
 def maps_per_step(scene):
-    """Return the size of the maps of a step."""
+    """Return the size of the maps of one step, in numbers."""
     return layout(scene).step_size
 
 
 @part
 def workspace(scene):
-    """Return memory for the lanes that cross, and for a block's only lane."""
+    """Return memory for lanes that cross, and for the only lane of a block."""
     aside = aligned_memory(aside_rows(scene).total)
     for number in range(aside.shape[0]):
         aside[number] = 0.0
-    return Work(aside, np.zeros(LANES, dtype=np.uint32), np.zeros(layout(scene).own))
+    return Work(aside, np.zeros(LANES, dtype=np.uint32), np.zeros(layout(scene).workspace))
 
 
 @scalar
 def step(memory, lanes, at, given, scene):
-    """Take one step in every slot; return how many may have left a contact branch."""
-    # A few lanes need no more than one vector, and one lane with maps of its own not even that.
+    """Take one step in every slot; return how many lanes may have left a contact branch."""
+    # Up to eight lanes fit into one vector; a single lane is faster along its state.
     slots = 1 if lanes == 1 else VECTOR if lanes <= VECTOR else LANES
     return move_block(memory, given.maps, at.maps_at, slots, given.work.numbers, scene)
 
 
 @scalar
 def grids(clock, given, scene):
-    """Return what all lanes share at the beginning of the step, in its middle and at its end."""
-    requested, of_it = clock.number // clock.every, clock.number % clock.every
-    begin = grid_within(given.tables, requested, of_it / clock.every, scene)
-    middle = grid_within(given.tables, requested, (of_it + 0.5) / clock.every, scene)
-    return begin, middle, grid_within(given.tables, requested, (of_it + 1.0) / clock.every, scene)
+    """Return what all lanes share at the beginning, in the middle and at the end of a step."""
+    requested, substep = clock.number // clock.substeps, clock.number % clock.substeps
+    begin = grid_within(given.tables, requested, substep / clock.substeps, scene)
+    middle = grid_within(given.tables, requested, (substep + 0.5) / clock.substeps, scene)
+    end = grid_within(given.tables, requested, (substep + 1.0) / clock.substeps, scene)
+    return begin, middle, end
 
 
 FLOW_MAP = Method(

@@ -1,9 +1,9 @@
-"""The moment at which a gap leaves its branch in a step that is a map.
+"""The moment at which a gap leaves its branch within a step by flow maps.
 
-The gap is a polynomial along the step, from -1 to 1; seen from one side and raised by a distance it
-falls below zero where it leaves. Nearly every one that may leave falls all the way, and is solved
-side by side with others (`find_side_by_side`), in the same steps for each, so that none depends on
-its neighbours. What is left is searched piece by piece (`find_in_pieces`).
+Along the step, s from -1 to 1, the gap is a polynomial. The gap leaves its branch where side * gap
++ distance falls below zero. Nearly always this polynomial is monotonically decreasing. Such gaps
+are solved for eight lanes at once (`find_side_by_side`), with the same operations for each lane, so
+that no lane depends on its neighbours. All others are searched piece by piece (`find_in_pieces`).
 """
 
 import math
@@ -24,16 +24,16 @@ largest_bend = scalar(fourth_derivative)
 
 _THIRD = 1.0 / 3.0
 UNKNOWN = -2.0
-"""In place of a moment that has to be searched."""
+"""Stands for a moment that still has to be searched."""
 
-_LOOKS = 300
-_NARROW = 1e-9
-"""In so short a piece of a step a gap that turns around goes as far as rounding does."""
+_MOST_PIECES = 300
+_SHORTEST = 1e-9
+"""In a shorter piece of a step, a gap that turns around changes by less than rounding."""
 
 
 @scalar
 def find_moments(aside, element, lanes, scene):
-    """Find the next crossing of a gap of some lanes side by side, or `NEVER`."""
+    """Store the moment of the next crossing of an element's gap for each lane, or `NEVER`."""
     if find_side_by_side(aside, element, scene) > 0:
         at = aside_rows(scene)
         for n in range(lanes):
@@ -77,11 +77,11 @@ def find_side_by_side(aside, element, scene):
         known = one_way and (stays or found) and aside[at_rows.after * STRIDE + n] == -1.0
         # The suspects are a sum of 2**element; this is the bit of the element.
         suspects = int(aside[rows(scene).suspect * STRIDE + n])
-        looked_at = (suspects >> element) & 1 == 1
-        unknown += 1 if looked_at and not known else 0
+        is_suspect = (suspects >> element) & 1 == 1
+        unknown += 1 if is_suspect and not known else 0
         if not known:
             moment = UNKNOWN
-        aside[first + at_rows.moment * STRIDE] = moment if looked_at else NEVER
+        aside[first + at_rows.moment * STRIDE] = moment if is_suspect else NEVER
         found_of_gap = GapSearch(value, slope, side, distance, bend)
         store(aside, element * at_rows.gap_rows + at_rows.gaps + at_rows.crossed, n, found_of_gap)
     return unknown
@@ -122,24 +122,24 @@ def refined_fall(aside, first, raised, at):
 
 @scalar
 def bounds_of(ends, width, bend):
-    """Bound a gap within a piece, from below and above, and the rise of its steepest slope.
+    """Return a lower and an upper bound of a gap within a piece, and an upper one of its slope.
 
-    ``ends``: value and slope on the left and on the right; ``bend``: more than the fourth
-    derivative. The gap and the cubic differ by bend (width^4 / 24) t^2 (1 - t)^2 at most.
+    ``ends``: value and slope on the left and on the right; ``bend``: bound on the fourth
+    derivative. The gap differs from the cubic by at most bend (width^4 / 24) t^2 (1 - t)^2.
     """
     value_left, slope_left, value_right, slope_right = ends
     point1 = value_left + _THIRD * width * slope_left
     point2 = value_right - _THIRD * width * slope_right
     stray = bend * width**4 / 24.0
     steepest = max(max(width * slope_left, 3.0 * (point2 - point1)), width * slope_right)
-    # Their slopes differ by less than a fifth of the same number.
+    # The slopes of gap and cubic differ by less than 0.2 stray.
     lowest, highest = min(point1, point2), max(point1, point2)
     return lowest - stray / 12.0, highest + stray / 12.0, steepest + 0.2 * stray
 
 
 @scalar
 def guess_fall(ends, width):
-    """Estimate where in a piece a gap falls below 0, by a cubic of the inverse function."""
+    """Estimate where in a piece a gap falls below 0, by inverse cubic interpolation."""
     value_left, slope_left, value_right, slope_right = ends
     fallen = value_left - value_right
     done = value_left / fallen
@@ -150,8 +150,8 @@ def guess_fall(ends, width):
 
 @scalar
 def gap_along(aside, first, at):
-    """Return value, slope and half the curvature of a gap whose terms stand from a place on."""
-    # Even and odd terms, which do not wait for each other.
+    """Return value, slope and half the curvature of a gap; ``first``: the place of its terms."""
+    # Even and odd terms are summed independently, so that they do not wait for each other.
     square = at * at
     even, odd = aside[first + (TERMS - 2) * STRIDE], aside[first + (TERMS - 1) * STRIDE]
     even_slope, odd_slope, even_bend, odd_bend = 0.0, 0.0, 0.0, 0.0
@@ -169,14 +169,14 @@ def gap_along(aside, first, at):
 
 @part
 def find_in_pieces(aside, element, n, scene):
-    """Find the crossing of a gap after the last one of its lane, or `NEVER`, whatever it does."""
+    """Store the first crossing of any gap after the last crossing of its lane, or `NEVER`."""
     at_rows = aside_rows(scene)
     first = (at_rows.gaps + element * at_rows.gap_rows) * STRIDE + n
     side, distance = aside[first + at_rows.side * STRIDE], aside[first + at_rows.distance * STRIDE]
     after, bend = aside[at_rows.after * STRIDE + n], aside[first + at_rows.bend * STRIDE]
     moment = first_below((aside, first, side, distance), bend, after)
     if distance > 0.0:
-        # A lane between the flanks may meet either.
+        # A lane between the flanks may meet either flank.
         moment = min(moment, first_below((aside, first, -side, distance), bend, after))
     value, slope, _ = gap_along(aside, first, moment)
     aside[first + at_rows.moment * STRIDE] = moment
@@ -186,16 +186,16 @@ def find_in_pieces(aside, element, n, scene):
 
 @part
 def first_below(given, bend, left):
-    """Return where a gap, seen from a side and raised, first falls below zero after a moment.
+    """Return where side * gap + distance first falls below zero after a moment, or `NEVER`.
 
-    Piece by piece: one whose Bezier points with their margins are not below zero has no such place,
-    in one that only falls it is found by Newton's method, others are halved.
+    Piece by piece. A piece whose lower bound is not negative has no such place. In a piece that is
+    monotonically decreasing, Newton's method finds it. Other pieces are halved.
     """
     value_left, slope_left = gap_at(given, left)
     value_left = max(value_left, 0.0)
     right = 1.0
     value_right, slope_right = gap_at(given, right)
-    for _ in range(_LOOKS):
+    for _ in range(_MOST_PIECES):
         width = right - left
         ends = value_left, slope_left, value_right, slope_right
         lowest, _, steepest = bounds_of(ends, width, bend)
@@ -205,7 +205,7 @@ def first_below(given, bend, left):
                 guess = min(max(left + guess_fall(ends, width), left), right)
                 return falling_root(gap_at, given, left, right, guess)
             clear = steepest < 0.0
-            if not clear and width < _NARROW:
+            if not clear and width < _SHORTEST:
                 if value_right < 0.0:
                     return right
                 clear = True
@@ -224,7 +224,7 @@ def first_below(given, bend, left):
 
 @scalar
 def gap_at(given, at):
-    """Return a gap, seen from one side and raised by a distance, and its slope."""
+    """Return side * gap + distance, and its slope."""
     aside, first, side, distance = given
     value, slope, _ = gap_along(aside, first, at)
     return side * value + distance, side * slope

@@ -1,7 +1,7 @@
-"""The maps of one lane from the Taylor series of its equations about the middle of every step.
+"""Compute the maps of a lane from Taylor series about the middle of every step.
 
-Two things enter: the formulas of the model, applied to unit vectors, and the functions of the mesh
-phase that excite it. `store` has the equations that are solved here.
+Input are the formulas of the model, applied to unit vectors, and the waves that excite it. The
+docstring of `store` has the equations that are solved here.
 """
 
 import numpy as np
@@ -30,17 +30,21 @@ from gearchaos_kernels.models.interfaces import (
 from gearchaos_kernels.plan import Floats
 
 ORDER = 22
-"""Terms of the Taylor series that they come from."""
+"""Number of terms of the Taylor series."""
 
 TAIL = 2e-15
 """Largest truncation error of the series, relative to their largest term."""
 
 TOGETHER = 8
-"""Steps whose series are computed side by side: they fill vectors, and the cache holds them."""
+"""Steps whose series are computed together: they fill vectors and fit into the cache."""
 
 
 def _economy() -> tuple[Floats, Floats]:
-    """What cuts a Taylor series (ORDER,) to TERMS terms, and the Chebyshev terms that it drops."""
+    """Return the matrices that cut a Taylor series to `TERMS` terms, and that give what is lost.
+
+    Shapes (TERMS, ORDER) and (ORDER - TERMS, ORDER). The series is cut as a Chebyshev series; the
+    second matrix gives the Chebyshev coefficients that are dropped.
+    """
     exact = np.stack(
         [np.pad(chebyshev.poly2cheb(unit), (0, ORDER))[:ORDER] for unit in np.eye(ORDER)]
     )
@@ -52,24 +56,25 @@ _KEPT, _DROPPED = _economy()
 
 
 _BENDS = fourth_derivative(np.arange(TERMS, dtype=float)) / 18.0
-"""By how much each power of s may lower the middle Bezier points of its Hermite cubic.
+"""By how much each power of s may lie below its Hermite cubic, as a shift of two Bezier points.
 
-With t from 0 to 1 along the step, which is 2 long, both differ by no more than f t^2 (1 - t)^2 2/3,
-where f is the fourth derivative, and that is no more than f/6 (t (1 - t)^2 + t^2 (1 - t)): what
-both middle points add, moved by f/18. A piece of the step has the fourth power of its share.
+Let t run from 0 to 1 along the step, which has length 2 in s, and let f bound the fourth
+derivative. A function differs from its Hermite cubic by at most f t^2 (1 - t)^2 2/3. This is at
+most f/6 (t (1 - t)^2 + t^2 (1 - t)), which is the effect of moving both middle Bezier points by
+f/18. For a piece of the step the shift is smaller by the fourth power of the piece's share.
 """
 
 _ENDS = np.stack([(-1.0) ** np.arange(ORDER + 1), np.ones(ORDER + 1)])
-"""What makes the values at both ends of a step of a series."""
+"""Matrix from the terms of a series to its values at both ends of the step."""
 
 
 @evaluator
 def differentiate(coefficients, matrices, scene):
-    """Apply the formulas of a model to one unit after the other, lane by lane.
+    """Apply the formulas of a model to unit vectors, lane by lane, and write the matrices.
 
-    ``matrices`` (lanes, states + elements, states + 1 + waves + elements): rates of the states
-    without the springs of the elements, and all gaps, by state, drive, waves, and by a force of
-    one of each element, with its share of the stiffness.
+    ``matrices`` has the shape (lanes, states + elements, states + 1 + waves + elements). Its rows
+    are the rates of the states, without the springs of the elements, and the gaps. Its columns are
+    the states, the drive, the waves, and a unit force of each element times its relative stiffness.
     """
     memory = aligned_memory(rows(scene).total)
     place = layout(scene)
@@ -98,21 +103,22 @@ def differentiate(coefficients, matrices, scene):
 
 @scalar
 def unit_push(gap, element, share, unit):
-    """Return the push of an element without its spring, with its share of a force of one."""
+    """Return the push of the damper of an element, plus a force times its relative stiffness."""
     return Push(element.damping * gap.closing + share * unit, 0.0)
 
 
 @driver
 def make_maps(matrices, stiffness, inputs, forcing, tables, tails, place):
-    """Fill the maps of lanes, shape (lanes, steps, size of a step), and their truncation errors.
+    """Compute the maps of lanes and their truncation errors; all scenes share the compiled code.
 
-    Compiled once for all scenes. ``matrices``: see `differentiate`; ``stiffness`` (lanes, 2): mean
-    and variation; ``inputs``: see `MapFormulas`; ``forcing`` (1 + waves, `ORDER`, steps): Taylor
-    coefficients about the middle of every step, of the stiffness variation and of the waves;
-    ``place``: the `Layout`.
+    ``tables`` (lanes, steps, size of a step) and ``tails`` (lanes,) are written. ``matrices``: see
+    `differentiate`; ``stiffness`` (lanes, 2): mean and variation; ``inputs``: see `MapFormulas`;
+    ``forcing`` (1 + waves, `ORDER`, steps): Taylor coefficients of the stiffness variation and of
+    the waves about the middle of every step; ``place``: the `Layout`.
     """
     for number in prange(tables.shape[0]):
-        # One type of number inside and outside of the parallel loop: else two are compiled.
+        # The index of a parallel loop has another type; without the cast, two versions of
+        # `fill_maps` are compiled.
         lane = np.int64(number)
         tails[lane] = fill_maps(
             matrices[lane], stiffness[lane], inputs, forcing, tables[lane], place
@@ -121,7 +127,7 @@ def make_maps(matrices, stiffness, inputs, forcing, tables, tails, place):
 
 @part
 def fill_maps(matrix, stiffness, inputs, forcing, table, place):
-    """Fill the maps of a lane, shape (steps, size of a step); return the truncation error."""
+    """Write the maps of a lane, shape (steps, size of a step); return the truncation error."""
     tail = 0.0
     for first in range(0, table.shape[0], TOGETHER):
         some = table[first : first + TOGETHER]
@@ -146,11 +152,10 @@ def fill_maps(matrix, stiffness, inputs, forcing, table, place):
 
 @part
 def fill_steps(matrix, engaged, inputs, forcing, table, place):
-    """Fill the maps of some steps on all sets of branches; return the truncation error.
+    """Write the maps of some steps on all sets of branches; return the truncation error.
 
-    The last axis of every array is that of these steps, one set of branches after the other.
-    Elements are written in loops: for an assignment of slices Numba also compiles an error message
-    for shapes that differ.
+    The last axis of every array runs over these steps, one set of branches after the other. Arrays
+    are written in loops, because for a slice Numba also compiles a check of the shapes.
     """
     states, columns, elements = place.states, place.columns, place.elements
     width = engaged.shape[1]
@@ -162,7 +167,7 @@ def fill_steps(matrix, engaged, inputs, forcing, table, place):
     backward = np.ascontiguousarray(rates[:, :states].T), gaps.T.copy(), mobility.T.copy()
     inverse, switch = inverse_series(backward, engaged, forcing[0], place)
 
-    # Both ends of the step: it is 2 long in s.
+    # Values at both ends of the step, s = -1 and 1.
     ends = combined(_ENDS, psi).reshape((2, states + functions, columns, width))
     back = combined(_ENDS, inverse).reshape((2, states, states, width))[0]
     from_beginning, first = at_beginning(ends[0], back, place)
@@ -284,7 +289,10 @@ def write_maps(end, along, traced, table, place):
 
 @part
 def solve(scale, matrices, stiffness, engaged, terms, seen, pulled):
-    """Solve terms' = scale (rates + outer K engaged inner) terms; give inner terms, and K of it."""
+    """Solve terms' = scale (rates + outer K engaged inner) terms for the terms of a series.
+
+    ``seen`` and ``pulled`` receive inner terms, and K inner terms.
+    """
     rates, outer, inner = matrices
     width = engaged.shape[1]
     acting = np.zeros(seen.shape[1:])
@@ -304,9 +312,9 @@ def solve(scale, matrices, stiffness, engaged, terms, seen, pulled):
 
 @part
 def add_product(scale, a, b, target):
-    """Add the product of two matrices, the first of which is small, times a number.
+    """Add the product of a small matrix and a large one, times a number, to a target.
 
-    Rows and columns beyond the size of the other matrix or of the target are ignored.
+    Rows and columns that exceed the size of the other matrix or of the target are ignored.
     """
     for line in range(min(a.shape[0], target.shape[0])):
         for source in range(min(a.shape[1], b.shape[0])):
@@ -318,7 +326,7 @@ def add_product(scale, a, b, target):
 
 @part
 def combined(matrix, series):
-    """Return combinations of the terms of a series."""
+    """Return a matrix times the terms of a series; further axes of the series are flattened."""
     flat = series.reshape((series.shape[0], -1))
     target = np.zeros((matrix.shape[0], flat.shape[1]))
     add_product(1.0, matrix, flat, target)
@@ -327,7 +335,7 @@ def combined(matrix, series):
 
 @part
 def multiplied(a, b):
-    """Return the product of the matrices of every step."""
+    """Return the products of the matrices of every step; the last axis is that of steps."""
     target = np.zeros((a.shape[0], b.shape[1], b.shape[2]))
     for line in range(a.shape[0]):
         for source in range(b.shape[0]):
@@ -339,7 +347,7 @@ def multiplied(a, b):
 
 @part
 def economised(series):
-    """Cut Taylor series to fewer terms; return them, and the largest share that is lost."""
+    """Cut Taylor series to `TERMS` terms; return them and the largest relative error of that."""
     kept, lost = combined(_KEPT, series), combined(_DROPPED, series)
     most = 0.0
     for column in range(lost.shape[1]):
@@ -352,7 +360,7 @@ def economised(series):
 
 @part
 def largest(matrix):
-    """Return the size of the largest element; what is not a number is larger than any."""
+    """Return the largest absolute value of a matrix, or NaN if it contains one."""
     most = 0.0
     for row in matrix:
         for number in row:

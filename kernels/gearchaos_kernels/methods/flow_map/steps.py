@@ -1,7 +1,7 @@
 """Steps of a block of lanes by flow maps.
 
-Lanes move by the map of the branches on which they begin the step. Those whose gaps may have left
-them are suspects, which `crossings` takes up.
+A lane takes a step by the map of the contact branches on which it begins. Lanes whose gaps may have
+left their branches are suspects; `crossings` resolves their step.
 """
 
 import math
@@ -24,17 +24,17 @@ from gearchaos_kernels.models.interfaces import (
 
 
 @scalar
-def points_of(table, row, scene):
+def points_of(maps, maps_at, scene):
     """Return the mesh phase at the beginning and at the end of a step."""
     return (
-        point_of_waves(waves_at(table, row, scene), scene),
-        point_of_waves(waves_at(table, row + layout(scene).waves, scene), scene),
+        point_of_waves(waves_at(maps, maps_at, scene), scene),
+        point_of_waves(waves_at(maps, maps_at + layout(scene).waves, scene), scene),
     )
 
 
 @scalar
 def begin_lane(memory, slot, lane, scene):
-    """Store what forces a lane, in the order of columns; without clearance no flank has offsets."""
+    """Store the inputs of a lane and the offsets of its branches, in the order of map columns."""
     place, first = layout(scene), method_rows(scene).inputs
     inputs = inputs_of(lane, scene)
     memory[first * STRIDE + slot] = inputs[0]
@@ -55,61 +55,64 @@ def always_engaged(_half_clearance):
 
 @scalar
 def store_offsets(memory, slot, lane, branches, scene):
-    """Store by how much each gap exceeds the deflection on its branch."""
+    """Store by how much each gap exceeds the deflection of its element on these branches."""
     means = mean_gaps(lane, scene)
     first = method_rows(scene).inputs + 1
     for element in range(layout(scene).elements):
         branch = branches[element]
-        # With the mean error, which no column of a map has.
+        # Includes the constant part of the gap, which has no column in the maps.
         offset = branch.offset + branch.engaged * means[element]
         memory[(first + element) * STRIDE + slot] = offset
 
 
 @scalar
-def maps_on(branches, row, scene):
-    """Return where in their table the maps of a step on a set of branches begin."""
+def maps_on(branches, maps_at, scene):
+    """Return where the maps for a set of branches begin, among the maps of a step."""
     number = 0
     for element in range(layout(scene).elements):
         number += 0 if branches[element].engaged != 0.0 else 1 << element
-    return row + layout(scene).header + number * layout(scene).size
+    return maps_at + layout(scene).header + number * layout(scene).size
 
 
 @scalar
-def move_block(memory, table, row, slots, numbers, scene):
-    """Take one step in so many slots; return how many may have left a contact branch."""
+def move_block(memory, maps, maps_at, slots, numbers, scene):
+    """Take one step in n slots; return how many lanes may have left a contact branch."""
     if slots == 1:
-        return move_lane(memory, table, row, numbers, scene)
+        return move_lane(memory, maps, maps_at, numbers, scene)
     for slot in range(0, slots, VECTOR):
         vectors.keep_before(memory, slot, scene)
-        vectors.bound_bends(memory, slot, table, row, scene)
-        vectors.move(memory, slot, table, row, scene)
-    # A constant number of slots, which the compiler vectorises.
+        vectors.bound_bends(memory, slot, maps, maps_at, scene)
+        vectors.move(memory, slot, maps, maps_at, scene)
+    # The compiler vectorises a loop over a constant number of slots only.
     if slots == VECTOR:
-        return count_suspects(memory, VECTOR, table, row, scene)
-    return count_suspects(memory, LANES, table, row, scene)
+        return count_suspects(memory, VECTOR, maps, maps_at, scene)
+    return count_suspects(memory, LANES, maps, maps_at, scene)
 
 
 @scalar
-def move_lane(memory, table, row, numbers, scene):
-    """Take one step of the only lane, along its state; bit for bit the one that vectors take."""
+def move_lane(memory, maps, maps_at, numbers, scene):
+    """Take one step of the only lane, vectorised along its state.
+
+    The result is bit for bit that of a vector of lanes.
+    """
     place, at = layout(scene), rows(scene)
-    # Number by number: a vector would have to wait for the single numbers stored before it.
+    # Number by number: a vector load would have to wait for the single stores before it.
     for line in range(place.states):
         memory[(at.state_before + line) * STRIDE] = memory[(STATE + line) * STRIDE]
         if scene.tangent is not None:
             memory[(at.tangent_before + line) * STRIDE] = memory[(at.tangent + line) * STRIDE]
     gather(memory, numbers, scene)
-    vectors.bound_bends(memory, 0, table, row, scene)
-    maps = row + place.header
+    vectors.bound_bends(memory, 0, maps, maps_at, scene)
+    branch_maps_at = maps_at + place.header
     if scene.resolved is not None:
-        maps = maps_on(read_branches(memory, 0, scene), row, scene)
-    scatter(memory, table, maps, numbers, scene)
-    return count_suspects(memory, 1, table, row, scene)
+        branch_maps_at = maps_on(read_branches(memory, 0, scene), maps_at, scene)
+    scatter(memory, maps, branch_maps_at, numbers, scene)
+    return count_suspects(memory, 1, maps, maps_at, scene)
 
 
 @scalar
 def gather(memory, numbers, scene):
-    """Read what is to be multiplied with a map: state before the step, forces, tangent vector."""
+    """Collect the factors of a map: state before the step, inputs and offsets, tangent vector."""
     place, at = layout(scene), rows(scene)
     for line in range(place.states):
         numbers[line] = memory[(at.state_before + line) * STRIDE]
@@ -121,28 +124,30 @@ def gather(memory, numbers, scene):
 
 
 @scalar
-def scatter(memory, table, maps, numbers, scene):
-    """Write where a map leads what was read, state and tangent vector."""
+def scatter(memory, maps, branch_maps_at, numbers, scene):
+    """Apply a map to the collected factors, and store state and tangent vector."""
     place = layout(scene)
-    vectors.end_of(numbers, place.result, 0, table, maps, scene)
+    vectors.end_of(numbers, place.result, 0, maps, branch_maps_at, scene)
     for line in range(place.states):
         memory[(STATE + line) * STRIDE] = numbers[place.result + line]
     if scene.tangent is not None:
-        vectors.tangent_end_of(numbers, place.result, place.tangent_inputs, table, maps, scene)
+        vectors.tangent_end_of(
+            numbers, place.result, place.tangent_inputs, maps, branch_maps_at, scene
+        )
         for line in range(place.states):
             memory[(rows(scene).tangent + line) * STRIDE] = numbers[place.result + line]
 
 
 @scalar
-def count_suspects(memory, slots, table, row, scene):
-    """Mark the lanes whose gaps may have left their branches since the step began."""
+def count_suspects(memory, slots, maps, maps_at, scene):
+    """Mark the lanes whose gaps may have left their branches in the step; return their number."""
     if scene.resolved is None:
         return 0
     suspects = 0
     for slot in range(slots):
         lane = read_lane(memory, slot, scene)
         branches = read_branches(memory, slot, scene)
-        gaps, gaps_after = gaps_at_ends(memory, slot, lane, table, row, scene)
+        gaps, gaps_after = gaps_at_ends(memory, slot, lane, maps, maps_at, scene)
         margins = vectors.margins_of(memory, slot, scene)
         elements = suspects_of(gaps, gaps_after, branches, margins, scene)
         suspects += 1 if elements != 0.0 else 0
@@ -151,9 +156,9 @@ def count_suspects(memory, slots, table, row, scene):
 
 
 @scalar
-def gaps_at_ends(memory, slot, lane, table, row, scene):
+def gaps_at_ends(memory, slot, lane, maps, maps_at, scene):
     """Return the gaps of a lane at the beginning and at the end of a step."""
-    begin, end = points_of(table, row, scene)
+    begin, end = points_of(maps, maps_at, scene)
     before = state_before(memory, slot, scene)
     after = state_of(memory, slot, scene)
     gaps = gaps_at(before, lane, forcing_at(lane, begin, scene), scene)

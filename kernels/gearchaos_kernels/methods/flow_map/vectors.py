@@ -1,8 +1,8 @@
-"""The arithmetic of flow maps, written as vectors of eight: lanes, or rows of a state.
+"""The arithmetic of flow maps as explicit vectors of eight, because LLVM does not vectorise it.
 
-A map is applied to eight lanes at once, its numbers the same for all of them (`move`), and so is
-what carries lanes over a crossing. What a lane with maps of its own needs are sums of columns, each
-a vector along a state (`combine`). The compiler finds neither by itself.
+Maps and switch terms are applied to eight lanes at once, with the same map for all of them
+(`move`). For the only lane of a block, vectors run along the state instead: its map is a sum of
+columns (`_combination`).
 """
 
 from collections.abc import Iterable, Sequence
@@ -22,7 +22,7 @@ _FLAGS = tuple(sorted(FASTMATH))
 
 
 def _inputs(scene: Scene) -> list[int]:
-    """Return the rows of what is multiplied with a map: state before the step, and what forces."""
+    """Return the rows of the factors of a map: state before the step, inputs and offsets."""
     place, before, forced = layout_of(scene), rows_of(scene).state_before, method_rows_of(scene)
     return [before + n for n in range(place.states)] + [
         forced.inputs + n for n in range(place.columns - place.states)
@@ -36,61 +36,61 @@ def _tangent_inputs(scene: Scene) -> range:
 
 
 class _Writer:
-    """Writes the instructions of one function: loads, stores and sums of vectors."""
+    """Generates the instructions of one function: loads, stores and sums of vectors."""
 
     def __init__(self, context: Any, builder: Any, signature: Any, arguments: Any) -> None:
         self.context, self.builder = context, builder
         self.arguments = tuple(zip(signature.args, arguments, strict=True))
 
     def element(self, number: int, at: Any) -> Any:
-        """Return the address of an element of the array that is this argument."""
+        """Return the address of an element of an array; ``number``: which argument it is."""
         kind, array = self.arguments[number]
         first = first_element(self.context, self.builder, kind, array)
         return self.builder.gep(first, [at])
 
     def load(self, pointer: Any, at: int, width: int = VECTOR) -> Any:
-        """Load a vector so many numbers behind an address."""
+        """Load a vector that begins ``at`` numbers after an address."""
         kind = ir.VectorType(_DOUBLE, width).as_pointer()
         place = self.builder.gep(pointer, [_INTEGER(at)])
         return self.builder.load(self.builder.bitcast(place, kind), align=8)
 
     def store(self, value: Any, pointer: Any, at: int) -> None:
-        """Store a vector so many numbers behind an address."""
+        """Store a vector that begins ``at`` numbers after an address."""
         place = self.builder.gep(pointer, [_INTEGER(at)])
         self.builder.store(value, self.builder.bitcast(place, value.type.as_pointer()), align=8)
 
-    def rows(self, lanes: Any, numbers: Iterable[int]) -> list[Any]:
+    def rows(self, vector: Any, numbers: Iterable[int]) -> list[Any]:
         """Load rows of eight lanes."""
-        return [self.load(lanes, row * STRIDE) for row in numbers]
+        return [self.load(vector, row * STRIDE) for row in numbers]
 
-    def put(self, value: Any, lanes: Any, row: int, mask: Any) -> None:
-        """Store a row of eight lanes, or of those of a mask."""
+    def put(self, value: Any, vector: Any, row: int, mask: Any) -> None:
+        """Store a row of eight lanes, or of the lanes of a mask."""
         if mask is not None:
-            value = self.builder.select(mask, value, self.load(lanes, row * STRIDE))
-        self.store(value, lanes, row * STRIDE)
+            value = self.builder.select(mask, value, self.load(vector, row * STRIDE))
+        self.store(value, vector, row * STRIDE)
 
-    def equal(self, lanes: Any, row: int, number: float) -> Any:
-        """Return a mask of the lanes, of eight, in which a row equals a number."""
-        given = self.load(lanes, row * STRIDE)
+    def equal(self, vector: Any, row: int, number: float) -> Any:
+        """Return the mask of those of eight lanes in which a row equals a number."""
+        given = self.load(vector, row * STRIDE)
         return self.builder.fcmp_ordered("==", given, self.constant(number))
 
     def spread(self, pointer: Any, at: int, width: int = VECTOR) -> Any:
-        """Load a number, and return a vector of it."""
+        """Load a number and return a vector whose components all equal it."""
         return self.splat(self.builder.load(self.builder.gep(pointer, [_INTEGER(at)])), width)
 
     def splat(self, number: Any, width: int = VECTOR) -> Any:
-        """Return a vector of one number."""
+        """Return a vector whose components all equal a number."""
         nothing = ir.Constant(ir.VectorType(_DOUBLE, width), ir.Undefined)
         first = self.builder.insert_element(nothing, number, _INDEX(0))
         order = ir.Constant(ir.VectorType(_INDEX, width), [_INDEX(0)] * width)
         return self.builder.shuffle_vector(first, nothing, order)
 
     def constant(self, number: float) -> Any:
-        """Return a vector of one known number."""
+        """Return a vector whose components all equal a constant."""
         return ir.Constant(ir.VectorType(_DOUBLE, VECTOR), [number] * VECTOR)
 
     def size(self, vector: Any) -> Any:
-        """Return the sizes of the numbers of a vector."""
+        """Return the absolute values of the components of a vector."""
         kind = vector.type
         name = f"llvm.fabs.v{kind.count}f64"
         module = self.builder.module
@@ -99,14 +99,15 @@ class _Writer:
         return self.builder.call(fabs, [vector])
 
     def multiply_add(self, a: Any, b: Any, c: Any) -> Any:
-        """Return a b + c, with c None for nothing."""
+        """Return a b + c, or a b if c is None."""
         product = self.builder.fmul(a, b, flags=_FLAGS)
         return product if c is None else self.builder.fadd(product, c, flags=_FLAGS)
 
     def sum(self, factors: Iterable[tuple[int, Any]], terms: Sequence[Any]) -> Any:
-        """Return a sum of products as two independent partial sums, which run in parallel.
+        """Return a sum of products as two partial sums, which the processor runs in parallel.
 
-        Those of even and of odd numbers: leaving out columns of zeros changes no bit.
+        One is over even numbers, the other over odd ones, so that leaving out columns of zeros
+        changes no bit.
         """
         parts: list[Any] = [None, None]
         for number, factor in factors:
@@ -116,165 +117,166 @@ class _Writer:
 
 @intrinsic
 def keep_before(_typing, memory, slot, scene):
-    """Copy eight lanes as they are before a step."""
+    """Copy state and tangent vector of eight lanes before a step."""
     place, at = layout_of(scene.scene), rows_of(scene.scene)
 
     def generate(context, builder, signature, arguments):
         w = _Writer(context, builder, signature, arguments)
-        lanes = w.element(0, arguments[1])
+        vector = w.element(0, arguments[1])
         for first in (STATE,) if scene.scene.tangent is None else (STATE, at.tangent):
             for line in range(first, first + place.states):
-                w.store(w.load(lanes, line * STRIDE), lanes, (at.before + line) * STRIDE)
+                w.store(w.load(vector, line * STRIDE), vector, (at.before + line) * STRIDE)
         return context.get_dummy_value()
 
     return types.void(memory, types.intp, scene), generate
 
 
 @intrinsic
-def bound_bends(_typing, memory, slot, table, row, scene):
-    """Bound how the gaps of eight lanes bend in a step."""
+def bound_bends(_typing, memory, slot, maps, maps_at, scene):
+    """Store by how much the gaps of eight lanes may deviate from their cubics in a step."""
     place, margins = layout_of(scene.scene), method_rows_of(scene.scene).margins
 
     def generate(context, builder, signature, arguments):
         w = _Writer(context, builder, signature, arguments)
-        lanes, numbers = w.element(0, arguments[1]), w.element(2, arguments[3])
+        vector, numbers = w.element(0, arguments[1]), w.element(2, arguments[3])
         if scene.scene.resolved is not None:
-            sizes = [w.size(given) for given in w.rows(lanes, _inputs(scene.scene))]
+            sizes = [w.size(given) for given in w.rows(vector, _inputs(scene.scene))]
             for element in range(place.elements):
                 first = place.bounds + element * place.bound_size
                 bends = [w.spread(numbers, first + column) for column in range(len(sizes))]
-                w.store(w.sum(enumerate(bends), sizes), lanes, (margins + element) * STRIDE)
+                w.store(w.sum(enumerate(bends), sizes), vector, (margins + element) * STRIDE)
         return context.get_dummy_value()
 
-    return types.void(memory, types.intp, table, types.intp, scene), generate
+    return types.void(memory, types.intp, maps, types.intp, scene), generate
 
 
 def _on_branches(scene: Scene, apply: Any) -> Any:
-    """Make the body of an intrinsic that acts on eight lanes by the maps of their branches.
+    """Return the body of an intrinsic that applies the maps of their branches to eight lanes.
 
-    ``apply(writer, lanes, maps, mask)``: for each set of branches on which some lanes are, with
-    the addresses of the lanes and of the maps, and which of the lanes these are, None for all.
+    ``apply(writer, vector, branch_maps, mask)`` is called for each set of branches on which any of
+    the lanes is. It receives the addresses of the lanes and of the maps, and the mask of the lanes
+    on these branches, None for all.
     """
     place, first = layout_of(scene), rows_of(scene).branches
 
     def generate(context, builder, signature, arguments):
         w = _Writer(context, builder, signature, arguments)
-        lanes = w.element(0, arguments[1])
+        vector = w.element(0, arguments[1])
         for number in range(place.branches):
             at = builder.add(arguments[3], _INTEGER(place.header + number * place.size))
-            maps = w.element(2, at)
+            branch_maps = w.element(2, at)
             if place.branches == 1:
-                apply(w, lanes, maps, None)
+                apply(w, vector, branch_maps, None)
                 break
             mask = None
             for element in range(place.elements):
                 engaged = 1.0 - (number >> element) % 2
-                those = w.equal(lanes, first + BRANCH * element, engaged)
+                those = w.equal(vector, first + BRANCH * element, engaged)
                 mask = those if mask is None else builder.and_(mask, those)
             bits = builder.bitcast(mask, ir.IntType(VECTOR))
             with builder.if_then(builder.icmp_unsigned("!=", bits, bits.type(0))):
-                apply(w, lanes, maps, mask)
+                apply(w, vector, branch_maps, mask)
         return context.get_dummy_value()
 
     return generate
 
 
 @intrinsic
-def move(_typing, memory, slot, table, row, scene):
+def move(_typing, memory, slot, maps, maps_at, scene):
     """Apply the map of its branches to each of eight lanes, state and tangent vector."""
     place, at = layout_of(scene.scene), rows_of(scene.scene)
-    # What acts on nothing but itself has columns of zeros elsewhere.
+    # The columns of states and elements that act on nothing else are zero in all other rows.
     model = provider_of(scene.scene.model)
     states, elements = model.maps.apart(scene.scene.model)
     columns = {*states, *(place.states + 1 + element for element in elements)}
 
-    def apply(w, lanes, maps, mask):
-        given = {STATE: w.rows(lanes, _inputs(scene.scene))}
+    def apply(w, vector, branch_maps, mask):
+        given = {STATE: w.rows(vector, _inputs(scene.scene))}
         if scene.scene.tangent is not None:
-            given[at.tangent] = w.rows(lanes, _tangent_inputs(scene.scene))
+            given[at.tangent] = w.rows(vector, _tangent_inputs(scene.scene))
         for line in range(place.states):
             factors = [
-                (column, w.spread(maps, column * place.width + line))
+                (column, w.spread(branch_maps, column * place.width + line))
                 for column in range(place.columns)
                 if line in states or column not in columns
             ]
             for target, inputs in given.items():
                 value = w.sum([one for one in factors if one[0] < len(inputs)], inputs)
-                w.put(value, lanes, target + line, mask)
+                w.put(value, vector, target + line, mask)
 
-    given = memory, types.intp, table, types.intp, scene
+    given = memory, types.intp, maps, types.intp, scene
     return types.void(*given), _on_branches(scene.scene, apply)
 
 
 @intrinsic
-def look_along(_typing, aside, slot, table, row, scene):
-    """Compute the terms of all gaps along the step, without the mean error, as `move` does."""
+def compute_gaps(_typing, aside, slot, maps, maps_at, scene):
+    """Store the terms of all gaps of eight lanes along the step, without their constant parts."""
     place, at = layout_of(scene.scene), aside_of(scene.scene)
 
-    def apply(w, lanes, maps, mask):
-        given = {0: w.rows(lanes, _inputs(scene.scene))}
+    def apply(w, vector, branch_maps, mask):
+        given = {0: w.rows(vector, _inputs(scene.scene))}
         if scene.scene.tangent is not None:
-            given[at.tangent_terms] = w.rows(lanes, _tangent_inputs(scene.scene))
+            given[at.tangent_terms] = w.rows(vector, _tangent_inputs(scene.scene))
         for element in range(place.elements):
             first = place.gap + element * place.columns * TERMS
             for term in range(TERMS):
                 factors = [
-                    (column, w.spread(maps, first + column * TERMS + term))
+                    (column, w.spread(branch_maps, first + column * TERMS + term))
                     for column in range(place.columns)
                 ]
                 for target, inputs in given.items():
                     value = w.sum(factors[: len(inputs)], inputs)
                     row = at.gaps + element * at.gap_rows + target + term
-                    w.put(value, lanes, row, mask)
+                    w.put(value, vector, row, mask)
 
-    given = aside, types.intp, table, types.intp, scene
+    given = aside, types.intp, maps, types.intp, scene
     return types.void(*given), _on_branches(scene.scene, apply)
 
 
 @intrinsic
-def add_switch(_typing, aside, slot, table, row, scene):
-    """Carry eight lanes to their branches: move state and tangent vector at the step's beginning.
+def add_switch(_typing, aside, slot, maps, maps_at, scene):
+    """Transfer eight lanes to their new branches, at the beginning of the step.
 
-    To them is added the integral from -1 to the moment of crossing of the `SWITCH` of the new
-    branch, sum_k s^k p_k, times the gap: each p_k times what `sum_along` has made of it.
+    State and tangent vector change by the integral of the switch terms of the new branch times the
+    gap, from -1 to the moment of crossing: sum_k p_k times the integrals of `sum_along`.
     """
     place, at, block = layout_of(scene.scene), aside_of(scene.scene), rows_of(scene.scene)
 
-    def apply(w, lanes, maps, mask):
-        given = {block.state_before: w.rows(lanes, range(at.sums, at.sums + TERMS))}
+    def apply(w, vector, branch_maps, mask):
+        given = {block.state_before: w.rows(vector, range(at.sums, at.sums + TERMS))}
         if scene.scene.tangent is not None:
             sums = range(at.tangent_sums, at.tangent_sums + TERMS)
-            given[block.tangent_before] = w.rows(lanes, sums)
+            given[block.tangent_before] = w.rows(vector, sums)
         for element in range(place.elements):
             those = mask
             if place.elements > 1:
-                those = w.builder.and_(mask, w.equal(lanes, at.element, float(element)))
+                those = w.builder.and_(mask, w.equal(vector, at.element, float(element)))
             first = place.switch + element * TERMS * place.width
             for line in range(place.states):
                 factors = [
-                    (k, w.spread(maps, first + k * place.width + line)) for k in range(TERMS)
+                    (k, w.spread(branch_maps, first + k * place.width + line)) for k in range(TERMS)
                 ]
                 for target, sums in given.items():
-                    before = w.load(lanes, (target + line) * STRIDE)
+                    before = w.load(vector, (target + line) * STRIDE)
                     value = w.builder.fadd(before, w.sum(factors, sums), flags=_FLAGS)
-                    w.put(value, lanes, target + line, those)
+                    w.put(value, vector, target + line, those)
 
-    given = aside, types.intp, table, types.intp, scene
+    given = aside, types.intp, maps, types.intp, scene
     return types.void(*given), _on_branches(scene.scene, apply)
 
 
 @intrinsic
 def sum_along(_typing, aside, scene):
-    """Integrate what pushes eight lanes that cross, times s^k, from -1 to the moment of that.
+    """Store the integrals of gap times s^k from -1 to the moment of crossing, for eight lanes.
 
-    That is, for every k, the sum of the terms j, each times the integral of s^(j + k).
+    For every k this is the sum over the terms j of the gap times the integral of s^(j + k).
     """
     place, at = layout_of(scene.scene), aside_of(scene.scene)
 
     def generate(context, builder, signature, arguments):
         w = _Writer(context, builder, signature, arguments)
-        lanes = w.element(0, _INTEGER(0))
-        after, factor, edge = w.rows(lanes, (at.after, at.factor, at.edge))
+        vector = w.element(0, _INTEGER(0))
+        after, factor, edge = w.rows(vector, (at.after, at.factor, at.edge))
         powers, integrals = {1: after}, []
         for n in range(1, 2 * TERMS):
             if n > 1:
@@ -285,17 +287,17 @@ def sum_along(_typing, aside, scene):
         if scene.scene.tangent is not None:
             given[at.tangent_terms] = at.tangent_sums
         for source, target in given.items():
-            terms = w.rows(lanes, range(at.gaps + source, at.gaps + source + TERMS))
+            terms = w.rows(vector, range(at.gaps + source, at.gaps + source + TERMS))
             for element in range(1, place.elements):
                 first = at.gaps + element * at.gap_rows + source
-                others = w.rows(lanes, range(first, first + TERMS))
-                those = w.equal(lanes, at.element, float(element))
+                others = w.rows(vector, range(first, first + TERMS))
+                those = w.equal(vector, at.element, float(element))
                 terms = [builder.select(those, *pair) for pair in zip(others, terms, strict=True)]
             if source == 0:
                 terms[0] = builder.fsub(terms[0], edge, flags=_FLAGS)
             for k in range(TERMS):
                 value = w.sum(enumerate(terms), integrals[k:])
-                w.put(builder.fmul(value, factor, flags=_FLAGS), lanes, target + k, None)
+                w.put(builder.fmul(value, factor, flags=_FLAGS), vector, target + k, None)
         return context.get_dummy_value()
 
     return types.void(aside, scene), generate
@@ -303,7 +305,7 @@ def sum_along(_typing, aside, scene):
 
 @intrinsic
 def copy_lane(_typing, memory, slot, aside, n, scene):
-    """Copy what a lane that crosses needs of itself to a place aside."""
+    """Copy the rows that are needed to resolve crossings of a lane to slot n of memory aside."""
     place, at, forced = layout_of(scene.scene), rows_of(scene.scene), method_rows_of(scene.scene)
     model = provider_of(scene.scene.model)
     copied = [*range(at.state_before, at.state_before + place.states)]
@@ -328,7 +330,7 @@ def copy_lane(_typing, memory, slot, aside, n, scene):
 
 @intrinsic
 def margins_of(_typing, memory, slot, scene):
-    """Return how far each gap of a lane may stray from its cubic, a tuple."""
+    """Return by how much each gap of a lane may deviate from its cubic, a tuple."""
     first, count = method_rows_of(scene.scene).margins, layout_of(scene.scene).elements
     margins = types.UniTuple(types.float64, count)
 
@@ -345,10 +347,13 @@ def margins_of(_typing, memory, slot, scene):
 
 
 def _combination(forced: bool) -> Any:
-    """Make a function that sums the columns of a map, each times an input of a lane."""
+    """Return an intrinsic that sums the columns of a map times their factors, for one lane.
+
+    ``forced``: whether it includes the columns of inputs and offsets.
+    """
 
     @intrinsic
-    def combine(_typing, numbers, target, inputs, table, at, scene):
+    def combine(_typing, numbers, target, inputs, maps, maps_at, scene):
         place = layout_of(scene.scene)
         columns = range(place.columns if forced else place.states)
 
@@ -363,12 +368,14 @@ def _combination(forced: bool) -> Any:
                 w.store(w.sum(enumerate(factors), terms), result, first)
             return context.get_dummy_value()
 
-        return types.void(numbers, types.intp, types.intp, table, types.intp, scene), generate
+        return types.void(numbers, types.intp, types.intp, maps, types.intp, scene), generate
 
     return combine
 
 
 end_of = _combination(forced=True)
-"""State at the end of the step: numbers, target, inputs, table, at, scene."""
+"""Compute the state at the end of a step; arguments: array, places of result and factors in it,
+maps, their place, scene."""
+
 tangent_end_of = _combination(forced=False)
-"""The same of a tangent vector."""
+"""Compute the tangent vector at the end of a step, with the same arguments."""

@@ -36,11 +36,11 @@ from gearchaos_kernels.scene import Scene, implement
 
 @dataclass(frozen=True)
 class Rk4:
-    """Stands for RK4 in a scene."""
+    """Identifies RK4 in a scene; it has no flags."""
 
 
 def prepare(system: Any, plan: Plan, _scene: Scene) -> Iterator[Share]:
-    """Yield all lanes at once: they share nothing but the number of steps."""
+    """Yield all lanes as one share: RK4 prepares nothing for them."""
     lanes, steps = system.lanes, plan.steps_per_period
     blocks = cut(np.array([lanes]), np.array([steps]), np.array([0]))
     yield Share(np.arange(lanes), blocks, np.zeros(0), np.full(lanes, steps))
@@ -54,7 +54,7 @@ def maps_per_step(scene):
 
 @scalar
 def workspace(scene):
-    """Return nothing: RK4 needs none."""
+    """Return nothing: RK4 needs no workspace."""
     return
 
 
@@ -65,12 +65,12 @@ def begin_lane(memory, slot, lane, scene):
 
 @scalar
 def step(memory, lanes, at, given, scene):
-    """Take one step in every slot; return how many may have left a contact branch."""
-    # Not in the loop over slots: the compiler cannot know that its stores leave the tables alone.
+    """Take one step in every slot; return how many lanes may have left a contact branch."""
+    # Hoisted out of the loop over slots: the compiler cannot rule out aliasing with the tables.
     start = grid_at(given.tables, 2 * at.number, scene)
     middle = grid_at(given.tables, 2 * at.number + 1, scene)
     final = grid_at(given.tables, 2 * at.number + 2, scene)
-    # A sum of integers, which the compiler vectorises; it does not vectorise a flag.
+    # A sum of integers, because the compiler does not vectorise a loop that sets a flag.
     suspects = 0
     for slot in range(slots_of(lanes)):
         lane = read_lane(memory, slot, scene)
@@ -85,7 +85,7 @@ def step(memory, lanes, at, given, scene):
         if scene.resolved is not None:
             branches = read_branches(memory, slot, scene)
         moving = from_kept(state, begin, scene)
-        after, pushes = rk4.advance(rk4.motion, moving, 1.0, lane, during, branches, scene)
+        after, pushes = rk4.advance(rk4.motion_stage, moving, 1.0, lane, during, branches, scene)
         if scene.resolved is not None:
             gaps = gaps_at(moving, lane, begin, scene)
             gaps_after = gaps_at(after, lane, end, scene)
@@ -99,7 +99,7 @@ def step(memory, lanes, at, given, scene):
             tangent = read_state(memory, rows(scene).tangent, slot, scene)
             if scene.resolved is not None:
                 write_state(memory, rows(scene).tangent_before, slot, tangent, scene)
-            tangent, _ = rk4.advance(rk4.tangent, tangent, 1.0, lane, pushes, None, scene)
+            tangent, _ = rk4.advance(rk4.tangent_stage, tangent, 1.0, lane, pushes, None, scene)
             write_state(memory, rows(scene).tangent, slot, tangent, scene)
     return suspects
 
@@ -115,7 +115,7 @@ def slots_of(lanes):
 @scalar
 def resolve(memory, lanes, at, given, scene):
     """Split the step of every lane that may have left a contact branch."""
-    # No array of the outcome here: passing one means counting references to it at every step.
+    # No argument is an array of the outcome: its references would be counted at every step.
     for slot in range(lanes):
         if memory[rows(scene).suspect * STRIDE + slot] != 0.0:
             split_step(memory, slot, at, given.tables, scene)
@@ -123,7 +123,7 @@ def resolve(memory, lanes, at, given, scene):
 
 @scalar
 def grids(clock, given, scene):
-    """Return what all lanes share at the beginning of the step, in its middle and at its end."""
+    """Return what all lanes share at the beginning, in the middle and at the end of a step."""
     begin = grid_at(given.tables, 2 * clock.number, scene)
     middle = grid_at(given.tables, 2 * clock.number + 1, scene)
     return begin, middle, grid_at(given.tables, 2 * clock.number + 2, scene)

@@ -1,12 +1,12 @@
-"""One step of one lane, split wherever it leaves a contact branch.
+"""One step of one lane, split at every crossing of a clearance boundary.
 
 The loop over slots integrates every step on the contact branches on which it begins, where the
-field is smooth. The few steps and lanes that may have left a branch come here one by one: the step
-is repeated up to the crossing, then on the next branch, as often as it crosses.
+field is smooth. The few lanes that may have left a branch are treated here one by one: the step is
+repeated up to the crossing, then continued on the next branch, until it crosses no more.
 """
 
 from gearchaos_kernels.compilation import scalar
-from gearchaos_kernels.contact.branches import branches_at, leave
+from gearchaos_kernels.contact.branches import MOST_CROSSINGS, branches_at, leave
 from gearchaos_kernels.contact.leaving import NEVER, leaving_fraction
 from gearchaos_kernels.memory.block_memory import (
     read_branches,
@@ -31,13 +31,10 @@ from gearchaos_kernels.models.interfaces import (
     to_kept,
 )
 
-MOST_SPLITS = 16
-"""Crossings of one step; a step with more continues with its last branches and is counted."""
-
 
 @scalar
 def split_step(memory, slot, at, tables, scene):
-    """Repeat a step of a lane that ignored a crossing in pieces that stay on their branches."""
+    """Repeat a step of a lane in pieces, each of which stays on its contact branches."""
     lane = read_lane(memory, slot, scene)
     state = state_before(memory, slot, scene)
     after = state_of(memory, slot, scene)
@@ -56,8 +53,8 @@ def split_step(memory, slot, at, tables, scene):
         left = 1.0 - done
         gaps_after = gaps_at(after, lane, end, scene)
         fraction, element = first_crossing(gaps, gaps_after, left, branches, lane, scene)
-        # Also where the lane has left the range of numbers, and the fraction is not one.
-        if not fraction <= 1.0 or crossings == MOST_SPLITS:
+        # The negated comparison also ends the loop if the fraction is not a number.
+        if not fraction <= 1.0 or crossings == MOST_CROSSINGS:
             break
 
         piece = fraction * left
@@ -65,7 +62,7 @@ def split_step(memory, slot, at, tables, scene):
         done += piece
         crossing = forcing_within(memory, slot, lane, tables, number, done, scene)
         during = begin, middle, middle, crossing
-        state, pushes = rk4.advance(rk4.motion, state, piece, lane, during, branches, scene)
+        state, pushes = rk4.advance(rk4.motion_stage, state, piece, lane, during, branches, scene)
         tangent = advance_tangent(tangent, piece, lane, pushes, scene)
         begin = crossing
         crossings += 1
@@ -77,7 +74,7 @@ def split_step(memory, slot, at, tables, scene):
         left = 1.0 - done
         middle = forcing_within(memory, slot, lane, tables, number, done + 0.5 * left, scene)
         during = begin, middle, middle, end
-        after, pushes = rk4.advance(rk4.motion, state, left, lane, during, branches, scene)
+        after, pushes = rk4.advance(rk4.motion_stage, state, left, lane, during, branches, scene)
         write_state(memory, STATE, slot, to_kept(after, end, scene), scene)
         if scene.tangent is not None:
             tangent_after = advance_tangent(tangent, left, lane, pushes, scene)
@@ -93,7 +90,7 @@ def advance_tangent(tangent, fraction, lane, pushes, scene):
     """Return a tangent vector a fraction of a step later, unchanged if the scene has none."""
     if scene.tangent is None:
         return tangent
-    after, _ = rk4.advance(rk4.tangent, tangent, fraction, lane, pushes, None, scene)
+    after, _ = rk4.advance(rk4.tangent_stage, tangent, fraction, lane, pushes, None, scene)
     return after
 
 
@@ -113,12 +110,12 @@ def forcing_within(memory, slot, lane, tables, number, fraction, scene):
 
 @scalar
 def first_crossing(begin, end, length, branches, lane, scene):
-    """Return where in a piece, ``length`` steps long, a gap leaves its branch, and which one."""
+    """Return at which fraction of a piece, ``length`` steps long, which element leaves first."""
     fractions = each(leaving_fraction, begin, end, length, branches, half_clearances(lane, scene))
     first = NEVER
     element = 0
     for number in range(len(fractions)):
-        # An element of a lower number comes first at the same moment.
+        # Of elements that leave at the same moment, the one with the lowest number is first.
         earlier = number > 0 and not first <= fractions[number]
         element = number if earlier else element
         first = fractions[number] if number == 0 else min(first, fractions[number])

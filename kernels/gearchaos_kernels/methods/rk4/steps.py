@@ -10,7 +10,7 @@ fraction s of the step become::
     A4 = a(t + s h,   y + s w   + s^2 A2/2,   w + s A3)
     y <- y + s w + s^2 (A1 + A2 + A3)/6,      w <- w + s (A1 + 2 A2 + 2 A3 + A4)/6
 
-A whole step has the constant s = 1, which the compiler folds away.
+For a whole step s is the constant 1, which the compiler removes.
 """
 
 from gearchaos_kernels.compilation import scalar
@@ -22,10 +22,10 @@ from gearchaos_kernels.models.interfaces import accelerations, elements_at, gaps
 
 @scalar
 def advance(stage, state, s, lane, given, branches, scene):
-    """Advance a state by a fraction of a step; return it and the pushes of its four stages.
+    """Advance a state by a fraction s of a step; return it and the pushes of its four stages.
 
-    ``stage``: `motion`, with the forcing of each as ``given``, or `tangent` for a tangent vector,
-    with the pushes of the motion.
+    ``stage``: `motion_stage` for a state or `tangent_stage` for a tangent vector; ``given``: for
+    each stage the forcing, or for a tangent vector the pushes of the motion.
     """
     y, w = state
     a1, pushes1 = stage(state, lane, given[0], branches, scene)
@@ -45,7 +45,7 @@ def advance(stage, state, s, lane, given, branches, scene):
 
 
 @scalar
-def motion(state, lane, forcing, branches, scene):
+def motion_stage(state, lane, forcing, branches, scene):
     """Return the accelerations of a state, per step squared, and the pushes of the elements."""
     gaps = gaps_at(state, lane, forcing, scene)
     pushes = pushes_of(gaps, elements_at(lane, forcing, scene), branches, scene)
@@ -53,8 +53,8 @@ def motion(state, lane, forcing, branches, scene):
 
 
 @scalar
-def tangent(vector, lane, pushes, _branches, scene):
-    """Return the accelerations of a tangent vector, per step squared, and the pushes."""
+def tangent_stage(vector, lane, pushes, _branches, scene):
+    """Return the accelerations of a tangent vector, per step squared, and the given pushes."""
     added = tangent_pushes(vector, lane, pushes, scene)
     return accelerations(vector, added, unforced(lane, scene), lane, scene), pushes
 

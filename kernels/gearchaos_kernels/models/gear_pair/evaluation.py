@@ -77,7 +77,7 @@ def _pitch_error(
             2 * steps_per_period,
             first_period,
             error,
-            scene_of(system, evaluation.ALONE),
+            scene_of(system, evaluation.WITHOUT_LOOP),
         )
     return error
 

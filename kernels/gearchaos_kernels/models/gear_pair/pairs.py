@@ -213,10 +213,10 @@ class GearPairs(LaneSystem):
             return "flow maps know pitch errors that are a sine, not those of teeth"
         return ""
 
-    def of(self, lanes: slice | NDArray[np.intp] | list[int]) -> Self:
+    def of(self, chosen: slice | NDArray[np.intp] | list[int]) -> Self:
         """Return the system of some lanes, in the order given."""
-        teeth = self.teeth and self.teeth._replace(profile=self.teeth.profile[lanes])
-        groups = Groups(*(group[lanes] for group in self.groups))
+        teeth = self.teeth and self.teeth._replace(profile=self.teeth.profile[chosen])
+        groups = Groups(*(group[chosen] for group in self.groups))
         return self.replace(groups=groups, teeth=teeth)
 
 
