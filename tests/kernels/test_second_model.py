@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from gearchaos_kernels import Plan, integrate
+from gearchaos_kernels import Plan, integrate, jacobian
 
 from .oscillator import Oscillators
 
@@ -69,3 +69,30 @@ def test_a_lane_does_not_depend_on_its_neighbours():
         alone = integrate(system.of(np.array([20])), start[:1], plan)
         assert np.array_equal(together.section[20:21], alone.section)
         assert np.array_equal(together.growth[20:21], alone.growth)
+
+
+def test_states_follow_from_the_coordinates():
+    system = oscillators(FREQUENCY, 0.1)
+    assert system.states == ("x", "x_rate")
+    assert system.elements == 1 and system.lanes == FREQUENCY.size
+    assert system.repeated(2).frequency.tolist() == np.repeat(FREQUENCY, 2).tolist()
+
+
+def test_the_jacobian_is_that_of_the_equation_on_either_branch():
+    system = oscillators(FREQUENCY, 0.1)
+    for stiffnesses, k in zip(system.branch_stiffnesses(), (1.0, 0.0), strict=True):
+        found = jacobian(system, stiffnesses)
+        assert found == pytest.approx(np.tile([[0.0, 1.0], [-k, -2.0 * ZETA]], (5, 1, 1)))
+
+
+def test_lanes_share_flow_maps_that_differ_in_what_forces_them():
+    system = oscillators(np.ones(4), 0.1)
+    two = np.array([1.0, 2.0, 1.0, 1.0])
+    for alike in ("half_clearance", "load", "amplitude"):
+        other = system.replace(**{alike: two})
+        assert np.array_equal(other.map_parameters(), system.map_parameters())
+        for name, value in vars(other.of_unit_inputs()).items():
+            assert np.array_equal(value, vars(system.of_unit_inputs())[name])
+    for differing in ("frequency", "damping"):
+        rows = system.replace(**{differing: two}).map_parameters()
+        assert len(np.unique(rows, axis=0)) == 2
