@@ -18,7 +18,7 @@ from gearchaos.models.gear_pair.derivation import (
     common_contact_ratios,
     derive_scales,
 )
-from gearchaos.models.gear_pair.group_table import GROUP_TABLE
+from gearchaos.models.gear_pair.group_table import GROUP_TABLE, GROUPS_BY_NAME
 from gearchaos.models.gear_pair.loads import loads_told
 from gearchaos.models.gear_pair.outputs import (
     CATALOGUE,
@@ -67,13 +67,14 @@ class GearPairModel(Model):
         multiple = filled("pitch_error")
         # "5.86 e(tau)" multiplies mean and amplitude of one pitch error alike (eq. 14).
         groups = {
-            "base_helix_angle": np.radians(filled("base_helix_angle_deg")),
             "error_mean": multiple * filled("pitch_error_mean"),
             "error_amplitude": multiple * filled("pitch_error_amplitude"),
             "error_phase": np.radians(filled("pitch_error_phase_deg")),
             "mass_ratio_p": filled("mass_ratio_p", absent=1.0),
             "mass_ratio_g": filled("mass_ratio_g", absent=1.0),
         }
+        angles = [name for name in Groups._fields if f"{name}_deg" in GROUPS_BY_NAME]
+        groups |= {name: np.radians(filled(f"{name}_deg")) for name in angles}
         groups |= {name: filled(name) for name in Groups._fields if name not in groups}
         cosine, sine = found.stiffness_cosine, found.stiffness_sine
         cosine, sine = (np.zeros(0) if wave is None else wave for wave in (cosine, sine))
