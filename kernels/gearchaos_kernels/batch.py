@@ -37,17 +37,19 @@ def _integrate_blocks(threads, next_block, batch, tables, plan, outcome, scene):
 
 def scene_of(system: LaneSystem, plan: Plan) -> Scene:
     """Return the scene that a system and a plan need."""
-    method = METHODS[plan.method]
+    method, flags = METHODS[plan.method], system.flags()
+    switches = provider_of(flags).switches(flags)
     resolved = system.clearance and (plan.resolved or method.always_resolved)
     wanted = [one for one in RECORDERS if one.wanted(plan, resolved)]
     return Scene(
-        model=system.flags(),
+        model=flags,
         method=method.flags(),
         recorders=Recorded(*(flag(one in wanted) for one in RECORDERS)),
         clearance=flag(system.clearance),
         resolved=flag(resolved),
         tangent=flag(plan.tangent),
         before=flag(resolved or any(one.reads_before for one in wanted)),
+        switches=flag(switches),
     )
 
 

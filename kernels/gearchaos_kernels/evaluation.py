@@ -17,6 +17,7 @@ from gearchaos_kernels.memory.block_memory import (
     fill,
     fill_lane,
     numbers_of_elements,
+    read_lane,
     state_of,
     take,
     write_state,
@@ -33,8 +34,10 @@ from gearchaos_kernels.models.interfaces import (
     grid_at,
     half_clearances,
     kept_accelerations,
+    next_switch,
     observed_at,
     point_at,
+    switch,
     unforced,
 )
 from gearchaos_kernels.models.lane_system import LaneSystem
@@ -192,6 +195,18 @@ def _zero_motion(states: Floats, scene: Scene) -> Motion:
     )
 
 
+@scalar
+def after_step(memory, number, scene):
+    """Switch the lane of slot 0 as often as it does in a step; return its coefficients."""
+    lane = read_lane(memory, 0, scene)
+    done = float(number)
+    while done < next_switch(lane, scene) <= number + 1.0:
+        done = next_switch(lane, scene)
+        switch(memory, 0, lane, scene)
+        lane = read_lane(memory, 0, scene)
+    return lane
+
+
 @evaluator
 def _follow(coefficients, scales, tables, steps, first_period, states, motion, scene):
     """Evaluate the equations at every sample, lane by lane, and write a `Motion` per step."""
@@ -206,6 +221,9 @@ def _follow(coefficients, scales, tables, steps, first_period, states, motion, s
             row = 2 * (sample % steps)
             if row == 0:
                 begin_period(memory, 0, index, first_period + sample // steps, tables, scene)
+            if scene.switches is not None:
+                if sample > 0:
+                    lane = after_step(memory, (sample - 1) % steps, scene)
             point = point_at(memory, 0, grid_at(tables, row, scene), scene)
             forcing = forcing_at(lane, point, scene)
             state = from_kept(kept, forcing, scene)

@@ -36,6 +36,8 @@ class Scene:
         Whether a tangent vector is integrated with every lane.
     before : True or None
         Whether the state before a step is kept until its end.
+    switches : True or None
+        Whether the equations of a lane switch at known moments of the mesh period.
     """
 
     model: Any
@@ -45,6 +47,7 @@ class Scene:
     resolved: Any
     tangent: Any
     before: Any
+    switches: Any = None
 
     def bare(self) -> "Scene":
         """Return the scene without tangent vector and recorders, on which flow maps depend not."""

@@ -4,6 +4,7 @@ They serve a model whose lanes share the mesh phase, which one number forces (it
 acceleration per step squared), and whose excitation contains sine and cosine of the mesh phase.
 """
 
+import math
 from typing import Any
 
 import numpy as np
@@ -76,6 +77,17 @@ def speeds_of_lane(lane, scene):
 def speed_of(_half_clearance, speed):
     """Return the factor from rates per step to rates per unit of tau."""
     return speed
+
+
+@scalar
+def never(lane, scene):
+    """Return a moment that never comes."""
+    return math.inf
+
+
+@scalar
+def switch_nothing(memory, slot, lane, scene):
+    """Change nothing, because the coefficients of a lane are constant."""
 
 
 @scalar

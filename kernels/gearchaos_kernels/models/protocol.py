@@ -118,6 +118,15 @@ class Model:
     accelerations(state, pushes, forcing, lane, scene)
         The equations of motion: accelerations of the coordinates, from the forces of the elements
         (`Push`), the forcing and the state.
+    switches : callable, optional
+        ``switches(flags)``: whether the coefficients of a lane switch at known moments of the mesh
+        period; by default they never do. The state is continuous at a switch, the accelerations
+        need not be. A method ends a step, or a part of one, at each of these moments.
+    next_switch(lane, scene)
+        The moment of the next switch in steps since the mesh period began, more than 0 and at most
+        the steps of a period. Two switches never coincide.
+    switch(memory, slot, lane, scene)
+        Stores the coefficients that a lane has after its next switch.
     observed_at(state, lane, point, scene)
         The observed signals of a state in the coordinates of the equations, a tuple.
     maps : MapFormulas or None
@@ -147,6 +156,9 @@ class Model:
     gap_speeds: Any = defaults.speeds_of_lane
     gaps_at: Any
     accelerations: Any
+    switches: Callable[[Any], bool] = lambda _flags: False
+    next_switch: Any = defaults.never
+    switch: Any = defaults.switch_nothing
     observed_at: Any
     maps: "MapFormulas | None" = None
 

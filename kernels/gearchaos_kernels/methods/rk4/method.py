@@ -20,6 +20,7 @@ from gearchaos_kernels.methods.protocol import Method, Share, cut
 from gearchaos_kernels.methods.rk4 import steps as rk4
 from gearchaos_kernels.methods.rk4.splitting import split_step
 from gearchaos_kernels.methods.rk4.stability import amplification, stable_reach
+from gearchaos_kernels.methods.rk4.switching import keep_before, switch_lanes, switching_lanes
 from gearchaos_kernels.models.interfaces import (
     first_point,
     forcing_at,
@@ -72,6 +73,10 @@ def step(memory, lanes, at, given, scene):
     final = grid_at(given.tables, 2 * at.number + 2, scene)
     # A sum of integers, because the compiler does not vectorise a loop that sets a flag.
     suspects = 0
+    if scene.switches is not None:
+        switching = switching_lanes(memory, at.number, scene)
+        if switching > 0:
+            keep_before(memory, scene)
     for slot in range(slots_of(lanes)):
         lane = read_lane(memory, slot, scene)
         state = state_of(memory, slot, scene)
@@ -101,6 +106,9 @@ def step(memory, lanes, at, given, scene):
                 write_state(memory, rows(scene).tangent_before, slot, tangent, scene)
             tangent, _ = rk4.advance(rk4.tangent_stage, tangent, 1.0, lane, pushes, None, scene)
             write_state(memory, rows(scene).tangent, slot, tangent, scene)
+    if scene.switches is not None:
+        if switching > 0:
+            switch_lanes(memory, lanes, at, given.tables, scene)
     return suspects
 
 

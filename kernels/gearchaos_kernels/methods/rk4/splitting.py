@@ -36,21 +36,32 @@ from gearchaos_kernels.models.interfaces import (
 def split_step(memory, slot, at, tables, scene):
     """Repeat a step of a lane in pieces, each of which stays on its contact branches."""
     lane = read_lane(memory, slot, scene)
+    begin = forcing_on_grid(memory, slot, lane, tables, 2 * at.number, scene)
+    end = forcing_on_grid(memory, slot, lane, tables, 2 * at.number + 2, scene)
+    split_part(memory, slot, at, (0.0, begin), (1.0, end), tables, scene)
+
+
+@scalar
+def split_part(memory, slot, at, first, last, tables, scene):
+    """Repeat a part of a step of a lane, in which it may cross, in pieces.
+
+    ``first``, ``last``: where the part begins and ends, as fractions of the step, and what acts on
+    the lane there.
+    """
+    lane = read_lane(memory, slot, scene)
     state = state_before(memory, slot, scene)
     after = state_of(memory, slot, scene)
     tangent = state
     if scene.tangent is not None:
         tangent = read_state(memory, rows(scene).tangent_before, slot, scene)
     number = at.number
-    begin = forcing_on_grid(memory, slot, lane, tables, 2 * number, scene)
-    end = forcing_on_grid(memory, slot, lane, tables, 2 * number + 2, scene)
+    (done, begin), (until, end) = first, last
     state, after = from_kept(state, begin, scene), from_kept(after, end, scene)
     gaps = gaps_at(state, lane, begin, scene)
     branches = read_branches(memory, slot, scene)
-    done = 0.0
     crossings = 0
     while True:
-        left = 1.0 - done
+        left = until - done
         gaps_after = gaps_at(after, lane, end, scene)
         fraction, element = first_crossing(gaps, gaps_after, left, branches, lane, scene)
         # The negated comparison also ends the loop if the fraction is not a number.
@@ -71,7 +82,7 @@ def split_step(memory, slot, at, tables, scene):
         leave(memory, slot, element, gaps[element], lane, moment, at.recorded, scene)
         branches = read_branches(memory, slot, scene)
 
-        left = 1.0 - done
+        left = until - done
         middle = forcing_within(memory, slot, lane, tables, number, done + 0.5 * left, scene)
         during = begin, middle, middle, end
         after, pushes = rk4.advance(rk4.motion_stage, state, left, lane, during, branches, scene)
