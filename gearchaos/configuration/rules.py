@@ -88,6 +88,14 @@ def _plain_steps_are_those_of_rk4(config: Tables) -> Iterator[Fault]:
         yield Fault("integration.crossings", rule, 'it goes with method = "rk4"', "plain")
 
 
+@GENERIC_RULES.reads("scene", "integration")
+def _maps_know_the_effects(config: Tables) -> Iterator[Fault]:
+    effect, method = config.scene.refuses_maps(), config.integration.method
+    if effect and METHODS[method].shares_maps:
+        rule = f'"{effect}" cannot be computed with integration.method = "{method}"'
+        yield Fault("scene.effects", rule, 'set integration.method = "rk4"', config.scene.effects)
+
+
 @GENERIC_RULES.reads("outputs", "integration")
 def _errors_are_measured_on_a_section(config: Tables) -> Iterator[Fault]:
     if config.outputs.section:

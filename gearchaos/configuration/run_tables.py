@@ -35,6 +35,10 @@ class Scene(Table):
 
     effects: tuple[str, ...] = ()
 
+    def refuses_maps(self) -> str:
+        """Return the effect that flow maps cannot compute, empty without one; by default none."""
+        return ""
+
 
 class Start(Table, Generic[State]):
     """The state in which the lanes start."""
