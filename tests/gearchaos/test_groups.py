@@ -13,7 +13,7 @@ from gearchaos.models.gear_pair.tables import PHYSICAL_KEYS
 
 MEAN_STIFFNESS = 13.3548 * 15 * 1e6  # N/m
 EQUIVALENT_MASS = 0.095448  # kg, to the digits of the geometry's own test
-ALL_EFFECTS = ("pitch_error", "stiffness_variation", "backlash", "transverse", "axial")
+ALL_EFFECTS = ("pitch_error", "stiffness_variation", "backlash", "transverse", "axial", "friction")
 
 
 PHYSICAL = {
@@ -34,6 +34,7 @@ PHYSICAL = {
     "mesh.normal_backlash_um": None,
     "mesh.damping_ratio": 0.1,
     "mesh.damping_N_s_per_m": None,
+    "mesh.friction_coefficient": 0.06,
     "mesh.stiffness.shape": "fourier",
     "mesh.stiffness.cosine_N_per_um_mm": (-1.202, 0.0, -0.1339),
     "mesh.stiffness.sine_N_per_um_mm": (1.203, 0.0, -0.1335),
@@ -101,7 +102,7 @@ def test_the_physical_data_have_the_paths_of_the_configuration():
 
 def test_complete_physical_data_give_every_group_without_a_default_of_its_own():
     derived = derive_groups(physical())
-    free = {"pitch_error", "stiffness_variation_scale"}
+    free = {"pitch_error", "stiffness_variation_scale", "pitch_point_phase_deg"}
     assert derived.keys() == {row.name for row in GROUP_TABLE} - free
     assert all(GROUPS_BY_NAME[name].valid.admits(value) for name, value in derived.items())
 
@@ -130,6 +131,10 @@ def test_derived_groups_follow_their_definitions():
         "axial_damping_p": 50.0 / (2 * 0.21669 * omega_h),
         "axial_stiffness_g": 4e7 / (0.70952 * omega_h**2),
         "axial_damping_g": 60.0 / (2 * 0.70952 * omega_h),
+        "friction_coefficient": 0.06,
+        # tan(21.1728 deg) / cos(18.7472 deg)
+        "friction_lever": 0.409014,
+        "pitch_point_phase_deg": 0.0,
     }
     computed = {name: getattr(groups, name) for name in expected}
     assert computed == pytest.approx(expected, rel=2e-5)
@@ -173,6 +178,7 @@ def test_groups_alone_need_no_physical_data():
         "pitch_error_mean": "default",
         "pitch_error_phase_deg": "default",
         "stiffness_variation_scale": "default",
+        "pitch_point_phase_deg": "default",
     }
 
 
@@ -187,6 +193,7 @@ def test_groups_alone_need_no_physical_data():
         ),
         ("mesh__stiffness__shape", {"stiffness_cosine", "stiffness_sine"}),
         ("bearings__axial_damping_N_s_per_m", {"axial_damping_p", "axial_damping_g"}),
+        ("mesh__friction_coefficient", {"friction_coefficient"}),
     ],
 )
 def test_a_missing_quantity_loses_exactly_the_groups_that_need_it(absent, lost):

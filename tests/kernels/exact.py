@@ -1,7 +1,8 @@
 """Motions of eq. 13 with pitch errors tooth by tooth, as exact as double precision allows.
 
 An adaptive method of order 8 that begins anew wherever the field is not smooth: at every knot of
-the splines between the shares, and at every crossing of a clearance, located by an event.
+the splines between the shares, where sliding changes its sign, and at every crossing of a
+clearance, located by an event.
 """
 
 from __future__ import annotations
@@ -42,18 +43,22 @@ class Exact(Twin):
     """The twin on one contact branch, +1 or -1 on a flank and 0 apart, of each direction."""
 
     def __init__(
-        self, groups: Any, scene: Effects, physical: bool, teeth: Teeth, periods: int
+        self, groups: Any, scene: Effects, physical: bool, teeth: Teeth | None, periods: int
     ) -> None:
         super().__init__(groups, scene, physical, teeth)
+        beta = groups.base_helix_angle
+        self.limits = groups.half_backlash * np.array([np.cos(beta), np.sin(beta)])
+        self.branches = [0, 0]
+        if teeth is None:
+            return
         error = PPoly.from_spline(error_spline(teeth, groups.profile, periods + 1))
         # Value, slope and curvature from one call.
         orders = [np.pad(error.derivative(order).c, ((order, 0), (0, 0))) for order in range(3)]
         self.shared = PPoly(np.stack(orders, axis=2), error.x)
-        beta = groups.base_helix_angle
-        self.limits = groups.half_backlash * np.array([np.cos(beta), np.sin(beta)])
-        self.branches = [0, 0]
 
     def error(self, tau: float) -> tuple[float, float, float]:
+        if self.teeth is None:
+            return super().error(tau)
         omega, amplitude = self.groups.mesh_frequency, self.groups.error_amplitude
         phase = omega * tau / (2.0 * np.pi)
         e, rate, second = amplitude * self.shared(phase) * (omega / (2.0 * np.pi)) ** np.arange(3)
@@ -92,12 +97,16 @@ class Exact(Twin):
         """Integrate from a state in the order of `STATES`."""
         joint = np.where(self.present, np.concatenate([start[0::2], start[1::2]]), 0.0)
         self.branches = [int(gap) for gap in np.fix(self.gaps(0.0, joint)).clip(-1, 1)]
-        cells, period = self.teeth.cells_per_period, 2.0 * np.pi / self.groups.mesh_frequency
-        knots = np.arange(-cells, periods * cells) / cells + self.teeth.begins
+        period, knots = 2.0 * np.pi / self.groups.mesh_frequency, np.zeros(0)
+        if self.teeth is not None:
+            cells = self.teeth.cells_per_period
+            knots = np.arange(-cells, periods * cells) / cells + self.teeth.begins
+        changes = np.add.outer(np.arange(periods), self.changes_of_sliding()).ravel()
         # Some knots are ends of periods but for their last digits.
-        stops = np.unique(np.round(np.concatenate([knots, np.arange(1, periods + 1)]), 12))
+        stops = np.unique(np.round(np.concatenate([knots, changes, np.arange(1, periods + 1)]), 12))
         tau, crossings, states = 0.0, 0, []
         for stop in stops[(stops > 0.0) & (stops <= periods)]:
+            self.sliding = self.sliding_at(0.5 * (tau / period + stop))
             while tau < stop * period:
                 exits = self.exits()
                 piece = solve_ivp(

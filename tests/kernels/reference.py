@@ -73,6 +73,9 @@ def pan2021(pitch_error: Any, **groups: Any) -> Groups:
         "axial_damping_p": _PRINTED["eta_12"],
         "axial_stiffness_g": _PRINTED["k_22"],
         "axial_damping_g": _PRINTED["eta_22"],
+        "friction_coefficient": 0.0,
+        "friction_lever": np.tan(np.radians(21.1728)) / np.cos(BASE_HELIX_ANGLE),
+        "pitch_point_phase": 0.0,
     }
     assert groups.keys() <= values.keys()
     values.update(groups)

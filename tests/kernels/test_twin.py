@@ -27,9 +27,10 @@ STEPS = 60
 PERIODS = 3
 ROUNDING = 2e-11
 
-NO_TRANSVERSE = TORSION._replace(backlash=True, axial=True)
+NO_TRANSVERSE = TORSION._replace(backlash=True, axial=True, friction=True)
+FRICTION = FULL._replace(friction=True)
 SCENES = [FULL, TORSION_ONLY, NO_BACKLASH, LINEAR, TORSION, NO_TRANSVERSE]
-SCENES += [TORSION._replace(stiffness_variation=True, transverse=True)]
+SCENES += [TORSION._replace(stiffness_variation=True, transverse=True, friction=True), FRICTION]
 """No formula asks for more than two effects: each two are both there, either alone, and neither.
 
 Most of these scenes are those of other tests, and compiled for them anyway.
@@ -49,6 +50,10 @@ MODEL = pan2021(
     axial_damping_p=[0.11, 0.07],
     axial_stiffness_g=[9.0, 5.0],
     axial_damping_g=[0.02, 0.03],
+    friction_coefficient=[0.2, 0.4],
+    friction_lever=[0.41, 0.36],
+    # One within a step, and one where a step ends.
+    pitch_point_phase=[1.3, -1.5 * np.pi],
 )
 IN_PHASE = MODEL._replace(error_phase=np.zeros(2))
 """The phase of the pitch error is an effect of its own, which one scene has."""

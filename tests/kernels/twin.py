@@ -7,6 +7,7 @@ the tangent vector by the variational equation: none of the kernels' scalings, t
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -62,6 +63,7 @@ class Twin:
         self.scene = scene
         self.physical = physical
         self.teeth = teeth
+        self.sliding = 1.0
         self.present = np.tile(np.repeat([True, scene.transverse, scene.axial], [1, 2, 2]), 2)
 
     def stiffness(self, tau):
@@ -85,6 +87,27 @@ class Twin:
         angle = omega * tau + self.groups.error_phase
         sine = amplitude * np.sin(angle)
         return self.groups.error_mean + sine, omega * amplitude * np.cos(angle), omega**2 * sine
+
+    def changes_of_sliding(self):
+        """The mesh phases, in periods from 0 to 1, at which sliding changes its sign.
+
+        There the contact passes the pitch point, and half a period later the next pair takes over.
+        """
+        if not self.scene.friction:
+            return np.zeros(0)
+        return (self.groups.pitch_point_phase / (2.0 * np.pi) + np.array([0.0, 0.5])) % 1.0
+
+    def sliding_at(self, phase):
+        """1 where the contact is before the pitch point, -1 where it is behind it."""
+        behind = phase - self.groups.pitch_point_phase / (2.0 * np.pi)
+        return 1.0 if behind % 1.0 > 0.5 else -1.0
+
+    def parts_of(self, begin, end):
+        """The ends of the parts of a step, phases in periods: sliding changes at none within."""
+        changes = self.changes_of_sliding() + np.floor(begin)
+        near = 1e-9 * (end - begin)
+        inside = changes[(changes > begin + near) & (changes < end - near)]
+        return [begin, *np.sort(inside), end]
 
     def relative(self, delta, error):
         """y_1 and y_2, eqs 6 and 7; with rates instead of displacements, their rates."""
@@ -127,7 +150,10 @@ class Twin:
         g = self.groups
         cosine, sine = np.cos(g.base_helix_angle), np.sin(g.base_helix_angle)
         acceleration = np.zeros(5)
-        acceleration[DELTA_5] = drive - cosine * force_y
+        friction = 0.0
+        if self.scene.friction:
+            friction = self.sliding * g.friction_coefficient * g.friction_lever
+        acceleration[DELTA_5] = drive - (1.0 - friction) * cosine * force_y
         for row, sign, force, ratio, damping, stiffness in (
             (DELTA_1, -1, cosine * force_y, g.mass_ratio_p, *self.bearing("transverse", "p")),
             (DELTA_2, +1, cosine * force_y, g.mass_ratio_g, *self.bearing("transverse", "g")),
@@ -187,25 +213,31 @@ class Twin:
             slope[5 + DELTA_5] -= inertia
         return slope
 
+    def step(self, joint, tau, h):
+        """Take one Runge-Kutta step."""
+        k_1 = self.slope_from_rest(tau, joint)
+        k_2 = self.slope_from_rest(tau + h / 2.0, joint + h / 2.0 * k_1)
+        k_3 = self.slope_from_rest(tau + h / 2.0, joint + h / 2.0 * k_2)
+        k_4 = self.slope_from_rest(tau + h, joint + h * k_3)
+        return joint + h / 6.0 * (k_1 + 2.0 * k_2 + 2.0 * k_3 + k_4)
+
     def integrate(self, start, steps: int, periods: int) -> Motion:
         """Take ``steps`` Runge-Kutta steps in each mesh period, in coordinates at rest."""
         # Here displacements come first, then rates.
         start = np.where(self.present, np.concatenate([start[0::2], start[1::2]]), 0.0)
         joint = np.concatenate([start, self.present / np.sqrt(np.sum(self.present))])
-        h = 2.0 * np.pi / self.groups.mesh_frequency / steps
+        mesh_period = 2.0 * np.pi / self.groups.mesh_frequency
         joint = joint + self.from_rest(0.0)
         states, growth = [], []
         for period in range(periods):
             for number in range(steps):
-                tau = (period * steps + number) * h
-                k_1 = self.slope_from_rest(tau, joint)
-                k_2 = self.slope_from_rest(tau + h / 2.0, joint + h / 2.0 * k_1)
-                k_3 = self.slope_from_rest(tau + h / 2.0, joint + h / 2.0 * k_2)
-                k_4 = self.slope_from_rest(tau + h, joint + h * k_3)
-                joint = joint + h / 6.0 * (k_1 + 2.0 * k_2 + 2.0 * k_3 + k_4)
+                ends = self.parts_of(period + number / steps, period + (number + 1) / steps)
+                for begin, end in pairwise(ends):
+                    self.sliding = self.sliding_at((begin + end) / 2.0)
+                    joint = self.step(joint, begin * mesh_period, (end - begin) * mesh_period)
             length = np.linalg.norm(joint[10:])
             joint[10:] /= length
-            seen = joint + self.from_rest((period + 1) * steps * h, -1.0)
+            seen = joint + self.from_rest((period + 1) * mesh_period, -1.0)
             states.append(seen[:10].reshape(2, 5).T.ravel())
             growth.append(np.log(length))
         return Motion(np.array(states), np.array(growth))

@@ -165,6 +165,16 @@ class Quantities:
             return self["mesh.damping_ratio"]
         return damping / (2.0 * np.sqrt(self.mean_stiffness * self.pair.equivalent_mass))
 
+    def friction_lever(self) -> Any:
+        """Lever of friction over that of the mesh force, tan(alpha_t) / cos(beta_b).
+
+        At the pitch point the contact is as far from the foot of either perpendicular on the line
+        of action as r_b tan(alpha_t). Friction is that of the normal force, of which the line of
+        action in the transverse plane has cos(beta_b).
+        """
+        tangent = np.tan(self.pair.transverse_pressure_angle)
+        return tangent / np.cos(self.pair.base_helix_angle)
+
     def bearing_stiffness(self, direction: str, gear: int) -> Any:
         """Bearing stiffness k / (m omega_h^2) (Pan 2021, eq. 13, without its stray factor 2)."""
         stiffness = self[f"bearings.{direction}_stiffness_N_per_m"][gear]
@@ -274,4 +284,6 @@ _DERIVATIONS: dict[str, Callable[[Quantities], Any]] = {
     "axial_damping_p": lambda q: q.bearing_damping("axial", 0),
     "axial_stiffness_g": lambda q: q.bearing_stiffness("axial", 1),
     "axial_damping_g": lambda q: q.bearing_damping("axial", 1),
+    "friction_coefficient": lambda q: q["mesh.friction_coefficient"],
+    "friction_lever": Quantities.friction_lever,
 }

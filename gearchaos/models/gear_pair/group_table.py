@@ -186,6 +186,28 @@ GROUP_TABLE = (
         valid=Range(ge=0.0),
         effects=_acting("axial"),
     ),
+    GroupRow(
+        "friction_coefficient",
+        r"$\mu$",
+        "coefficient of friction between the teeth",
+        valid=Range(ge=0.0, lt=1.0),
+        effects=_acting("friction"),
+    ),
+    GroupRow(
+        "friction_lever",
+        r"$\lambda$",
+        "lever of friction at the pitch point over that of the mesh force",
+        valid=Range(ge=0.0),
+        effects=_acting("friction"),
+    ),
+    GroupRow(
+        "pitch_point_phase_deg",
+        r"$\varphi_C$",
+        "mesh phase at which the contact passes the pitch point",
+        units="degree",
+        default=0.0,
+        effects=_acting("friction"),
+    ),
 )
 
 GROUPS_BY_NAME = MappingProxyType({row.name: row for row in GROUP_TABLE})

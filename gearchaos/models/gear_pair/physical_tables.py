@@ -110,6 +110,9 @@ class Mesh(Table):
     damping_N_s_per_m: float | None = _optional(
         "mesh damping, instead of damping_ratio", "N s/m", 247.0, ge=0
     )
+    friction_coefficient: float | None = _optional(
+        "coefficient of friction between the teeth", "1", 0.06, ge=0, lt=1
+    )
     stiffness: (
         Annotated[FourierStiffness | TrapezoidStiffness, Field(discriminator="shape")] | None
     ) = _optional("variation of the mesh stiffness over the mesh period")

@@ -7,7 +7,9 @@ from gearchaos.configuration import run_tables
 from gearchaos.configuration.keys import AS_LIST, key
 from gearchaos.configuration.run_tables import ONCE
 
-Effect: TypeAlias = Literal["pitch_error", "stiffness_variation", "backlash", "transverse", "axial"]
+Effect: TypeAlias = Literal[
+    "pitch_error", "stiffness_variation", "backlash", "transverse", "axial", "friction"
+]
 EFFECTS: tuple[str, ...] = get_args(Effect)
 
 State: TypeAlias = Literal[
@@ -44,6 +46,10 @@ class Scene(run_tables.Scene):
     def states(self) -> tuple[str, ...]:
         """States of the scene, 2, 6 or 10, in the order of `STATES`."""
         return states_of(self.effects)
+
+    def refuses_maps(self) -> str:
+        """Return "friction", which changes its sign within the mesh period, where it acts."""
+        return "friction" if "friction" in self.effects else ""
 
 
 class Start(run_tables.Start[State]):

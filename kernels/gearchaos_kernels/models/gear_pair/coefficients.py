@@ -23,10 +23,14 @@ Lane = namedtuple(
     "mean_stiffness stiffness_variation mesh_damping axial_share half_backlash load "
     "error_inertia error_mean error_amplitude error_rate "
     "axial_error_mean axial_error_amplitude axial_error_rate "
-    "cos_phase sin_phase cosine tangential_speed axial_speed",
+    "cos_phase sin_phase cosine tangential_speed axial_speed "
+    "friction next_sliding later_sliding",
 )
 """Coefficients of one lane (numbers) or of all lanes (arrays), per step; `lane_coefficients`
 has their definitions."""
+
+_ON_GRID = 1e-9
+"""Steps by which rounding may move a moment at most."""
 
 BEARING_DAMPING = [name for name in Groups._fields if "_damping_" in name]
 BEARING_STIFFNESS = [name for name in Groups._fields if "_stiffness_" in name]
@@ -64,6 +68,7 @@ def lane_coefficients(system: "GearPairs", step: Floats) -> Floats:
         # Deviations of teeth are measured in the transverse plane: y_1 = q - e.
         share, share_z = 1.0 / cosine, 2.0 / cosine
     phase_step = groups.mesh_frequency * step
+    friction, next_sliding, later_sliding = friction_coefficients(system, step)
     lane = Lane(
         mass_ratio_p=groups.mass_ratio_p,
         mass_ratio_g=groups.mass_ratio_g,
@@ -87,8 +92,43 @@ def lane_coefficients(system: "GearPairs", step: Floats) -> Floats:
         cosine=cosine,
         tangential_speed=cosine / step,
         axial_speed=sine / step,
+        friction=friction,
+        next_sliding=next_sliding,
+        later_sliding=later_sliding,
     )
     return np.array(lane, dtype=np.float64).T.copy()
+
+
+def friction_coefficients(system: "GearPairs", step: Floats) -> tuple[Floats, Floats, Floats]:
+    """Return friction at mesh phase 0, and the next two moments at which its sign changes.
+
+    Friction: s mu lambda, with s = 1 before the pitch point and -1 behind it. The representative
+    contact point passes the pitch point once per mesh period; half a period later that of the next
+    tooth pair takes over, as far before the pitch point. Moments are in steps since the mesh period
+    began, more than 0. Each has the shape (lanes,).
+    """
+    groups, nothing = system.groups, np.zeros(step.shape)
+    if not system.effects.friction:
+        return nothing, nothing, nothing
+    steps = np.rint(system.mesh_period / step)
+    turns = groups.pitch_point_phase / (2.0 * np.pi)
+    passing = _moment(turns, steps)
+    taking_over = _moment(turns + 0.5, steps)
+    sign = np.where(passing < taking_over, 1.0, -1.0)
+    return (
+        sign * groups.friction_coefficient * groups.friction_lever,
+        np.minimum(passing, taking_over),
+        np.maximum(passing, taking_over),
+    )
+
+
+def _moment(turns: Floats, steps: Floats) -> Floats:
+    """Return the moment of a mesh phase, in periods, in steps: more than 0, at most all steps."""
+    moment = turns % 1.0 * steps
+    # Rounding must not put a moment that lies on the grid of steps a little beside it.
+    whole = np.rint(moment)
+    moment = np.where(np.abs(moment - whole) < _ON_GRID, whole, moment)
+    return np.where(moment > 0.0, moment, steps)
 
 
 def growth_rates(system: "GearPairs") -> Floats:
@@ -101,6 +141,8 @@ def growth_rates(system: "GearPairs") -> Floats:
     bearings = np.maximum.reduce([getattr(groups, name) for name in BEARING_DAMPING])
     # Acceleration of the approach of the gears in one direction per unit of mesh force.
     mobility = 1.0 + groups.mass_ratio_p + groups.mass_ratio_g
+    if system.effects.friction:
+        mobility = mobility + groups.friction_coefficient * groups.friction_lever
     damping = 2.0 * groups.damping_ratio * mobility + 2.0 * bearings
     bound: Floats = damping + np.sqrt(mobility * (1.0 + np.abs(groups.stiffness_variation_scale)))
     return bound

@@ -25,9 +25,14 @@ error of a tooth is constant, so the damper acts on the rates of q and of p - q.
 from typing import NamedTuple
 
 from gearchaos_kernels.compilation import scalar
-from gearchaos_kernels.memory.rows import State
+from gearchaos_kernels.memory.block_memory import store
+from gearchaos_kernels.memory.rows import State, rows
+from gearchaos_kernels.models.gear_pair.coefficients import Lane
 from gearchaos_kernels.models.gear_pair.forcing import pitch_error_at
 from gearchaos_kernels.models.protocol import Element, Gap
+
+FRICTION = Lane._fields.index("friction")
+"""Place of friction among the coefficients; the moments at which it changes follow."""
 
 
 class Coordinates(NamedTuple):
@@ -164,7 +169,22 @@ def accelerations(state, pushes, forcing, lane, scene):
             -lane.axial_damping_g * w.axial_g - lane.axial_stiffness_g * y.axial_g
         ) - axial_force
     torsion = forcing.drive - force
+    if scene.model.friction is not None:
+        torsion += lane.friction * force
     return Coordinates(torsion, transverse_p, transverse_g, axial_p, axial_g)
+
+
+@scalar
+def next_sliding(lane, scene):
+    """Return when sliding, and with it friction, changes its sign next."""
+    return lane.next_sliding
+
+
+@scalar
+def change_sliding(memory, slot, lane, scene):
+    """Store friction of the other sign, which changes again at the other moment."""
+    changed = -lane.friction, lane.later_sliding, lane.next_sliding
+    store(memory, rows(scene).coefficients + FRICTION, slot, changed)
 
 
 @scalar

@@ -23,6 +23,8 @@ class Effects(NamedTuple):
         The teeth have clearance (eqs 22, 23).
     transverse, axial : bool
         The bearings are flexible in the transverse and in the axial direction.
+    friction : bool
+        The teeth slide on each other with friction, which Pan 2021 leaves out.
 
     Examples
     --------
@@ -35,6 +37,7 @@ class Effects(NamedTuple):
     backlash: bool = True
     transverse: bool = True
     axial: bool = True
+    friction: bool = False
 
     @property
     def states(self) -> tuple[str, ...]:
@@ -74,6 +77,12 @@ class Groups(NamedTuple):
         k_11, k_21, k_12 and k_22, stiffnesses of the bearings.
     transverse_damping_p, transverse_damping_g, axial_damping_p, axial_damping_g : array
         eta_11, eta_21, eta_12 and eta_22, damping ratios of the bearings.
+    friction_coefficient : array
+        mu, coefficient of the friction between the teeth.
+    friction_lever : array
+        lambda, the lever of friction relative to that of the mesh force, at the pitch point.
+    pitch_point_phase : array
+        phi_C in rad, the mesh phase at which the contact passes the pitch point.
 
     Examples
     --------
@@ -102,3 +111,6 @@ class Groups(NamedTuple):
     axial_damping_p: Floats
     axial_stiffness_g: Floats
     axial_damping_g: Floats
+    friction_coefficient: Floats
+    friction_lever: Floats
+    pitch_point_phase: Floats

@@ -20,7 +20,7 @@ class GearPair:
 
     Attributes
     ----------
-    pitch_error, stiffness_variation, transverse, axial : True or None
+    pitch_error, stiffness_variation, transverse, axial, friction : True or None
         The effects of these names; see `Effects`.
     phase : True or None
         The pitch error of eq. 14 has a phase.
@@ -40,6 +40,7 @@ class GearPair:
     stiffness_variation: Any
     transverse: Any
     axial: Any
+    friction: Any
 
 
 def _coordinates_of(flags: GearPair) -> tuple[bool, ...]:
@@ -172,6 +173,9 @@ MODEL = Model(
     gap_speeds=equations.gap_speeds,
     gaps_at=equations.gaps_at,
     accelerations=equations.accelerations,
+    switches=lambda flags: bool(flags.friction),
+    next_switch=equations.next_sliding,
+    switch=equations.change_sliding,
     observed_at=equations.observed_at,
     maps=MAPS,
 )

@@ -119,6 +119,7 @@ class GearPairs(LaneSystem):
             stiffness_variation=flag(effects.stiffness_variation),
             transverse=flag(effects.transverse),
             axial=flag(effects.axial),
+            friction=flag(effects.friction),
         )
 
     def coefficients(self, step: Floats) -> Floats:
@@ -153,14 +154,20 @@ class GearPairs(LaneSystem):
         The branches are: contact at the smallest and at the largest mesh stiffness, and no contact.
         Both directions are on the same branch: the axial motion does not act back on the rest, so
         combinations add no further exponents.
+        Friction reduces the smallest mesh stiffness and adds to the largest.
         """
         values = [np.ones(self.lanes)]
+        if self.effects.friction:
+            values = 2 * values
         if self.effects.stiffness_variation:
             waves = self.stiffness_cosine + 1j * self.stiffness_sine
             harmonics = np.concatenate([[0.0], waves])
             variation = np.fft.fft(harmonics, _POINTS_PER_WAVE * harmonics.size).real
             scale = self.groups.stiffness_variation_scale
             values = [1.0 + scale * extreme for extreme in (np.min(variation), np.max(variation))]
+        if self.effects.friction:
+            share = self.groups.friction_coefficient * self.groups.friction_lever
+            values = [values[0] * (1.0 - share), values[1] * (1.0 + share)]
         if self.effects.backlash:
             values.append(np.zeros(self.lanes))
         return np.repeat(np.stack(values)[..., np.newaxis], self.elements, axis=2)
@@ -211,6 +218,8 @@ class GearPairs(LaneSystem):
         """Return why flow maps cannot integrate the system, or an empty text."""
         if self.effects.pitch_error and self.teeth is not None:
             return "flow maps know pitch errors that are a sine, not those of teeth"
+        if self.effects.friction:
+            return "flow maps know no friction, whose sign changes within the mesh period"
         return ""
 
     def of(self, chosen: slice | NDArray[np.intp] | list[int]) -> Self:
