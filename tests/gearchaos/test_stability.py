@@ -17,6 +17,7 @@ from gearchaos.dynamics.stability import (
 from gearchaos.models.gear_pair.contact_lines import series_table
 
 from ..kernels.reference import (
+    BASE_HELIX_ANGLE,
     COSINE,
     FULL,
     LINEAR,
@@ -153,6 +154,15 @@ def test_lanes_that_share_some_groups_but_not_all_are_told_apart():
     stiffest = np.sqrt(np.maximum.reduce([p, g, np.full(4, 36.315)]))
     wanted = PERIOD * stiffest / np.sqrt(8.0)
     assert fewest(FULL, grid) == pytest.approx(wanted, rel=0.02, abs=1.0)
+
+
+def test_friction_stiffens_the_mesh_on_one_side_of_the_pitch_point():
+    # delta_5'' = -cos(beta_b) (1 + mu lambda) delta_5, and RK4 ends at sqrt(8) on that axis.
+    share, cosine = 0.5, np.cos(BASE_HELIX_ANGLE)
+    model = pan2021(1.0, damping_ratio=0.0, friction_coefficient=share, friction_lever=1.0)
+    wanted = PERIOD * 100.0 * np.sqrt(cosine * (1.0 + share) / 8.0)
+    slow = model._replace(mesh_frequency=model.mesh_frequency / 100.0)
+    assert fewest(TORSION._replace(friction=True), slow) == pytest.approx(wanted, abs=1.0)
 
 
 def test_the_refusal_names_lanes_and_steps():
