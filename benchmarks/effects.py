@@ -27,7 +27,16 @@ SCENES = {
     "+ backlash": Effects(True, True, True, False, False),
     "+ transverse pair": Effects(True, True, True, True, False),
     "+ axial pair": Effects(True, True, True, True, True),
+    "+ friction": Effects(friction=True),
+    "its changes within steps": Effects(friction=True),
 }
+FRICTION = {"friction_coefficient": 0.1, "friction_lever": 0.41}
+GROUPS = {
+    "+ friction": FRICTION,
+    "its changes within steps": {**FRICTION, "pitch_point_phase": 0.01},
+}
+"""Friction changes its sign where steps end, as by default, and then within two steps a period."""
+
 MODES = {
     "plain": {"tangent": False, "resolved": False},
     "plain, tangent": {"tangent": True, "resolved": False},
@@ -51,7 +60,7 @@ def main() -> None:
     options = parser.parse_args()
     print_machine()
     works = {
-        (scene, mode): engine(SCENES[scene], threads=1, **MODES[mode])
+        (scene, mode): engine(SCENES[scene], threads=1, **MODES[mode], **GROUPS.get(scene, {}))
         for scene in SCENES
         for mode in MODES
     }

@@ -81,13 +81,16 @@ def engine(
     threads: int,
     steps: int = STEPS,
     method: str = "rk4",
+    **groups: float,
 ) -> Callable[[], int]:
     """Return work that integrates the sweep of Pan 2021 and tells how many steps that took.
 
-    Steps of RK4: flow maps count for `STEPS` a period.
+    Steps of RK4: flow maps count for `STEPS` a period. ``groups``: groups of all lanes to replace.
     """
     lanes = LANES * threads
     system = _pan(lanes).replace(effects=scene)
+    given = {name: np.full(lanes, value) for name, value in groups.items()}
+    system = system.replace(groups=system.groups._replace(**given))
     # The end state is written in full, so that no effect can be optimised away.
     plan = Plan(steps, 0, PERIODS, 1, tangent, resolved, method=method)
     counted = lanes * PERIODS * (steps if method == "rk4" else STEPS)
