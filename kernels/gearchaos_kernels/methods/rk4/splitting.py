@@ -67,7 +67,6 @@ def split_part(memory, slot, at, first, last, tables, scene):
         # The negated comparison also ends the loop if the fraction is not a number.
         if not fraction <= 1.0 or crossings == MOST_CROSSINGS:
             break
-
         piece = fraction * left
         middle = forcing_within(memory, slot, lane, tables, number, done + 0.5 * piece, scene)
         done += piece
@@ -78,8 +77,7 @@ def split_part(memory, slot, at, first, last, tables, scene):
         begin = crossing
         crossings += 1
         gaps = gaps_at(state, lane, begin, scene)
-        moment = number + done
-        leave(memory, slot, element, gaps[element], lane, moment, at.recorded, scene)
+        leave(memory, slot, element, gaps[element], lane, number + done, at.recorded, scene)
         branches = read_branches(memory, slot, scene)
 
         left = until - done

@@ -94,7 +94,7 @@ def take_part(memory, slot, at, first, last, tables, scene):
         if scene.resolved is not None:
             branches = read_branches(memory, slot, scene)
         state = from_kept(state_before(memory, slot, scene), begin, scene)
-        after, pushes = rk4.advance(rk4.motion, state, length, lane, during, branches, scene)
+        after, pushes = rk4.advance(rk4.motion_stage, state, length, lane, during, branches, scene)
         write_state(memory, STATE, slot, to_kept(after, end, scene), scene)
         if scene.tangent is not None:
             tangent = read_state(memory, rows(scene).tangent_before, slot, scene)
