@@ -74,6 +74,8 @@ def source_hash() -> str:
 
 
 CACHE_FOLDER = cache_folder(source_hash())
+"""Folder of cached compiled code, a `pathlib.Path` whose name is `source_hash`."""
+
 if getattr(config, "CPU_FEATURES", "") is None:
     features = llvmlite.binding.get_host_cpu_features().flatten()
     config.CPU_FEATURES = f"{features},-prefer-256-bit"

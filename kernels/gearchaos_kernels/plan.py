@@ -97,7 +97,17 @@ class Schedule(NamedTuple):
 
 
 class Status(IntEnum):
-    """How the integration of a lane ended; the values are those of the result file."""
+    """How the integration of a lane ended; the values are those of the result file.
+
+    Attributes
+    ----------
+    OK
+        The lane was integrated to the end.
+    DIVERGED
+        A state left the range of numbers, or became NaN, and the lane was stopped.
+    TOO_FAST
+        Flow maps do not converge for the lane even with the largest number of steps.
+    """
 
     OK = 0
     DIVERGED = 1
@@ -109,6 +119,7 @@ STATUS_TEXTS = {
     Status.DIVERGED: "left the range of numbers (or became not a number) and was stopped",
     Status.TOO_FAST: "moves faster than so few flow maps can follow, and was stopped",
 }
+"""What each status means, as a text for people."""
 
 
 class Outcome(NamedTuple):

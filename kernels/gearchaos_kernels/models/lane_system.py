@@ -170,7 +170,7 @@ class LaneSystem(ABC):
 
     def of(self, chosen: _Chosen) -> Self:
         """Return the system of some lanes, in the given order."""
-        return self.replace(**{field: getattr(self, field)[chosen] for field in self._fields()})
+        return self.replace(**{field: getattr(self, field)[chosen] for field in self._parameters()})
 
     def replace(self, **changes: Any) -> Self:
         """Return the system with other values of some fields."""
@@ -180,7 +180,7 @@ class LaneSystem(ABC):
         """Return the system with every lane n times in a row."""
         return self.of(np.repeat(np.arange(self.lanes), times))
 
-    def _fields(self) -> list[str]:
+    def _parameters(self) -> list[str]:
         """Return the names of the parameters of the lanes."""
         return [field.name for field in fields(self)]  # type: ignore[arg-type]
 
@@ -199,7 +199,7 @@ class LaneSystem(ABC):
 
     def map_parameters(self) -> Floats:
         """Return all numbers on which the flow maps of a lane depend, shape (lanes, numbers)."""
-        names = [name for name in self._fields() if name not in self.unit_inputs]
+        names = [name for name in self._parameters() if name not in self.unit_inputs]
         return np.stack([getattr(self, name) for name in names], axis=1)
 
     def map_constants(self) -> tuple[object, ...]:
