@@ -50,7 +50,7 @@ class Scene:
     switches: Any = None
 
     def bare(self) -> "Scene":
-        """Return the scene without tangent vector and recorders, on which flow maps depend not."""
+        """Return the scene without tangent vector and recorders, which do not affect flow maps."""
         recorders = type(self.recorders)()
         return replace(self, tangent=None, before=None, recorders=recorders)
 
@@ -96,6 +96,7 @@ register_model(SceneType)(models.OpaqueModel)
 
 @typeof_impl.register(Scene)
 def _typeof_scene(scene: Scene, _context: Any) -> SceneType:
+    """Return the Numba type of a scene; raise TypeError if a flag is not True or None."""
     for part in (scene.model, scene.method, scene.recorders):
         for name, value in vars(part).items():
             if value is not None and value is not True:
@@ -105,7 +106,7 @@ def _typeof_scene(scene: Scene, _context: Any) -> SceneType:
 
 @unbox(SceneType)
 def _unbox_scene(_kind: Any, _scene: Any, c: Any) -> NativeValue:
-    # A scene has no data at run time; its type contains everything.
+    """Return no data: at run time a scene has none, since its type contains everything."""
     return NativeValue(c.context.get_dummy_value())
 
 

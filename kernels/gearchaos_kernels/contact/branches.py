@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 from gearchaos_kernels.compilation import scalar
 from gearchaos_kernels.contact.leaving import may_leave
-from gearchaos_kernels.memory.block_memory import read_branches, store
+from gearchaos_kernels.memory.block_memory import store
 from gearchaos_kernels.memory.rows import BRANCH, STRIDE, Branch, rows
 from gearchaos_kernels.memory.tuples import as_mask, each
 from gearchaos_kernels.models.interfaces import gap_speeds, half_clearances
@@ -18,6 +18,21 @@ from gearchaos_kernels.recorders.protocol import record_crossing
 
 MOST_CROSSINGS = 16
 """Crossings that are resolved in one step; a step with more continues without and is counted."""
+
+
+class Moment(NamedTuple):
+    """When a gap leaves its branch.
+
+    Attributes
+    ----------
+    steps : float
+        Steps since the beginning of the mesh period.
+    recorded : bool
+        Whether the mesh period is recorded.
+    """
+
+    steps: float
+    recorded: bool
 
 
 class Crossing(NamedTuple):
@@ -92,12 +107,13 @@ def next_branch(branch, gap, half_clearance):
 
 
 @scalar
-def leave(memory, slot, element, gap, lane, moment, recorded, scene):
+def leave(memory, slot, element, gap, branches, lane, moment, scene):
     """Put a lane on the next branch where the gap of an element leaves one; record the crossing."""
-    branch = read_branches(memory, slot, scene)[element]
+    # The branches are an argument: reading them here slows down the loop over slots.
+    branch = branches[element]
     following = next_branch(branch, gap.value, half_clearances(lane, scene)[element])
     store(memory, rows(scene).branches + BRANCH * element, slot, following)
-    if recorded:
+    if moment.recorded:
         scale = gap_speeds(lane, scene)[element]
         at = rows(scene).crossings * STRIDE + slot
         memory[at] += 1.0
@@ -105,7 +121,7 @@ def leave(memory, slot, element, gap, lane, moment, recorded, scene):
         # One of the two offsets is that of the flank, the other is 0.
         offset = branch.offset + following.offset
         speed = scale * abs(gap.closing)
-        crossing = Crossing(element, moment, gap.closing, offset, following.engaged, speed)
+        crossing = Crossing(element, moment.steps, gap.closing, offset, following.engaged, speed)
         record_crossing(memory, slot, crossing, lane, scene)
 
 

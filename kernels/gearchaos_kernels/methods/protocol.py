@@ -57,13 +57,14 @@ class Method:
         ``memory(system, plan, scene, stable)``: estimated bytes of what is prepared; ``stable``
         (lanes,): steps per period with which RK4 is stable.
     amplification : callable
-        ``amplification(z)``: by how much one step multiplies the size of a mode, z being step
+        ``amplification(z)``: factor by which one step multiplies the modulus of a mode; z: step
         length times eigenvalue.
     stable_reach : callable or None
         ``stable_reach(angles)``: length of the longest stable z on rays from 0 at these angles,
         between pi/2 and pi; None if every step is stable.
     is_kept : callable
-        ``is_kept(system, plan, scene)``: whether all of that stays in memory between calls.
+        ``is_kept(system, plan, scene)``: whether all that is prepared stays in memory between
+        calls.
     maps_per_step(scene)
         Returns how many numbers are prepared for one step.
     workspace(scene)

@@ -11,7 +11,13 @@ the moments of the motion. The field is continuous, so a crossing adds no furthe
 """
 
 from gearchaos_kernels.compilation import scalar
-from gearchaos_kernels.contact.branches import MOST_CROSSINGS, branches_at, leave, next_branch
+from gearchaos_kernels.contact.branches import (
+    MOST_CROSSINGS,
+    Moment,
+    branches_at,
+    leave,
+    next_branch,
+)
 from gearchaos_kernels.contact.leaving import may_leave
 from gearchaos_kernels.memory.block_memory import read_branches, read_lane, store, write_branches
 from gearchaos_kernels.memory.rows import BRANCH, STATE, STRIDE, VECTOR, Branch, rows
@@ -115,9 +121,11 @@ def record_crossing_of(memory, slot, aside, n, at, scene):
         return
     element = int(aside[at_rows.element * STRIDE + n])
     lane = read_lane(memory, slot, scene)
-    moment = at.number + 0.5 * (1.0 + aside[at_rows.after * STRIDE + n])
+    steps = at.number + 0.5 * (1.0 + aside[at_rows.after * STRIDE + n])
+    moment = Moment(steps, at.recorded)
     crossed = crossed_at(aside, n, element, scene)
-    leave(memory, slot, element, crossed, lane, moment, at.recorded, scene)
+    branches = read_branches(memory, slot, scene)
+    leave(memory, slot, element, crossed, branches, lane, moment, scene)
     store_offsets(memory, slot, lane, read_branches(memory, slot, scene), scene)
 
 

@@ -6,7 +6,7 @@ repeated up to the crossing, then continued on the next branch, until it crosses
 """
 
 from gearchaos_kernels.compilation import scalar
-from gearchaos_kernels.contact.branches import MOST_CROSSINGS, branches_at, leave
+from gearchaos_kernels.contact.branches import MOST_CROSSINGS, Moment, branches_at, leave
 from gearchaos_kernels.contact.leaving import NEVER, leaving_fraction
 from gearchaos_kernels.memory.block_memory import (
     read_branches,
@@ -54,8 +54,7 @@ def split_part(memory, slot, at, first, last, tables, scene):
     tangent = state
     if scene.tangent is not None:
         tangent = read_state(memory, rows(scene).tangent_before, slot, scene)
-    number = at.number
-    (done, begin), (until, end) = first, last
+    number, (done, begin), (until, end) = at.number, first, last
     state, after = from_kept(state, begin, scene), from_kept(after, end, scene)
     gaps = gaps_at(state, lane, begin, scene)
     branches = read_branches(memory, slot, scene)
@@ -77,7 +76,8 @@ def split_part(memory, slot, at, first, last, tables, scene):
         begin = crossing
         crossings += 1
         gaps = gaps_at(state, lane, begin, scene)
-        leave(memory, slot, element, gaps[element], lane, number + done, at.recorded, scene)
+        moment = Moment(number + done, at.recorded)
+        leave(memory, slot, element, gaps[element], branches, lane, moment, scene)
         branches = read_branches(memory, slot, scene)
 
         left = until - done

@@ -1,4 +1,4 @@
-"""The stable region of RK4: where a step does not amplify a mode (Hairer, Wanner 1996, sec. IV.2).
+"""The stability region of RK4: where a step amplifies no mode (Hairer, Wanner 1996, sec. IV.2).
 
 A step of length h multiplies the mode of an eigenvalue lambda by R(h lambda), with
 R(z) = 1 + z + z^2/2 + z^3/6 + z^4/24.
@@ -18,16 +18,15 @@ _HALVINGS = 52
 
 
 def amplification(z: Complex) -> Floats:
-    """Return abs(R(z)), by which one step multiplies a mode, for z = h lambda."""
+    """Return abs(R(z)), the factor by which one step multiplies a mode, for z = h lambda."""
     return np.abs(1.0 + z * (1.0 + z / 2.0 * (1.0 + z / 3.0 * (1.0 + z / 4.0))))
 
 
 def stable_reach(angles: Floats) -> Floats:
-    """Return where rays from 0 at these angles leave the stable region.
+    """Return where rays from 0 at these angles, between pi/2 and pi, leave the stability region.
 
-    ``angles``: between pi/2 and pi. The size of R need not rise steadily along a ray: on the
-    negative real axis it first falls. But it passes 1 only once, so that all steps shorter than the
-    longest stable one are stable.
+    Along a ray abs(R) is not always monotonic: on the negative real axis it first decreases. But it
+    passes 1 only once, so all steps shorter than the longest stable one are stable.
     """
     known, lengths = _reach()
     return np.interp(angles, known, lengths)
@@ -35,7 +34,7 @@ def stable_reach(angles: Floats) -> Floats:
 
 @cache
 def _reach() -> tuple[Floats, Floats]:
-    """Return angles, and the lengths of the rays there, which all end between 2.5 and 3."""
+    """Return angles and the lengths of the rays there, which are all between 2.5 and 3."""
     angles = np.linspace(0.5 * np.pi, np.pi, _RAYS)
     inside, outside = np.full_like(angles, 2.5), np.full_like(angles, 3.0)
     for _ in range(_HALVINGS):

@@ -44,11 +44,13 @@ class GearPair:
 
 
 def _coordinates_of(flags: GearPair) -> tuple[bool, ...]:
+    """Return for each of the five coordinates whether a scene has it."""
     transverse, axial = bool(flags.transverse), bool(flags.axial)
     return True, transverse, transverse, axial, axial
 
 
 def _elements(flags: GearPair) -> int:
+    """Return the number of directions of the mesh: tangential, and axial in a scene with it."""
     return 2 if flags.axial else 1
 
 
@@ -75,6 +77,7 @@ def _apart(flags: GearPair) -> tuple[frozenset[int], frozenset[int]]:
 
 
 def _gap_coefficients(flags: GearPair) -> tuple[str, ...]:
+    """Return the names of the coefficients on which the gaps depend (eqs 6, 7)."""
     names = ["half_backlash"]
     if flags.transverse or flags.axial:
         names += ["mass_ratio_p", "mass_ratio_g"]
