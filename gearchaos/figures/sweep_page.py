@@ -1,6 +1,7 @@
-"""The page of a sweep: the bifurcation diagram over the Lyapunov chart, on one shared axis."""
+"""The page of a sweep: bifurcation diagram above Lyapunov chart, on one shared axis."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from itertools import cycle
 from typing import Any
 
@@ -21,8 +22,8 @@ from gearchaos.results.reading.result import Result, section_variables
 from gearchaos.results.reading.stage_table import LabelledLanes
 
 HEIGHT_RATIOS = (1.6, 1.0)
-SHADE = "0.92"  # Where directions differ.
-MOST_INTERVALS = (7, 8)  # Between the ticks of the lower panel, and of the one above it.
+SHADE = "0.92"  # Grey of the stretches where the two directions differ.
+MOST_INTERVALS = (7, 8)  # Most tick intervals of the lower and of the upper panel.
 
 
 def bifurcation_page(
@@ -36,95 +37,174 @@ def bifurcation_page(
     width_mm: float = SINGLE_COLUMN_MM,
     height_mm: float | None = None,
 ) -> Page:
-    """Draw the bifurcation diagram (a) over the Lyapunov chart (b).
+    """Draw the bifurcation diagram (a) above the chart of the largest Lyapunov exponent (b).
 
-    A result without section points or without exponents gives the one panel it has data for. The
-    page is a Figure not known to pyplot, which a notebook shows; `savefig` or
-    `gearchaos.figures.save_figure` writes it.
+    Parameters
+    ----------
+    result : Result or sequence of Result
+        Results over one swept parameter, the same for all; they are drawn over each other.
+    variable, between
+        As for `bifurcation`. Amplitudes at mesh orders are drawn as by `waterfall`.
+    stages : bool or LabelledLanes
+        Shade the stages of the result behind both panels, or those of lanes with other labels.
+    marked : (str, sequence of float), optional
+        Legend entry, and the values of the swept parameter with a tick at the upper edge.
+    labels : sequence of str, optional
+        Legend entry of each result; by default its title.
+    width_mm, height_mm : float
+        Size of the page. The default height follows from the width and the number of panels.
 
-    ``result``: over one swept parameter, or several of them, drawn over each other; ``variable``,
-    ``between``: as for `bifurcation`; amplitudes at mesh orders are drawn as by `waterfall`;
-    ``stages``: shade the stages behind both panels, also those of lanes with other labels than
-    those of the result; ``marked``: a few words, and the values of the parameter of which they
-    tell: ticks at the upper edge; ``labels``: what the legend calls each of several results, by
-    default their titles; ``width_mm``, ``height_mm``: size of the page; 85 mm is one column of a
-    journal and 180 mm two. The default height follows from the width and the number of panels.
+    Returns
+    -------
+    Page
+        A figure unknown to pyplot. It has one panel if section points or exponents are missing.
 
-    Raises FigureError if the result has nothing to draw, no such variable or no lane in the range,
-    or runs over two parameters; if several results run over different parameters or stages are
-    wanted. Raises FileError if stages are wanted and the result has no labels of the motion.
+    Raises
+    ------
+    FigureError
+        If the variable, the range or any data is missing, there are several swept parameters, or
+        stages or amplitudes are requested for several results.
+    FileError
+        If stages are requested and the result has no labels of the motion.
     """
-    # A variable that was asked for and is not there is an error, not a page without it.
+    overlay = _overlay(result, variable, between, labels)
+    overlay.check(bool(stages))
+    height = height_mm or (55.0 + 0.35 * width_mm) * (1.0 if overlay.panels == 2 else 0.7)
+    with page(width_mm, height) as figure:
+        _draw(figure, overlay, stages, marked)
+    return figure
+
+
+@dataclass(frozen=True, eq=False)
+class _Overlay:
+    """The results on one page, and what is drawn of them.
+
+    ``files``: the results as given; ``results``: the same with one result for each direction;
+    ``labels``: legend entries of ``results``.
+    """
+
+    files: Sequence[Result]
+    results: Sequence[Result]
+    labels: Sequence[str]
+    variable: str | None
+    between: Between
+
+    @property
+    def of_orders(self) -> bool:
+        """Whether the variable has a value for each mesh order."""
+        name = str(self.variable)
+        return any(name in one and one.dims(name)[-1] == ORDER for one in self.results)
+
+    @property
+    def panels(self) -> int:
+        """Number of panels."""
+        # A requested variable that is missing is an error, not a page without its panel.
+        has_section = self.variable is not None or any(map(section_variables, self.results))
+        return has_section + any(LARGEST_EXPONENT in one for one in self.results)
+
+    def check(self, stages: bool) -> None:
+        """Raise FigureError if the results cannot share a page or have nothing to draw."""
+        if len({one.axis for one in self.results}) > 1:
+            raise FigureError(
+                f"results over {', '.join(one.axis for one in self.results)}: only those over the "
+                "same parameter are drawn over each other"
+            )
+        if len(self.results) > 1 and (stages or self.of_orders):
+            both = len(self.results) > len(self.files)
+            remedy = "; choose one with --at direction=upwards" if both else ""
+            what = "stages are" if stages else f"{self.variable}: is"
+            raise FigureError(f"{what} drawn of one result, in one direction{remedy}")
+        if not self.panels:
+            raise FigureError(
+                "nothing to draw: the result has neither section points nor Lyapunov exponents"
+            )
+
+
+def _overlay(
+    result: Result | Sequence[Result],
+    variable: str | None,
+    between: Between,
+    labels: Sequence[str] | None,
+) -> _Overlay:
+    """Split results by direction and label each part."""
     files = [result] if isinstance(result, Result) else list(result)
     titles = labels or [str(one.metadata.get("title", "")) for one in files]
-    results, labels = [], []
+    results: list[Result] = []
+    names: list[str] = []
     for one, title in zip(files, titles, strict=True):
         ways = directions_of(one)
         results += ways
         of_ways = [title] if len(ways) == 1 else [f"{title}, {way}" for way in WAYS]
-        labels += of_ways if len(files) > 1 else WAYS[: len(ways)]
-    if len({one.axis for one in results}) > 1:
-        raise FigureError(
-            f"results over {', '.join(one.axis for one in results)}: only those over the same "
-            "parameter are drawn over each other"
-        )
-    of_orders = any(variable in one and one.dims(str(variable))[-1] == ORDER for one in results)
-    if len(results) > 1 and (stages or of_orders):
-        remedy = "; choose one with --at direction=upwards" if len(results) > len(files) else ""
-        what = "stages are" if stages else f"{variable}: is"
-        raise FigureError(f"{what} drawn of one result, in one direction{remedy}")
-    has_section = variable is not None or any(map(section_variables, results))
-    panels = has_section + any(LARGEST_EXPONENT in one for one in results)
-    if not panels:
-        raise FigureError(
-            "nothing to draw: the result has neither section points nor Lyapunov exponents"
-        )
-    height = height_mm or (55.0 + 0.35 * width_mm) * (1.0 if panels == 2 else 0.7)
-    with page(width_mm, height) as figure:
-        ratios = HEIGHT_RATIOS if panels == 2 else (1.0,)
-        grid = figure.subplots(panels, 1, sharex=True, squeeze=False, height_ratios=ratios)
-        stack: list[Axes] = grid[:, 0].tolist()
-        looks = zip(results, labels, cycle(OVERLAID), strict=False)
-        for number, (one, name, (color, marker)) in enumerate(looks):
-            shown: dict[str, Any] = {"between": between}
-            if len(results) > 1:
-                shown |= {"color": color, "marker": marker, "label": plain(name) or "untitled"}
-            if of_orders:
-                waterfall(stack[0], one, str(variable), between=between)
-            elif variable is not None or section_variables(one):
-                # Dots lie on larger marks, and thin lines on wide ones: where results agree, both
-                # are seen.
-                drawn = bifurcation(stack[0], one, variable, **shown)
-                drawn.points.set_zorder(2.0 - 0.01 * number)
-            if LARGEST_EXPONENT in one:
-                # A legend of the colours is enough.
-                curve = lyapunov(stack[-1], one, **shown | ({"label": None} if panels == 2 else {}))
-                curve.points.set(zorder=2.0 - 0.01 * number, linewidth=0.6 * (number + 1))
-        if panels == 2:
-            stack[0].set_xlabel("")
-            letter(stack)
-        for axes, intervals in zip(reversed(stack), MOST_INTERVALS, strict=False):
-            few_ticks(axes, None, None if axes.images else intervals)
-            axes.yaxis.label.set_linespacing(1.0)
-        if marked is not None:
-            mark_values(stack, *marked)
-        if len(files) < len(results) == 2 and LABELS[0] in files[0]:
-            _mark_stretches(stack, files[0])
-        if stages:
-            given = None if isinstance(stages, bool) else stages
-            for axes in stack:
-                shade_stages(axes, results[0], lanes=given, legend=axes is stack[0])
-        else:
-            footnote(figure, max(map(form_in_words, results)))
-        places = dict.fromkeys(in_words(one, one.fixed) for one in files if one.fixed)
-        if places:
-            figure.suptitle("; ".join(places))
-        figure.align_ylabels(stack)
-    return figure
+        names += of_ways if len(files) > 1 else WAYS[: len(ways)]
+    return _Overlay(files, results, names, variable, between)
+
+
+def _draw(
+    figure: Page,
+    overlay: _Overlay,
+    stages: bool | LabelledLanes,
+    marked: tuple[str, Sequence[float]] | None,
+) -> None:
+    """Draw the panels, the marks and shades behind them, and the texts around them."""
+    stack = _draw_panels(figure, overlay)
+    files, results = overlay.files, overlay.results
+    if marked is not None:
+        mark_values(stack, *marked)
+    if len(files) < len(results) == 2 and LABELS[0] in files[0]:
+        _mark_stretches(stack, files[0])
+    if stages:
+        given = None if isinstance(stages, bool) else stages
+        for axes in stack:
+            shade_stages(axes, results[0], lanes=given, legend=axes is stack[0])
+    else:
+        footnote(figure, max(map(form_in_words, results)))
+    places = dict.fromkeys(in_words(one, one.fixed) for one in files if one.fixed)
+    if places:
+        figure.suptitle("; ".join(places))
+    figure.align_ylabels(stack)
+
+
+def _draw_panels(figure: Page, overlay: _Overlay) -> list[Axes]:
+    """Make the panels, draw every result into them, and return them from top to bottom."""
+    two = overlay.panels == 2
+    ratios = HEIGHT_RATIOS if two else (1.0,)
+    grid = figure.subplots(overlay.panels, 1, sharex=True, squeeze=False, height_ratios=ratios)
+    stack: list[Axes] = grid[:, 0].tolist()
+    for number, look in zip(range(len(overlay.results)), cycle(OVERLAID), strict=False):
+        _draw_result(stack, overlay, number, look)
+    if two:
+        stack[0].set_xlabel("")
+        letter(stack)
+    for axes, intervals in zip(reversed(stack), MOST_INTERVALS, strict=False):
+        few_ticks(axes, None, None if axes.images else intervals)
+        axes.yaxis.label.set_linespacing(1.0)
+    return stack
+
+
+def _draw_result(
+    stack: Sequence[Axes], overlay: _Overlay, number: int, look: tuple[str, str]
+) -> None:
+    """Draw one result into the panels, with a colour and a marker if it is one of several."""
+    one, variable = overlay.results[number], overlay.variable
+    shown: dict[str, Any] = {"between": overlay.between}
+    if len(overlay.results) > 1:
+        label = plain(overlay.labels[number]) or "untitled"
+        shown |= {"color": look[0], "marker": look[1], "label": label}
+    # Later results have larger dots and wider lines: drawn below, they show where results agree.
+    zorder = 2.0 - 0.01 * number
+    if overlay.of_orders:
+        waterfall(stack[0], one, str(variable), between=overlay.between)
+    elif variable is not None or section_variables(one):
+        drawn = bifurcation(stack[0], one, variable, **shown)
+        drawn.points.set_zorder(zorder)
+    if LARGEST_EXPONENT in one:
+        # One legend of the colours is enough.
+        curve = lyapunov(stack[-1], one, **shown | ({"label": None} if len(stack) == 2 else {}))
+        curve.points.set(zorder=zorder, linewidth=0.6 * (number + 1))
 
 
 def _mark_stretches(panels: Sequence[Axes], result: Result) -> None:
-    """Shade where both directions of a result differ, and tick where either jumps."""
+    """Shade where the two directions of a result differ, and tick where either jumps."""
     low, high = panels[0].get_xlim()
     stretches = apart(result, NARROWEST_SHARE * (high - low))
     shades: list[Artist] = [
