@@ -1,19 +1,22 @@
 """The diagrams of a sweep over its parameter: section points, largest exponent, amplitudes."""
 
 from fractions import Fraction
-from typing import Any
+from typing import Any, NamedTuple
 
 import matplotlib as mpl
 import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.colors import LogNorm, to_rgb
+from matplotlib.lines import Line2D
 
+from gearchaos.arrays import Floats, Integers, Mask
 from gearchaos.errors import FigureError
 from gearchaos.figures.labels import axis_label, check_variable
 from gearchaos.figures.lanes import (
     MOST_DOTS,
     Between,
+    Lanes,
     cell_edges,
     diagram_lanes,
     dots,
@@ -88,56 +91,116 @@ def lyapunov(
 ) -> Diagram:
     """Draw the largest Lyapunov exponent into axes, with zero line and uncertainty.
 
-    Diverged lanes are gaps with a red tick at the bottom; a positive exponent is hatched down to
-    zero; the vertical axis always holds zero, and lanes beyond robust limits get a triangle. Of
-    more lanes than a page can tell apart (`figures.lanes.COLUMNS`), line, shades and bars are those
-    of the lowest and the highest exponent in each column. Of what is returned ``points`` is the
-    line of the exponents; its ``parts`` are the ``dots`` of those without a neighbour to draw a
-    line to, or of all where a value has several starts, the ``band`` and ``bars`` of two standard
-    errors, what is ``positive``, and ``zero``. Parameters are as for `bifurcation`; raises
-    FigureError if the result has no Lyapunov exponents, no lane in the range, or two swept
-    parameters.
+    Parameters
+    ----------
+    axes, result, between, color, label, marker
+        As for `bifurcation`.
+
+    Returns
+    -------
+    Diagram
+        ``points`` is the line of the exponents. ``parts`` holds the line at ``zero``, the hatched
+        ``positive`` part, the ``band`` and ``bars`` of two standard errors, and the ``dots`` of
+        isolated exponents, or of all where a swept value has several starts.
+
+    Raises
+    ------
+    FigureError
+        If the result has no exponents, no lane in the range, or several swept parameters.
+
+    Notes
+    -----
+    Diverged lanes are gaps with a red tick at the bottom; lanes beyond robust limits get a
+    triangle. Zero is always within the limits. Where a page cannot resolve all lanes
+    (`figures.lanes.COLUMNS`), only the lowest and the highest exponent of each column are drawn.
     """
+    shown = _exponents(result, between)
+    look = {"color": color, "marker": marker, "label": label}
+    line, parts = _draw_exponents(axes, result, shown, look)
+    named: list[Artist] = [parts["band"]] if (shown.spread[shown.finite] > 0.0).any() else []
+    named += _circle_mixed(axes, result, shown)
+    axes.set_ylabel(axis_label(result, LARGEST_EXPONENT, line_length=20))
+    reach = np.nan_to_num(shown.spread)
+    own = Diagram(line, shown.lanes, shown.values, shown.values, reach, named, parts)
+    return close_panel(axes, result, own, hold_zero=True)
+
+
+class _Exponents(NamedTuple):
+    """Largest exponents of the lanes in a range, each array of shape (lanes,).
+
+    ``values``: NaN where the lane diverged; ``spread``: two standard errors; ``isolated``: whether
+    no line joins the exponent to a neighbour; ``drawn``: numbers of the lanes to draw.
+    """
+
+    lanes: Lanes
+    values: Floats
+    spread: Floats
+    isolated: Mask
+    drawn: Integers
+
+    @property
+    def finite(self) -> Mask:
+        """Whether a lane has an exponent."""
+        return np.isfinite(self.values)
+
+    @property
+    def several_starts(self) -> bool:
+        """Whether several lanes have the same swept value."""
+        return bool(np.any(np.diff(self.lanes.parameter) == 0.0))
+
+
+def _exponents(result: Result, between: Between) -> _Exponents:
+    """Select the exponents of a diagram; FigureError if the result has none."""
     if LARGEST_EXPONENT not in result:
         raise FigureError("the result has no Lyapunov exponents: the sweep left them out")
     lanes = diagram_lanes(result, between)
-    stored = result.lanes(LARGEST_EXPONENT)
-    whole = stored[lanes.numbers]
-    whole[lanes.diverged | np.isinf(whole)] = np.nan
+    values = result.lanes(LARGEST_EXPONENT)[lanes.numbers]
+    values[lanes.diverged | np.isinf(values)] = np.nan
     error = result.lanes(LARGEST_EXPONENT + STANDARD_ERROR)[lanes.numbers]
-    spread = BAND_STANDARD_ERRORS * error
-    several_starts = bool(np.any(np.diff(lanes.parameter) == 0.0))
+    drawn = outermost(lanes, values)
+    found = _Exponents(lanes, values, BAND_STANDARD_ERRORS * error, np.isfinite(values), drawn)
     # Several starts may lie on different motions, which no line should join.
-    lonely = np.isfinite(whole)
-    if not several_starts:
-        beside = np.pad(lonely, 1)
-        lonely = lonely & ~(beside[2:] | beside[:-2])
-    drawn = outermost(lanes, whole)
-    x, exponent, reach, alone = (a[drawn] for a in (lanes.parameter, whole, spread, lonely))
-    joined = np.where(alone, np.nan, exponent)
+    if found.several_starts:
+        return found
+    beside = np.pad(found.finite, 1)
+    return found._replace(isolated=found.finite & ~(beside[2:] | beside[:-2]))
 
+
+def _draw_exponents(
+    axes: Axes, result: Result, shown: _Exponents, look: dict[str, Any]
+) -> tuple[Line2D, dict[str, Any]]:
+    """Draw line, dots, zero, positive part and uncertainty; return the line, the others by name."""
+    lanes, color = shown.lanes, look["color"]
+    arrays = lanes.parameter, shown.values, shown.spread, shown.isolated
+    x, exponent, reach, alone = (array[shown.drawn] for array in arrays)
+    joined = np.where(alone, np.nan, exponent)
     zero = axes.axhline(0.0, color=GREY, linewidth=0.5, linestyle=(0, (4, 2)), zorder=1)
-    # Colours are those of the stages behind; what is said of an exponent is black and grey.
-    look: dict[str, Any] = {"where": joined > 0.0, "interpolate": True, "hatch": "////"}
-    positive = axes.fill_between(x, 0.0, joined, fc="none", ec=GREY, lw=0.0, **look)
+    # Colours are left to the stages behind: hatching and uncertainty are grey.
+    fill: dict[str, Any] = {"where": joined > 0.0, "interpolate": True, "hatch": "////"}
+    positive = axes.fill_between(x, 0.0, joined, fc="none", ec=GREY, lw=0.0, **fill)
     pale: Any = 0.6 + 0.4 * np.array(to_rgb(color))
-    look = {"color": pale, "lw": 0.0, "label": "\N{PLUS-MINUS SIGN}2 standard errors"}
-    band = axes.fill_between(x, joined - reach, joined + reach, **look)
+    fill = {"color": pale, "lw": 0.0, "label": "\N{PLUS-MINUS SIGN}2 standard errors"}
+    band = axes.fill_between(x, joined - reach, joined + reach, **fill)
     ends = (exponent - reach)[alone], (exponent + reach)[alone]
     bars = axes.vlines(x[alone], *ends, colors=pale, lw=0.6)
-    line_style = "none" if several_starts and alone.any() else "-"
-    (line,) = axes.plot(x, exponent, ls=line_style, lw=0.6, color=color, label=label)
-    look = {"markersize": lanes.dot_size(1.0), "color": color, "marker": marker}
-    points = dots(axes, lanes._replace(diverged=~lonely), stored[:, np.newaxis], **look)
-    named: list[Artist] = [band] if (spread[np.isfinite(whole)] > 0.0).any() else []
-    if RECORD in result and (mixed := result.lanes(RECORD)[lanes.numbers][drawn] == 1).any():
-        # Orbits that were reached within the record.
-        look = {"ms": 3.0, "mfc": "none", "mew": 0.5, "color": VERMILION}
-        named += axes.plot(x[mixed], exponent[mixed], "o", label="came from another motion", **look)
-    axes.set_ylabel(axis_label(result, LARGEST_EXPONENT, line_length=20))
-    parts = {"dots": points, "band": band, "bars": bars, "positive": positive, "zero": zero}
-    own = Diagram(line, lanes, whole, whole, np.nan_to_num(spread), named, parts)
-    return close_panel(axes, result, own, hold_zero=True)
+    line_style = "none" if shown.several_starts and alone.any() else "-"
+    (line,) = axes.plot(x, exponent, ls=line_style, lw=0.6, color=color, label=look["label"])
+    rows = result.lanes(LARGEST_EXPONENT)[:, np.newaxis]
+    dot = {"markersize": lanes.dot_size(1.0), "color": color, "marker": look["marker"]}
+    points = dots(axes, lanes._replace(diverged=~shown.isolated), rows, **dot)
+    return line, {"dots": points, "band": band, "bars": bars, "positive": positive, "zero": zero}
+
+
+def _circle_mixed(axes: Axes, result: Result, shown: _Exponents) -> list[Line2D]:
+    """Circle the exponents of lanes that reached their orbit within the record."""
+    if RECORD not in result:
+        return []
+    mixed = result.lanes(RECORD)[shown.lanes.numbers][shown.drawn] == 1
+    if not mixed.any():
+        return []
+    x, exponent = (array[shown.drawn][mixed] for array in (shown.lanes.parameter, shown.values))
+    look: dict[str, Any] = {"ms": 3.0, "mfc": "none", "mew": 0.5, "color": VERMILION}
+    return axes.plot(x, exponent, "o", label="came from another motion", **look)
 
 
 def waterfall(axes: Axes, result: Result, variable: str, *, between: Between = (None, None)) -> Any:
