@@ -192,7 +192,7 @@ def _draw_exponents(
 
 
 def _circle_mixed(axes: Axes, result: Result, shown: _Exponents) -> list[Line2D]:
-    """Circle the exponents of lanes that reached their orbit within the record."""
+    """Circle the exponents of lanes whose record begins on another motion than the labelled one."""
     if RECORD not in result:
         return []
     mixed = result.lanes(RECORD)[shown.lanes.numbers][shown.drawn] == 1

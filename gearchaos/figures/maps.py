@@ -1,7 +1,7 @@
 """Maps over two swept parameters: motion and period, exponent, contact, or any number of a lane."""
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, NamedTuple
 
 import matplotlib as mpl
 import numpy as np
@@ -14,7 +14,7 @@ from matplotlib.path import Path
 from matplotlib.ticker import MaxNLocator
 from matplotlib.transforms import offset_copy
 
-from gearchaos.arrays import Array, Floats, Mask
+from gearchaos.arrays import Array, Floats, Integers, Mask
 from gearchaos.errors import FigureError
 from gearchaos.figures.labels import axis_label, check_variable, in_words, legend_title
 from gearchaos.figures.lanes import Between, cell_edges, map_axes, select_lanes
@@ -54,59 +54,104 @@ def parameter_map(
 ) -> ScalarMappable:
     """Draw one variable of the lanes as a map over two swept parameters into axes.
 
-    Each lane is a cell that reaches halfway to its neighbours. The motion is drawn with its period,
-    in the colours and hatches that diagrams have for them, an exponent in colours that part at
-    zero. Lanes without a number are grey or hatched, and the legend says why. The cells are an
-    image, so that a PDF stays small.
+    Parameters
+    ----------
+    axes : Axes
+        The axes to draw into.
+    result : Result
+        A result over two swept parameters, the first one along x, with one lane per pair of values.
+    variable : str
+        "motion", another variable with flags, or a variable with one number per lane.
+    between : (float or None, float or None)
+        Part of the first parameter's range to show; None is the end of the sweep.
 
-    ``result``: over two swept parameters, the first one along x, with one lane for each pair of
-    values; ``variable``: "motion", any other variable with flags, or one with a number for each
-    lane; ``between``: the part of the first parameter's range to show. Returns the image. Its array
-    has the shape (values of the second parameter, values shown of the first), with the number of
-    the kind where there are kinds, masked where there is none. Raises FigureError if the result has
-    no such variable, no lane in the range, or other axes than two parameters; FileError if the
-    motion is wanted and the result has no labels.
+    Returns
+    -------
+    ScalarMappable
+        The image. Its array has shape (values of the second parameter, shown values of the first).
+        It holds the numbers of the kinds, or numbers that are masked where a lane has none.
+
+    Raises
+    ------
+    FigureError
+        If the variable is missing, no lane is in the range, or the axes are not two parameters.
+    FileError
+        If the motion is requested and the result has no labels.
+
+    Notes
+    -----
+    Each lane is a cell that ends halfway to its neighbours. The motion has the colours and hatches
+    of the diagrams; exponents have colours that part at zero. Lanes without a number are grey or
+    hatched, and the legend gives the reason. The cells are an image, so that a PDF stays small.
     """
-    x_axis, y_axis = map_axes(result)
-    lanes, y = select_lanes(result, between), np.asarray(result[y_axis], dtype=np.float64)
-    x = lanes.parameter[:: y.size]
-    edges = cell_edges(x), cell_edges(y)
-
-    def cells(values: Array) -> Array:
-        return values.ravel()[lanes.numbers].reshape(x.size, y.size).T
-
-    image: ScalarMappable
-    of_lanes = [one.name for one in result.variables.values() if one.dims == result.axes]
-    if variable not in LABELS:
-        check_variable(variable, of_lanes, "of each lane")
-    if variable in LABELS or result.variables[variable].flags:
-        kinds, looks = _kinds(result, variable)
-        numbers = cells(kinds)
-        colours = ListedColormap([look["facecolor"] for look in looks.values()])
-        image = axes.pcolorfast(*edges, numbers, cmap=colours, vmin=-0.5, vmax=len(looks) - 0.5)
-        masks = {name: numbers == number for number, name in enumerate(looks)}
-    else:
-        numbers = cells(result[variable].astype(np.float64))
-        numbers[(numbers == result.variables[variable].fill_value) | np.isinf(numbers)] = np.nan
-        image = _number_cells(axes, edges, numbers, variable == LARGEST_EXPONENT)
-        none, ended = np.isnan(numbers), cells(result[STATUS]) != 0
-        masks = {"diverged": none & ended, NO_VALUE: none & ~ended}
-        looks = {name: look_of(name) for name in masks}
-    seen = {name: mask for name, mask in masks.items() if mask.any()}
-    for name, mask in seen.items():
+    grid = _grid(result, between)
+    image, masks, looks = _draw_cells(axes, result, variable, grid)
+    seen = [name for name, mask in masks.items() if mask.any()]
+    for name in seen:
         if looks[name].get("hatch"):
-            # As a patch, each of its corners would be asked for the limits.
-            axes.add_artist(PathPatch(_outline(mask, *edges), linewidth=0.0, **looks[name]))
-    if type(image) is AxesImage:
-        # A PDF then has the cells themselves, not the pixels that they would be on paper.
-        image.set_interpolation("none")
-    low, high = between
-    axes.set_xlim(edges[0][0] if low is None else low, edges[0][-1] if high is None else high)
-    axes.set_ylim(edges[1][0], edges[1][-1])
-    axes.set(xlabel=axis_label(result, x_axis), ylabel=axis_label(result, y_axis))
+            # As a patch, each corner would be a candidate for the limits of the axes.
+            outline = _outline(masks[name], *grid.edges)
+            axes.add_artist(PathPatch(outline, linewidth=0.0, **looks[name]))
+    _set_map_axes(axes, result, grid, between)
     _legend(axes, [Patch(linewidth=0.3, label=name, **looks[name]) for name in seen])
     _title(axes, _name(result, variable), _rows(axes))
     return image
+
+
+class _Grid(NamedTuple):
+    """Cells of a map: lane numbers (rows, columns), and the edges of the cells along x and y."""
+
+    numbers: Integers
+    edges: tuple[Floats, Floats]
+
+    def cells(self, values: Array) -> Array:
+        """Arrange values of all lanes as cells, shape (rows, columns)."""
+        return values.ravel()[self.numbers]
+
+
+def _grid(result: Result, between: Between) -> _Grid:
+    """Arrange the lanes in a range of the first parameter as cells."""
+    _, y_axis = map_axes(result)
+    lanes, y = select_lanes(result, between), np.asarray(result[y_axis], dtype=np.float64)
+    x = lanes.parameter[:: y.size]
+    return _Grid(lanes.numbers.reshape(x.size, y.size).T, (cell_edges(x), cell_edges(y)))
+
+
+def _draw_cells(
+    axes: Axes, result: Result, variable: str, grid: _Grid
+) -> tuple[ScalarMappable, dict[str, Mask], dict[str, dict[str, Any]]]:
+    """Draw the image of the cells; return it, and mask and look of each legend entry by name."""
+    of_lanes = [one.name for one in result.variables.values() if one.dims == result.axes]
+    if variable not in LABELS:
+        check_variable(variable, of_lanes, "of each lane")
+    image: ScalarMappable
+    if variable in LABELS or result.variables[variable].flags:
+        kinds, looks = _kinds(result, variable)
+        numbers = grid.cells(kinds)
+        colours = ListedColormap([look["facecolor"] for look in looks.values()])
+        ends: Any = {"vmin": -0.5, "vmax": len(looks) - 0.5}
+        image = axes.pcolorfast(*grid.edges, numbers, cmap=colours, **ends)
+        masks = {name: numbers == number for number, name in enumerate(looks)}
+    else:
+        numbers = grid.cells(result[variable].astype(np.float64))
+        numbers[(numbers == result.variables[variable].fill_value) | np.isinf(numbers)] = np.nan
+        image = _number_cells(axes, grid.edges, numbers, variable == LARGEST_EXPONENT)
+        none, ended = np.isnan(numbers), grid.cells(result[STATUS]) != 0
+        masks = {"diverged": none & ended, NO_VALUE: none & ~ended}
+        looks = {name: look_of(name) for name in masks}
+    if type(image) is AxesImage:
+        # A PDF then holds the cells themselves, not the pixels they cover on paper.
+        image.set_interpolation("none")
+    return image, masks, looks
+
+
+def _set_map_axes(axes: Axes, result: Result, grid: _Grid, between: Between) -> None:
+    """Set limits and labels of the axes of a map."""
+    x_axis, y_axis = map_axes(result)
+    (x, y), (low, high) = grid.edges, between
+    axes.set_xlim(x[0] if low is None else low, x[-1] if high is None else high)
+    axes.set_ylim(y[0], y[-1])
+    axes.set(xlabel=axis_label(result, x_axis), ylabel=axis_label(result, y_axis))
 
 
 def map_page(
