@@ -2,7 +2,7 @@
 
 from contextlib import suppress
 from math import ceil, log10
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -21,21 +21,22 @@ from gearchaos.outputs.names import TIME, acceleration_of
 from gearchaos.results.reading.excitation import Excitation, excitation_of
 from gearchaos.results.reading.result import Result
 
-SIDE_BY_SIDE_MM = 120.0  # Width from which on two panels stand side by side.
+SIDE_BY_SIDE_MM = 120.0  # Least width of a page with two panels side by side.
 SHOWN_PERIODS = 12  # Mesh periods at the end of the record that the time history shows.
-
-_PANEL_HEIGHT_MM = 52.0
 
 SHOWN_REVOLUTIONS = 2
 """Revolutions of the driving gear at the end of the record that the time histories show."""
 
-HIGHEST_ORDER = 3.5  # Multiple of the mesh order up to which the spectrum goes.
+HIGHEST_ORDER = 3.5  # Highest mesh order of the spectrum where teeth have errors of their own.
 
-MOST_TICKS = 120
+MOST_TICKS = 120  # Most minor ticks of an axis.
+
+_PANEL_HEIGHT_MM = 52.0
 
 _HEIGHTS_MM = {"e": 32.0, "h": 48.0, "p": 56.0, "s": 56.0, "f": 56.0}
-"""Of the panels of error, history, portrait, section and frequencies."""
+"""Heights of the panels of pitch error, history, portrait, section and spectrum."""
 
+# Colour and width of lines of the spectrum: other, driven shaft, driving shaft, mesh.
 _LOOKS = (("0.65", 0.4), (BLUE, 0.9), (VERMILION, 0.9), (BLACK, 0.9))
 
 
@@ -49,89 +50,151 @@ def response_page(
 ) -> Page:
     """Draw time history (a), phase portrait (b), Poincare section (c) and spectrum (d) of a lane.
 
-    The spectrum is that of the acceleration: of a motion that repeats with a rectangular window, of
-    any other with that of Hann. Where teeth have errors of their own, the page begins with the
-    pitch error, in um where b' is known, over revolutions of the driving gear, and points once a
-    mesh period stand behind those of the section.
+    Parameters
+    ----------
+    result, lane
+        As for `time_history`.
+    coordinate : str, optional
+        Such as ``"delta_1"``; by default ``"delta_5"``, the torsion. Another variable over time,
+        such as ``"mesh_force_tangential"``, gives time history and spectrum only.
+    width_mm, height_mm : float
+        Size of the page. Below 120 mm, as in one column of a journal, the panels are stacked.
 
-    ``result``, ``lane`` and errors: as for `time_history`; ``coordinate``: such as ``"delta_1"``,
-    by default ``"delta_5"``, the torsion. Of what is no coordinate, such as
-    ``"mesh_force_tangential"``, the page has the time history and its own spectrum. ``width_mm``,
-    ``height_mm``: size of the page; 180 mm is two columns of a journal, and at 85 mm, one column,
-    the panels stand one above the other.
+    Returns
+    -------
+    Page
+        A figure unknown to pyplot.
+
+    Raises
+    ------
+    FigureError
+        As for `time_history`.
+
+    Notes
+    -----
+    The spectrum is that of the acceleration: with a rectangular window if the motion repeats, with
+    a Hann window otherwise. Where each tooth has its own error, the page begins with the pitch
+    error over revolutions of the driving gear, in um where b' is known. The section then also shows
+    the points once a mesh period.
     """
-    coordinate = response.COORDINATE if coordinate is None else coordinate
-    response.motion_of(result, lane, coordinate)
-    whole, side_by_side = coordinate in response.coordinates_of(result), width_mm >= SIDE_BY_SIDE_MM
-    excitation, last = excitation_of(result.metadata), float(result[TIME][-1])
-    teeth = excitation.driving_teeth if excitation.of_teeth else 0
-    shown = (max(0.0, last - (SHOWN_REVOLUTIONS * teeth or SHOWN_PERIODS)), last)
-    layout = ("hp;sf" if whole else "hf") if side_by_side else ("h;p;s;f" if whole else "h;f")
-    heights = [_PANEL_HEIGHT_MM] * (layout.count(";") + 1)
-    if teeth:
-        with suppress(ConfigurationError):
-            result = result.physical(MESH_ERROR)
-        layout = ("ee;hh;ps;ff" if side_by_side else "e;h;p;s;f") if whole else "e;h;f"
-        heights = [_HEIGHTS_MM[row[0]] for row in layout.split(";")]
+    motion = _motion(result, lane, response.COORDINATE if coordinate is None else coordinate)
+    layout, heights = _layout(motion, width_mm >= SIDE_BY_SIDE_MM)
     with page(width_mm, height_mm or sum(heights)) as figure:
         panels = figure.subplot_mosaic(layout, height_ratios=heights)
-        history, spectrum = panels["h"], panels["f"]
-        response.time_history(history, result, lane, coordinate, between=shown)
-        if coordinate.startswith(MESH_FORCE):
-            response.contact_strip(history, result, lane, coordinate)
-        few_ticks(history, None if teeth else 6, 6)
-        remark(panels["e" if teeth else "h"], in_words(result, place_of(result, lane)))
-        foot = [form_in_words(result)]
-        if whole:
-            curve, _ = response.phase_portrait(panels["p"], result, lane, coordinate)
-            points = response.poincare_section(panels["s"], result, lane, coordinate)
-            late = f", black: last {SHOWN_REVOLUTIONS} revolutions" if teeth and shown[0] else ""
-            remark(panels["p"], f"last {round(last)} mesh periods{late}")
-            if teeth:
-                repeats, n = response.repeats_after(result, lane), excitation.excitation_period
-                period = f"period {repeats // n} of the excitation, {repeats} mesh periods"
-                remark(panels["s"], period if repeats else "")
-                late_curve = np.array(curve.get_data())[:, result[TIME] >= shown[0]]
-                panels["p"].plot(*late_curve, "k", linewidth=0.4)
-                curve.set(color="0.85", linewidth=0.3, zorder=1, rasterized=True)
-                foot.append("points once a mesh period (grey) and once an excitation period (red)")
-            else:
-                # A lane may have come to rest on its orbit within the longer of the two records.
-                remark(panels["s"], f"last {np.size(points.get_xdata())} mesh periods")
-            for name in "ps":
-                few_ticks(panels[name], 6, 6)
-        variable = acceleration_of(coordinate) if whole else coordinate
-        look: dict[str, Any] = {"highest": HIGHEST_ORDER} if teeth else {}
-        lines = response.amplitude_spectrum(spectrum, result, lane, variable, **look)
-        if teeth:
-            _pitch_error_above(panels["e"], history, result, lane, excitation)
-            resolved = round(last) >= excitation.excitation_period
-            _in_shaft_orders(spectrum, lines, excitation, resolved)
+        _draw_panels(panels, motion)
         letter(panels.values())
+        foot = [form_in_words(result)]
+        if motion.whole and motion.teeth:
+            foot.append("points once a mesh period (grey) and once an excitation period (red)")
         footnote(figure, "\n".join(filter(None, foot)))
         figure.align_ylabels([*panels.values()])
     return figure
 
 
-def _pitch_error_above(
-    top: Axes, history: Axes, result: Result, lane: int, excitation: Excitation
-) -> None:
-    """Draw the pitch error over the time history, and let both count revolutions.
+class _Motion(NamedTuple):
+    """The motion of one lane on a page.
 
-    Of the driving gear, with ticks for its teeth. A record ends where tooth 0 comes into mesh
-    again, at the last of the shown revolutions.
+    ``whole``: whether the variable is a coordinate, with velocity and acceleration; ``teeth``: of
+    the driving gear, 0 if the teeth have no errors of their own; ``shown``: first and last mesh
+    period of the time histories.
     """
-    response.time_history(top, result, lane, MESH_ERROR, between=history.get_xlim())
+
+    result: Result
+    lane: int
+    variable: str
+    whole: bool
+    teeth: int
+    excitation: Excitation
+    shown: tuple[float, float]
+
+
+def _motion(result: Result, lane: int, variable: str) -> _Motion:
+    """Check that the lane has the variable, and choose which periods to show."""
+    response.motion_of(result, lane, variable)
+    whole = variable in response.coordinates_of(result)
+    excitation, last = excitation_of(result.metadata), float(result[TIME][-1])
+    teeth = excitation.driving_teeth if excitation.of_teeth else 0
+    shown = (max(0.0, last - (SHOWN_REVOLUTIONS * teeth or SHOWN_PERIODS)), last)
+    if teeth:
+        with suppress(ConfigurationError):
+            result = result.physical(MESH_ERROR)
+    return _Motion(result, lane, variable, whole, teeth, excitation, shown)
+
+
+def _layout(motion: _Motion, side_by_side: bool) -> tuple[str, list[float]]:
+    """Return the mosaic of the panels, named as in `_HEIGHTS_MM`, and the heights of its rows."""
+    if motion.teeth:
+        whole = "ee;hh;ps;ff" if side_by_side else "e;h;p;s;f"
+        layout = whole if motion.whole else "e;h;f"
+        return layout, [_HEIGHTS_MM[row[0]] for row in layout.split(";")]
+    if side_by_side:
+        layout = "hp;sf" if motion.whole else "hf"
+    else:
+        layout = "h;p;s;f" if motion.whole else "h;f"
+    return layout, [_PANEL_HEIGHT_MM] * (layout.count(";") + 1)
+
+
+def _draw_panels(panels: dict[str, Axes], motion: _Motion) -> None:
+    """Draw all panels, those for teeth with errors of their own over orders of the shafts."""
+    result, lane, variable = motion.result, motion.lane, motion.variable
+    history = panels["h"]
+    response.time_history(history, result, lane, variable, between=motion.shown)
+    if variable.startswith(MESH_FORCE):
+        response.contact_strip(history, result, lane, variable)
+    few_ticks(history, None if motion.teeth else 6, 6)
+    remark(panels["e" if motion.teeth else "h"], in_words(result, place_of(result, lane)))
+    if motion.whole:
+        _draw_phase_plane(panels["p"], panels["s"], motion)
+    transformed = acceleration_of(variable) if motion.whole else variable
+    look: dict[str, Any] = {"highest": HIGHEST_ORDER} if motion.teeth else {}
+    lines = response.amplitude_spectrum(panels["f"], result, lane, transformed, **look)
+    if motion.teeth:
+        _pitch_error_above(panels["e"], history, motion)
+        resolved = round(motion.shown[1]) >= motion.excitation.excitation_period
+        _in_shaft_orders(panels["f"], lines, motion.excitation, resolved)
+
+
+def _draw_phase_plane(portrait: Axes, section: Axes, motion: _Motion) -> None:
+    """Draw phase portrait and Poincare section, and remark how long their records are."""
+    result, lane = motion.result, motion.lane
+    curve, _ = response.phase_portrait(portrait, result, lane, motion.variable)
+    points = response.poincare_section(section, result, lane, motion.variable)
+    first, last = motion.shown
+    late = f", black: last {SHOWN_REVOLUTIONS} revolutions" if motion.teeth and first else ""
+    remark(portrait, f"last {round(last)} mesh periods{late}")
+    if motion.teeth:
+        repeats = response.repeats_after(result, lane)
+        number = repeats // motion.excitation.excitation_period
+        period = f"period {number} of the excitation, {repeats} mesh periods"
+        remark(section, period if repeats else "")
+        late_curve = np.array(curve.get_data())[:, result[TIME] >= first]
+        portrait.plot(*late_curve, "k", linewidth=0.4)
+        curve.set(color="0.85", linewidth=0.3, zorder=1, rasterized=True)
+    else:
+        # The section may be longer than the history: the lane may converge in between.
+        remark(section, f"last {np.size(points.get_xdata())} mesh periods")
+    for axes in (portrait, section):
+        few_ticks(axes, 6, 6)
+
+
+def _pitch_error_above(top: Axes, history: Axes, motion: _Motion) -> None:
+    """Draw the pitch error above the time history, both over revolutions of the driving gear.
+
+    Minor ticks mark its teeth. A record ends where tooth 0 meshes again, at the end of the last
+    revolution.
+    """
+    between = history.get_xlim()
+    response.time_history(top, motion.result, motion.lane, MESH_ERROR, between=between)
     top.sharex(history)
     few_ticks(top, None, 4)
-    teeth = excitation.driving_teeth
+    teeth = motion.teeth
     begin = float(history.get_xlim()[1]) - SHOWN_REVOLUTIONS * teeth
     for axes in (top, history):
         every = _ticks(axes.xaxis, teeth / 2, 1.0, begin)
         axes.xaxis.set_major_formatter(lambda x, _: f"{(x - begin) / teeth:.3g}")
     ticks = "a tick for each tooth" if every == 1 else f"a tick every {every} teeth"
     history.set_xlabel(f"Revolutions of the driving gear, {ticks}")
-    remark(history, f"excitation period: {excitation.excitation_period} mesh periods")
+    remark(history, f"excitation period: {motion.excitation.excitation_period} mesh periods")
     top.set_xlabel("")
     top.tick_params(labelbottom=False)
 
@@ -139,18 +202,18 @@ def _pitch_error_above(
 def _in_shaft_orders(
     axes: Axes, lines: LineCollection, excitation: Excitation, resolved: bool
 ) -> None:
-    """Let a spectrum over mesh orders count those of the driving shaft, and colour its lines.
+    """Label a spectrum with orders of the driving shaft, and colour its lines by shaft.
 
-    Ticks with a number are multiples of the mesh order, those between them sidebands of the driving
-    shaft. A line has the colour of the shaft whose multiple it is, and is pale where it is that of
-    neither, or of a record that does not hold a period of the excitation and resolves none.
+    Major ticks are multiples of the mesh order, minor ticks the sidebands of the driving shaft. A
+    line at a multiple of a shaft's order has the colour of that shaft. Other lines are pale, and so
+    are all but those of the mesh if the record is shorter than an excitation period.
     """
     period, driving, driven = excitation
     segments = np.array(lines.get_segments())
     multiples = segments[:, :1, 0] * np.array([driven, driving, 1])
     near = np.abs(multiples - np.rint(multiples)) < 1e-6
-    # The last column that holds decides: the mesh is a multiple of both shafts. A gear without
-    # errors has none in the period.
+    # The last match decides, since a mesh order is a multiple of both shafts' orders. A gear
+    # without errors does not contribute to the excitation period.
     shafts = [resolved and period % teeth == 0 for teeth in (driven, driving)]
     kind = np.max(near * [shafts[0], 2 * shafts[1], 3], axis=1)
     at = np.argsort(kind, kind="stable")
@@ -173,7 +236,7 @@ def _in_shaft_orders(
 
 
 def _ticks(axis: Axis, coarse: float, fine: float, begin: float = 0.0) -> int:
-    """Set ticks at multiples of both, fine ones at every one, tenth or hundredth, as returned."""
+    """Set major and minor ticks; minor ones are thinned by the power of ten that is returned."""
     low, high = axis.get_view_interval()
     every = 10 ** max(0, ceil(log10((high - low) / fine / MOST_TICKS)))
     axis.set_major_locator(MultipleLocator(coarse, begin))
