@@ -54,12 +54,12 @@ def _explore(options: ExploreOptions) -> None:
     import gearchaos_kernels  # noqa: F401
 
     panel, *_ = (needed(package, "explore") for package in PACKAGES)
-    from gearchaos.explorer.page import Page
+    from gearchaos.explorer.page import ExplorerPage
     from gearchaos.explorer.policy import origins, protect
 
     panel.extension()
     server = panel.io.server.get_server(
-        lambda: Page(result, options.result, _draw).view(),
+        lambda: ExplorerPage(result, options.result, _draw).view(),
         port=port,
         address=HOST,
         websocket_origin=origins(port),

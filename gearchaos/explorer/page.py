@@ -35,7 +35,7 @@ WIDE = {"sizing_mode": "stretch_width"}
 HALF = {"flex": "1 1 560px", "min-width": "0"}  # Side by side where the window is wide enough.
 
 
-class Page:
+class ExplorerPage:
     """What a visitor sees of a result, whose file is ``path``.
 
     ``draw`` runs the command `plot` with its arguments, and raises FigureError if that fails.

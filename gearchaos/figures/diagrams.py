@@ -16,7 +16,7 @@ from gearchaos.figures.labels import axis_label, check_variable
 from gearchaos.figures.lanes import (
     MOST_DOTS,
     Between,
-    Lanes,
+    ShownLanes,
     cell_edges,
     diagram_lanes,
     dots,
@@ -132,7 +132,7 @@ class _Exponents(NamedTuple):
     no line joins the exponent to a neighbour; ``drawn``: numbers of the lanes to draw.
     """
 
-    lanes: Lanes
+    lanes: ShownLanes
     values: Floats
     spread: Floats
     isolated: Mask

@@ -27,7 +27,7 @@ MOST_DOTS = 1 << 18
 """More points are counted: a panel of one column has about as many pixels at 300 dpi."""
 
 
-class Lanes(NamedTuple):
+class ShownLanes(NamedTuple):
     """Lanes in ascending order of the swept parameter, and the ends of its axis.
 
     ``numbers`` (lanes,) among all lanes of the result, its axes flattened; ``parameter`` (lanes,);
@@ -49,7 +49,7 @@ def swept_axes(result: Result) -> list[str]:
     return [axis for axis in result.axes if axis not in UNSWEPT]
 
 
-def diagram_lanes(result: Result, between: Between = (None, None)) -> Lanes:
+def diagram_lanes(result: Result, between: Between = (None, None)) -> ShownLanes:
     """Select the lanes of a diagram, as `select_lanes`, and refuse two swept parameters."""
     swept = swept_axes(result)
     if len(swept) > 1:
@@ -77,7 +77,7 @@ def map_axes(result: Result) -> tuple[str, str]:
     return swept[1], swept[0]
 
 
-def select_lanes(result: Result, between: Between = (None, None)) -> Lanes:
+def select_lanes(result: Result, between: Between = (None, None)) -> ShownLanes:
     """Select lanes by the swept parameter: its lowest and highest value, both included.
 
     None: as far as the sweep goes. Raises FigureError if no lane lies in between.
@@ -101,7 +101,7 @@ def select_lanes(result: Result, between: Between = (None, None)) -> Lanes:
     if left >= right:
         pad = abs(left) * PAD or 0.5
         left, right = left - pad, right + pad
-    return Lanes(numbers, parameter, diverged, (left, right))
+    return ShownLanes(numbers, parameter, diverged, (left, right))
 
 
 def cell_edges(values: Floats) -> Floats:
@@ -125,7 +125,7 @@ def columns(parameter: Floats, limits: tuple[float, float]) -> Integers:
     return np.flatnonzero(np.diff(number, prepend=-1.0))
 
 
-def outermost(lanes: Lanes, values: Floats) -> Integers:
+def outermost(lanes: ShownLanes, values: Floats) -> Integers:
     """Return which lanes have the lowest or the highest value of their column, or none in a gap."""
     first = columns(lanes.parameter, lanes.limits)
     sizes = np.diff(first, append=values.size)
@@ -135,7 +135,7 @@ def outermost(lanes: Lanes, values: Floats) -> Integers:
     return np.flatnonzero(shown)
 
 
-def dots(axes: Axes, lanes: Lanes, rows: Floats, **look: Any) -> Line2D:
+def dots(axes: Axes, lanes: ShownLanes, rows: Floats, **look: Any) -> Line2D:
     """Draw the points of lanes as dots, those that diverged left out.
 
     Up to `MOST_DOTS` they are a line without a stroke; more of them look the same, as `DenseDots`.
@@ -150,7 +150,7 @@ def dots(axes: Axes, lanes: Lanes, rows: Floats, **look: Any) -> Line2D:
     return axes.plot(x[finite], values[finite], **look)[0]
 
 
-def portions(lanes: Lanes, rows: Floats) -> Iterator[tuple[slice, Floats]]:
+def portions(lanes: ShownLanes, rows: Floats) -> Iterator[tuple[slice, Floats]]:
     """Give the rows of lanes, at most `MOST_DOTS` points at once.
 
     Of diverged lanes, and where they are not finite, they are not a number.
@@ -172,7 +172,7 @@ class DenseDots(Line2D):
     that the dots would give them, in memory and time that hardly depend on their number.
     """
 
-    def __init__(self, lanes: Lanes, rows: Floats, **look: Any) -> None:
+    def __init__(self, lanes: ShownLanes, rows: Floats, **look: Any) -> None:
         super().__init__([], [], **look | {"rasterized": True})
         self._points = lanes, rows
 
@@ -210,7 +210,7 @@ class DenseDots(Line2D):
         return np.asarray(paper.buffer_rgba())[::-1, :, 3] * min(alpha, 1.0 - 1e-6) / 255.0
 
 
-def counts(axes: Axes, lanes: Lanes, rows: Floats, margin: int = 0) -> NDArray[np.uint32]:
+def counts(axes: Axes, lanes: ShownLanes, rows: Floats, margin: int = 0) -> NDArray[np.uint32]:
     """Count the points in each pixel of the axes and of a margin around them, from the bottom.
 
     Returns an array of shape (rows, columns) of pixels; a point lies in that pixel which a marker

@@ -12,7 +12,7 @@ from matplotlib.lines import Line2D
 
 from gearchaos.arrays import Floats
 from gearchaos.figures.labels import axis_label, short
-from gearchaos.figures.lanes import Lanes, columns
+from gearchaos.figures.lanes import ShownLanes, columns
 from gearchaos.figures.style import BLACK, GREY, LEGEND, VERMILION
 from gearchaos.results.reading.result import Result
 
@@ -35,7 +35,7 @@ class Diagram:
     """
 
     points: Line2D
-    lanes: Lanes
+    lanes: ShownLanes
     low: Floats
     high: Floats
     spread: Floats | float = 0.0

@@ -7,7 +7,13 @@ import numpy as np
 
 from gearchaos.arrays import Floats, Mask
 from gearchaos.identification.evaluation import Records
-from gearchaos.identification.targets import Exponent, Increment, Place, Stage, Targets
+from gearchaos.identification.targets import (
+    Exponent,
+    Increment,
+    ObservedPlace,
+    ObservedStage,
+    Targets,
+)
 from gearchaos.results.reading.jumps import jump_sizes
 
 GROWTH = 1.2  # Least factor by which the section of a chaotic motion grows where there is a crisis.
@@ -37,7 +43,7 @@ class Observation:
         return np.clip(np.where(np.isnan(off), self.missing, off), -self.missing, self.missing)
 
 
-def stage_length(stage: Stage) -> Observation:
+def stage_length(stage: ObservedStage) -> Observation:
     """Over which length of a stage the motion is another one; none is wanted.
 
     The stage is cut into cells, small ones at its ends, each judged by the lane in its middle.
@@ -55,7 +61,7 @@ def stage_length(stage: Stage) -> Observation:
     return Observation(name, 0.0, stage.width, values, computed, length / stage.width)
 
 
-def change_place(kind: str, place: Place) -> Observation:
+def change_place(kind: str, place: ObservedPlace) -> Observation:
     """Where the sweep has a change of this kind, a jump or a crisis: in the middle of two lanes."""
     low, high = place.within
     above, below = (

@@ -9,7 +9,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 from gearchaos.arrays import Floats
 from gearchaos.identification.flat_directions import ONE_UNIT, directions_at, distinct
 from gearchaos.identification.loading import Problem
-from gearchaos.identification.search import STEPS_ALONE, answers_of, shares
+from gearchaos.identification.search import STEPS_ALONE, answers_of, budget_of
 from gearchaos.identification.tried import Tried
 from gearchaos.models.gear_pair.group_table import SWEEPABLE_GROUPS
 
@@ -100,7 +100,7 @@ def _counted(observations: int, unknowns: int) -> str:
 
 def _moved(problem: Problem, tried: Tried, points: Floats, keys: list[str]) -> Iterator[str]:
     """Word how far the parameters can move, alone and together."""
-    rungs = shares(problem.targets.search, len(keys)).rungs
+    rungs = budget_of(problem.targets.search, len(keys)).rungs
     found = reach(tried, rungs)
     yield "how far each can move before the misfit grows by one, alone and with the others:"
     yield _row("", ["alone from", "to", "all from", "to"])

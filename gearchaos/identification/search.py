@@ -43,7 +43,7 @@ MOST_CENTRES = 5
 LANES_AT_ONCE = 2**13  # Lanes of one batch: enough for all threads, and little memory.
 
 
-class Shares(NamedTuple):
+class Budget(NamedTuple):
     """How the candidates of a search are shared out.
 
     ``bred``: those of CMA-ES; ``last``: those that tell how far the best set can move, by
@@ -60,7 +60,7 @@ class Shares(NamedTuple):
         return self.rungs > 0
 
 
-def shares(search: Search, parameters: int) -> Shares:
+def budget_of(search: Search, parameters: int) -> Budget:
     """Share out the candidates of a search with so many parameters.
 
     A third of those that are not drawn, at most, is left for the surroundings of the best set: two
@@ -70,8 +70,8 @@ def shares(search: Search, parameters: int) -> Shares:
     last = min(others // 3, 2 * MOST_CENTRES * (1 + 2 * RUNGS * parameters))
     rungs = min(RUNGS, (2 * last // 5 - 1) // (2 * parameters))
     if rungs < FEWEST_RUNGS:
-        return Shares(others, 0, 0)
-    return Shares(others - last, last, rungs)
+        return Budget(others, 0, 0)
+    return Budget(others - last, last, rungs)
 
 
 def judge(problem: Problem, run: int, parameters: dict[str, Floats]) -> Tried:
@@ -137,7 +137,7 @@ def proposals(search: Search, parameters: int) -> Proposals:
 
     All of them together are ``search.candidates`` at most.
     """
-    random, part = np.random.default_rng(search.seed), shares(search, parameters)
+    random, part = np.random.default_rng(search.seed), budget_of(search, parameters)
     points, answers = np.empty((0, parameters)), []
     bred = _bred(search, parameters, part.bred, random)
     asked = next(bred)
@@ -173,7 +173,7 @@ def _bred(search: Search, parameters: int, left: int, random: np.random.Generato
 
 
 def _surroundings(
-    points: Floats, answers: Floats, part: Shares, random: np.random.Generator
+    points: Floats, answers: Floats, part: Budget, random: np.random.Generator
 ) -> Proposals:
     """Yield steps away from the best candidate so far, and walks along its flat directions."""
     best, least = points[np.argmin(answers[:, 0])], float(np.min(answers[:, 0]))

@@ -10,7 +10,7 @@ from pydantic import Field, field_validator, model_validator
 from gearchaos.arrays import Floats
 from gearchaos.configuration.keys import Table, key
 
-Pair: TypeAlias = Annotated[tuple[float, float], Field(strict=False)]
+Interval: TypeAlias = Annotated[tuple[float, float], Field(strict=False)]
 Entry = TypeVar("Entry")
 Coordinate: TypeAlias = Literal["delta_5", "delta_1", "delta_2", "delta_3", "delta_4"]
 Several: TypeAlias = Annotated[tuple[Entry, ...], Field(strict=False)]
@@ -19,7 +19,7 @@ MOST_FREE = 16
 """Parameters that are free: 2^16 corners of their bounds are looked at before a search."""
 
 
-class Parameter(Table):
+class FreeParameter(Table):
     """A parameter that is free within bounds."""
 
     name: str = key("a group by its name, or the path of a physical key", example="load")
@@ -54,7 +54,7 @@ class _Observed(Table):
     width: float = key("how far off counts as one unit of misfit", example=0.05, gt=0)
 
 
-class Stage(_Observed):
+class ObservedStage(_Observed):
     """A span of the swept parameter in which the motion is of one kind."""
 
     motion: str = key(
@@ -72,11 +72,13 @@ class Stage(_Observed):
         return self
 
 
-class Place(_Observed):
+class ObservedPlace(_Observed):
     """Where the sweep jumps to another motion of the same period, or chaos grows in a crisis."""
 
     at: float = key("where, on the axis of the sweep", example=1.12)
-    within: Pair = key("the span in which it is looked for, and must be alone", example=[0.6, 2.0])
+    within: Interval = key(
+        "the span in which it is looked for, and must be alone", example=[0.6, 2.0]
+    )
 
     @model_validator(mode="after")
     def _within(self) -> Self:
@@ -128,16 +130,16 @@ class Targets(Table):
     configuration: str = key("file with all that is known, beside this one", example="pair.toml")
     set: Several[str] = key("keys of it that are replaced, as by --set", default=())
     search: Search = key("how much is tried", default=Search())
-    parameter: Several[Parameter] = key("what is free", min_length=1, max_length=MOST_FREE)
-    stage: Several[Stage] = key("observed stages", default=())
-    jump: Several[Place] = key("observed jumps", default=())
-    crisis: Several[Place] = key("observed crises", default=())
+    parameter: Several[FreeParameter] = key("what is free", min_length=1, max_length=MOST_FREE)
+    stage: Several[ObservedStage] = key("observed stages", default=())
+    jump: Several[ObservedPlace] = key("observed jumps", default=())
+    crisis: Several[ObservedPlace] = key("observed crises", default=())
     exponent: Several[Exponent] = key("observed exponents", default=())
     increment: Several[Increment] = key("observed increments", default=())
 
     @field_validator("parameter")
     @classmethod
-    def _named_once(cls, given: tuple[Parameter, ...]) -> tuple[Parameter, ...]:
+    def _named_once(cls, given: tuple[FreeParameter, ...]) -> tuple[FreeParameter, ...]:
         if len({one.name for one in given}) < len(given):
             raise ValueError("names a parameter twice; name it once")
         return given

@@ -22,7 +22,7 @@ from gearchaos.models.gear_pair.derivation import Quantities
 from gearchaos.models.gear_pair.geometry import HelicalPair
 from gearchaos.outputs.names import CROSSINGS
 from gearchaos.paper.published import contact_line_stiffness, printed_coefficients, published
-from gearchaos.paper.stages import Crisis, crisis_of, lanes_as_printed
+from gearchaos.paper.stages import Widening, crisis_of, lanes_as_printed
 from gearchaos.progress import say
 from gearchaos.records.amplitude_spectrum import spectral_lines
 from gearchaos.records.period import POINTS_NEEDED
@@ -79,7 +79,7 @@ class Reproduction:
     exponents: tuple[list[float], list[float]]
     response: Result
     motions: Result
-    crisis: Crisis
+    crisis: Widening
 
     @cached_property
     def lanes(self) -> LabelledLanes:

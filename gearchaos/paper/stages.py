@@ -21,7 +21,7 @@ OUT_OF_TURN = 0.25
 """Largest share of points out of turn: half of that of a coin, below the third of a period 3."""
 
 
-class Crisis(NamedTuple):
+class Widening(NamedTuple):
     """Where a section widens at once: ``before``, the widest up to there, and ``after``, there."""
 
     value: float
@@ -29,7 +29,7 @@ class Crisis(NamedTuple):
     after: float
 
 
-def crisis_of(sweep: Result) -> Crisis:
+def crisis_of(sweep: Result) -> Widening:
     """Find the greatest growth, from a lane to the next, of the widest section so far.
 
     Among the lanes from the first motion on two bands to the first that no longer takes turns.
@@ -41,10 +41,10 @@ def crisis_of(sweep: Result) -> Crisis:
     widest = np.maximum.accumulate(np.ptp(section[first:][turning], axis=1))
     last = int(np.argmax(widest[1:] / widest[:-1]))
     place = float(lanes.values[first + last + 1])
-    return Crisis(place, float(widest[last]), float(widest[last + 1]))
+    return Widening(place, float(widest[last]), float(widest[last + 1]))
 
 
-def lanes_as_printed(result: Result, crisis: Crisis, *, strictly: bool = False) -> LabelledLanes:
+def lanes_as_printed(result: Result, crisis: Widening, *, strictly: bool = False) -> LabelledLanes:
     """Label as two bands what has more than two points, takes turns, and is as before a crisis.
 
     Narrower, that is, than the mean of the two widths of the crisis. If ``strictly``, bands that

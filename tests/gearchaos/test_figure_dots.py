@@ -8,7 +8,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from gearchaos.figures import bifurcation, lyapunov
-from gearchaos.figures.lanes import COLUMNS, MOST_DOTS, DenseDots, Lanes, counts, dots
+from gearchaos.figures.lanes import COLUMNS, MOST_DOTS, DenseDots, ShownLanes, counts, dots
 from gearchaos.outputs.variable import coordinate
 from gearchaos.results.reading.result import Result
 
@@ -25,11 +25,11 @@ def panel(dpi: int = 100):
     return axes
 
 
-def lanes_of(count: int, diverged: tuple[int, ...] = ()) -> Lanes:
+def lanes_of(count: int, diverged: tuple[int, ...] = ()) -> ShownLanes:
     out = np.zeros(count, bool)
     out[list(diverged)] = True
     # The lanes of a result may come in another order than the parameter.
-    return Lanes(np.arange(count)[::-1], np.linspace(0.0, 1.0, count), out, (0.0, 1.0))
+    return ShownLanes(np.arange(count)[::-1], np.linspace(0.0, 1.0, count), out, (0.0, 1.0))
 
 
 def picture(axes) -> np.ndarray:

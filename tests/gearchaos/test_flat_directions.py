@@ -8,7 +8,7 @@ import pytest
 from gearchaos.identification.flat_directions import ALONG, ONE_UNIT, directions_at
 from gearchaos.identification.loading import load_targets
 from gearchaos.identification.observations import misfit
-from gearchaos.identification.search import DRAWN, STEPS_ALONE, judge, proposals, shares
+from gearchaos.identification.search import DRAWN, STEPS_ALONE, budget_of, judge, proposals
 from gearchaos.identification.targets import Search
 from gearchaos.identification.tried import read_tried
 
@@ -76,7 +76,7 @@ def test_a_search_tries_no_more_candidates_than_it_is_granted(candidates, residu
     run, _, _ = searched(residuals, **settings)
     assert run.size <= candidates
     assert (run == DRAWN).sum() == 60
-    part = shares(Search(**settings), 3)
+    part = budget_of(Search(**settings), 3)
     assert part.bred + part.last == candidates - 60
     moved = (run == STEPS_ALONE).sum()
     # Once at least, where there is enough for four steps of each.

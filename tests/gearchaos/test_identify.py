@@ -15,7 +15,7 @@ from gearchaos.identification import search as searching
 from gearchaos.identification.evaluation import require_stable
 from gearchaos.identification.loading import load_targets
 from gearchaos.identification.report import _row, reach
-from gearchaos.identification.search import decisive_facts, judge, shares
+from gearchaos.identification.search import budget_of, decisive_facts, judge
 from gearchaos.identification.tried import read_tried, write_tried
 from gearchaos.identify import main
 
@@ -171,7 +171,7 @@ class TestALinearPair:
 
     def test_the_report_tells_what_the_targets_determine(self, identified):
         tried, _ = tried_of(identified)
-        found = reach(tried, shares(problem_of(identified).targets.search, 2).rungs)
+        found = reach(tried, budget_of(problem_of(identified).targets.search, 2).rungs)
         best = tried["values"][np.argmin(tried["misfit"])]
         assert np.all(found.alone[:, 0] < best) and np.all(best < found.alone[:, 1])
         # The misfit is 2 (sqrt(1 + r^2) - 1) of the exponent at least, and may grow by one.

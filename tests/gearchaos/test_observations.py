@@ -11,7 +11,7 @@ from gearchaos.identification.observations import (
     stage_length,
 )
 from gearchaos.identification.search import distinct, steps_alone
-from gearchaos.identification.targets import Place, Stage
+from gearchaos.identification.targets import ObservedPlace, ObservedStage
 from gearchaos.records.period import return_distances
 
 POINTS = np.arange(96)
@@ -64,7 +64,7 @@ def test_on_two_bands_are_chaos_and_longer_periods_that_alternate_between_them()
 
 
 def test_the_length_of_a_wrong_motion_counts():
-    stage = stage_length(Stage(motion="period 2", **{"from": 1.0, "to": 2.0}, width=0.1))
+    stage = stage_length(ObservedStage(motion="period 2", **{"from": 1.0, "to": 2.0}, width=0.1))
     lanes = [CYCLES[1] if value < 1.3 else CYCLES[2] for value in stage.values]
     (length,) = stage.computed(records(*lanes))
     # A cell counts as a whole: the one that 1.3 lies in may be counted or not.
@@ -78,7 +78,7 @@ def test_the_length_of_a_wrong_motion_counts():
 
 @pytest.mark.parametrize("place", [0.7, 1.0, 1.31])
 def test_a_jump_lies_between_the_lanes_of_different_branches(place):
-    jump = change_place("jump", Place(at=1.0, within=(0.5, 1.5), width=0.02))
+    jump = change_place("jump", ObservedPlace(at=1.0, within=(0.5, 1.5), width=0.02))
     lanes = [0.3 * value + (value > place) for value in jump.values]
     (found,) = jump.computed(records(*lanes))
     below, above = jump.values[jump.values <= place][-1], jump.values[jump.values > place][0]
@@ -87,7 +87,7 @@ def test_a_jump_lies_between_the_lanes_of_different_branches(place):
 
 
 def test_a_branch_without_a_jump_has_none():
-    jump = change_place("jump", Place(at=1.0, within=(0.5, 1.5), width=0.02))
+    jump = change_place("jump", ObservedPlace(at=1.0, within=(0.5, 1.5), width=0.02))
     computed = jump.computed(records(*[0.3 * value + 1.0 for value in jump.values]))
     assert np.isnan(computed).all()
     # What is not there at all is as wrong as the span is long.
@@ -95,7 +95,7 @@ def test_a_branch_without_a_jump_has_none():
 
 
 def test_a_crisis_lies_where_the_section_first_grows():
-    crisis = change_place("crisis", Place(at=1.0, within=(0.5, 1.5), width=0.02))
+    crisis = change_place("crisis", ObservedPlace(at=1.0, within=(0.5, 1.5), width=0.02))
     seeds = range(crisis.values.size)
     # After it, every third lane has not left the former part of the section.
     wide = [value > 1.1 and seed % 3 == 0 for seed, value in zip(seeds, crisis.values, strict=True)]
