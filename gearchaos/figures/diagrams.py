@@ -1,4 +1,4 @@
-"""The diagrams of a sweep over its parameter: section points, largest exponent, amplitudes."""
+"""Diagrams of a sweep over its parameter: section points, largest exponent, amplitudes."""
 
 from fractions import Fraction
 from typing import Any, NamedTuple
@@ -32,7 +32,7 @@ from gearchaos.outputs.names import LARGEST_EXPONENT, ORDER, RECORD, STANDARD_ER
 from gearchaos.results.reading.result import Result, section_variables
 
 BAND_STANDARD_ERRORS = 2.0
-DECADES = 5  # Below the largest amplitude; what is smaller has the lightest colour.
+DECADES = 5  # Decades of the colour scale, down from the largest amplitude.
 
 
 def bifurcation(
@@ -47,37 +47,69 @@ def bifurcation(
 ) -> Diagram:
     """Draw the bifurcation diagram of one section variable into axes.
 
-    Every section point is a small translucent dot: a periodic motion, whose points coincide, shows
-    as a crisp black line, and chaos as grey whose depth is the density of visits. The dots are
-    rasterised, so that a PDF stays small. Above `figures.lanes.MOST_DOTS` they are counted by
-    pixel, and fainter the more there are, so that chaos stays grey. Diverged lanes get a red tick
-    at the bottom, lanes beyond robust limits a triangle at the edge, and a legend above says so.
+    Parameters
+    ----------
+    axes : Axes
+        The axes to draw into. Limits, triangles and legend cover all diagrams in them.
+    result : Result
+        A result over one swept parameter.
+    variable : str, optional
+        A section variable, or a variable with one number per lane. By default the first section
+        variable of the result.
+    between : (float or None, float or None)
+        Part of the parameter range to show; None is the end of the sweep.
+    color, label, marker : str
+        Colour, legend entry and marker of the dots.
 
-    ``result``: over one swept parameter; ``variable``: a section variable, or one with a number for
-    each lane, by default `section_delta_5`, or the first section variable that the result has;
-    ``between``: the part of the parameter range to show; ``color``, ``label``, ``marker`` of the
-    dots, for diagrams of several results in the same axes: the limits then hold what those of each
-    would, the triangles follow them, and the legend names the labels. Raises FigureError if the
-    result has no such variable, no lane in the range, or two swept parameters.
+    Returns
+    -------
+    Diagram
+        What was drawn; its ``points`` are the dots.
+
+    Raises
+    ------
+    FigureError
+        If the variable is missing, no lane is in the range, or there are two swept parameters.
+
+    Notes
+    -----
+    Each section point is a translucent, rasterised dot. Points of a periodic motion coincide in a
+    black line; chaos is grey, darker where visited more often. Above `figures.lanes.MOST_DOTS` the
+    dots are counted per pixel. Diverged lanes get a red tick, lanes beyond the limits a triangle.
     """
+    variable = _diagram_variable(result, variable)
+    lanes = diagram_lanes(result, between)
+    rows = result.lanes(variable).reshape(result.lanes(STATUS).size, -1)
+    alpha = _opacity(lanes.numbers.size, max(1, rows.shape[1]))
+    look = {"markersize": lanes.dot_size(0.8), "marker": marker, "color": color, "label": label}
+    points = dots(axes, lanes, rows, rasterized=True, alpha=alpha, **look)
+    axes.set_ylabel(axis_label(result, variable, line_length=34))
+    return close_panel(axes, result, Diagram(points, lanes, *_extremes(lanes, rows)))
+
+
+def _opacity(lanes: int, points: int) -> float:
+    """Choose the opacity of dots from the number of lanes and of points per lane."""
+    opacity: float = min(1.0, 4.0 / points**0.5) * min(1.0, MOST_DOTS / (lanes * points))
+    return opacity
+
+
+def _extremes(lanes: ShownLanes, rows: Floats) -> tuple[Floats, Floats]:
+    """Return the lowest and the highest value of each lane, (lanes,); NaN without a value."""
+    low, high = np.full((2, lanes.numbers.size), np.nan)
+    for part, values in portions(lanes, rows):
+        np.fmin.reduce(values, axis=1, out=low[part])
+        np.fmax.reduce(values, axis=1, out=high[part])
+    return low, high
+
+
+def _diagram_variable(result: Result, variable: str | None) -> str:
+    """Check the variable of a diagram, or return the default."""
     names = section_variables(result)
     numbers = [v for v in result.variables.values() if v.dtype == "float64"]
     of_lanes = [v.name for v in numbers if v.dims == result.axes and v.name not in result.axes]
     variable = variable or next(iter(names), DEFAULT_VARIABLE)
     check_variable(variable, (*names, *of_lanes), "of the diagram")
-    lanes = diagram_lanes(result, between)
-    rows = result.lanes(variable).reshape(result.lanes(STATUS).size, -1)
-    of_a_lane = max(1, rows.shape[1])
-    alpha = min(1.0, 4.0 / of_a_lane**0.5) * min(1.0, MOST_DOTS / (lanes.numbers.size * of_a_lane))
-    look = {"markersize": lanes.dot_size(0.8), "marker": marker, "color": color, "label": label}
-    points = dots(axes, lanes, rows, rasterized=True, alpha=alpha, **look)
-    axes.set_ylabel(axis_label(result, variable, line_length=34))
-    low, high = np.full((2, lanes.numbers.size), np.nan)
-    for part, values in portions(lanes, rows):
-        np.fmin.reduce(values, axis=1, out=low[part])
-        np.fmax.reduce(values, axis=1, out=high[part])
-    own = Diagram(points, lanes, low, high)
-    return close_panel(axes, result, own)
+    return variable
 
 
 def lyapunov(
@@ -204,12 +236,26 @@ def _circle_mixed(axes: Axes, result: Result, shown: _Exponents) -> list[Line2D]
 
 
 def waterfall(axes: Axes, result: Result, variable: str, *, between: Between = (None, None)) -> Any:
-    """Draw amplitudes of the lanes of a sweep into axes, a row for each mesh order.
+    """Draw amplitudes over the swept parameter into axes, one row per mesh order.
 
-    Colours are logarithmic, lanes without amplitudes grey. ``variable``: such as
-    "amplitude_transmission_error"; ``between``: as for `bifurcation`. Returns the image. Raises
-    FigureError if the result has no such amplitudes, no lane in the range, two swept parameters or
-    several lanes for one value.
+    Parameters
+    ----------
+    axes, result, between
+        As for `bifurcation`.
+    variable : str
+        Amplitudes such as "amplitude_transmission_error".
+
+    Returns
+    -------
+    ScalarMappable
+        The image, shape (orders, lanes). Its colours are logarithmic; lanes without amplitudes are
+        grey.
+
+    Raises
+    ------
+    FigureError
+        If the amplitudes are missing, no lane is in the range, there are two swept parameters, or
+        several lanes have the same value.
     """
     there = [name for name in result if result.dims(name) == (*result.axes, ORDER)]
     check_variable(variable, there, "over mesh orders")

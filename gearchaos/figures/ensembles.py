@@ -1,4 +1,4 @@
-"""Ensembles: which share of pairs and starts moves in which way, which start comes to what."""
+"""Figures of ensembles: shares of motions among gear pairs and starts, basins of attraction."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -27,29 +27,44 @@ from gearchaos.results.reading.result import Result
 Drawn = Artist | Container
 
 COLORS = ("#D6E6F3", "#EDBE62", "#5DB898", "#C284AD", "#B4602F", "#4C6E8E")
-"""Of attractors by their numbers, over and over again; lightness tells them apart in grey."""
+"""Colours of attractors by number, used cyclically; they differ in lightness when grey."""
 
-MOST_POINTS = 500  # Section points that are drawn of an attractor.
+MOST_POINTS = 500  # Most section points drawn per attractor.
 
 MOST_BARS = 24
-"""More values than these are steps side by side, with a band instead of bars of confidence."""
+"""Most values drawn as bars with error bars; more are drawn as steps with a confidence band."""
 
 
 def shares(
     axes: Axes, result: Result, *, between: Between = (None, None), contact: Axes | None = None
 ) -> list[Drawn]:
-    """Draw the shares of all motions of each value on top of each other, period 1 as the highest.
+    """Draw the shares of all motions at each swept value, stacked with period 1 on top.
 
-    The edge below period 1 is so the share of motions that are not period 1, those diverged or
-    unresolved among them; drawn around it is its confidence interval of 95 % (Wilson 1927), which
-    takes gear pairs and starts for independent.
+    Parameters
+    ----------
+    axes, between
+        As for `bifurcation`.
+    result : Result
+        A result over one swept parameter, with labels, of several gear pairs or starts.
+    contact : Axes, optional
+        Axes for the share of motions that lose contact, if the result contains it.
 
-    ``axes``, ``result``, ``between``: as for `bifurcation`, with labels of the motion of several
-    gear pairs or starts; ``contact``: axes in which to draw the share of motions whose teeth lose
-    contact, if the result tells. Returns what is drawn into the first axes, with labels, in the
-    order of a legend. Raises FigureError if there is no lane in the range, or two swept parameters;
-    ConfigurationError or FileError if the result has neither several gear pairs nor several starts,
-    or no labels.
+    Returns
+    -------
+    list of Artist or Container
+        Drawn and labelled parts of the first axes, in the order of a legend.
+
+    Raises
+    ------
+    FigureError
+        If no lane is in the range or there are two swept parameters.
+    ConfigurationError, FileError
+        If the result has one lane per value, or no labels.
+
+    Notes
+    -----
+    The edge below period 1 is the share of all other motions, including diverged and unresolved
+    lanes. Its 95 % confidence interval (Wilson 1927) assumes independent gear pairs and starts.
     """
     limits, counted = diagram_lanes(result, between).limits, motion_shares(result)
     values, known = counted.values, list(dict.fromkeys([*SHADES, *counted.motions]))
@@ -77,9 +92,19 @@ def shares_page(
     width_mm: float = SINGLE_COLUMN_MM,
     height_mm: float | None = None,
 ) -> Page:
-    """Draw the shares of all motions (a) over the share that loses contact (b), if that is known.
+    """Draw the shares of all motions (a) above the share that loses contact (b), if known.
 
-    Parameters and errors as for `shares`; width and height are those of the page.
+    Parameters
+    ----------
+    result, between
+        As for `shares`.
+    width_mm, height_mm : float
+        Size of the page.
+
+    Raises
+    ------
+    FigureError, ConfigurationError, FileError
+        As for `shares`.
     """
     panels = 2 if motion_shares(result).apart else 1
     height = height_mm or (60.0 + 0.35 * width_mm) * (1.0 if panels == 2 else 0.7)
@@ -104,7 +129,7 @@ def shares_page(
 def _stacked(
     axes: Axes, values: Floats, shares: Sequence[Floats], looks: Sequence[dict[str, Any]]
 ) -> list[Drawn]:
-    """Draw shares, each (values,), on top of each other, the first one lowest."""
+    """Draw stacked shares, each of shape (values,), the first one lowest."""
     drawn: list[Drawn] = []
     width = 0.8 * (np.diff(values).min() if values.size > 1 else 1.0)
     edges, tops = cell_edges(values), np.cumsum(shares, axis=0)
@@ -118,7 +143,7 @@ def _stacked(
 
 
 def _confidence(axes: Axes, values: Floats, counted: Counted, marker: str) -> Drawn:
-    """Draw shares with their intervals of confidence: bars at few values, a band over many."""
+    """Draw shares with their confidence intervals: error bars for few values, else a band."""
     label = "not period 1, 95 % confidence"
     share, (low, high) = counted.shares, counted.intervals.T
     if values.size <= MOST_BARS:
@@ -131,11 +156,27 @@ def _confidence(axes: Axes, values: Floats, counted: Counted, marker: str) -> Dr
 
 
 def basins(axes: Axes, found: Basins, value: int = 0) -> ScalarMappable:
-    """Draw the basins over the two states of a grid of starts, with the attractors on top.
+    """Draw the basins over a grid of starts in two states, with the attractors on top.
 
-    Every start is a cell in the colour of its attractor, circles are the points of a periodic one
-    that lie within the axes, dots those of any other. ``found``: from `find_basins`, ``value``:
-    which of its values. Raises FigureError if the starts are not on a grid over two states.
+    Parameters
+    ----------
+    axes : Axes
+        The axes to draw into.
+    found : Basins
+        Basins from `find_basins`.
+    value : int
+        Number of the swept value.
+
+    Returns
+    -------
+    ScalarMappable
+        The image: one cell per start, in the colour of its attractor. Circles are the section
+        points of periodic attractors, dots those of all others.
+
+    Raises
+    ------
+    FigureError
+        If the starts are not on a grid over two states.
     """
     if len(found.grid) != 2:
         raise FigureError(
@@ -159,10 +200,19 @@ def basins(axes: Axes, found: Basins, value: int = 0) -> ScalarMappable:
 
 
 def fractions(axes: Axes, found: Basins) -> list[Drawn]:
-    """Draw the shares of all basins over the parameter on top of each other, number 1 lowest.
+    """Draw the shares of all basins over the swept parameter, stacked with number 1 lowest.
 
-    ``found``: from `find_basins`, of several values. Returns what is drawn, with labels, in the
-    order of the numbers.
+    Parameters
+    ----------
+    axes : Axes
+        The axes to draw into.
+    found : Basins
+        Basins at several values, from `find_basins`.
+
+    Returns
+    -------
+    list of Artist or Container
+        Drawn and labelled parts, in the order of the numbers.
     """
     numbers, looks = in_order(one.number for one in found.basins), []
     for number in numbers:
@@ -179,9 +229,19 @@ def fractions(axes: Axes, found: Basins) -> list[Drawn]:
 def basins_page(
     found: Basins, width_mm: float = SINGLE_COLUMN_MM, height_mm: float | None = None
 ) -> Page:
-    """Draw the basins of one value as `basins` does, those of several as `fractions`.
+    """Draw the basins at one value as `basins` does, those at several as `fractions` does.
 
-    Width and height are those of the page; raises FigureError as `basins`.
+    Parameters
+    ----------
+    found : Basins
+        Basins from `find_basins`.
+    width_mm, height_mm : float
+        Size of the page.
+
+    Raises
+    ------
+    FigureError
+        As for `basins`, at one value.
     """
     several, fixed = found.values.size > 1, found.result.fixed
     with page(width_mm, height_mm or 20.0 + (0.55 if several else 0.85) * width_mm) as figure:

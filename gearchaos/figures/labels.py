@@ -1,4 +1,4 @@
-"""Axis labels from what the result file says about its variables."""
+"""Labels and texts of figures, from the metadata of a result."""
 
 import re
 from collections.abc import Mapping, Sequence
@@ -18,8 +18,20 @@ from gearchaos.results.reading.result import Result
 def axis_label(result: Result, name: str, line_length: int = 60) -> str:
     """Compose the label of a variable: its long name, symbol and unit, broken into lines.
 
-    For example ``Largest Lyapunov exponent, $\\lambda_1$ (per unit of $\\tau$)``; of a pure number
-    there is no unit. Lines are broken after ``line_length`` characters.
+    Parameters
+    ----------
+    result : Result
+        The result that has the variable.
+    name : str
+        Name of the variable.
+    line_length : int
+        Most characters of a line; a formula counts as two.
+
+    Returns
+    -------
+    str
+        Such as ``Largest Lyapunov exponent, $\\lambda_1$ (per unit of $\\tau$)``. Pure numbers have
+        no unit.
     """
     variable = result.variables[name]
     wording = " ".join((variable.long_name or name).split())
@@ -30,13 +42,13 @@ def axis_label(result: Result, name: str, line_length: int = 60) -> str:
         words[-1] += f", {symbol}"
     if unit:
         words.append(f"({unit})")
-    # No shorter last line than need be: of those that are as few the narrowest.
+    # The narrowest of all layouts with the fewest lines: its lines have similar lengths.
     fewest = min((_broken(words, length) for length in range(1, line_length + 1)), key=len)
     return "\n".join(fewest)
 
 
 def unit_of(result: Result, name: str) -> str:
-    """Word the unit of a variable, or what its numbers are multiples of; "" of a pure number."""
+    """Word the unit or the scale of a variable; the empty string for a pure number."""
     variable = _known(result)[name]
     if variable.units in ("", "1"):
         return variable.scale.stands_for
@@ -45,24 +57,24 @@ def unit_of(result: Result, name: str) -> str:
 
 
 def place_of(result: Result, lane: int) -> dict[str, float]:
-    """Return the value of a lane along each axis of its result, and of those it was fixed at."""
+    """Return the coordinates of a lane: along each axis, and along axes fixed by selection."""
     return {**result.fixed, **{axis: result.along(axis)[lane] for axis in result.axes}}
 
 
 def form_in_words(result: Result) -> str:
-    """Name the form of the gaps where it is not the physical one, for the foot of a page."""
+    """Name the formulation of the gaps if it is not the physical one, for the foot of a page."""
     published = result.metadata.get("formulation") == "published"
     return "gaps as printed in Pan 2021 (eqs 6 and 7), not the physical ones" if published else ""
 
 
 def legend_title(result: Result) -> str | None:
-    """Name the form of the gaps and the unit of periods where they need it, above a legend."""
+    """Name the formulation of the gaps and the unit of periods if they differ from the default."""
     words = (form_in_words(result), excitation_of(result.metadata).in_words)
     return "\n".join(filter(None, words)) or None
 
 
 def in_words(result: Result, place: Mapping[str, float]) -> str:
-    """Word a place on the axes of a result, such as ``$P$ = 5.86, start 0``."""
+    """Word coordinates on the axes of a result, such as ``$P$ = 5.86, start 0``."""
     texts = []
     for axis, value in place.items():
         known = _known(result).get(axis)
@@ -76,12 +88,12 @@ def in_words(result: Result, place: Mapping[str, float]) -> str:
 
 
 def in_a_name(place: Mapping[str, float], digits: int = 12) -> str:
-    """Word a place for the name of a file: ``_pitch_error_5.86_start_0``."""
+    """Word coordinates for the name of a file: ``_pitch_error_5.86_start_0``."""
     return "".join(f"_{axis}_{coordinate_text(axis, at, digits)}" for axis, at in place.items())
 
 
 def check_variable(variable: str, there: Sequence[str], where: str) -> None:
-    """Raise a FigureError unless there is such a variable, which says what there is instead."""
+    """Raise FigureError unless the variable is in ``there``; the message lists the others."""
     if variable not in there:
         hint = "".join(f"; did you mean {one}?" for one in get_close_matches(variable, there, 1))
         rule = f"no variable {variable!r} {where} in the result"
@@ -89,25 +101,25 @@ def check_variable(variable: str, there: Sequence[str], where: str) -> None:
 
 
 def short(value: float, digits: int = 4, sign: str = "-") -> str:
-    """Write a number in a few digits, with a true minus sign."""
-    # Adding zero makes plus zero of minus zero.
+    """Write a number with a few significant digits and a true minus sign."""
+    # Adding zero turns minus zero into zero.
     return f"{value + 0.0:{sign}.{digits}g}".replace("-", "\N{MINUS SIGN}")
 
 
 def plain(text: str) -> str:
-    """Return a text in which a dollar sign is a dollar sign, not the start of a formula."""
+    """Escape dollar signs, which would begin a formula."""
     return text.replace("$", r"\$")
 
 
 def _known(result: Result) -> Mapping[str, Variable]:
-    """Return all that a result tells of, also what it was fixed at."""
+    """Return all described quantities of a result, including axes fixed by selection."""
     return result.parameters | result.fixed_axes | result.variables
 
 
 def _broken(words: list[str], line_length: int) -> list[str]:
     lines = [words[0]]
     for word in words[1:]:
-        # Of a formula, however long its source, little is to be seen.
+        # A formula is short on paper, however long its source.
         if len(re.sub(r"\$[^$]*\$", "xx", f"{lines[-1]} {word}")) <= line_length:
             lines[-1] += " " + word
         else:
@@ -117,8 +129,8 @@ def _broken(words: list[str], line_length: int) -> list[str]:
 
 @cache
 def _formula(text: str) -> str:
-    """Return a symbol that is no formula as plain text."""
-    # A file may come from anywhere; a formula that matplotlib cannot read would fail at drawing.
+    """Return a symbol, with dollar signs escaped if matplotlib cannot parse it as a formula."""
+    # Files may come from anywhere, and an invalid formula would raise an error while drawing.
     try:
         with DRAWING:
             MathTextParser("path").parse(text)

@@ -1,4 +1,4 @@
-"""Which lanes of a result a figure shows, and how it shows more than a page can tell apart."""
+"""The lanes that a figure shows, and the drawing of more points than a page can resolve."""
 
 from collections.abc import Iterator
 from math import ceil, floor
@@ -20,18 +20,26 @@ from gearchaos.results.reading.result import Result
 
 Between = tuple[float | None, float | None]
 
-PAD = 0.05  # What is added to either end of an axis of one value, in parts of the value.
-COLUMNS = 4000  # Columns of an axis that a page can tell apart: two of a journal at 600 dpi.
+PAD = 0.05  # Margin of an axis with a single value, relative to the value.
+COLUMNS = 4000  # Columns that a page can resolve: two journal columns at 600 dpi.
 
 MOST_DOTS = 1 << 18
-"""More points are counted: a panel of one column has about as many pixels at 300 dpi."""
+"""Most points drawn one by one: about the pixels of a one-column panel at 300 dpi."""
 
 
 class ShownLanes(NamedTuple):
     """Lanes in ascending order of the swept parameter, and the ends of its axis.
 
-    ``numbers`` (lanes,) among all lanes of the result, its axes flattened; ``parameter`` (lanes,);
-    ``diverged`` (lanes,): whether the status is any but 0.
+    Attributes
+    ----------
+    numbers : (lanes,)
+        Numbers among all lanes of the result, its axes flattened.
+    parameter : (lanes,)
+        Swept value.
+    diverged : (lanes,)
+        Whether the status differs from 0.
+    limits : (float, float)
+        Ends of the axis.
     """
 
     numbers: Integers
@@ -40,7 +48,7 @@ class ShownLanes(NamedTuple):
     limits: tuple[float, float]
 
     def dot_size(self, least: float) -> float:
-        """Choose the size in points of a dot, larger where the parameter has few values."""
+        """Choose the diameter of dots in points; few swept values have larger dots."""
         return float(np.clip(150.0 / np.unique(self.parameter).size, least, 3.0))
 
 
@@ -50,7 +58,20 @@ def swept_axes(result: Result) -> list[str]:
 
 
 def diagram_lanes(result: Result, between: Between = (None, None)) -> ShownLanes:
-    """Select the lanes of a diagram, as `select_lanes`, and refuse two swept parameters."""
+    """Select the lanes of a diagram, in ascending order of its swept parameter.
+
+    Parameters
+    ----------
+    result : Result
+        A result over one swept parameter.
+    between : (float or None, float or None)
+        Lowest and highest swept value, both included; None is the end of the sweep.
+
+    Raises
+    ------
+    FigureError
+        If no lane is in the range, or there are two swept parameters.
+    """
     swept = swept_axes(result)
     if len(swept) > 1:
         raise FigureError(
@@ -62,7 +83,13 @@ def diagram_lanes(result: Result, between: Between = (None, None)) -> ShownLanes
 
 
 def map_axes(result: Result) -> tuple[str, str]:
-    """Name the axes along x and y of a map; FigureError if the result has others, or too few."""
+    """Return the names of the axes along x and y of a map.
+
+    Raises
+    ------
+    FigureError
+        If the axes of the result are not exactly two swept parameters.
+    """
     swept = swept_axes(result)
     if len(swept) != 2:
         raise FigureError(
@@ -78,9 +105,19 @@ def map_axes(result: Result) -> tuple[str, str]:
 
 
 def select_lanes(result: Result, between: Between = (None, None)) -> ShownLanes:
-    """Select lanes by the swept parameter: its lowest and highest value, both included.
+    """Select lanes by `Result.axis`, the parameter along x, in ascending order.
 
-    None: as far as the sweep goes. Raises FigureError if no lane lies in between.
+    Parameters
+    ----------
+    result : Result
+        A result with at least one swept parameter.
+    between : (float or None, float or None)
+        Lowest and highest swept value, both included; None is the end of the sweep.
+
+    Raises
+    ------
+    FigureError
+        If no lane is in the range.
     """
     parameter = np.asarray(result.along(result.axis), dtype=np.float64)
     low, high = between
@@ -94,7 +131,7 @@ def select_lanes(result: Result, between: Between = (None, None)) -> ShownLanes:
     numbers = numbers[np.argsort(parameter[numbers], kind="stable")]
     parameter = parameter[numbers]
     diverged = result.lanes(STATUS)[numbers] != 0
-    # Half a lane beyond the outermost ones, which would lie under the frame.
+    # Half a lane of margin: the outermost lanes would lie under the frame.
     half = float(parameter[-1] - parameter[0]) / (2 * max(1, np.unique(parameter).size - 1))
     left = float(parameter[0]) - half if low is None else low
     right = float(parameter[-1]) + half if high is None else high
@@ -105,7 +142,7 @@ def select_lanes(result: Result, between: Between = (None, None)) -> ShownLanes:
 
 
 def cell_edges(values: Floats) -> Floats:
-    """Return where the cells of ascending values end: halfway between them, shape (values + 1,)."""
+    """Return the edges of cells around ascending values, halfway between them, (values + 1,)."""
     if values.size == 1:
         pad = abs(float(values[0])) * PAD or 0.5
         return np.array([values[0] - pad, values[0] + pad])
@@ -115,9 +152,9 @@ def cell_edges(values: Floats) -> Floats:
 
 
 def columns(parameter: Floats, limits: tuple[float, float]) -> Integers:
-    """Return where in an ascending parameter each column of an axis begins.
+    """Return the index of the first value in each of the `COLUMNS` of an axis.
 
-    If there are not several values for each of the `COLUMNS`, every one begins a column.
+    ``parameter`` (values,) ascends. Up to two values per column, each begins its own column.
     """
     if parameter.size <= 2 * COLUMNS:
         return np.arange(parameter.size)
@@ -126,7 +163,7 @@ def columns(parameter: Floats, limits: tuple[float, float]) -> Integers:
 
 
 def outermost(lanes: ShownLanes, values: Floats) -> Integers:
-    """Return which lanes have the lowest or the highest value of their column, or none in a gap."""
+    """Return the lanes with the lowest or highest value of their column; of a gap, the first."""
     first = columns(lanes.parameter, lanes.limits)
     sizes = np.diff(first, append=values.size)
     low, high = np.fmin.reduceat(values, first), np.fmax.reduceat(values, first)
@@ -136,10 +173,10 @@ def outermost(lanes: ShownLanes, values: Floats) -> Integers:
 
 
 def dots(axes: Axes, lanes: ShownLanes, rows: Floats, **look: Any) -> Line2D:
-    """Draw the points of lanes as dots, those that diverged left out.
+    """Draw the points of lanes as dots; diverged lanes are left out.
 
-    Up to `MOST_DOTS` they are a line without a stroke; more of them look the same, as `DenseDots`.
-    ``rows`` (all lanes of the result, points); ``look``: properties of the dots, as of a line.
+    Up to `MOST_DOTS` points are markers of a line; more are `DenseDots`, which look the same.
+    ``rows``: (all lanes of the result, points); ``look``: properties of the line.
     """
     look = {"linestyle": "none", "marker": ".", **look, "markeredgewidth": 0.0}
     if lanes.numbers.size * rows.shape[1] > MOST_DOTS:
@@ -151,9 +188,9 @@ def dots(axes: Axes, lanes: ShownLanes, rows: Floats, **look: Any) -> Line2D:
 
 
 def portions(lanes: ShownLanes, rows: Floats) -> Iterator[tuple[slice, Floats]]:
-    """Give the rows of lanes, at most `MOST_DOTS` points at once.
+    """Yield slices of the lanes and their rows, at most `MOST_DOTS` points at once.
 
-    Of diverged lanes, and where they are not finite, they are not a number.
+    Infinite values and the rows of diverged lanes become NaN.
     """
     step = max(1, MOST_DOTS // max(1, rows.shape[1]))
     for first in range(0, lanes.numbers.size, step):
@@ -165,11 +202,11 @@ def portions(lanes: ShownLanes, rows: Floats) -> Iterator[tuple[slice, Floats]]:
 
 
 class DenseDots(Line2D):
-    """Dots of which only the number in each pixel is kept.
+    """Dots that are counted per pixel and drawn as one image.
 
-    A dot one by one is the same small picture of some opacity, laid over whole pixels, so that n
-    of them leave its n-th power of what shines through. The pixels of the axes so have the colour
-    that the dots would give them, in memory and time that hardly depend on their number.
+    Agg draws each dot as the same small picture on whole pixels. With opacity a per dot, n dots let
+    (1 - a)^n of the background through. The image has the colours that the single dots would
+    give, while memory and drawing time hardly depend on their number.
     """
 
     def __init__(self, lanes: ShownLanes, rows: Floats, **look: Any) -> None:
@@ -198,7 +235,7 @@ class DenseDots(Line2D):
         gc.restore()
 
     def _dot(self, renderer: Any) -> Floats:
-        """Draw one dot by itself, and give the opacity of the pixels around it, from the bottom."""
+        """Draw a single dot; return the opacity of the pixels around it, bottom row first."""
         reach = ceil(renderer.points_to_pixels(self.get_markersize()) / 2.0) + 1
         size = 2 * reach + 1
         paper: Any = RendererAgg(size, size, 72.0 * renderer.points_to_pixels(1.0))  # type: ignore[no-untyped-call]
@@ -211,16 +248,16 @@ class DenseDots(Line2D):
 
 
 def counts(axes: Axes, lanes: ShownLanes, rows: Floats, margin: int = 0) -> NDArray[np.uint32]:
-    """Count the points in each pixel of the axes and of a margin around them, from the bottom.
+    """Count the points in each pixel of the axes and of a margin around them.
 
-    Returns an array of shape (rows, columns) of pixels; a point lies in that pixel which a marker
-    is placed on.
+    Returns shape (rows, columns) of pixels, bottom row first. Points count for the pixel on which
+    Agg would place their marker.
     """
     box = axes.bbox
     left, bottom = floor(box.x0) - margin, floor(box.y0) - margin
     width, height = ceil(box.x1) + margin - left, ceil(box.y1) + margin - bottom
     counted = np.zeros(height * width, np.intp)
-    # Each axis for itself, as those of a diagram are: a point is half the work of a transform.
+    # Axis by axis, since the axes are independent: half the work of transforming each point.
     (along, _, begin), (_, up, bottom_edge), _ = (axes.transLimits + axes.transAxes).get_matrix()
     x = along * axes.xaxis.get_transform().transform(lanes.parameter) + begin
     columns = np.floor(x + 0.5) - left

@@ -1,6 +1,6 @@
-"""Maps over two swept parameters: motion and period, exponent, contact, or any number of a lane."""
+"""Maps over two swept parameters: motion and period, exponent, contact, or another variable."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import matplotlib as mpl
@@ -28,25 +28,25 @@ from gearchaos.results.reading.ensembles import motion_kinds
 from gearchaos.results.reading.result import Result
 
 SHOWN = (LABELS[0], LARGEST_EXPONENT, *(f"contact_state_{way}" for way in DIRECTIONS))
-"""What a page shows, if the result has it."""
+"""Variables of the panels of a page, if the result has them."""
 
-NO_VALUE = "no value"  # What there is of a lane that did not diverge, but has no number.
+NO_VALUE = "no value"  # Legend entry of lanes that did not diverge but have no number.
 
 NUMBERS = "YlGn"
-"""Colours of numbers, and of kinds without colours of their own, the first ones light."""
+"""Colour map of numbers, and of kinds without colours of their own."""
 
 SIGNS = {-1.0: "#3C7FB8", -0.5: "#82B1DE", 0.0: "#F7F7F7"}
 SIGNS |= {0.3: "#E69F00", 0.65: "#A84300", 1.0: "#4A1500"}
-"""Colours of exponents, in parts of the way from zero to the lowest and to the highest: blue as
-periodic motions are, orange as chaos is, which alone is dark in grey."""
+"""Colours of exponents by their share of the lowest (negative) or the highest (positive) one.
 
-NARROWEST_MM = 60.0  # Of panels side by side; narrower ones stand on top of each other.
+As in diagrams, blue is periodic and orange is chaotic; in grey only chaos is dark.
+"""
 
-KEY_COLUMNS = 3
-ROW_PT = 1.5 * SMALL_FONT_PT
-BAR_ROWS = 2
-"""Of what stands between a map and its title: columns and height of the rows of a legend, and how
-many rows a bar of colours takes."""
+NARROWEST_MM = 60.0  # Least width of panels side by side; narrower panels are stacked.
+
+KEY_COLUMNS = 3  # Columns of the legend between a map and its title.
+ROW_PT = 1.5 * SMALL_FONT_PT  # Height of a row of the legend.
+BAR_ROWS = 2  # Rows that a colour bar takes.
 
 
 def parameter_map(
@@ -163,18 +163,28 @@ def map_page(
     width_mm: float = SINGLE_COLUMN_MM,
     height_mm: float | None = None,
 ) -> Page:
-    """Draw the maps of motion and period (a), largest exponent (b) and state of contact (c).
+    """Draw the maps of motion and period (a), largest exponent (b) and contact state (c).
 
-    A result without one of them gives the panels that it has data for; a ``variable`` gives one
-    panel, of itself. Parameters and errors as for `parameter_map`, and FigureError if there is
-    nothing to draw; ``marked``: values of the two parameters at which a line crosses the maps;
-    ``width_mm``, ``height_mm``: size of the page. Panels for which it is wide enough stand side by
-    side.
+    Parameters
+    ----------
+    result, between
+        As for `parameter_map`.
+    variable : str, optional
+        Draw one panel of this variable. By default all three, as far as the result has them.
+    marked : mapping of str to float, optional
+        Values of the two parameters, each marked by a line across the maps.
+    width_mm, height_mm : float
+        Size of the page. Panels are side by side where each is at least 60 mm wide.
+
+    Raises
+    ------
+    FigureError, FileError
+        As for `parameter_map`; FigureError also if there is nothing to draw.
     """
     names = [name for name in SHOWN if name in result] if variable is None else [variable]
     if not names:
         raise FigureError(f"nothing to draw: the result has none of {', '.join(SHOWN)}; name one")
-    x_axis, _ = map_axes(result)
+    map_axes(result)  # Raises FigureError before a page is made.
     beside = width_mm >= NARROWEST_MM * len(names)
     shape = (1, len(names)) if beside else (len(names), 1)
     height = height_mm or 25.0 + 0.68 * width_mm * shape[0] / shape[1]
@@ -184,29 +194,39 @@ def map_page(
             parameter_map(axes, result, name, between=between)
             few_ticks(axes)
             axes.label_outer()
-            for axis, value in (marked or {}).items():
-                line = axes.axvline if axis == x_axis else axes.axhline
-                line(value, color="white", linewidth=1.4)
-                label = in_words(result, {axis: value})
-                line(value, color=BLACK, linewidth=0.7, linestyle=(0, (5, 2)), label=label)
+            _mark_lines(axes, result, marked or {})
         if marked:
             before, lines = panels[0].get_legend(), panels[0].get_legend_handles_labels()[0]
             _legend(panels[0], [*(before.legend_handles if before else ()), *lines])
-        titles = [_name(result, name, 34 if beside else 80) for name in names]
-        pairs = list(zip(panels, titles, strict=True))
-        most = max(_rows(axes) + title.count("\n") for axes, title in pairs)
-        for letter, (axes, title) in zip("abcd", pairs, strict=False):
-            head = rf"$\mathbf{{({letter})}}$ " if len(panels) > 1 else ""
-            # Side by side, the first lines are at the same height.
-            _title(axes, head + title, most - title.count("\n") if beside else _rows(axes))
+        _set_titles(panels, [_name(result, name, 34 if beside else 80) for name in names], beside)
         footnote(figure, legend_title(result) or "")
         if result.fixed:
             figure.suptitle(in_words(result, result.fixed))
     return figure
 
 
+def _mark_lines(axes: Axes, result: Result, marked: Mapping[str, float]) -> None:
+    """Draw a line across a map at each marked value."""
+    x_axis, _ = map_axes(result)
+    for axis, value in marked.items():
+        line = axes.axvline if axis == x_axis else axes.axhline
+        line(value, color="white", linewidth=1.4)
+        label = in_words(result, {axis: value})
+        line(value, color=BLACK, linewidth=0.7, linestyle=(0, (5, 2)), label=label)
+
+
+def _set_titles(panels: Sequence[Axes], titles: Sequence[str], beside: bool) -> None:
+    """Title the panels, with letters if there are several; ``beside``: they are side by side."""
+    pairs = list(zip(panels, titles, strict=True))
+    most = max(_rows(axes) + title.count("\n") for axes, title in pairs)
+    for letter, (axes, title) in zip("abcd", pairs, strict=False):
+        head = rf"$\mathbf{{({letter})}}$ " if len(panels) > 1 else ""
+        # Side by side, the first lines are at the same height.
+        _title(axes, head + title, most - title.count("\n") if beside else _rows(axes))
+
+
 def _kinds(result: Result, variable: str) -> tuple[Array, dict[str, dict[str, Any]]]:
-    """Return the number of each lane's kind, and by the names of 0, 1, ... how it is filled."""
+    """Return the number of each lane's kind, and the look of the kinds 0, 1, ... by name."""
     if variable in LABELS:
         kinds, names = motion_kinds(result)
         return kinds, {name: look_of(name) for name in names}
@@ -220,14 +240,14 @@ def _kinds(result: Result, variable: str) -> tuple[Array, dict[str, dict[str, An
 def _number_cells(
     axes: Axes, edges: tuple[Floats, Floats], numbers: Floats, signed: bool
 ) -> ScalarMappable:
-    """Draw numbers (rows, columns), with the bar of their colours; robust limits may cut it."""
+    """Draw numbers (rows, columns) and their colour bar, within robust limits."""
     there = numbers[np.isfinite(numbers)]
     there = there if there.size else np.zeros(1)
     ends = lowest, highest = there.min(), there.max()
     low, high = np.clip(robust_limits(there, there), *ends)
     colours: Colormap = mpl.colormaps[NUMBERS]
     if signed:
-        # Neither way is so short that zero would lie on the edge of the bar.
+        # Both sides of zero have a minimum length: zero must not lie at the end of the bar.
         low, high = min(low, -high / 50.0, -1e-9), max(high, -low / 50.0, 1e-9)
         values = [share * high if share > 0.0 else -share * low for share in SIGNS]
         shades = zip((np.array(values) - low) / (high - low), SIGNS.values(), strict=True)
@@ -243,7 +263,7 @@ def _number_cells(
 
 
 def _legend(axes: Axes, handles: list[Any]) -> None:
-    """Place a legend above the left end of the axes, and of the bar of colours if they have one."""
+    """Place a legend above the left end of the axes, above the colour bar if there is one."""
     if handles:
         above = 2.0 + BAR_ROWS * ROW_PT * len(axes.child_axes)
         figure: Any = axes.figure
@@ -253,7 +273,7 @@ def _legend(axes: Axes, handles: list[Any]) -> None:
 
 
 def _rows(axes: Axes) -> int:
-    """Return how many rows stand above axes, below their title."""
+    """Return the number of rows between the axes and their title."""
     legend = axes.get_legend()
     entries = len(legend.legend_handles) if legend else 0
     return BAR_ROWS * len(axes.child_axes) + -(-entries // KEY_COLUMNS)
@@ -271,7 +291,7 @@ def _title(axes: Axes, text: str, rows: int) -> None:
 
 
 def _outline(mask: Mask, x: Floats, y: Floats) -> Path:
-    """Outline the cells of a mask (rows, columns), those side by side as one rectangle."""
+    """Outline the cells of a mask (rows, columns); adjacent cells of a row share a rectangle."""
     ends = np.diff(np.pad(mask, ((0, 0), (1, 1))).astype(np.int8), axis=1)
     (row, first), after = np.nonzero(ends == 1), np.nonzero(ends == -1)[1]
     left, right, bottom, top = x[first], x[after], y[row], y[row + 1]

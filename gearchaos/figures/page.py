@@ -1,4 +1,4 @@
-"""A page for a journal: what is written beside its panels, and its file."""
+"""A page for a journal: its size and style, the texts beside its panels, and its file."""
 
 import re
 from collections.abc import Iterable, Iterator, Sequence
@@ -29,11 +29,11 @@ from gearchaos.interrupts import check
 from gearchaos.results.files.atomic_file import check_output, replacing
 from gearchaos.version import software_version
 
-FORMATS: tuple[str, ...] = ("png", "pdf")  # What is written unless asked otherwise.
+FORMATS: tuple[str, ...] = ("png", "pdf")  # Default formats.
 
 ENDINGS = (*FORMATS, "svg", "eps", "tiff", "tif")
-FINENESS = {"pdf": 2, "svg": 2}
-BELOW_AXIS = 2.4
+FINENESS = {"pdf": 2, "svg": 2}  # Factor of the resolution, for formats that readers zoom into.
+BELOW_AXIS = 2.4  # Drawing order just below that of axes with their ticks and labels.
 SIGNATURE = "gearchaos"
 OWN = rb"(Software[\0 ]|/Creator \(|%%Creator: |<dc:creator>\s*<cc:Agent>\s*<dc:title>)gearchaos "
 
@@ -41,10 +41,10 @@ NOTEBOOK_DPI = 200
 
 
 FORMULAE: Any = getattr(RendererAgg(1, 1, 72.0), "mathtext_parser", None)  # type: ignore[no-untyped-call]
-"""Reads formulae for all pages and caches the results: the next page has most of them again.
+"""Parser of formulae, shared by all pages: it caches its results, and pages repeat most formulae.
 
-The parser of a renderer, since its kind depends on the version of matplotlib: Agg takes pictures
-before 3.11 and paths from then on.
+It is taken from a renderer because its kind depends on the version of matplotlib: Agg draws
+formulae as pictures before 3.11 and as paths from 3.11 on.
 """
 
 
@@ -58,19 +58,19 @@ class Page(Figure):
         return picture.getvalue()
 
     def savefig(self, *given: Any, **named: Any) -> None:
-        """Write the page, as the same method of its base class does, while no other is drawn."""
+        """Write the page as `Figure.savefig` does; wait while another page is drawn."""
         with DRAWING:
             super().savefig(*given, **named)
 
     def draw(self, renderer: Any) -> None:
-        """Draw the page while no other is drawn."""
+        """Draw the page; wait while another page is drawn."""
         with DRAWING:
             super().draw(renderer)
 
 
 @contextmanager
 def page(width_mm: float, height_mm: float) -> Iterator[Page]:
-    """Make a page of this size; what is drawn on it meanwhile has the project's style."""
+    """Make a page of a size in mm; within the context the project's style is set."""
     with styled():
         size = (width_mm / MM_PER_INCH, height_mm / MM_PER_INCH)
         layout = ConstrainedLayoutEngine()
@@ -80,15 +80,15 @@ def page(width_mm: float, height_mm: float) -> Iterator[Page]:
         yield figure
         for axes in figure.axes:
             light(axes)
-        # Ticks are made when they are first measured, in the style of that moment.
+        # Ticks are created when they are first measured, in the style of that moment.
         layout.execute(figure)
-        # The layout is found; looking for it again takes longer than the drawing itself. The engine
-        # "none" would have every page drawn twice.
+        # Repeating the layout takes longer than the drawing itself. With the engine "none",
+        # matplotlib would draw each page twice.
         figure.set_layout_engine(None)
 
 
 column = partial(page, SINGLE_COLUMN_MM)
-"""Make a page as wide as one column of a journal, of a height in millimetres."""
+"""Make a page as wide as one journal column, of a height in mm."""
 
 
 def letter(panels: Iterable[Axes]) -> None:
@@ -98,24 +98,24 @@ def letter(panels: Iterable[Axes]) -> None:
 
 
 def remark(axes: Axes, text: str) -> None:
-    """Write a few words above the right end of a panel."""
+    """Write a short text above the right end of a panel."""
     axes.set_title(text, loc="right", fontsize=SMALL_FONT_PT, fontweight="normal")
 
 
 def footnote(figure: Figure, text: str) -> None:
-    """Write a line at the foot of a page; nothing where there is no text."""
+    """Write a line at the foot of a page, unless the text is empty."""
     if text:
         figure.supxlabel(text, fontsize=SMALL_FONT_PT, color="0.4", x=0.99, ha="right")
 
 
 def legend_below(figure: Figure, handles: Sequence[Any], title: str | None, columns: int) -> Legend:
-    """Place a legend below everything in a figure, which needs the constrained layout."""
+    """Place a legend below everything in a figure with constrained layout."""
     look = {"loc": "outside lower center", "ncols": min(len(handles), columns), **LEGEND}
     return figure.legend(handles=handles, title=title, **look)
 
 
 def few_ticks(axes: Axes, x: int | None = 5, y: int | None = 4) -> None:
-    """Leave so many intervals at most on the axes of a panel; None leaves an axis alone."""
+    """Limit the numbers of tick intervals along x and y; None leaves an axis unchanged."""
     for axis, most in ((axes.xaxis, x), (axes.yaxis, y)):
         if most is not None:
             axis.set_major_locator(MaxNLocator(most, steps=[1, 2, 5, 10]))
@@ -125,35 +125,40 @@ def few_ticks(axes: Axes, x: int | None = 5, y: int | None = 4) -> None:
 def save_figure(
     figure: Figure, path: str | Path, *, dpi: int = 300, overwrite: bool = True
 ) -> None:
-    """Write a figure in one of the formats of `ENDINGS`, complete or not at all.
+    """Write a figure to a file, complete or not at all.
 
-    The file carries the version of the software, but no date: the same figure gives the same bits.
-    The ending of the ``path`` says the format, such as `.png` or `.pdf`; ``dpi``: pixels per inch.
-    The rasterised points in a PDF or SVG get twice as many, since they will be looked at more
-    closely. EPS knows no transparency: its panels are pictures. ``overwrite``: whether an existing
-    file is replaced. Raises FigureError if the ending names no known format, FileError if the file
-    cannot be written.
+    Parameters
+    ----------
+    figure : Figure
+        A page, or any figure of matplotlib.
+    path : str or Path
+        The file. Its ending, one of `ENDINGS`, selects the format.
+    dpi : int
+        Pixels per inch. Rasterised points in PDF and SVG get twice as many, for zooming in.
+    overwrite : bool
+        Whether to replace an existing file.
+
+    Raises
+    ------
+    FigureError
+        If the ending is unknown.
+    FileError
+        If the file cannot be written, or exists and must not be replaced.
+
+    Notes
+    -----
+    The metadata contain the version of the software but no date: the same figure gives the same
+    bytes. EPS has no transparency; its panels are pictures.
     """
     kind = Path(path).suffix.lower().removeprefix(".")
     if kind not in ENDINGS:
         raise FigureError(f"{path}: a figure ends in {' or '.join('.' + f for f in ENDINGS)}")
-    software = f"{SIGNATURE} {software_version()}"
-    # A sixth larger, in two thirds of the time.
-    fast = {"pil_kwargs": {"compress_level": 1}}
-    facts: dict[str, dict[str, Any]] = {
-        "png": {"metadata": {"Software": software}, **fast},
-        "pdf": {"metadata": {"Creator": software, "CreationDate": None}},
-        "svg": {"metadata": {"Creator": software, "Date": None}},
-        "eps": {"metadata": {"Creator": software}},
-    }
-    tags = {"software": f"Software {software}", "compression": "tiff_lzw"}
-    dpi *= FINENESS.get(kind, 1)
     drawn, before = BytesIO(), [axes.get_rasterization_zorder() for axes in figure.axes]
     check()
     with replacing(path, overwrite=overwrite) as partial, styled():
         for axes in figure.axes if kind == "eps" else ():
             axes.set_rasterization_zorder(BELOW_AXIS)
-        figure.savefig(drawn, format=kind, dpi=dpi, **facts.get(kind, {"pil_kwargs": tags}))
+        figure.savefig(drawn, format=kind, dpi=dpi * FINENESS.get(kind, 1), **_facts(kind))
         for axes, zorder in zip(figure.axes, before, strict=True):
             axes.set_rasterization_zorder(zorder)
         content = drawn.getvalue()
@@ -162,10 +167,37 @@ def save_figure(
         partial.write_bytes(content)
 
 
-def check_figures(paths: Sequence[Path], results: Sequence[str | Path], overwrite: bool) -> None:
-    """Make sure that figures of results can be written, before anything is computed for them.
+def _facts(kind: str) -> dict[str, Any]:
+    """Return the arguments of `Figure.savefig` that set metadata and compression of a format."""
+    software = f"{SIGNATURE} {software_version()}"
+    # Files are a sixth larger, and written in two thirds of the time.
+    fast = {"pil_kwargs": {"compress_level": 1}}
+    facts: dict[str, dict[str, Any]] = {
+        "png": {"metadata": {"Software": software}, **fast},
+        "pdf": {"metadata": {"Creator": software, "CreationDate": None}},
+        "svg": {"metadata": {"Creator": software, "Date": None}},
+        "eps": {"metadata": {"Creator": software}},
+    }
+    tags = {"software": f"Software {software}", "compression": "tiff_lzw"}
+    return facts.get(kind, {"pil_kwargs": tags})
 
-    What `save_figure` wrote is replaced. Raises FileError if something else stands in the way.
+
+def check_figures(paths: Sequence[Path], results: Sequence[str | Path], overwrite: bool) -> None:
+    """Check that figures of results can be written, before anything is computed for them.
+
+    Parameters
+    ----------
+    paths : sequence of Path
+        Files of the figures.
+    results : sequence of str or Path
+        Result files to draw, which are never replaced.
+    overwrite : bool
+        Whether to replace any other file. Files from `save_figure` are always replaced.
+
+    Raises
+    ------
+    FileError
+        If a file cannot be written or must not be replaced.
     """
     for path in paths:
         if path.exists() and any(path.samefile(result) for result in results):
@@ -174,7 +206,7 @@ def check_figures(paths: Sequence[Path], results: Sequence[str | Path], overwrit
 
 
 def _is_own(path: Path) -> bool:
-    """Whether a file says in its metadata that `save_figure` wrote it."""
+    """Whether the metadata of a file show that `save_figure` wrote it."""
     with suppress(OSError):
         return re.search(OWN, path.read_bytes()) is not None
     return False

@@ -1,4 +1,4 @@
-"""How far the axes of a diagram reach, and how it marks what it cannot show."""
+"""Limits and legend of a diagram, and marks for lanes it cannot show."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -16,8 +16,8 @@ from gearchaos.figures.lanes import ShownLanes, columns
 from gearchaos.figures.style import BLACK, GREY, LEGEND, VERMILION
 from gearchaos.results.reading.result import Result
 
-OUTLYING_SHARE = 0.03
-MARGIN = 0.05
+OUTLYING_SHARE = 0.03  # Share of the lanes at either end that limits may leave out.
+MARGIN = 0.05  # Margin of the limits, relative to their distance.
 
 _DIAGRAM = "_gearchaos_diagram"
 """Attribute of the line of a diagram that holds the diagram."""
@@ -25,13 +25,28 @@ _DIAGRAM = "_gearchaos_diagram"
 
 @dataclass(eq=False)
 class Diagram:
-    """What one call has drawn into axes, and how far it reaches.
+    """The parts that one call has drawn into axes, and the range of their values.
 
-    ``points``: what shows the lanes, lane after lane; ``low``, ``high`` (lanes,): lowest and
-    highest value of each lane, not a number where there is none; ``spread``, (lanes,) or one for
-    all: what the limits leave room for beyond these; ``named``: what the legend names beside the
-    points; ``parts``: what else is drawn, by name; ``diverged``: the rug of diverged lanes;
-    ``off_scale``: triangles for lanes beyond bottom and top; ``legend``: of all these.
+    Attributes
+    ----------
+    points : Line2D
+        Dots or line of the lanes.
+    lanes : ShownLanes
+        The lanes in the order of the arrays below.
+    low, high : (lanes,)
+        Lowest and highest value of each lane; NaN without a value.
+    spread : (lanes,) or float
+        Distance beyond ``low`` and ``high`` that the limits include.
+    named : list of Artist
+        Further entries of the legend.
+    parts : dict
+        Further parts by name.
+    diverged : Line2D, optional
+        Ticks of the diverged lanes.
+    off_scale : list of Line2D
+        Triangles for lanes beyond the bottom and the top.
+    legend : Legend, optional
+        The legend of all diagrams in the axes.
     """
 
     points: Line2D
@@ -49,10 +64,9 @@ class Diagram:
 def close_panel(axes: Axes, result: Result, own: Diagram, *, hold_zero: bool = False) -> Diagram:
     """Set limits and the label of the parameter, and mark the lanes that cannot be shown.
 
-    Limits and marks are those of everything that was drawn into the axes in this way; ``hold_zero``
-    is as for `robust_limits`.
+    Limits and marks cover all diagrams in the axes; ``hold_zero`` is as for `robust_limits`.
     """
-    # Kept by their lines: axes that are cleared lose them, and nothing outlives its figure.
+    # Stored in its line: clearing the axes removes it, and it does not outlive its figure.
     setattr(own.points, _DIAGRAM, own)
     drawn = [getattr(line, _DIAGRAM) for line in axes.lines if hasattr(line, _DIAGRAM)]
     left, right = zip(*(one.lanes.limits for one in drawn), strict=True)
@@ -86,10 +100,18 @@ def close_panel(axes: Axes, result: Result, own: Diagram, *, hold_zero: bool = F
 def robust_limits(low: Floats, high: Floats, *, hold_zero: bool = False) -> tuple[float, float]:
     """Return limits that a few outlying lanes cannot stretch.
 
-    Where the outermost 3 % of the lanes at either end would take more than half of the height
-    from all the others, those that lie far out are left out; a triangle then says so. ``low``,
-    ``high`` (lanes,): lowest and highest value of each lane, all finite; ``hold_zero``: zero is
-    part of what is to be shown.
+    Parameters
+    ----------
+    low, high : (lanes,)
+        Lowest and highest value of each lane, all finite.
+    hold_zero : bool
+        Whether the limits must include zero.
+
+    Returns
+    -------
+    (float, float)
+        Lower and upper limit. If the outermost 3 % of the lanes at either end would take more than
+        half of the height, lanes farther out than half of the inner height are left out.
     """
     bottom, top = float(low.min()), float(high.max())
     inner_bottom = float(np.quantile(low, OUTLYING_SHARE))
@@ -121,16 +143,16 @@ def _mark_off_scale(axes: Axes, drawn: Diagram) -> list[Line2D]:
 
 
 def _marks(axes: Axes, parameter: Floats, height: float, label: str, **look: Any) -> Line2D:
-    """Draw marks at some height of the axes, in parts of it, one in each column."""
+    """Draw marks at a height relative to that of the axes, at most one per column."""
     parameter = parameter[columns(parameter, axes.get_xlim())]
     look |= {"linestyle": "none", "transform": axes.get_xaxis_transform(), "zorder": 4}
     return axes.plot(parameter, np.full(parameter.size, height), label=label, **look)[0]
 
 
 def mark_values(panels: Sequence[Axes], label: str, values: Sequence[float]) -> None:
-    """Tick values of the parameter at the upper edge of panels; a legend above the first says so.
+    """Tick values of the parameter at the upper edge of panels, named in the legend of the first.
 
-    The legend keeps what it has named before.
+    The legend keeps its former entries.
     """
     look: dict[str, Any] = {"marker": "|", "ms": 8.0, "mew": 0.9, "color": VERMILION}
     ticks = [_marks(axes, np.asarray(values), 1.0, label, **look) for axes in panels]
@@ -139,10 +161,10 @@ def mark_values(panels: Sequence[Axes], label: str, values: Sequence[float]) -> 
 
 
 def legend_above(axes: Axes, handles: Sequence[Artist]) -> Legend | None:
-    """Place a legend above the right end of the axes, where it hides nothing."""
+    """Place a legend above the right end of the axes; None without entries."""
     if not handles:
         return None
-    # What the axes are wide, and a column: its mark and gaps, and so much for each letter.
+    # Widths in points: a column takes its mark, its gaps and 3.2 for each letter.
     room = axes.get_window_extent().width / axes.figure.dpi * 72.0
     column = 17.0 + 3.2 * max(len(str(one.get_label())) for one in handles)
     most = int(np.clip(room // column, 1, 3))

@@ -21,18 +21,18 @@ from gearchaos.records.period import motion_period
 from gearchaos.results.reading.excitation import excitation_of
 from gearchaos.results.reading.result import Result, section_variables
 
-COORDINATE = "delta_5"  # The coordinate that is drawn unless another is asked for: the torsion.
+COORDINATE = "delta_5"  # Default coordinate: the torsion.
 
-HIGHEST_ORDER = 8.0
-DECADES = 5  # Decades that a spectrum shows, up to that of its highest line.
-CONTACT_COLOURS = (ORANGE, "0.8", BLUE)  # Of teeth apart, of driving and of back flanks in contact.
-STRIP_HEIGHT = 0.05  # Of what tells the contact along the foot of a panel, in parts of the panel.
+HIGHEST_ORDER = 8.0  # Default limit of a spectrum, as a multiple of the mesh frequency.
+DECADES = 5  # Decades of a spectrum, down from that of its highest line.
+CONTACT_COLOURS = (ORANGE, "0.8", BLUE)  # No contact, driving flanks, back flanks.
+STRIP_HEIGHT = 0.05  # Height of the contact strip, relative to its panel.
 
 _LINE_LENGTH = 26
 _MARGIN = 0.06
 _MANY_LINES = 64
 _SMALLEST_SHARE = 0.2
-"""A section takes at least this share of the phase portrait: points that coincide stay one."""
+"""Least extent of a section, relative to the phase portrait, so that equal points coincide."""
 
 
 def time_history(
@@ -45,10 +45,23 @@ def time_history(
 ) -> Line2D:
     """Draw a variable against time in mesh periods.
 
-    ``result``: a response; ``lane``: number of the lane, from 0, all axes of the result flattened;
-    ``variable``: one over time, such as ``"delta_5_acceleration"`` or ``"mesh_force_tangential"``;
-    ``between``: mesh periods to show; None: as far as the record goes. Raises FigureError if the
-    result is no response, or has no such lane or variable, or the lane diverged.
+    Parameters
+    ----------
+    axes : Axes
+        The axes to draw into.
+    result : Result
+        A response.
+    lane : int
+        Number of the lane, from 0, in the flattened axes of the result.
+    variable : str
+        A variable over time, such as ``"delta_5_acceleration"`` or ``"mesh_force_tangential"``.
+    between : (float or None, float or None)
+        First and last mesh period to show; None is the end of the record.
+
+    Raises
+    ------
+    FigureError
+        If the result is not a response, the variable is missing, or the lane diverged.
     """
     values = motion_of(result, lane, variable)
     time = result[TIME]
@@ -62,11 +75,19 @@ def time_history(
 
 
 def contact_strip(axes: Axes, result: Result, lane: int, variable: str) -> list[PolyCollection]:
-    """Tell along the foot of a time history of a mesh force which flanks are in contact.
+    """Draw the contact state as a strip along the foot of a time history of a mesh force.
 
-    Parameters as for `time_history`, for ``"mesh_force_tangential"`` or ``"mesh_force_axial"``.
-    Returns a strip of bars for each state of contact that occurs; a legend above everything in the
-    figure, which needs the constrained layout, names them.
+    Parameters
+    ----------
+    axes, result, lane
+        As for `time_history`; the figure needs the constrained layout for its legend.
+    variable : str
+        ``"mesh_force_tangential"`` or ``"mesh_force_axial"``.
+
+    Returns
+    -------
+    list of PolyCollection
+        Bars of each contact state that occurs.
     """
     name, time = f"contact_{variable.removeprefix(MESH_FORCE)}", result[TIME]
     states, strips = result.lanes(name)[lane], []
@@ -86,12 +107,25 @@ def contact_strip(axes: Axes, result: Result, lane: int, variable: str) -> list[
 def phase_portrait(
     axes: Axes, result: Result, lane: int, coordinate: str = COORDINATE
 ) -> tuple[Line2D, Line2D]:
-    """Draw velocity against displacement, with the points at the beginning of each mesh period.
+    """Draw velocity against displacement, with a point at the beginning of each mesh period.
 
-    Where the excitation repeats after several of them, other points than the first are light grey.
+    Parameters
+    ----------
+    axes, result, lane
+        As for `time_history`.
+    coordinate : str
+        Such as ``"delta_5"``.
 
-    Parameters and errors as for `time_history`, but for a coordinate such as ``"delta_5"``; returns
-    the curve and the points.
+    Returns
+    -------
+    (Line2D, Line2D)
+        The curve, and the points once an excitation period. If that is longer than a mesh period,
+        the points once a mesh period are light grey.
+
+    Raises
+    ------
+    FigureError
+        As for `time_history`.
     """
     plane = coordinate, f"{coordinate}_rate"
     displacement, velocity = (motion_of(result, lane, name) for name in plane)
@@ -104,10 +138,27 @@ def phase_portrait(
 
 
 def poincare_section(axes: Axes, result: Result, lane: int, coordinate: str = COORDINATE) -> Line2D:
-    """Draw the states at the beginning of all recorded mesh periods, as `phase_portrait` does.
+    """Draw the states at the beginning of all recorded mesh periods.
 
-    Parameters and errors as for `phase_portrait`. The axes reach over at least a fifth of the phase
-    portrait, so that the points of a periodic motion coincide.
+    Parameters
+    ----------
+    axes, result, lane, coordinate
+        As for `phase_portrait`.
+
+    Returns
+    -------
+    Line2D
+        The points once an excitation period, as for `phase_portrait`.
+
+    Raises
+    ------
+    FigureError
+        As for `time_history`.
+
+    Notes
+    -----
+    The axes cover at least a fifth of the phase portrait, so that the points of a periodic motion
+    coincide.
     """
     plane = coordinate, f"{coordinate}_rate"
     curve = np.array([motion_of(result, lane, name) for name in plane])
@@ -118,7 +169,7 @@ def poincare_section(axes: Axes, result: Result, lane: int, coordinate: str = CO
     low, high = middle - reach, middle + reach
     once = once_an_excitation(result, section.shape[1])
     places = np.round((section.T[once] - low) / (high - low), 3)
-    # Few points are seen as such only if they are large.
+    # A few points are visible only if they are large.
     markersize = float(np.clip(40.0 / len(np.unique(places, axis=0)), 1.5, 3.5))
     points = _points(axes, section[0], section[1], markersize, once)
     axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
@@ -136,16 +187,48 @@ def amplitude_spectrum(
 ) -> LineCollection:
     """Draw the single-sided amplitude spectrum; a sine of amplitude A is a line of height A.
 
-    A motion that repeats is transformed over as many of its periods as the record holds, with a
-    rectangular window, so that all its lines are those of the transform; any other one over as many
-    periods of the excitation, with the window of Hann. Each of the lines that are returned begins
-    at the bottom of the axes, five decades below the top.
+    Parameters
+    ----------
+    axes, result, lane
+        As for `time_history`.
+    variable : str, optional
+        A variable over time, by default ``"delta_5_acceleration"``.
+    highest : float
+        Highest multiple of the mesh frequency to show.
 
-    ``axes``, ``result``, ``lane`` and errors: as for `time_history`; ``variable``: one over time,
-    by default ``"delta_5_acceleration"``; ``highest``: multiple of the mesh frequency up to which
-    lines are shown.
+    Returns
+    -------
+    LineCollection
+        The lines; each begins at the bottom of the axes, five decades below their top.
+
+    Raises
+    ------
+    FigureError
+        As for `time_history`.
+
+    Notes
+    -----
+    A motion that repeats within the record is transformed over a whole number of its periods with
+    a rectangular window. Any other motion is transformed over a whole number of excitation periods
+    with a Hann window.
     """
     variable = variable or acceleration_of(COORDINATE)
+    order, amplitude, window = _spectrum(result, lane, variable)
+    shown = order <= highest
+    order, amplitude = order[shown], amplitude[shown]
+    lines = _draw_spectrum(axes, order, amplitude)
+    spare = 0.02 * highest
+    axes.set_xlim(-spare, highest + spare)
+    axes.set_xlabel("Frequency over mesh frequency")
+    axes.xaxis.set_major_locator(MaxNLocator(9, integer=True))
+    symbol = result.attributes(variable).get("symbol") or plain(variable)
+    axes.set_ylabel(f"Amplitude of {symbol} ({unit_of(result, variable)})")
+    remark(axes, window)
+    return lines
+
+
+def _spectrum(result: Result, lane: int, variable: str) -> tuple[Floats, Floats, str]:
+    """Return orders and amplitudes, each (lines,), and the window in words."""
     values, steps = motion_of(result, lane, variable), samples_per_period(result)
     held, excitation = values.size // steps, excitation_of(result.metadata).excitation_period
     repeats = repeats_after(result, lane)
@@ -154,35 +237,30 @@ def amplitude_spectrum(
     periods = held // period * period
     record = values[-1 - periods * steps : -1]
     order, amplitude = spectral_lines(record, steps, hann=window == "Hann")
-    shown = order <= highest
-    order, amplitude = order[shown], amplitude[shown]
+    plural = "s" if periods > 1 else ""
+    return order, amplitude, f"{window} window, {periods} mesh period{plural}"
+
+
+def _draw_spectrum(axes: Axes, order: Floats, amplitude: Floats) -> LineCollection:
+    """Draw lines over a logarithmic axis of `DECADES` decades."""
     top = 10.0 ** np.ceil(np.log10((1.0 + _MARGIN) * float(amplitude.max()) or 1.0))
     floor = top * 10.0**-DECADES
     axes.set_yscale("log")
     axes.yaxis.set_minor_formatter(NullFormatter())
-    # Before the lines: matplotlib 3.9 finds limits from their logarithms, and warns.
+    # Before the lines: matplotlib 3.9 would take limits from their logarithms, and warn.
     axes.set_ylim(floor, top)
     seen = amplitude > floor
     width = 0.5 if np.count_nonzero(amplitude > 1e-3 * top) > _MANY_LINES else 1.0
-    lines = axes.vlines(order[seen], floor, amplitude[seen], color=BLUE, linewidth=width)
-    spare = 0.02 * highest
-    axes.set_xlim(-spare, highest + spare)
-    axes.set_xlabel("Frequency over mesh frequency")
-    axes.xaxis.set_major_locator(MaxNLocator(9, integer=True))
-    symbol = result.attributes(variable).get("symbol") or plain(variable)
-    axes.set_ylabel(f"Amplitude of {symbol} ({unit_of(result, variable)})")
-    plural = "s" if periods > 1 else ""
-    remark(axes, f"{window} window, {periods} mesh period{plural}")
-    return lines
+    return axes.vlines(order[seen], floor, amplitude[seen], color=BLUE, linewidth=width)
 
 
 def is_response(result: Result) -> bool:
-    """Whether a result holds the motion of its lanes in time."""
+    """Whether a result contains the motion of its lanes over time."""
     return bool(response_variables_of(result))
 
 
 def response_variables_of(result: Result) -> tuple[str, ...]:
-    """Return the variables that run over time as numbers: all but the contact states."""
+    """Return the names of the variables over time, without contact states."""
     return tuple(
         name
         for name in result
@@ -191,15 +269,15 @@ def response_variables_of(result: Result) -> tuple[str, ...]:
 
 
 def coordinates_of(result: Result) -> tuple[str, ...]:
-    """Return the coordinates whose motion a response holds, `delta_5` first."""
+    """Return the coordinates of a response that have accelerations, `delta_5` first."""
     names = response_variables_of(result)
     return tuple(name for name in names if acceleration_of(name) in names)
 
 
 def repeats_after(result: Result, lane: int) -> int:
-    """Return after how many mesh periods the motion of a lane repeats.
+    """Return the number of mesh periods after which the motion of a lane repeats.
 
-    0 for none up to 16 periods of the excitation, or a section with too few points to tell.
+    0 if it does not repeat within 16 excitation periods, or the section has too few points.
     """
     section = np.stack([result.lanes(name)[lane] for name in section_variables(result)], axis=1)
     once = once_an_excitation(result, section.shape[0])
@@ -207,23 +285,27 @@ def repeats_after(result: Result, lane: int) -> int:
 
 
 def once_an_excitation(result: Result, points: int) -> slice:
-    """Return which of so many points, a mesh period apart, are one period of the excitation apart.
+    """Select every point that is a whole number of excitation periods before the last point.
 
-    The last of them ends the lane, as it does a whole number of excitation periods.
+    ``points`` is the number of points, one per mesh period. A lane ends at the end of an
+    excitation period.
     """
     period = excitation_of(result.metadata).excitation_period
     return slice((points - 1) % period, None, period)
 
 
 def samples_per_period(result: Result) -> int:
-    """Return how many samples of a response make a mesh period."""
+    """Return the number of samples of a response per mesh period."""
     return int(np.searchsorted(result[TIME], 1.0))
 
 
 def motion_of(result: Result, lane: int, variable: str) -> Floats:
     """Return a variable of one lane over time, shape (samples,).
 
-    Raises FigureError if the result is no response, has no such variable, or the lane diverged.
+    Raises
+    ------
+    FigureError
+        If the result is not a response, the variable is missing, or the lane diverged.
     """
     check_variable(variable, response_variables_of(result), "over time")
     values = np.asarray(result.lanes(variable)[lane], dtype=np.float64)

@@ -13,7 +13,7 @@ SINGLE_COLUMN_MM = 85.0
 DOUBLE_COLUMN_MM = 180.0
 MM_PER_INCH = 25.4
 
-# Of Okabe and Ito: told apart by colour-blind readers, and by their lightness in grey.
+# Colours of Okabe and Ito: colour-blind readers can distinguish them, and so can print in grey.
 BLACK = "#000000"
 BLUE = "#0072B2"
 ORANGE = "#E69F00"
@@ -44,12 +44,12 @@ LEGEND: dict[str, Any] = {
 
 
 DRAWING = RLock()
-"""Held by the one thread that draws a page or writes one.
+"""Held by the thread that draws or writes a page.
 
-Matplotlib's settings are those of the whole process, and it has one parser of formulae.
+Matplotlib's settings and its parser of formulae are global to the process.
 """
 if hasattr(os, "register_at_fork"):
-    # A process forked in the middle of a page would keep its settings, and the lock for ever.
+    # A process forked while a page is drawn would keep the settings, and never release the lock.
     os.register_at_fork(
         before=DRAWING.acquire, after_in_parent=DRAWING.release, after_in_child=DRAWING.release
     )
@@ -57,17 +57,17 @@ if hasattr(os, "register_at_fork"):
 
 @contextmanager
 def styled() -> Iterator[None]:
-    """Set the project's style for what is drawn meanwhile; other threads wait for their pages."""
+    """Set the project's style within a context; other threads wait before they draw pages."""
     with DRAWING, mpl.rc_context(style()):
         yield
 
 
 def style() -> dict[Any, Any]:
-    """Return the settings of `styled`; what a user has set otherwise stays."""
+    """Return the settings of `styled`; settings that the user has changed are kept."""
     now, default = mpl.rcParams, mpl.rcParamsDefault
     return {
         **{key: now[key] if now[key] != default[key] else _STYLE[key] for key in _STYLE},
-        # Whatever they are: the page is as large as the figure, and laid out once.
+        # Overridden in any case: a page has the size of its figure, and is laid out once.
         "savefig.bbox": None,
         "figure.autolayout": False,
         "figure.constrained_layout.use": False,

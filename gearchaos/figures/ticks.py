@@ -1,4 +1,4 @@
-"""Ticks that are laid out and drawn in less than half of matplotlib's time, and look the same."""
+"""Ticks that look like matplotlib's and are laid out and drawn in less than half the time."""
 
 from typing import Any
 
@@ -10,13 +10,14 @@ from gearchaos.figures.style import FONT_PT
 
 
 def light(axes: Any) -> None:
-    """Let what is slow of the ticks of finished axes be drawn by what follows in this module."""
+    """Replace the slow parts of the ticks of finished axes by the classes of this module."""
     for axis in (axes.xaxis, axes.yaxis):
         if type(axis.get_major_formatter()) is ScalarFormatter:
             axis.set_major_formatter(PlainNumbers())
         if isinstance(axis.get_minor_formatter(), NullFormatter):
             axes.add_artist(FineTicks(axis))
-    # A power of ten stands where titles do, which look for none: that takes long.
+    # A power of ten is drawn where titles are. The padding is set here: matplotlib's automatic
+    # placement of titles is slow.
     formatter = axes.yaxis.get_major_formatter()
     formatter.format_ticks(axes.yaxis.get_majorticklocs().tolist())
     if formatter.get_offset():
@@ -25,7 +26,7 @@ def light(axes: Any) -> None:
 
 
 class PlainNumbers(ScalarFormatter):
-    """Numbers as plain text, and a power of ten that all have in common as a formula."""
+    """Numbers as plain text, and their common power of ten as a formula."""
 
     def __init__(self) -> None:
         super().__init__(useMathText=False)
@@ -39,14 +40,14 @@ class PlainNumbers(ScalarFormatter):
 
 
 class FineTicks(Artist):
-    """The ticks without numbers of one axis, of which only one is made, to be drawn at all places.
+    """The minor ticks of one axis: a single tick that is drawn at all places.
 
-    Their places are those of the minor locator of the axis at the time of drawing.
+    The places are those of the axis's minor locator at the time of drawing.
     """
 
     def __init__(self, axis: Axis) -> None:
         super().__init__()
-        # Over the frame, as the axis itself is.
+        # Above the frame, like the axis itself.
         self.set(in_layout=False, zorder=axis.get_zorder() + 0.01)
         tick = axis.get_minor_ticks(1)[0]
         self._axis, self._along_x = axis, isinstance(axis, XAxis)

@@ -1,4 +1,4 @@
-"""Error against steps and against time: what accuracy costs."""
+"""Work-precision diagram: error against steps per period and against computing time."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -18,9 +18,13 @@ HEIGHT_MM = 65.0
 
 
 def work_precision_page(modes: Mapping[str, Sequence[tuple[int, float, float]]]) -> Page:
-    """Draw the error against the steps per period and against the time, all logarithmic.
+    """Draw the error against steps per period (a) and against time (b), all logarithmic.
 
-    ``modes``: points (steps, seconds, error) by mode; those without an error are left out.
+    Parameters
+    ----------
+    modes : mapping of str to sequence of (int, float, float)
+        Steps per mesh period, time in s and error by mode, one of `LOOKS`. Points whose error is
+        zero or not finite are left out.
     """
     with column(HEIGHT_MM) as figure:
         panels = figure.subplots(1, 2, sharey=True)
@@ -34,7 +38,7 @@ def work_precision_page(modes: Mapping[str, Sequence[tuple[int, float, float]]])
             axes.margins(0.08)
             axes.xaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
             axes.xaxis.set_minor_formatter(NullFormatter())
-        # Times rarely span a decade, within which nothing would be labelled, or everything.
+        # Times rarely span a decade; the default locator would label no tick or all of them.
         panels[1].xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
         panels[0].set_ylabel("Error of section and exponent")
         letter(panels)
