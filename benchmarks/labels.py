@@ -31,7 +31,7 @@ from machine import machine_facts, print_machine
 import gearchaos
 from gearchaos.dynamics.orbits import polish
 from gearchaos.engine.run_plan import RunPlan, plan_run
-from gearchaos.records.label import MEANINGS
+from gearchaos.records.label import MOTION_MEANINGS
 
 SWEEPS = Path(__file__).parent.parent / "sweeps"
 LONGER = 10
@@ -323,7 +323,7 @@ def judged(config: gearchaos.Configuration) -> Judged:
     truths, true_periods = told(simulation, result["end_state"])
     return Judged(
         result[result.axis],
-        np.array(MEANINGS)[result["motion"]],
+        np.array(MOTION_MEANINGS)[result["motion"]],
         result["period"],
         truths,
         true_periods,
@@ -420,7 +420,7 @@ def confusion(lanes: Judged) -> dict[str, dict[str, int]]:
     return {
         truth: {
             label: int(np.sum((lanes.truths == truth) & (lanes.labels == label)))
-            for label in MEANINGS
+            for label in MOTION_MEANINGS
         }
         for truth in ROWS
     }
@@ -453,9 +453,9 @@ def disagreements(sets: dict[str, Judged]) -> list[str]:
 
 
 def _print(matrix: dict[str, dict[str, int]]) -> None:
-    print(f"{'motion':16}" + "".join(f"{label:>16}" for label in MEANINGS))
+    print(f"{'motion':16}" + "".join(f"{label:>16}" for label in MOTION_MEANINGS))
     for truth, row in matrix.items():
-        print(f"{truth:16}" + "".join(f"{row[label]:16d}" for label in MEANINGS))
+        print(f"{truth:16}" + "".join(f"{row[label]:16d}" for label in MOTION_MEANINGS))
 
 
 if __name__ == "__main__":

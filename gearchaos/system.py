@@ -23,7 +23,7 @@ from gearchaos.arguments import (
 from gearchaos.arguments import state as checked_state
 from gearchaos.arrays import Floats
 from gearchaos.dynamics.exponents import Exponents, exponents, sum_of_exponents
-from gearchaos.dynamics.following import Branch, Orbit, follow
+from gearchaos.dynamics.following import Branch, Followed, Orbit, follow
 from gearchaos.dynamics.orbits import Orbits, polish
 from gearchaos.dynamics.plans import plan_of
 from gearchaos.dynamics.stability import fewest_stable_steps
@@ -216,15 +216,7 @@ class System:
             width,
             self._plan,
         )
-        loss = StabilityLoss(int(followed.loss[0]))
-        return Branch(
-            float(followed.stable_value[0]),
-            self._orbit(followed.stable, orbit.period),
-            float(followed.beyond_value[0]),
-            loss,
-            STABILITY_LOSS_TEXTS[loss],
-            complex(followed.multiplier[0]),
-        )
+        return self._branch(followed, orbit.period)
 
     def exponents(self, start: Floats | None = None) -> Exponents:
         """Compute all Lyapunov exponents over the configured record, after its transient.
@@ -292,4 +284,16 @@ class System:
             found.multipliers[0],
             float(np.log(np.abs(found.multipliers[0, 0])) / duration),
             float(found.residual[0]),
+        )
+
+    def _branch(self, followed: Followed, period: int) -> Branch:
+        """Return the branch of one lane that was followed."""
+        loss = StabilityLoss(int(followed.loss[0]))
+        return Branch(
+            float(followed.stable_value[0]),
+            self._orbit(followed.stable, period),
+            float(followed.beyond_value[0]),
+            loss,
+            STABILITY_LOSS_TEXTS[loss],
+            complex(followed.multiplier[0]),
         )

@@ -12,7 +12,7 @@ from gearchaos.configuration.keys import Key
 from gearchaos.configuration.toml_text import quoted_key, toml_literal
 
 MOST_SHOWN = 100  # Faults that are worded; a file with more of them is hardly a configuration.
-LONGEST = 80  # Characters of a value.
+MOST_CHARACTERS = 80  # Characters of a value.
 
 _RULES = {
     "missing": "is missing",
@@ -72,7 +72,7 @@ def shown(value: object) -> str:
             text = str(value)
         except ValueError:  # Python writes no integer as long as that.
             text = "an integer of thousands of digits"
-    text = text if len(text) <= LONGEST else f"{text[:LONGEST]}..."
+    text = text if len(text) <= MOST_CHARACTERS else f"{text[:MOST_CHARACTERS]}..."
     return "".join(c if c.isprintable() else repr(c)[1:-1] for c in text)
 
 

@@ -7,7 +7,7 @@ from typing import Any, TypeAlias
 from gearchaos.configuration.messages import Fault
 from gearchaos.configuration.methods import METHODS
 from gearchaos.configuration.ranges import LARGEST_VALUE
-from gearchaos.configuration.run_tables import MOST_LANES, Start
+from gearchaos.configuration.run_tables import MOST_RUN_LANES, Start
 from gearchaos.configuration.tables import Tables
 
 Rule: TypeAlias = Callable[[Any], Iterator[Fault]]
@@ -151,7 +151,7 @@ def _lanes_are_not_too_many(config: Tables) -> Iterator[Fault]:
     counts["starts"] = config.start.size
     counts["directions"] = 2 if config.start.carry == "both" else 1
     lanes = math.prod(counts.values())
-    if lanes > MOST_LANES:
+    if lanes > MOST_RUN_LANES:
         product = " x ".join(f"{count} {name}" for name, count in counts.items() if count > 1)
-        rule = f"{product} make {lanes} lanes, must be at most {MOST_LANES}"
+        rule = f"{product} make {lanes} lanes, must be at most {MOST_RUN_LANES}"
         yield Fault(list(config.sweeps)[-1], rule, "lower a count, or split it into several runs")

@@ -9,7 +9,7 @@ from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 from gearchaos.configuration.keys import AS_LIST, Numbers, Table, key
 from gearchaos.configuration.methods import EXACT, METHODS
 
-MOST_LANES = 100_000_000  # Lanes of one run: what a file and a machine can still hold.
+MOST_RUN_LANES = 100_000_000  # Lanes of one run: what a file and a machine can still hold.
 MOST_STEPS_PER_PERIOD = 1_000_000
 DEFAULT_STEPS = 200
 """Fewest Runge-Kutta steps per period that are chosen for a scene where none are given."""
@@ -22,7 +22,7 @@ State = TypeVar("State", bound=str, covariant=True)
 ONCE = AfterValidator(lambda given: tuple(dict.fromkeys(given)))
 """Repeating a name or value is no mistake worth a message."""
 
-Bounds: TypeAlias = Annotated[tuple[float, float], AS_LIST]
+Interval: TypeAlias = Annotated[tuple[float, float], AS_LIST]
 Order: TypeAlias = Annotated[
     str,
     BeforeValidator(str, json_schema_input_type=int | str),
@@ -47,12 +47,12 @@ class Start(Table, Generic[State]):
     """all zero, on the contact flank, as in `state`, at random, or on a grid"""
     state: dict[State, float] = key(example={"delta_5": 1.0}, default={})
     """start values by state for kind = "given", and beside a box; those not named are 0"""
-    box: dict[State, Bounds] = key(
+    box: dict[State, Interval] = key(
         example={"delta_5": [-2.0, 2.0], "delta_5_rate": [-1.5, 1.5]}, default={}
     )
     """lowest and highest start value by state: where a grid reaches, both ends included, or where
     random starts are uniform; those not named are as in `state`"""
-    drawn: dict[State, Bounds] = key(example={"delta_1": [-0.5, 0.5]}, default={})
+    drawn: dict[State, Interval] = key(example={"delta_1": [-0.5, 0.5]}, default={})
     """for kind = "grid": lowest and highest start value of states that are drawn beside it"""
     spread: float = key(units="1", default=1.0, gt=0)
     """for kind = "random" without a box: every state is uniform between minus and plus this"""

@@ -1,1 +1,1 @@
-"""What one asks of a system: orbits, loss of stability, exponents, mesh forces."""
+"""Orbits, their stability, Lyapunov exponents, labels and attractors of a system."""

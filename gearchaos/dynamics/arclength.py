@@ -1,8 +1,8 @@
-"""The curve of a periodic orbit over a parameter, followed past the point where it turns back.
+"""The curve of a periodic orbit over a parameter, continued around its folds.
 
 Pseudo-arclength continuation (Keller 1977): state and parameter are unknown together, and a step
-goes along the tangent of the curve. At a fold the curve turns back, but has no singular point, so
-that the multiplier is seen on both sides of +1 however fast it moves with the parameter.
+follows the tangent of the curve. A fold is a regular point of the curve. The multiplier is
+therefore found on both sides of +1, however fast it changes with the parameter.
 """
 
 from collections.abc import Callable
@@ -16,36 +16,51 @@ from gearchaos.dynamics.exponents import period_jacobian
 from gearchaos.dynamics.orbits import CLOSED, NEWTON_STEPS
 from gearchaos.records.period import TOLERANCE, coordinate_scale
 
-FIRST_STEP, LONGEST_STEP, SHORTEST_STEP = 1e-3, 0.05, 1e-10
-"""Steps along a curve, whose coordinates are measured by their scale, the parameter by the way."""
+FIRST_STEP, LONGEST_CURVE_STEP, SHORTEST_STEP = 1e-3, 0.05, 1e-10
+"""Lengths of steps along a curve: states in their scales, the parameter in shares of the way."""
 
-STRAIGHT = 0.9  # Least cosine between the tangents of successive points: else another branch.
+STRAIGHT = 0.9
+"""Least cosine between tangents of successive points; below it they are on different curves."""
 
-MOST_STEPS = 200
+MOST_CURVE_STEPS = 200
+"""Largest number of points computed along one curve."""
 
 MOST_HALVINGS = 48
+"""Largest number of halvings with which the end of a curve is located."""
 
-APART = 1e-6  # Largest moduli of the multipliers on both sides of a located end differ by no more.
+APART = 1e-6
+"""Largest difference of the largest multiplier moduli on both sides of a located end."""
 
-NEAR = 1e-4  # Both sides of a located end are this close along the curve.
+NEAR_ON_CURVE = 1e-4
+"""Largest distance along the curve between both sides of a located end."""
 
-DIFFERENCE = 1e-6  # Share of the way over which the map is differenced for its parameter.
+DIFFERENCE = 1e-6
+"""Share of the way used for the difference quotient of the map by the parameter."""
 
 
 HALF_RETURN = 1e-2
-"""Return distance after half the period below which a curve ends in an orbit of half the period.
+"""Half-period return distance below which a curve ends in an orbit of half the period.
 
-There a multiplier nears +1 with the square of this distance: closer, the error of steps hides it.
+There a multiplier approaches +1 with the square of this distance. At smaller distances the error
+of the steps is larger than the deviation from +1.
 """
 
 
 class CurvePoint(NamedTuple):
     """A point of a curve.
 
-    ``place`` (states + 1,): the state in its scales, then the share of the way; ``tangent``
-    (states + 1,): unit vector in the direction in which the curve is followed; ``multipliers``
-    (states,), largest modulus first; ``residual``: return distance, in the scales;
-    ``half_return``: that after half the period, infinite for an odd one.
+    Attributes
+    ----------
+    place : array, shape (states + 1,)
+        The state in its scales, then the share of the way.
+    tangent : array, shape (states + 1,)
+        Unit vector in the direction in which the curve is followed.
+    multipliers : array of complex, shape (states,)
+        Floquet multipliers, largest modulus first.
+    residual : float
+        Return distance, in the scales of the states.
+    half_return : float
+        Return distance after half the period, infinite for an odd period.
     """
 
     place: Floats
@@ -56,12 +71,12 @@ class CurvePoint(NamedTuple):
 
     @property
     def share(self) -> float:
-        """The share of the way at which the orbit lies."""
+        """Share of the way at which the orbit lies."""
         return float(self.place[-1])
 
     @property
     def onward(self) -> bool:
-        """Whether the curve leads on along the way, and has not turned back."""
+        """Whether the curve advances along the way, that is, has not turned back."""
         return bool(self.tangent[-1] > 0.0)
 
     @property
@@ -71,24 +86,28 @@ class CurvePoint(NamedTuple):
 
     @property
     def before_its_end(self) -> bool:
-        """Whether the point lies on the stable part of the curve, before that ends.
+        """Whether the point lies on the stable part of the curve, before its end.
 
-        Beyond the place where it was born in an orbit of half the period the curve turns back, or
-        a step leads to the curve of that orbit.
+        Beyond its birth from an orbit of half the period the curve turns back, or a step leads to
+        the curve of that orbit.
         """
         return self.stable and self.onward and self.half_return > TOLERANCE
 
     @property
     def halved(self) -> bool:
-        """Whether the orbit is all but that of half the period in which it was born."""
+        """Whether the orbit nearly coincides with the orbit of half the period."""
         return self.half_return <= HALF_RETURN
 
 
 class End(NamedTuple):
-    """How far a curve was followed.
+    """The last stable point of a followed curve, and the point beyond.
 
-    ``inner``: the last stable point, None where the orbit at the beginning is not found again;
-    ``beyond``: the point behind the end of the stable part, None where no end was located.
+    Attributes
+    ----------
+    inner : CurvePoint or None
+        Last stable point; None where the orbit at the beginning is not found again.
+    beyond : CurvePoint or None
+        Point beyond the end of the stable part; None where no end was located.
     """
 
     inner: CurvePoint | None
@@ -98,8 +117,16 @@ class End(NamedTuple):
 class Curve(NamedTuple):
     """The orbits of one period over a parameter.
 
-    ``system_at`` gives the systems at shares of the way, (lanes,); ``plan`` records ``periods``
-    excitation periods with a tangent; ``scale`` (states,) measures the coordinates.
+    Attributes
+    ----------
+    system_at : callable
+        Returns the system of the lanes at shares of the way, (lanes,).
+    plan : Plan
+        Records the period of the orbit with a tangent.
+    periods : int
+        Period in excitation periods.
+    scale : array, shape (states,)
+        Scales of the states.
     """
 
     system_at: Callable[[Floats], LaneSystem]
@@ -116,7 +143,7 @@ class Curve(NamedTuple):
         point: Floats,
         share: float,
     ) -> Self:
-        """Return the curve through an orbit at a share of the way, with the scales of the orbit."""
+        """Return the curve through the orbit with state ``point`` (states,) at a share of the way."""
         system = system_at(np.array([share]))
         whole = periods * system.repeats_after
         plan = Plan(plan.steps_per_period, 0, whole, whole, tangent=True, method=plan.method)
@@ -126,7 +153,8 @@ class Curve(NamedTuple):
     def corrected(self, guess: Floats, direction: Floats) -> CurvePoint | None:
         """Find the point of the curve next to a guess, in the plane normal to a direction.
 
-        Newton's method; None where it does not converge.
+        ``guess`` and ``direction``: shape (states + 1,). Newton's method; None where it does not
+        converge.
         """
         place, last = guess, np.inf
         for _ in range(NEWTON_STEPS):
@@ -136,7 +164,7 @@ class Curve(NamedTuple):
                 if not np.isfinite(slopes).all():
                     break
                 return self._point(place, slopes, direction, (size, half_return))
-            # Not a number, too, where the motion diverged.
+            # The size is also NaN where the motion diverged.
             if not size < 0.5 * last:
                 break
             try:
@@ -148,9 +176,9 @@ class Curve(NamedTuple):
         return None
 
     def _defect(self, place: Floats) -> tuple[Floats, Floats, float]:
-        """Return P(x) - x in the scales, its derivatives by place, and the half return distance."""
+        """Return P(x) - x in the scales, its derivatives by place, half-period return distance."""
         point = place[:-1] * self.scale
-        # Beyond the way a parameter may have values that no system has.
+        # Beyond the ends of the way the value of the parameter may be invalid.
         shares = np.clip(place[-1] + DIFFERENCE * np.array([0.0, -1.0, 1.0]), 0.0, 1.0)
         system = self.system_at(shares)
         start = np.repeat(point[np.newaxis], 3, axis=0)
@@ -180,13 +208,23 @@ class Curve(NamedTuple):
 def end_of_curve(curve: Curve, point: Floats, share: float, limit: float, width: float) -> End:
     """Follow a curve from a stable orbit onwards to where it loses stability or turns back.
 
-    ``point`` (states,), ``share``: the orbit; ``limit``: the share to which the curve is followed
-    at most, and where the inner point lies if it is stable up to there; ``width``: both sides of
-    the end differ by no more in their shares.
+    Parameters
+    ----------
+    curve : Curve
+        The curve.
+    point : array, shape (states,)
+        State of the orbit at tau = 0.
+    share : float
+        Share of the way at which the orbit lies.
+    limit : float
+        Share up to which the curve is followed. If the curve is stable up to there, the inner point
+        of the result lies there.
+    width : float
+        Largest difference in share between both sides of the end.
     """
     here = curve.corrected(np.append(point / curve.scale, share), _along_the_way(point.size))
     step = FIRST_STEP
-    for _ in range(MOST_STEPS if here is not None else 0):
+    for _ in range(MOST_CURVE_STEPS if here is not None else 0):
         assert here is not None
         trial = curve.corrected(here.place + step * here.tangent, here.tangent)
         bends = trial is None or trial.tangent @ here.tangent < STRAIGHT
@@ -203,17 +241,17 @@ def end_of_curve(curve: Curve, point: Floats, share: float, limit: float, width:
             return End(_at_share(curve, here, end.inner, limit), None)
         if end.beyond is not None:
             return end
-        here, step = end.inner, min(2.0 * step, LONGEST_STEP)
+        here, step = end.inner, min(2.0 * step, LONGEST_CURVE_STEP)
     return End(here, None)
 
 
 def _along_the_way(states: int) -> Floats:
-    """Return the direction in which the parameter alone changes."""
+    """Return the unit vector (states + 1,) in which only the parameter changes."""
     return np.append(np.zeros(states), 1.0)
 
 
 def _at_share(curve: Curve, one: CurvePoint, other: CurvePoint, share: float) -> CurvePoint | None:
-    """Return the point of the curve at a share between those of two points."""
+    """Return the point of the curve at a share between the shares of two points."""
     part = (share - one.share) / (other.share - one.share)
     guess = one.place + part * (other.place - one.place)
     guess[-1] = share
@@ -221,11 +259,11 @@ def _at_share(curve: Curve, one: CurvePoint, other: CurvePoint, share: float) ->
 
 
 def _located(curve: Curve, inner: CurvePoint, beyond: CurvePoint, width: float) -> End:
-    """Halve the stretch of a curve in which it loses stability or turns back."""
+    """Bisect the stretch of a curve in which it loses stability or turns back."""
     for _ in range(MOST_HALVINGS):
         chord = beyond.place - inner.place
         moduli = abs(abs(beyond.multipliers[0]) - abs(inner.multipliers[0]))
-        if np.linalg.norm(chord) <= NEAR and moduli <= APART and abs(chord[-1]) <= width:
+        if np.linalg.norm(chord) <= NEAR_ON_CURVE and moduli <= APART and abs(chord[-1]) <= width:
             break
         middle = curve.corrected((inner.place + beyond.place) / 2.0, chord / np.linalg.norm(chord))
         if middle is None:

@@ -7,23 +7,31 @@ from gearchaos.arrays import Complex, Floats
 from gearchaos.dynamics.stability import in_contact
 
 
-# Parameters that no computation could hold have no eigenvalues.
+# Parameters so large that the matrix overflows have no eigenvalues.
 @np.errstate(all="ignore")
 def eigenfrequencies(system: LaneSystem) -> Floats:
     """Return the eigenfrequencies at the mean stiffness with all elements in contact.
 
-    They are angular, per unit of tau, and those of the damped system: the imaginary parts of the
-    eigenvalues of its Jacobian. Ascending, shape (lanes, coordinates); NaN, at the end,
-    stands for what does not oscillate.
+    Parameters
+    ----------
+    system : LaneSystem
+        The system of the lanes.
+
+    Returns
+    -------
+    array, shape (lanes, coordinates)
+        Angular frequencies of the damped system per unit of tau, ascending: the imaginary parts of
+        the eigenvalues of its Jacobian. Modes that do not oscillate are NaN and come last.
     """
     matrices = jacobian(system, in_contact(system))
     frequencies = np.stack([_eigenvalues(matrix).imag for matrix in matrices])
-    # Of a conjugate pair one; the smallest half of the sorted values are the others, or zeros.
+    # One of each conjugate pair: the lower half of the sorted values are the others, or zeros.
     upper = np.sort(frequencies, axis=1)[:, frequencies.shape[1] // 2 :]
     return np.sort(np.where(upper > 0.0, upper, np.nan), axis=1)
 
 
 def _eigenvalues(matrix: Floats) -> Complex:
+    """Return the eigenvalues (states,) of a matrix, NaN where they cannot be computed."""
     try:
         return np.linalg.eigvals(matrix).astype(np.complex128)
     except np.linalg.LinAlgError:

@@ -1,8 +1,8 @@
 """All Lyapunov exponents of a system, and the Jacobian of its map over mesh periods.
 
-The kernels carry one tangent vector per lane. Here every lane is repeated once per state, each copy
-with a tangent vector of its own; the copies see the same motion bit for bit. Lengths and angles of
-tangent vectors are the Euclidean ones of the states of eq. 13.
+The kernels carry one tangent vector per lane. Here every lane is repeated once per state, and each
+copy carries a different tangent vector; the copies have bit-identical motions. Lengths and angles
+of tangent vectors are Euclidean in the dimensionless states.
 """
 
 from typing import NamedTuple, Self
@@ -15,19 +15,27 @@ from gearchaos.dynamics.modes import memory
 from gearchaos.records.lyapunov import largest_exponent
 
 SMALLEST_RESOLVED = 1e-8
-"""Share of a tangent vector that must be left when those before it are taken out."""
+"""Smallest share of a tangent vector that must remain after orthogonalisation."""
 
 
 class Exponents(NamedTuple):
-    """Lyapunov exponents and their standard errors, shape (lanes, states), largest first."""
+    """Lyapunov exponents, largest first, per unit of tau.
+
+    Attributes
+    ----------
+    values : array, shape (lanes, states)
+        Exponents, NaN where they are not resolved; shape (states,) from `System.exponents`.
+    standard_errors : array, shape (lanes, states)
+        Their standard errors.
+    """
 
     values: Floats
     standard_errors: Floats
 
     def given(self, exact: Floats) -> Self:
-        """Return them with all of a lane replaced of which the first one is known exactly.
+        """Return the exponents with lanes replaced whose first exponent is known exactly.
 
-        ``exact`` (lanes, states): not a number where none is known, or where rounding hides it.
+        ``exact`` (lanes, states): NaN where no exponent is known, or where rounding hides it.
         """
         known = np.broadcast_to(np.isfinite(exact[:, :1]), exact.shape)
         return type(self)(
@@ -37,31 +45,30 @@ class Exponents(NamedTuple):
 
 
 def exponents(system: LaneSystem, start: Floats, plan: Plan) -> Exponents:
-    """Compute all Lyapunov exponents of every lane, per unit of tau.
+    """Compute all Lyapunov exponents of every lane.
 
-    An orthonormal frame of tangent vectors is carried along and made orthonormal again after every
-    mesh period, from the transient on (Benettin et al. 1980). The logarithms of the stretches of
-    the recorded periods are averaged as those of a single vector are, see `largest_exponent`; the
-    first vector of the frame is that single vector.
+    Parameters
+    ----------
+    system : LaneSystem
+        The system of the lanes.
+    start : array, shape (lanes, states)
+        States at tau = 0.
+    plan : Plan
+        Method, steps and periods.
 
-    ``start`` (lanes, states) at tau = 0; of the plan only steps and periods count. Exponents are
-    not a number in lanes that diverged, and from the first one on that the numbers do not resolve:
-    two directions whose exponents times the mesh period differ by more than about 18 are parallel
-    in double precision after one period. `sum_of_exponents` is an exact check.
+    Returns
+    -------
+    Exponents
+        Per unit of tau; NaN in lanes that diverged, and from the first exponent on that double
+        precision does not resolve. Two directions are parallel after one period if their exponents
+        times the mesh period differ by more than about 18.
+
+    Notes ----- An orthonormal frame of tangent vectors is orthonormalised after every mesh period,
+    also during the transient (Benettin et al. 1980). The logarithms of the stretches are averaged
+    as those of a single vector, see `largest_exponent`. `sum_of_exponents` is an exact check.
     """
     lanes, states = start.shape
-    logarithms = np.full((lanes, states, plan.recorded_periods), np.nan)
-    # The first vector is an equal share of every state, as a single vector is.
-    frame, _ = np.linalg.qr(np.column_stack([np.ones(states), np.eye(states)[:, 1:]]))
-    frame, state = np.broadcast_to(frame, (lanes, states, states)), start
-    for period in range(-plan.transient_periods, plan.recorded_periods):
-        once = plan._replace(recorded_periods=1, first_period=plan.transient_periods + period)
-        state, vectors, growth = _carry(system, state, frame, once)
-        frame, triangle = np.linalg.qr(vectors)
-        left = np.abs(np.diagonal(triangle, axis1=1, axis2=2))
-        resolved = np.logical_and.accumulate(left > SMALLEST_RESOLVED, axis=1)
-        if period >= 0:
-            logarithms[:, :, period] = growth[:, :, 0] + np.log(np.where(resolved, left, np.nan))
+    logarithms = _stretches(system, start, plan)
     mean, error = largest_exponent(
         logarithms.reshape(lanes * states, -1),
         np.repeat(system.mesh_period, states),
@@ -72,12 +79,43 @@ def exponents(system: LaneSystem, start: Floats, plan: Plan) -> Exponents:
     return Exponents(*(np.take_along_axis(found, descending, axis=1) for found in (mean, error)))
 
 
-def sum_of_exponents(system: LaneSystem) -> Floats:
-    """Return the sum of all Lyapunov exponents of every lane, per unit of tau, shape (lanes,).
+def _stretches(system: LaneSystem, start: Floats, plan: Plan) -> Floats:
+    """Return the logarithms by which a frame stretches, shape (lanes, states, recorded periods).
 
-    It is the trace of the Jacobian. The damping is constant and also acts out of contact, so that
-    the trace depends neither on contact nor on stiffness or excitation. For the full scene of
-    eq. 13 it is::
+    They are NaN from the first direction on that double precision does not resolve.
+    """
+    lanes, states = start.shape
+    logarithms = np.full((lanes, states, plan.recorded_periods), np.nan)
+    # The first vector has equal components, as the single vector of the kernels.
+    frame, _ = np.linalg.qr(np.column_stack([np.ones(states), np.eye(states)[:, 1:]]))
+    frame, state = np.broadcast_to(frame, (lanes, states, states)), start
+    for period in range(-plan.transient_periods, plan.recorded_periods):
+        once = plan._replace(recorded_periods=1, first_period=plan.transient_periods + period)
+        state, vectors, growth = _carry(system, state, frame, once)
+        frame, triangle = np.linalg.qr(vectors)
+        left = np.abs(np.diagonal(triangle, axis1=1, axis2=2))
+        resolved = np.logical_and.accumulate(left > SMALLEST_RESOLVED, axis=1)
+        if period >= 0:
+            logarithms[:, :, period] = growth[:, :, 0] + np.log(np.where(resolved, left, np.nan))
+    return logarithms
+
+
+def sum_of_exponents(system: LaneSystem) -> Floats:
+    """Return the sum of all Lyapunov exponents of every lane.
+
+    Parameters
+    ----------
+    system : LaneSystem
+        The system of the lanes.
+
+    Returns
+    -------
+    array, shape (lanes,)
+        Sum per unit of tau.
+
+    Notes ----- The sum is the trace of the Jacobian. Damping is constant and also acts out of
+    contact, so that the trace depends neither on contact nor on stiffness or excitation. For the
+    full scene of eq. 13 of Pan, Li, Wang 2021 it is::
 
         -2 xi [cos(beta_b) (1 + m_e/m_p + m_e/m_g) + sin(beta_b) (m_e/m_p + m_e/m_g)]
         -2 (eta_11 + eta_21 + eta_12 + eta_22)
@@ -88,11 +126,22 @@ def sum_of_exponents(system: LaneSystem) -> Floats:
 
 
 def period_jacobian(system: LaneSystem, start: Floats, plan: Plan) -> Floats:
-    """Return the Jacobian of the map over the recorded mesh periods, with no transient before.
+    """Return the Jacobian of the map over the recorded mesh periods, without a transient.
 
-    On a periodic orbit over its own number of periods this is the monodromy matrix, whose
-    eigenvalues are the Floquet multipliers. Of shape (lanes, states, states), column j the
-    derivative with respect to state j; not a number in lanes that diverged.
+    Parameters
+    ----------
+    system : LaneSystem
+        The system of the lanes.
+    start : array, shape (lanes, states)
+        States at tau = 0.
+    plan : Plan
+        Method, steps and recorded periods.
+
+    Returns
+    -------
+    array, shape (lanes, states, states)
+        Column j is the derivative by state j; NaN in lanes that diverged. For a periodic orbit over
+        its period this is the monodromy matrix; its eigenvalues are the Floquet multipliers.
     """
     lanes, states = start.shape
     frame = np.broadcast_to(np.eye(states), (lanes, states, states))
@@ -104,10 +153,10 @@ def period_jacobian(system: LaneSystem, start: Floats, plan: Plan) -> Floats:
 def _carry(
     system: LaneSystem, start: Floats, frame: Floats, plan: Plan
 ) -> tuple[Floats, Floats, Floats]:
-    """Integrate every lane over its recorded periods for every column of its frame, at once.
+    """Integrate every lane once for every column of its frame (lanes, states, states).
 
-    The frame is of shape (lanes, states, states). Return end states (lanes, states), unit tangent
-    vectors as columns, logarithms of their growth.
+    Returns end states (lanes, states), unit tangent vectors as columns (lanes, states, states), and
+    the logarithms of their growth (lanes, states, periods).
     """
     lanes, states, _ = frame.shape
     outcome = integrate(

@@ -16,7 +16,7 @@ from gearchaos.dynamics.arclength import Curve, End, end_of_curve
 from gearchaos.dynamics.orbits import Orbits, polish
 from gearchaos.dynamics.stability_loss import CONFIRMED, StabilityLoss, loss_of_stability
 
-LONGEST_STEP = 1.0 / 16.0  # Share of the way along which an orbit is followed.
+LONGEST_SHARE = 1.0 / 16.0  # Share of the way along which an orbit is followed.
 
 MOST_ORBITS = 200
 """Orbits tried along the way; where they do not suffice nothing is known of what lies beyond."""
@@ -128,7 +128,7 @@ class _Lanes:
         self._first, self._way = ends[0], ends[1] - ends[0]
         # Whatever the width: an orbit is never lost sight of within the first step.
         share = width / np.maximum(np.abs(self._way), width)
-        self._smallest = np.minimum(share, LONGEST_STEP)
+        self._smallest = np.minimum(share, LONGEST_SHARE)
         self._share = np.zeros_like(self._first)
         self.stable = self._orbits(self._share, guess, period > 0)
         self._slope = np.zeros_like(self.stable.points)
@@ -169,7 +169,7 @@ class _Lanes:
 
     def march(self, going: Mask) -> None:
         """Follow the orbits of some lanes, value by value, until they end or are unstable."""
-        step = np.full_like(self._share, LONGEST_STEP)
+        step = np.full_like(self._share, LONGEST_SHARE)
         unstable_from = np.full_like(self._share, np.inf)
         for _ in range(MOST_ORBITS):
             if not going.any():
@@ -187,7 +187,7 @@ class _Lanes:
             self._slope[kept] = ((found.points - self.stable.points) / ahead)[kept]
             self.stable = _chosen(kept, found, self.stable)
             self._share = np.where(kept, trial, self._share)
-            step = np.where(kept, np.minimum(2.0 * step, LONGEST_STEP), step / 2.0)
+            step = np.where(kept, np.minimum(2.0 * step, LONGEST_SHARE), step / 2.0)
             step = np.minimum(step, (unstable_from - self._share) / 2.0)
             going = going & (step > self._smallest / 2.0) & (self._share < 1.0)
         self._beyond.multipliers[going] = np.nan
@@ -199,7 +199,7 @@ class _Lanes:
         """
         first, way, share = self._first[lane], self._way[lane], float(self._share[lane])
         point, periods = self.stable.points[lane], int(self._period[lane])
-        limit = min(max(share, float(self._end[lane])) + LONGEST_STEP, 1.0)
+        limit = min(max(share, float(self._end[lane])) + LONGEST_SHARE, 1.0)
         width = float(self._smallest[lane])
 
         def system_at(shares: Floats) -> LaneSystem:
@@ -210,10 +210,10 @@ class _Lanes:
         if end.inner is None or (end.beyond is None and end.inner.share < limit):
             return False
         self._put(lane, end, curve.scale, width)
-        goes_on = end.beyond is None and limit < 1.0
-        if goes_on:
+        continues = end.beyond is None and limit < 1.0
+        if continues:
             self._beyond.multipliers[lane] = np.nan
-        return goes_on
+        return continues
 
     def _put(self, lane: int, end: End, scale: Floats, width: float) -> None:
         """Put a lane where its curve was followed to."""

@@ -12,10 +12,12 @@ from gearchaos.records import label
 from gearchaos.records.bands import band_count, subsequence_spread
 from gearchaos.records.period import coordinate_scale, return_distances
 
-LOOKS = (4, 16)
+LONGER_RECORDS = (4, 16)
 """How many times the record doubtful lanes go on, and then those that are doubtful still."""
 
-LOOK_BYTES = 2**25  # Memory for longer records that is always there: lanes side by side are faster.
+LONGER_RECORD_BYTES = (
+    2**25
+)  # Memory for longer records that is always there: lanes side by side are faster.
 
 WHOLE = 0.25  # Largest difference of the subsequences of a curve, see `subsequence_spread`.
 
@@ -23,15 +25,15 @@ WHOLE = 0.25  # Largest difference of the subsequences of a curve, see `subseque
 MARGIN = 1e-9  # Distance of a multiplier from the unit circle that rounding does not explain.
 
 
-class Told(NamedTuple):
+class Labelled(NamedTuple):
     """Labels, and the state (lanes, states) at the end of the look that told each."""
 
     labels: label.Labels
     state: Floats
 
 
-def labels_of(system: LaneSystem, outcome: Outcome, plan: Plan) -> Told:
-    """Label lanes by their record, which should hold `MOST_POINTS` section points or all there are.
+def labels_of(system: LaneSystem, outcome: Outcome, plan: Plan) -> Labelled:
+    """Label lanes by their record, which should hold `MOST_LABEL_POINTS` section points or all there are.
 
     ``plan`` is that by which they were integrated, over whole excitation periods. `doubtful` lanes
     are labelled by a longer record that begins where theirs ended, and what that does not tell by a
@@ -39,49 +41,51 @@ def labels_of(system: LaneSystem, outcome: Outcome, plan: Plan) -> Told:
     """
     repeats = system.repeats_after
     outcome = outcome.every(repeats)
-    labels = _told(system, outcome, plan, label.MOST_POINTS)
+    labels = _label_record(system, outcome, plan, label.MOST_LABEL_POINTS)
     lanes = np.flatnonzero(label.doubtful(outcome.growth, labels))
     state, tangent = outcome.end_state.copy(), outcome.end_tangent.copy()
-    for longer in LOOKS:
-        points = longer * min(label.MOST_POINTS * repeats, plan.recorded_periods)
+    for longer in LONGER_RECORDS:
+        points = longer * min(label.MOST_LABEL_POINTS * repeats, plan.recorded_periods)
         lengths = plan.steps_per_period, 0, longer * plan.recorded_periods, points
         further = Plan(*lengths, plan.tangent, plan.resolved, method=plan.method)
         # In portions whose longer records take no more memory than those of all lanes.
         record = 8 * (further.section_points * state.shape[1] + further.recorded_periods)
-        size = max(1, system.lanes // longer, LOOK_BYTES // record)
+        size = max(1, system.lanes // longer, LONGER_RECORD_BYTES // record)
         for first in range(0, lanes.size, size):
             some = lanes[first : first + size]
             part = system.of(some)
             again = integrate(part, state[some], further, tangent_start=tangent[some])
             again = again.every(repeats)
             state[some], tangent[some] = again.end_state, again.end_tangent
-            told = _told_again(part, again, further)
-            labels.motion[some], labels.period[some] = told.motion, told.period
-            labels.bands[some] = told.bands
-            _measure_return(labels, outcome.section, some[told.period > 0])
+            found = _label_longer_record(part, again, further)
+            labels.motion[some], labels.period[some] = found.motion, found.period
+            labels.bands[some] = found.bands
+            _measure_return(labels, outcome.section, some[found.period > 0])
         sound = np.isfinite(state[lanes]).all(axis=1)
         lanes = lanes[sound & (labels.motion[lanes] == label.UNRESOLVED)]
     # Nothing is known of it, not that it diverges.
     labels.motion[outcome.status == Status.TOO_FAST] = label.UNRESOLVED
-    return Told(labels, state)
+    return Labelled(labels, state)
 
 
-def _told(system: LaneSystem, outcome: Outcome, plan: Plan, most_points: int) -> label.Labels:
+def _label_record(
+    system: LaneSystem, outcome: Outcome, plan: Plan, most_points: int
+) -> label.Labels:
     """Return what one record tells."""
     section, diverged = outcome.section[:, -most_points:], outcome.status != Status.OK
     record = label.Record(section, outcome.growth, diverged, _admits_tori(system))
     labels = label.label(record)
     if not system.clearance:
-        _tell_linear(system, plan, labels)
+        _label_linear(system, plan, labels)
     _settle(system, outcome, plan, labels, label.settling_periods(record, labels))
     lanes = np.flatnonzero(np.isin(labels.motion, (label.CHAOTIC, label.QUASI_PERIODIC)))
     labels.bands[lanes] = band_count(section[lanes])
     return labels
 
 
-def _told_again(system: LaneSystem, outcome: Outcome, plan: Plan) -> label.Labels:
+def _label_longer_record(system: LaneSystem, outcome: Outcome, plan: Plan) -> label.Labels:
     """Return what a longer record tells; also of a torus, that it is not a cascade."""
-    labels = _told(system, outcome, plan, plan.section_points)
+    labels = _label_record(system, outcome, plan, plan.section_points)
     tori = np.flatnonzero(labels.motion == label.QUASI_PERIODIC)
     hopping = tori[subsequence_spread(outcome.section[tori]) > WHOLE]
     # What diverges only now has not done so in what is kept.
@@ -90,7 +94,7 @@ def _told_again(system: LaneSystem, outcome: Outcome, plan: Plan) -> label.Label
     return labels
 
 
-def _tell_linear(system: LaneSystem, plan: Plan, labels: label.Labels) -> None:
+def _label_linear(system: LaneSystem, plan: Plan, labels: label.Labels) -> None:
     """Tell growth without bound by the multipliers, in place: what is linear is never chaotic."""
     once = plan._replace(recorded_periods=system.repeats_after)
     jacobian = period_jacobian(system, np.zeros((system.lanes, len(system.states))), once)

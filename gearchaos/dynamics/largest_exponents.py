@@ -12,15 +12,15 @@ from gearchaos.dynamics.orbits import polish
 from gearchaos.records.label import CHAOTIC_GROWTH
 from gearchaos.records.lyapunov import largest_exponent
 
-UNIFORM, MIXED, NOT_TOLD = 0, 1, 2
-MEANINGS = ("uniform", "mixed", "not_told")  # Meanings of the values of ``record``.
+UNIFORM, MIXED, NOT_COMPARED = 0, 1, 2
+RECORD_MEANINGS = ("uniform", "mixed", "not_told")  # Meanings of the values of ``record``.
 
 
 class LargestExponents(NamedTuple):
     """Largest Lyapunov exponents per unit of tau, and what of their errors the record tells.
 
     ``values``, ``standard_errors`` (lanes,): the standard error is that of a finite record, and
-    thus 0 where the exponent is that of an orbit; ``record`` (lanes,) of `MEANINGS`: mixed where a
+    thus 0 where the exponent is that of an orbit; ``record`` (lanes,) of `RECORD_MEANINGS`: mixed where a
     lane is periodic in the end, but its record holds motion of another kind, and not told where
     there is no orbit to compare it with; ``of_orbit`` (lanes,
     states): all exponents of the orbit, the largest first, not a number where there is none and
@@ -44,7 +44,7 @@ def largest_exponents(
     excitation periods, 0 where a lane is not periodic.
     """
     values, errors = largest_exponent(outcome.growth, system.mesh_period, memory(system))
-    record = np.full(period.shape, NOT_TOLD, dtype=np.uint8)
+    record = np.full(period.shape, NOT_COMPARED, dtype=np.uint8)
     of_orbit = np.full((period.size, len(system.states)), np.nan)
     found = LargestExponents(values, errors, record, of_orbit)
     lanes = np.flatnonzero((period > 0) & np.isfinite(values))
@@ -52,8 +52,8 @@ def largest_exponents(
         return found
     orbits = polish(system.of(lanes), state[lanes], period[lanes], plan)
     # A multiplier that is 0 but for underflow tells no exponent.
-    told = orbits.stable & (np.abs(orbits.multipliers[:, 0]) > 0.0)
-    lanes, size = lanes[told], np.abs(orbits.multipliers[told])
+    usable = orbits.stable & (np.abs(orbits.multipliers[:, 0]) > 0.0)
+    lanes, size = lanes[usable], np.abs(orbits.multipliers[usable])
     duration = period[lanes] * system.excitation_period[lanes]
     resolved = size > SMALLEST_RESOLVED * size[:, :1]
     size = np.where(resolved, size, np.nan)

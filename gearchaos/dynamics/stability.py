@@ -11,7 +11,7 @@ from gearchaos_kernels import METHODS, LaneSystem, jacobian
 
 from gearchaos.arrays import Complex, Floats, Integers
 
-MOST_STEPS = 2**53  # Stands for every number of steps beyond it.
+STEPS_CEILING = 2**53  # Stands for every number of steps beyond it.
 
 ROUNDING = 1e-9
 """Relative error granted to eigenvalues: an undamped mode lies on the imaginary axis up to that."""
@@ -30,7 +30,7 @@ def fewest_stable_steps(system: LaneSystem, method: str = "rk4") -> Integers:
     demand = np.max([_demand(matrix, method) for matrix in held], axis=0)
     with np.errstate(over="ignore"):
         steps: Floats = np.ceil(demand * (1.0 - ROUNDING) * system.mesh_period)
-    return np.clip(steps, 1.0, MOST_STEPS).astype(np.intp)
+    return np.clip(steps, 1.0, STEPS_CEILING).astype(np.intp)
 
 
 def in_contact(system: LaneSystem) -> Floats:

@@ -5,9 +5,9 @@ from collections.abc import Iterator, Sequence
 from gearchaos.configuration.methods import METHODS
 from gearchaos.engine.run_plan import Chosen, RunPlan
 from gearchaos.engine.step_choice import judged_steps
-from gearchaos.engine.steps import MOST_STEPS, PILOT_LANES, Candidate, choose_steps, pilot
-from gearchaos.engine.transient import settled
-from gearchaos.records.label import MOST_POINTS
+from gearchaos.engine.steps import FINEST_GRID, PILOT_LANES, Candidate, choose_steps, pilot
+from gearchaos.engine.transient import choose_transient
+from gearchaos.records.label import MOST_LABEL_POINTS
 
 
 def with_chosen_steps(run: RunPlan) -> RunPlan:
@@ -43,10 +43,10 @@ def _within_tolerance(run: RunPlan, tolerance: float) -> RunPlan:
     """Return a run with a transient and steps that reach a tolerance on lanes that are tried."""
     recording, coarsest = run.recording, run.plan.steps_per_period
     # As many points as show a period, however few the file keeps.
-    enough = min(MOST_POINTS * run.lanes.repeats_after, recording.recorded_periods)
+    enough = min(MOST_LABEL_POINTS * run.lanes.repeats_after, recording.recorded_periods)
     recording = recording._replace(section_points=max(recording.section_points, enough))
     kept = run.plan.section_points
-    transient, left, note = settled(run.lanes, recording, kept, tolerance, PILOT_LANES)
+    transient, left, note = choose_transient(run.lanes, recording, kept, tolerance, PILOT_LANES)
     run = run.with_choice(Chosen(coarsest, transient), note)
     lanes, solution = pilot(run.lanes, run.plan, PILOT_LANES, 4 * coarsest)
     resolved, method = run.plan.resolved, run.plan.method
@@ -56,7 +56,7 @@ def _within_tolerance(run: RunPlan, tolerance: float) -> RunPlan:
         tolerance,
         run.config.source,
         # Finer steps of an exact method are no more exact.
-        4 * coarsest if METHODS[method].exact else MOST_STEPS,
+        4 * coarsest if METHODS[method].exact else FINEST_GRID,
         left,
     )
     chosen = Chosen(candidates[-1].steps, transient)

@@ -6,7 +6,7 @@ import numpy as np
 from gearchaos_kernels import LaneSystem, Outcome, Plan
 
 from gearchaos.dynamics.hidden_modes import hidden_error
-from gearchaos.dynamics.labelling import Told
+from gearchaos.dynamics.labelling import Labelled
 from gearchaos.dynamics.remainders import remainders
 from gearchaos.records.difference import Solution
 
@@ -22,14 +22,14 @@ def completed(
     outcome: Outcome,
     plan: Plan,
     kept: Sequence[str],
-    told: Told | None,
+    labelled: Labelled | None,
 ) -> Solution:
     """Add to a solution what the transient has left, what no grid shows, and rounding.
 
-    ``outcome`` and ``told``: the integrated lanes and their labels; ``kept``: the states whose
+    ``outcome`` and ``labelled``: the integrated lanes and their labels; ``kept``: the states whose
     section is compared. The distance from the orbit is that of its last period.
     """
-    state = outcome.end_state if told is None else told.state
+    state = outcome.end_state if labelled is None else labelled.state
     section = outcome.every(system.repeats_after).section
     of_states = 1, columns_of(system, kept)
     left = remainders(system, section, of_states, solution.period, state, plan)

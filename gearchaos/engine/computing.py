@@ -7,7 +7,7 @@ import numpy as np
 
 from gearchaos.arrays import Floats, Integers
 from gearchaos.configuration.methods import METHODS
-from gearchaos.dynamics.labelling import LOOK_BYTES, LOOKS
+from gearchaos.dynamics.labelling import LONGER_RECORD_BYTES, LONGER_RECORDS
 from gearchaos.dynamics.stability import fewest_stable_steps
 from gearchaos.engine.kept import arrays_of
 from gearchaos.engine.run_plan import RunPlan
@@ -57,8 +57,8 @@ def block_memory(run: RunPlan, threads: int) -> int:
         numbers += run.plan.recorded_periods
         if run.config.outputs.motion:
             # Doubtful lanes are integrated again, a share at a time, but a whole lane at least.
-            longest = 8 * numbers * LOOKS[-1]
-            looked = max(8 * numbers * lanes, longest, min(longest * lanes, LOOK_BYTES))
+            longest = 8 * numbers * LONGER_RECORDS[-1]
+            looked = max(8 * numbers * lanes, longest, min(longest * lanes, LONGER_RECORD_BYTES))
     if run.config.outputs.exponents:
         numbers += run.plan.recorded_periods * states
     return 8 * lanes * numbers + looked + _maps_memory(run, lanes)

@@ -10,7 +10,11 @@ from gearchaos.dynamics.largest_exponents import MIXED, UNIFORM
 from gearchaos.outputs.names import SECTION
 
 NOT_CHECKED, SAME, CHANGED = 0, 1, 2
-MEANINGS = ("not_checked", "same", "changed")  # Meanings of the values of ``motion_changed``.
+CHANGE_MEANINGS = (
+    "not_checked",
+    "same",
+    "changed",
+)  # Meanings of the values of ``motion_changed``.
 
 CHECKED = ("section_error", "exponent_step_error", "motion_changed")
 """Variables that the check yields."""

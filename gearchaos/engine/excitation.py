@@ -64,9 +64,10 @@ def _longer(lanes: Lanes, lengths: Mapping[str, int]) -> str:
         for name, length in lengths.items()
         if length != (asked := getattr(lanes.config.integration, name))
     ]
-    told = min(lengths["recorded_periods"] // (RETURNS * repeats), LONGEST_PERIOD)
+    longest = min(lengths["recorded_periods"] // (RETURNS * repeats), LONGEST_PERIOD)
+    shorter = " and shorter ones" if longest > 1 else ""
     text = (
         f"the {lanes.model.excitation_words} after {repeats} mesh periods, the excitation period; "
-        f"the record is long enough to tell period {told}{' and shorter ones' if told > 1 else ''}"
+        f"the record is long enough to tell period {longest}{shorter}"
     )
     return f"{text}; {', '.join(changed)}, whole ones of it" if changed else text

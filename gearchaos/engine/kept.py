@@ -8,9 +8,8 @@ import numpy as np
 
 from gearchaos.arrays import Array, Floats, Integers
 from gearchaos.dynamics.exponents import exponents, sum_of_exponents
-from gearchaos.dynamics.labelling import Told, labels_of
-from gearchaos.dynamics.largest_exponents import MEANINGS as RECORD_MEANINGS
-from gearchaos.dynamics.largest_exponents import largest_exponents
+from gearchaos.dynamics.labelling import Labelled, labels_of
+from gearchaos.dynamics.largest_exponents import RECORD_MEANINGS, largest_exponents
 from gearchaos.engine import error_check
 from gearchaos.engine.claims import completed
 from gearchaos.engine.run_plan import RunPlan
@@ -19,15 +18,15 @@ from gearchaos.outputs import catalogue, names
 from gearchaos.outputs.entries import Part
 from gearchaos.outputs.listing import Details, for_each
 from gearchaos.outputs.variable import Variable
-from gearchaos.records.contact import CONTACT_STATES, contact_told
+from gearchaos.records.contact import CONTACT_STATES, contact_summary
 from gearchaos.records.difference import difference
-from gearchaos.records.label import MEANINGS as MOTION_MEANINGS
+from gearchaos.records.label import MOTION_MEANINGS
 
 
 def variables_of(run: RunPlan) -> list[Variable]:
     """Return the variables of a sweep, in the order of the file."""
     outputs, repeats = run.config.outputs, run.lanes.repeats_after
-    of_teeth = f"periods of the excitation, {repeats} mesh periods each,"
+    excitation_periods = f"periods of the excitation, {repeats} mesh periods each,"
     touched = run.plan.contact and run.splits_steps
     model = run.lanes.model
     signals = (*outputs.states, *model.signals[:1])
@@ -57,11 +56,11 @@ def variables_of(run: RunPlan) -> list[Variable]:
         "motion": MOTION_MEANINGS,
         names.RECORD: RECORD_MEANINGS,
         "contact_state_@": CONTACT_STATES,
-        "motion_changed": error_check.MEANINGS,
+        "motion_changed": error_check.CHANGE_MEANINGS,
         names.STATUS: [status.name.lower() for status in kernels.STATUS_TEXTS],
         names.STATE: run.lanes.states,
     }
-    wordings = {"period": of_teeth if repeats > 1 else "mesh periods"}
+    wordings = {"period": excitation_periods if repeats > 1 else "mesh periods"}
     return model.catalogue.variables(run.lanes.axes, parts, Details(values, meanings, wordings))
 
 
@@ -83,22 +82,22 @@ def arrays_of(
         slowest = np.where(outcome.crossings > 0, outcome.slowest_crossing, np.nan)
         arrays["slowest_crossing"] = np.where(sound, slowest, np.nan)
         arrays["unsplit_steps"] = outcome.overflows
-    arrays |= _told_of_elements(run, system, outcome)
+    arrays |= _recorded_quantities(run, system, outcome)
     for name in outputs.section:
         points = outcome.section[:, -plan.section_points :, system.states.index(name)]
         # A copy: a view would keep alive all that was recorded.
         arrays[f"section_{name}"] = points.copy()
-    told = labels_of(system, outcome, run.recording) if outputs.motion else None
-    if told is not None:
-        arrays |= told.labels._asdict()
+    labelled = labels_of(system, outcome, run.recording) if outputs.motion else None
+    if labelled is not None:
+        arrays |= labelled.labels._asdict()
     largest = None
     if plan.tangent:
-        period = told.labels.period if told else np.zeros(lanes.size, dtype=np.int32)
-        state = told.state if told else outcome.end_state
+        period = labelled.labels.period if labelled else np.zeros(lanes.size, dtype=np.int32)
+        state = labelled.state if labelled else outcome.end_state
         largest = largest_exponents(system, outcome, run.recording, period, state)
         arrays["lyapunov_exponent"] = largest.values
         arrays["lyapunov_exponent_standard_error"] = largest.standard_errors
-        if told is not None:
+        if labelled is not None:
             arrays["record"] = largest.record
     if outputs.exponents:
         spectrum = exponents(system, start, plan)
@@ -108,30 +107,34 @@ def arrays_of(
         arrays["lyapunov_exponents_standard_error"] = spectrum.standard_errors
         arrays["lyapunov_sum"] = sum_of_exponents(system)
     if run.config.integration.error_check > 0.0:
-        arrays |= _check(run, lanes, start, outcome, told)
+        arrays |= _check(run, lanes, start, outcome, labelled)
     return arrays
 
 
-def _told_of_elements(
+def _recorded_quantities(
     run: RunPlan, system: kernels.LaneSystem, outcome: kernels.Outcome
 ) -> dict[str, Array]:
     """Return what is kept of contact, loads and states; of lanes that diverged none of it."""
-    told: dict[str, Array] = {}
+    kept: dict[str, Array] = {}
     if run.plan.contact and run.splits_steps:
-        for number, way in enumerate(run.elements):
-            found = contact_told(outcome.contact[:, number], run.plan.recorded_periods)
-            told |= {f"{name}_{way}": values for name, values in found.items()}
+        for number, element in enumerate(run.elements):
+            found = contact_summary(outcome.contact[:, number], run.plan.recorded_periods)
+            kept |= {f"{name}_{element}": values for name, values in found.items()}
     if run.plan.loads:
-        told |= run.lanes.model.loads(outcome.loads, system)
-    told |= states_told(outcome, run.plan, run.lanes.model.signals[:1])
-    for values in told.values():
+        kept |= run.lanes.model.loads(outcome.loads, system)
+    kept |= state_summary(outcome, run.plan, run.lanes.model.signals[:1])
+    for values in kept.values():
         if values.dtype != np.uint8:
             values[outcome.status != kernels.Status.OK] = np.nan
-    return told
+    return kept
 
 
 def _check(
-    run: RunPlan, lanes: Integers, start: Floats, outcome: kernels.Outcome, told: Told | None
+    run: RunPlan,
+    lanes: Integers,
+    start: Floats,
+    outcome: kernels.Outcome,
+    labelled: Labelled | None,
 ) -> dict[str, Array]:
     """Integrate and label the checked lanes of a block again with half the step, and compare.
 
@@ -147,9 +150,9 @@ def _check(
         half = plan._replace(steps_per_period=2 * plan.steps_per_period)
         system = run.lanes.system_of(lanes[checked])
         finer = kernels.integrate(system, start[checked], half)
-        some = told and labels_of(system, finer, half)
+        some = labelled and labels_of(system, finer, half)
         fine = solution_of(system, finer, half, kept, some)
-        some = told and Told(told.labels.of(checked), told.state[checked])
+        some = labelled and Labelled(labelled.labels.of(checked), labelled.state[checked])
         theirs: Any = (array[checked] for array in outcome)
         ended = kernels.Outcome(*theirs)
         coarse = solution_of(system, ended, plan, kept, some)
@@ -160,19 +163,19 @@ def _check(
     return dict(zip(error_check.CHECKED, (section, exponent, motion), strict=True))
 
 
-def states_told(
+def state_summary(
     outcome: kernels.Outcome, plan: kernels.Plan, signals: Sequence[str]
 ) -> dict[str, Floats]:
     """Return extremes of the states of a plan, and amplitudes at its orders, by name.
 
     ``signals``: name of the observed signal of which there are amplitudes.
     """
-    told: dict[str, Floats] = {}
+    found: dict[str, Floats] = {}
     for number, state in enumerate(plan.states):
         smallest, largest = outcome.extremes[:, number].T
         ends = smallest, largest, largest - smallest
-        told |= {f"{state}_{name}": end for name, end in zip(names.EXTREMES, ends, strict=True)}
+        found |= {f"{state}_{name}": end for name, end in zip(names.EXTREMES, ends, strict=True)}
     if plan.orders:
         amplitudes = (f"{names.AMPLITUDE}{one}" for one in (*plan.states, *signals))
-        told |= zip(amplitudes, np.moveaxis(outcome.amplitudes, 1, 0), strict=True)
-    return told
+        found |= zip(amplitudes, np.moveaxis(outcome.amplitudes, 1, 0), strict=True)
+    return found

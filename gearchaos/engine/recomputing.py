@@ -16,7 +16,9 @@ from gearchaos.records.lyapunov import largest_exponent
 from gearchaos.results.reading.result import Result
 from gearchaos.results.reading.stage_table import labelled_lanes
 
-MOST_LANES = 25  # Chaotic lanes that are tried, spread evenly over the sweep: they bound the cost.
+MOST_CHAOTIC_LANES = (
+    25  # Chaotic lanes that are tried, spread evenly over the sweep: they bound the cost.
+)
 
 
 def stored_text(result: Result, name: str, attribute: str) -> str:
@@ -123,7 +125,7 @@ def survival(config: Configuration, result: Result, records: int) -> Survival:
     chaotic = np.flatnonzero(labelled_lanes(result).labels == "chaotic")
     if not chaotic.size:
         return Survival(records, 0, 0)
-    chosen = np.linspace(0, chaotic.size - 1, min(MOST_LANES, chaotic.size))
+    chosen = np.linspace(0, chaotic.size - 1, min(MOST_CHAOTIC_LANES, chaotic.size))
     lanes = chaotic[chosen.round().astype(np.intp)]
     values = {config.sweep.parameter: result[result.axis][lanes]}
     system = system_of(config, values, config.needed_effects)

@@ -11,7 +11,7 @@ from gearchaos_kernels import LaneSystem, integrate
 
 from gearchaos.arrays import Array, Floats
 from gearchaos.dynamics.following import Followed, follow
-from gearchaos.dynamics.labelling import LOOKS, labels_of
+from gearchaos.dynamics.labelling import LONGER_RECORDS, labels_of
 from gearchaos.dynamics.plans import plan_of
 from gearchaos.dynamics.stability_loss import STABILITY_LOSS_TEXTS, StabilityLoss
 from gearchaos.engine.computing import block_lanes
@@ -21,7 +21,7 @@ from gearchaos.interrupts import check
 from gearchaos.models import Configuration, swept_values
 from gearchaos.models.registry import system_of
 from gearchaos.outputs.names import LABELS, WAYS
-from gearchaos.records.label import MEANINGS
+from gearchaos.records.label import MOTION_MEANINGS
 from gearchaos.records.period import TOLERANCE
 from gearchaos.results.reading.jumps import Apart, directions_of
 from gearchaos.results.reading.result import Result
@@ -150,22 +150,22 @@ def refined_jumps(
             continue
         further = 2.0 * beyond["value"] - last["value"]
         followed = _followed(config, edges[inner[there]], further, width)
-        goes_on = np.isin(followed.loss, NO_LOSS)
-        stable = np.where(goes_on, last["value"], followed.stable_value)
-        lost = np.where(goes_on, beyond["value"], followed.beyond_value)
+        continues = np.isin(followed.loss, NO_LOSS)
+        stable = np.where(continues, last["value"], followed.stable_value)
+        lost = np.where(continues, beyond["value"], followed.beyond_value)
         for n, kind in enumerate(followed.loss):
-            told = STABILITY_LOSS_TEXTS[kind] if last["period"][n] else ""
+            loss = STABILITY_LOSS_TEXTS[kind] if last["period"][n] else ""
             sides = (float(stable[n]), last["label"][n]), (float(lost[n]), beyond["label"][n])
             (below, one), (above, other) = sides[::step]
             multiplier = complex(followed.multiplier[n])
-            found.append(Boundary(below, above, one, other, told, multiplier, way))
+            found.append(Boundary(below, above, one, other, loss, multiplier, way))
     return sorted(found, key=lambda boundary: boundary.below)
 
 
 def _edges_of(result: Result) -> Array:
     """Return the edges that the lanes of a result with labels are, in their order."""
-    told = [result.lanes(name) for name in (*LABELS, "end_state")]
-    edges = _edges(result.along(result.axis), result.variables["motion"].flags, *told)
+    columns = [result.lanes(name) for name in (*LABELS, "end_state")]
+    edges = _edges(result.along(result.axis), result.variables["motion"].flags, *columns)
     if "return_distance" in result:
         distance = result.lanes("return_distance")
         edges["far"] = (edges["period"] > 0) & ~(distance <= TOLERANCE)
@@ -196,7 +196,7 @@ def _computed(run: RunPlan, values: Mapping[str, Floats]) -> Array:
         start = start_states(config, system, np.zeros(system.lanes, dtype=np.intp))
         labels, state = labels_of(system, integrate(system, start, plan), plan)
         found.append((labels.motion, labels.period, state))
-    return _edges(axis, MEANINGS, *map(np.concatenate, zip(*found, strict=True)))
+    return _edges(axis, MOTION_MEANINGS, *map(np.concatenate, zip(*found, strict=True)))
 
 
 def _losses(
@@ -206,7 +206,7 @@ def _losses(
     # Close to a bifurcation the label changes a little before or after it: one lane further.
     upwards = _followed(config, below, above["value"] + spacing)
     downwards = _followed(config, above, below["value"] - spacing)
-    told = []
+    losses = []
     for number in range(spacing.size):
         sides = [
             (followed.loss[number], complex(followed.multiplier[number]))
@@ -214,8 +214,8 @@ def _losses(
             if edge["period"][number] > 0
         ]
         loss, multiplier = min(sides, key=itemgetter(0), default=(None, complex("nan")))
-        told.append(("" if loss is None else STABILITY_LOSS_TEXTS[loss], multiplier))
-    return told
+        losses.append(("" if loss is None else STABILITY_LOSS_TEXTS[loss], multiplier))
+    return losses
 
 
 def _followed(config: Configuration, edge: Array, last: Floats, width: float = np.inf) -> Followed:
@@ -226,7 +226,7 @@ def _followed(config: Configuration, edge: Array, last: Floats, width: float = n
     lanes = np.flatnonzero(edge["far"])
     if lanes.size:
         # Where a longer look told the orbit, the end of the record may be far away.
-        longer = sum(LOOKS) * config.integration.recorded_periods
+        longer = sum(LONGER_RECORDS) * config.integration.recorded_periods
         further = plan_of(config, transient_periods=longer, recorded_periods=0)
         state[lanes] = integrate(system(first[lanes]), state[lanes], further).end_state
     lowest, highest = swept_values(config.sweep)[[0, -1]]

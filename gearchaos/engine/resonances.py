@@ -12,7 +12,7 @@ from gearchaos.models.registry import system_of
 ORDERS = (1, 2, 3)
 """Multiples of the mesh frequency that are told."""
 
-LANES = 256  # Lanes that are looked at, spread evenly over the sweep.
+EXAMINED_LANES = 256  # Lanes that are looked at, spread evenly over the sweep.
 
 UNIT, MESH_FREQUENCY = "per unit of tau", "(mesh frequency)"
 
@@ -81,7 +81,7 @@ class Resonances(NamedTuple):
 
 def resonances(lanes: Lanes) -> Resonances:
     """Return the resonances of the whole scene, with the effects on which nothing kept depends."""
-    config, values = lanes.config, lanes.values_of(lanes.spread(LANES))
+    config, values = lanes.config, lanes.values_of(lanes.spread(EXAMINED_LANES))
     system, scales = system_of(config, values), lanes.model.scales(config, values)
     found, bent = eigenfrequencies(system), system.static_force()
     modes, hertz, rpm = np.isfinite(found).any(axis=0), None, None

@@ -11,7 +11,7 @@ from gearchaos.engine.lanes import Lanes
 from gearchaos.engine.step_choice import steps_for_exponents
 from gearchaos.engine.steps import coarse_steps, needless_maps, stable_steps
 from gearchaos.models import Configuration
-from gearchaos.records.label import MOST_POINTS
+from gearchaos.records.label import MOST_LABEL_POINTS
 from gearchaos.records.period import POINTS_NEEDED
 
 
@@ -57,7 +57,7 @@ class RunPlan:
     def recording(self) -> kernels.Plan:
         """The plan with everything that is recorded: what is kept, and what labels are read off."""
         checked = POINTS_NEEDED if self.config.integration.error_check > 0.0 else 0
-        wanted = MOST_POINTS if self.config.outputs.motion else checked
+        wanted = MOST_LABEL_POINTS if self.config.outputs.motion else checked
         enough = min(wanted * self.lanes.repeats_after, self.plan.recorded_periods)
         return self.plan._replace(section_points=max(self.plan.section_points, enough))
 

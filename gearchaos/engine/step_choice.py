@@ -20,7 +20,9 @@ from gearchaos.interrupts import check
 PERIODS = 12
 """Mesh periods that are tried: fast modes have been excited, and chaos has grown little."""
 
-LANES = 48  # Lanes that are tried, spread evenly over the sweep, and the one with the fastest mode.
+MOST_TRIED_LANES = (
+    48  # Lanes that are tried, spread evenly over the sweep, and the one with the fastest mode.
+)
 LANES_COMPARED = 2048  # Lanes among which that one is looked for.
 
 WRONG = 1e-2
@@ -228,5 +230,5 @@ def _tried_lanes(lanes: Lanes, steps: int) -> tuple[Integers, int]:
     """
     many = lanes.spread(LANES_COMPARED)
     fewest = fewest_stable_steps(lanes.system_of(many))
-    count = int(np.clip(MOST_WORK / (3.0 * PERIODS * steps), 1, LANES))
+    count = int(np.clip(MOST_WORK / (3.0 * PERIODS * steps), 1, MOST_TRIED_LANES))
     return np.union1d(lanes.spread(count), many[np.argmax(fewest)]), int(np.max(fewest))

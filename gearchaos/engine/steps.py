@@ -13,7 +13,7 @@ from gearchaos.configuration.methods import METHODS
 from gearchaos.configuration.run_tables import DEFAULT_STEPS, MOST_STEPS_PER_PERIOD
 from gearchaos.dynamics import stability
 from gearchaos.dynamics.hidden_modes import hidden_error
-from gearchaos.dynamics.labelling import Told
+from gearchaos.dynamics.labelling import Labelled
 from gearchaos.dynamics.largest_exponents import largest_exponents
 from gearchaos.dynamics.plans import plan_of
 from gearchaos.dynamics.remainders import EPSILON
@@ -37,7 +37,7 @@ SURELY_FINE = 8  # So many times the fewest stable steps shift no exponent that 
 PILOT_PERIODS = 150
 """Mesh periods in which a lane settles on its grid, and as many that are compared."""
 
-MOST_STEPS = 25_600  # Finest grid of the search, where the method needs one.
+FINEST_GRID = 25_600  # Finest grid of the search, where the method needs one.
 
 
 class Candidate(NamedTuple):
@@ -158,7 +158,11 @@ def _fault(lanes: Lanes, limit: int, unstable: Integers, steps: int | None) -> F
 
 
 def solution_of(
-    system: LaneSystem, outcome: Outcome, plan: Plan, kept: Sequence[str], told: Told | None = None
+    system: LaneSystem,
+    outcome: Outcome,
+    plan: Plan,
+    kept: Sequence[str],
+    labelled: Labelled | None = None,
 ) -> Solution:
     """Return of integrated lanes what tells two grids apart.
 
@@ -167,11 +171,11 @@ def solution_of(
     smaller than a rounding in each step of a mesh period.
     """
     outcome = outcome.every(system.repeats_after)
-    if told is None:
+    if labelled is None:
         period, state = motion_period(outcome.section), outcome.end_state
         motion = np.where(period > 0, PERIODIC, UNRESOLVED)
     else:
-        period, state, motion = told.labels.period, told.state, told.labels.motion
+        period, state, motion = labelled.labels.period, labelled.state, labelled.labels.motion
     exponent = np.full(period.shape, np.nan)
     if plan.tangent:
         exponent = largest_exponents(system, outcome, plan, period, state).values
@@ -236,7 +240,7 @@ def choose_steps(
     coarsest: int,
     tolerance: float,
     source: str,
-    finest: int = MOST_STEPS,
+    finest: int = FINEST_GRID,
     left: float = 0.0,
 ) -> list[Candidate]:
     """Double the steps until the error is small enough; the last candidate is the one to take.

@@ -19,7 +19,7 @@ from gearchaos.results.files.block_store import BlockStore
 BLOCKS_PER_SHARD = 4
 """At least so many blocks for everyone, as far as there are enough lanes: shards end together."""
 
-FEWEST_LANES, MOST_LANES = 8 * LANES, 128 * LANES
+FEWEST_BLOCK_LANES, MOST_BLOCK_LANES = 8 * LANES, 128 * LANES
 """Lanes of a block: a few threads are kept busy by the fewest, a whole node by the most."""
 
 
@@ -55,7 +55,7 @@ def shared_blocks(lanes: int, shards: int) -> list[Bounds]:
 def shared_block_lanes(lanes: int, shards: int) -> int:
     """Return how many lanes such a block has."""
     share = -(-lanes // (BLOCKS_PER_SHARD * shards))
-    return min(max(LANES * -(-share // LANES), FEWEST_LANES), MOST_LANES)
+    return min(max(LANES * -(-share // LANES), FEWEST_BLOCK_LANES), MOST_BLOCK_LANES)
 
 
 def open_store(

@@ -14,12 +14,12 @@ from gearchaos.errors import ConfigurationError
 from gearchaos.interrupts import check
 from gearchaos.records.difference import bound
 
-LONGEST = 16  # Times the configured periods up to which a transient is raised.
+LONGEST_FACTOR = 16  # Times the configured periods up to which a transient is raised.
 
 ROUNDS = 4  # Transients tried: the approach to an orbit is geometric only in the end.
 
 
-def settled(
+def choose_transient(
     lanes: Lanes, recording: Plan, kept_points: int, tolerance: float, count: int
 ) -> tuple[int, float, str]:
     """Return a transient after which the kept section is close enough to the periodic orbits.
@@ -50,11 +50,11 @@ def settled(
     Raises
     ------
     ConfigurationError
-        If the transient would be `LONGEST` times as long as what is configured.
+        If the transient would be `LONGEST_FACTOR` times as long as what is configured.
     """
     numbers, repeats = lanes.spread(count), lanes.repeats_after
     configured = transient = recording.transient_periods
-    most = LONGEST * (configured + recording.recorded_periods)
+    most = LONGEST_FACTOR * (configured + recording.recorded_periods)
     distances = []
     for _ in range(ROUNDS):
         plan = recording._replace(transient_periods=transient)
@@ -65,12 +65,10 @@ def settled(
         if transient + missing > most:
             raise ConfigurationError(_out_of_reach(lanes, tolerance, distance, transient, missing))
         transient += repeats * math.ceil(missing / repeats)
-    note = (
-        f"integration.transient_periods raised from {configured} to {transient} for "
-        f"integration.tolerance = {tolerance:g}: the section was up to {distances[0]:.1e} away "
-        "from the periodic orbits, which no number of steps changes"
-    )
-    return transient, distances[-1], note if transient > configured else ""
+    note = ""
+    if transient > configured:
+        note = _raised(configured, transient, tolerance, distances[0])
+    return transient, distances[-1], note
 
 
 def _left(
@@ -84,11 +82,11 @@ def _left(
     check()
     system = lanes.system_of(numbers)
     outcome = integrate(system, lanes.start_of(numbers), plan)
-    told = labels_of(system, outcome, plan)
+    labelled = labels_of(system, outcome, plan)
     points = -(-kept_points // system.repeats_after)
     kept = points, columns_of(system, lanes.config.outputs.section)
     section = outcome.every(system.repeats_after).section
-    left = remainders(system, section, kept, told.labels.period, told.state, plan)
+    left = remainders(system, section, kept, labelled.labels.period, labelled.state, plan)
     distance = float(np.nan_to_num(bound(left.of_kept)))
     if distance <= tolerance / 2.0:
         return distance, 0.0
@@ -97,6 +95,15 @@ def _left(
     further = np.where(np.isfinite(left.of_kept), 0.0, np.nan)
     further[far] = np.log(4.0 * left.of_kept[far] / tolerance) / left.decay[far]
     return distance, bound(further)
+
+
+def _raised(configured: int, transient: int, tolerance: float, distance: float) -> str:
+    """Return the note about a transient that was raised."""
+    return (
+        f"integration.transient_periods raised from {configured} to {transient} for "
+        f"integration.tolerance = {tolerance:g}: the section was up to {distance:.1e} away "
+        "from the periodic orbits, which no number of steps changes"
+    )
 
 
 def _out_of_reach(

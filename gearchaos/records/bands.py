@@ -16,7 +16,7 @@ STRIDES = (2, 3, 5, 7)
 
 FEWEST = 16  # Points that every subsequence must have.
 
-MOST_POINTS = 512
+MOST_BAND_POINTS = 512
 """Points, the last ones, of which the bands are counted: comparing all pairs costs their square."""
 
 NEIGHBOURS = 4  # Nearest points that must lie in the same band.
@@ -64,7 +64,7 @@ def band_count(section: Floats) -> Counts:
     number of dimensions. Of section (lanes, points, states) with fewer than 32 points it is 1, and
     also where a band would have fewer than 16 points.
     """
-    points = section[:, -MOST_POINTS:]
+    points = section[:, -MOST_BAND_POINTS:]
     count = np.ones(points.shape[0], dtype=np.int32)
     for lane in np.flatnonzero(_may_have_bands(points)):
         common = _common_step(points[lane] / coordinate_scale(points[lane : lane + 1])[0])

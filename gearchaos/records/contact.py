@@ -10,7 +10,7 @@ CONTACT_STATES = ("held", "single_sided_impact", "double_sided_impact", "free")
 flanks, meets none."""
 
 
-def contact_told(contact: Floats, periods: int) -> dict[str, Array]:
+def contact_summary(contact: Floats, periods: int) -> dict[str, Array]:
     """Return contact and impacts of one element, each of shape (lanes,), by name.
 
     ``contact`` (lanes, 6), that of one element of an `Outcome`, covers this number of mesh periods.

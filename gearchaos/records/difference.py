@@ -68,7 +68,7 @@ def difference(one: Solution, other: Solution) -> Difference:
     size = np.max(np.abs(other.section), axis=(1, 2), initial=0.0)
     apart = distance > _ANOTHER_ORBIT * size
     period[apart] = 0
-    told = (one.motion != UNRESOLVED) & (other.motion != UNRESOLVED)
+    labelled = (one.motion != UNRESOLVED) & (other.motion != UNRESOLVED)
     exponent = np.abs(one.exponent - other.exponent)
     return Difference(
         period,
@@ -76,7 +76,7 @@ def difference(one: Solution, other: Solution) -> Difference:
         np.maximum(np.maximum(exponent, one.hidden), one.exponent_rounding),
         (first != second)
         | apart
-        | (told & (one.motion != other.motion))
+        | (labelled & (one.motion != other.motion))
         | (one.diverged != other.diverged),
     )
 

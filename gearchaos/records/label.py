@@ -10,10 +10,10 @@ from gearchaos.records.lyapunov import largest_exponent
 from gearchaos.records.period import POINTS_NEEDED, period_of, return_distances
 
 PERIODIC, QUASI_PERIODIC, CHAOTIC, UNRESOLVED, DIVERGED, GROWS = range(6)
-MEANINGS = ("periodic", "quasi_periodic", "chaotic", "unresolved", "diverged", "grows")
+MOTION_MEANINGS = ("periodic", "quasi_periodic", "chaotic", "unresolved", "diverged", "grows")
 """Meanings of the values of ``motion``."""
 
-MOST_POINTS = 512  # Section points with which a motion is labelled: the last ones.
+MOST_LABEL_POINTS = 512  # Section points with which a motion is labelled: the last ones.
 STANDARD_ERRORS = 3.0  # An exponent within so many of its standard errors is not told from zero.
 CERTAIN = 6.0  # Standard errors beyond which a positive exponent is not doubted.
 
@@ -26,7 +26,9 @@ NEUTRAL_GROWTH = 1.0
 AGREEMENT = 0.05
 """Largest difference of the weighted averages of two halves of a quasi-periodic record."""
 
-NEAR = 0.01  # Return distance below which a motion that was chaotic may be settling on an orbit.
+NEAR_RETURN = (
+    0.01  # Return distance below which a motion that was chaotic may be settling on an orbit.
+)
 
 SETTLING = 0.1
 """Return distance below which a motion that comes ever closer may be settling on an orbit."""
@@ -51,7 +53,7 @@ class Record(NamedTuple):
 class Labels(NamedTuple):
     """Labels of some lanes.
 
-    ``motion`` (lanes,) of `MEANINGS`; ``period`` (lanes,) in excitation periods, 0 where the motion
+    ``motion`` (lanes,) of `MOTION_MEANINGS`; ``period`` (lanes,) in excitation periods, 0 where the motion
     is not periodic; ``return_distance`` (lanes,): that of the period, or else the smallest one;
     ``bands`` (lanes,): on how many a chaotic or quasi-periodic section lies, see `band_count`, 0
     where it is neither or has not been looked at.
@@ -112,7 +114,7 @@ def settling_periods(record: Record, labels: Labels) -> Counts:
         latest = return_distances(record.section[chaotic, -LATEST:])
         latest = np.where(np.isnan(latest), np.inf, latest)
         nearest = np.argmin(latest, axis=1)
-        settling = latest[np.arange(chaotic.size), nearest] <= NEAR
+        settling = latest[np.arange(chaotic.size), nearest] <= NEAR_RETURN
         found[chaotic[settling]] = nearest[settling] + 1
     lanes = np.flatnonzero((labels.motion == UNRESOLVED) | (labels.period > 1))
     if not lanes.size:

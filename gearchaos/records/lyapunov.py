@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
-from gearchaos.arrays import Counts, Floats
+from gearchaos.arrays import Floats
 
 BLOCKS = 8
 """Blocks side by side whose estimates give the standard error; half-way blocks lie between them."""
@@ -47,38 +47,43 @@ def largest_exponent(
     exponent = _weighted_mean(growth) / period
     if periods < 2:
         return exponent, np.full_like(exponent, np.nan)
-    length = max(1, periods // BLOCKS)
-    blocks = sliding_window_view(growth, length, axis=1)[:, :: max(1, length // 2)]
-    means = _weighted_mean(blocks)
+    means = _block_means(growth)
     spread = np.std(means, axis=1, ddof=1) / period
     # The quantile of Student's t at two standard errors, to first order in 1/freedom.
-    few = 1.0 + 1.25 / (means.shape[1] - 1)
-    error = few * spread * np.sqrt(length / periods)
-    if memory is None:
-        return exponent, error
-    slow = memory * BLOCKS > periods
-    # As many waves as pass within the record while the slowest mode remembers.
-    most = min(BLOCKS, means.shape[1] - 1)
-    waves = np.clip(periods / memory[slow], min(FEWEST_WAVES, most), most).astype(np.int32)
-    error[slow] = np.fmax(error[slow], _slow_errors(means[slow], periods, waves) / period[slow])
+    widening = 1.0 + 1.25 / (means.shape[1] - 1)
+    error = widening * spread * np.sqrt(max(1, periods // BLOCKS) / periods)
+    if memory is not None:
+        slow = memory * BLOCKS > periods
+        errors = _slow_errors(means[slow], periods, memory[slow]) / period[slow]
+        error[slow] = np.fmax(error[slow], errors)
     return exponent, error
 
 
-def _slow_errors(means: Floats, periods: int, waves: Counts) -> Floats:
-    """Return the standard error of the weighted mean of a record that remembers for long.
+def _block_means(growth: Floats) -> Floats:
+    """Return the weighted means of blocks that overlap by half, shape (lanes, blocks)."""
+    length = max(1, growth.shape[1] // BLOCKS)
+    blocks = sliding_window_view(growth, length, axis=1)[:, :: max(1, length // 2)]
+    return _weighted_mean(blocks)
 
-    Its variance is that of the slowest movements there are in the record, and these are told by the
-    first cosines of the block means: the variance of white growth with the same cosines, averaged
-    over so many ``waves`` (lanes,) (Mueller 2007; Lazarus, Lewis, Stock, Watson 2018), widened by
-    the quantile of Student's t with as many degrees of freedom. ``means`` (lanes, blocks): of
-    blocks of a record of so many periods.
+
+def _slow_errors(means: Floats, periods: int, memory: Floats) -> Floats:
+    """Return the standard error of the weighted mean of a record whose memory is long.
+
+    The variance is that of the slowest fluctuations of the record, measured by the first cosines of
+    the block means ``means`` (lanes, blocks): the variance of white growth with the same cosines,
+    averaged over as many cosines as the record of ``periods`` mesh periods holds multiples of the
+    memory (lanes,) (Mueller 2007; Lazarus, Lewis, Stock, Watson 2018). The error is widened by the
+    quantile of Student's t with as many degrees of freedom.
     """
-    blocks, most = means.shape[1], int(waves.max(initial=1))
+    blocks = means.shape[1]
+    largest = min(BLOCKS, blocks - 1)
+    waves = np.clip(periods / memory, min(FEWEST_WAVES, largest), largest).astype(np.int32)
+    most = int(waves.max(initial=1))
     numbers = np.arange(1, most + 1)
     cosines = np.cos(np.pi * numbers[:, np.newaxis] * (np.arange(blocks) + 0.5) / blocks)
     length = max(1, periods // BLOCKS)
     hop, kernel = max(1, length // 2), _weights(length)
-    # What a cosine of the block means is, as weights of the single periods.
+    # Each cosine of the block means, written as weights of the single periods.
     over_record = np.zeros((most, periods))
     for block, column in enumerate(cosines.T):
         over_record[:, block * hop : block * hop + length] += np.outer(column, kernel)
@@ -87,8 +92,8 @@ def _slow_errors(means: Floats, periods: int, waves: Counts) -> Floats:
     variance = np.cumsum(found**2 / np.sum(over_record**2, axis=1), axis=1) / numbers
     own = variance[np.arange(waves.size), waves - 1] * np.sum(_weights(periods) ** 2)
     # The quantile of Student's t at two standard errors, to second order in 1/freedom.
-    few = 1.0 + 1.25 / waves + 1.53 / waves**2
-    errors: Floats = few * np.sqrt(own)
+    widening = 1.0 + 1.25 / waves + 1.53 / waves**2
+    errors: Floats = widening * np.sqrt(own)
     return errors
 
 

@@ -9,7 +9,7 @@ import gearchaos
 from gearchaos import load_config
 from gearchaos.engine.kept import variables_of
 from gearchaos.figures import bifurcation
-from gearchaos.records.contact import CONTACT_STATES, contact_told
+from gearchaos.records.contact import CONTACT_STATES, contact_summary
 
 from .commands import run_module
 from .short_sweeps import PAN2021, SHORT, simulation
@@ -39,7 +39,7 @@ def test_the_four_states_of_contact():
     ).T
     speeds = 0.5 * (on_driving + on_back)
     contact = np.stack([driving, on_driving, back, on_back, speeds, 0.7 * speeds], axis=1)
-    found = contact_told(contact, 10)
+    found = contact_summary(contact, 10)
     assert [CONTACT_STATES[state] for state in found["contact_state"]] == [
         "held",
         "held",

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from gearchaos.outputs.variable import coordinate
-from gearchaos.records.label import CHAOTIC, MEANINGS, PERIODIC
+from gearchaos.records.label import CHAOTIC, MOTION_MEANINGS, PERIODIC
 from gearchaos.results.reading.jumps import crises, grows_at
 from gearchaos.results.reading.result import Result
 
@@ -74,7 +74,7 @@ def result(backwards: bool) -> Result:
         section=["delta_5", "delta_5_rate"],
         section_points=100,
         lyapunov=False,
-        motion_meanings=MEANINGS,
+        motion_meanings=MOTION_MEANINGS,
         status_meanings=["ok"],
     )
     arrays = {v.name: v.values for v in variables if v.values is not None}

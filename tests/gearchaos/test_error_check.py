@@ -5,9 +5,9 @@ import pytest
 
 import gearchaos
 from gearchaos.engine.error_check import (
+    CHANGE_MEANINGS,
     CHANGED,
     CHECKED,
-    MEANINGS,
     NOT_CHECKED,
     SAME,
     Tally,
@@ -114,5 +114,5 @@ def test_the_file_tells_the_errors_and_what_they_mean(tmp_path):
     config = simulation("integration.error_check=0.5").config
     gearchaos.run(config).save(tmp_path / "checked.h5")
     result = gearchaos.open_result(tmp_path / "checked.h5")
-    assert result.attributes("motion_changed")["flag_meanings"].split() == list(MEANINGS)
+    assert result.attributes("motion_changed")["flag_meanings"].split() == list(CHANGE_MEANINGS)
     assert result.metadata["error_check"] == 0.5

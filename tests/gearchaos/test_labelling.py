@@ -17,7 +17,7 @@ from gearchaos.records.label import (
     CHAOTIC,
     DIVERGED,
     GROWS,
-    MEANINGS,
+    MOTION_MEANINGS,
     PERIODIC,
     QUASI_PERIODIC,
     UNRESOLVED,
@@ -209,7 +209,7 @@ def test_a_lane_too_fast_for_its_flow_maps_is_no_diverged_one(tmp_path):
 
 def test_the_meanings_of_the_labels_are_in_the_result():
     (motion,) = [v for v in variables_of(simulation()) if v.name == "motion"]
-    assert motion.flags == MEANINGS
+    assert motion.flags == MOTION_MEANINGS
     assert motion.flags[PERIODIC] == "periodic"
 
 

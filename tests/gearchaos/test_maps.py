@@ -14,7 +14,7 @@ from gearchaos.models.gear_pair.outputs import CATALOGUE
 from gearchaos.outputs.variable import Variable, coordinate
 from gearchaos.plot import main
 from gearchaos.records.contact import CONTACT_STATES
-from gearchaos.records.label import MEANINGS
+from gearchaos.records.label import MOTION_MEANINGS
 from gearchaos.results.reading.result import Result
 
 from .listed_variables import sweep_variables
@@ -43,7 +43,7 @@ def result_over(*axes: Variable, labelled: bool = True) -> Result:
         lyapunov=True,
         contact=["tangential"],
         status_meanings=["ok", "diverged"],
-        motion_meanings=MEANINGS if labelled else (),
+        motion_meanings=MOTION_MEANINGS if labelled else (),
     )
     shape = [axis.values.size for axis in axes]
     dims = {"section_point": 2, "state": 1}

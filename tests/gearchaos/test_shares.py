@@ -15,7 +15,7 @@ from gearchaos.figures import shares, shares_page
 from gearchaos.models.gear_pair.outputs import CATALOGUE
 from gearchaos.outputs.variable import coordinate
 from gearchaos.plot import main
-from gearchaos.records.label import MEANINGS
+from gearchaos.records.label import MOTION_MEANINGS
 from gearchaos.records.wilson import wilson_interval
 from gearchaos.results.reading.ensembles import motion_shares
 from gearchaos.results.reading.result import Result
@@ -24,7 +24,7 @@ from .listed_variables import sweep_variables
 
 INTERVAL = "not period 1, 95 % confidence"
 PAIRS, STARTS, TEETH_MEET = 10, 2, 798
-PERIODIC, QUASI_PERIODIC, CHAOTIC, UNRESOLVED, DIVERGED, _ = range(len(MEANINGS))
+PERIODIC, QUASI_PERIODIC, CHAOTIC, UNRESOLVED, DIVERGED, _ = range(len(MOTION_MEANINGS))
 
 
 def known_motions(
@@ -55,7 +55,7 @@ def known_motions(
         lyapunov=False,
         crossings=contact,
         status_meanings=("ok", "diverged"),
-        motion_meanings=MEANINGS if labelled else (),
+        motion_meanings=MOTION_MEANINGS if labelled else (),
         excitation_period=TEETH_MEET,
     )
     motion = np.full((values.size, pairs), PERIODIC)

@@ -9,7 +9,7 @@ from gearchaos_kernels import Effects, GearPairs, Groups, Plan, Status, jacobian
 from gearchaos import ConfigurationError
 from gearchaos.dynamics.exponents import period_jacobian
 from gearchaos.dynamics.stability import (
-    MOST_STEPS,
+    STEPS_CEILING,
     exponent_bias,
     fewest_stable_steps,
     steps_per_time,
@@ -224,7 +224,7 @@ def test_the_stiffest_bearing_sets_the_limit(direction, gear):
 @pytest.mark.parametrize("name", ["transverse_stiffness_p", "damping_ratio", "axial_damping_g"])
 def test_groups_beyond_all_measure_ask_for_more_steps_than_there_are(name):
     model = pan2021(1.0, **{name: np.array([1.0, 1e300, 1.7e308])})
-    assert fewest(FULL, model)[1:].tolist() == [MOST_STEPS, MOST_STEPS]
+    assert fewest(FULL, model)[1:].tolist() == [STEPS_CEILING, STEPS_CEILING]
 
 
 def test_a_state_at_rest_without_load_stays_there_with_any_number_of_steps():
@@ -275,10 +275,10 @@ def test_the_shift_of_an_exponent_by_the_step_is_that_of_the_linear_pair(steps):
 def test_groups_whose_products_overflow_need_more_steps_than_there_are():
     groups = pan2021(1.0, damping_ratio=np.array([0.1, 1e300]), mass_ratio_g=1e300)
     found = fewest(FULL._replace(axial=True), groups)
-    assert found.tolist() == [MOST_STEPS, MOST_STEPS]
+    assert found.tolist() == [STEPS_CEILING, STEPS_CEILING]
 
 
 def test_a_lane_that_overflows_leaves_the_limits_of_the_others():
     alone = fewest(TORSION, oscillator(np.array([0.1])))
     both = fewest(TORSION, oscillator(np.array([0.1, 1e200])))
-    assert both[0] == alone[0] and both[1] == MOST_STEPS
+    assert both[0] == alone[0] and both[1] == STEPS_CEILING

@@ -11,7 +11,7 @@ from gearchaos.errors import FileError
 from gearchaos.figures.panel import mark_values
 from gearchaos.figures.stages import HATCHES, SHADES, shade_stages
 from gearchaos.outputs.variable import coordinate
-from gearchaos.records.label import MEANINGS
+from gearchaos.records.label import MOTION_MEANINGS
 from gearchaos.results.reading.result import Result
 from gearchaos.results.reading.stage_table import labelled_lanes
 
@@ -30,7 +30,7 @@ def result_of(labels: str, *, labelled: bool = True) -> Result:
         section_points=0,
         lyapunov=False,
         status_meanings=["ok", "diverged"],
-        motion_meanings=MEANINGS if labelled else (),
+        motion_meanings=MOTION_MEANINGS if labelled else (),
     )
     lanes = len(labels)
     data = {
