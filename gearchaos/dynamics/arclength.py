@@ -143,7 +143,7 @@ class Curve(NamedTuple):
         point: Floats,
         share: float,
     ) -> Self:
-        """Return the curve through the orbit with state ``point`` (states,) at a share of the way."""
+        """Return the curve through the orbit with state ``point`` (states,) at a share of it."""
         system = system_at(np.array([share]))
         whole = periods * system.repeats_after
         plan = Plan(plan.steps_per_period, 0, whole, whole, tangent=True, method=plan.method)

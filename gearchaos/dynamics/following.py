@@ -1,8 +1,8 @@
-"""Which way a periodic orbit loses its stability as a parameter changes.
+"""How a periodic orbit loses its stability as a parameter changes.
 
-An orbit is stable while its Floquet multipliers lie within the unit circle. With backlash the
-multipliers may change fast next to a motion that grazes a flank, but they do not jump: the mesh
-force is continuous, so that the map over a period has a continuous derivative.
+An orbit is stable while its Floquet multipliers lie within the unit circle. With clearances the
+multipliers may change fast next to a motion that grazes a flank, but they do not jump: the forces
+of the elements are continuous, so that the map over a period has a continuous derivative.
 """
 
 from collections.abc import Callable
@@ -16,21 +16,31 @@ from gearchaos.dynamics.arclength import Curve, End, end_of_curve
 from gearchaos.dynamics.orbits import Orbits, polish
 from gearchaos.dynamics.stability_loss import CONFIRMED, StabilityLoss, loss_of_stability
 
-LONGEST_SHARE = 1.0 / 16.0  # Share of the way along which an orbit is followed.
+LONGEST_SHARE = 1.0 / 16.0
+"""Largest step along the way, as a share of it."""
 
 MOST_ORBITS = 200
-"""Orbits tried along the way; where they do not suffice nothing is known of what lies beyond."""
+"""Largest number of steps along the way; beyond the last step nothing is known."""
 
-MOST_CURVES = 8  # Places at which an orbit that Newton's method misses is followed along its curve.
+MOST_CURVES = 8
+"""Largest number of places per lane at which an orbit is followed along its curve."""
 
 
 class Orbit(NamedTuple):
     """A periodic orbit.
 
-    ``period`` in excitation periods; ``point`` (states,) at its beginning; ``multipliers``
-    (states,): the Floquet multipliers, largest modulus first; ``exponent``: the largest Lyapunov
-    exponent per unit of tau; ``residual``: distance after one period, relative to the scale of each
-    coordinate.
+    Attributes
+    ----------
+    period : int
+        Period in excitation periods.
+    point : array, shape (states,)
+        Dimensionless state at the beginning, at mesh phase 0.
+    multipliers : array of complex, shape (states,)
+        Floquet multipliers, largest modulus first.
+    exponent : float
+        Largest Lyapunov exponent per unit of tau.
+    residual : float
+        Distance after one period, relative to the scale of each state.
     """
 
     period: int
@@ -46,11 +56,23 @@ class Orbit(NamedTuple):
 
 
 class Branch(NamedTuple):
-    """How far an orbit goes along a parameter.
+    """A periodic orbit followed along a parameter.
 
-    ``value``, ``orbit``: the last value at which it is stable, and the orbit there; ``beyond``: the
-    first value at which it is unstable or not found, the end of the way if it stays stable;
-    ``loss``, ``text``: how it loses stability; ``multiplier``: the one that tells.
+    Attributes
+    ----------
+    value : float
+        Last value of the parameter at which the orbit is stable.
+    orbit : Orbit
+        The orbit at this value.
+    beyond : float
+        First value at which the orbit is unstable or not found; the last value of the way if the
+        orbit stays stable.
+    loss : StabilityLoss
+        How the orbit loses stability.
+    text : str
+        The same in words.
+    multiplier : complex
+        The Floquet multiplier that shows the loss, see `loss_of_stability`.
     """
 
     value: float
@@ -64,10 +86,18 @@ class Branch(NamedTuple):
 class Followed(NamedTuple):
     """The orbits of some lanes, followed until they lose stability or to the end of the way.
 
-    ``stable_value``, ``beyond_value`` (lanes,): the last value of the parameter with a stable
-    orbit, and the first one at which it is unstable or not found; both are the end of the way
-    where the orbit is stable all along, and not a number where there is none at the beginning.
-    ``stable``, ``beyond``: the `Orbits` there; ``loss``, ``multiplier``: see `loss_of_stability`.
+    Attributes
+    ----------
+    stable_value, beyond_value : array, shape (lanes,)
+        Last value of the parameter with a stable orbit, and first value at which the orbit is
+        unstable or not found. Both are the end of the way where the orbit is stable everywhere, and
+        NaN where there is no orbit at the beginning.
+    stable, beyond : Orbits
+        The orbits at these values.
+    loss : array of int, shape (lanes,)
+        See `StabilityLoss`.
+    multiplier : array of complex, shape (lanes,)
+        The multiplier that shows the loss, see `loss_of_stability`.
     """
 
     stable_value: Floats
@@ -89,16 +119,25 @@ def follow(
 ) -> Followed:
     """Follow the orbit of every lane along a parameter to where it loses stability.
 
-    Every orbit is polished from the straight line through the two before it. Steps begin with a
-    sixteenth of the way, are halved where no orbit is found, and end in a bisection where one is
-    unstable. All lanes are followed side by side. Where an orbit ends, or the unstable one does not
-    explain the loss of stability (`loss_of_stability`) and so belongs to another branch, it is
-    followed along its curve, see `arclength`, and where this goes on it is followed on from there.
+    Parameters
+    ----------
+    system_at : callable
+        Returns the systems of the lanes at values (lanes,) of the parameter.
+    guess : array, shape (lanes, states)
+        States next to the orbits at the first values.
+    period : array of int, shape (lanes,)
+        Period in excitation periods, 0 where there is no orbit.
+    first, last : array, shape (lanes,)
+        Values at both ends of the way, in either order.
+    width : float
+        Wanted distance between the last stable value and the value beyond.
+    plan : Plan
+        Method and steps per period, as for `polish`.
 
-    ``system_at`` gives the systems at values of the parameter, (lanes,), of any number;
-    ``first``, ``last`` (lanes,): the values at both ends of the way, in either order; ``guess``,
-    ``period`` and ``plan`` as for `polish` at the first values; ``width``: wanted distance of the
-    stable value and the one beyond.
+    Notes ----- Newton's method starts from the line through the last two orbits. Steps are halved
+    where no orbit is found; the loss of stability is bisected. Where an orbit ends, or the unstable
+    orbit belongs to another branch, it is followed along its curve (`arclength`), and onwards where
+    the curve continues.
     """
     lanes = _Lanes(system_at, guess, period, (first, last), width, plan)
     going = lanes.stable.stable
@@ -113,7 +152,7 @@ def follow(
 
 
 class _Lanes:
-    """Where orbits that are followed side by side stand: arguments as of `follow`."""
+    """The state of orbits that are followed side by side; arguments as in `follow`."""
 
     def __init__(
         self,
@@ -126,38 +165,40 @@ class _Lanes:
     ) -> None:
         self._system_at, self._period, self._plan = system_at, period, plan
         self._first, self._way = ends[0], ends[1] - ends[0]
-        # Whatever the width: an orbit is never lost sight of within the first step.
+        # At most a long step, so that a large width does not end the search at the first step.
         share = width / np.maximum(np.abs(self._way), width)
         self._smallest = np.minimum(share, LONGEST_SHARE)
         self._share = np.zeros_like(self._first)
         self.stable = self._orbits(self._share, guess, period > 0)
         self._slope = np.zeros_like(self.stable.points)
         self._beyond, self._end = self.stable, np.zeros_like(self._first)
-        # Those whose curve was followed to an end, and those that end in an orbit of half.
+        # Curves that were followed to an end, and those that end in an orbit of half the period.
         self._located = np.zeros(self._first.shape, np.bool_)
         self._halved = np.zeros(self._first.shape, np.bool_)
 
     def _orbits(self, share: Floats, guess: Floats, followed: Mask) -> Orbits:
+        """Return the orbits of the lanes ``followed`` at shares of their ways (lanes,)."""
         system = self._system_at(self._first + share * self._way)
         sought = np.where(followed, self._period, np.int32(0))
         return polish(system, guess, sought, self._plan)
 
     @property
     def _loss(self) -> tuple[Codes, Complex]:
+        """The `StabilityLoss` of every lane and its multiplier."""
         kind, multiplier = loss_of_stability(self.stable.multipliers, self._beyond.multipliers)
         kind[self._halved] = StabilityLoss.PERIOD_HALVING
         return kind, multiplier
 
     @property
     def unexplained(self) -> Mask:
-        """Which stable orbits have ended, or lie beside an unstable one of another branch."""
+        """Stable orbits that end, or lie beside an unstable one of another branch, (lanes,)."""
         other = self._loss[0] == StabilityLoss.UNCONFIRMED
         ended: Mask = np.isnan(self._beyond.multipliers[:, 0]) | other
         return ended & self.stable.stable & ~self._located
 
     @property
     def followed(self) -> Followed:
-        """What was found."""
+        """The result for all lanes."""
         exists = self.stable.converged
         return Followed(
             np.where(exists, self._first + self._share * self._way, np.nan),
@@ -168,7 +209,7 @@ class _Lanes:
         )
 
     def march(self, going: Mask) -> None:
-        """Follow the orbits of some lanes, value by value, until they end or are unstable."""
+        """Follow the orbits of the lanes ``going`` step by step until they end or are unstable."""
         step = np.full_like(self._share, LONGEST_SHARE)
         unstable_from = np.full_like(self._share, np.inf)
         for _ in range(MOST_ORBITS):
@@ -180,7 +221,7 @@ class _Lanes:
             kept = going & found.stable
             unstable, missing = going & found.converged & ~kept, going & ~found.converged
             unstable_from[unstable] = trial[unstable]
-            # Newton's method may fail for a step too long; a smaller one goes on past the place.
+            # Newton's method may fail for a long step and succeed for a smaller one.
             reached = unstable | (missing & np.isinf(unstable_from)) | (kept & (trial == 1.0))
             self._beyond = _chosen(reached, found, self._beyond)
             self._end = np.where(reached, trial, self._end)
@@ -193,9 +234,9 @@ class _Lanes:
         self._beyond.multipliers[going] = np.nan
 
     def follow_curve(self, lane: int) -> bool:
-        """Follow the curve of one lane to its end, and return whether it goes on from there.
+        """Follow the curve of one lane to its end, and return whether it continues from there.
 
-        At most a long step further than where the orbit was missed.
+        The curve is followed at most one long step beyond the place where the orbit was missed.
         """
         first, way, share = self._first[lane], self._way[lane], float(self._share[lane])
         point, periods = self.stable.points[lane], int(self._period[lane])
@@ -216,7 +257,7 @@ class _Lanes:
         return continues
 
     def _put(self, lane: int, end: End, scale: Floats, width: float) -> None:
-        """Put a lane where its curve was followed to."""
+        """Set a lane to the end of its followed curve; ``scale`` (states,) of the curve."""
         inner, beyond = end.inner, end.beyond or end.inner
         assert inner is not None
         assert beyond is not None
@@ -228,7 +269,7 @@ class _Lanes:
             orbits.residual[lane], orbits.converged[lane] = place.residual, True
         self._slope[lane] = inner.tangent[:-1] * scale / inner.tangent[-1]
         self._share[lane] = inner.share
-        # Where the curve turns back there is no orbit behind the turn.
+        # Where the curve turns back, there is no orbit beyond the fold.
         behind = 0.0 if beyond.onward else width / 2.0
         self._end[lane] = max(inner.share, beyond.share) + behind
         self._located[lane] = end.beyond is not None
@@ -237,7 +278,7 @@ class _Lanes:
 
 
 def _chosen(lanes: Mask, one: Orbits, other: Orbits) -> Orbits:
-    """Take some lanes from one, the rest from the other."""
+    """Take the orbits of some lanes from ``one``, of all others from ``other``."""
     return Orbits(
         *(
             np.where(lanes.reshape(-1, *[1] * (mine.ndim - 1)), mine, yours)

@@ -1,8 +1,8 @@
-"""The error of an exponent that half the step does not show.
+"""The error of an exponent that halving the step does not show.
 
-Close to its stability limit the Runge-Kutta method damps a fast mode that hardly decays: the
-largest exponent of the steps is then that of another mode, and so is that of half the steps. The
-difference of the two says nothing of the error.
+Close to its stability limit, the Runge-Kutta method damps fast modes that hardly decay. The largest
+exponent with N and with 2 N steps is then that of another mode. The difference between the two
+results does not contain the error.
 """
 
 import numpy as np
@@ -17,29 +17,29 @@ from gearchaos.dynamics.orbits import polish
 def hidden_error(
     system: LaneSystem, plan: Plan, period: Counts, state: Floats, exponent: Floats
 ) -> Floats:
-    """Return the error of the largest exponent of periodic lanes whose modes half a step damps.
-
-    Where half the step changes the decay of a mode, see `modes.hidden_decay`, the exponent is
-    compared with that of the orbit of flow maps, which is exact. Where there are no flow maps, or
-    they find no orbit, with the decay of the slowest such mode: the orbit decays no faster.
+    """Return the error of the largest exponent of periodic lanes with numerically damped modes.
 
     Parameters
     ----------
     system : LaneSystem
-        Lanes of the kernels.
+        The system of the lanes.
     plan : Plan
-        Of it only method and steps per period count.
+        Method and steps per period.
     period : array of int, shape (lanes,)
         Period in excitation periods, 0 where a lane is not periodic.
     state : array, shape (lanes, states)
         State next to the orbit.
     exponent : array, shape (lanes,)
-        Largest exponent that the steps give, per unit of tau.
+        Largest exponent with these steps, per unit of tau.
 
     Returns
     -------
     array, shape (lanes,)
         Error per unit of tau; 0 where half the step shows it, and in lanes that are not periodic.
+
+    Notes ----- Where half the step changes the decay of a mode (`modes.hidden_decay`), the exponent
+    is compared with that of the orbit of exact flow maps. Without flow maps or without an orbit, it
+    is compared with the decay of the slowest such mode, because the orbit does not decay faster.
     """
     error = np.zeros(period.size)
     if METHODS[plan.method].exact:

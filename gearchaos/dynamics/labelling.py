@@ -1,4 +1,4 @@
-"""Labels of integrated lanes: what their records tell, and Newton's method where they settle."""
+"""Labels of integrated lanes, from their records and from Newton's method where they settle."""
 
 from typing import NamedTuple
 
@@ -13,31 +13,52 @@ from gearchaos.records.bands import band_count, subsequence_spread
 from gearchaos.records.period import coordinate_scale, return_distances
 
 LONGER_RECORDS = (4, 16)
-"""How many times the record doubtful lanes go on, and then those that are doubtful still."""
+"""Lengths of the longer records of doubtful lanes, as multiples of the record."""
 
-LONGER_RECORD_BYTES = (
-    2**25
-)  # Memory for longer records that is always there: lanes side by side are faster.
+LONGER_RECORD_BYTES = 2**25
+"""Memory that longer records may always take: lanes side by side are faster."""
 
-WHOLE = 0.25  # Largest difference of the subsequences of a curve, see `subsequence_spread`.
+WHOLE = 0.25
+"""Largest difference between the subsequences of a curve, see `subsequence_spread`."""
 
 
-MARGIN = 1e-9  # Distance of a multiplier from the unit circle that rounding does not explain.
+MARGIN = 1e-9
+"""Distance between a multiplier and the unit circle that rounding does not explain."""
 
 
 class Labelled(NamedTuple):
-    """Labels, and the state (lanes, states) at the end of the look that told each."""
+    """Labels of lanes and the states at which they were found.
+
+    Attributes
+    ----------
+    labels : Labels
+        The labels.
+    state : array, shape (lanes, states)
+        State at the end of the record from which each label was taken.
+    """
 
     labels: label.Labels
     state: Floats
 
 
 def labels_of(system: LaneSystem, outcome: Outcome, plan: Plan) -> Labelled:
-    """Label lanes by their record, which should hold `MOST_LABEL_POINTS` section points or all there are.
+    """Label lanes by their records.
 
-    ``plan`` is that by which they were integrated, over whole excitation periods. `doubtful` lanes
-    are labelled by a longer record that begins where theirs ended, and what that does not tell by a
-    still longer one.
+    Parameters
+    ----------
+    system : LaneSystem
+        The system of the lanes.
+    outcome : Outcome
+        Outcome of their integration, with `MOST_LABEL_POINTS` section points per lane or, in a
+        shorter record, all of them.
+    plan : Plan
+        Plan of that integration, over whole excitation periods.
+
+    Returns
+    -------
+    Labelled
+        Labels and states. Lanes that are `doubtful` are labelled by a longer record that begins at
+        the end of theirs. If they are still unresolved, an even longer record follows.
     """
     repeats = system.repeats_after
     outcome = outcome.every(repeats)
@@ -48,7 +69,7 @@ def labels_of(system: LaneSystem, outcome: Outcome, plan: Plan) -> Labelled:
         points = longer * min(label.MOST_LABEL_POINTS * repeats, plan.recorded_periods)
         lengths = plan.steps_per_period, 0, longer * plan.recorded_periods, points
         further = Plan(*lengths, plan.tangent, plan.resolved, method=plan.method)
-        # In portions whose longer records take no more memory than those of all lanes.
+        # In portions, so that longer records take no more memory than the records of all lanes.
         record = 8 * (further.section_points * state.shape[1] + further.recorded_periods)
         size = max(1, system.lanes // longer, LONGER_RECORD_BYTES // record)
         for first in range(0, lanes.size, size):
@@ -63,7 +84,7 @@ def labels_of(system: LaneSystem, outcome: Outcome, plan: Plan) -> Labelled:
             _measure_return(labels, outcome.section, some[found.period > 0])
         sound = np.isfinite(state[lanes]).all(axis=1)
         lanes = lanes[sound & (labels.motion[lanes] == label.UNRESOLVED)]
-    # Nothing is known of it, not that it diverges.
+    # A lane that is too fast for the steps has an unknown motion; it need not diverge.
     labels.motion[outcome.status == Status.TOO_FAST] = label.UNRESOLVED
     return Labelled(labels, state)
 
@@ -71,7 +92,7 @@ def labels_of(system: LaneSystem, outcome: Outcome, plan: Plan) -> Labelled:
 def _label_record(
     system: LaneSystem, outcome: Outcome, plan: Plan, most_points: int
 ) -> label.Labels:
-    """Return what one record tells."""
+    """Return the labels from one record, with the last ``most_points`` section points."""
     section, diverged = outcome.section[:, -most_points:], outcome.status != Status.OK
     record = label.Record(section, outcome.growth, diverged, _admits_tori(system))
     labels = label.label(record)
@@ -84,40 +105,40 @@ def _label_record(
 
 
 def _label_longer_record(system: LaneSystem, outcome: Outcome, plan: Plan) -> label.Labels:
-    """Return what a longer record tells; also of a torus, that it is not a cascade."""
+    """Return the labels from a longer record; a torus that may be a cascade is unresolved."""
     labels = _label_record(system, outcome, plan, plan.section_points)
     tori = np.flatnonzero(labels.motion == label.QUASI_PERIODIC)
     hopping = tori[subsequence_spread(outcome.section[tori]) > WHOLE]
-    # What diverges only now has not done so in what is kept.
+    # A lane that diverges only here has not diverged in the record that is kept.
     refused = np.concatenate([hopping, np.flatnonzero(labels.motion == label.DIVERGED)])
     labels.motion[refused], labels.bands[refused] = label.UNRESOLVED, 0
     return labels
 
 
 def _label_linear(system: LaneSystem, plan: Plan, labels: label.Labels) -> None:
-    """Tell growth without bound by the multipliers, in place: what is linear is never chaotic."""
+    """Label unbounded growth from the multipliers, in place: a linear system is never chaotic."""
     once = plan._replace(recorded_periods=system.repeats_after)
     jacobian = period_jacobian(system, np.zeros((system.lanes, len(system.states))), once)
     size = np.max(np.abs(np.linalg.eigvals(np.nan_to_num(jacobian))), axis=1)
     grows = size > 1.0 + MARGIN
     labels.motion[grows] = label.GROWS
     labels.period[grows] = 0
-    # Without damping a forced oscillation goes around a torus.
+    # Without damping, a forced oscillation lies on a torus.
     settles = (labels.motion == label.QUASI_PERIODIC) & (size < 1.0 - MARGIN)
     labels.motion[settles | (labels.motion == label.CHAOTIC) & ~grows] = label.UNRESOLVED
 
 
 def _measure_return(labels: label.Labels, section: Floats, lanes: Integers) -> None:
-    """Keep how near their own period brings the record of some lanes back to itself."""
+    """Store the return distances after the own period of some lanes, in place."""
     distances = return_distances(section[lanes])
     labels.return_distance[lanes] = distances[np.arange(lanes.size), labels.period[lanes] - 1]
 
 
 def _admits_tori(system: LaneSystem) -> Mask:
-    """Whether quasi-periodic motion can exist at all.
+    """Whether quasi-periodic motion can exist, (lanes,).
 
-    With two states and damping the period map contracts every area by the same factor; a closed
-    curve that it maps onto itself would enclose an area that stays the same.
+    With two states and damping, the period map contracts every area by the same factor. The area
+    enclosed by an invariant closed curve would stay the same, so that there is no such curve.
     """
     if len(system.states) > 2:
         return np.ones(system.lanes, dtype=np.bool_)
@@ -127,7 +148,7 @@ def _admits_tori(system: LaneSystem) -> Mask:
 def _settle(
     system: LaneSystem, outcome: Outcome, plan: Plan, labels: label.Labels, period: Counts
 ) -> None:
-    """Give the lanes that have come close to a stable orbit its period, in place."""
+    """Label lanes next to a stable orbit as periodic, in place; ``period`` (lanes,): to try."""
     searched = period > 0
     for n in range(1, int(period.max(initial=0)) + 1):
         tried = np.flatnonzero(searched & (period % n == 0))

@@ -1,4 +1,4 @@
-"""The largest exponent of the motion that lanes have come to: of its orbit where it is periodic."""
+"""The largest exponent of every lane: of its orbit where the lane is periodic, or of its record."""
 
 from typing import NamedTuple
 
@@ -13,18 +13,24 @@ from gearchaos.records.label import CHAOTIC_GROWTH
 from gearchaos.records.lyapunov import largest_exponent
 
 UNIFORM, MIXED, NOT_COMPARED = 0, 1, 2
-RECORD_MEANINGS = ("uniform", "mixed", "not_told")  # Meanings of the values of ``record``.
+RECORD_MEANINGS = ("uniform", "mixed", "not_told")
+"""Meanings of the values of ``record``."""
 
 
 class LargestExponents(NamedTuple):
-    """Largest Lyapunov exponents per unit of tau, and what of their errors the record tells.
+    """Largest Lyapunov exponents of lanes, per unit of tau.
 
-    ``values``, ``standard_errors`` (lanes,): the standard error is that of a finite record, and
-    thus 0 where the exponent is that of an orbit; ``record`` (lanes,) of `RECORD_MEANINGS`: mixed where a
-    lane is periodic in the end, but its record holds motion of another kind, and not told where
-    there is no orbit to compare it with; ``of_orbit`` (lanes,
-    states): all exponents of the orbit, the largest first, not a number where there is none and
-    where rounding hides them.
+    Attributes
+    ----------
+    values, standard_errors : array, shape (lanes,)
+        Exponents and the standard errors that follow from the finite record; the error is 0 where
+        the exponent is that of an orbit.
+    record : array of int, shape (lanes,)
+        See `RECORD_MEANINGS`: mixed where the lane is periodic in the end but its record contains
+        another motion. The last value means that there is no orbit to compare the record with.
+    of_orbit : array, shape (lanes, states)
+        All exponents of the orbit, largest first; NaN without an orbit, and where rounding hides
+        them.
     """
 
     values: Floats
@@ -36,12 +42,26 @@ class LargestExponents(NamedTuple):
 def largest_exponents(
     system: LaneSystem, outcome: Outcome, plan: Plan, period: Counts, state: Floats
 ) -> LargestExponents:
-    """Tell the exponent of lanes from the multipliers of their orbits, or else from their records.
+    """Return the largest exponents of lanes, from their orbits or else from their records.
 
-    A lane that is periodic and has its crossings resolved takes the exponent of the stable orbit
-    next to its state (lanes, states): no finite record enters there, and a transient at its begin
-    does not count. ``outcome``: with growth, integrated by ``plan``; ``period`` (lanes,) in
-    excitation periods, 0 where a lane is not periodic.
+    Parameters
+    ----------
+    system : LaneSystem
+        The system of the lanes.
+    outcome : Outcome
+        Outcome with the growth of a tangent vector.
+    plan : Plan
+        Plan of that integration.
+    period : array of int, shape (lanes,)
+        Period in excitation periods, 0 where a lane is not periodic.
+    state : array, shape (lanes, states)
+        State next to the orbit.
+
+    Returns
+    -------
+    LargestExponents
+        A periodic lane whose crossings are resolved has the exponent of its stable orbit. Neither
+        the length of the record nor a transient at its beginning affects this value.
     """
     values, errors = largest_exponent(outcome.growth, system.mesh_period, memory(system))
     record = np.full(period.shape, NOT_COMPARED, dtype=np.uint8)
@@ -51,7 +71,7 @@ def largest_exponents(
     if not plan.resolved or not lanes.size:
         return found
     orbits = polish(system.of(lanes), state[lanes], period[lanes], plan)
-    # A multiplier that is 0 but for underflow tells no exponent.
+    # A multiplier that underflows to 0 has no logarithm.
     usable = orbits.stable & (np.abs(orbits.multipliers[:, 0]) > 0.0)
     lanes, size = lanes[usable], np.abs(orbits.multipliers[usable])
     duration = period[lanes] * system.excitation_period[lanes]

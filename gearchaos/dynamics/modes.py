@@ -1,9 +1,9 @@
-"""Modes of a system on its contact branches: how long they last, and which ones a step damps.
+"""Modes of a system on its contact branches: their decay, and which of them a step damps.
 
-On a contact branch with the stiffnesses of its elements held, the equations are linear. Their
-eigenvalues lambda are the modes: a disturbance decays as exp(Re lambda tau), and in computed steps
-of length h as abs(R(h lambda)) a step, see `stability`. Where damping is constant and also acts
-out of contact, the decay of a fast mode is nearly the same on all branches.
+On a contact branch with constant stiffnesses, the equations are linear. The eigenvalues lambda of
+their Jacobian are the modes. A disturbance decays as exp(Re lambda tau). In steps of length h it
+changes by abs(R(h lambda)) per step, see `stability`. Where damping is constant and also acts out
+of contact, the decay of a fast mode is nearly the same on all branches.
 """
 
 import numpy as np
@@ -13,14 +13,22 @@ from gearchaos.arrays import Complex, Floats, Mask
 from gearchaos.dynamics.stability import ROUNDING, in_contact
 
 MOST_SHIFT = 0.05
-"""Largest change of a decay by half the step, relative to it, that a comparison bears."""
+"""Largest relative change of a decay rate by half the step that counts as resolved."""
 
 
 def memory(system: LaneSystem) -> Floats:
-    """Return the mesh periods in which the slowest mode in contact falls by a factor e.
+    """Return the mesh periods in which the slowest mode in contact decays by a factor e.
 
-    Shape (lanes,); infinite without damping. Modes of independent states are left out: they act on
-    no other one.
+    Parameters
+    ----------
+    system : LaneSystem
+        The system of the lanes.
+
+    Returns
+    -------
+    array, shape (lanes,)
+        Mesh periods, infinite without damping. Modes of independent states are left out, because
+        they do not act on other states.
     """
     matrix = jacobian(system.measurable(), in_contact(system))
     independent = system.independent_states
@@ -33,18 +41,33 @@ def memory(system: LaneSystem) -> Floats:
 
 
 def hidden_decay(system: LaneSystem, steps: int, method: str) -> Floats:
-    """Return the slowest decay rate among the modes that neither a step nor half of it computes.
+    """Return the slowest decay rate among the modes that neither a step nor half of it resolves.
 
-    Comparing two grids does not show what both damp away. A mode belongs to them if half the step
-    still changes its rate of decay by more than `MOST_SHIFT` of it. Returned is the largest real
-    part of their eigenvalues over all branches, per unit of tau, shape (lanes,), and minus infinity
-    where half the step is right about every mode.
+    Parameters
+    ----------
+    system : LaneSystem
+        The system of the lanes.
+    steps : int
+        Steps per mesh period.
+    method : str
+        Method of integration.
+
+    Returns
+    -------
+    array, shape (lanes,)
+        Largest real part of the eigenvalues of these modes over all branches, per unit of tau;
+        minus infinity where half the step resolves every mode.
+
+    Notes
+    -----
+    A comparison of two grids does not show a mode that both damp. A mode is unresolved if its decay
+    rate with half the step differs from the true rate by more than `MOST_SHIFT` of it.
     """
     half = system.mesh_period[:, np.newaxis, np.newaxis] / (2 * steps)
     modes = _of_branches(system)
     with np.errstate(divide="ignore"):
         computed = np.log(METHODS[method].amplification(half * modes)) / half
-    # The second term: an undamped mode is computed up to the rounding of its growth in a step.
+    # The second term: the growth of an undamped mode per step is known up to rounding.
     borne = MOST_SHIFT * np.abs(modes.real) + ROUNDING / half
     hidden: Mask = np.abs(computed - modes.real) > borne
     slowest: Floats = np.max(np.where(hidden, modes.real, -np.inf), axis=(1, 2))

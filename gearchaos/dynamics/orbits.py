@@ -10,24 +10,34 @@ from gearchaos.dynamics.exponents import period_jacobian
 from gearchaos.records.period import TOLERANCE, coordinate_scale
 
 CLOSED = 1e-12
-"""Return distance, relative to the scale of each coordinate, at which an orbit is closed."""
+"""Return distance, relative to the scale of each state, below which an orbit is closed."""
 
 NEIGHBOURHOOD = 0.1
-"""An orbit further from its guess than this, in the same measure, is another one."""
+"""Largest distance between an orbit and its guess, in the same measure."""
 
 NEWTON_STEPS = 10
+"""Largest number of Newton steps."""
 
 _SHARES = (1.0, 0.5, 0.25)
+"""Shares of a Newton step that are tried in turn."""
 
 
 class Orbits(NamedTuple):
     """Periodic orbits of some lanes.
 
-    ``points`` (lanes, states): the state at tau = 0; ``multipliers`` (lanes, states), complex: the
-    Floquet multipliers, largest modulus first; ``monodromy`` (lanes, states, states): the Jacobian
-    of the map over one period of the orbit, whose eigenvalues they are; all three are not a number
-    where no orbit was found. ``residual`` (lanes,): largest distance after one period of the orbit,
-    relative to the scale of each coordinate; ``converged`` (lanes,).
+    Attributes
+    ----------
+    points : array, shape (lanes, states)
+        State at tau = 0, NaN where no orbit was found.
+    multipliers : array of complex, shape (lanes, states)
+        Floquet multipliers, largest modulus first, NaN where no orbit was found.
+    monodromy : array, shape (lanes, states, states)
+        Jacobian of the map over one period of the orbit, whose eigenvalues are the multipliers; NaN
+        where no orbit was found.
+    residual : array, shape (lanes,)
+        Largest distance after one period of the orbit, relative to the scale of each state.
+    converged : array of bool, shape (lanes,)
+        Whether an orbit was found.
     """
 
     points: Floats
@@ -38,7 +48,7 @@ class Orbits(NamedTuple):
 
     @property
     def stable(self) -> Mask:
-        """Whether there is an orbit, and all its multipliers lie inside the unit circle."""
+        """Whether there is an orbit whose multipliers all lie inside the unit circle, (lanes,)."""
         inside: Mask = np.abs(self.multipliers[:, 0]) < 1.0
         return inside
 
@@ -46,16 +56,28 @@ class Orbits(NamedTuple):
 def polish(system: LaneSystem, guess: Floats, period: Counts, plan: Plan) -> Orbits:
     """Find the periodic orbit next to the guess of every lane.
 
-    Newton's method on the map over ``period`` excitation periods, with its Jacobian from the
-    tangent flow. A step is halved until the return distance falls and the point stays near the
-    guess. A coordinate is measured by its largest magnitude on the section of the guess, or by a
-    thousandth of that of the largest coordinate where this is more.
+    Parameters
+    ----------
+    system : LaneSystem
+        The system of the lanes.
+    guess : array, shape (lanes, states)
+        States at tau = 0.
+    period : array of int, shape (lanes,)
+        Period in excitation periods, 0 for lanes without a search.
+    plan : Plan
+        Method and steps per period; crossings are always resolved.
 
-    ``guess`` (lanes, states): states of eq. 13 at tau = 0; ``period`` (lanes,) in excitation
-    periods, see `LaneSystem.repeats_after`, 0 where there is no orbit to look for; of the ``plan``
-    only method and steps per period count, which are resolved. Not converged is a lane in which
-    Newton's method does not close the orbit or leads out of the neighbourhood of the guess, in
-    which the orbit found repeats after a divisor of the period, or whose period is 0.
+    Returns
+    -------
+    Orbits
+        A lane has no orbit if its period is 0, if Newton's method does not close the orbit within
+        the neighbourhood of the guess, or if the orbit repeats after a divisor of the period.
+
+    Notes
+    -----
+    Newton's method solves P(x) = x, P the map over the period; its Jacobian is integrated with the
+    motion. A step is halved until the return distance falls. A state is measured by its largest
+    magnitude on the section, or by a thousandth of the largest state if that is more.
     """
     found = Orbits(
         points=np.full(guess.shape, np.nan),
@@ -66,7 +88,7 @@ def polish(system: LaneSystem, guess: Floats, period: Counts, plan: Plan) -> Orb
     )
     for n in np.unique(period[period > 0]).tolist():
         chosen = np.flatnonzero(period == n)
-        # With a tangent, so that map and Jacobian are compiled once and agree bit for bit.
+        # With a tangent: map and Jacobian then share one kernel and agree bit for bit.
         whole = n * system.repeats_after
         once = Plan(plan.steps_per_period, 0, whole, whole, tangent=True, method=plan.method)
         polished = _polish(system.of(chosen), guess[chosen], once)
@@ -76,7 +98,7 @@ def polish(system: LaneSystem, guess: Floats, period: Counts, plan: Plan) -> Orb
 
 
 def _polish(system: LaneSystem, guess: Floats, plan: Plan) -> Orbits:
-    """Polish lanes of one period."""
+    """Find the orbits of lanes with one period; ``guess`` (lanes, states)."""
     lanes = np.arange(guess.shape[0])
     start, points = guess, guess.copy()
     repeats = system.repeats_after
@@ -97,7 +119,7 @@ def _polish(system: LaneSystem, guess: Floats, plan: Plan) -> Orbits:
             trial = points[rest] + share * step[rest]
             passed = integrate(system.of(rest), trial, plan).every(repeats).section
             distance = _distance(passed[:, -1], trial, scale[rest])
-            # Half of what the tangent promises: beyond a fold the distance falls, but not to 0.
+            # At least half of the predicted decrease: beyond a fold it falls, but not to 0.
             better = distance < (1.0 - share / 2.0) * residual[rest]
             better &= _distance(trial, start[rest], scale[rest]) < NEIGHBOURHOOD
             taken = rest[better]
@@ -121,7 +143,7 @@ def _polish(system: LaneSystem, guess: Floats, plan: Plan) -> Orbits:
 
 
 def _newton_step(jacobian: Floats, returned: Floats) -> Floats:
-    """Solve (1 - J) step = returned, with NaN where that has no solution."""
+    """Solve (1 - J) step = returned, (lanes, states); NaN where there is no solution."""
     matrix = np.eye(jacobian.shape[-1]) - jacobian
     soluble = np.abs(np.linalg.det(matrix)) > 0.0
     step = np.full(returned.shape, np.nan)
@@ -130,12 +152,13 @@ def _newton_step(jacobian: Floats, returned: Floats) -> Floats:
 
 
 def _distance(one: Floats, other: Floats, scale: Floats) -> Floats:
+    """Return the largest scaled difference of states (lanes, states), shape (lanes,)."""
     distance: Floats = np.max(np.abs(one - other) / scale, axis=1)
     return distance
 
 
 def _repeats_earlier(section: Floats, points: Floats, scale: Floats) -> Mask:
-    """Whether a point comes back after a proper divisor of the period."""
+    """Whether an orbit returns after a proper divisor of its period, (lanes,)."""
     periods = section.shape[1]
     repeats = np.zeros(points.shape[0], dtype=np.bool_)
     for divisor in range(1, periods // 2 + 1):

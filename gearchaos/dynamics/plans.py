@@ -1,4 +1,4 @@
-"""From a configuration to the plan of an integration."""
+"""The plan of an integration, from a configuration."""
 
 from typing import Any
 
@@ -10,10 +10,24 @@ from gearchaos.errors import ExecutionError
 
 
 def plan_of(config: Configuration, **others: Any) -> Plan:
-    """Return the configured plan of an integration that keeps no section, but for some fields.
+    """Return the plan of an integration as configured, without a section.
 
-    Where no steps per period are configured, it has the fewest that are ever chosen. Raises
-    ExecutionError in a process that cannot integrate, as it was forked from one that has.
+    Parameters
+    ----------
+    config : Configuration
+        The configuration.
+    **others
+        Fields of the plan that differ from the configuration.
+
+    Returns
+    -------
+    Plan
+        The plan; without configured steps per period it has `DEFAULT_STEPS`.
+
+    Raises
+    ------
+    ExecutionError
+        If the process was forked from one that has integrated, and therefore cannot integrate.
     """
     try:
         require_threads()

@@ -1,7 +1,7 @@
-"""What the transient has left of the distance between a section and its periodic orbit.
+"""The distance between a section and its periodic orbit that remains after the transient.
 
-Half the step does not show it: both grids are as far away. The orbit itself is known from Newton's
-method, see `orbits.polish`.
+Halving the step does not show this distance, because it is the same on both grids. The orbit itself
+comes from Newton's method, see `orbits.polish`.
 """
 
 from collections.abc import Sequence
@@ -18,13 +18,19 @@ EPSILON = float(np.finfo(np.float64).eps)
 
 
 class Remainders(NamedTuple):
-    """How far periodic lanes are from their orbits, and what rounding makes of them.
+    """Distances of periodic lanes from their orbits, and the rounding errors of the orbits.
 
-    ``distance`` (lanes,): largest distance of the section from the stable orbit over the last
-    period of the orbit; ``of_kept`` (lanes,): the same over all kept points; ``decay`` (lanes,):
-    rate at which they fall, per mesh period; ``section_rounding`` and ``exponent_rounding``
-    (lanes,): errors of the section and of the exponents of the orbit by rounding alone. All are not
-    a number where no stable orbit was found.
+    Attributes
+    ----------
+    distance : array, shape (lanes,)
+        Largest distance between section and stable orbit over the last period of the orbit.
+    of_kept : array, shape (lanes,)
+        Largest distance over all kept points.
+    decay : array, shape (lanes,)
+        Decay rate of these distances per mesh period.
+    section_rounding, exponent_rounding : array, shape (lanes,)
+        Errors of the section and of the exponents of the orbit from rounding alone. All arrays are
+        NaN where no stable orbit was found.
     """
 
     distance: Floats
@@ -42,27 +48,28 @@ def remainders(
     state: Floats,
     plan: Plan,
 ) -> Remainders:
-    """Measure how far the sections of periodic lanes are from the orbits that they approach.
+    """Measure the distance between the sections of periodic lanes and their orbits.
 
     Parameters
     ----------
     system : LaneSystem
-        Lanes of the kernels.
+        The system of the lanes.
     section : array, shape (lanes, points, states)
-        Points of the section once an excitation period, all states.
-    kept : tuple of an int and ints
-        How many of these points the file keeps, the last ones, and which states are compared.
+        Section once per excitation period, all states.
+    kept : tuple of int and ints
+        Number of section points in the file, counted from the end, and columns of the compared
+        states.
     period : array of int, shape (lanes,)
         Period in excitation periods, 0 where a lane is not periodic.
     state : array, shape (lanes, states)
-        State next to the orbit, as the look that labelled the lane left it.
+        State next to the orbit, from `labels_of`.
     plan : Plan
-        Of it only method and steps per period count.
+        Method and steps per period.
 
     Returns
     -------
     Remainders
-        Distances and floors; not a number where a lane is not periodic.
+        Distances and rounding errors; NaN where a lane is not periodic.
     """
     found = Remainders(*np.full((len(Remainders._fields), period.size), np.nan))
     points, columns = kept
@@ -90,7 +97,7 @@ def _orbit_section(system: LaneSystem, orbits: Orbits, period: int, plan: Plan) 
     whole = period * system.repeats_after
     once = Plan(plan.steps_per_period, 0, whole, whole, tangent=True, method=plan.method)
     points = orbits.points
-    # Newton's method stopped at a small distance; a last step takes it to rounding.
+    # Newton's method stops at a small distance; one more step reduces it to rounding.
     left = integrate(system, points, once).end_state - points
     points = points + np.einsum("lij,lj->li", _resolvent(orbits.monodromy), left)
     return integrate(system, points, once).every(system.repeats_after).section
@@ -99,20 +106,20 @@ def _orbit_section(system: LaneSystem, orbits: Orbits, period: int, plan: Plan) 
 def _decay_and_rounding(
     system: LaneSystem, orbits: Orbits, orbit: Floats, plan: Plan
 ) -> tuple[Floats, Floats, Floats]:
-    """Return the decay to orbits, and what rounding makes of their sections and exponents.
+    """Return the decay towards orbits, and the rounding errors of sections and exponents, (lanes,).
 
-    Each of the N steps of a period rounds by about eps in parts of the motion x. With J the
-    monodromy matrix, such errors add up to N eps |x| |(1 - J)^-1| on the orbit. Its largest
-    multiplier mu has an error of about N eps |J|, and the exponent one of N eps |J| / |mu| over the
-    period. Flow maps are divided, so that N is at least the fewest stable steps of RK4. ``orbit``
-    (lanes, points, states): the section over one period.
+    Each of the N steps of a period has a rounding error of about eps relative to the motion x. With
+    J the monodromy matrix, the errors add up to N eps |x| |(1 - J)^-1| on the orbit. The largest
+    multiplier mu has an error of about N eps |J|, and the exponent an error of N eps |J| / |mu|
+    over the period. Flow maps are computed in smaller steps, so that N is at least the stability
+    limit of RK4. ``orbit`` (lanes, points, states): section over one period.
     """
     periods = orbit.shape[1] * system.repeats_after
     largest = np.abs(orbits.multipliers[:, 0])
     steps = np.maximum(plan.steps_per_period, fewest_stable_steps(system))
     rounding, size = EPSILON * periods * steps, np.max(np.abs(orbit), axis=(1, 2))
     of_section = rounding * size * _norm(_resolvent(orbits.monodromy))
-    # A multiplier that is 0 but for underflow gives no exponent.
+    # A multiplier that underflows to 0 has no logarithm.
     share = _norm(orbits.monodromy) / np.maximum(largest, np.finfo(np.float64).tiny)
     of_exponent = rounding * share / (periods * system.mesh_period)
     decay = -np.log(np.maximum(largest, np.finfo(np.float64).tiny)) / periods
@@ -120,21 +127,21 @@ def _decay_and_rounding(
 
 
 def _resolvent(monodromy: Floats) -> Floats:
-    """Return (1 - J)^-1 of stable orbits, by which an error of the map moves the orbit."""
+    """Return (1 - J)^-1 of stable orbits (lanes, states, states): orbit error per map error."""
     identity: Floats = np.eye(monodromy.shape[-1])
     return np.linalg.inv(identity - monodromy).astype(np.float64, copy=False)
 
 
 def _norm(matrices: Floats) -> Floats:
-    """Return the largest sum of a row's magnitudes of every matrix, shape (lanes,)."""
+    """Return the largest row sum of magnitudes of every matrix, shape (lanes,)."""
     norm: Floats = np.max(np.sum(np.abs(matrices), axis=2), axis=1)
     return norm
 
 
 def _distance(section: Floats, orbit: Floats) -> Floats:
-    """Return the largest distance of the points of a section from those of the orbit.
+    """Return the largest distance between the points of a section and of the orbit, (lanes,).
 
-    The phase at which the section ends is that with the smallest distance.
+    The phase of the orbit at the end of the section is the phase with the smallest distance.
     """
     period, points = orbit.shape[1], section.shape[1]
     ends: Integers = np.arange(points) - points

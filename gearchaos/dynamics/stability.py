@@ -1,9 +1,8 @@
-"""The fewest steps per mesh period with which the integration of a lane is stable.
+"""The smallest number of steps per mesh period with which an integration is stable.
 
-On a contact branch with the stiffnesses of its elements held, the equations of motion are linear
-with the eigenvalues of their Jacobian. None of them may lie outside the stable region of the
-method, see `gearchaos_kernels.methods.rk4.stability`, or the computed motion grows where the true
-one decays.
+On a contact branch with constant stiffnesses, the equations of motion are linear. If an eigenvalue
+of their Jacobian lies outside the stable region of the method, the computed motion grows where the
+true motion decays, see `gearchaos_kernels.methods.rk4.stability`.
 """
 
 import numpy as np
@@ -11,19 +10,32 @@ from gearchaos_kernels import METHODS, LaneSystem, jacobian
 
 from gearchaos.arrays import Complex, Floats, Integers
 
-STEPS_CEILING = 2**53  # Stands for every number of steps beyond it.
+STEPS_CEILING = 2**53
+"""Largest number of steps that is returned; it also represents all larger numbers."""
 
 ROUNDING = 1e-9
-"""Relative error granted to eigenvalues: an undamped mode lies on the imaginary axis up to that."""
+"""Relative error of eigenvalues: undamped modes lie on the imaginary axis up to this error."""
 
 
 def fewest_stable_steps(system: LaneSystem, method: str = "rk4") -> Integers:
-    """Return the fewest steps per period with which a method is stable on every branch.
+    """Return the smallest number of steps per period that is stable on every branch.
 
-    The branches are those with and without contact, with the stiffness held at its smallest and at
-    its largest value, see `LaneSystem.branch_stiffnesses`. A motion that stays on one branch for
-    some of the time only may survive with fewer steps. Eigenvalues whose real part is positive grow
-    by themselves and set no limit. Every larger number of steps, shape (lanes,), is stable too.
+    Parameters
+    ----------
+    system : LaneSystem
+        The system of the lanes.
+    method : str
+        Method of integration.
+
+    Returns
+    -------
+    array of int, shape (lanes,)
+        Steps per mesh period; every larger number is stable, too.
+
+    Notes ----- The branches are all combinations of contact and no contact, with the stiffness at
+    its minimum and at its maximum, see `LaneSystem.branch_stiffnesses`. A motion that visits a
+    branch only for part of the time may need fewer steps. Eigenvalues with a positive real part
+    grow by themselves and set no limit.
     """
     system = system.measurable()
     held = (jacobian(system, stiffnesses) for stiffnesses in system.branch_stiffnesses())
@@ -34,18 +46,40 @@ def fewest_stable_steps(system: LaneSystem, method: str = "rk4") -> Integers:
 
 
 def in_contact(system: LaneSystem) -> Floats:
-    """Return the relative stiffnesses of all elements in contact, at their mean: ones."""
+    """Return the relative stiffnesses of all elements in contact at their mean, all 1.
+
+    Parameters
+    ----------
+    system : LaneSystem
+        The system of the lanes.
+
+    Returns
+    -------
+    array, shape (lanes, elements)
+        Ones.
+    """
     return np.ones((system.lanes, system.elements))
 
 
 def exponent_bias(system: LaneSystem, steps: int, method: str) -> tuple[Floats, Floats]:
-    """Return by how much a step alone shifts the largest exponent of the system in contact.
+    """Return the shift of the largest exponent in contact by the step alone.
 
-    With stiffnesses held at their mean, the equations are linear: the method multiplies the mode of
-    an eigenvalue by R(h lambda) in each step, where the true factor is exp(h lambda).
+    Parameters
+    ----------
+    system : LaneSystem
+        The system of the lanes.
+    steps : int
+        Steps per mesh period.
+    method : str
+        Method of integration.
 
-    Returns the difference of the largest rate of growth from the true one, and the true one, both
-    per unit of tau, shape (lanes,).
+    Returns
+    -------
+    bias, true : array, shape (lanes,)
+        Largest computed growth rate minus the true rate, and the true rate, per unit of tau.
+
+    Notes ----- With constant stiffnesses, the equations are linear. In each step the method
+    multiplies the mode of an eigenvalue lambda by R(h lambda) instead of exp(h lambda).
     """
     step, contact = system.mesh_period[:, np.newaxis] / steps, in_contact(system)
     eigenvalues = np.linalg.eigvals(jacobian(system, contact)).astype(np.complex128)
@@ -55,10 +89,10 @@ def exponent_bias(system: LaneSystem, steps: int, method: str) -> tuple[Floats, 
 
 
 def steps_per_time(eigenvalues: Complex, method: str = "rk4") -> Floats:
-    """Return the fewest stable steps per unit of time for every eigenvalue.
+    """Return the smallest stable number of steps per unit of time for every eigenvalue.
 
-    It is abs(lambda) over the length of the ray through lambda, and 0 where the real part is
-    positive: what grows by itself may grow in the steps.
+    This is abs(lambda) divided by the length of the ray through lambda within the stable region. It
+    is 0 where the real part is positive, because such a mode grows by itself.
     """
     reach = METHODS[method].stable_reach
     if reach is None:
@@ -69,12 +103,12 @@ def steps_per_time(eigenvalues: Complex, method: str = "rk4") -> Floats:
 
 
 def _demand(matrix: Floats, method: str) -> Floats:
-    """Return the fewest stable steps per unit of tau of every matrix."""
-    # As bytes, which are sorted much faster than rows of numbers.
+    """Return the smallest stable number of steps per unit of tau of every matrix, (lanes,)."""
+    # Sorted as bytes: much faster than rows of numbers.
     rows = np.ascontiguousarray(matrix).reshape(matrix.shape[0], -1)
     every = rows.view(np.dtype((np.void, rows.itemsize * rows.shape[1])))[:, 0]
     _, distinct, kind = np.unique(every, return_index=True, return_inverse=True)
-    # Where groups are so large that their products overflow, no number of steps is enough.
+    # Where parameters are so large that their products overflow, no number of steps is enough.
     demand = np.full(distinct.size, np.inf)
     computable = np.isfinite(matrix[distinct]).all(axis=(1, 2))
     eigenvalues = np.linalg.eigvals(matrix[distinct][computable]).astype(np.complex128)

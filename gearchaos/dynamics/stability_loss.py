@@ -1,4 +1,4 @@
-"""How an orbit loses stability, named from its Floquet multipliers on both sides."""
+"""The kind of stability loss of an orbit, from its Floquet multipliers on both sides."""
 
 from enum import IntEnum
 
@@ -7,11 +7,11 @@ import numpy as np
 from gearchaos.arrays import Codes, Complex, Mask
 
 CONFIRMED = 0.1
-"""On both sides of a loss of stability its multiplier is this close to the unit circle."""
+"""Largest distance of the multiplier from the unit circle on both sides of a loss."""
 
 
 class StabilityLoss(IntEnum):
-    """How an orbit loses stability; of two sides of a boundary, the earlier one here tells more."""
+    """The kinds of stability loss, the most informative first."""
 
     PERIOD_DOUBLING = 0
     NEIMARK_SACKER = 1
@@ -34,18 +34,26 @@ STABILITY_LOSS_TEXTS = (
 
 
 def loss_of_stability(stable: Complex, beyond: Complex) -> tuple[Codes, Complex]:
-    """Tell from the multipliers on either side of a boundary how the orbit loses stability.
+    """Return how orbits lose stability, from the multipliers on both sides of a boundary.
 
-    Returned are the `StabilityLoss` and the multiplier that tells, of a pair that with the positive
-    imaginary part, both (lanes,).
+    Parameters
+    ----------
+    stable, beyond : array of complex, shape (lanes, states)
+        Multipliers of the same orbit, largest modulus first: where it is stable, and as close as
+        possible beyond the boundary. NaN where there is no such orbit.
 
-    ``stable``, ``beyond`` (lanes, states): those of the same orbit, largest modulus first, where it
-    is stable and as near as possible beyond; not a number where there is no such orbit. A loss
-    counts only if its multiplier lies within `CONFIRMED` of the unit circle on both sides, and
-    moves by no more than twice that. An orbit that ends by itself meets an unstable one, so that
-    only a real multiplier near +1 explains its end. The multiplier that tells is the largest one
-    beyond, or where there is no orbit the largest positive one before; not a number where the orbit
-    was not followed.
+    Returns
+    -------
+    loss : array of int, shape (lanes,)
+        See `StabilityLoss`.
+    multiplier : array of complex, shape (lanes,)
+        The multiplier that crosses the unit circle, of a pair the one with positive imaginary part:
+        the largest multiplier beyond, or without an orbit there the largest positive multiplier
+        before; NaN where the orbit was not followed.
+
+    Notes ----- A loss is confirmed if its multiplier lies within `CONFIRMED` of the unit circle on
+    both sides and moves by at most twice that distance. An orbit that ends meets an unstable orbit;
+    therefore only a real multiplier near +1 explains its end.
     """
     positive = np.where((stable.imag == 0.0) & (stable.real > 0.0), stable.real, 0.0).max(axis=1)
     leading = beyond[:, 0]
@@ -77,7 +85,7 @@ def loss_of_stability(stable: Complex, beyond: Complex) -> tuple[Codes, Complex]
 
 
 def _confirmed(stable: Complex, leading: Complex) -> Mask:
-    """Whether the multiplier that leads beyond, (lanes,), leaves the unit circle in between."""
+    """Whether the leading multiplier beyond, (lanes,), crosses the unit circle in between."""
     moved = np.abs(stable - leading[:, np.newaxis])
     near = np.where(np.isnan(moved), np.inf, moved)
     before = np.take_along_axis(stable, np.argmin(near, axis=1)[:, np.newaxis], axis=1)[:, 0]

@@ -1,1 +1,1 @@
-"""What a computed record is: its period, its label, its exponent. NumPy alone."""
+"""Period, bands, label and exponents of a recorded motion: NumPy only."""

@@ -8,10 +8,14 @@ from gearchaos.arrays import Floats
 
 
 class SpectralLines(NamedTuple):
-    """Lines of a spectrum; a sine of amplitude A is a line of height A.
+    """Lines of an amplitude spectrum; a sine of amplitude A is a line of height A.
 
-    ``order`` (lines,): frequency over the mesh frequency; ``amplitude`` (..., lines): in the unit
-    of the motion.
+    Attributes
+    ----------
+    order : array, shape (lines,)
+        Frequency divided by the mesh frequency.
+    amplitude : array, shape (..., lines)
+        Amplitude in the unit of the motion.
     """
 
     order: Floats
@@ -21,15 +25,23 @@ class SpectralLines(NamedTuple):
 def spectral_lines(values: Floats, samples_per_period: int, hann: bool = False) -> SpectralLines:
     """Return the amplitude spectrum of evenly spaced samples over whole mesh periods.
 
-    A rectangular window, the default, is exact for every motion that repeats within the record: its
-    lines fall on those of the transform and nothing leaks. The Hann window, divided by its coherent
-    gain 1/2, keeps down what leaks from motions that do not repeat. A line at the order 0 has the
-    height of the absolute mean; the mean is taken out before the window, so that it does not leak
-    either.
+    Parameters
+    ----------
+    values : array, shape (..., samples)
+        Samples; the first sample of the next record would follow the last one.
+    samples_per_period : int
+        Samples per mesh period.
+    hann : bool
+        Whether to apply the Hann window, divided by its coherent gain of 1/2.
 
-    ``values`` (..., samples): the last sample is followed by the first one of the next record, a
-    repeated end is left off; ``hann``: take the window of Hann. The lines go from 0 to half of the
-    sampling frequency, one over the number of periods apart.
+    Returns
+    -------
+    SpectralLines
+        Lines from order 0 to half the sampling frequency, spaced by one over the number of periods.
+
+    Notes ----- The rectangular window is exact for every motion that repeats within the record. The
+    Hann window reduces the leakage of motions that do not repeat. The mean is subtracted before the
+    window, so that it does not leak; the line at order 0 has the height of its magnitude.
     """
     samples = values.shape[-1]
     weights = np.ones(samples)

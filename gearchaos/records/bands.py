@@ -1,9 +1,9 @@
-"""On how many bands a section lies, and whether it winds around curves or hops in a fixed order.
+"""The number of bands of a section, and whether it lies on curves or visits bands in a fixed order.
 
-A period of more than 16, and the infinite one at the end of a cascade of period doublings, have
-averages that converge like those on a torus, and exponents near zero. But every 2nd point of a
-doubled orbit, or every 3rd of a tripled one, stays on one side; on a curve with an irrational
-rotation every n-th point goes everywhere.
+A period above 16, and the limit of a cascade of period doublings, have averages that converge as on
+a torus and exponents near zero. But every 2nd point of a doubled orbit, or every 3rd of a tripled
+orbit, stays in one part of the section. On a curve with an irrational rotation, every n-th point
+visits the whole curve.
 """
 
 import numpy as np
@@ -12,28 +12,32 @@ from gearchaos.arrays import Counts, Floats, Mask
 from gearchaos.records.period import LONGEST_PERIOD, coordinate_scale
 
 STRIDES = (2, 3, 5, 7)
-"""Every so many points of a curve are averaged; what the windows of chaos are made of."""
+"""Every 2nd, 3rd, 5th and 7th point of a curve is averaged: the factors of periodic windows."""
 
-FEWEST = 16  # Points that every subsequence must have.
+FEWEST = 16
+"""Smallest number of points of a subsequence."""
 
 MOST_BAND_POINTS = 512
-"""Points, the last ones, of which the bands are counted: comparing all pairs costs their square."""
+"""Points at the end of a section used to count bands; the cost grows with their square."""
 
-NEIGHBOURS = 4  # Nearest points that must lie in the same band.
+NEIGHBOURS = 4
+"""Number of nearest points that must lie in the same band."""
 
-PORTION = 64  # Points looked at together: most chaotic sections show soon that they have one band.
+PORTION = 64
+"""Points compared at a time: most chaotic sections are found to have one band early."""
 
 EXPLAINED = 0.1
-"""Share of the variance beyond which subsequences may be bands; of 13 random ones it is 0.02."""
+"""Share of variance above which subsequences may be bands; for 13 random ones it is 0.02."""
 
 
 def subsequence_spread(section: Floats) -> Floats:
-    """Return how far the averages of every 2nd, 3rd, 5th and 7th point of a curve lie apart.
+    """Return the spread of the averages of every 2nd, 3rd, 5th and 7th point of curves.
 
-    A torus may cut the section in up to 16 curves, which are visited in turn. For each number of
-    curves and each stride the points of a curve fall into subsequences; their averages are weighted
-    by exp(-1/(t(1-t))) and differ by so many standard deviations of the curve. The number of curves
-    with the smallest difference counts; infinite, shape (lanes,), with too few points to tell.
+    A torus may intersect the section (lanes, points, states) in up to 16 curves, visited in turn.
+    For each number of curves and each stride, the points of a curve form subsequences. Their
+    averages, with weights exp(-1/(t(1-t))), differ by a number of standard deviations of the curve.
+    Returned is the smallest difference over the number of curves, shape (lanes,); infinite with too
+    few points.
     """
     lanes, points, states = section.shape
     smallest = np.full(lanes, np.inf)
@@ -48,7 +52,7 @@ def subsequence_spread(section: Floats) -> Floats:
             deviation = np.std(dealt, axis=(1, 2))
             averages = np.einsum("t,ltpcs->lpcs", smooth_weights(turns), dealt)
             apart = np.ptp(averages, axis=1)
-            # A coordinate at rest has nothing that could differ.
+            # A constant state has no difference.
             apart /= np.where(deviation > 0.0, deviation, 1.0)
             largest = np.maximum(largest, np.max(apart, axis=(1, 2)))
         smallest = np.minimum(smallest, largest)
@@ -56,13 +60,12 @@ def subsequence_spread(section: Floats) -> Floats:
 
 
 def band_count(section: Floats) -> Counts:
-    """Return on how many bands every section lies, which are visited in turn, shape (lanes,).
+    """Return the number of bands of every section, which are visited in turn, shape (lanes,).
 
-    The largest n <= 16 such that every n-th point stays away from the other ones: the four nearest
-    neighbours of each of the last 512 points come n, 2n, 3n, ... points before or after it. That
-    needs no distance below which points are near, and holds for curves and scattered points in any
-    number of dimensions. Of section (lanes, points, states) with fewer than 32 points it is 1, and
-    also where a band would have fewer than 16 points.
+    The largest n <= 16 such that the four nearest neighbours of each of the last 512 points lie n,
+    2n, 3n, ... points before or after it. This rule needs no threshold for a distance, and holds
+    for curves and scattered points in any number of dimensions. A section (lanes, points, states)
+    of fewer than 32 points has 1, as well as a section whose bands would have fewer than 16 points.
     """
     points = section[:, -MOST_BAND_POINTS:]
     count = np.ones(points.shape[0], dtype=np.int32)
@@ -74,7 +77,7 @@ def band_count(section: Floats) -> Counts:
 
 
 def _may_have_bands(section: Floats) -> Mask:
-    """Whether subsequences explain much of a coordinate's variance: looking at pairs is dear."""
+    """Whether subsequences explain much of a state's variance, (lanes,): a cheap first test."""
     lanes, points, states = section.shape
     found = np.zeros(lanes, dtype=np.bool_)
     for stride in (2, 3, 5, 7, 11, 13):
@@ -105,7 +108,7 @@ def _common_step(points: Floats) -> int:
 
 
 def smooth_weights(points: int) -> Floats:
-    """Return the weights exp(-1/(t(1-t))) of an average over so many points, of sum 1."""
+    """Return the weights exp(-1/(t(1-t))) of an average over n points, of sum 1, (points,)."""
     time = (np.arange(points) + 0.5) / points
     weights = np.exp(-1.0 / (time * (1.0 - time)))
     normalised: Floats = weights / np.sum(weights)

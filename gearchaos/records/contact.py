@@ -1,4 +1,4 @@
-"""What a clearance element does over a record: shares of time in contact, and impacts."""
+"""Contact of a clearance element over a record: shares of time and impacts."""
 
 import numpy as np
 
@@ -6,15 +6,17 @@ from gearchaos.arrays import Array, Floats
 
 HELD, SINGLE_SIDED, DOUBLE_SIDED, FREE = range(4)
 CONTACT_STATES = ("held", "single_sided_impact", "double_sided_impact", "free")
-"""Meanings of the values of ``contact_state``: the element never parts, meets one flank, meets both
-flanks, meets none."""
+"""Meanings of the values of ``contact_state``.
+
+The element never separates, hits one flank, hits both flanks, or has no contact.
+"""
 
 
 def contact_summary(contact: Floats, periods: int) -> dict[str, Array]:
     """Return contact and impacts of one element, each of shape (lanes,), by name.
 
-    ``contact`` (lanes, 6), that of one element of an `Outcome`, covers this number of mesh periods.
-    Speeds are not a number without any impact.
+    ``contact`` (lanes, 6): values of one element of an `Outcome` over a number of mesh periods.
+    Speeds are NaN in lanes without an impact.
     """
     driving, on_driving, back, on_back, speeds, largest = contact.T
     impacts = on_driving + on_back

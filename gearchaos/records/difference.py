@@ -1,4 +1,4 @@
-"""How far the motions that two grids give for the same lanes lie apart."""
+"""The difference between the motions of the same lanes on two grids."""
 
 from typing import NamedTuple
 
@@ -8,22 +8,34 @@ from gearchaos.arrays import Codes, Counts, Floats, Mask
 from gearchaos.records.label import UNRESOLVED
 from gearchaos.records.period import section_distance
 
-MOST = 0.95  # Share of the lanes that `bound` speaks for: the rest lies next to a bifurcation.
+MOST = 0.95
+"""Share of the lanes covered by `bound`: the others lie next to a bifurcation."""
 
 _ANOTHER_ORBIT = 0.1
+"""Distance, relative to the size of the orbit, above which two orbits are different."""
 
 
 class Solution(NamedTuple):
-    """What one grid gives for some lanes.
+    """The motions of some lanes on one grid.
 
-    ``section`` (lanes, points, states), ``exponent`` (lanes,), not a number where there is none,
-    ``diverged`` (lanes,), ``motion`` (lanes,) as `records.label` has it, ``period`` (lanes,) in
-    mesh periods, 0 where the motion is not periodic.
-
-    What another grid does not show, (lanes,) or one number for all: ``transient``, how far the
-    section is from the periodic orbit that it approaches; ``hidden``, the error of the exponent
-    from modes that both grids damp away; ``section_rounding`` and ``exponent_rounding``, what
-    rounding makes of both.
+    Attributes
+    ----------
+    section : array, shape (lanes, points, states)
+        Section.
+    exponent : array, shape (lanes,)
+        Largest exponent, NaN where there is none.
+    diverged : array of bool, shape (lanes,)
+        Lanes that diverged.
+    motion : array of int, shape (lanes,)
+        Label, see `records.label`.
+    period : array of int, shape (lanes,)
+        Period in excitation periods, 0 where the motion is not periodic.
+    transient : array, shape (lanes,), or float
+        Distance between section and periodic orbit; a second grid does not show it.
+    hidden : array, shape (lanes,), or float
+        Error of the exponent from modes that both grids damp.
+    section_rounding, exponent_rounding : array, shape (lanes,), or float
+        Rounding errors of both.
     """
 
     section: Floats
@@ -38,14 +50,20 @@ class Solution(NamedTuple):
 
 
 class Difference(NamedTuple):
-    """How far two grids lie apart, by lane.
+    """The differences between two grids.
 
-    ``period`` (lanes,): common period in mesh periods, 0 where the two have none in common;
-    ``section_error`` (lanes,): largest difference of the sections, not below rounding, and the
-    transient of the first one added, NaN where the period is 0 or the transient unknown;
-    ``exponent_error`` (lanes,): difference of the largest Lyapunov exponents, not below what is
-    hidden nor below rounding, NaN where a lane diverged or no exponent was computed; ``changed``
-    (lanes,): whether the lane moves in another way.
+    Attributes
+    ----------
+    period : array of int, shape (lanes,)
+        Common period, 0 where there is none.
+    section_error : array, shape (lanes,)
+        Largest difference of the sections, at least the rounding error, plus the transient of the
+        first grid; NaN where the period is 0 or the transient unknown.
+    exponent_error : array, shape (lanes,)
+        Difference of the largest Lyapunov exponents, at least the hidden and the rounding error;
+        NaN where a lane diverged or no exponent was computed.
+    changed : array of bool, shape (lanes,)
+        Whether the lane settles on a different motion.
     """
 
     period: Counts
@@ -55,12 +73,12 @@ class Difference(NamedTuple):
 
 
 def difference(one: Solution, other: Solution) -> Difference:
-    """Compare two solutions lane by lane; the errors are those of the first one.
+    """Compare two solutions lane by lane; the errors are those of the first solution.
 
-    A lane moves in another way if its period is another one, if its motion is of another kind where
-    both are known, if it diverged in one of the two only, or if the orbits of equal period lie
-    further apart than a tenth of their size: then they are two attractors, and not one attractor
-    and its error.
+    A lane has changed if its period differs, if both motions are known and differ, or if it
+    diverged in one solution only. It has also changed if the orbits of equal period lie further
+    apart than a tenth of their size: they are then two attractors, and their distance is not an
+    error.
     """
     first, second = one.period, other.period
     period = np.where(first == second, first, np.int32(0))

@@ -1,4 +1,4 @@
-"""What kind of motion a lane has come to: periodic, quasi-periodic, chaotic, or not to be told."""
+"""The label of a motion: periodic, quasi-periodic, chaotic, or unresolved."""
 
 from typing import Any, NamedTuple, Self
 
@@ -13,35 +13,47 @@ PERIODIC, QUASI_PERIODIC, CHAOTIC, UNRESOLVED, DIVERGED, GROWS = range(6)
 MOTION_MEANINGS = ("periodic", "quasi_periodic", "chaotic", "unresolved", "diverged", "grows")
 """Meanings of the values of ``motion``."""
 
-MOST_LABEL_POINTS = 512  # Section points with which a motion is labelled: the last ones.
-STANDARD_ERRORS = 3.0  # An exponent within so many of its standard errors is not told from zero.
-CERTAIN = 6.0  # Standard errors beyond which a positive exponent is not doubted.
+MOST_LABEL_POINTS = 512
+"""Section points used for a label, counted from the end."""
+STANDARD_ERRORS = 3.0
+"""An exponent within this number of standard errors counts as zero."""
+CERTAIN = 6.0
+"""Number of standard errors above which a positive exponent is certain."""
 
 CHAOTIC_GROWTH = 2.0
-"""Logarithm of the growth over the record beyond which a disturbance counts as growing."""
+"""Logarithm of growth over the record above which a disturbance grows."""
 
 NEUTRAL_GROWTH = 1.0
-"""Logarithm of growth or decay over the record up to which a disturbance counts as neutral."""
+"""Logarithm of growth or decay over the record up to which a disturbance is neutral."""
 
 AGREEMENT = 0.05
-"""Largest difference of the weighted averages of two halves of a quasi-periodic record."""
+"""Largest difference between the weighted averages of two halves of a quasi-periodic record."""
 
 NEAR_RETURN = (
     0.01  # Return distance below which a motion that was chaotic may be settling on an orbit.
 )
+"""Return distance below which a chaotic motion may be settling on an orbit."""
 
 SETTLING = 0.1
-"""Return distance below which a motion that comes ever closer may be settling on an orbit."""
+"""Return distance below which a motion with decreasing distance may settle on an orbit."""
 
-LATEST = 16  # Section points at the end of a chaotic record that may have settled.
+LATEST = 16
+"""Section points at the end of a chaotic record in which it may have settled."""
 
 
 class Record(NamedTuple):
-    """What is known of some lanes after their transient.
+    """The record of some lanes after their transient.
 
-    ``section`` (lanes, points, states): all states of the scene, once an excitation period;
-    ``growth`` (lanes, mesh periods): logarithm of the tangent vector's growth, or (lanes, 0);
-    ``diverged`` (lanes,); ``torus`` (lanes,): whether the scene admits quasi-periodic motion.
+    Attributes
+    ----------
+    section : array, shape (lanes, points, states)
+        All states of the scene, once per excitation period.
+    growth : array, shape (lanes, periods)
+        Logarithm of the tangent vector's growth over each mesh period, or shape (lanes, 0).
+    diverged : array of bool, shape (lanes,)
+        Lanes that diverged.
+    torus : array of bool, shape (lanes,)
+        Whether quasi-periodic motion is possible.
     """
 
     section: Floats
@@ -53,10 +65,17 @@ class Record(NamedTuple):
 class Labels(NamedTuple):
     """Labels of some lanes.
 
-    ``motion`` (lanes,) of `MOTION_MEANINGS`; ``period`` (lanes,) in excitation periods, 0 where the motion
-    is not periodic; ``return_distance`` (lanes,): that of the period, or else the smallest one;
-    ``bands`` (lanes,): on how many a chaotic or quasi-periodic section lies, see `band_count`, 0
-    where it is neither or has not been looked at.
+    Attributes
+    ----------
+    motion : array of int, shape (lanes,)
+        See `MOTION_MEANINGS`.
+    period : array of int, shape (lanes,)
+        Period in excitation periods, 0 where the motion is not periodic.
+    return_distance : array, shape (lanes,)
+        Return distance after the period, or the smallest return distance without a period.
+    bands : array of int, shape (lanes,)
+        Number of bands of a chaotic or quasi-periodic section, see `band_count`; 0 for other
+        motions or where it was not determined.
     """
 
     motion: Codes
@@ -73,13 +92,19 @@ class Labels(NamedTuple):
 def label(record: Record) -> Labels:
     """Label the motion at the end of every lane; docs/numerics.md gives the rule and its reasons.
 
-    In this order: *diverged*; *periodic* with the smallest period whose return distance is within
-    the tolerance, see `motion_period`; *chaotic* where the largest exponent is positive by three
-    standard errors, a disturbance grows by a factor exp(2) over the record, and its later half
-    goes on at this pace, but *grows* where the motion itself does so; *quasi-periodic* where the
-    scene admits it, the exponent is zero within its error, and the weighted averages of both halves
-    agree, see `halves_differ_by`;
-    *unresolved* otherwise.
+    The first rule that holds counts:
+
+    - *diverged*;
+    - *periodic* with the smallest period whose return distance is within the tolerance, see
+      `motion_period`;
+    - *chaotic* if the largest exponent is positive by three standard errors, a disturbance grows by
+    a
+      factor of exp(2) over the record, and grows at least as fast in the later half; but *grows* if
+      the motion itself grows in this way;
+    - *quasi-periodic* if the scene admits it, the exponent is zero within its error, and the
+    weighted
+      averages of both halves agree, see `halves_differ_by`;
+    - *unresolved*.
     """
     distances = return_distances(record.section)
     period = period_of(distances)
@@ -97,16 +122,16 @@ def label(record: Record) -> Labels:
 
 
 def settling_periods(record: Record, labels: Labels) -> Counts:
-    """Return the period of the orbit on which a lane may still be settling, 0 for none.
+    """Return the period of the orbit on which a lane may be settling, 0 for none, (lanes,).
 
-    A lane settles where its return distance after some period is small and smaller than in the
-    middle of the record, and the exponent of the later half, if known, is negative. Looked at are
-    the periods of unresolved lanes, and in periodic ones those that divide the period: close to a
-    period doubling a motion approaches its orbit from alternating sides, and returns after twice
-    the period long before it does after one. A chaotic lane may settle at the very end of its
-    record: there the return of the last 16 points counts alone. Whether there is such an orbit, of
-    the period or a divisor of it, and whether it is stable is for Newton's method to tell. In
-    periodic lanes the period returned is smaller than that of the label.
+    A lane may settle if its return distance after some period is small and smaller than in the
+    middle of the record, and if the exponent of the later half, where known, is negative. All
+    periods are tried in unresolved lanes, and proper divisors of the period in periodic lanes:
+    close to a period doubling a motion approaches its orbit from alternating sides, and returns
+    after twice the period long before it returns after one. In a chaotic lane only the last 16
+    points count. Newton's method then decides whether there is an orbit with this period or a
+    divisor of it, and whether it is stable. In periodic lanes the returned period is smaller than
+    the period of the label.
     """
     found = np.zeros(labels.motion.shape, dtype=np.int32)
     chaotic = np.flatnonzero(labels.motion == CHAOTIC)
@@ -129,7 +154,7 @@ def settling_periods(record: Record, labels: Labels) -> Counts:
     if record.growth.size:
         later = record.growth[lanes, record.growth.shape[1] // 2 :]
         falling = largest_exponent(later, np.ones(lanes.size))[0] < 0.0
-    # All of a short record may return no better than its begin, and half of it tells fewer periods.
+    # A short record may return no better than its beginning; half a record holds fewer periods.
     for now in (whole, late):
         now = np.where(looked_at & (now < before), now, np.inf)
         nearest = np.argmin(now, axis=1)
@@ -139,12 +164,13 @@ def settling_periods(record: Record, labels: Labels) -> Counts:
 
 
 def doubtful(growth: Floats, labels: Labels) -> Mask:
-    """Whether a longer record may tell another motion than this one did.
+    """Whether a longer record may lead to another label, (lanes,).
 
-    Next to a resonance one turn of a torus may take more than a hundred periods, next to a
-    bifurcation an orbit attracts by less than a factor e over the record, and weak chaos takes long
-    to show: such lanes are unresolved. A period beyond 16 may pass for a torus, a torus or chaos
-    that is about to end for chaos as long as the exponent is within six standard errors of zero.
+    Some lanes are unresolved because their record is too short: next to a resonance one turn of a
+    torus may take more than a hundred periods, next to a bifurcation an orbit attracts by less than
+    a factor e over the record, and weak chaos develops slowly. A period above 16 may be labelled as
+    a torus. A torus, or chaos that is about to end, may be labelled as chaos while the exponent
+    lies within six standard errors of zero.
     """
     found = np.zeros(labels.motion.shape, dtype=np.bool_)
     if growth.size:
@@ -156,12 +182,12 @@ def doubtful(growth: Floats, labels: Labels) -> Mask:
 
 
 def halves_differ_by(section: Floats) -> Floats:
-    """Return how far the averages of the two halves of every section lie apart.
+    """Return the difference between the averages of the two halves of every section, (lanes,).
 
-    Averaged are every coordinate, centred and scaled to variance 1, and its square, with the
-    weight exp(-1/(t(1-t))) over each half. On a quasi-periodic motion these averages converge
-    faster than any power of the number of points, on a chaotic one like its square root, and on a
-    transient not at all (Das, Sander, Yorke 2017). NaN with fewer than two points.
+    The averages are those of every state, centred and scaled to variance 1, and of its square, with
+    weights exp(-1/(t(1-t))) over each half. Their convergence is faster than any power of the
+    number of points for quasi-periodic motion, and like its square root for chaos; they do not
+    converge for a transient (Das, Sander, Yorke 2017). NaN with fewer than two points.
     """
     half = section.shape[1] // 2
     if half == 0:
@@ -170,7 +196,7 @@ def halves_differ_by(section: Floats) -> Floats:
     section = section / np.maximum(size, np.finfo(np.float64).tiny)
     centred = section - np.mean(section, axis=1, keepdims=True)
     deviation = np.std(section, axis=1, keepdims=True)
-    # A coordinate at rest has nothing that could differ.
+    # A constant state has no difference.
     scaled = centred / np.where(deviation > 0.0, deviation, 1.0)
     weights = smooth_weights(half)[:, np.newaxis]
     differences = [
@@ -182,7 +208,7 @@ def halves_differ_by(section: Floats) -> Floats:
 
 
 def _aperiodic(section: Floats, growth: Floats, torus: Mask) -> Codes:
-    """Tell chaotic, quasi-periodic and unresolved lanes that do not return."""
+    """Label chaotic, quasi-periodic, growing and unresolved lanes, shape (lanes,)."""
     periods = growth.shape[1]
     one = np.ones(growth.shape[0])
     exponent, error = largest_exponent(growth, one)
@@ -190,7 +216,7 @@ def _aperiodic(section: Floats, growth: Floats, torus: Mask) -> Codes:
     pace = CHAOTIC_GROWTH / periods
     chaotic = (exponent > STANDARD_ERRORS * error) & (exponent > pace) & (later > pace)
     neutral = np.abs(exponent) <= np.minimum(STANDARD_ERRORS * error, NEUTRAL_GROWTH / periods)
-    # Far beyond the clearances all is linear: the motion grows as a disturbance does.
+    # Far beyond the clearances the system is linear: motion and disturbance grow alike.
     quarter = max(1, section.shape[1] // 4)
     first, last = section[:, :quarter], section[:, -quarter:]
     ratio = np.max(np.abs(last), axis=(1, 2)) / np.max(np.abs(first), axis=(1, 2))

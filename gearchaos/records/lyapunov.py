@@ -6,27 +6,16 @@ from numpy.lib.stride_tricks import sliding_window_view
 from gearchaos.arrays import Floats
 
 BLOCKS = 8
-"""Blocks side by side whose estimates give the standard error; half-way blocks lie between them."""
+"""Number of adjacent blocks for the standard error; half-overlapping blocks lie between them."""
 
-FEWEST_WAVES = 2  # Slow waves that a standard error is taken from at least.
+FEWEST_WAVES = 2
+"""Smallest number of slow cosines from which a standard error is estimated."""
 
 
 def largest_exponent(
     growth: Floats, period: Floats, memory: Floats | None = None
 ) -> tuple[Floats, Floats]:
-    """Estimate the largest Lyapunov exponent of every lane, per unit of tau, with its error.
-
-    The growth rates of the single periods are averaged with weights sin^2 that fall off smoothly at
-    both ends (weighted Birkhoff average; Das, Saiki, Sander, Yorke 2017). On periodic and
-    quasi-periodic motions the error then falls like the third power of the number of periods
-    instead of the first; on chaotic motions the standard error is a factor sqrt(3/2) larger. It is
-    that of the same average over blocks of an eighth of the record that overlap by half (Welch
-    1967: nearly independent under these weights), widened such that two of it cover as much as two
-    of a normal distribution; it is not a number where fewer than two periods were recorded.
-
-    Blocks shorter than the memory of the motion depend on each other, and their spread understates
-    the error. There the slow waves of the block estimates count as well, see `_slow_errors`, and
-    the larger error is returned.
+    """Estimate the largest Lyapunov exponent of every lane and its standard error.
 
     Parameters
     ----------
@@ -35,13 +24,21 @@ def largest_exponent(
     period : array, shape (lanes,)
         Duration of a mesh period in units of tau.
     memory : array, shape (lanes,), optional
-        Mesh periods in which the slowest mode of a lane falls by a factor e; left out, the blocks
-        count as independent.
+        Mesh periods in which the slowest mode of a lane decays by a factor e. Without it, the
+        blocks count as independent.
 
     Returns
     -------
-    tuple of two arrays, shape (lanes,)
-        Exponents and standard errors per unit of tau, both not a number where the lane diverged.
+    exponents, errors : array, shape (lanes,)
+        Per unit of tau, NaN where the lane diverged. Errors are NaN with fewer than two periods.
+
+    Notes ----- The exponent is the average of the growth rates with weights sin^2 (weighted
+    Birkhoff average; Das, Saiki, Sander, Yorke 2017). For periodic and quasi-periodic motion its
+    error falls with the third power of the number of periods instead of the first. For chaos its
+    standard error is larger by a factor sqrt(3/2). The error follows from the same average over
+    eighths of the record that overlap by half (Welch 1967), widened by Student's t. Blocks shorter
+    than the memory depend on each other. The larger of this error and that of the slow fluctuations
+    (`_slow_errors`) is then returned.
     """
     periods = growth.shape[1]
     exponent = _weighted_mean(growth) / period
@@ -99,12 +96,13 @@ def _slow_errors(means: Floats, periods: int, memory: Floats) -> Floats:
 
 def _weighted_mean(growth: Floats) -> Floats:
     # A matrix product would sum in an order that depends on the number of lanes.
+    """Return the weighted mean over the last axis (..., periods)."""
     means: Floats = np.sum(growth * _weights(growth.shape[-1]), axis=-1)
     return means
 
 
 def _weights(periods: int) -> Floats:
-    """Return the weights sin^2 of an average over so many periods, of sum 1."""
+    """Return the weights sin^2 of an average over n mesh periods, of sum 1, (periods,)."""
     weights = np.sin(np.pi * (np.arange(periods) + 0.5) / periods) ** 2
     normalised: Floats = weights / np.sum(weights)
     return normalised

@@ -1,47 +1,49 @@
-"""The period of a motion, read off its stroboscopic section."""
+"""The period of a motion, from its stroboscopic section."""
 
 import numpy as np
 
 from gearchaos.arrays import Counts, Floats
 
-LONGEST_PERIOD = 16  # Longest period looked for, in mesh periods.
-RETURNS = 3  # A period counts if the section holds it so many times.
+LONGEST_PERIOD = 16
+"""Longest period that is found, in section points."""
+RETURNS = 3
+"""Number of times the section must contain a period."""
 
 POINTS_NEEDED = RETURNS * LONGEST_PERIOD
-"""Section points with which every period can be told; more are not looked at."""
+"""Section points with which every period can be found; further points are not used."""
 
 TOLERANCE = 1e-5
-"""Distance, relative to the size of the coordinate, within which a section returns."""
+"""Distance, relative to the scale of a state, within which a section returns."""
 
 _SMALLEST_SCALE = 1e-3
+"""Smallest scale of a state, relative to the largest state."""
 
 
 def motion_period(section: Floats) -> Counts:
-    """Return after how many mesh periods the motion of each lane repeats, shape (lanes,).
+    """Return the number of section points after which the motion of each lane repeats, (lanes,).
 
-    The smallest n <= 16 for which the last 48 points of the section (lanes, points, states), or all
-    there are, each lie within the tolerance of the one n points before; the section must hold the
-    period three times. A coordinate is measured by its largest magnitude, or by a thousandth of
-    that of the largest coordinate where this is more. 0 where no such period is found: chaos,
-    quasi-periodic motion, a transient that has not died away, longer periods, a section with NaN,
-    or too few points.
+    The smallest n <= 16 for which each of the last 48 points of the section (lanes, points,
+    states), or all points of a shorter section, lies within the tolerance of the point n points
+    before. The section must contain the period three times. The scale of a state is its largest
+    magnitude, or a thousandth of the largest state if that is more. The period is 0 for chaos,
+    quasi-periodic motion, a transient, longer periods, a section with NaN, and too few points.
     """
     return period_of(return_distances(section))
 
 
 def period_of(distances: Floats, tolerance: float = TOLERANCE) -> Counts:
-    """Return the smallest period whose return distance (lanes, 16) is within tolerance, or 0."""
+    """Return the smallest period with a return distance (lanes, 16) within tolerance, or 0."""
     returns = distances <= tolerance
     first = np.argmax(returns, axis=1) + 1
     return np.where(returns.any(axis=1), first, 0).astype(np.int32)
 
 
 def return_distances(section: Floats) -> Floats:
-    """Return how far from itself every section comes back after 1, 2, ... 16 mesh periods.
+    """Return the distance of every section from itself 1, 2, ... 16 points earlier, (lanes, 16).
 
-    Of the last 48 points of a section (lanes, points, states) the largest distance, (lanes, 16),
-    over all points and coordinates, each measured as in `motion_period`; NaN for periods that the
-    section does not hold three times, and in lanes with NaN.
+    This is the largest scaled difference (`motion_period`) over all states and the last 48 points
+    of a section (lanes, points, states). It is NaN for periods that the section does not contain
+    three times, and in lanes with NaN.
     """
     points = section[:, -POINTS_NEEDED:]
     distances = np.full((points.shape[0], LONGEST_PERIOD), np.nan)
@@ -54,10 +56,10 @@ def return_distances(section: Floats) -> Floats:
 
 
 def coordinate_scale(section: Floats) -> Floats:
-    """Return what distances in every coordinate are measured by, shape (lanes, states).
+    """Return the positive scale of every state, shape (lanes, states).
 
-    The largest magnitude of the coordinate on the section (lanes, points, states), or a thousandth
-    of that of the largest coordinate where this is more; positive.
+    The largest magnitude of the state on the section (lanes, points, states), or a thousandth of
+    the largest state if that is more.
     """
     scale: Floats = np.max(np.abs(section), axis=1)
     scale = np.maximum(scale, _SMALLEST_SCALE * np.max(scale, axis=1, keepdims=True))
@@ -65,11 +67,11 @@ def coordinate_scale(section: Floats) -> Floats:
 
 
 def section_distance(one: Floats, other: Floats, period: Counts) -> Floats:
-    """Return the largest distance between the sections of two periodic motions.
+    """Return the largest distance between the sections of two periodic motions, (lanes,).
 
-    Over one common period (lanes,) and all states of both sections (lanes, points, states); NaN
-    where the period is 0. Two motions of period n may pass the points of their orbit n mesh periods
-    apart; of the n ways to align them the one with the smallest distance counts.
+    The sections (lanes, points, states) are compared over one common period (lanes,) and all
+    states; NaN where the period is 0. Two motions of period n may be at different points of the
+    same orbit. Of the n possible shifts, the one with the smallest distance counts.
     """
     distance = np.full(period.shape, np.nan)
     for n in np.unique(period[period > 0]):
