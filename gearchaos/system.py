@@ -1,4 +1,4 @@
-"""One gear pair at one point of operation, and what a dynamicist asks of it.
+"""One gear pair at one operating point: motions, orbits, stability and exponents.
 
 >>> import gearchaos
 >>> system = gearchaos.System("sweeps/pan2021.toml", pitch_error=10.75)
@@ -43,9 +43,16 @@ from gearchaos.results.reading.result import Result
 
 
 class Trajectory(NamedTuple):
-    """A motion: ``time`` (samples,) in mesh periods, ``states`` (samples, states) of eq. 13.
+    """A motion with every step of the integration.
 
-    ``first_period``: mesh periods that the teeth have turned before it.
+    Attributes
+    ----------
+    time : array, shape (samples,)
+        Time in mesh periods.
+    states : array, shape (samples, states)
+        Dimensionless states (eq. 13 of Pan, Li, Wang 2021).
+    first_period : int
+        Mesh periods before the first sample.
     """
 
     time: Floats
@@ -56,12 +63,33 @@ class Trajectory(NamedTuple):
 class System:
     """A gear pair with all its parameters fixed.
 
-    ``config``, or the path of its file: scene, start and integration; what it sweeps is fixed by
-    ``at``, parameters by their paths, such as ``{"operation.speed_rpm": 12000.0}``, or by
-    ``groups``, by their names, such as ``pitch_error=10.75``. The attribute ``state`` (states,) is
-    where motions start unless another state is given: as the configuration says, or where the lane
-    of a result ended. Raises ConfigurationError if a swept parameter is left open, a parameter is
-    unknown or out of its range, or the steps per period are unstable.
+    Parameters
+    ----------
+    config : Configuration or path
+        Scene, start and integration. Swept parameters must be fixed by ``at`` or ``groups``.
+    at : mapping of str to float, optional
+        Values of parameters by their paths, such as ``{"operation.speed_rpm": 12000.0}``.
+    **groups : float
+        Values of parameters by their names, such as ``pitch_error=10.75``.
+
+    Attributes
+    ----------
+    config : Configuration
+        The configuration with all parameters fixed.
+    state : array, shape (states,)
+        Dimensionless state in which motions start unless another start is given.
+
+    Raises
+    ------
+    ConfigurationError
+        If a swept parameter is not fixed, if a parameter is unknown or out of its range, or if the
+        steps per period are unstable.
+
+    Examples
+    --------
+    >>> system = System("sweeps/pan2021.toml", pitch_error=10.75)
+    >>> system.orbit(period=2).stable
+    True
     """
 
     def __init__(
@@ -84,11 +112,26 @@ class System:
 
     @classmethod
     def of_lane(cls, result: Result, **coordinates: float | str) -> Self:
-        """Return the system of one lane of a result; it starts where the lane ended.
+        """Return the system of one lane of a result; it starts at the end of the lane.
 
-        ``result``: of a sweep or a response, with its configuration; ``coordinates``: one for each
-        of its axes, by name; the nearest lane is taken. Raises ConfigurationError if a coordinate
-        is missing or of no axis.
+        Parameters
+        ----------
+        result : Result
+            Result of a sweep or a response.
+        **coordinates : float or str
+            One value per axis of the result, by name; the nearest lane is taken.
+
+        Returns
+        -------
+        System
+            The system.
+
+        Raises
+        ------
+        ConfigurationError
+            If a coordinate is missing or names no axis.
+        FileError
+            If the result does not contain its configuration.
         """
         instance("result", result, Result, "open_result reads it from a file")
         missing = [axis for axis in result.axes if axis not in coordinates]
@@ -107,12 +150,12 @@ class System:
 
     @property
     def groups(self) -> dict[str, float]:
-        """The dimensionless groups as the kernels take them, angles in rad."""
+        """Dimensionless groups of the gear pair as the kernels use them, angles in rad."""
         return {name: float(value[0]) for name, value in self._pair.groups._asdict().items()}
 
     @property
     def _pair(self) -> kernels.GearPairs:
-        """The system of a model that is a gear pair."""
+        """The system of the lane if its model is the gear pair."""
         if not isinstance(self._record, kernels.GearPairs):
             raise ConfigurationError(
                 f"{self.config.source}: is no gear pair, and has neither its groups nor its mesh"
@@ -121,12 +164,12 @@ class System:
 
     @property
     def mesh_period(self) -> float:
-        """2 pi / Omega in units of tau."""
+        """Duration of a mesh period, 2 pi / Omega, in units of tau."""
         return float(self._record.mesh_period[0])
 
     @property
     def repeats_after(self) -> int:
-        """Mesh periods of an excitation period: 1, or until the same teeth meet again."""
+        """Mesh periods per excitation period: 1, or until the same teeth meet again."""
         return self._record.repeats_after
 
     def __repr__(self) -> str:
@@ -136,10 +179,26 @@ class System:
     def integrate(
         self, periods: int, transient: int = 0, start: Floats | None = None
     ) -> Trajectory:
-        """Integrate the motion and keep every step of so many mesh periods after the transient.
+        """Integrate the motion and keep every step after the transient.
 
-        ``start`` (states,) is the state at mesh phase 0, by default `state`. Raises
-        ConfigurationError if the motion leaves the range of numbers.
+        Parameters
+        ----------
+        periods : int
+            Mesh periods that are kept.
+        transient : int
+            Mesh periods before them.
+        start : array, shape (states,), optional
+            Dimensionless state at mesh phase 0; by default `state`.
+
+        Returns
+        -------
+        Trajectory
+            The motion, both ends included.
+
+        Raises
+        ------
+        ConfigurationError
+            If the motion leaves the range of numbers.
         """
         periods = whole_number("periods", periods, least=1)
         transient = whole_number("transient", transient, least=0)
@@ -159,19 +218,45 @@ class System:
     def response(self, periods: int = DEFAULT_PERIODS) -> Result:
         """Compute the motion after the configured transient, with accelerations and mesh forces.
 
-        The lane starts at `state`; see `gearchaos.respond` for what the result holds.
+        Parameters
+        ----------
+        periods : int
+            Mesh periods at the end of the recorded periods.
+
+        Returns
+        -------
+        Result
+            The motion from `state`, see `gearchaos.respond`.
+
+        Raises
+        ------
+        ConfigurationError
+            If fewer periods are recorded.
         """
         state = dict(zip(self.states, self.state.tolist(), strict=True))
         start = {"kind": "given", "state": state}
         return respond(self.config.replace("start", start), periods)
 
     def orbit(self, period: int = 1, guess: Floats | None = None) -> Orbit:
-        """Find the orbit of so many periods that a motion settles on, or that next to a guess.
+        """Find the periodic orbit on which the motion settles, or the orbit next to a guess.
 
-        Of excitation periods: with pitch errors tooth by tooth these are `repeats_after` mesh
-        periods, else one. ``guess`` (states,) is a state close to the orbit at its beginning, by
-        default the one after the configured transient. Raises ConfigurationError if there is no
-        orbit of this period next to the guess.
+        Parameters
+        ----------
+        period : int
+            Period in excitation periods, of `repeats_after` mesh periods each.
+        guess : array, shape (states,), optional
+            State next to the orbit at mesh phase 0; by default the state after the configured
+            transient.
+
+        Returns
+        -------
+        Orbit
+            The orbit, stable or unstable, see `polish`.
+
+        Raises
+        ------
+        ConfigurationError
+            If there is no orbit with this period next to the guess.
         """
         period = whole_number("period", period, least=1)
         if guess is None:
@@ -195,9 +280,26 @@ class System:
     ) -> Branch:
         """Follow an orbit along a parameter to where it loses stability.
 
-        The way leads from the first value, that of the orbit, to the last one; ``parameter`` is a
-        group by its name or a physical key by its path, and ``width`` the wanted distance of the
-        last stable value and the one beyond it.
+        Parameters
+        ----------
+        orbit : Orbit
+            The orbit at the first value.
+        parameter : str
+            Name of a group, or path of a physical key.
+        first, last : float
+            Values at the beginning and at the end of the way, in the unit of the parameter.
+        width : float
+            Wanted distance between the last stable value and the value beyond.
+
+        Returns
+        -------
+        Branch
+            The last stable orbit, and how it loses stability.
+
+        Raises
+        ------
+        ConfigurationError
+            If the parameter is unknown or a value out of its range.
         """
         instance("orbit", orbit, Orbit, "System.orbit finds it")
         instance("parameter", parameter, str, "name a group, or a key by its path")
@@ -221,20 +323,46 @@ class System:
     def exponents(self, start: Floats | None = None) -> Exponents:
         """Compute all Lyapunov exponents over the configured record, after its transient.
 
-        Per unit of tau and largest first, with their standard errors, each of shape (states,).
+        Parameters
+        ----------
+        start : array, shape (states,), optional
+            Dimensionless state at mesh phase 0; by default `state`.
+
+        Returns
+        -------
+        Exponents
+            Exponents per unit of tau, largest first, and standard errors, each of shape (states,).
         """
         found = exponents(self._record, self._start(start), self._plan)
         return Exponents(*(values[0] for values in found))
 
     def sum_of_exponents(self) -> float:
-        """Return the sum of all Lyapunov exponents as the damping gives it, exactly."""
+        """Return the exact sum of all Lyapunov exponents per unit of tau.
+
+        The sum follows from the damping alone.
+        """
         return float(sum_of_exponents(self._record)[0])
 
     def spectrum(self, state: str = "delta_5", periods: int = 64) -> SpectralLines:
         """Return the amplitude spectrum of a state after the configured transient.
 
-        Over a record of so many mesh periods: its lines are one mesh frequency over them apart.
-        Raises ConfigurationError if there is no such state.
+        Parameters
+        ----------
+        state : str
+            Name of the state.
+        periods : int
+            Length of the record in mesh periods; the spacing of lines is one mesh frequency divided
+            by it.
+
+        Returns
+        -------
+        SpectralLines
+            Orders of the mesh frequency, and dimensionless amplitudes.
+
+        Raises
+        ------
+        ConfigurationError
+            If there is no such state.
         """
         one_of("state", state, self.states)
         motion = self.integrate(periods, transient=self.config.integration.transient_periods)
@@ -242,16 +370,24 @@ class System:
         return spectral_lines(values, self._steps)
 
     def stability_limit(self) -> int:
-        """Return the fewest steps per mesh period with which the integration is stable.
+        """Return the smallest number of steps per mesh period for a stable integration.
 
-        Of flow maps that is one.
+        For flow maps the limit is 1.
         """
         return int(fewest_stable_steps(self._record, self.config.integration.method)[0])
 
     def mesh_motion(self, motion: Trajectory) -> kernels.MeshMotion:
-        """Return mesh forces, contact and accelerations along a motion from `integrate` (eq. 13).
+        """Return mesh forces, contact and accelerations along a motion (eq. 13).
 
-        Every array has the shape (samples,), accelerations (samples, coordinates).
+        Parameters
+        ----------
+        motion : Trajectory
+            Motion from `integrate`.
+
+        Returns
+        -------
+        MeshMotion
+            Dimensionless arrays of shape (samples,), accelerations of shape (samples, coordinates).
         """
         instance("motion", motion, Trajectory, "System.integrate gives it")
         states = motion.states[np.newaxis]
@@ -260,23 +396,27 @@ class System:
 
     @cached_property
     def _steps(self) -> int:
-        """Steps per mesh period: those given, raised if need be, or those chosen for the scene."""
+        """Steps per mesh period: as configured, raised where allowed, or chosen for the scene."""
         if self.config.integration.steps_per_period is not None:
             return self._first_steps
-        # As `run` of this configuration chooses them.
+        # The same choice as in `run` of this configuration.
         return with_chosen_steps(plan_run(self.config)).plan.steps_per_period
 
     @property
     def _plan(self) -> Plan:
+        """The plan of an integration with these steps."""
         return plan_of(self.config, steps_per_period=self._steps)
 
     def _at(self, values: Mapping[str, Floats]) -> kernels.LaneSystem:
+        """Return the system at values of parameters, one lane per value."""
         return system_of(self.config, {**axis_values(self.config), **values})
 
     def _start(self, start: Floats | None) -> Floats:
+        """Return a checked start state (states,)."""
         return checked_state("start", self.state if start is None else start, self.states)
 
     def _orbit(self, found: Orbits, period: int) -> Orbit:
+        """Return the orbit of the only lane."""
         duration = period * self._record.excitation_period[0]
         return Orbit(
             period,
@@ -287,7 +427,7 @@ class System:
         )
 
     def _branch(self, followed: Followed, period: int) -> Branch:
-        """Return the branch of one lane that was followed."""
+        """Return the branch of the only lane."""
         loss = StabilityLoss(int(followed.loss[0]))
         return Branch(
             float(followed.stable_value[0]),

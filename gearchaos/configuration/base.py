@@ -1,4 +1,4 @@
-"""The whole configuration of a sweep, read and checked, whatever its model."""
+"""The whole configuration of a sweep, read and checked, for any model."""
 
 import os
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
@@ -28,18 +28,24 @@ DEFAULT_KIND = "gear_pair"
 
 
 class Configuration(Tables):
-    """A machine, the effects that exist, the sweeps, and what is kept of them.
+    """A checked configuration: a machine, its effects, the sweeps, and the outputs.
 
-    A Configuration that exists is sound: every rule has been checked, also those between tables.
-    It cannot be changed; `replace` gives a changed copy. Each model derives its own class, which
-    adds tables and rules; the class methods of this one choose among them.
+    Every rule holds for a Configuration, also rules between tables. It is immutable; `replace`
+    returns a changed copy. Each model derives a class with its own tables and rules. The class
+    methods of this base class choose among them.
 
     Attributes
     ----------
     kind : str
         Name of the model.
     rules : sequence
-        Rules between tables, each with the tables that it needs free of faults of their own.
+        Rules between tables, each with the tables that must be free of faults before it is checked.
+
+    Examples
+    --------
+    >>> config = load_config("sweeps/pan2021.toml")
+    >>> config.replace("sweep.count", 31).sweep.count
+    31
     """
 
     kind: ClassVar[str] = ""
@@ -58,20 +64,21 @@ class Configuration(Tables):
     def with_files(
         cls, tables: Mapping[str, Any], folder: str | None
     ) -> tuple[Mapping[str, Any], list[Fault]]:
-        """Return tables with the contents of the files that they name, and the faults of files."""
+        """Return tables with the contents of the files that they name, and the faults of these."""
         del folder
         return tables, []
 
     @property
     def source(self) -> str:
-        """Path of the file, or a word in angle brackets for what came from no file."""
+        """Path of the file, or a word in angle brackets without a file."""
         return self._source
 
     @property
     def text(self) -> str:
-        """The TOML text verbatim, before overrides; `resolved_toml` where there was none.
+        """TOML text as given, before overrides; `resolved_toml` if there was no text.
 
-        Files that it names are appended as ``[files]``, so that it stands alone.
+        Contents of files that the text names are appended as ``[files]``, so that the text is
+        complete.
         """
         return self.resolved_toml() if self._text is None else self._text
 
@@ -83,11 +90,29 @@ class Configuration(Tables):
         overrides: Iterable[str] = (),
         folder: str | None = None,
     ) -> Self:
-        """Make a configuration from TOML text, which messages call ``source``.
+        """Make a configuration from TOML text.
 
-        ``overrides`` are those of `load_config`. Files that the text names are read from
-        ``folder``; without one, their text must be part of it, under ``[files]``. Raises
-        ConfigurationError with one message per fault, all faults at once.
+        Parameters
+        ----------
+        text : str
+            The TOML text.
+        source : str
+            Name of the text in messages.
+        overrides : iterable of str
+            Overrides, see `load_config`.
+        folder : str, optional
+            Folder of the files that the text names. Without it, the text must contain them as
+            ``[files]``.
+
+        Returns
+        -------
+        Configuration
+            The checked configuration.
+
+        Raises
+        ------
+        ConfigurationError
+            With one message per fault, all faults at once.
         """
         tables = with_overrides(tables_from_toml(text, source), overrides, source)
         config = cls.from_tables(tables, source, folder)
@@ -102,8 +127,25 @@ class Configuration(Tables):
     ) -> Self:
         """Make a configuration from nested mappings with the keys of the TOML file.
 
-        Files that they name are read from ``folder``; without one, their text must be among them,
-        under ``files``. Raises ConfigurationError with one message per fault, all faults at once.
+        Parameters
+        ----------
+        tables : mapping
+            The tables by name.
+        source : str
+            Name of the tables in messages.
+        folder : str, optional
+            Folder of the files that the tables name. Without it, their text must be given as
+            ``files``.
+
+        Returns
+        -------
+        Configuration
+            The checked configuration.
+
+        Raises
+        ------
+        ConfigurationError
+            With one message per fault, all faults at once.
         """
         if cls is Configuration:
             chosen: Any = cls.kinds[DEFAULT_KIND]
@@ -122,10 +164,24 @@ class Configuration(Tables):
         return config
 
     def replace(self, path: str, value: Any) -> Self:
-        """Return a copy in which one key, or table, at its dotted path has another value.
+        """Return a copy with another value of one key or table.
 
-        A value of a table is a mapping; None removes the key. Raises ConfigurationError if the
-        changed configuration breaks a rule.
+        Parameters
+        ----------
+        path : str
+            Dotted path of the key or table.
+        value
+            The value, a mapping for a table; None removes the key.
+
+        Returns
+        -------
+        Configuration
+            The changed copy.
+
+        Raises
+        ------
+        ConfigurationError
+            If the changed configuration breaks a rule.
         """
         try:
             tables = with_value(self.tables(), path.split("."), value)
@@ -134,11 +190,24 @@ class Configuration(Tables):
         return type(self).from_tables(tables, self.source, self._folder)
 
     def at(self, values: Mapping[str, float]) -> Self:
-        """Return a copy in which parameters, by name, are fixed at values in their units.
+        """Return a copy with parameters fixed at values.
 
-        What swept one of them goes, and [second_sweep] then is [sweep]; where nothing is left,
-        [sweep] has the one value. ``realisation`` is the number of a drawn gear pair, then the only
-        one. Raises ConfigurationError if a parameter cannot be swept, or if a rule is broken.
+        Parameters
+        ----------
+        values : mapping of str to float
+            Values by the name of the parameter, in its unit. ``realisation`` selects one drawn
+            realisation by its number.
+
+        Returns
+        -------
+        Configuration
+            A copy without the sweeps of these parameters. If [sweep] is removed, [second_sweep]
+            takes its place; if nothing is left, [sweep] has one value.
+
+        Raises
+        ------
+        ConfigurationError
+            If a parameter cannot be swept, or if a rule is broken.
         """
         fixed = {REALISATION: self.keys_of_realisation(values.get(REALISATION, 0.0))}
         for parameter in values:
@@ -160,7 +229,7 @@ class Configuration(Tables):
         return type(self).from_tables(tables, self.source, self._folder)
 
     def resolved_toml(self) -> str:
-        """Return TOML with every default filled in; it loads to an equal configuration."""
+        """Return TOML with all defaults; it loads to an equal configuration."""
         return toml_text(self.tables())
 
     @model_validator(mode="after")
@@ -170,7 +239,7 @@ class Configuration(Tables):
             raise ConfigurationError(texts(faults, (info.context or {}).get("source", "<python>")))
         return self
 
-    # Where a configuration came from does not make it another one.
+    # Configurations are equal whatever their source.
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Configuration) and self.__dict__ == other.__dict__
 
@@ -183,10 +252,30 @@ Given: TypeAlias = Configuration | str | os.PathLike[str]
 def load_config(path: str | os.PathLike[str], overrides: Iterable[str] = ()) -> Configuration:
     """Read a configuration from a TOML file.
 
-    The path ``-`` is standard input. Overrides are such as ``"integration.steps_per_period=100"``;
-    what is not TOML is taken as text. Raises FileError if the file cannot be read,
-    ConfigurationError if it is not a sound configuration: one message per fault, all faults at
-    once.
+    Parameters
+    ----------
+    path : str or path
+        Path of the file; ``-`` is standard input.
+    overrides : iterable of str
+        Changes such as ``"integration.steps_per_period=100"``. A value that is not TOML is a text.
+
+    Returns
+    -------
+    Configuration
+        The checked configuration.
+
+    Raises
+    ------
+    FileError
+        If the file cannot be read.
+    ConfigurationError
+        With one message per fault, all faults at once.
+
+    Examples
+    --------
+    >>> config = load_config("sweeps/pan2021.toml", ["sweep.count=31"])
+    >>> config.sweep.count
+    31
     """
     source, overrides = path_text(path, "a TOML file"), texts_of("overrides", overrides)
     folder = os.path.dirname(source) or "."
@@ -194,7 +283,7 @@ def load_config(path: str | os.PathLike[str], overrides: Iterable[str] = ()) -> 
 
 
 def configuration_of(given: Given) -> Configuration:
-    """Return a configuration, or read it from the TOML file at a path, see `load_config`."""
+    """Return a configuration as given, or read it from a TOML file, see `load_config`."""
     if isinstance(given, Mapping):
         raise ConfigurationError(
             "<python>: is a mapping and no configuration; make one of it with "
@@ -207,11 +296,12 @@ def configuration_of(given: Given) -> Configuration:
 def configuration_keys(kind: type[Tables]) -> dict[str, Key]:
     """Return every key of a class of configurations by its dotted path."""
     every = [(one.path, one) for one in keys_of(kind)]
-    # Of a key that several kinds of a table have, the first counts: that of the default.
+    # If several kinds of a table have a key, the key of the default kind counts.
     return dict(every) | dict(reversed(every))
 
 
 def _broken_rules(config: Configuration, unreadable: Collection[str]) -> Iterator[Fault]:
+    """Yield the faults of all rules whose tables are readable."""
     suspect = set(unreadable)
     for tables, broken in config.rules:
         if tables.isdisjoint(unreadable):

@@ -1,4 +1,4 @@
-"""Tables of a configuration and their keys: how they are declared, and what is declared of them."""
+"""Tables of a configuration and their keys: their declarations, and access to these."""
 
 import typing
 from collections.abc import Collection, Iterator
@@ -29,22 +29,22 @@ class Table(BaseModel):
     @model_validator(mode="before")
     @classmethod
     def _numbers_of_numpy(cls, given: Any) -> Any:
-        """Take the numbers of NumPy for those of Python: nothing is converted by that."""
+        """Accept numbers of NumPy as numbers of Python."""
         kinds = (np.generic, np.ndarray)
         entries = given.items() if isinstance(given, dict) else ()
         return {k: v.tolist() if isinstance(v, kinds) else v for k, v in entries} or given
 
     def tables(self, include: Collection[str] | None = None) -> dict[str, Any]:
-        """Return nested mappings of every known value by its key in the file, defaults included.
+        """Return nested mappings of all known values by key, defaults included.
 
-        ``include``: which keys of this table, by default all.
+        ``include``: keys of this table, by default all.
         """
         # Before pydantic 2.11, no setting of the model makes aliases the default.
         names = None if include is None else set(include)
         return self.model_dump(include=names, exclude_none=True, by_alias=True)
 
 
-# TOML has lists, the models hold tuples; strictness about the entries is not affected.
+# TOML has lists, the tables have tuples; entries are still checked strictly.
 AS_LIST = Field(strict=False)
 Numbers: TypeAlias = Annotated[tuple[float, ...], AS_LIST]
 
@@ -52,11 +52,11 @@ Numbers: TypeAlias = Annotated[tuple[float, ...], AS_LIST]
 def key(
     description: str = "", units: str = "", example: Any = None, *, default: Any = ..., **rules: Any
 ) -> Any:
-    """Declare a key: what it is without its unit, its unit, an example, and its default.
+    """Declare a key: its description without the unit, its unit, an example, and its default.
 
-    What takes more than the line of the declaration to say stands below it. The unit is empty where
-    there is none and ``"1"`` for a dimensionless number, ``...`` as default makes the key required,
-    and the rules are constraints of `pydantic.Field`, such as ``gt=0``.
+    A longer description is the docstring below the declaration. The unit is empty where there is
+    none, and ``"1"`` for a dimensionless number. A key with the default ``...`` is required.
+    Further arguments are constraints of `pydantic.Field`, such as ``gt=0``.
     """
     return Field(
         default,
@@ -69,7 +69,7 @@ def key(
 
 @dataclass(frozen=True)
 class Key:
-    """One key: its dotted path, its declaration, the tables that may stand there, if any."""
+    """One key: its dotted path, its declaration, and the tables that its value may be."""
 
     path: str
     field: FieldInfo
@@ -83,11 +83,12 @@ class Key:
 
     @property
     def wording(self) -> str:
-        """The meaning without the unit."""
+        """The description without the unit."""
         return self._described.removesuffix(f", in {self.units}")
 
     @property
     def _described(self) -> str:
+        """The description on one line."""
         return " ".join((self.field.description or "").split())
 
     @property
@@ -103,14 +104,14 @@ class Key:
 
     @property
     def choices(self) -> tuple[str, ...]:
-        """What the value, or each entry of it, may be, as TOML writes it; empty: no such list."""
+        """Valid values, or entries, as TOML writes them; empty where all values are valid."""
         parts = _parts(self.field.annotation)
         literals = (part for part in parts if typing.get_origin(part) is typing.Literal)
         return tuple(toml_literal(one) for part in literals for one in typing.get_args(part))
 
     @property
     def remedy(self) -> str:
-        """What belongs here, with an example where there is one."""
+        """The expected value, with an example where there is one."""
         example = f", such as {toml_literal(self.field.examples[0])}" if self.field.examples else ""
         return f"expected: {self._described}{example}"
 
@@ -127,7 +128,7 @@ def keys_of(model: type[Table], path: str = "") -> Iterator[Key]:
 
 
 def _parts(annotation: Any) -> Iterator[Any]:
-    """List the types that an annotation is made of, the whole first, choices as one."""
+    """List the types of an annotation: first the whole, and choices as one."""
     yield annotation
     if typing.get_origin(annotation) is not typing.Literal:
         for part in typing.get_args(annotation):

@@ -11,8 +11,10 @@ from pydantic_core import ErrorDetails
 from gearchaos.configuration.keys import Key
 from gearchaos.configuration.toml_text import quoted_key, toml_literal
 
-MOST_SHOWN = 100  # Faults that are worded; a file with more of them is hardly a configuration.
-MOST_CHARACTERS = 80  # Characters of a value.
+MOST_SHOWN = 100
+"""Largest number of faults in words; a file with more is hardly a configuration."""
+MOST_CHARACTERS = 80
+"""Largest number of characters of a value in a message."""
 
 _RULES = {
     "missing": "is missing",
@@ -34,15 +36,16 @@ _RULES = {
     "tuple_type": "must be a list",
     **dict.fromkeys(("dict_type", "model_type", "model_attributes_type"), "must be a table"),
 }
-"""Words for faults by the type that pydantic gives them; its own ones serve for the others."""
+"""Rules by the type of the fault in pydantic; other faults have the message of pydantic."""
 
 NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?")
 
-_TAGS = ("kind", "shape")  # Keys by which the kinds of a table are told apart.
+_TAGS = ("kind", "shape")
+"""Keys that select the kind of a table."""
 
 
 class Fault(NamedTuple):
-    """One fault: dotted path of the key, rule that is broken, what to do instead, value if any."""
+    """One fault: dotted path of the key, broken rule, remedy, and value if any."""
 
     key: str
     rule: str
@@ -57,20 +60,23 @@ class Fault(NamedTuple):
 
 
 def texts(faults: Iterable[Fault], source: str, more: int = 0) -> list[str]:
-    """Return the faults as lines, each once, the first hundred; ``more`` have not been worded."""
+    """Return the first hundred faults as lines, without repetitions.
+
+    ``more``: number of further faults that have no words.
+    """
     lines = list(dict.fromkeys(fault.text(source) for fault in faults))
     rest = max(0, len(lines) - MOST_SHOWN) + more
     return lines if rest == 0 else [*lines[:MOST_SHOWN], f"{source}: and {rest} more faults"]
 
 
 def shown(value: object) -> str:
-    """Return a value as TOML writes it, cut to a readable length, and nothing but printable."""
+    """Return a value as TOML writes it, shortened, with printable characters only."""
     try:
         text = toml_literal(value)
-    except (TypeError, ValueError):  # A date, or no finite number.
+    except (TypeError, ValueError):  # A date or a number that is not finite.
         try:
             text = str(value)
-        except ValueError:  # Python writes no integer as long as that.
+        except ValueError:  # The integer has more digits than Python prints.
             text = "an integer of thousands of digits"
     text = text if len(text) <= MOST_CHARACTERS else f"{text[:MOST_CHARACTERS]}..."
     return "".join(c if c.isprintable() else repr(c)[1:-1] for c in text)
@@ -87,14 +93,15 @@ def suggestion(word: str, words: Iterable[str]) -> str:
 
 
 def faults_of(error: ValidationError, keys: Mapping[str, Key]) -> tuple[list[Fault], int]:
-    """Word the first hundred faults of tables, and count the others; ``keys`` are all by path."""
+    """Return the first hundred faults in words, and the number of others; ``keys`` by path."""
     found = error.errors(include_url=False)
-    # A long list of nonsense can hold a million faults.
+    # A long invalid list can contain a million faults.
     worded = [_fault_of(one, keys) for one in found[:MOST_SHOWN]]
     return worded, len(found) - len(worded)
 
 
 def _fault_of(error: ErrorDetails, keys: Mapping[str, Key]) -> Fault:
+    """Return one fault of pydantic in words."""
     kind, value = error["type"], error["input"]
     rule = _RULES.get(kind, error["msg"].replace("Input should", "must"))
     rule = rule.format(**error.get("ctx", {}))
@@ -108,7 +115,7 @@ def _fault_of(error: ErrorDetails, keys: Mapping[str, Key]) -> Fault:
         table = ".".join(map(str, names[:-1]))
         remedy = _elsewhere(str(names[-1]), table, keys)
         if path in keys:
-            # Tables of another kind have this key; pydantic names the kind before it.
+            # Another kind of this table has the key; in pydantic the kind precedes the key.
             tag = next(name for name in _TAGS if f"{table}.{name}" in keys)
             rule = f'has no meaning with {tag} = "{error["loc"][-2]}"'
             remedy = f"drop it, or choose another {table}.{tag}"
@@ -125,11 +132,11 @@ def _fault_of(error: ErrorDetails, keys: Mapping[str, Key]) -> Fault:
 
 
 def _names(error: ErrorDetails, keys: Mapping[str, Key]) -> list[int | str]:
-    """Return the names of the keys on the way to an error, numbers in lists among them."""
+    """Return the names of the keys, and the indices in lists, on the path to an error."""
     names: list[int | str] = []
     tagged = False
     for name in error["loc"]:
-        # pydantic adds the kind of a table that has several, and "[key]" for a key itself.
+        # pydantic adds the kind of a table that has several, and "[key]" for an invalid key.
         added = tagged or (name == "[key]" and error["type"] != "extra_forbidden")
         names += [] if added else [name]
         key = keys.get(".".join(map(str, names)))
@@ -138,6 +145,7 @@ def _names(error: ErrorDetails, keys: Mapping[str, Key]) -> list[int | str]:
 
 
 def _elsewhere(name: str, table: str, keys: Mapping[str, Key]) -> str:
+    """Return the remedy for an unknown key of a table."""
     here = [path.rpartition(".")[2] for path in keys if path.rpartition(".")[0] == table]
     if near := suggestion(name, here):
         return near

@@ -1,6 +1,6 @@
-"""What a configuration, its messages and the choice of steps know of a method of integration.
+"""Properties of the integration methods for configurations, messages and the choice of steps.
 
-The compiled part of a method, and its limits of stability, are in the kernels under its name.
+The compiled part of a method and its stability limits are in the kernels, under the same name.
 """
 
 from dataclasses import dataclass
@@ -13,18 +13,18 @@ class Method:
     Attributes
     ----------
     name : str
-        As ``integration.method`` has it.
+        Value of ``integration.method``.
     words : str
-        What it is, for a table of keys.
+        Description for the table of keys.
     steps : int or None
-        Steps per mesh period where a configuration gives none; None: chosen for the scene.
+        Default steps per mesh period; None: chosen for the scene.
     exact : bool
-        Whether steps have no error between crossings, so that none are chosen and no number of
-        them is unstable.
+        Whether steps have no error between crossings. No steps are then chosen, and any number of
+        steps is stable.
     always_resolved : bool
-        Whether every crossing is resolved, whatever ``integration.crossings`` says.
+        Whether every crossing is resolved, whatever ``integration.crossings`` is.
     shares_maps : bool
-        Whether maps are made beforehand, which take memory and which lanes share.
+        Whether maps are computed in advance; they take memory, and lanes share them.
     """
 
     name: str
@@ -36,7 +36,7 @@ class Method:
 
 
 FLOW_MAP_STEPS = 24
-"""Steps per period of flow maps: fewer cost more at a crossing, more cost more between them."""
+"""Steps per period of flow maps: fewer take longer at crossings, more between them."""
 
 METHODS = {
     one.name: one
@@ -55,4 +55,4 @@ METHODS = {
 """All methods by name; the first is the default."""
 
 EXACT = next(one for one in METHODS.values() if one.exact)
-"""The method with which others are compared."""
+"""The method to which others are compared."""

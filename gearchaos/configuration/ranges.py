@@ -6,11 +6,11 @@ import numpy as np
 import numpy.typing as npt
 
 LARGEST_VALUE = 1e300
-"""Largest value of a sweep: sums and differences of such values are numbers, too."""
+"""Largest value of a sweep: sums and differences of such values are finite."""
 
 
 class Range(NamedTuple):
-    """The valid numbers: finite, and greater than, at least, less than, at most these bounds."""
+    """The valid numbers: finite, and within these bounds."""
 
     gt: float | None = None
     ge: float | None = None

@@ -1,4 +1,4 @@
-"""Rules that tie several keys of a configuration together, whatever its model."""
+"""Rules between keys of a configuration, for any model."""
 
 import math
 from collections.abc import Callable, Iterator
@@ -14,10 +14,10 @@ Rule: TypeAlias = Callable[[Any], Iterator[Fault]]
 
 
 class Rules(list[tuple[frozenset[str], Rule]]):
-    """Rules, each with the tables that it needs free of faults of their own."""
+    """Rules, each with the tables that must be free of faults before it is checked."""
 
     def reads(self, *tables: str) -> Callable[[Rule], Rule]:
-        """Make a function a rule that reads these tables beside the sweeps that are readable."""
+        """Register a function as a rule that reads these tables and all readable sweeps."""
 
         def listed(check: Rule) -> Rule:
             self.append((frozenset(tables), check))
@@ -107,7 +107,7 @@ def _errors_are_measured_on_a_section(config: Tables) -> Iterator[Fault]:
 
 
 def unknown_parameter(config: Tables, key: str, parameter: str) -> Iterator[Fault]:
-    """Yield the fault of a parameter, given under some key, that cannot be swept."""
+    """Yield the fault of a parameter that cannot be swept; ``key`` has its name."""
     if parameter not in config.parameters:
         remedy = config.parameter_remedy(parameter)
         yield Fault(key, "is not a parameter that can be swept", remedy, parameter)

@@ -1,4 +1,4 @@
-"""The tables that say what is computed, for any model: scene, start, sweeps, method, outputs."""
+"""The tables of a run, for any model: scene, start, sweeps, method, outputs."""
 
 import math
 from fractions import Fraction
@@ -9,10 +9,11 @@ from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 from gearchaos.configuration.keys import AS_LIST, Numbers, Table, key
 from gearchaos.configuration.methods import EXACT, METHODS
 
-MOST_RUN_LANES = 100_000_000  # Lanes of one run: what a file and a machine can still hold.
+MOST_RUN_LANES = 100_000_000
+"""Largest number of lanes of one run, limited by files and memory."""
 MOST_STEPS_PER_PERIOD = 1_000_000
 DEFAULT_STEPS = 200
-"""Fewest Runge-Kutta steps per period that are chosen for a scene where none are given."""
+"""Smallest number of Runge-Kutta steps per period that is chosen for a scene."""
 _MOST_VALUES = 10_000_000
 _MOST_STARTS = 1_000_000
 
@@ -20,7 +21,7 @@ State = TypeVar("State", bound=str, covariant=True)
 """Names of the states of a model, a ``Literal``."""
 
 ONCE = AfterValidator(lambda given: tuple(dict.fromkeys(given)))
-"""Repeating a name or value is no mistake worth a message."""
+"""Repeated names or values are removed without a message."""
 
 Interval: TypeAlias = Annotated[tuple[float, float], AS_LIST]
 Order: TypeAlias = Annotated[
@@ -31,7 +32,7 @@ Order: TypeAlias = Annotated[
 
 
 class Scene(Table):
-    """Which effects exist; what is not listed is not computed."""
+    """The included effects; all others are left out."""
 
     effects: tuple[str, ...] = ()
 
@@ -46,17 +47,17 @@ class Start(Table, Generic[State]):
     kind: Literal["rest", "contact", "given", "random", "grid"] = key(default="rest")
     """all zero, on the contact flank, as in `state`, at random, or on a grid"""
     state: dict[State, float] = key(example={"delta_5": 1.0}, default={})
-    """start values by state for kind = "given", and beside a box; those not named are 0"""
+    """start values by state for kind = "given", and beside a box; other states are 0"""
     box: dict[State, Interval] = key(
         example={"delta_5": [-2.0, 2.0], "delta_5_rate": [-1.5, 1.5]}, default={}
     )
-    """lowest and highest start value by state: where a grid reaches, both ends included, or where
-    random starts are uniform; those not named are as in `state`"""
+    """lowest and highest start value by state: range of a grid, both ends included, or of uniform
+    random starts; other states are as in `state`"""
     drawn: dict[State, Interval] = key(example={"delta_1": [-0.5, 0.5]}, default={})
-    """for kind = "grid": lowest and highest start value of states that are drawn beside it"""
+    """for kind = "grid": lowest and highest start value of states that are drawn at random"""
     spread: float = key(units="1", default=1.0, gt=0)
     """for kind = "random" without a box: every state is uniform between minus and plus this"""
-    seed: int = key("seed of what is drawn", default=0, ge=0, le=2**32 - 1)
+    seed: int = key("seed of the random numbers", default=0, ge=0, le=2**32 - 1)
     count: int = key(default=1, ge=1, le=_MOST_STARTS)
     """random starts per parameter value, or points of a grid along each state of its box"""
     carry: Literal["none", "upwards", "downwards", "both"] = key(default="none")
@@ -114,17 +115,17 @@ class Integration(Table):
 
     method: MethodName = key(", or ".join(one.words for one in METHODS.values()), default="rk4")
     steps_per_period: int | None = key(
-        f"steps per mesh period; left out, {DEFAULT_STEPS} or as many times 2 as the scene needs "
-        f'are chosen, and {EXACT.steps} with method = "{EXACT.name}"',
+        f"steps per mesh period; by default {DEFAULT_STEPS}, doubled until the scene is resolved, "
+        f'and {EXACT.steps} with method = "{EXACT.name}"',
         example=400,
         default=None,
         ge=1,
         le=MOST_STEPS_PER_PERIOD,
     )
     tolerance: float | None = key(example=1e-6, default=None, gt=0)
-    """largest error of section and exponent; the steps are then doubled, from steps_per_period on,
-    until lanes of the sweep that are tried beforehand reach it, and transient_periods are raised
-    where the section is still on its way; flow maps are tried once"""
+    """largest error of section and exponent; steps_per_period are doubled until trial lanes of the
+    sweep reach it, and transient_periods are raised where the section is still settling; flow maps
+    are tried once"""
     error_check: float = key(units="1", default=0.0, ge=0, le=1)
     """share of the lanes that are computed again with half the step, to measure their error"""
     crossings: Literal["resolved", "plain"] = key(default="resolved")
@@ -132,12 +133,12 @@ class Integration(Table):
     method, or is a plain step; flow maps resolve every crossing"""
     unstable: Literal["refuse", "raise"] = key(default="refuse")
     """whether a number of steps below the stability limit of a lane is refused, or raised to it;
-    flow maps have none"""
+    flow maps have no such limit"""
     transient_periods: int = key(default=500, ge=0, le=1_000_000_000)
     """mesh periods discarded before anything is recorded"""
     recorded_periods: int = key(default=500, ge=1, le=1_000_000_000)
-    """mesh periods observed after the transient; raised, as that is, to whole periods of the
-    excitation where teeth have errors of their own"""
+    """mesh periods recorded after the transient; both lengths are raised to whole periods of the
+    excitation where these are longer than a mesh period"""
 
     @model_validator(mode="before")
     @classmethod
@@ -159,14 +160,14 @@ class Outputs(Table, Generic[State]):
     motion: bool = key(default=True)
     """whether the motion is labelled: its kind, its period, and the distance of its return"""
     contact: bool = key(default=False)
-    """whether the shares of time on either flank and the impacts on it are told"""
+    """whether the shares of time in contact and the impacts are kept, for each flank"""
     loads: bool = key(default=False)
-    """whether mesh forces, load factors and the transmission error are told"""
+    """whether mesh forces, load factors and the transmission error are kept"""
     states: Annotated[tuple[State, ...], AS_LIST, ONCE] = key(example=["delta_5"], default=())
-    """states of which extremes, and amplitudes at the orders, are told"""
+    """states of which extremes, and amplitudes at the orders, are kept"""
     orders: Annotated[tuple[Order, ...], Field(strict=False, max_length=1000)] = key(
         "multiples of the mesh frequency, whole or fractions of two whole numbers, at which "
-        "amplitudes of the transmission error are told; the record has whole cycles of them",
+        "amplitudes of the transmission error are kept; the record has whole cycles of them",
         example=["1/3", "1/2", 1, 2],
         default=(),
     )

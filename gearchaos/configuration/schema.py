@@ -1,4 +1,4 @@
-"""The configuration described for others: JSON Schema for editors, a table of keys for people."""
+"""The configuration as JSON Schema for editors, and as a table of keys for the documentation."""
 
 from typing import Any
 
@@ -16,7 +16,7 @@ def json_schema(kind: type[Configuration]) -> dict[str, Any]:
 
 
 def _without_null(node: Any) -> Any:
-    # TOML has no null: a key that may be absent is simply not required.
+    """Return a schema without null: in TOML an absent key is simply not required."""
     if isinstance(node, list):
         return [_without_null(entry) for entry in node]
     if not isinstance(node, dict):
@@ -40,6 +40,7 @@ def key_tables(kind: type[Configuration]) -> str:
 
 
 def _table(kind: type[Configuration], name: str, keys: list[Key]) -> str:
+    """Return the Markdown table of one table."""
     title = f"### `[{name}]`" if name else "### Top level"
     lines = [
         title,
@@ -49,7 +50,7 @@ def _table(kind: type[Configuration], name: str, keys: list[Key]) -> str:
     ]
     for key in keys:
         column, unit = key.path.rpartition(".")[2], "" if key.units == "1" else key.units
-        # The one choice of a key that tells kinds of a table apart is that of the first kind.
+        # A key that selects the kind of a table has one choice per kind; it is not a range.
         choices = ", ".join(f"`{one}`" for one in key.choices if len(key.choices) > 1)
         cells = [f"`{column}`", unit, key.valid.bounds or choices, _default(kind, key), key.wording]
         lines.append(f"| {' | '.join(cells)} |")
@@ -57,6 +58,7 @@ def _table(kind: type[Configuration], name: str, keys: list[Key]) -> str:
 
 
 def _default(kind: type[Configuration], key: Key) -> str:
+    """Return the default of a key as TOML."""
     if key.field.is_required():
         return "required"
     default = kind.default_of(key)

@@ -1,4 +1,4 @@
-"""The tables that every configuration has, whatever its model, and the swept values."""
+"""The tables of every configuration, for any model, and the swept values."""
 
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
@@ -21,13 +21,13 @@ class Parameter:
     Attributes
     ----------
     name : str
-        Its name, as ``sweep.parameter`` has it.
+        Value of ``sweep.parameter``.
     path : str
-        Dotted path of the key that has its value.
+        Dotted path of the key with its value.
     valid : Range
         Valid values.
     units, long_name, symbol : str
-        Unit, ``"1"`` if dimensionless, wording, and mathtext symbol if it has one.
+        Unit, ``"1"`` if dimensionless; description; mathtext symbol if it has one.
     """
 
     name: str
@@ -39,7 +39,7 @@ class Parameter:
 
 
 class Titled(Table):
-    """What comes first in every file."""
+    """The keys at the top of every file."""
 
     title: str = key("title of the sweep, for figures and files", default="")
 
@@ -73,13 +73,13 @@ class Tables(Titled):
 
     @property
     def sweeps(self) -> dict[str, Sweep]:
-        """The sweeps that are there by the name of their table."""
+        """The sweeps that exist, by the name of their table."""
         tables = {name: self.__dict__.get(name) for name in ("sweep", "second_sweep")}
         return {name: sweep for name, sweep in tables.items() if sweep is not None}
 
     @property
     def swept(self) -> dict[str, str]:
-        """The key of each swept parameter, such as ``sweep.parameter``."""
+        """The key that names each swept parameter, such as ``sweep.parameter``."""
         return {sweep.parameter: f"{table}.parameter" for table, sweep in self.sweeps.items()}
 
     @property
@@ -88,24 +88,24 @@ class Tables(Titled):
         raise NotImplementedError
 
     def states_of(self, effects: Collection[str]) -> tuple[str, ...]:
-        """Return the states of a scene with some of the effects; by default all there are."""
+        """Return the states of the scene with some of its effects; by default all states."""
         del effects
         return self.states
 
     @property
     def needed_effects(self) -> tuple[str, ...]:
-        """The effects of the scene that act on what is kept; by default all."""
+        """Effects of the scene that act on the outputs; by default all."""
         return self.scene.effects
 
     @property
     def realisations(self) -> Integers:
-        """Numbers of the realisations of each value that are drawn, (realisations,)."""
+        """Numbers of the drawn realisations of each value, (realisations,)."""
         return np.zeros(1, dtype=np.intp)
 
     def keys_of_realisation(self, number: float) -> dict[str, float]:
-        """Return the keys by path, and values, that make this realisation the only one.
+        """Return keys by path, and values, with which this realisation is the only one.
 
-        None if none is drawn.
+        Empty if none is drawn.
         """
         del number
         return {}
@@ -117,11 +117,11 @@ class Tables(Titled):
 
     @classmethod
     def parameter_remedy(cls, unknown: str) -> str:
-        """Return what to sweep instead of an unknown parameter."""
+        """Return which parameter to sweep instead of an unknown one."""
         return suggestion(unknown, cls.parameters) or f"parameters: {', '.join(cls.parameters)}"
 
     def lane_faults(self) -> Iterator[Fault]:
-        """Yield what is wrong with the parameters of the lanes, where each table is sound."""
+        """Yield the faults of parameters of the lanes, once each table is free of faults."""
         yield from ()
 
 
@@ -142,6 +142,6 @@ def swept_values(sweep: Sweep) -> Floats:
 def axis_values(config: Tables) -> dict[str, Floats]:
     """Return the swept values by parameter, in the order of the axes: [second_sweep] first.
 
-    Each has the shape (values,); a parameter is in its own unit.
+    Each array has the shape (values,) and the unit of its parameter.
     """
     return {one.parameter: swept_values(one) for one in reversed(config.sweeps.values())}

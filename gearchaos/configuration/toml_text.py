@@ -1,4 +1,4 @@
-"""TOML text: read from a file, to tables and back, with `key.path=value` overrides."""
+"""TOML text: reading files, conversion to tables and back, and `key.path=value` overrides."""
 
 import json
 import os
@@ -11,25 +11,27 @@ from typing import Any
 from gearchaos.errors import ConfigurationError, FileError
 
 LARGEST_FILE = 4 * 1024 * 1024
-"""Bytes: room for several hundred thousand swept values, and read in seconds whatever it holds."""
+"""Largest file in bytes: several hundred thousand values, and any content is read in seconds."""
 
 CONFIGURATION = "configuration"
+"""Name of a configuration file in messages."""
 
 _DEEPEST = 8
+"""Largest number of parts of the key of an override."""
 _BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
 _PART = r"""(?:[A-Za-z0-9_-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+"""
 _ENDLESS_KEY = re.compile(rf"(?<![A-Za-z0-9_-])(?:{_PART}\.[ \t]*+){{64}}")
-"""A key of so many parts that is no key of ours: tomllib takes the square of their number."""
+"""A key with 64 parts, which no configuration has: tomllib takes quadratic time for it."""
 
 _ENDLESS_INTEGER = re.compile(r"0[xob][0-9A-Fa-f_]{1000}")
-"""An integer that Python reads and refuses to print."""
+"""An integer that Python reads but does not print."""
 
 
 def text_of_file(source: str, what: str = CONFIGURATION) -> str:
-    """Read the text of a file at a path, a configuration or what else the messages call it.
+    """Read the text of a configuration file, or of another file that messages call ``what``.
 
-    A configuration may come through a pipe, whatever it names is a regular file. Raises FileError
-    or ConfigurationError if it cannot be read.
+    A configuration may come from a pipe; other files must be regular. Raises FileError or
+    ConfigurationError if the file cannot be read.
     """
     if not source:
         raise FileError("no configuration file: the path is empty; name a TOML file")
@@ -57,11 +59,11 @@ def text_of_file(source: str, what: str = CONFIGURATION) -> str:
 
 
 def _content(source: str, regular: bool) -> bytes:
-    """Read no more of a file than shows that it is too large; ValueError if it is not regular."""
+    """Read a file up to the largest size plus one byte; ValueError if it is not regular."""
     if source == "-":
         with open(0, "rb", closefd=False) as file:
             return file.read(LARGEST_FILE + 1)
-    # A pipe is opened without waiting for its writer, and then refused.
+    # Non-blocking: opening a pipe would wait for its writer; it is then rejected.
     more = getattr(os, "O_NONBLOCK", 0) if regular else 0
     with open(source, "rb", opener=lambda path, flags: os.open(path, flags | more)) as file:
         if regular and not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
@@ -75,7 +77,7 @@ def quoted_key(name: str) -> str:
 
 
 def tables_from_toml(text: str, source: str) -> dict[str, Any]:
-    """Parse TOML text; ConfigurationError with the line and column where it stops being TOML."""
+    """Parse TOML text; ConfigurationError with the line and column of the first error."""
     try:
         if _ENDLESS_KEY.search(text):
             raise RecursionError
@@ -87,7 +89,7 @@ def tables_from_toml(text: str, source: str) -> dict[str, Any]:
         raise ConfigurationError(
             f"{source}: nested too deeply to be a configuration; tables go three levels deep"
         ) from None
-    # Not only TOMLDecodeError: endless integers and what is no Unicode are plain ValueErrors.
+    # Besides TOMLDecodeError: endless integers and invalid Unicode raise a plain ValueError.
     except ValueError as error:
         remedy = "write `key = value`, each key once, text in double quotes, tables as [name]"
         raise ConfigurationError(f"{source}: not valid TOML: {error}; {remedy}") from None
@@ -96,11 +98,11 @@ def tables_from_toml(text: str, source: str) -> dict[str, Any]:
 def with_overrides(
     tables: Mapping[str, Any], overrides: Iterable[str], source: str
 ) -> dict[str, Any]:
-    """Return the tables with ``key.path=value`` overrides applied, later ones over earlier ones.
+    """Return the tables with ``key.path=value`` overrides applied in order.
 
-    A value is read as TOML; what is not TOML is taken as text, so that ``start.kind=rest`` needs
-    no quotes. Raises ConfigurationError with one message, which calls the file ``source``, per
-    override that is not of this form or goes through a value.
+    A value that is not TOML is a text, so that ``start.kind=rest`` needs no quotes. Raises
+    ConfigurationError with one message per override that has another form or passes through a
+    value; the messages call the file ``source``.
     """
     result = dict(tables)
     problems = []
@@ -129,9 +131,9 @@ def with_overrides(
 
 
 def with_value(tables: Mapping[str, Any], names: list[str], value: Any) -> dict[str, Any]:
-    """Return a copy of nested tables in which one value is replaced, or removed by None.
+    """Return a copy of nested tables in which one value is replaced; None removes it.
 
-    Raises KeyError with the path that would have to be a table and is a value.
+    Raises KeyError with the path of a value that would have to be a table.
     """
     head, *rest = names
     result = dict(tables)
@@ -146,7 +148,7 @@ def with_value(tables: Mapping[str, Any], names: list[str], value: Any) -> dict[
 
 
 def flat_tables(tables: Mapping[str, Any], path: str = "") -> dict[str, Any]:
-    """Return the values of nested tables by their dotted paths; an empty table is a value."""
+    """Return the values of nested tables by dotted path; an empty table is a value."""
     flat: dict[str, Any] = {}
     for name, value in tables.items():
         here = f"{path}{quoted_key(name)}"
@@ -156,23 +158,24 @@ def flat_tables(tables: Mapping[str, Any], path: str = "") -> dict[str, Any]:
 
 
 def toml_text(tables: Mapping[str, Any]) -> str:
-    """Write nested tables of texts, numbers, truth values and lists as TOML, a line for each."""
+    """Write nested tables of texts, numbers, booleans and lists as TOML, one line per value."""
     flat = flat_tables(tables)
     return "".join(f"{path} = {toml_literal(value)}\n" for path, value in flat.items())
 
 
 def toml_literal(value: Any) -> str:
-    """Write one value as TOML, a mapping as an inline table; ValueError for no finite number."""
-    # JSON is TOML but for the colon, and for DEL, which TOML wants escaped.
+    """Write one value as TOML, a mapping as an inline table; ValueError if not finite."""
+    # JSON values are TOML except for the colon and for DEL, which TOML escapes.
     separators = (", ", " = ")
     text = json.dumps(value, ensure_ascii=False, allow_nan=False, separators=separators)
     return text.replace("\x7f", "\\u007f")
 
 
 def _value(text: str) -> Any:
+    """Return the value of an override."""
     try:
         parsed = tables_from_toml(f"value = {text}", "override")
     except ConfigurationError:
         return text.strip()
-    # A line break in the text could have smuggled in further keys.
+    # With a line break, the text could contain further keys.
     return parsed["value"] if parsed.keys() == {"value"} else text
