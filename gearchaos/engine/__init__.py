@@ -1,1 +1,1 @@
-"""From a configuration to the lanes of a sweep, computed block by block by the kernels."""
+"""From a configuration to computed lanes, on this machine or on a cluster."""

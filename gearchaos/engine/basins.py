@@ -1,4 +1,4 @@
-"""From a result with several starts to its basins of attraction."""
+"""Basins of attraction from a result with several starts."""
 
 from typing import NamedTuple
 

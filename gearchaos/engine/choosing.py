@@ -1,4 +1,4 @@
-"""Transient and steps of a run, chosen by trials before it begins."""
+"""Transient and steps of a run, chosen by trials before the run."""
 
 from collections.abc import Iterator, Sequence
 
@@ -13,8 +13,8 @@ from gearchaos.records.label import MOST_LABEL_POINTS
 def with_chosen_steps(run: RunPlan) -> RunPlan:
     """Return a run with the transient and the steps that its tolerance or its scene needs.
 
-    They change where a tolerance or no number of steps is configured. Where a number is configured
-    that is too coarse, the notes say so.
+    They change if a tolerance is configured, or if no number of steps is configured. If the
+    configured number of steps is too coarse, the notes say so.
 
     Parameters
     ----------
@@ -24,7 +24,7 @@ def with_chosen_steps(run: RunPlan) -> RunPlan:
     Returns
     -------
     RunPlan
-        The run with what was chosen, and with notes about it.
+        The run with the chosen steps and transient, and with notes about them.
 
     Raises
     ------
@@ -40,9 +40,9 @@ def with_chosen_steps(run: RunPlan) -> RunPlan:
 
 
 def _within_tolerance(run: RunPlan, tolerance: float) -> RunPlan:
-    """Return a run with a transient and steps that reach a tolerance on lanes that are tried."""
+    """Return a run with a transient and steps that reach a tolerance on trial lanes."""
     recording, coarsest = run.recording, run.plan.steps_per_period
-    # As many points as show a period, however few the file keeps.
+    # Enough points to find a period, even if the file keeps fewer.
     enough = min(MOST_LABEL_POINTS * run.lanes.repeats_after, recording.recorded_periods)
     recording = recording._replace(section_points=max(recording.section_points, enough))
     kept = run.plan.section_points
@@ -55,7 +55,7 @@ def _within_tolerance(run: RunPlan, tolerance: float) -> RunPlan:
         coarsest,
         tolerance,
         run.config.source,
-        # Finer steps of an exact method are no more exact.
+        # More steps do not make an exact method more exact.
         4 * coarsest if METHODS[method].exact else FINEST_GRID,
         left,
     )
@@ -66,7 +66,7 @@ def _within_tolerance(run: RunPlan, tolerance: float) -> RunPlan:
 def _texts(
     candidates: Sequence[Candidate], lanes: int, tolerance: float, tangent: bool
 ) -> Iterator[str]:
-    """Yield what was measured for each number of steps on some lanes."""
+    """Yield the measured errors for each number of steps on a number of trial lanes."""
     for tried in candidates:
         exponent = f", their exponent by {tried.exponent_error:.1e}" if tangent else ""
         yield (

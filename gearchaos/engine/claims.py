@@ -1,4 +1,4 @@
-"""What is claimed of the error of some lanes beyond what another grid shows."""
+"""Errors of lanes that a comparison of two grids does not show."""
 
 from collections.abc import Sequence
 
@@ -12,7 +12,7 @@ from gearchaos.records.difference import Solution
 
 
 def columns_of(system: LaneSystem, kept: Sequence[str]) -> list[int]:
-    """Return the numbers of the kept states, or of all where none is kept."""
+    """Return the columns of the kept states, or of all states if none is kept."""
     return [system.states.index(name) for name in kept or system.states]
 
 
@@ -24,10 +24,10 @@ def completed(
     kept: Sequence[str],
     labelled: Labelled | None,
 ) -> Solution:
-    """Add to a solution what the transient has left, what no grid shows, and rounding.
+    """Add the remaining transient, hidden errors and rounding to a solution.
 
-    ``outcome`` and ``labelled``: the integrated lanes and their labels; ``kept``: the states whose
-    section is compared. The distance from the orbit is that of its last period.
+    ``outcome`` and ``labelled``: the integrated lanes and their labels; ``kept``: states whose
+    sections are compared. The distance from the orbit is measured over its last period.
     """
     state = outcome.end_state if labelled is None else labelled.state
     section = outcome.every(system.repeats_after).section

@@ -1,4 +1,4 @@
-"""The lanes of a run computed, block by block."""
+"""The integration of the lanes of a run, block by block."""
 
 from typing import Any
 
@@ -14,13 +14,13 @@ from gearchaos.engine.run_plan import RunPlan
 from gearchaos.interrupts import check
 
 Bounds = tuple[int, int]
-"""First lane of a block and the one behind its last, in the order of computation."""
+"""Number of the first lane of a block, and of the lane after its last, in computing order."""
 
 
 class EndStates:
-    """The states in which the lanes of a carried sweep ended, in the order of computation.
+    """The end states of the lanes of a carried sweep, in the order of computation.
 
-    Lanes that are not known have NaN. Of any other sweep nothing is kept.
+    Lanes that are not computed yet have NaN. For other sweeps nothing is stored.
     """
 
     def __init__(self, run: RunPlan) -> None:
@@ -33,13 +33,13 @@ class EndStates:
         return self._ends[max(0, first - self._side_by_side) : first]
 
     def keep(self, first: int, ends: Floats) -> None:
-        """Keep the end states (lanes, states) of the lanes from ``first`` on."""
+        """Store the end states (lanes, states) of the lanes from ``first`` on."""
         if self._ends.size:
             self._ends[first : first + len(ends)] = ends
 
 
 def rehearse(run: RunPlan, periods: int = 0) -> None:
-    """Integrate the first lane, and some mesh periods of it step by step.
+    """Integrate the first lane over some mesh periods, keeping every step.
 
     This compiles the kernel of the scene, or loads it from the cache.
     """
@@ -50,13 +50,13 @@ def rehearse(run: RunPlan, periods: int = 0) -> None:
 
 
 def block_memory(run: RunPlan, threads: int) -> int:
-    """Return about how many bytes the arrays of one block take while it is computed."""
+    """Return the approximate size in bytes of the arrays of one block during computation."""
     states, lanes = len(run.lanes.states), min(len(run.lanes), block_lanes(run, threads))
     numbers, looked = (run.recording.section_points + 4) * states, 0
     if run.plan.tangent:
         numbers += run.plan.recorded_periods
         if run.config.outputs.motion:
-            # Doubtful lanes are integrated again, a share at a time, but a whole lane at least.
+            # Doubtful lanes are integrated again, in portions of at least one lane.
             longest = 8 * numbers * LONGER_RECORDS[-1]
             looked = max(8 * numbers * lanes, longest, min(longest * lanes, LONGER_RECORD_BYTES))
     if run.config.outputs.exponents:
@@ -65,7 +65,7 @@ def block_memory(run: RunPlan, threads: int) -> int:
 
 
 def _maps_memory(run: RunPlan, lanes: int) -> int:
-    """Return about how many bytes the maps of a block of lanes take, 0 without maps."""
+    """Return the approximate size in bytes of the maps of a block of lanes, 0 without maps."""
     if not METHODS[run.plan.method].shares_maps:
         return 0
     every = len(run.lanes)
@@ -77,14 +77,14 @@ def _maps_memory(run: RunPlan, lanes: int) -> int:
 
 
 def block_lanes(run: RunPlan, threads: int) -> int:
-    """Return how many lanes make a block: work for every thread, and progress to be seen."""
+    """Return the lanes of a block: enough for every thread, few enough to show progress."""
     lanes = kernels.LANES * max(8, 2 * threads)
-    # What is left over of lanes side by side would fill no vector.
+    # A block with the remainder of the lanes side by side would not fill a vector.
     return lanes - lanes % min(lanes, run.lanes.side_by_side)
 
 
 def blocks(run: RunPlan, size: int) -> list[Bounds]:
-    """Cut a run into blocks of this number of lanes, in the order in which they are computed."""
+    """Cut a run into blocks of ``size`` lanes, in the order of computation."""
     lanes = len(run.lanes)
     return [(n, min(n + size, lanes)) for n in range(0, lanes, size)]
 
@@ -95,16 +95,16 @@ def compute(run: RunPlan, block: Bounds, before: Floats) -> dict[str, Any]:
     Parameters
     ----------
     run : RunPlan
-        The run, whose steps have been chosen.
+        The run, with chosen steps.
     block : tuple of int
         Bounds of the block, see `Bounds`.
     before : array, shape (lanes, states)
-        End states of the lanes from which a carried sweep starts, see `EndStates.before`.
+        End states from which a carried sweep starts, see `EndStates.before`.
 
     Returns
     -------
     dict of str to array, shape (lanes, ...)
-        Every variable by its name.
+        All variables by name.
     """
     places = np.arange(*block)
     start, outcome = integrate(run, places, run.recording, before)
@@ -114,18 +114,18 @@ def compute(run: RunPlan, block: Bounds, before: Floats) -> dict[str, Any]:
 def integrate(
     run: RunPlan, places: Integers, plan: kernels.Plan, before: Floats | None = None
 ) -> tuple[Floats, kernels.Outcome]:
-    """Integrate some lanes of a run by a plan.
+    """Integrate some lanes of a run with a plan.
 
     Parameters
     ----------
     run : RunPlan
         The run.
     places : array of int, shape (lanes,)
-        Places of the lanes in the order of computation; those of a carried sweep are consecutive.
+        Numbers of the lanes in the order of computation; consecutive in a carried sweep.
     plan : gearchaos_kernels.Plan
-        How they are integrated.
+        Plan of the integration.
     before : array, shape (lanes, states), optional
-        As in `compute`; without it a carried sweep begins anew.
+        As in `compute`; without it a carried sweep starts from the configured start.
 
     Returns
     -------
@@ -145,7 +145,7 @@ def integrate(
         starts.append(run.lanes.start_of(lanes))
         if run.carried:
             ends = earlier[: some.size]
-            # A lane that diverged hands nothing on: its successor begins anew.
+            # A lane that diverged has no end state: its successor has the configured start.
             on = np.isfinite(ends).all(axis=1)
             starts[-1][on] = ends[on]
         outcomes.append(kernels.integrate(run.lanes.system_of(lanes), starts[-1], plan))

@@ -1,4 +1,4 @@
-"""Blocks of lanes computed by the workers of a dask.distributed cluster."""
+"""Computation of blocks by the workers of a dask.distributed cluster."""
 
 import logging
 import re
@@ -26,24 +26,33 @@ from gearchaos.models import Configuration
 from gearchaos.progress import notice, say
 from gearchaos.version import Software, software_version
 
-BLOCKS_PER_WORKER = 2  # One that is computed, and one that waits, so that a worker need not wait.
-_HOURS_WITHOUT_WORKERS = 24.0  # Their jobs may stand in a queue.
+BLOCKS_PER_WORKER = 2
+"""One block in computation and one in the queue, so that a worker never waits."""
+_HOURS_WITHOUT_WORKERS = 24.0  # Jobs of workers may be queued for hours.
 _SECONDS_TO_IMPORT = 300.0
 _SECONDS_BETWEEN_LOOKS = 0.2
-_WORKERS_PER_CORE = (
-    8  # Each is a process of some 200 MB: with many more, a typing error fills memory.
-)
+_WORKERS_PER_CORE = 8  # Each is a process of 200 MB; the limit stops typing errors.
 
-# Ctrl-C in a terminal reaches the workers too: they finish the blocks that they have.
+# Ctrl-C in a terminal also reaches the workers: they ignore it and finish their blocks.
 _IGNORE_INTERRUPTS = "import signal; signal.signal(signal.SIGINT, signal.SIG_IGN)"
 
 
 class DaskExecutor(ExitStack):
-    """Hands blocks to the workers of a cluster; blocks of a lost worker are run again.
+    """Submits blocks to the workers of a cluster; blocks of a lost worker are computed again.
 
-    The run is not carried and its number of steps has been chosen; the address is that of a
-    scheduler, such as ``tcp://node7:8786``, or ``local:N`` for N processes here. Raises
-    ConfigurationError if N is no number of workers, ExecutionError if no scheduler answers.
+    Parameters
+    ----------
+    run : RunPlan
+        A run that is not carried, with chosen steps.
+    address : str
+        Address of a scheduler, such as ``tcp://node7:8786``, or ``local:N`` for N local processes.
+
+    Raises
+    ------
+    ConfigurationError
+        If N is not a number of workers.
+    ExecutionError
+        If no scheduler answers.
     """
 
     def __init__(self, run: RunPlan, address: str) -> None:
@@ -51,7 +60,7 @@ class DaskExecutor(ExitStack):
         self._address = address
         self._recipe = run.config.resolved_toml(), run.chosen
         for name in ("distributed", "distributed.client"):
-            # What goes wrong comes as an exception.
+            # Errors arrive as exceptions; no log is needed.
             logging.getLogger(name).setLevel(logging.CRITICAL)
         with ExitStack() as stack:
             self._client: Any = stack.enter_context(_connected(stack, address))
@@ -62,14 +71,14 @@ class DaskExecutor(ExitStack):
         say(f"{workers} dask worker{'s' if workers > 1 else ''} at {address}")
 
     def count_workers(self) -> int:
-        """Ask the cluster how many workers there are; wait for one where none is left."""
+        """Return the number of workers of the cluster; wait if there is none."""
         client, hours = self._client, _HOURS_WITHOUT_WORKERS
         try:
             while not (workers := len(_answer(client.nthreads, _patience()))):
                 say(f"{self._address}: waits up to {hours:g} h for a worker to join")
                 _answer(lambda: client.wait_for_workers(1), 3600.0 * hours)
         except KeyboardInterrupt:
-            # Nobody computes what has been handed out.
+            # There is no worker that could finish the submitted blocks.
             self.close()
             raise
         except OSError as error:
@@ -77,20 +86,21 @@ class DaskExecutor(ExitStack):
         return workers
 
     def count_blocks(self) -> int:
-        """Ask the cluster how many blocks to hand out at a time."""
+        """Return the number of blocks to submit at a time."""
         return BLOCKS_PER_WORKER * self.count_workers()
 
     def submit(self, block: Bounds) -> Future[Arrays]:
-        """Hand a block to the cluster and return the future of its arrays."""
+        """Submit a block to the cluster and return the future of its arrays."""
         future: Future[Arrays] = Future()
-        # Which of them runs is known to the workers only: all that are handed out are finished.
+        # Only the workers know which blocks run: all submitted blocks are finished.
         future.set_running_or_notify_cancel()
         inner = self._executor.submit(compute_block, SOFTWARE, *self._recipe, block)
         inner.add_done_callback(lambda done: _settle(future, done.result, self._worded))
         return future
 
     def _require_software(self) -> None:
-        # Blocks cannot even be sent to a worker without it; versions are compared with the blocks.
+        """Raise ExecutionError if a worker cannot import this package."""
+        # Without the package a worker cannot receive blocks; its version is checked per block.
         try:
             with notice(f"{self._address}: waits up to {_SECONDS_TO_IMPORT:g} s for the workers"):
                 _answer(lambda: self._client.run(find_spec, __name__), _SECONDS_TO_IMPORT)
@@ -98,6 +108,7 @@ class DaskExecutor(ExitStack):
             raise self._worded(error) from None
 
     def _worded(self, error: BaseException) -> BaseException:
+        """Return an error of the cluster as an ExecutionError, other errors as they are."""
         match error:
             case TimeoutError():
                 text = f"{error}; are scheduler and workers alive?"
@@ -119,15 +130,15 @@ def compute_block(
 ) -> dict[str, Any]:
     """Compute a block on a worker; ExecutionError if its software is not that of the client.
 
-    ``configuration`` is the resolved one in TOML; steps and transient are chosen once, not on every
-    worker.
+    ``configuration``: the resolved TOML text; ``chosen``: steps and transient, which the client has
+    chosen once for all workers.
     """
     if software != SOFTWARE:
         raise ExecutionError(
             f"the worker {distributed.get_worker().address} has {SOFTWARE}, this process "
             f"{software}: install the same on both"
         )
-    # A worker of several task threads is one of as many cores: its blocks take turns.
+    # A worker with n task threads has n cores, which compute one block at a time.
     with _ONE_AT_A_TIME:
         tasks, most = distributed.get_worker().state.nthreads, numba.config.NUMBA_NUM_THREADS
         numba.set_num_threads(min(tasks, most) if tasks > 1 else most)
@@ -140,16 +151,17 @@ _ONE_AT_A_TIME = Lock()
 
 @lru_cache(maxsize=1)
 def _run_plan(configuration: str, chosen: Chosen) -> RunPlan:
+    """Return the run of a configuration, kept for the next block."""
     return plan_run(Configuration.from_toml(configuration, "<client>")).with_choice(chosen)
 
 
 def _patience() -> float:
-    """Return for how many seconds a scheduler may be silent."""
+    """Return the number of seconds for which a scheduler may be silent."""
     return float(parse_timedelta(dask.config.get("distributed.comm.timeouts.connect")))
 
 
 def _settle(future: Future[Any], question: Callable[[], Any], worded: Callable[..., Any]) -> None:
-    """Give a future the answer to a question, or the error that comes instead, worded."""
+    """Set the result of a future, or the error of the question, in words."""
     try:
         future.set_result(question())
     except BaseException as error:
@@ -157,19 +169,20 @@ def _settle(future: Future[Any], question: Callable[[], Any], worded: Callable[.
 
 
 def _answer(question: Callable[[], Any], seconds: float) -> Any:
-    """Ask in a thread, and heed interrupts meanwhile."""
+    """Call a function in a thread and check for interrupts; TimeoutError if it takes longer."""
     future: Future[Any] = Future()
     Thread(target=_settle, args=(future, question, lambda error: error), daemon=True).start()
     began = time.monotonic()
     while not wait([future], _SECONDS_BETWEEN_LOOKS).done:
         check()
-        # What dask has to say itself once the time is up goes before this.
+        # One second later, so that a timeout message of dask itself comes first.
         if time.monotonic() - began > seconds + 1.0:
             raise TimeoutError(f"silent for {seconds:g} s")
     return future.result()
 
 
 def _connected(stack: ExitStack, address: str) -> Any:
+    """Return a client of the scheduler at an address, or of a new local cluster."""
     local = re.fullmatch(r"local:(.*)", address)
     if local is None:
         try:
@@ -180,7 +193,7 @@ def _connected(stack: ExitStack, address: str) -> Any:
                 f"--dask {address}: cannot be the address of a scheduler here ({error}); give one "
                 "such as tcp://node7:8786"
             ) from None
-        # What else is raised is up to the transport that the address names.
+        # The transport of the address may raise any other exception.
         except Exception as error:
             raise ExecutionError(
                 f"{address}: no dask scheduler answers ({error}); start one with `dask scheduler` "
@@ -188,7 +201,7 @@ def _connected(stack: ExitStack, address: str) -> Any:
             ) from None
     cores = numba.config.NUMBA_NUM_THREADS
     most = _WORKERS_PER_CORE * cores
-    # Of more digits, int() may raise an error of its own.
+    # With more digits, int() may raise another error.
     known = re.fullmatch(r"0*(\d{1,9})", local[1], re.ASCII)
     workers = int(known[1]) if known else 0
     if not 1 <= workers <= most:
@@ -204,7 +217,7 @@ def _connected(stack: ExitStack, address: str) -> Any:
 
 
 def _local_cluster(address: str, workers: int) -> Any:
-    """Start workers here; ExecutionError if one of them dies before it has joined."""
+    """Start local workers; ExecutionError if a worker ends before it has joined."""
 
     def started() -> Any:
         return distributed.LocalCluster(

@@ -14,29 +14,31 @@ CHANGE_MEANINGS = (
     "not_checked",
     "same",
     "changed",
-)  # Meanings of the values of ``motion_changed``.
+)
+"""Meanings of the values of ``motion_changed``."""
 
 CHECKED = ("section_error", "exponent_step_error", "motion_changed")
-"""Variables that the check yields."""
+"""Variables of the check."""
 
 _OF_THE_RECORD = "lyapunov_exponent_standard_error"
 _OF_KEPT = "spread of the kept section"
 
 
 def checked_lanes(numbers: Integers, share: float) -> Integers:
-    """Return which of the lanes with these numbers, of shape (lanes,), are checked.
+    """Return the indices of the checked lanes among lanes with these numbers (lanes,).
 
-    The share is spread evenly over the whole sweep and depends on the number of a lane alone.
+    The checked share is spread evenly over the whole sweep and depends on the number of a lane
+    only.
     """
     return np.flatnonzero(np.floor((numbers + 1) * share) > np.floor(numbers * share))
 
 
 def spread_of_kept(arrays: Mapping[str, Array], repeats: int) -> Floats:
-    """Return how far the kept section points of periodic lanes are from those of the last period.
+    """Return the distance of kept points of periodic lanes from their last period, (lanes,).
 
-    Shape (lanes,); not a number where a lane is not periodic or the file keeps less than a period.
-    The arrays of a block: sections (lanes, points) and ``period`` (lanes,) in excitation periods of
-    so many mesh periods.
+    NaN where a lane is not periodic or the file keeps less than a period. ``arrays``: arrays of a
+    block with sections (lanes, points) and ``period`` (lanes,) in excitation periods of ``repeats``
+    mesh periods.
     """
     status = arrays["status"]
     spread = np.full(status.shape, np.nan)
@@ -52,9 +54,9 @@ def spread_of_kept(arrays: Mapping[str, Array], repeats: int) -> Floats:
 
 
 class Tally:
-    """What the blocks of a sweep add up to: diverged lanes, and the errors of the checked ones.
+    """Counts over the blocks of a sweep: diverged lanes, and errors of the checked lanes.
 
-    ``repeats``: mesh periods in an excitation period.
+    ``repeats``: mesh periods per excitation period.
     """
 
     def __init__(self, repeats: int = 1) -> None:
@@ -79,7 +81,7 @@ class Tally:
 
     @property
     def remarks(self) -> list[str]:
-        """What a user should know of the lanes, a line each."""
+        """Remarks about the lanes for the user, one line each."""
         remarks = (
             (self.errors, self.errors),
             (
@@ -129,4 +131,5 @@ class Tally:
 
 
 def _spread(errors: Floats) -> str:
+    """Return median and maximum of errors in words."""
     return f"{np.nanmedian(errors):.1e} (median) to {np.nanmax(errors):.1e}"

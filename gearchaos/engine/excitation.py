@@ -1,4 +1,4 @@
-"""What the excitation of a sweep requires: whole periods of it, and remarks before it begins."""
+"""Requirements of the excitation: whole periods of transient and record, and remarks."""
 
 import math
 from collections.abc import Mapping
@@ -12,14 +12,14 @@ from gearchaos.errors import ConfigurationError
 from gearchaos.records.period import LONGEST_PERIOD, RETURNS
 
 LONGEST_EXCITATION = 50_000
-"""Mesh periods after which an excitation repeats, at most: a record holds some of them."""
+"""Largest excitation period in mesh periods; a record contains several."""
 
 
 def whole_lengths(lanes: Lanes) -> dict[str, int]:
-    """Return transient and record in whole excitation periods, enough of them to tell a period.
+    """Return transient and record in whole excitation periods, enough to find a period.
 
-    In mesh periods, by the names of their keys. Raises ConfigurationError if the excitation repeats
-    too late, or the record does not suit an order of which amplitudes are told.
+    The lengths are in mesh periods, by key. Raises ConfigurationError if the excitation period is
+    too long, or if the record does not have whole cycles of an order whose amplitude is requested.
     """
     integration, repeats = lanes.config.integration, lanes.repeats_after
     if repeats > LONGEST_EXCITATION:
@@ -33,7 +33,7 @@ def whole_lengths(lanes: Lanes) -> dict[str, int]:
         for name, count in least.items()
     }
     orders, record = lanes.config.outputs.mesh_orders, lengths["recorded_periods"]
-    # A choice has no fewer steps.
+    # A chosen number of steps is never smaller.
     most = (integration.steps_per_period or DEFAULT_STEPS) / 2
     if unfit := [str(one) for one in orders if record % one.denominator or one >= most]:
         whole = math.lcm(repeats, *(order.denominator for order in orders))
@@ -47,7 +47,7 @@ def whole_lengths(lanes: Lanes) -> dict[str, int]:
 
 
 def remarks(lanes: Lanes, lengths: Mapping[str, int]) -> list[str]:
-    """Return what a user should know before the sweep; ``lengths`` from `whole_lengths`."""
+    """Return remarks for the user before the sweep; ``lengths`` from `whole_lengths`."""
     system = lanes.system_of(lanes.spread(PILOT_LANES))
     parameters = {name: np.asarray(one.values) for name, one in lanes.parameters.items()}
     of_model = lanes.model.remarks(lanes.config, system, parameters)
@@ -55,7 +55,7 @@ def remarks(lanes: Lanes, lengths: Mapping[str, int]) -> list[str]:
 
 
 def _longer(lanes: Lanes, lengths: Mapping[str, int]) -> str:
-    """Return by how much the excitation makes transient and record longer than configured."""
+    """Return a remark about transient and record that the excitation makes longer."""
     repeats = lanes.repeats_after
     if repeats == 1:
         return ""

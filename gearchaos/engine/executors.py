@@ -1,9 +1,8 @@
-"""Where blocks of lanes are computed: ``submit(block)`` gives a future, and one loop waits for it.
+"""Executors of blocks of lanes: ``submit(block)`` returns a future, and one loop waits for it.
 
-A `BlockExecutor` is used as those of `concurrent.futures` are: leaving its context ends what it has
-started. Its ``count_blocks`` returns how many blocks to hand out at a time, so that nobody waits
-for the next one. The loop does not know whether a block is computed in this process or on a
-cluster.
+A `BlockExecutor` is used like those of `concurrent.futures`: leaving its context ends its work. Its
+``count_blocks`` returns the number of blocks to submit at a time, so that no worker waits for the
+next block. The loop does not depend on whether blocks are computed in this process or on a cluster.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -27,15 +26,15 @@ if TYPE_CHECKING:
 BlockExecutor: TypeAlias = "LocalExecutor | DaskExecutor"
 
 SECONDS_BETWEEN_LOOKS = 1.0
-"""How often it is looked whether somebody is there to compute, while no block ends."""
+"""Interval of checks whether there are workers, while no block ends."""
 
 
 class LocalExecutor(ExitStack):
-    """Computes in this process, one block at a time: all threads work within a block.
+    """Computes blocks in this process, one at a time: all threads share one block.
 
-    ``ends``: end states of the lanes of a carried sweep that are computed already; those of the
-    other lanes are kept there. A thread of its own leaves the main one free to write finished
-    blocks, and an interrupt, which the main thread receives, does not cost the running block.
+    ``ends``: end states of a carried sweep; those of computed lanes are stored there. A separate
+    thread computes, so that the main thread can write finished blocks. An interrupt, which the main
+    thread receives, does not lose the running block.
     """
 
     def __init__(self, run: RunPlan, ends: EndStates | None = None) -> None:
@@ -46,17 +45,18 @@ class LocalExecutor(ExitStack):
         self.callback(self._pool.shutdown, cancel_futures=True)
 
     def submit(self, block: Bounds) -> Future[Arrays]:
-        """Begin a block once those before it are done, and return the future of its arrays.
+        """Queue a block and return the future of its arrays.
 
-        Its `cancel` succeeds until the block runs.
+        The future can be cancelled until the block runs.
         """
         return self._pool.submit(self._compute, block)
 
     def count_blocks(self) -> int:
-        """Return how many blocks to hand out at a time: one that runs, and one that waits."""
+        """Return the number of blocks to submit at a time: one running, one queued."""
         return 2
 
     def _compute(self, block: Bounds) -> Arrays:
+        """Compute a block and store its end states."""
         arrays = compute(self._run, block, self._ends.before(block[0]))
         self._ends.keep(block[0], arrays["end_state"])
         return arrays
@@ -69,11 +69,11 @@ def compute_blocks(
     tally: Tally | None = None,
     done: int = 0,
 ) -> Tally:
-    """Have blocks computed, handed out in this order, and keep each as soon as it is there.
+    """Compute blocks in this order and keep each block as soon as it is finished.
 
-    ``keep(block, arrays)`` is called in this thread. Returns what the blocks add up to with those
-    of a tally, where so many lanes are done already. An interrupt lets the blocks that are running
-    end and keeps them.
+    ``keep(block, arrays)`` is called in this thread. ``tally`` and ``done``: counts, and number of
+    lanes, of blocks that are finished already. Returns the counts of all blocks. After an
+    interrupt, running blocks are finished and kept.
     """
     tally, waiting = tally or Tally(), list(reversed(blocks))
     lanes = done + sum(last - first for first, last in blocks)
@@ -99,7 +99,7 @@ def compute_blocks(
             running = {future: block for future, block in futures.items() if not future.cancel()}
             while running:
                 for future in _ended(executor, running):
-                    # What cannot be computed or kept is missing afterwards, and counted as such.
+                    # A block that fails is missing afterwards, and counted as missing.
                     with suppress(GearchaosError):
                         collect(future, running.pop(future))
             raise
@@ -109,7 +109,7 @@ def compute_blocks(
 def _ended(
     executor: BlockExecutor, futures: Mapping[Future[Arrays], Bounds]
 ) -> set[Future[Arrays]]:
-    """Wait until some blocks have ended, as long as the executor has somebody to compute them."""
+    """Return the blocks that have ended; wait for at least one while there are workers."""
     while not (ended := wait(futures, SECONDS_BETWEEN_LOOKS, FIRST_COMPLETED).done):
         executor.count_blocks()
     return ended

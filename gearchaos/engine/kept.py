@@ -1,4 +1,4 @@
-"""What a run keeps of integrated lanes: the variables of its result, and their arrays."""
+"""The kept outputs of integrated lanes: the variables of a result, and their arrays."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -67,7 +67,7 @@ def variables_of(run: RunPlan) -> list[Variable]:
 def arrays_of(
     run: RunPlan, lanes: Integers, start: Floats, outcome: kernels.Outcome
 ) -> dict[str, Any]:
-    """Return what is kept of integrated lanes, by the name of the variable."""
+    """Return the arrays (lanes, ...) of integrated lanes by variable; ``start`` (lanes, states)."""
     system, plan, outputs = run.lanes.system_of(lanes), run.plan, run.config.outputs
     sound = outcome.status == kernels.Status.OK
     arrays: dict[str, Any] = {
@@ -85,7 +85,7 @@ def arrays_of(
     arrays |= _recorded_quantities(run, system, outcome)
     for name in outputs.section:
         points = outcome.section[:, -plan.section_points :, system.states.index(name)]
-        # A copy: a view would keep alive all that was recorded.
+        # A copy: a view would keep the whole record in memory.
         arrays[f"section_{name}"] = points.copy()
     labelled = labels_of(system, outcome, run.recording) if outputs.motion else None
     if labelled is not None:
@@ -114,7 +114,7 @@ def arrays_of(
 def _recorded_quantities(
     run: RunPlan, system: kernels.LaneSystem, outcome: kernels.Outcome
 ) -> dict[str, Array]:
-    """Return what is kept of contact, loads and states; of lanes that diverged none of it."""
+    """Return contact, loads and state summaries by variable; NaN in lanes that diverged."""
     kept: dict[str, Array] = {}
     if run.plan.contact and run.splits_steps:
         for number, element in enumerate(run.elements):
@@ -136,10 +136,10 @@ def _check(
     outcome: kernels.Outcome,
     labelled: Labelled | None,
 ) -> dict[str, Array]:
-    """Integrate and label the checked lanes of a block again with half the step, and compare.
+    """Integrate the checked lanes of a block again with half the step, and compare.
 
-    Compared is what the labels know: the file may keep fewer section points. Added is what half
-    the step does not show.
+    The comparison uses the section points of the labels, because the file may keep fewer. Errors
+    that half the step does not show are added.
     """
     plan, kept = run.recording, run.config.outputs.section
     share = run.config.integration.error_check
@@ -166,9 +166,9 @@ def _check(
 def state_summary(
     outcome: kernels.Outcome, plan: kernels.Plan, signals: Sequence[str]
 ) -> dict[str, Floats]:
-    """Return extremes of the states of a plan, and amplitudes at its orders, by name.
+    """Return extremes of the states of a plan, and amplitudes at its orders, by variable.
 
-    ``signals``: name of the observed signal of which there are amplitudes.
+    ``signals``: names of the observed signals with amplitudes.
     """
     found: dict[str, Floats] = {}
     for number, state in enumerate(plan.states):

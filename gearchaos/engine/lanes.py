@@ -1,4 +1,4 @@
-"""The lanes of a configured sweep: their axes, and the system and the start of any of them."""
+"""The lanes of a configured sweep: their axes, systems and starts."""
 
 import math
 from collections.abc import Sequence
@@ -18,20 +18,32 @@ from gearchaos.outputs.names import DIRECTION, HARMONIC, REALISATION, START, axi
 from gearchaos.outputs.variable import Variable, coordinate
 
 _DRAWS_PER_LANE = 12
-"""Random numbers set aside per lane: a multiple of the four that one Philox counter yields."""
+"""Random numbers reserved per lane, a multiple of `_PHILOX_WIDTH`."""
 
 _PHILOX_WIDTH = 4
+"""Random numbers per Philox counter."""
 
 
 class Lanes:
-    """The product of all axes as a flat list, the last axis running fastest.
+    """The product of all axes as a list of lanes; the last axis varies fastest.
 
-    A lane's result depends on its number in this list and nothing else. ``axes``: a coordinate for
-    each dimension, the second swept parameter, the first one, the drawn gear pair, the start, the
-    direction, those that there are; ``effects``: those that act on what is kept, and ``states``:
-    those that they leave; ``starts``: of one value, or pair of values, with one gear pair;
-    ``directions``, in which states are carried; ``repeats``: lanes of one value, or pair of values,
-    with all its gear pairs, starts and directions.
+    The result of a lane depends on its number in this list only.
+
+    Attributes
+    ----------
+    axes : list of Variable
+        Coordinates of the axes that exist, in the order second swept parameter, first swept
+        parameter, realisation, start, direction.
+    effects : tuple of str
+        Effects that act on the outputs.
+    states : tuple of str
+        States with these effects.
+    starts : int
+        Starts per realisation.
+    directions : int
+        Directions of a carried sweep, otherwise 1.
+    repeats : int
+        Lanes per value, or pair of values, of the swept parameters.
     """
 
     def __init__(self, config: Configuration) -> None:
@@ -41,7 +53,7 @@ class Lanes:
         self.axes = [
             axis_of(config.parameters[name], one, self.model) for name, one in self._values.items()
         ]
-        # What the system of a lane depends on, in the order of the axes.
+        # Parameters of the system of a lane, in the order of the axes.
         self._of_systems: dict[str, Array] = dict(self._values)
         numbers = config.realisations
         if numbers.size > 1:
@@ -67,7 +79,7 @@ class Lanes:
 
     @cached_property
     def repeats_after(self) -> int:
-        """Mesh periods after which the excitation of every lane repeats."""
+        """Mesh periods per excitation period, for all lanes."""
         return self.system_of(np.arange(1)).repeats_after
 
     @cached_property
@@ -77,15 +89,15 @@ class Lanes:
 
     @property
     def side_by_side(self) -> int:
-        """Lanes that wait for no other: of a carried sweep one of each line, otherwise all."""
+        """Lanes that can be computed at once: in a carried sweep one per line, otherwise all."""
         carried = self.config.start.carry != "none"
         return len(self) // (swept_values(self.config.sweep).size if carried else 1)
 
     def computed_at(self, places: Integers) -> Integers:
-        """Return the lanes at some places in the order of computation.
+        """Return the lanes at positions (lanes,) in the order of computation.
 
-        A carried sweep takes a lane of each line along the first swept parameter, then the next one
-        of each; any other sweep goes through its list.
+        A carried sweep computes the first lane of every line along the first swept parameter, then
+        the second of every line, and so on. Other sweeps are computed in the order of the list.
         """
         carry, values = self.config.start.carry, swept_values(self.config.sweep).size
         if carry == "none":
@@ -100,7 +112,7 @@ class Lanes:
         return np.ravel_multi_index(place, (lines, values, repeats, directions))
 
     def values_of(self, lanes: Integers) -> dict[str, Floats]:
-        """Return the value of each swept parameter in some lanes, and the number of the pair."""
+        """Return the value of each swept parameter, and the realisation, of some lanes (lanes,)."""
         index = np.unravel_index(lanes, self.shape)
         found = zip(self._of_systems.items(), index, strict=False)
         return {parameter: values[at] for (parameter, values), at in found}
@@ -111,17 +123,17 @@ class Lanes:
 
     def start_of(self, lanes: Integers) -> Floats:
         """Return the configured start states of some lanes, shape (lanes, states)."""
-        # Both directions of a carried sweep begin alike.
+        # Both directions of a carried sweep have the same start.
         return start_states(self.config, self.system_of(lanes), lanes // self.directions)
 
     def spread(self, count: int) -> Integers:
-        """Return the numbers of at most so many lanes, spread evenly over all."""
+        """Return the numbers of at most ``count`` lanes, spread evenly over the sweep."""
         chosen = np.linspace(0, len(self) - 1, min(count, len(self)))
         return np.unique(chosen.round().astype(np.intp))
 
     @property
     def parameters(self) -> dict[str, Variable]:
-        """The parameters of the model that some effect needs, with their origin."""
+        """Parameters of the model that its effects need, with their origin."""
         names = [axis_name(parameter) for parameter in self._values]
         sizes = [values.size for values in self._values.values()]
         values = dict(zip(self._values, np.ix_(*self._values.values()), strict=True))
@@ -132,13 +144,13 @@ class Lanes:
 
 
 def _kept(one: ParameterValue, names: Sequence[str], sizes: Sequence[int]) -> Variable:
-    """Return a parameter as a result keeps it; ``names``, ``sizes``: of the swept axes."""
+    """Return a parameter as a result variable; ``names``, ``sizes``: of the swept axes."""
     value, origin = one.value, one.origin
     dims: tuple[str, ...] = (HARMONIC,) if one.is_list else ()
     if np.ndim(value) > 0 and not dims:
         origin = "swept"
         along = [n for n, size in enumerate(np.shape(value)) if size > 1]
-        # With one value on the axis nothing shows whether the parameter depends on it.
+        # With one value per axis, the shape does not show on which axes the parameter depends.
         along = along or list(range(len(names)))
         dims = tuple(names[n] for n in along)
         value = np.broadcast_to(np.squeeze(value), [sizes[n] for n in along])
@@ -156,8 +168,8 @@ def axis_of(parameter: Parameter, values: Floats, model: Model) -> Variable:
 def start_states(config: Configuration, system: LaneSystem, numbers: Integers) -> Floats:
     """Return the start states, shape (lanes, states), of lanes with this system.
 
-    ``numbers`` (lanes,): those that they have in the whole sweep: the random state of a lane
-    depends on its number and the seed alone.
+    ``numbers`` (lanes,): numbers of the lanes in the whole sweep. The random state of a lane
+    depends on its number and the seed only.
     """
     values: dict[Any, Any] = dict.fromkeys(system.states, 0.0)
     kind, spread = config.start.kind, config.start.spread
@@ -179,7 +191,7 @@ def start_states(config: Configuration, system: LaneSystem, numbers: Integers) -
         for name, (low, high) in box.items():
             place = draws[:, config.states.index(name)]
             values[name] = (low + high) / 2.0 + (high - low) / 2.0 * place
-    # What starts in a state that nothing kept depends on is not computed.
+    # States on which no output depends are left out.
     columns = [np.broadcast_to(values[name], system.lanes) for name in system.states]
     return np.stack(columns, axis=1).astype(np.float64)
 

@@ -1,4 +1,4 @@
-"""Where a result comes from: versions, processor, threads, time, commit."""
+"""The provenance of a result: versions, processor, threads, time, commit."""
 
 import platform
 import subprocess
@@ -13,11 +13,11 @@ from gearchaos_kernels import source_hash
 from gearchaos.version import Software, software_version
 
 SOFTWARE = Software(f"gearchaos {software_version()}", source_hash())
-"""That of this process. Not asked for later: somebody may edit a source that was imported."""
+"""Software of this process, read at import because sources may be edited afterwards."""
 
 
 def provenance(seconds: float) -> dict[str, str | int | float]:
-    """Return what a result file says about the run that made it in so many seconds."""
+    """Return the provenance of a result that took a number of seconds, as metadata."""
     facts: dict[str, str | int | float] = {
         "created": datetime.now(UTC).isoformat(timespec="seconds"),
         **SOFTWARE._asdict(),
@@ -33,7 +33,7 @@ def provenance(seconds: float) -> dict[str, str | int | float]:
 
 
 def commit_of(clone: Path) -> str:
-    """Return the commit that a folder is at, with "-dirty" after changes; "" if it is no clone."""
+    """Return the commit of a clone, with "-dirty" after changes; empty if it is not a clone."""
     if not (clone / ".git").exists():
         return ""
     command = ["git", "-C", str(clone), "describe", "--always", "--dirty", "--abbrev=40"]

@@ -1,4 +1,4 @@
-"""The lanes of a result computed again, or others between them, or going on from their ends."""
+"""Lanes of a result that are computed again, refined, or continued from their ends."""
 
 from typing import NamedTuple
 
@@ -19,6 +19,7 @@ from gearchaos.results.reading.stage_table import labelled_lanes
 MOST_CHAOTIC_LANES = (
     25  # Chaotic lanes that are tried, spread evenly over the sweep: they bound the cost.
 )
+"""Largest number of chaotic lanes that are tried, spread over the sweep: it limits the cost."""
 
 
 def stored_text(result: Result, name: str, attribute: str) -> str:
@@ -32,9 +33,9 @@ def stored_text(result: Result, name: str, attribute: str) -> str:
 
 
 def computable(result: Result, name: str) -> Configuration:
-    """Return the configuration with which lanes of a result can be computed again, or go on.
+    """Return the configuration with which lanes of a result can be recomputed or continued.
 
-    Messages call the result ``name``. Raises FileError if it does not hold its configuration.
+    Messages call the result ``name``. Raises FileError if it does not contain its configuration.
     """
     text = stored_text(result, name, "configuration_resolved")
     config = Configuration.from_toml(text, f"{name} (configuration_resolved)")
@@ -42,7 +43,7 @@ def computable(result: Result, name: str) -> Configuration:
     fixed = {p: result.fixed[axis_name(p)] for p in parameters if axis_name(p) in result.fixed}
     if fixed:
         config = config.at(fixed)
-    # The steps and periods that were taken, not those from which they were chosen or raised.
+    # The steps and periods of the computation, which may differ from the configured ones.
     taken = {
         f"integration.{key}": int(result.metadata[key])
         for key in ("steps_per_period", "transient_periods", "recorded_periods")
@@ -62,7 +63,8 @@ def computable(result: Result, name: str) -> Configuration:
 def refinable(result: Result, name: str) -> Configuration:
     """Return the configuration with which lanes between those of a result can be computed.
 
-    As `computable`, and raises ConfigurationError if its lanes do not stand for themselves.
+    Errors are those of `computable`; ConfigurationError if a lane depends on its number or on other
+    lanes.
     """
     config = computable(result, name)
     start = config.start
@@ -79,11 +81,28 @@ def refinable(result: Result, name: str) -> Configuration:
 
 
 def continued(lane: Result, name: str, begin: str = "end") -> Configuration:
-    """Return the configuration of the motion that goes on from the end of a lane of a result.
+    """Return the configuration of the motion that continues from the end of a lane.
 
-    All axes of the result, which messages call by a name, are fixed; no transient is left out. To
-    ``begin`` at its "start" repeats the lane, transient and all. Raises FileError if it holds no
-    configuration, ConfigurationError if the lane diverged.
+    Parameters
+    ----------
+    lane : Result
+        A result with all axes fixed.
+    name : str
+        Name of the result in messages.
+    begin : str
+        "end" continues the lane without a transient; "start" repeats it, transient included.
+
+    Returns
+    -------
+    Configuration
+        The configuration, with the whole scene that the lane was computed with.
+
+    Raises
+    ------
+    FileError
+        If the result does not contain its configuration.
+    ConfigurationError
+        If the lane diverged.
     """
     config, ended = computable(lane, name), lane[f"{begin}_state"].tolist()
     if not np.isfinite(ended).all():
@@ -94,7 +113,7 @@ def continued(lane: Result, name: str, begin: str = "end") -> Configuration:
     state = dict(zip(lane.variables["state"].flags, ended, strict=True))
     for key, value in {
         "start": {"kind": "given", "state": state},
-        # States that the file lacks would begin far from where they settle.
+        # States that are missing in the file would start far from their orbits.
         "scene.effects": config.needed_effects,
     }.items():
         config = config.replace(key, value)
@@ -102,7 +121,17 @@ def continued(lane: Result, name: str, begin: str = "end") -> Configuration:
 
 
 class Survival(NamedTuple):
-    """Of so many chaotic lanes tried, how many are still chaotic after so many more records."""
+    """The chaotic lanes that stay chaotic over further records.
+
+    Attributes
+    ----------
+    records : int
+        Number of further records.
+    lanes : int
+        Number of lanes that were tried.
+    outlasting : int
+        Number of lanes that are still chaotic.
+    """
 
     records: int
     lanes: int
@@ -110,17 +139,17 @@ class Survival(NamedTuple):
 
     @property
     def text(self) -> str:
-        """One line for a person."""
+        """The numbers in one line."""
         tried = f"{self.outlasting} of {self.lanes} lanes that were tried"
         return f"chaotic: {tried} outlast {self.records} records"
 
 
 def survival(config: Configuration, result: Result, records: int) -> Survival:
-    """Try how many chaotic lanes outlast so many records of their own length.
+    """Count the chaotic lanes that are still chaotic after a number of further records.
 
-    A lane outlasts them if a disturbance still grows over the later half of the last one, at the
-    pace of `CHAOTIC_GROWTH` over a record. ``config`` is from `computable`; the result, which it
-    computed, has one axis.
+    A lane is still chaotic if a disturbance grows over the later half of the last record at the
+    rate of `CHAOTIC_GROWTH` per record. ``config``: from `computable`, of ``result``, which has one
+    axis.
     """
     chaotic = np.flatnonzero(labelled_lanes(result).labels == "chaotic")
     if not chaotic.size:

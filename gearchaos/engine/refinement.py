@@ -1,4 +1,4 @@
-"""The boundaries between the stages of a sweep, found more exactly than its lanes lie."""
+"""Boundaries between the stages of a sweep, located more precisely than by its lanes."""
 
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
@@ -28,19 +28,31 @@ from gearchaos.results.reading.result import Result
 from gearchaos.results.reading.stage_table import Stage, label_text
 
 FOLLOWED_WIDTH = 2.0**-16
-"""Share of its way to which the end of an orbit is located: next to a fold a multiplier nears +1
-like the root of the distance, so that a coarse end tells nothing."""
+"""Share of the way to which the end of an orbit is located.
+
+Next to a fold, a multiplier approaches +1 like the square root of the distance. A coarser end would
+not identify the loss of stability.
+"""
 
 NO_LOSS = (StabilityLoss.STAYS_STABLE, StabilityLoss.UNCONFIRMED, StabilityLoss.NOT_FOLLOWED)
+"""Results without a loss of stability of the followed orbit."""
 
 
 class Boundary(NamedTuple):
-    """Where one stage ends, between two computed lanes.
+    """The boundary between two stages.
 
-    ``below``, ``above``: values of the swept parameter; ``label_below``, ``label_above``: the
-    labels there; ``loss``: how the periodic orbit beside it loses stability, empty where there is
-    none; ``multiplier``: the Floquet multiplier that tells, NaN where none does; ``direction``: in
-    which a carried sweep jumps there.
+    Attributes
+    ----------
+    below, above : float
+        Values of the swept parameter on both sides.
+    label_below, label_above : str
+        Labels there.
+    loss : str
+        How the periodic orbit next to the boundary loses stability, empty without one.
+    multiplier : complex
+        Floquet multiplier at the loss, NaN without one.
+    direction : str
+        Direction in which a carried sweep jumps at the boundary, otherwise empty.
     """
 
     below: float
@@ -55,12 +67,11 @@ class Boundary(NamedTuple):
 def refined_boundaries(
     config: Configuration, result: Result, stages: list[Stage], width: float
 ) -> list[Boundary]:
-    """Bisect every boundary between two stages, and tell what the orbits beside it do.
+    """Bisect every boundary between two stages, and follow the orbits next to it.
 
-    All boundaries are bisected side by side, with one batch of lanes per round, until the two lanes
-    on either side are no farther apart than ``width``. A boundary is where the label of the lane
-    below ends: where bisection meets a third motion, that counts as the other side. ``config`` is
-    from `refinable`, the stages are those of this result.
+    All boundaries are bisected together, with one batch of lanes per round, until the lanes on both
+    sides are at most ``width`` apart. A boundary is the end of the label below: any other label
+    counts as the upper side. ``config``: from `refinable`; ``stages``: of this result.
     """
     if len(stages) < 2:
         return []
@@ -87,13 +98,12 @@ def refined_boundaries(
 def refined_map(
     config: Configuration, result: Result, width: float
 ) -> tuple[dict[float, list[Boundary]], int]:
-    """Find the boundaries in all rows of a map to this width, without a look at orbits.
+    """Find the boundaries in all rows of a map to a width, without following orbits.
 
-    Halved, round by round, are the stretches of a row between two lanes that move differently, and
-    those beside which, in the row above or below, a lane moves differently: so islands and windows
-    are found that no lane of their own row shows. Returns the boundaries of each value of the
-    second parameter that has any, and the number of lanes that this takes. ``config`` is from
-    `refinable`, the axes of the result are its two sweeps.
+    Each round halves the stretches between two lanes of a row with different labels. It also halves
+    stretches with a different label next to them in the row above or below, which finds islands and
+    windows between the lanes of a row. Returns the boundaries by value of the second parameter, and
+    the number of computed lanes. ``config``: from `refinable`, with two sweeps.
     """
     run = plan_run(config)
     first, second = (sweep.parameter for sweep in config.sweeps.values())
@@ -131,18 +141,18 @@ def refined_map(
 def refined_jumps(
     config: Configuration, result: Result, stretches: list[Apart], width: float
 ) -> list[Boundary]:
-    """Follow the motions of both directions to where they end and the sweep jumps.
+    """Follow the motions of both directions to their ends, where the sweep jumps.
 
-    ``config`` is from `computable`, the stretches, in which directions differ, are those of this
-    result. Where a motion has no orbit, or it goes on, a jump lies between two lanes; elsewhere its
-    place is known to the width.
+    ``config``: from `computable`; ``stretches``: of this result, where the directions differ.
+    Without an orbit, or if the orbit continues, a jump is located between two lanes; otherwise to
+    ``width``.
     """
     found: list[Boundary] = []
     outermost = np.array([(one.first, one.last) for one in stretches], np.intp).reshape(-1, 2).T
     ways = zip(WAYS, directions_of(result), outermost[::-1], (1, -1), strict=True)
     for way, one_way, end, step in ways:
         edges = _edges_of(one_way)
-        # Next to its end a lane may still be on its way: the orbit is that of the lane before.
+        # The last lane may still be in its transient: take the orbit of the lane before.
         inner = np.clip(end - step, *outermost)
         there = (end + step >= 0) & (end + step < edges.size)
         last, beyond = edges[end[there]], edges[end[there] + step]
@@ -163,7 +173,7 @@ def refined_jumps(
 
 
 def _edges_of(result: Result) -> Array:
-    """Return the edges that the lanes of a result with labels are, in their order."""
+    """Return the lanes of a result with labels as edges, in their order."""
     columns = [result.lanes(name) for name in (*LABELS, "end_state")]
     edges = _edges(result.along(result.axis), result.variables["motion"].flags, *columns)
     if "return_distance" in result:
@@ -175,7 +185,7 @@ def _edges_of(result: Result) -> Array:
 def _edges(
     values: Floats, flags: Sequence[str], motion: Array, period: Array, state: Floats
 ) -> Array:
-    """Return of each lane value, label, period, state, and whether that is far from its orbit."""
+    """Return value, label, period, state, and whether the state is far from its orbit, per lane."""
     fields = [("value", "f8"), ("label", object), ("period", "i4"), ("far", "?")]
     edges = np.zeros(values.size, [*fields, ("state", "f8", state.shape[1:])])
     edges["value"], edges["period"], edges["state"] = values, period, state
@@ -185,7 +195,7 @@ def _edges(
 
 
 def _computed(run: RunPlan, values: Mapping[str, Floats]) -> Array:
-    """Compute lanes at values of the swept parameters, the first one first, as the sweep would."""
+    """Compute lanes at values of the swept parameters (lanes,), with the start of the sweep."""
     config, plan = run.config, run.recording
     (axis, *_), found = values.values(), []
     size = block_lanes(run, numba.get_num_threads())
@@ -202,8 +212,8 @@ def _computed(run: RunPlan, values: Mapping[str, Floats]) -> Array:
 def _losses(
     config: Configuration, below: Array, above: Array, spacing: Floats
 ) -> list[tuple[str, complex]]:
-    """Follow the orbits below a boundary upwards, and those above it downwards."""
-    # Close to a bifurcation the label changes a little before or after it: one lane further.
+    """Follow the orbits below each boundary upwards and those above it downwards."""
+    # Labels change slightly before or after a bifurcation: follow one lane further.
     upwards = _followed(config, below, above["value"] + spacing)
     downwards = _followed(config, above, below["value"] - spacing)
     losses = []
@@ -219,13 +229,15 @@ def _losses(
 
 
 def _followed(config: Configuration, edge: Array, last: Floats, width: float = np.inf) -> Followed:
+    """Follow the orbits of edges (lanes,) to the values ``last`` (lanes,)."""
+
     def system(values: Floats) -> LaneSystem:
         return system_of(config, {config.sweep.parameter: values}, config.needed_effects)
 
     first, state = edge["value"], edge["state"].copy()
     lanes = np.flatnonzero(edge["far"])
     if lanes.size:
-        # Where a longer look told the orbit, the end of the record may be far away.
+        # If a longer record was labelled, the end of the first record may be far from the orbit.
         longer = sum(LONGER_RECORDS) * config.integration.recorded_periods
         further = plan_of(config, transient_periods=longer, recorded_periods=0)
         state[lanes] = integrate(system(first[lanes]), state[lanes], further).end_state

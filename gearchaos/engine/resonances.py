@@ -1,4 +1,4 @@
-"""Where mesh orders meet the eigenfrequencies of a sweep, and its static deflection."""
+"""Resonances of mesh orders with eigenfrequencies over a sweep, and its static deflection."""
 
 from typing import Any, NamedTuple
 
@@ -10,29 +10,29 @@ from gearchaos.engine.lanes import Lanes
 from gearchaos.models.registry import system_of
 
 ORDERS = (1, 2, 3)
-"""Multiples of the mesh frequency that are told."""
+"""Multiples of the mesh frequency that are reported."""
 
-EXAMINED_LANES = 256  # Lanes that are looked at, spread evenly over the sweep.
+EXAMINED_LANES = 256
+"""Largest number of lanes that are examined, spread evenly over the sweep."""
 
 UNIT, MESH_FREQUENCY = "per unit of tau", "(mesh frequency)"
 
 
 class Resonances(NamedTuple):
-    """What is known of a sweep before it runs; each value as its smallest and its largest one.
+    """Properties of a sweep that are known before it runs, each as minimum and maximum.
 
     Attributes
     ----------
     frequencies : array, shape (modes, 2)
-        Eigenfrequencies, angular per unit of tau.
+        Angular eigenfrequencies per unit of tau.
     hertz, rpm : array, shape (modes, 2), or None
-        The same in Hz, and the speeds at which the mesh frequency equals them; None where the
-        scales are not known.
+        The same in Hz, and the speeds at which the mesh frequency equals them; None without scales.
     deflection : array, shape (2,)
         Static deflection in units of b'; NaN where the model has none.
     micrometres : array, shape (2,), or None
         The same in micrometres.
     contact_words, deflection_words : str
-        What both are those of, see `Model`.
+        Descriptions of contact and deflection, see `Model`.
     """
 
     frequencies: Floats
@@ -45,7 +45,7 @@ class Resonances(NamedTuple):
 
     @property
     def texts(self) -> dict[str, str]:
-        """Lines for a person, by what they are about."""
+        """Lines for a person, by subject."""
         where = f"({self.contact_words})"
         texts = {"modes": f"none that oscillates {where}"}
         if len(self.frequencies):
@@ -66,7 +66,7 @@ class Resonances(NamedTuple):
 
     @property
     def facts(self) -> dict[str, Any]:
-        """The same for programs: every value as its smallest and its largest one in the sweep."""
+        """Values for programs, each as minimum and maximum over the sweep."""
         facts: dict[str, Any] = {"eigenfrequencies": self.frequencies.tolist()}
         facts["resonant_mesh_frequencies"] = _by_order(self.frequencies)
         if self.hertz is not None:
@@ -80,7 +80,7 @@ class Resonances(NamedTuple):
 
 
 def resonances(lanes: Lanes) -> Resonances:
-    """Return the resonances of the whole scene, with the effects on which nothing kept depends."""
+    """Return the resonances of the whole scene, including effects on which no output depends."""
     config, values = lanes.config, lanes.values_of(lanes.spread(EXAMINED_LANES))
     system, scales = system_of(config, values), lanes.model.scales(config, values)
     found, bent = eigenfrequencies(system), system.static_force()
@@ -100,20 +100,23 @@ def resonances(lanes: Lanes) -> Resonances:
 
 
 def _ends(values: Floats) -> Floats:
-    """Return the smallest and the largest value over the lanes, (..., 2)."""
+    """Return minimum and maximum over the lanes, (..., 2)."""
     if np.isnan(values).all():
         return np.full((*values.shape[1:], 2), np.nan)
     return np.stack([np.nanmin(values, axis=0), np.nanmax(values, axis=0)], axis=-1)
 
 
 def _by_order(values: Floats) -> dict[str, Any]:
+    """Return values divided by each order, by order."""
     return {str(order): (values / order).tolist() for order in ORDERS}
 
 
 def _listed(values: Floats) -> str:
+    """Return all ranges in words."""
     return ", ".join(map(_span, values))
 
 
 def _span(ends: Floats) -> str:
+    """Return one range in words."""
     low, high = (f"{end:.4g}" if abs(end) < 1e4 else f"{end:.0f}" for end in ends.tolist())
     return low if low == high else f"{low} to {high}"

@@ -23,12 +23,31 @@ from gearchaos.results.reading.result import Result
 def respond(config: Given, periods: int = DEFAULT_PERIODS, threads: int | None = None) -> Result:
     """Compute the motion at every step of the last mesh periods, for every value of the sweep.
 
-    ``config``, or the path of its file: transient, recorded periods, start and scene are as
-    configured; ``periods``: mesh periods at the end of the recorded ones; ``threads``: by default
-    all that there are. The result has the variables of a sweep, and the motion along ``time``; its
-    sections hold all states of the scene in all recorded periods. Raises ConfigurationError if
-    fewer periods are recorded, the motion does not fit into memory or there are not so many
-    threads.
+    Parameters
+    ----------
+    config : Configuration or path
+        Scene, start, transient and recorded periods.
+    periods : int
+        Mesh periods at the end of the recorded periods.
+    threads : int, optional
+        Number of threads; by default all cores.
+
+    Returns
+    -------
+    Result
+        The variables of a sweep, and the motion along ``time`` in mesh periods. Sections have all
+        states of the scene in all recorded periods.
+
+    Raises
+    ------
+    ConfigurationError
+        If fewer periods are recorded, if the motion does not fit into memory, or if there are fewer
+        threads.
+
+    Examples
+    --------
+    >>> result = gearchaos.respond("sweeps/pan2021.toml", periods=4)
+    >>> result["delta_5"]
     """
     choose_threads(threads)
     config, periods = configuration_of(config), whole_number("periods", periods)
@@ -37,7 +56,7 @@ def respond(config: Given, periods: int = DEFAULT_PERIODS, threads: int | None =
 
 
 def prepared(config: Configuration, periods: int) -> RunPlan:
-    """Return the run of a response, of which the steps may still be chosen.
+    """Return the run of a response before its steps are chosen.
 
     Raises ConfigurationError if fewer periods are recorded.
     """
@@ -47,16 +66,16 @@ def prepared(config: Configuration, periods: int) -> RunPlan:
             f"{config.source}: periods = {periods}: must be between 1 and "
             f"integration.recorded_periods = {recorded}; ask for fewer or record more"
         )
-    # A scene whose axial pair acts on nothing that a sweep keeps is computed as a whole here.
+    # All states are kept, so that effects which act on no output of a sweep are computed, too.
     whole = config.replace("outputs.section", config.states)
     return plan_run(whole.replace("outputs.section_points", recorded))
 
 
 def compute_response(run: RunPlan, periods: int, text: str, fixed: str = "") -> Result:
-    """Compute all lanes of a run from `prepared`; keep the last so many mesh periods.
+    """Compute all lanes of a run from `prepared` and keep the last ``periods`` mesh periods.
 
-    ``text``: the configuration as it was written; ``fixed``: as in the metadata of the lane that
-    goes on. Raises ConfigurationError if the motion does not fit into memory.
+    ``text``: the configuration as written; ``fixed``: coordinates of the lane that is continued,
+    for the metadata. Raises ConfigurationError if the motion does not fit into memory.
     """
     plan, states, lanes = run.recording, len(run.lanes.states), len(run.lanes)
     plan = plan._replace(history_periods=periods)
@@ -88,7 +107,7 @@ def compute_response(run: RunPlan, periods: int, text: str, fixed: str = "") -> 
 
 
 def _motion(model: Model, system: LaneSystem, outcome: Outcome, plan: Plan) -> dict[str, Array]:
-    """Return states and what the model derives from them; of lanes that diverged none of it."""
+    """Return states and outputs of the model by name; NaN in lanes that diverged."""
     turned = plan.transient_periods + plan.recorded_periods - plan.history_periods
     motion: dict[str, Array] = {
         name: outcome.history[..., column].copy() for column, name in enumerate(system.states)

@@ -1,4 +1,4 @@
-"""What a run computes: the lanes of a configured sweep, and the plan of their integration."""
+"""The plan of a run: the lanes of a configured sweep, and the plan of their integration."""
 
 from dataclasses import dataclass, replace
 from typing import NamedTuple, Self
@@ -16,7 +16,15 @@ from gearchaos.records.period import POINTS_NEEDED
 
 
 class Chosen(NamedTuple):
-    """The part of a plan that trials choose before a sweep begins."""
+    """The part of a plan that trials choose before a sweep.
+
+    Attributes
+    ----------
+    steps_per_period : int
+        Steps per mesh period.
+    transient_periods : int
+        Length of the transient in mesh periods.
+    """
 
     steps_per_period: int
     transient_periods: int
@@ -24,7 +32,7 @@ class Chosen(NamedTuple):
 
 @dataclass(frozen=True)
 class RunPlan:
-    """What a run computes. It cannot be changed: choosing its steps gives another one.
+    """The lanes of a run and the plan of their integration. It is immutable.
 
     Attributes
     ----------
@@ -33,9 +41,9 @@ class RunPlan:
     lanes : Lanes
         The lanes of its sweep.
     plan : gearchaos_kernels.Plan
-        Method, steps and periods, with the section that is kept.
+        Method, steps and periods, with the kept section.
     notes : tuple of str
-        What a user should know before the run begins.
+        Notes for the user before the run.
     """
 
     config: Configuration
@@ -45,7 +53,7 @@ class RunPlan:
 
     @property
     def chosen(self) -> Chosen:
-        """The part of the plan that trials choose, for all processes that compute lanes of it."""
+        """The part of the plan that trials choose, for all processes that compute its lanes."""
         return Chosen(self.plan.steps_per_period, self.plan.transient_periods)
 
     @property
@@ -55,7 +63,7 @@ class RunPlan:
 
     @property
     def recording(self) -> kernels.Plan:
-        """The plan with everything that is recorded: what is kept, and what labels are read off."""
+        """The plan with the section points for outputs and for labels."""
         checked = POINTS_NEEDED if self.config.integration.error_check > 0.0 else 0
         wanted = MOST_LABEL_POINTS if self.config.outputs.motion else checked
         enough = min(wanted * self.lanes.repeats_after, self.plan.recorded_periods)
@@ -72,19 +80,19 @@ class RunPlan:
         return self.lanes.model.elements(self.lanes.effects)
 
     def with_choice(self, chosen: Chosen, *notes: str) -> Self:
-        """Return it with what trials have chosen, and with further notes; empty ones are none."""
+        """Return a copy with chosen steps and transient, and with further non-empty notes."""
         plan = self.plan._replace(**chosen._asdict())
         return replace(self, plan=plan, notes=(*self.notes, *filter(None, notes)))
 
     def with_notes(self, *notes: str) -> Self:
-        """Return it with further notes; empty ones are none."""
+        """Return a copy with further notes that are not empty."""
         return self.with_choice(self.chosen, *notes)
 
 
 def plan_run(config: Configuration) -> RunPlan:
-    """Return what a configured run computes, with steps that are stable in every lane.
+    """Return the plan of a configured run, with steps that are stable in every lane.
 
-    `gearchaos.engine.choosing.with_chosen_steps` makes them fine enough.
+    `gearchaos.engine.choosing.with_chosen_steps` then makes them accurate enough.
 
     Parameters
     ----------
@@ -94,12 +102,12 @@ def plan_run(config: Configuration) -> RunPlan:
     Returns
     -------
     RunPlan
-        The lanes, the plan and notes.
+        Lanes, plan and notes.
 
     Raises
     ------
     ConfigurationError
-        If the number of steps per period is unstable and may not be raised, or if the excitation
+        If the number of steps per period is unstable and must not be raised, or if the excitation
         or the record does not suit the outputs.
     """
     lanes, integration, outputs = Lanes(config), config.integration, config.outputs

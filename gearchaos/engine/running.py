@@ -1,4 +1,4 @@
-"""Run a sweep from Python: a configuration in, a result out."""
+"""A sweep in memory: a configuration in, a result out."""
 
 import math
 import os
@@ -30,11 +30,12 @@ from gearchaos.progress import say, speaking
 from gearchaos.results.reading.result import Result
 
 COMPILING = "preparing the kernel of this scene, once; this takes some seconds"
+"""Message before a kernel is compiled."""
 
 
 @contextmanager
 def compiling() -> Iterator[None]:
-    """Say so if what follows is compiled, and not only loaded from the cache."""
+    """Report if the following code compiles a kernel, instead of loading it from the cache."""
     once = cache(lambda: say(COMPILING))
     with on_compilation(once):
         yield
@@ -43,10 +44,29 @@ def compiling() -> Iterator[None]:
 def run(config: Given, threads: int | None = None, progress: bool = False) -> Result:
     """Compute a sweep in memory.
 
-    ``config``: from `load_config`, or the path of its file; ``threads``: by default all that there
-    are; ``progress``: whether to show a progress bar on stderr. The result has named arrays with
-    units; `Result.save` writes them to a file. Raises ConfigurationError if there are not so many
-    threads.
+    Parameters
+    ----------
+    config : Configuration or path
+        The configuration, or the path of its file.
+    threads : int, optional
+        Number of threads; by default all cores.
+    progress : bool
+        Whether to show a progress bar on stderr.
+
+    Returns
+    -------
+    Result
+        Named arrays with units; `Result.save` writes them to a file.
+
+    Raises
+    ------
+    ConfigurationError
+        If the configuration is wrong, or if there are fewer threads.
+
+    Examples
+    --------
+    >>> result = gearchaos.run("sweeps/pan2021.toml")
+    >>> result["lyapunov_exponent"]
     """
     choose_threads(threads)
     with speaking(quiet=not progress):
@@ -68,10 +88,10 @@ def result_of(
     facts: Mapping[str, Any],
     more: Sequence[Variable] = (),
 ) -> Result:
-    """Join blocks in the order of computation to a result, which says these facts about itself.
+    """Join blocks in the order of computation to a result with these metadata.
 
-    ``more``: what the blocks hold beside the variables of the sweep. Raises ValueError if they hold
-    anything else.
+    ``more``: variables in the blocks besides those of the sweep. Raises ValueError if the blocks
+    contain any other variable.
     """
     lanes = run.lanes
     order = np.argsort(lanes.computed_at(np.arange(len(lanes)))) if run.carried else ...
@@ -83,12 +103,12 @@ def result_of(
 
 
 def prepare(run: RunPlan, *, compile_now: bool = True, history_periods: int = 0) -> RunPlan:
-    """Compile the kernel, choose transient and steps, say the notes, and return the chosen run.
+    """Compile the kernel, choose transient and steps, print the notes, and return the run.
 
-    Raises ConfigurationError if a block of lanes, where they are computed here, does not fit into
+    Raises ConfigurationError if a block of lanes, where it is computed here, does not fit into
     memory.
     """
-    check()  # Imports take a while.
+    check()  # Imports take long enough for an interrupt.
     if compile_now:
         plan, wanted = run.plan, block_memory(run, numba.get_num_threads())
         what = f"integration.recorded_periods = {plan.recorded_periods}, outputs.section_points = "
@@ -106,8 +126,8 @@ def prepare(run: RunPlan, *, compile_now: bool = True, history_periods: int = 0)
 
 
 def require_memory(run: RunPlan, wanted: int, what: str, remedy: str) -> None:
-    """Raise a ConfigurationError if what is computed takes more bytes than this machine has."""
-    # Windows does not tell.
+    """Raise ConfigurationError if ``what`` takes more bytes than this machine has."""
+    # Windows does not report its memory here.
     known = hasattr(os, "sysconf")
     memory = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE") if known else math.inf
     if wanted > memory:
@@ -118,7 +138,7 @@ def require_memory(run: RunPlan, wanted: int, what: str, remedy: str) -> None:
 
 
 def choose_threads(threads: int | None) -> None:
-    """Use so many threads from now on, by default all; ConfigurationError if there are fewer."""
+    """Use this number of threads, by default all cores; ConfigurationError if there are fewer."""
     most = numba.config.NUMBA_NUM_THREADS
     threads = None if threads is None else whole_number("threads", threads)
     if threads is not None and not 1 <= threads <= most:
@@ -130,7 +150,7 @@ def choose_threads(threads: int | None) -> None:
 
 
 def metadata(run: RunPlan, seconds: float) -> Mapping[str, Any]:
-    """Return what a result says of itself beside its arrays, after so many seconds of wall time."""
+    """Return the metadata of a result, which took a number of seconds."""
     config, repeats = run.config, run.lanes.repeats_after
     return {
         "title": config.title,

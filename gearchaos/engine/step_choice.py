@@ -1,7 +1,7 @@
-"""The number of Runge-Kutta steps per mesh period that a scene needs, tried on some of its lanes.
+"""The number of Runge-Kutta steps per mesh period that a scene needs, from trials on some lanes.
 
-Some lanes are integrated from their start over a few mesh periods with N and with 2 N steps; what
-differs is the error of N steps. It falls 16 times when N is doubled.
+Some lanes are integrated from their start over a few mesh periods with N and with 2 N steps. The
+difference is the error of N steps. It decreases by a factor of 16 when N is doubled.
 """
 
 from functools import cached_property
@@ -18,39 +18,54 @@ from gearchaos.engine.steps import coarse_steps
 from gearchaos.interrupts import check
 
 PERIODS = 12
-"""Mesh periods that are tried: fast modes have been excited, and chaos has grown little."""
+"""Mesh periods of a trial: enough to excite fast modes, too few for chaos to grow much."""
 
 MOST_TRIED_LANES = (
     48  # Lanes that are tried, spread evenly over the sweep, and the one with the fastest mode.
 )
-LANES_COMPARED = 2048  # Lanes among which that one is looked for.
+"""Largest number of trial lanes, spread over the sweep, besides the lane with the fastest mode."""
+LANES_COMPARED = 2048
+"""Number of lanes among which the lane with the fastest mode is searched."""
 
 WRONG = 1e-2
-"""Error from which on steps are too coarse, as a part of the largest value of each state."""
+"""Error, relative to the largest value of each state, above which steps are too coarse."""
 
 WANTED = WRONG / 10.0
-"""Error with which a choice is content: lanes beside those that are tried may be worse."""
+"""Largest error of chosen steps: other lanes than the trial lanes may have a larger error."""
 
-MOST_CHOSEN = 25_600  # More steps are chosen where stability needs them, and for nothing else.
-MOST_WORK = 2e7  # Steps of all lanes together, about a second of one core.
+MOST_CHOSEN = 25_600
+"""Largest number of steps chosen for accuracy; stability may need more."""
+MOST_WORK = 2e7
+"""Largest number of steps of all lanes together, about a second of one core."""
 
-DISTURBANCE = 1e-8  # Of every state at the start, as a part of the largest value of all states.
+DISTURBANCE = 1e-8
+"""Disturbance of every state at the start, relative to the largest value of all states."""
 
 AMPLIFIED = 1e2
-"""Growth of a disturbance beyond which its lane counts as sensitive: more error is then granted.
+"""Growth of a disturbance above which a lane is sensitive and a larger error is allowed.
 
-Chaos makes any error of a step grow, so that no number of steps would be enough for long.
+Chaos amplifies every error of a step, so that no number of steps would be enough for long.
 """
 
 SMALLEST_STATE = 1e-9
-"""Largest value of a state, as a part of that of all states, below which its error is not judged.
+"""Largest value of a state, relative to all states, below which its error is not judged.
 
-What is zero but for rounding has no relative error.
+A state that is zero except for rounding has no relative error.
 """
 
 
 class Verdict(NamedTuple):
-    """Steps per period, their error in each lane that was tried, and which lanes are sensitive."""
+    """The errors of a number of steps.
+
+    Attributes
+    ----------
+    steps : int
+        Steps per mesh period.
+    error : array, shape (lanes,)
+        Error in each trial lane, relative to the largest value of each state.
+    granted : array, shape (lanes,)
+        Factor by which the error of a sensitive lane may be larger, otherwise 1.
+    """
 
     steps: int
     error: Floats
@@ -58,16 +73,16 @@ class Verdict(NamedTuple):
 
     @property
     def sensitive(self) -> Mask:
-        """Lanes in which a disturbance grows so much that their error may be larger."""
+        """Lanes in which a disturbance grows so much that a larger error is allowed."""
         return self.granted > 1.0
 
     def within(self, error: float) -> bool:
-        """Whether no lane has a larger error, sensitive ones as much as is granted to them."""
+        """Whether no lane has a larger error than this, times its factor."""
         return bool(np.all(self.error <= error * self.granted))
 
 
 def steps_for_exponents(lanes: Lanes, steps: int) -> int:
-    """Double a number of steps until it shifts no Lyapunov exponent, or there are too many."""
+    """Double a number of steps until it shifts no Lyapunov exponent, up to a limit."""
     while coarse_steps(lanes, steps) and 2 * steps <= MOST_CHOSEN:
         steps *= 2
     return steps
@@ -76,13 +91,13 @@ def steps_for_exponents(lanes: Lanes, steps: int) -> int:
 class Trial:
     """Some lanes of a sweep, integrated from their start with different numbers of steps.
 
-    ``plan``: of the sweep; its kernel is used, so that nothing else is compiled. The lanes depend
-    on the sweep alone, and so does the choice: shards, workers and threads agree on it.
-    ``limit``: fewest steps with which RK4 is stable.
+    ``plan``: plan of the sweep, whose kernel is used, so that no other kernel is compiled. The
+    trial lanes depend on the sweep only; shards, workers and threads therefore choose the same
+    steps. ``limit``: stability limit of RK4 in steps.
     """
 
     def __init__(self, lanes: Lanes, plan: Plan) -> None:
-        # Only whole records have whole cycles of an order.
+        # The short record does not have whole cycles of every order.
         self._plan = plan._replace(
             transient_periods=0, recorded_periods=PERIODS, section_points=PERIODS, orders=()
         )
@@ -91,10 +106,10 @@ class Trial:
         self._known: dict[int, Floats] = {}
 
     def verdict(self, steps: int) -> Verdict:
-        """Judge a number of steps per period against twice as many."""
+        """Judge a number of steps per period by comparison with twice as many."""
         coarse, fine = self._section(steps), self._section(2 * steps)
         error = _apart(coarse[:, -1], fine[:, -1], _scale(fine))
-        # What leaves the range of numbers with either has no error, but ends with its own status.
+        # A lane that diverges with both numbers of steps has no error; its status reports it.
         error[np.isnan(fine).any(axis=(1, 2)) & np.isnan(coarse).any(axis=(1, 2))] = 0.0
         granted = np.ones(error.size)
         if np.any(error > WANTED):
@@ -102,7 +117,7 @@ class Trial:
         return Verdict(steps, error, granted)
 
     def chosen(self, steps: int, error: float = WANTED) -> Verdict:
-        """Double a number of steps until the error is small enough, or there are too many."""
+        """Double a number of steps until the error is small enough, up to a limit."""
         verdict = self.verdict(steps)
         while not verdict.within(error) and 2 * verdict.steps <= MOST_CHOSEN:
             verdict = self.verdict(2 * verdict.steps)
@@ -115,6 +130,7 @@ class Trial:
         return self._known[steps]
 
     def _integrated(self, steps: int, start: Floats) -> Floats:
+        """Integrate from a start (lanes, states); NaN in lanes that diverge."""
         check()
         outcome = integrate(self._system, start, self._plan._replace(steps_per_period=steps))
         sound = (outcome.status == Status.OK)[:, np.newaxis, np.newaxis]
@@ -122,13 +138,13 @@ class Trial:
 
     @cached_property
     def _growth(self) -> Floats:
-        """How many times a disturbance of the start grows, with the finest steps so far, (lanes,).
+        """Growth of a disturbance of the start, with the finest steps so far, (lanes,).
 
-        It is NaN where a lane leaves the range of numbers.
+        NaN where a lane leaves the range of numbers.
         """
         steps = max(self._known)
         section = self._known[steps]
-        # One scale for all: a state that hardly moves is no sign of sensitivity.
+        # One scale for all states: a state that hardly moves does not show sensitivity.
         largest = np.nan_to_num(np.max(_scale(section), axis=1, keepdims=True), nan=1.0)
         disturbed = self._integrated(steps, self._start + DISTURBANCE * largest)
         found = _apart(disturbed[:, -1], section[:, -1], largest) / DISTURBANCE
@@ -136,10 +152,9 @@ class Trial:
 
 
 def judged_steps(lanes: Lanes, plan: Plan) -> tuple[Plan, str]:
-    """Return a plan with the steps that a sweep needs, and what to say of them.
+    """Return a plan with the steps that a sweep needs, and a note.
 
-    Those of the plan are kept where the configuration gives a number; the note then says whether
-    they are too coarse.
+    Configured steps are kept; the note then reports whether they are too coarse.
     """
     trial = Trial(lanes, plan)
     if lanes.config.integration.steps_per_period is None:
@@ -151,7 +166,7 @@ def judged_steps(lanes: Lanes, plan: Plan) -> tuple[Plan, str]:
 
 
 def choice_note(verdict: Verdict, limit: int) -> str:
-    """Word which number of steps was chosen, and why."""
+    """Return a note with the chosen number of steps and the reason."""
     lanes = verdict.error.size
     chosen = "chosen for this scene"
     if not verdict.within(WANTED):
@@ -164,9 +179,9 @@ def choice_note(verdict: Verdict, limit: int) -> str:
 
 
 def coarse_note(verdict: Verdict, better: Verdict) -> str:
-    """Word that the given number of steps is too coarse; empty where it is not.
+    """Return a note that the given number of steps is too coarse; empty if it is not.
 
-    ``better``: the verdict on the steps that would be fine enough.
+    ``better``: verdict on steps that are fine enough.
     """
     wrong = verdict.error > WRONG
     if not wrong.any():
@@ -183,6 +198,7 @@ def coarse_note(verdict: Verdict, better: Verdict) -> str:
 
 
 def _off(verdict: Verdict) -> str:
+    """Return the largest error in words."""
     largest = np.max(verdict.error)
     if not np.isfinite(largest):
         return "states leave the range of numbers"
@@ -194,10 +210,12 @@ def _off(verdict: Verdict) -> str:
 
 
 def _tried(lanes: int) -> str:
+    """Return the number of trial lanes in words."""
     return f"{lanes} lane{'' if lanes == 1 else 's'} that {'was' if lanes == 1 else 'were'} tried"
 
 
 def _sensitive_ones(verdict: Verdict) -> str:
+    """Return the number of sensitive lanes in words."""
     count = np.count_nonzero(verdict.sensitive & (verdict.error > WANTED))
     if not count:
         return ""
@@ -209,7 +227,7 @@ def _sensitive_ones(verdict: Verdict) -> str:
 
 
 def _scale(section: Floats) -> Floats:
-    """Return what errors of the states are parts of, (lanes, states)."""
+    """Return the scales of the states, (lanes, states)."""
     largest = np.max(np.abs(section), axis=1)
     least = SMALLEST_STATE * np.max(largest, axis=1, keepdims=True)
     scale: Floats = np.maximum(largest, least)
@@ -217,16 +235,16 @@ def _scale(section: Floats) -> Floats:
 
 
 def _apart(one: Floats, other: Floats, scale: Floats) -> Floats:
-    """Return how far states are apart in parts of their scale, the largest of them, (lanes,)."""
+    """Return the largest scaled difference of states (lanes, states), (lanes,)."""
     with np.errstate(all="ignore"):
         apart = np.max(np.abs(one - other) / scale, axis=1)
     return np.where(np.isnan(apart), np.inf, apart)
 
 
 def _tried_lanes(lanes: Lanes, steps: int) -> tuple[Integers, int]:
-    """Return the numbers of the lanes that are tried, and the stability limit of the fastest one.
+    """Return the numbers of the trial lanes, and the largest stability limit.
 
-    They are fewer where each takes many steps.
+    There are fewer trial lanes if each takes many steps.
     """
     many = lanes.spread(LANES_COMPARED)
     fewest = fewest_stable_steps(lanes.system_of(many))

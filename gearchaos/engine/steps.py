@@ -1,4 +1,4 @@
-"""The number of steps per mesh period of a sweep: stable in every lane, and fine enough."""
+"""The number of steps per mesh period of a sweep: stable in every lane, and accurate enough."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -26,26 +26,41 @@ from gearchaos.records.difference import Difference, Solution, bound, difference
 from gearchaos.records.label import PERIODIC, UNRESOLVED
 from gearchaos.records.period import POINTS_NEEDED, RETURNS, motion_period
 
-LANES_AT_ONCE = 2**14  # Lanes whose stability is looked at together.
-PILOT_LANES = 48  # Lanes on which the error is measured, spread evenly over the sweep.
+LANES_AT_ONCE = 2**14
+"""Number of lanes whose stability is examined together."""
+PILOT_LANES = 48
+"""Largest number of lanes on which the error is measured, spread over the sweep."""
 
 MOST_BIAS = 0.05
-"""Largest shift of an exponent by the step alone that is passed over, in parts of the exponent."""
+"""Largest shift of an exponent by the step that is ignored, relative to the exponent."""
 
-SURELY_FINE = 8  # So many times the fewest stable steps shift no exponent that matters.
+SURELY_FINE = 8
+"""Multiple of the stability limit at which steps shift no exponent that matters."""
 
 PILOT_PERIODS = 150
-"""Mesh periods in which a lane settles on its grid, and as many that are compared."""
+"""Mesh periods in which a lane settles on its grid, and mesh periods that are compared."""
 
-FINEST_GRID = 25_600  # Finest grid of the search, where the method needs one.
+FINEST_GRID = 25_600
+"""Largest number of steps of the search, where the method needs a limit."""
 
 
 class Candidate(NamedTuple):
-    """A number of steps per period and what was measured for it against a finer grid.
+    """A number of steps per period and its errors against a finer grid.
 
-    ``section_error``, ``exponent_error``: not exceeded by 95 % of the lanes that move periodically
-    on all grids, the ``periodic_share`` of them; ``changed_share``: share of the lanes that move in
-    another way; ``mode``, ``seconds``: how they were integrated and how long that took, if told.
+    Attributes
+    ----------
+    steps : int
+        Steps per mesh period.
+    section_error, exponent_error : float
+        Errors that 95 % of the lanes with a common period do not exceed.
+    changed_share : float
+        Share of the lanes that settle on a different motion.
+    periodic_share : float
+        Share of the lanes that are periodic on all grids.
+    mode : str
+        Description of the integration, if given.
+    seconds : float
+        Duration of the integration in seconds, NaN if not measured.
     """
 
     steps: int
@@ -58,18 +73,17 @@ class Candidate(NamedTuple):
 
     @property
     def error(self) -> float:
-        """The larger of the two errors; not a number where nothing is periodic."""
+        """The larger of the two errors; NaN where no lane is periodic."""
         return float(np.fmax(self.section_error, self.exponent_error))
 
 
 def stable_steps(lanes: Lanes, given: int | None) -> tuple[int, str]:
-    """Return a number of steps with which the method does not blow up, and what to say of it.
+    """Return a stable number of steps, and a note.
 
-    Where none is given, it is 200, doubled until it is stable in all lanes.
-    Raises ConfigurationError if so many steps are unstable in some lanes and may not be raised, or
-    not far enough.
+    By default the number is 200, doubled until it is stable in all lanes. Raises ConfigurationError
+    if the given number is unstable in some lanes and must not be raised, or not far enough.
     """
-    # Starts and pitch errors of one value share its stability.
+    # Starts, realisations and directions of one value have the same stability.
     every = np.arange(0, len(lanes), lanes.repeats)
     parts = np.split(every, range(LANES_AT_ONCE, every.size, LANES_AT_ONCE))
     needed = [stability.fewest_stable_steps(lanes.system_of(part)) for part in parts]
@@ -94,16 +108,16 @@ def stable_steps(lanes: Lanes, given: int | None) -> tuple[int, str]:
 
 
 def _doubled(steps: int, limit: int) -> int:
-    """Double a number of steps until it is no less than this limit, as far as steps go."""
+    """Double a number of steps until it reaches a limit, up to the largest valid number."""
     while steps < min(limit, MOST_STEPS_PER_PERIOD):
         steps *= 2
     return min(steps, MOST_STEPS_PER_PERIOD)
 
 
 def coarse_steps(lanes: Lanes, steps: int) -> str:
-    """Tell where steps that are stable are yet too few to give exponents; empty where they are not.
+    """Return a note that stable steps are too coarse for exponents; empty if they are not.
 
-    A standard error does not show it: it speaks of the length of the record.
+    A standard error does not show this, because it describes the length of the record.
     """
     system = lanes.system_of(lanes.spread(PILOT_LANES))
     method = lanes.config.integration.method
@@ -123,7 +137,7 @@ def coarse_steps(lanes: Lanes, steps: int) -> str:
 
 
 def needless_maps(lanes: Lanes, plan: Plan) -> str:
-    """Tell where flow maps are too many to be kept and fewer would do; empty where they are not."""
+    """Return a note that there are more flow maps than can be kept, and fewer would be enough."""
     enough = METHODS[plan.method].steps
     if enough is None or plan.records_steps or plan.steps_per_period <= enough:
         return ""
@@ -137,6 +151,7 @@ def needless_maps(lanes: Lanes, plan: Plan) -> str:
 
 
 def _fault(lanes: Lanes, limit: int, unstable: Integers, steps: int | None) -> Fault:
+    """Return the fault of an unstable number of steps in the lanes ``unstable``."""
     places = []
     swept = lanes.values_of(unstable)
     swept.pop(REALISATION, None)
@@ -164,11 +179,11 @@ def solution_of(
     kept: Sequence[str],
     labelled: Labelled | None = None,
 ) -> Solution:
-    """Return of integrated lanes what tells two grids apart.
+    """Return the quantities of integrated lanes that are compared between grids.
 
-    Compared is the section of the kept states, or of all where none is kept. Without labels the
-    period is read off the section, and other motions are not told from each other. No error is
-    smaller than a rounding in each step of a mesh period.
+    These are the sections of the kept states, or of all states if none is kept. Without labels, the
+    period follows from the section and other motions are not distinguished. Every error is at least
+    one rounding error per step of a mesh period.
     """
     outcome = outcome.every(system.repeats_after)
     if labelled is None:
@@ -194,13 +209,12 @@ def solution_of(
 
 
 def pilot(lanes: Lanes, plan: Plan, count: int, finest: int) -> tuple[int, Callable[..., Solution]]:
-    """Prepare to integrate some lanes of a sweep on several grids, to compare them.
+    """Prepare the integration of some lanes of a sweep on several grids, for comparison.
 
-    ``count``: lanes wanted, spread evenly over the sweep; ``finest``: steps per period of the
-    transient that all grids go on from, so that a lane comes to the same one of several coexisting
-    motions on each of them. Returned are the number of lanes that there are, and a function that
-    settles with ``(steps, resolved, method)`` and gives the `Solution`; with ``hidden=True`` it
-    also has the errors that comparing grids does not show.
+    ``count``: number of lanes; ``finest``: steps per period of the common transient, after which a
+    lane settles on the same one of several coexisting motions on each grid. Returns the number of
+    lanes that exist, and a function of ``(steps, resolved, method)`` that returns the `Solution`;
+    with ``hidden=True`` it includes the errors that a comparison of grids does not show.
     """
     numbers = lanes.spread(count)
     system = lanes.system_of(numbers)
@@ -213,7 +227,7 @@ def pilot(lanes: Lanes, plan: Plan, count: int, finest: int) -> tuple[int, Calla
 
     def solution(steps: int, resolved: bool, method: str, hidden: bool = False) -> Solution:
         check()
-        # Loads and states are not compared.
+        # Loads and summaries of states are not compared.
         grid = plan_of(
             lanes.config,
             steps_per_period=steps,
@@ -243,14 +257,13 @@ def choose_steps(
     finest: int = FINEST_GRID,
     left: float = 0.0,
 ) -> list[Candidate]:
-    """Double the steps until the error is small enough; the last candidate is the one to take.
+    """Double the steps until the error is small enough; the last candidate is the choice.
 
-    ``solution`` integrates the pilot lanes with so many steps per period, from one common state;
-    ``tolerance``: of section and exponent; ``source``: what a message calls the configuration;
-    ``finest``: steps per period beyond which only the first number is compared; ``left``: what the
-    transient of the sweep leaves of the section's error whatever the steps. Raises
-    ConfigurationError if the tolerance is not reached, with what was reached, or if no lane moves
-    periodically.
+    ``solution`` integrates the trial lanes with a number of steps per period from a common state;
+    ``tolerance``: largest error of section and exponent; ``source``: name of the configuration in
+    messages; ``finest``: limit of the steps beyond the first comparison; ``left``: distance of the
+    section from its orbit after the transient. Raises ConfigurationError, with the error that was
+    reached, if the tolerance is not reached, or if no lane is periodic.
     """
     found: dict[int, Solution] = {}
     candidates: list[Candidate] = []
@@ -279,7 +292,7 @@ def choose_steps(
 
 
 def candidate(steps: int, found: Difference, periodic: Mask) -> Candidate:
-    """Return what a difference from a finer grid, of which some lanes are periodic, tells."""
+    """Return the errors of steps from their difference to a finer grid; ``periodic`` (lanes,)."""
     return Candidate(
         steps,
         bound(found.section_error[periodic]),

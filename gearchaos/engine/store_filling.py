@@ -1,4 +1,4 @@
-"""The blocks of a sweep in its store: which of them are whose, and the missing ones computed."""
+"""The blocks of a sweep in its store: shards, and the computation of missing blocks."""
 
 import re
 from typing import NamedTuple, Self
@@ -17,21 +17,29 @@ from gearchaos.progress import complain
 from gearchaos.results.files.block_store import BlockStore
 
 BLOCKS_PER_SHARD = 4
-"""At least so many blocks for everyone, as far as there are enough lanes: shards end together."""
+"""Smallest number of blocks per shard, given enough lanes: shards then end together."""
 
 FEWEST_BLOCK_LANES, MOST_BLOCK_LANES = 8 * LANES, 128 * LANES
-"""Lanes of a block: a few threads are kept busy by the fewest, a whole node by the most."""
+"""Limits of the lanes of a block: enough for a few threads, and for a whole node."""
 
 
 class Shard(NamedTuple):
-    """The ``number``-th, from 1, ``of`` several portions of a sweep, each the work of one job."""
+    """One of several portions of a sweep, each the work of one job.
+
+    Attributes
+    ----------
+    number : int
+        Number of the portion, from 1.
+    of : int
+        Number of portions.
+    """
 
     number: int
     of: int
 
     @classmethod
     def from_text(cls, text: str) -> Self:
-        """Read ``2/8``; ConfigurationError if it is no shard."""
+        """Read ``2/8``; ConfigurationError if the text has another form."""
         found = re.fullmatch(r"(\d{1,9})/(\d{1,9})", text, re.ASCII)
         shard = cls(*map(int, found.groups())) if found else cls(0, 0)
         if not 1 <= shard.number <= shard.of:
@@ -42,18 +50,18 @@ class Shard(NamedTuple):
         return shard
 
     def blocks(self, lanes: int) -> list[Bounds]:
-        """Return the bounds of this shard's blocks of a sweep of so many lanes."""
+        """Return the bounds of this shard's blocks of a sweep with ``lanes`` lanes."""
         return shared_blocks(lanes, self.of)[self.number - 1 :: self.of]
 
 
 def shared_blocks(lanes: int, shards: int) -> list[Bounds]:
-    """Cut a sweep into blocks, whatever the machine, that so many jobs or workers share."""
+    """Cut a sweep into blocks for a number of jobs or workers, equal on every machine."""
     size = shared_block_lanes(lanes, shards)
     return [(first, min(first + size, lanes)) for first in range(0, lanes, size)]
 
 
 def shared_block_lanes(lanes: int, shards: int) -> int:
-    """Return how many lanes such a block has."""
+    """Return the number of lanes of such a block."""
     share = -(-lanes // (BLOCKS_PER_SHARD * shards))
     return min(max(LANES * -(-share // LANES), FEWEST_BLOCK_LANES), MOST_BLOCK_LANES)
 
@@ -61,7 +69,7 @@ def shared_block_lanes(lanes: int, shards: int) -> int:
 def open_store(
     run: RunPlan, output: str, *, resume: bool, shard: Shard | None = None
 ) -> BlockStore:
-    """Open the store of a sweep, see `BlockStore`; it needs not be compiled for that."""
+    """Open the store of a sweep, see `BlockStore`; no kernel is compiled."""
     return BlockStore(
         output,
         variables_of(run),
@@ -75,11 +83,11 @@ def open_store(
 
 
 def fill(run: RunPlan, store: BlockStore, cluster: str | None) -> tuple[Tally, dict[str, int]]:
-    """Compute the blocks that are missing, and keep each of them as soon as it is there.
+    """Compute the missing blocks, and store each block as soon as it is finished.
 
-    The kernel is compiled and its number of steps chosen; ``cluster`` says where dask workers
-    are, see `DaskExecutor`, and None computes in this process. Returns the tally of all own blocks,
-    the finished ones too, and what the result file says about who has computed.
+    The kernel is compiled and the steps are chosen. ``cluster``: address of a dask scheduler, see
+    `DaskExecutor`; None computes in this process. Returns the tally of all own blocks, finished
+    ones included, and metadata about the workers.
     """
     tally = Tally(run.lanes.repeats_after)
     finished, problems = store.finished(tally.add)

@@ -1,4 +1,4 @@
-"""A transient long enough for a tolerance: what is left of it is part of a section's error."""
+"""A transient that is long enough for a tolerance: its remainder is part of a section's error."""
 
 import math
 
@@ -14,9 +14,11 @@ from gearchaos.errors import ConfigurationError
 from gearchaos.interrupts import check
 from gearchaos.records.difference import bound
 
-LONGEST_FACTOR = 16  # Times the configured periods up to which a transient is raised.
+LONGEST_FACTOR = 16
+"""Largest transient, as a multiple of the configured transient and record together."""
 
-ROUNDS = 4  # Transients tried: the approach to an orbit is geometric only in the end.
+ROUNDS = 4
+"""Largest number of trials: the approach to an orbit is geometric only in the end."""
 
 
 def choose_transient(
@@ -24,33 +26,32 @@ def choose_transient(
 ) -> tuple[int, float, str]:
     """Return a transient after which the kept section is close enough to the periodic orbits.
 
-    Some lanes of the sweep are integrated as it would integrate them, and their sections compared
-    with their orbits. Where 95 % of the periodic ones are not within half the tolerance, the
-    transient is raised.
+    Some lanes are integrated as in the sweep, and their sections are compared with their orbits.
+    The transient is raised until 95 % of the periodic lanes are within half the tolerance.
 
     Parameters
     ----------
     lanes : Lanes
         Lanes of the sweep.
     recording : Plan
-        Plan of the sweep with all section points that labels are read off.
+        Plan of the sweep with all section points for labels.
     kept_points : int
-        Points of the section that the file keeps.
+        Section points in the file.
     tolerance : float
         Largest error of the section.
     count : int
-        Lanes that are tried, spread evenly over the sweep.
+        Number of trial lanes, spread evenly over the sweep.
 
     Returns
     -------
     tuple of int, float and str
-        Transient in mesh periods; distance from their orbits that 95 % of the periodic lanes do not
-        exceed behind it, 0 where none is periodic; a note, empty where nothing was raised.
+        Transient in mesh periods; distance from the orbits afterwards that 95 % of the periodic
+        lanes do not exceed, 0 if none is periodic; a note, empty if nothing was raised.
 
     Raises
     ------
     ConfigurationError
-        If the transient would be `LONGEST_FACTOR` times as long as what is configured.
+        If the transient would exceed `LONGEST_FACTOR` times the configured length.
     """
     numbers, repeats = lanes.spread(count), lanes.repeats_after
     configured = transient = recording.transient_periods
@@ -74,10 +75,10 @@ def choose_transient(
 def _left(
     lanes: Lanes, numbers: Integers, plan: Plan, kept_points: int, tolerance: float
 ) -> tuple[float, float]:
-    """Return how far some lanes are from their orbits, and what their transient is short of.
+    """Return the distance of some lanes from their orbits, and the missing transient.
 
-    Neither is exceeded by 95 % of the periodic lanes; the second, in mesh periods, is 0 where the
-    distance is within half the tolerance, or rounding.
+    95 % of the periodic lanes do not exceed either number. The second, in mesh periods, is 0 if the
+    distance is within half the tolerance or is rounding error.
     """
     check()
     system = lanes.system_of(numbers)
@@ -90,7 +91,7 @@ def _left(
     distance = float(np.nan_to_num(bound(left.of_kept)))
     if distance <= tolerance / 2.0:
         return distance, 0.0
-    # Rounding does not fall with time.
+    # The rounding error does not decrease with time.
     far = left.of_kept > np.maximum(tolerance / 4.0, 8.0 * left.section_rounding)
     further = np.where(np.isfinite(left.of_kept), 0.0, np.nan)
     further[far] = np.log(4.0 * left.of_kept[far] / tolerance) / left.decay[far]
@@ -109,6 +110,7 @@ def _raised(configured: int, transient: int, tolerance: float, distance: float) 
 def _out_of_reach(
     lanes: Lanes, tolerance: float, distance: float, transient: int, missing: float
 ) -> str:
+    """Return the message that no transient of valid length is enough."""
     return (
         f"{lanes.config.source}: integration.tolerance = {tolerance:g}: after "
         f"integration.transient_periods = {transient} the section is still {distance:.1e} away "

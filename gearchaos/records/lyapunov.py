@@ -95,8 +95,8 @@ def _slow_errors(means: Floats, periods: int, memory: Floats) -> Floats:
 
 
 def _weighted_mean(growth: Floats) -> Floats:
-    # A matrix product would sum in an order that depends on the number of lanes.
     """Return the weighted mean over the last axis (..., periods)."""
+    # A matrix product would sum in an order that depends on the number of lanes.
     means: Floats = np.sum(growth * _weights(growth.shape[-1]), axis=-1)
     return means
 
