@@ -25,9 +25,9 @@ class StabilityLoss(IntEnum):
 STABILITY_LOSS_TEXTS = (
     "period doubling: a real multiplier passes -1",
     "Neimark-Sacker: a complex pair leaves the unit circle",
-    "fold, or where the orbit goes on symmetry breaking: a real multiplier reaches +1",
+    "fold, or symmetry breaking if the orbit continues: a real multiplier reaches +1",
     "the orbit ends in one of half its period: a real multiplier reaches +1",
-    "the orbit stays stable: the motion went to one that coexists",
+    "the orbit stays stable: the motion jumped to a coexisting one",
     "not confirmed: the next orbit is unstable, but no multiplier is near the unit circle",
     "the orbit could not be followed, with no multiplier near +1",
 )
@@ -47,13 +47,14 @@ def loss_of_stability(stable: Complex, beyond: Complex) -> tuple[Codes, Complex]
     loss : array of int, shape (lanes,)
         See `StabilityLoss`.
     multiplier : array of complex, shape (lanes,)
-        The multiplier that crosses the unit circle, of a pair the one with positive imaginary part:
-        the largest multiplier beyond, or without an orbit there the largest positive multiplier
-        before; NaN where the orbit was not followed.
+        The multiplier that crosses the unit circle (of a pair, with positive imaginary part): the
+        largest one beyond, or without an orbit there the largest positive one before; else NaN.
 
-    Notes ----- A loss is confirmed if its multiplier lies within `CONFIRMED` of the unit circle on
-    both sides and moves by at most twice that distance. An orbit that ends meets an unstable orbit;
-    therefore only a real multiplier near +1 explains its end.
+    Notes
+    -----
+    A loss is confirmed if its multiplier lies within `CONFIRMED` of the unit circle on both sides
+    and moves by at most twice that distance. An orbit that ends meets an unstable orbit; only a
+    real multiplier near +1 explains its end.
     """
     positive = np.where((stable.imag == 0.0) & (stable.real > 0.0), stable.real, 0.0).max(axis=1)
     leading = beyond[:, 0]

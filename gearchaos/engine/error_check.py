@@ -127,7 +127,7 @@ class Tally:
                 f"exponent of {others.sum()} others by {_spread(exponent[others])} from the step "
                 f"and {_spread(of_record[others])} from the length of the record; "
             )
-        return f"{text}{np.count_nonzero(motion == CHANGED)} move in another way"
+        return f"{text}{np.count_nonzero(motion == CHANGED)} settle on a different motion"
 
 
 def _spread(errors: Floats) -> str:

@@ -68,6 +68,6 @@ def _longer(lanes: Lanes, lengths: Mapping[str, int]) -> str:
     shorter = " and shorter ones" if longest > 1 else ""
     text = (
         f"the {lanes.model.excitation_words} after {repeats} mesh periods, the excitation period; "
-        f"the record is long enough to tell period {longest}{shorter}"
+        f"the record is long enough to find period {longest}{shorter}"
     )
     return f"{text}; {', '.join(changed)}, whole ones of it" if changed else text

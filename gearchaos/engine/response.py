@@ -64,7 +64,7 @@ def prepared(config: Configuration, periods: int) -> RunPlan:
     if not 1 <= periods <= recorded:
         raise ConfigurationError(
             f"{config.source}: periods = {periods}: must be between 1 and "
-            f"integration.recorded_periods = {recorded}; ask for fewer or record more"
+            f"integration.recorded_periods = {recorded}; request fewer or record more"
         )
     # All states are kept, so that effects which act on no output of a sweep are computed, too.
     whole = config.replace("outputs.section", config.states)
@@ -81,7 +81,7 @@ def compute_response(run: RunPlan, periods: int, text: str, fixed: str = "") -> 
     plan = plan._replace(history_periods=periods)
     size = 8 * lanes * states * (3 * periods * plan.steps_per_period + plan.section_points)
     what = f"the response of {lanes} lanes over {periods} mesh periods of {plan.steps_per_period} "
-    require_memory(run, size, f"{what}steps", "ask for fewer periods or values")
+    require_memory(run, size, f"{what}steps", "request fewer periods or values")
     began = time.monotonic()
     places = run.lanes.computed_at(np.arange(lanes))
     start, outcome = integrate(run, np.arange(lanes), plan)

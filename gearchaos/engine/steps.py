@@ -145,8 +145,8 @@ def needless_maps(lanes: Lanes, plan: Plan) -> str:
         return ""
     return (
         f"integration.steps_per_period = {plan.steps_per_period}: lanes that differ in more than "
-        f"pitch error, load and clearance have flow maps of their own, so many that they are made "
-        f"again for every look at a lane; {enough} steps are as exact and much faster"
+        f"pitch error, load and clearance do not share flow maps, and there are too many to keep: "
+        f"each integration makes them again; {enough} steps are as exact and much faster"
     )
 
 
@@ -287,7 +287,8 @@ def choose_steps(
         steps *= 2
     raise ConfigurationError(
         f"{source}: integration.tolerance = {tolerance:g}: is not reached, but "
-        f"{candidates[-1].error:.1e} with {candidates[-1].steps} steps per period; ask for less"
+        f"{candidates[-1].error:.1e} with {candidates[-1].steps} steps per period; raise the "
+        "tolerance"
     )
 
 

@@ -338,7 +338,7 @@ def test_lanes_that_move_in_another_way_are_no_part_of_the_errors():
     assert tally.errors == (
         "3 lanes computed again with half the step: exponent of 2 others by 2.0e-03 (median) to "
         "3.0e-03 from the step and 2.0e-03 (median) to 2.0e-03 from the length of the record; "
-        "1 move in another way"
+        "1 settle on a different motion"
     )
 
 

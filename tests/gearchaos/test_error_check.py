@@ -106,7 +106,7 @@ def test_the_summary_counts_what_was_measured():
     assert tally.errors == (
         "3 lanes computed again with half the step: section of 2 periodic ones off by "
         "2.0e-06 (median) to 3.0e-06, their exponent by 1.0e-07 (median) to 1.0e-07; "
-        "1 move in another way"
+        "1 settle on a different motion"
     )
 
 

@@ -144,7 +144,7 @@ def test_the_axial_motion_is_there_where_a_sweep_would_leave_it_out():
 def test_more_periods_than_are_recorded_are_refused(periods):
     config = load_config(FULL, at(1.0))
     with pytest.raises(
-        ConfigurationError, match=r"periods = .*recorded_periods = 6; ask for fewer"
+        ConfigurationError, match=r"periods = .*recorded_periods = 6; request fewer"
     ):
         respond(config, periods)
 
