@@ -58,6 +58,7 @@ class Configuration(Tables):
 
     @classmethod
     def __pydantic_init_subclass__(cls, **_: Any) -> None:
+        """Register the class of a model by its kind."""
         Configuration.kinds[cls.kind] = cls
 
     @classmethod
@@ -234,6 +235,7 @@ class Configuration(Tables):
 
     @model_validator(mode="after")
     def _obeys_the_rules(self, info: ValidationInfo) -> Self:
+        """Raise ConfigurationError if a rule between tables is broken."""
         faults = list(_broken_rules(self, set()))
         if faults:
             raise ConfigurationError(texts(faults, (info.context or {}).get("source", "<python>")))

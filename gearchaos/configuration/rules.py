@@ -31,6 +31,7 @@ GENERIC_RULES = Rules()
 
 @GENERIC_RULES.reads("start")
 def _start_keys_belong_to_the_kind(config: Tables) -> Iterator[Fault]:
+    """Keys of [start] suit its kind, and ranges are in order and not given twice."""
     start, default = config.start, Start[str]()
     kind, boxed = start.kind, " and a box" if start.box else ""
     needed = {"given": ("state", "delta_5 = 1.0"), "grid": ("box", "delta_5 = [-2.0, 2.0]")}
@@ -65,6 +66,7 @@ def _start_keys_belong_to_the_kind(config: Tables) -> Iterator[Fault]:
 
 @GENERIC_RULES.reads("outputs", "integration")
 def _section_points_are_recorded(config: Tables) -> Iterator[Fault]:
+    """The kept section points are at most the recorded periods."""
     points, periods = config.outputs.section_points, config.integration.recorded_periods
     if points > periods:
         rule = f"must be at most integration.recorded_periods = {periods}"
@@ -74,6 +76,7 @@ def _section_points_are_recorded(config: Tables) -> Iterator[Fault]:
 
 @GENERIC_RULES.reads("outputs", "start")
 def _exponents_are_not_carried(config: Tables) -> Iterator[Fault]:
+    """All exponents are only computed without carried starts."""
     if config.outputs.exponents and config.start.carry != "none":
         rule = f'cannot be computed with start.carry = "{config.start.carry}"'
         remedy = 'set start.carry = "none", or compute the exponents in a sweep of its own'
@@ -82,6 +85,7 @@ def _exponents_are_not_carried(config: Tables) -> Iterator[Fault]:
 
 @GENERIC_RULES.reads("integration")
 def _plain_steps_are_those_of_rk4(config: Tables) -> Iterator[Fault]:
+    """Plain steps need a method that does not resolve every crossing."""
     method = config.integration.method
     if METHODS[method].always_resolved and config.integration.crossings == "plain":
         rule = f'has no meaning with integration.method = "{method}", which resolves every crossing'
@@ -90,6 +94,7 @@ def _plain_steps_are_those_of_rk4(config: Tables) -> Iterator[Fault]:
 
 @GENERIC_RULES.reads("scene", "integration")
 def _maps_know_the_effects(config: Tables) -> Iterator[Fault]:
+    """Flow maps can compute all effects of the scene."""
     effect, method = config.scene.refuses_maps(), config.integration.method
     if effect and METHODS[method].shares_maps:
         rule = f'"{effect}" cannot be computed with integration.method = "{method}"'
@@ -98,6 +103,7 @@ def _maps_know_the_effects(config: Tables) -> Iterator[Fault]:
 
 @GENERIC_RULES.reads("outputs", "integration")
 def _errors_are_measured_on_a_section(config: Tables) -> Iterator[Fault]:
+    """A tolerance or an error check needs a section."""
     if config.outputs.section:
         return
     for name in ("tolerance", "error_check"):
@@ -115,12 +121,14 @@ def unknown_parameter(config: Tables, key: str, parameter: str) -> Iterator[Faul
 
 @GENERIC_RULES.reads()
 def _parameter_is_known(config: Tables) -> Iterator[Fault]:
+    """Every swept parameter exists."""
     for table, sweep in config.sweeps.items():
         yield from unknown_parameter(config, f"{table}.parameter", sweep.parameter)
 
 
 @GENERIC_RULES.reads()
 def _parameters_differ(config: Tables) -> Iterator[Fault]:
+    """The two sweeps have different parameters."""
     parameters = [sweep.parameter for sweep in config.sweeps.values()]
     if len(set(parameters)) < len(parameters):
         remedy = "sweep another parameter, or drop [second_sweep]"
@@ -130,6 +138,7 @@ def _parameters_differ(config: Tables) -> Iterator[Fault]:
 
 @GENERIC_RULES.reads()
 def _values_are_in_range(config: Tables) -> Iterator[Fault]:
+    """All swept values are within the range of their parameter."""
     for table, sweep in config.sweeps.items():
         known = config.parameters.get(sweep.parameter)
         named = [("from", sweep.from_), ("to", None if sweep.count == 1 else sweep.to)]
@@ -146,6 +155,7 @@ def _values_are_in_range(config: Tables) -> Iterator[Fault]:
 
 @GENERIC_RULES.reads("start")
 def _lanes_are_not_too_many(config: Tables) -> Iterator[Fault]:
+    """The product of all axes is at most `MOST_RUN_LANES`."""
     counts = {f"values of [{table}]": sweep.size for table, sweep in config.sweeps.items()}
     counts[config.realisation_words] = config.realisations.size
     counts["starts"] = config.start.size

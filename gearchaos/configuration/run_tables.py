@@ -85,6 +85,7 @@ class Sweep(Table):
 
     @model_validator(mode="after")
     def _has_values(self) -> Self:
+        """Require either a list of values, or a range of distinct ascending values."""
         first, last, count = self.from_, self.from_ if self.count == 1 else self.to, self.count
         if self.values is not None and (first, self.to, count) == (None, None, None):
             return self
@@ -143,6 +144,7 @@ class Integration(Table):
     @model_validator(mode="before")
     @classmethod
     def _steps_of_the_method(cls, given: Any) -> Any:
+        """Set the default steps of the method, if it has any."""
         method = METHODS.get(str(given.get("method"))) if isinstance(given, dict) else None
         if method is not None and method.steps is not None:
             return {"steps_per_period": method.steps, **given}

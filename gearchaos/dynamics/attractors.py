@@ -149,10 +149,12 @@ def numbers_along(value: Integers, sizes: Integers, averages: Floats) -> Integer
     array of int, shape (attractors,)
         Numbers from 1 on.
 
-    Notes ----- At each value, its attractors are compared with the latest attractor of every
-    number. The pair with the smallest change of averages is matched first, up to
-    `CONTINUED_CHANGE`. An attractor that is absent at some values therefore returns with its
-    number. The remaining attractors get new numbers, the largest basin first.
+    Notes
+    -----
+    At each value, its attractors are compared with the latest attractor of every number. The pair
+    with the smallest change of averages is matched first, up to `CONTINUED_CHANGE`. An attractor
+    that is absent at some values therefore returns with its number. The remaining attractors get
+    new numbers, the largest basin first.
     """
     size = np.linalg.norm(averages, axis=(1, 2))
     numbers = np.zeros(len(value), dtype=np.intp)

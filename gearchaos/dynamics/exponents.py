@@ -63,9 +63,11 @@ def exponents(system: LaneSystem, start: Floats, plan: Plan) -> Exponents:
         precision does not resolve. Two directions are parallel after one period if their exponents
         times the mesh period differ by more than about 18.
 
-    Notes ----- An orthonormal frame of tangent vectors is orthonormalised after every mesh period,
-    also during the transient (Benettin et al. 1980). The logarithms of the stretches are averaged
-    as those of a single vector, see `largest_exponent`. `sum_of_exponents` is an exact check.
+    Notes
+    -----
+    An orthonormal frame of tangent vectors is orthonormalised after every mesh period, also during
+    the transient (Benettin et al. 1980). The logarithms of the stretches are averaged as those of a
+    single vector, see `largest_exponent`. `sum_of_exponents` is an exact check.
     """
     lanes, states = start.shape
     logarithms = _stretches(system, start, plan)
@@ -113,9 +115,11 @@ def sum_of_exponents(system: LaneSystem) -> Floats:
     array, shape (lanes,)
         Sum per unit of tau.
 
-    Notes ----- The sum is the trace of the Jacobian. Damping is constant and also acts out of
-    contact, so that the trace depends neither on contact nor on stiffness or excitation. For the
-    full scene of eq. 13 of Pan, Li, Wang 2021 it is::
+    Notes
+    -----
+    The sum is the trace of the Jacobian. Damping is constant and also acts out of contact, so that
+    the trace depends neither on contact nor on stiffness or excitation. For the full scene of eq.
+    13 of Pan, Li, Wang 2021 it is::
 
         -2 xi [cos(beta_b) (1 + m_e/m_p + m_e/m_g) + sin(beta_b) (m_e/m_p + m_e/m_g)]
         -2 (eta_11 + eta_21 + eta_12 + eta_22)

@@ -134,10 +134,12 @@ def follow(
     plan : Plan
         Method and steps per period, as for `polish`.
 
-    Notes ----- Newton's method starts from the line through the last two orbits. Steps are halved
-    where no orbit is found; the loss of stability is bisected. Where an orbit ends, or the unstable
-    orbit belongs to another branch, it is followed along its curve (`arclength`), and onwards where
-    the curve continues.
+    Notes
+    -----
+    Newton's method starts from the line through the last two orbits. Steps are halved where no
+    orbit is found; the loss of stability is bisected. Where an orbit ends, or the unstable orbit
+    belongs to another branch, it is followed along its curve (`arclength`), and onwards where the
+    curve continues.
     """
     lanes = _Lanes(system_at, guess, period, (first, last), width, plan)
     going = lanes.stable.stable

@@ -37,9 +37,11 @@ def hidden_error(
     array, shape (lanes,)
         Error per unit of tau; 0 where half the step shows it, and in lanes that are not periodic.
 
-    Notes ----- Where half the step changes the decay of a mode (`modes.hidden_decay`), the exponent
-    is compared with that of the orbit of exact flow maps. Without flow maps or without an orbit, it
-    is compared with the decay of the slowest such mode, because the orbit does not decay faster.
+    Notes
+    -----
+    Where half the step changes the decay of a mode (`modes.hidden_decay`), the exponent is compared
+    with that of the orbit of exact flow maps. Without flow maps or without an orbit, it is compared
+    with the decay of the slowest such mode, because the orbit does not decay faster.
     """
     error = np.zeros(period.size)
     if METHODS[plan.method].exact:

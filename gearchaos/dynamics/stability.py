@@ -32,10 +32,12 @@ def fewest_stable_steps(system: LaneSystem, method: str = "rk4") -> Integers:
     array of int, shape (lanes,)
         Steps per mesh period; every larger number is stable, too.
 
-    Notes ----- The branches are all combinations of contact and no contact, with the stiffness at
-    its minimum and at its maximum, see `LaneSystem.branch_stiffnesses`. A motion that visits a
-    branch only for part of the time may need fewer steps. Eigenvalues with a positive real part
-    grow by themselves and set no limit.
+    Notes
+    -----
+    The branches are all combinations of contact and no contact, with the stiffness at its minimum
+    and at its maximum, see `LaneSystem.branch_stiffnesses`. A motion that visits a branch only for
+    part of the time may need fewer steps. Eigenvalues with a positive real part grow by themselves
+    and set no limit.
     """
     system = system.measurable()
     held = (jacobian(system, stiffnesses) for stiffnesses in system.branch_stiffnesses())
@@ -78,8 +80,10 @@ def exponent_bias(system: LaneSystem, steps: int, method: str) -> tuple[Floats, 
     bias, true : array, shape (lanes,)
         Largest computed growth rate minus the true rate, and the true rate, per unit of tau.
 
-    Notes ----- With constant stiffnesses, the equations are linear. In each step the method
-    multiplies the mode of an eigenvalue lambda by R(h lambda) instead of exp(h lambda).
+    Notes
+    -----
+    With constant stiffnesses, the equations are linear. In each step the method multiplies the mode
+    of an eigenvalue lambda by R(h lambda) instead of exp(h lambda).
     """
     step, contact = system.mesh_period[:, np.newaxis] / steps, in_contact(system)
     eigenvalues = np.linalg.eigvals(jacobian(system, contact)).astype(np.complex128)

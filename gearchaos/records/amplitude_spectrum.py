@@ -39,9 +39,11 @@ def spectral_lines(values: Floats, samples_per_period: int, hann: bool = False) 
     SpectralLines
         Lines from order 0 to half the sampling frequency, spaced by one over the number of periods.
 
-    Notes ----- The rectangular window is exact for every motion that repeats within the record. The
-    Hann window reduces the leakage of motions that do not repeat. The mean is subtracted before the
-    window, so that it does not leak; the line at order 0 has the height of its magnitude.
+    Notes
+    -----
+    The rectangular window is exact for every motion that repeats within the record. The Hann window
+    reduces the leakage of motions that do not repeat. The mean is subtracted before the window, so
+    that it does not leak; the line at order 0 has the height of its magnitude.
     """
     samples = values.shape[-1]
     weights = np.ones(samples)

@@ -32,13 +32,15 @@ def largest_exponent(
     exponents, errors : array, shape (lanes,)
         Per unit of tau, NaN where the lane diverged. Errors are NaN with fewer than two periods.
 
-    Notes ----- The exponent is the average of the growth rates with weights sin^2 (weighted
-    Birkhoff average; Das, Saiki, Sander, Yorke 2017). For periodic and quasi-periodic motion its
-    error falls with the third power of the number of periods instead of the first. For chaos its
-    standard error is larger by a factor sqrt(3/2). The error follows from the same average over
-    eighths of the record that overlap by half (Welch 1967), widened by Student's t. Blocks shorter
-    than the memory depend on each other. The larger of this error and that of the slow fluctuations
-    (`_slow_errors`) is then returned.
+    Notes
+    -----
+    The exponent is the average of the growth rates with weights sin^2 (weighted Birkhoff average;
+    Das, Saiki, Sander, Yorke 2017). For periodic and quasi-periodic motion its error falls with the
+    third power of the number of periods instead of the first. For chaos its standard error is
+    larger by a factor sqrt(3/2). The error follows from the same average over eighths of the record
+    that overlap by half (Welch 1967), widened by Student's t. Blocks shorter than the memory depend
+    on each other. The larger of this error and that of the slow fluctuations (`_slow_errors`) is
+    then returned.
     """
     periods = growth.shape[1]
     exponent = _weighted_mean(growth) / period

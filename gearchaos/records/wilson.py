@@ -24,9 +24,11 @@ def wilson_interval(counted: ArrayLike, of: ArrayLike) -> Floats:
     array, shape (..., 2)
         Lower and upper bound; NaN without a trial.
 
-    Notes ----- The bounds are the shares that differ from the observed share by 1.96 of their own
-    standard deviations (Wilson 1927). Unlike the estimate plus or minus two standard errors, the
-    interval keeps its confidence for few trials and for shares near 0 and 1.
+    Notes
+    -----
+    The bounds are the shares that differ from the observed share by 1.96 of their own standard
+    deviations (Wilson 1927). Unlike the estimate plus or minus two standard errors, the interval
+    keeps its confidence for few trials and for shares near 0 and 1.
     """
     trials = np.where(np.asarray(of) > 0, of, np.nan)
     share, weight = np.asarray(counted) / trials, CONFIDENCE_95**2 / trials
