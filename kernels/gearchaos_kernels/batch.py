@@ -77,9 +77,9 @@ def integrate(
     Raises
     ------
     ValueError
-        If the method cannot integrate the system (flow maps with pitch errors tooth by tooth), if
-        amplitudes are requested of a model without observed signals, or if more tooth pairs are in
-        mesh than the model supports.
+        If the method cannot integrate the system, see `LaneSystem.refuses_maps`, if amplitudes are
+        requested of a model without observed signals, or if the system is beyond what the model
+        supports.
 
     Examples
     --------

@@ -35,7 +35,7 @@ class Plan(NamedTuple):
     method : str
         Name of the method: "rk4" or "flow_map".
     first_period : int
-        Number of mesh periods before tau = 0, for pitch errors tooth by tooth.
+        Number of mesh periods before tau = 0, for an excitation that repeats after several.
     contact : bool
         Whether contact times and impacts of every element are recorded; needs resolved crossings.
     loads : bool
