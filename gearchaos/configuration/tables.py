@@ -53,12 +53,15 @@ class Tables(Titled):
         The parameters of the model that a sweep can vary, by name.
     realisation_words : str
         What realisations are, in the plural.
+    discrete_parameters : frozenset of str
+        Parameters without values between two of their values.
     tables_of_lanes : frozenset of str
-        Tables that `lane_faults` needs free of faults of their own.
+        Tables that must be free of faults before `lane_faults` is called.
     """
 
     parameters: ClassVar[Mapping[str, Parameter]] = MappingProxyType({})
     realisation_words: ClassVar[str] = "realisations"
+    discrete_parameters: ClassVar[frozenset[str]] = frozenset()
     tables_of_lanes: ClassVar[frozenset[str]] = frozenset({"sweep", "second_sweep", "scene"})
 
     scene: Scene = key("which effects exist", default=Scene())

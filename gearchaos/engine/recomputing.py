@@ -68,11 +68,15 @@ def refinable(result: Result, name: str) -> Configuration:
     """
     config = computable(result, name)
     start = config.start
-    own = start.carry != "none" or start.kind == "random" or start.drawn
-    if own or config.sweep.parameter == "pitch_error.grade":
+    if config.sweep.parameter in config.discrete_parameters:
         raise ConfigurationError(
-            f"{name}: nothing lies between two grades, nor between lanes whose starts are carried "
-            "on, random or drawn; refine a sweep of another parameter, or from another start"
+            f"{name}: nothing lies between two values of {config.sweep.parameter}; refine a sweep "
+            "of another parameter"
+        )
+    if start.carry != "none" or start.kind == "random" or start.drawn:
+        raise ConfigurationError(
+            f"{name}: nothing lies between lanes whose starts are carried on, random or drawn; "
+            "refine a sweep from another start"
         )
     if start.kind == "grid":
         state = zip(result.variables["state"].flags, result["start_state"][0].tolist(), strict=True)

@@ -131,7 +131,7 @@ def coarse_steps(lanes: Lanes, steps: int) -> str:
         return ""
     return (
         f"{steps} steps per period shift Lyapunov exponents by about {bias[worst]:.1g} (that of "
-        f"the pair in contact is {true[worst]:.2g}), and no standard error shows it; raise "
+        f"the system in contact is {true[worst]:.2g}), and no standard error shows it; raise "
         "integration.steps_per_period, or measure it with integration.error_check"
     )
 

@@ -123,7 +123,7 @@ def test_boundaries_are_refined_with_the_gear_pair_of_the_slice(tmp_path):
     gearchaos.run(configured(grades)).save(tmp_path / "drawn.h5", overwrite=True)
     ended = run_module("gearchaos.stages", *arguments, cwd=tmp_path)
     assert (ended.code, ended.out) == (2, "")
-    assert "drawn.h5: nothing lies between two grades" in ended.err
+    assert "drawn.h5: nothing lies between two values of pitch_error.grade" in ended.err
 
 
 def test_the_truth_of_flow_maps_is_not_asked_for(tmp_path):

@@ -127,7 +127,7 @@ def test_lanes_that_do_not_stand_for_themselves_are_not_refined(result, tmp_path
     assert stages(tmp_path, "pan.h5").code == 0
     ended = stages(tmp_path, "pan.h5", "--refine", "0.01")
     assert (ended.code, ended.out) == (2, "")
-    assert "nor between lanes whose starts are carried on, random or drawn" in ended.err
+    assert "nothing lies between lanes whose starts are carried on, random or drawn" in ended.err
 
 
 def test_a_file_without_labels_or_without_its_configuration_is_told(result, tmp_path):

@@ -21,6 +21,7 @@ class GearPairConfiguration(GearPairTables, Configuration):
 
     kind = "gear_pair"
     rules = (*RULES, *GENERIC_RULES)
+    discrete_parameters = frozenset({"pitch_error.grade"})
 
     @classmethod
     def with_files(
