@@ -245,7 +245,7 @@ def test_more_flow_maps_than_are_kept_are_told():
         ([swept, finer, "integration.method=rk4"], False),
     ):
         sweep = simulation("integration.method=flow_map", *settings)
-        assert any("made again for every look" in note for note in sweep.notes) == many
+        assert any("there are too many to keep" in note for note in sweep.notes) == many
 
 
 def test_flow_maps_have_no_limit_and_say_so():
