@@ -1,1 +1,1 @@
-"""Unknown parameters of a pair, fitted to what was observed of its bifurcation diagram."""
+"""Identification of unknown parameters of a gear pair from observations of its diagram."""

@@ -1,4 +1,4 @@
-"""What the lanes of many candidates come to: all of a generation are one batch."""
+"""Integration of the lanes of many candidates; one generation is one batch."""
 
 from typing import Any, NamedTuple
 
@@ -18,24 +18,32 @@ from gearchaos.records.lyapunov import largest_exponent
 from gearchaos.records.period import period_of, return_distances
 
 RETURN = 1e-3
-"""Return distance that counts as periodic: what is compared are short runs on coarse grids."""
+"""Return distance that counts as periodic; generous, since runs are short and grids coarse."""
 
 KEPT_PERIODS = 8
-"""Mesh periods after the recorded ones over which the largest acceleration is looked for."""
+"""Mesh periods after the recorded ones from which the largest acceleration is taken."""
 
 FINER = 4
-"""How many times finer that motion is, so that its largest acceleration is not stepped over."""
+"""Refinement of the steps over these periods, so that no step misses the largest acceleration."""
 
-MOTIONS_AT_ONCE = 2**8  # Lanes whose finer motion is in memory at a time: all of its samples are.
+MOTIONS_AT_ONCE = 2**8  # Lanes with a finer motion at a time: all its samples are in memory.
 
 
 class Records(NamedTuple):
-    """What the lanes of some candidates came to, candidates first and swept values second.
+    """Results of the lanes of some candidates.
 
-    ``section`` (candidates, values, points): delta_5 once a mesh period; ``period``: in mesh
-    periods, 0 where the motion is not periodic; ``exponent``: per unit of tau; both are
-    (candidates, values); ``acceleration`` (candidates, values, coordinates): the largest one, not a
-    number at values where nobody looks at it; ``sound`` (candidates, values): not diverged.
+    Attributes
+    ----------
+    section : (candidates, values, points)
+        delta_5 once a mesh period.
+    period : (candidates, values)
+        Period in mesh periods, 0 where the motion is not periodic.
+    exponent : (candidates, values)
+        Largest Lyapunov exponent per unit of tau.
+    acceleration : (candidates, values, coordinates)
+        Largest acceleration, NaN at values where no observation uses it.
+    sound : (candidates, values)
+        Whether the lane did not diverge.
     """
 
     section: Floats
@@ -45,7 +53,7 @@ class Records(NamedTuple):
     sound: Mask
 
     def at(self, values: Integers) -> "Records":
-        """Return what there is at some of the swept values, by their numbers."""
+        """Return the results at some of the swept values, by their numbers."""
         arrays: Any = (array[:, values] for array in self)
         return Records(*arrays)
 
@@ -55,13 +63,20 @@ def evaluate(
 ) -> Records:
     """Integrate every candidate at every swept value.
 
-    The configuration gives the scene, the start, and how long and how finely is integrated;
-    ``values`` (values,) of the swept parameter ascend; ``parameters``: the free ones by their keys,
-    (candidates,); ``accelerated`` (values,): where the largest acceleration is looked for.
+    Parameters
+    ----------
+    config : Configuration
+        Scene, start and integration.
+    values : (values,)
+        Swept values, ascending.
+    parameters : dict of str to (candidates,)
+        Free parameters by key.
+    accelerated : (values,)
+        Whether the largest acceleration is computed at a value.
     """
     lines = np.arange(values.size)[np.newaxis]
     if config.start.carry != "none":
-        # One value after the other, each from where the one before it ended.
+        # One value after the other: each starts at the end state of the previous one.
         lines = lines.T[::-1] if config.start.carry == "downwards" else lines.T
     candidates = len(next(iter(parameters.values())))
     recorded = config.integration.recorded_periods
@@ -84,9 +99,17 @@ def evaluate(
 
 
 def require_stable(config: Configuration, values: Floats, parameters: dict[str, Floats]) -> None:
-    """Refuse candidates with which RK4 is unstable at the ends of the swept values.
+    """Reject steps with which RK4 is unstable at the ends of the swept values.
 
-    ``values`` and ``parameters`` as in `evaluate`. Raises ConfigurationError.
+    Parameters
+    ----------
+    config, values, parameters
+        As for `evaluate`.
+
+    Raises
+    ------
+    ConfigurationError
+        If the method is RK4 and a candidate needs more steps per period than configured.
     """
     steps, ends = plan_of(config).steps_per_period, values[[0, -1]]
     if METHODS[config.integration.method].exact:
@@ -106,9 +129,9 @@ def require_stable(config: Configuration, values: Floats, parameters: dict[str, 
 
 
 def _records(system: LaneSystem, outcome: Outcome, looked_at: Integers, plan: Plan) -> Records:
-    """Return what lanes came to, each array with the lanes first."""
+    """Return the results of lanes, each array with the lanes first."""
     sound = outcome.status == Status.OK
-    # The torsion and its rate: the other coordinates follow them.
+    # Torsion and its rate are enough: the other coordinates are periodic when these are.
     distances = return_distances(outcome.section[..., :2])
     period = np.where(sound, period_of(distances, RETURN), np.int32(0))
     exponent, _ = largest_exponent(outcome.growth, system.mesh_period)

@@ -1,4 +1,4 @@
-"""Reading a targets file, with one message for every fault."""
+"""Reading a targets file, with one message per fault."""
 
 import os
 from collections.abc import Iterable, Iterator
@@ -26,9 +26,20 @@ from gearchaos.records.period import POINTS_NEEDED
 
 
 class Problem(NamedTuple):
-    """What is to be found: the targets, and the configuration that computes them.
+    """A search problem: the targets, and the configuration that computes them.
 
-    ``values``: all of the swept parameter at which something is looked at, ascending, (values,).
+    Attributes
+    ----------
+    targets : Targets
+        The targets file.
+    config : Configuration
+        The configuration it names, with the outputs that the observations need.
+    text : str
+        Text of the targets file.
+    observations : list of Observation
+        All observations in the order of the file.
+    values : (values,)
+        Swept values that the observations use, ascending.
     """
 
     targets: Targets
@@ -41,8 +52,19 @@ class Problem(NamedTuple):
 def load_targets(file: str | os.PathLike[str], overrides: Iterable[str] = ()) -> Problem:
     """Read a targets file and the configuration that it names.
 
-    ``overrides`` replace keys of the targets file, such as ``search.seed=2``. Raises FileError if
-    one of the two cannot be read, ConfigurationError if one is not sound: one message per fault.
+    Parameters
+    ----------
+    file : str or PathLike
+        The targets file.
+    overrides : iterable of str
+        Keys of the targets file to replace, such as ``search.seed=2``.
+
+    Raises
+    ------
+    FileError
+        If one of the two files cannot be read.
+    ConfigurationError
+        If one of them is invalid, with one message per fault.
     """
     source = os.fspath(file)
     text = text_of_file(source)
@@ -52,8 +74,7 @@ def load_targets(file: str | os.PathLike[str], overrides: Iterable[str] = ()) ->
     except ValidationError as error:
         worded, more = faults_of(error, {one.path: one for one in keys_of(Targets)})
         raise ConfigurationError(texts(worded, source, more)) from None
-    # What is observed is kept, and no more: the axial pair, which is driven one way, is computed
-    # only where somebody looks at it.
+    # Only observed coordinates: axial motion does not act back, and is computed only if observed.
     section = [*dict.fromkeys(("delta_5", *(one.coordinate for one in targets.increment)))]
     outputs = {"section": section, "section_points": 1, "lyapunov": bool(targets.exponent)}
     replaced = [*targets.set, f"outputs={toml_literal(outputs)}"]
@@ -86,7 +107,7 @@ def _unfit(config: Configuration, targets: Targets, source: str, values: Floats)
         )
     if config.second_sweep is not None:
         return
-    # A second sweep over the bounds obeys the rules that a free parameter must obey.
+    # A second sweep over the bounds is subject to the same rules as a free parameter.
     for number, free in enumerate(targets.parameter):
         bounds = {"parameter": free.name, "values": [free.low, free.high]}
         yield from _refusals(config, f"{source}: parameter[{number}]", "second_sweep", bounds)
@@ -95,8 +116,10 @@ def _unfit(config: Configuration, targets: Targets, source: str, values: Floats)
 
 
 def _refusals(config: Configuration, what: str, table: str, value: Any) -> Iterator[str]:
-    """Word why a configuration cannot have such a table."""
+    """Word why a configuration rejects a value of a table."""
     try:
         config.replace(table, value)
     except ConfigurationError as error:
-        yield from (f"{what}: {told.removeprefix(f'{config.source}: ')}" for told in error.problems)
+        yield from (
+            f"{what}: {problem.removeprefix(f'{config.source}: ')}" for problem in error.problems
+        )

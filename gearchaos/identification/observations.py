@@ -1,4 +1,4 @@
-"""How each kind of observation is read off the lanes of a candidate, and how far off it is."""
+"""Computation of each kind of observation from the lanes of a candidate, and its residual."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -16,18 +16,27 @@ from gearchaos.identification.targets import (
 )
 from gearchaos.results.reading.jumps import jump_sizes
 
-GROWTH = 1.2  # Least factor by which the section of a chaotic motion grows where there is a crisis.
-NOWHERE = 100.0  # Widths that a number is off which a candidate does not have.
+GROWTH = 1.2  # Least factor by which the section of a chaotic motion grows in a crisis.
+NOWHERE = 100.0  # Default residual, in widths, of a candidate without the observed number.
 
 
 @dataclass(frozen=True)
 class Observation:
-    """One observed number, and how it is read off the lanes of candidates.
+    """One observed number, and how it is computed from the lanes of candidates.
 
-    ``wanted``, ``width``: the number and its unit of misfit; ``values``: of the swept parameter,
-    ascending, shape (values,), at which it is looked at; ``computed``: gives the number of every
-    candidate, NaN where there is none, shape (candidates,), from the records at these values;
-    ``missing``: how many widths off is a candidate in which there is no such thing.
+    Attributes
+    ----------
+    name : str
+        Name in reports and files.
+    wanted, width : float
+        The number, and its unit of misfit.
+    values : (values,)
+        Swept values that are needed, ascending.
+    computed : callable
+        Returns the number of every candidate, (candidates,), from the records at these values;
+        NaN for candidates without it.
+    missing : float
+        Residual of a candidate without the number, in widths.
     """
 
     name: str
@@ -38,15 +47,15 @@ class Observation:
     missing: float = NOWHERE
 
     def residual(self, computed: Floats) -> Floats:
-        """Return how many widths off a number is, with its sign."""
+        """Return the signed difference from the observed number in widths."""
         off = (computed - self.wanted) / self.width
         return np.clip(np.where(np.isnan(off), self.missing, off), -self.missing, self.missing)
 
 
 def stage_length(stage: ObservedStage) -> Observation:
-    """Over which length of a stage the motion is another one; none is wanted.
+    """Observe the length of a stage over which the motion differs; zero is wanted.
 
-    The stage is cut into cells, small ones at its ends, each judged by the lane in its middle.
+    The stage is cut into cells, small ones at its ends. The lane in its middle decides for a cell.
     """
     length = stage.to - stage.from_
     half = _spaced(length / 2.0, stage.width / 2.0, 1.5)
@@ -62,7 +71,7 @@ def stage_length(stage: ObservedStage) -> Observation:
 
 
 def change_place(kind: str, place: ObservedPlace) -> Observation:
-    """Where the sweep has a change of this kind, a jump or a crisis: in the middle of two lanes."""
+    """Observe the place of a jump or a crisis, halfway between two lanes."""
     low, high = place.within
     above, below = (
         _spaced(way, place.width / 2.0, 1.25) for way in (high - place.at, place.at - low)
@@ -83,9 +92,9 @@ def change_place(kind: str, place: ObservedPlace) -> Observation:
 
 
 def _jumps(records: Records, cells: Floats) -> Floats:
-    """Return by how much motions beside each other differ, 0 where this is no jump.
+    """Return the sizes of jumps between neighbouring values, 0 where there is none.
 
-    Shape (candidates, values - 1), as for ``cells``, the distances of the values (values - 1,).
+    Shape (candidates, values - 1); ``cells`` (values - 1,): distances of the values.
     """
     sound = np.where(records.sound[..., np.newaxis], records.section, 0.0)
     size = np.max(np.abs(sound), axis=(1, 2), keepdims=True)
@@ -95,10 +104,10 @@ def _jumps(records: Records, cells: Floats) -> Floats:
 
 
 def _growth(records: Records) -> Floats:
-    """Return 1 where the section of a motion first passes half of all that it grows, else 0.
+    """Return 1 where the section of a motion first passes half of its total growth, else 0.
 
-    Next to a crisis the motion leaves its former part of the section seldom, and the record of a
-    single lane may miss it: so the growth is that over the span, and not from lane to lane.
+    Close to a crisis bursts are rare, and the record of a single lane may miss them. The growth is
+    therefore taken over the whole interval, not from lane to lane.
     """
     extent = np.ptp(np.where(records.sound[..., np.newaxis], records.section, 0.0), axis=2)
     chaotic = has_motion(records, "chaotic")
@@ -110,7 +119,7 @@ def _growth(records: Records) -> Floats:
 
 
 def exponent_at(exponent: Exponent) -> Observation:
-    """The largest Lyapunov exponent at one value."""
+    """Observe the largest Lyapunov exponent at one value."""
     at, wanted, width = exponent.at, exponent.value, exponent.width
     return Observation(
         f"exponent at {at:g}", wanted, width, np.array([at]), lambda lanes: lanes.exponent[:, 0]
@@ -118,7 +127,7 @@ def exponent_at(exponent: Exponent) -> Observation:
 
 
 def acceleration_increment(increment: Increment, coordinates: Sequence[str]) -> Observation:
-    """Growth of the largest acceleration of a coordinate, one of these, between two values."""
+    """Observe the growth of the largest acceleration of a coordinate between two values."""
     ends, column = (increment.from_, increment.to), coordinates.index(increment.coordinate)
     sign = 1.0 if ends[0] <= ends[1] else -1.0
 
@@ -146,11 +155,11 @@ def observations_of(targets: Targets, coordinates: Sequence[str]) -> list[Observ
 
 
 def has_motion(records: Records, motion: str) -> Mask:
-    """Tell which lanes have a motion of this kind, shape (candidates, values).
+    """Return which lanes have a motion of this kind, shape (candidates, values).
 
-    On n bands moves what is not of period n or of a divisor of it, and visits n parts of the
-    section in turn that have no value of delta_5 in common: motions of the periods 2 n, 3 n and so
-    on, and chaos.
+    A motion on n bands visits n parts of the section in turn whose ranges of delta_5 do not
+    overlap, and its period is not a divisor of n. Such motions are chaotic or have periods 2 n,
+    3 n and so on.
     """
     kind, _, number = motion.partition(" ")
     period, has = records.period, records.sound.copy()
@@ -169,8 +178,8 @@ def has_motion(records: Records, motion: str) -> Mask:
 def misfit(residuals: Floats) -> Floats:
     """Return the misfit of candidates, shape (candidates,), from residuals in widths.
 
-    The sum of 2 (sqrt(1 + r^2) - 1) over the observations: r^2 where they are met nearly, and 2 r
-    far off, so that no single one decides while others are wrong too.
+    The sum of 2 (sqrt(1 + r^2) - 1) over the observations: about r^2 for small residuals and
+    2 |r| for large ones, so that no single observation dominates.
     """
     return np.asarray(np.sum(2.0 * (np.sqrt(1.0 + residuals**2) - 1.0), axis=1))
 
@@ -185,7 +194,7 @@ def _on_bands(section: Floats, count: int) -> Mask:
 
 
 def _spaced(way: float, first: float, growth: float) -> Floats:
-    """Return places from 0 to the end of a way, each cell longer than the one before it."""
+    """Return places from 0 to ``way``; each cell is longer than the one before it."""
     first = min(first, way)
     count = max(1, round(np.log1p((growth - 1.0) * way / first) / np.log(growth)))
     places = np.cumsum(growth ** np.arange(count))

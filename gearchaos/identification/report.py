@@ -1,4 +1,4 @@
-"""What a search has found, in words: the best sets that differ, and what the targets determine."""
+"""The report of a search: the best distinct sets, and how well the targets determine them."""
 
 from collections.abc import Iterable, Iterator
 from typing import NamedTuple
@@ -13,23 +13,23 @@ from gearchaos.identification.search import STEPS_ALONE, answers_of, budget_of
 from gearchaos.identification.tried import Tried
 from gearchaos.models.gear_pair.group_table import SWEEPABLE_GROUPS
 
-NEAREST = 3  # Steps in each direction whose misfits tell how even the best set's surroundings are.
+NEAREST = 3  # Nearest steps in each direction; their median misfit is that of the surroundings.
 
 UNDETERMINED = 0.5
-"""Share of its bounds from which on a parameter counts as not determined by the observations."""
+"""Share of its bounds over which a parameter may move and still counts as determined."""
 
 FLAT_EXTENT = 0.1
-"""Way in the unit cube from which on sets that fit alike are said to lie along a direction."""
+"""Least extent, in the unit cube, of a flat direction that is reported."""
 
 LABEL, COLUMN = 34, 12
 
 
 class Reach(NamedTuple):
-    """From where to where parameters can move before the fit is worse by one unit.
+    """Ranges of the parameters over which the misfit grows by less than one unit.
 
-    ``alone`` (parameters, 2): one moved away from the centre of the last steps, the others held;
-    ``among`` (parameters, 2): among all candidates that were tried; ``surroundings``: misfit of the
-    sets next to that centre, the median.
+    ``alone`` (parameters, 2): one parameter moves from the centre of the last steps, the others are
+    fixed; ``among`` (parameters, 2): range among all computed candidates; ``surroundings``: median
+    misfit of the sets next to that centre.
     """
 
     alone: Floats
@@ -38,13 +38,14 @@ class Reach(NamedTuple):
 
 
 def reach(tried: Tried, rungs: int) -> Reach:
-    """Return how far each parameter can move; ``rungs`` are the steps of the last candidates.
+    """Return how far each parameter can move.
 
-    With none, nothing is known of one that moves alone.
+    ``rungs``: steps per parameter and direction at the end of the search; with 0, ``alone`` is NaN.
 
-    A label changes at once, and chaos is judged by a short record: the misfit is uneven on the
-    smallest scale. So a parameter is too far where the median of three neighbouring steps exceeds
-    that of the sets next to the best one, or the misfit of the best one if this is more, by one.
+    Labels change abruptly and chaos is judged from a short record, so that the misfit is not smooth
+    on a small scale. The limit is therefore where the median of three neighbouring steps exceeds a
+    reference by one. The reference is the median misfit of the sets next to the centre or the
+    misfit of the centre, whichever is larger.
     """
     parameters = tried["values"].shape[1]
     alike = tried["values"][tried["misfit"] <= np.min(tried["misfit"]) + ONE_UNIT]
@@ -57,7 +58,7 @@ def reach(tried: Tried, rungs: int) -> Reach:
     padded = np.pad(misfit, ((0, 0), (0, 0), (1, 1)), mode="edge")
     median = np.median(sliding_window_view(padded, 3, axis=2), axis=3)
     too_far = median > max(surroundings, tried["misfit"][steps[0]]) + ONE_UNIT
-    # The last step before the first one that is too far; 0 is the centre.
+    # The last step within the limit; 0 is the centre.
     last = np.where(too_far.any(axis=2), np.argmax(too_far, axis=2), rungs)
     number = np.arange(parameters)[:, np.newaxis]
     row = np.where(last > 0, rungs * (2 * number + [0, 1]) + last, 0)
@@ -66,7 +67,22 @@ def reach(tried: Tried, rungs: int) -> Reach:
 
 
 def report(problem: Problem, tried: Tried, most: int = 4) -> Iterator[str]:
-    """Word the best sets, what they come to, and how well the targets determine them."""
+    """Word the best sets, their computed observations, and how well the targets determine them.
+
+    Parameters
+    ----------
+    problem : Problem
+        The search problem.
+    tried : Tried
+        All candidates of the search.
+    most : int
+        Most sets to report.
+
+    Yields
+    ------
+    str
+        Lines of text.
+    """
     free, apart = problem.targets.parameter, problem.targets.search.apart
     points = _points(problem, tried["values"])
     sets, keys = distinct(points, tried["misfit"], apart, most), [one.name for one in free]
@@ -90,7 +106,7 @@ def report(problem: Problem, tried: Tried, most: int = 4) -> Iterator[str]:
 
 
 def _counted(observations: int, unknowns: int) -> str:
-    """Word how many numbers stand against how many unknowns."""
+    """Word the numbers of observations and of unknowns."""
     text = f"{observations} observations, {unknowns} unknowns"
     if observations < unknowns:
         free = unknowns - observations
@@ -107,7 +123,7 @@ def _moved(problem: Problem, tried: Tried, points: Floats, keys: list[str]) -> I
     low, high = _points(problem, found.among.T)
     answers = answers_of(problem, tried)
     near = directions_at(points[np.argmin(answers[:, 0])], points, answers)
-    # As far as sets were found that fit, or as the residuals near the best one promise them.
+    # The larger of the range of fitting sets and the range predicted by the residuals.
     wide_ones = np.maximum(high - low, np.minimum(1.0, 2.0 * near.reach))
     for key, wide, *row in zip(keys, wide_ones, found.alone, found.among, strict=True):
         yield _row(key, np.ravel(row)) + ("  not determined" if wide >= UNDETERMINED else "")
@@ -121,16 +137,16 @@ def _moved(problem: Problem, tried: Tried, points: Floats, keys: list[str]) -> I
     yield f"({beside}: misfit {found.surroundings:.4g})"
     alike = points[tried["misfit"] <= np.min(tried["misfit"]) + ONE_UNIT]
     for extent, direction in flat_directions(alike):
-        # As much as the parameter that moves most.
+        # Relative to the parameter that moves most.
         parts = zip(keys, direction / np.max(np.abs(direction)), strict=True)
         together = ", ".join(f"{key} {part:+.2f}" for key, part in parts if abs(part) >= 0.05)
         yield f"flat over {extent:.2f} of the bounds: {together}"
 
 
 def flat_directions(alike: Floats) -> list[tuple[float, Floats]]:
-    """Return along which directions the sets that fit alike lie, and how far, the longest first.
+    """Return extent and direction of the sets that fit equally well, the longest first.
 
-    ``alike`` (sets, parameters) are points of the unit cube; the directions are those of their
+    ``alike`` (sets, parameters): points of the unit cube. The directions (parameters,) are their
     principal components.
     """
     around = alike - alike.mean(axis=0)

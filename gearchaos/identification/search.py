@@ -1,8 +1,8 @@
-"""The search: candidates are drawn, bred by CMA-ES and moved alone, computed, judged and kept.
+"""The search: random candidates, generations of CMA-ES, and steps around the best candidate.
 
-The candidates of a generation are yielded as points of the unit cube, and their misfits and
-residuals sent back: the same ones lead to the same candidates, which is how a search that was
-stopped goes on.
+A generator yields the candidates of a generation as points of the unit cube and receives their
+misfits and residuals. Equal misfits lead to equal candidates, so that an interrupted search can be
+resumed from the candidates in its file.
 """
 
 import warnings
@@ -30,24 +30,24 @@ from gearchaos.identification.targets import Search
 from gearchaos.identification.tried import Tried, fields_of
 from gearchaos.interrupts import check
 
-DRAWN = 0  # Number of the run to which drawn candidates belong; those of CMA-ES count from 1.
-STEPS_ALONE = -1  # Number of the run of the steps away from the best candidate.
-FIRST_SPREAD = 0.2  # Standard deviation with which CMA-ES begins, as a share of the bounds.
-RUNGS = 20  # Most steps away from the best candidate, for each parameter and direction.
-FEWEST_RUNGS = 4  # With fewer it is not told how far a parameter can move.
-STARTS = 4  # Drawn sets kept for each run to begin from: runs that end early are followed by more.
+DRAWN = 0  # Run number of random candidates; runs of CMA-ES count from 1.
+STEPS_ALONE = -1  # Run number of the steps away from the best candidate.
+FIRST_SPREAD = 0.2  # Initial standard deviation of CMA-ES, as a share of the bounds.
+RUNGS = 20  # Most steps away from the best candidate, per parameter and direction.
+FEWEST_RUNGS = 4  # Fewest of these steps; with fewer the ranges of parameters are not reported.
+STARTS = 4  # Random sets kept per run as starting points: early stops leave room for more runs.
 
 MOST_CENTRES = 5
-"""Where one of those steps is better than the best candidate, they begin again from it."""
+"""Most centres of these steps: they are repeated from a step that is better than the centre."""
 
-LANES_AT_ONCE = 2**13  # Lanes of one batch: enough for all threads, and little memory.
+LANES_AT_ONCE = 2**13  # Lanes per batch: enough for all threads, and little memory.
 
 
 class Budget(NamedTuple):
-    """How the candidates of a search are shared out.
+    """Numbers of candidates for the parts of a search.
 
-    ``bred``: those of CMA-ES; ``last``: those that tell how far the best set can move, by
-    ``rungs`` steps of each parameter in each direction, 0 where they are too few, and by walks.
+    ``bred``: candidates of CMA-ES; ``last``: candidates around the best set, for steps and walks;
+    ``rungs``: steps per parameter and direction, 0 if the candidates are too few.
     """
 
     bred: int
@@ -56,15 +56,15 @@ class Budget(NamedTuple):
 
     @property
     def looked(self) -> bool:
-        """Whether it is told how far the best set can move."""
+        """Whether the surroundings of the best set are explored."""
         return self.rungs > 0
 
 
 def budget_of(search: Search, parameters: int) -> Budget:
-    """Share out the candidates of a search with so many parameters.
+    """Divide the candidates of a search over its parts.
 
-    A third of those that are not drawn, at most, is left for the surroundings of the best set: two
-    fifths of it for steps of single parameters, the others for walks along flat directions.
+    Up to a third of the candidates that are not random is kept for the surroundings of the best
+    set: two fifths of it for steps of single parameters, the rest for walks along flat directions.
     """
     others = search.candidates - search.drawn
     last = min(others // 3, 2 * MOST_CENTRES * (1 + 2 * RUNGS * parameters))
@@ -75,7 +75,7 @@ def budget_of(search: Search, parameters: int) -> Budget:
 
 
 def judge(problem: Problem, run: int, parameters: dict[str, Floats]) -> Tried:
-    """Compute candidates, and how far off they are; each of their parameters is (candidates,)."""
+    """Compute candidates and their misfits; ``parameters`` are (candidates,) by key."""
     ends = [end for one in problem.targets.increment for end in (one.from_, one.to)]
     accelerated = np.isin(problem.values, ends)
     records = evaluate(problem.config, problem.values, parameters, accelerated)
@@ -91,17 +91,39 @@ def judge(problem: Problem, run: int, parameters: dict[str, Floats]) -> Tried:
 
 
 def decisive_facts(problem: Problem) -> dict[str, Any]:
-    """Return what decides which candidates are tried and what they come to."""
+    """Return all facts that determine the candidates of a search and their results.
+
+    Returns
+    -------
+    dict of str to Any
+        Versions of the software, and targets and configuration as TOML.
+    """
     tables = {"targets": problem.targets.tables(), "of": problem.config.tables()}
     text = toml_text({"cma_version": version("cma"), **tables})
     return {**SOFTWARE._asdict(), "configuration": text}
 
 
 def search(problem: Problem, known: Tried, source: str) -> Iterator[Tried]:
-    """Yield all candidates of a search, some at a time.
+    """Yield all candidates of a search, one batch at a time.
 
-    ``known`` are those of an earlier part of it, from the file ``source``, which are not computed
-    again. Raises FileError if they are not the first of this search.
+    Parameters
+    ----------
+    problem : Problem
+        The search problem.
+    known : Tried
+        Candidates of an interrupted part of the search, which are not computed again.
+    source : str
+        The file of these candidates, for messages.
+
+    Yields
+    ------
+    Tried
+        The candidates of a batch.
+
+    Raises
+    ------
+    FileError
+        If ``known`` are not the first candidates of this search.
     """
     targets, done = problem.targets, 0
     at_once = max(1, LANES_AT_ONCE // problem.values.size)
@@ -127,16 +149,13 @@ def search(problem: Problem, known: Tried, source: str) -> Iterator[Tried]:
 
 
 def answers_of(problem: Problem, tried: Tried) -> Floats:
-    """Return misfit and residuals of candidates, (candidates, 1 + observations)."""
+    """Return misfits and residuals of candidates, (candidates, 1 + observations)."""
     columns = zip(problem.observations, tried["computed"].T, strict=True)
     return np.column_stack([tried["misfit"], *(one.residual(values) for one, values in columns)])
 
 
 def proposals(search: Search, parameters: int) -> Proposals:
-    """Yield one generation after the other; their misfits and residuals are to be sent back.
-
-    All of them together are ``search.candidates`` at most.
-    """
+    """Yield generations, at most ``search.candidates`` in total; receive misfits and residuals."""
     random, part = np.random.default_rng(search.seed), budget_of(search, parameters)
     points, answers = np.empty((0, parameters)), []
     bred = _bred(search, parameters, part.bred, random)
@@ -153,7 +172,7 @@ def proposals(search: Search, parameters: int) -> Proposals:
 
 
 def _bred(search: Search, parameters: int, left: int, random: np.random.Generator) -> Proposals:
-    """Yield the drawn candidates, and after them at most so many generations of CMA-ES."""
+    """Yield the random candidates, then generations of CMA-ES with ``left`` candidates at most."""
     drawn = random.random((search.drawn, parameters))
     misfits = (yield DRAWN, drawn)[:, 0]
     starts = distinct(drawn, misfits, search.apart, most=STARTS * search.runs)
@@ -161,7 +180,7 @@ def _bred(search: Search, parameters: int, left: int, random: np.random.Generato
     while left >= search.population:
         begin = drawn[starts[run % len(starts)]]
         strategy = _strategy(begin, search.population, random)
-        # A run that comes to its end early leaves the rest to those after it.
+        # A run that stops early leaves its remaining candidates to later runs.
         share = max(search.population, left // max(1, search.runs - run))
         run += 1
         while min(left, share) >= search.population and not strategy.stop():
@@ -175,7 +194,7 @@ def _bred(search: Search, parameters: int, left: int, random: np.random.Generato
 def _surroundings(
     points: Floats, answers: Floats, part: Budget, random: np.random.Generator
 ) -> Proposals:
-    """Yield steps away from the best candidate so far, and walks along its flat directions."""
+    """Yield steps away from the best candidate, then walks along its flat directions."""
     best, least = points[np.argmin(answers[:, 0])], float(np.min(answers[:, 0]))
     left, again = part.last, 2 * part.last // 5
     for _ in range(MOST_CENTRES):
@@ -193,10 +212,10 @@ def _surroundings(
 
 
 def steps_alone(centre: Floats, rungs: int) -> Floats:
-    """Return points away from a centre, one parameter at a time.
+    """Return points that differ from a centre in one parameter, (points, parameters).
 
-    First the centre, then for each parameter the steps down and those up, smallest first, from a
-    thousandth of the bounds to all of them; at a bound they stay there.
+    First the centre, then for each parameter the steps down and the steps up, smallest first, from
+    a thousandth of the bounds to all of them, clipped at the bounds.
     """
     steps = 2.0 ** -np.linspace(10.0, 0.0, rungs)
     points = np.tile(centre, (centre.size, 2, rungs, 1))
@@ -223,7 +242,7 @@ def _strategy(begin: Floats, population: int, random: np.random.Generator) -> An
         options = {
             "bounds": [0.0, 1.0],
             "popsize": population,
-            # A generator of its own instead of the seed of all of NumPy.
+            # An own generator: the default would set NumPy's global seed.
             "randn": lambda *shape: random.standard_normal(shape),
             "seed": np.nan,
             "verbose": -9,

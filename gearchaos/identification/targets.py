@@ -1,4 +1,4 @@
-"""The targets file: what was observed, which parameters are free, and how they are searched."""
+"""The targets file: observations, free parameters and settings of the search."""
 
 import math
 from itertools import product
@@ -16,7 +16,7 @@ Coordinate: TypeAlias = Literal["delta_5", "delta_1", "delta_2", "delta_3", "del
 Several: TypeAlias = Annotated[tuple[Entry, ...], Field(strict=False)]
 
 MOST_FREE = 16
-"""Parameters that are free: 2^16 corners of their bounds are looked at before a search."""
+"""Most free parameters: the 2^16 corners of their bounds are checked before a search."""
 
 
 class FreeParameter(Table):
@@ -39,12 +39,12 @@ class FreeParameter(Table):
         """Return the values at shares of the way from the lower to the upper bound."""
         if not self.logarithmic:
             return self.low + share * (self.high - self.low)
-        # Not by NumPy, whose powers differ from one processor to the next.
+        # Not with NumPy, whose powers differ between processors.
         way = math.log(self.high / self.low)
         return np.array([self.low * math.exp(part * way) for part in share.tolist()])
 
     def share(self, value: float) -> float:
-        """Return at which share of the way from the lower to the upper bound a value lies."""
+        """Return the position of a value between the bounds as a share; inverse of `value`."""
         if not self.logarithmic:
             return (value - self.low) / (self.high - self.low)
         return math.log(value / self.low) / math.log(self.high / self.low) if value > 0 else -1.0
@@ -73,7 +73,7 @@ class ObservedStage(_Observed):
 
 
 class ObservedPlace(_Observed):
-    """Where the sweep jumps to another motion of the same period, or chaos grows in a crisis."""
+    """A jump to another motion of the same period, or a crisis in which chaos suddenly grows."""
 
     at: float = key("where, on the axis of the sweep", example=1.12)
     within: Interval = key(
@@ -104,7 +104,7 @@ class Increment(_Observed):
 
 
 class Search(Table):
-    """How much is tried."""
+    """Size and seed of the search."""
 
     seed: int = key("of the random numbers", default=0, ge=0, le=2**32 - 1)
     candidates: int = key("sets that are tried", default=20_000, ge=8, le=10_000_000)
@@ -124,7 +124,7 @@ class Search(Table):
 
 
 class Targets(Table):
-    """A targets file; one that exists is sound."""
+    """A targets file, validated on creation."""
 
     title: str = key("title, for people", default="")
     configuration: str = key("file with all that is known, beside this one", example="pair.toml")
@@ -149,9 +149,9 @@ class Targets(Table):
         return self.values(np.array(list(product((0.0, 1.0), repeat=len(self.parameter)))))
 
     def values(self, points: Floats) -> dict[str, Floats]:
-        """Return the free parameters, each of shape (candidates,), at points of the unit cube.
+        """Return the free parameters at points of the unit cube, each of shape (candidates,).
 
-        ``points``, shape (candidates, parameters), are shares of the way between the bounds.
+        ``points`` (candidates, parameters): positions between the bounds as shares.
         """
         return {
             one.name: one.value(part) for one, part in zip(self.parameter, points.T, strict=True)

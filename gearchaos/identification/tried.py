@@ -1,4 +1,4 @@
-"""Every candidate that was tried, in memory and in a file."""
+"""The computed candidates of a search, in memory and in a file."""
 
 import hashlib
 import json
@@ -17,15 +17,18 @@ from gearchaos.outputs.names import STATUS
 from gearchaos.results.files.atomic_file import reason, replacing
 
 Tried: TypeAlias = NDArray[np.void]
-"""Candidates, in the order in which they were tried: an array with the fields of `fields_of`."""
+"""Candidates in the order of computation: an array with the fields of `fields_of`."""
 
 
 def fields_of(problem: Problem) -> np.dtype[np.void]:
-    """Return the fields of a candidate, all of which are numbers.
+    """Return the fields of a candidate, all of type float64.
 
-    ``run``: see `search`; ``values`` (parameters,), in their units; ``computed`` (observations,):
-    what was observed of it, NaN where there is no such thing; ``misfit``; ``status``: 1 where one
-    of the lanes was not integrated to the end.
+    Returns
+    -------
+    dtype
+        ``run``: run number, see `search`; ``values`` (parameters,): parameters in their units;
+        ``computed`` (observations,): computed observations, NaN where the candidate has none;
+        ``misfit``; ``status``: 1 if a lane diverged, else 0.
     """
     counts = {"values": len(problem.targets.parameter), "computed": len(problem.observations)}
     names = ("run", "values", "computed", "misfit", STATUS)
@@ -35,11 +38,23 @@ def fields_of(problem: Problem) -> np.dtype[np.void]:
 def write_tried(
     path: str | os.PathLike[str], tried: Tried, problem: Problem, facts: Mapping[str, Any]
 ) -> None:
-    """Write all candidates as CSV; the file appears complete or not at all, and replaces another.
+    """Write all candidates as CSV, complete or not at all; an existing file is replaced.
 
-    A row per candidate: its run, the parameters by their keys, what was observed, misfit and
-    status. The first line is a comment: the facts and the targets, as JSON. Raises FileError if it
-    cannot be written.
+    Parameters
+    ----------
+    path : str or PathLike
+        The file.
+    tried : Tried
+        The candidates. Each row has run, parameters, computed observations, misfit and status.
+    problem : Problem
+        The search problem.
+    facts : mapping
+        Facts to write with the targets, as JSON, into a comment in the first line.
+
+    Raises
+    ------
+    FileError
+        If the file cannot be written.
     """
     targets, observations = problem.targets, problem.observations
     keys = [one.name for one in targets.parameter]
@@ -47,16 +62,26 @@ def write_tried(
     rows, body = tried.view(np.float64).reshape(len(tried), -1), StringIO()
     np.savetxt(body, rows, "%.17g", ",", header=",".join(names), comments="")
     wanted = {one.name: {"wanted": one.wanted, "width": one.width} for one in observations}
-    told = {**facts, "title": targets.title, "targets": problem.text, "observations": wanted}
-    told["sha256"] = _checksum(body.getvalue())
+    header = {**facts, "title": targets.title, "targets": problem.text, "observations": wanted}
+    header["sha256"] = _checksum(body.getvalue())
     with replacing(path, overwrite=True) as partial:
-        partial.write_text(f"# {json.dumps(told)}\n{body.getvalue()}", encoding="utf-8")
+        partial.write_text(f"# {json.dumps(header)}\n{body.getvalue()}", encoding="utf-8")
 
 
 def read_tried(path: str | os.PathLike[str], problem: Problem) -> tuple[Tried, dict[str, Any]]:
     """Read the candidates of a file, and the facts in its first line.
 
-    Raises FileError if it is missing, damaged or no file of a search.
+    Parameters
+    ----------
+    path : str or PathLike
+        A file from `write_tried`.
+    problem : Problem
+        The search problem, which determines the fields.
+
+    Raises
+    ------
+    FileError
+        If the file is missing, damaged or not from a search.
     """
     try:
         first, _, body = Path(path).read_text("utf-8").partition("\n")
