@@ -1,4 +1,4 @@
-"""Every number that the paper prints beside ours, and by which rule the two agree."""
+"""Comparison of every number printed in the paper with ours, each by a stated rule."""
 
 import math
 from collections import defaultdict
@@ -15,13 +15,13 @@ from gearchaos.paper.published import Printed, contact_line_stiffness, published
 from gearchaos.results.reading.stage_table import LabelledLanes, Stage, stage_table
 
 WINDOW = 0.1
-"""Narrowest stage, in multiples of e(tau): narrower ones are windows in what surrounds them."""
+"""Least width of a stage in multiples of e(tau); narrower ones are windows in a stage."""
 
 NONE = "–"
 
 
 class Verdict(StrEnum):
-    """What a comparison comes to."""
+    """Result of a comparison."""
 
     AGREES = "agrees"
     IN_KIND = "agrees in kind"
@@ -32,7 +32,7 @@ RULES = vars(published().rules)
 
 
 class Row(NamedTuple):
-    """One line of the comparison, worded."""
+    """One row of the comparison as text."""
 
     quantity: str
     where: str
@@ -44,7 +44,7 @@ class Row(NamedTuple):
 
 
 def compare(found: Reproduction) -> dict[str, list[Row]]:
-    """Compare a reproduction with all that the paper prints: the tables of the report, by name."""
+    """Compare a reproduction with all printed numbers; return the report's tables by name."""
     printed, ours = published(), found.numbers
     numbers = defaultdict(list)
     for key, number in vars(printed.numbers).items():
@@ -88,7 +88,7 @@ def _stages(found: Reproduction, pairs: list[tuple[Printed, Stage | None]]) -> I
             share = np.mean(labels[stage.first : stage.last + 1] == stage.label)
             mine = f"{stage.start:.2f} – {stage.end:.2f}"
             if share < 1.0:
-                # Rounded downwards: all of them are never said to be where one is not.
+                # Rounded down: 100 % only if all lanes have the motion.
                 mine += f", in {math.floor(100.0 * share)} % of its lanes"
             ends = (stage.start - printed.first, stage.end - printed.last)
             difference = ", ".join(map(signed, ends))
@@ -99,7 +99,7 @@ def _stages(found: Reproduction, pairs: list[tuple[Printed, Stage | None]]) -> I
 
 def _boundaries(pairs: list[tuple[Printed, Stage | None]]) -> Iterator[Row]:
     for (before, ended), (after, begun) in pairwise(pairs):
-        # A boundary has two sides.
+        # A boundary needs a stage on either side.
         mine = math.nan if ended is None or begun is None else begun.start
         quantity = f"{before.printed} → {after.printed}"
         yield _row(quantity, published().boundaries, after.first, mine, unit="e(τ)", digits=2)
@@ -110,7 +110,7 @@ def _motions(found: Reproduction) -> Iterator[Row]:
     for shown in published().motions:
         p = shown.pitch_error
         ours = found.motion_at(p)
-        # A value at the end of the reach but for rounding is within it.
+        # The tolerance includes values at the end of the reach despite rounding.
         near = found.lanes.labels[np.abs(found.lanes.values - p) <= reach + 1e-9]
         judged = motion_verdict(shown.motion, ours, near.tolist())
         place = f"motion at {p:g} e(τ)", f"figure {shown.figure}", published().kinds.motions
@@ -118,10 +118,10 @@ def _motions(found: Reproduction) -> Iterator[Row]:
 
 
 def counterparts(printed: Sequence[Printed], lanes: LabelledLanes) -> list[Stage | None]:
-    """Find the stage of a sweep that answers each printed one.
+    """Find the stage of a sweep that corresponds to each printed stage.
 
-    Of the stages with the printed motion, the one that has most in common with the printed one; if
-    there is none that overlaps, the nearest one within reach of the rule for boundaries, or None.
+    It is the stage with the printed motion and the largest overlap. Without any overlap it is the
+    nearest stage within reach of the rule for boundaries, or None.
     """
     stages, found = stage_table(lanes, WINDOW), []
     for one in printed:
@@ -134,14 +134,14 @@ def counterparts(printed: Sequence[Printed], lanes: LabelledLanes) -> list[Stage
 
 
 def verdict(rule: Printed, published: float, ours: float, size: float | None = None) -> Verdict:
-    """Judge a number, not a number where there is no such thing.
+    """Judge a number by a rule; NaN does not agree.
 
-    Where the rule is relative the distance is divided by ``size``, by default the printed one.
+    For a relative rule the distance is divided by ``size``, by default the printed number.
     """
     distance = abs(ours - published)
     if rule.relative:
         distance /= abs(published if size is None else size)
-    # A distance that is the limit but for rounding is within it.
+    # The tolerance includes distances at the limit despite rounding.
     within = distance * (1.0 - 1e-9)
     if within <= rule.agrees:
         return Verdict.AGREES
@@ -149,21 +149,21 @@ def verdict(rule: Printed, published: float, ours: float, size: float | None = N
 
 
 def overlap_verdict(published: tuple[float, float], ours: tuple[float, float]) -> Verdict:
-    """Judge a span, its first and last value, by how much of both together is common to them."""
+    """Judge an interval (first, last) by the ratio of intersection to union."""
     common = min(published[1], ours[1]) - max(published[0], ours[0])
     together = max(published[1], ours[1]) - min(published[0], ours[0])
     return verdict(RULES["stage"], 1.0, max(common, 0.0) / together)
 
 
 def motion_verdict(published: str, ours: str, near: Sequence[str]) -> Verdict:
-    """Judge the motion at one pitch error; near are those within reach of the boundary rule."""
+    """Judge the motion at one pitch error; ``near``: motions within reach of the boundary rule."""
     if ours == published:
         return Verdict.AGREES
     return Verdict.IN_KIND if published in near else Verdict.DOES_NOT
 
 
 def signed(value: float, digits: int = 2) -> str:
-    """Write a difference with its sign, zero without."""
+    """Write a difference with its sign; zero has none."""
     text = f"{value:+.{digits}f}"
     return text.replace("-", "−") if float(text) else "0"
 
@@ -178,7 +178,7 @@ def _row(
     size: float | None = None,
     digits: int | None = None,
 ) -> Row:
-    """Compare two numbers; ``size`` is what a relative rule divides by, if not the printed one."""
+    """Compare two numbers; ``size``: divisor of a relative rule, if not the printed number."""
     rule, mine, difference = RULES[printed.rule], NONE, NONE
     if math.isfinite(ours):
         mine = f"{_number(ours if digits is None else round(ours, digits))} {unit}".rstrip()

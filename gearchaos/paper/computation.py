@@ -1,8 +1,8 @@
-"""Everything that the gallery shows, computed from two configurations.
+"""Computation of everything that the gallery shows, from two configurations.
 
-A pair that settles on one of two coexisting motions hops where its start passes from the basin of
-one into that of the other. The ends of the interval in which both exist belong to the pair; the
-place of a hop between them belongs to the start state as much as to the pair.
+Where two motions coexist, a sweep hops when its start state passes from the basin of one motion to
+that of the other. The interval in which both exist depends on the gear pair only; the place of the
+hop within it depends on the start state too.
 """
 
 import math
@@ -35,24 +35,29 @@ LOW, HIGH = 0.5, 2.0
 """Pitch errors between which both motions are followed, in multiples of e(tau)."""
 
 STEP = 0.01  # Step of the carried sweeps.
-FINENESS = 10  # Parts of a step between which the place of a hop is told.
+FINENESS = 10  # Subdivision of a step to locate a hop.
 
 FOLLOWING = {"transient_periods": 100, "recorded_periods": POINTS_NEEDED}
-"""Mesh periods of a carried sweep per value: its motion changes little from one to the next."""
+"""Mesh periods per value of a carried sweep: few, since the motion changes little per step."""
 
-ACCURACY = 1e-5  # To which the ends of the interval are located, in multiples of e(tau).
+ACCURACY = 1e-5  # Accuracy of the ends of the interval in multiples of e(tau).
 
 KEPT_PERIODS = 64
-"""Mesh periods of a response: lines of a spectrum 1/64 of the mesh frequency apart."""
+"""Mesh periods of a response; the lines of its spectrum are 1/64 of the mesh frequency apart."""
 
 
 class Hop(NamedTuple):
-    """Two coexisting motions, and where they take over from each other.
+    """Two coexisting motions, and where starts change from one to the other.
 
-    ``sweeps``: carried upwards and downwards; ``first``, ``last``: between which they are on
-    different motions, as far as their orbits can be followed; ``changes``: by the kind of the
-    start, the last pitch error at which the teeth never part, as on the motion of the upward sweep,
-    and the next one.
+    Attributes
+    ----------
+    sweeps : Result
+        Sweeps carried upwards and downwards.
+    first, last : Boundary
+        Ends of the interval with both motions, located by following their orbits.
+    changes : dict of str to (float, float)
+        By kind of start: the last pitch error without contact loss, as on the motion of the upward
+        sweep, and the next pitch error.
     """
 
     sweeps: Result
@@ -63,14 +68,25 @@ class Hop(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Reproduction:
-    """What was computed to answer the paper.
+    """All results that are compared with the paper.
 
-    ``config``: of the torsional diagram, figure 7; ``sweep``: that diagram; ``hop``: the hop in it,
-    with the interval in which two motions coexist; ``exponents``: the largest ones before and after
-    it, starting at rest, of all ten states and of six; ``response``: all effects, at rest at the
-    start, without pitch error and at those of figures 5, 6, 14 and 15 and of Table 3;
-    ``motions``: at the pitch errors of figures 8 to 13; ``crisis``: where the diagram of figure 7
-    widens at once.
+    Attributes
+    ----------
+    config : Configuration
+        Configuration of the torsional diagram, figure 7.
+    sweep : Result
+        The diagram.
+    hop : Hop
+        The hop in the diagram, and the interval with two coexisting motions.
+    exponents : (list of float, list of float)
+        Largest exponents before and after the hop from rest, of all ten states and of six.
+    response : Result
+        Motion from rest with all effects, without pitch error and at the pitch errors of figures
+        5, 6, 14, 15 and Table 3.
+    motions : Result
+        Motions at the pitch errors of figures 8 to 13.
+    crisis : Widening
+        Where the section in the diagram suddenly widens.
     """
 
     config: Configuration
@@ -87,7 +103,7 @@ class Reproduction:
         return lanes_as_printed(self.sweep, self.crisis)
 
     def motion_at(self, pitch_error: float) -> str:
-        """Return the motion at a pitch error as a figure shows it."""
+        """Return the label of the motion at a pitch error, as in the figures of motions."""
         lanes = lanes_as_printed(self.motions, self.crisis, strictly=True)
         return str(lanes.labels[lane_of(self.motions, pitch_error)])
 
@@ -102,7 +118,7 @@ class Reproduction:
 
     @cached_property
     def numbers(self) -> dict[str, float]:
-        """Our counterpart of each of the `published` numbers, by its key."""
+        """Our counterparts of the `published` numbers, by key."""
         speed, response, pair = published().driving_speed_rpm, self.response, self.pair
         printed = published().numbers.mean_stiffness.value * printed_coefficients()
         lines = contact_line_stiffness().coefficients(printed.size)
@@ -115,7 +131,7 @@ class Reproduction:
             "driven_speed": speed * pair.teeth[0] / pair.teeth[1],
             "mesh_frequency_hz": speed / 60.0 * pair.teeth[0],
             "total_contact_ratio": pair.total_contact_ratio,
-            # The mean about which Table 2's variation is that of the contact lines, in N/(um mm).
+            # Fitted: with this mean, Table 2 has the variation of the contact lines; N/(um mm).
             "mean_stiffness": np.vdot(lines, printed).real / np.vdot(lines, lines).real,
             "damping_ratio": xi,
             # With the stiffness of the whole face width, in N s/m (eq. 20).
@@ -147,17 +163,24 @@ def compute(
     periods: int = KEPT_PERIODS,
     threads: int | None = None,
 ) -> Reproduction:
-    """Compute the gallery, and say what comes next.
+    """Compute the gallery and report progress.
 
-    ``config``, ``full``: ``pan2021.toml`` and ``pan2021_full.toml``; coarser ones give a coarser
-    gallery sooner; ``hop_step``: of the carried sweeps between which the hop lies; ``periods``:
-    mesh periods of which every step is kept.
+    Parameters
+    ----------
+    config, full : Configuration
+        ``pan2021.toml`` and ``pan2021_full.toml``, or coarser ones.
+    hop_step : float
+        Step of the carried sweeps around the hop, in multiples of e(tau).
+    periods : int
+        Mesh periods of the responses.
+    threads : int, optional
+        Number of threads; by default all.
     """
     say("figure 7: the sweep over the pitch error")
     sweep = run(config, threads)
     say("the hop of figure 7: both motions, upwards and downwards")
     hop = find_hop(config, step=hop_step, threads=threads)
-    # Soft axial bearings take long to come to rest: the exponents are those of the orbits.
+    # Exponents of the orbits: with soft axial bearings the transient is long.
     ten, six = (
         [System(scene, pitch_error=p).orbit().exponent for p in hop.changes["rest"]]
         for scene in (full, config)
@@ -171,9 +194,9 @@ def compute(
 
 
 def find_hop(config: Configuration, step: float, threads: int | None) -> Hop:
-    """Follow both motions, to the ends of their interval too, and find where starts change over.
+    """Follow both motions to the ends of their interval, and find where starts change between them.
 
-    ``config`` sweeps the pitch error; ``step``: of the carried sweeps.
+    ``config`` sweeps the pitch error; ``step``: step of the carried sweeps.
     """
     config = config.replace("outputs", {"section_points": 1, "lyapunov": False})
     values = np.linspace(LOW, HIGH, 1 + round((HIGH - LOW) / step))
@@ -199,14 +222,14 @@ def _at(config: Configuration, pitch_errors: list[float]) -> Configuration:
 
 
 def lane_of(result: Result, pitch_error: float) -> int:
-    """Return the number of the lane next to a pitch error."""
+    """Return the number of the lane nearest to a pitch error."""
     return int(np.argmin(np.abs(result[result.axis] - pitch_error)))
 
 
 def largest_acceleration(result: Result, pitch_error: float, coordinate: str = "delta_5") -> float:
     """Return the largest acceleration of a coordinate over a response.
 
-    Signed, not in magnitude: so read, the growth between the pitch errors of figure 14 is as even
-    as the paper prints it.
+    The signed maximum, not the largest magnitude: with it, the increments between the pitch errors
+    of figure 14 are as uniform as those printed in the paper.
     """
     return float(np.max(result[f"{coordinate}_acceleration"][lane_of(result, pitch_error)]))

@@ -33,7 +33,7 @@ from gearchaos.paper.published import (
 from gearchaos.records.amplitude_spectrum import spectral_lines
 from gearchaos.results.reading.result import Result
 
-CYCLE = np.arange(1001) / 1000  # Mesh phases, in parts of the mesh period.
+CYCLE = np.arange(1001) / 1000  # Mesh phases, relative to the mesh period.
 
 HIGHEST_ORDER = 8
 TIME_LABEL = r"Time in mesh periods, $\Omega\tau/2\pi$"
@@ -42,10 +42,10 @@ SHOWN_PERIODS = 4.0  # Mesh periods of the histories of figures 5 and 14.
 LONG_HISTORY = 16.0  # Mesh periods of the histories of figures 8 to 13.
 
 Curves: TypeAlias = Sequence[tuple[float, str, float]]
-"""Pitch errors, the colours of their curves, and how far the lines of their spectra step aside."""
+"""Pitch errors, the colours of their curves, and the horizontal shifts of their spectra."""
 
 WITHOUT_AND_WITH: Curves = ((0.0, BLUE, -0.07), (1.0, VERMILION, 0.07))
-"""What figures 5 and 6 compare."""
+"""The curves that figures 5 and 6 compare."""
 
 
 def pitch_error_page(found: Reproduction) -> Page:
@@ -77,7 +77,7 @@ def mesh_stiffness_page(found: Reproduction) -> Page:
 def _over_a_cycle(
     height_mm: float, level: float, label: str, curves: dict[str, Floats], level_name: str = ""
 ) -> Page:
-    """Draw curves over one mesh cycle, and a line at the level about which they turn."""
+    """Draw curves over one mesh cycle, and a line at their mean level."""
     looks = (BLACK, 0.8, ()), (BLUE, 1.2, (5, 2)), (ORANGE, 1.0, (1.5, 1.5))
     with column(height_mm) as figure:
         axes = figure.subplots()
@@ -96,7 +96,7 @@ def _over_a_cycle(
 def accelerations_page(found: Reproduction, *, growing: bool = False) -> Page:
     """Draw the accelerations of all coordinates without and with pitch error (figure 5).
 
-    If ``growing``, the torsional one at growing pitch errors (figure 14).
+    If ``growing``, draw the torsional acceleration at growing pitch errors (figure 14).
     """
     response = found.response
     with _stack(response, growing, "Acceleration") as (figure, panels):
@@ -115,7 +115,7 @@ def accelerations_page(found: Reproduction, *, growing: bool = False) -> Page:
 
 
 def spectra_page(found: Reproduction, *, growing: bool = False) -> Page:
-    """Draw the amplitude spectra of those accelerations (figures 6 and 15)."""
+    """Draw the amplitude spectra of the curves of `accelerations_page` (figures 6 and 15)."""
     response = found.response
     with _stack(response, growing, "Amplitude of the acceleration") as (figure, panels):
         for axes, name, curves in panels:
@@ -146,9 +146,10 @@ def spectra_page(found: Reproduction, *, growing: bool = False) -> Page:
 def _stack(
     response: Result, growing: bool, label: str
 ) -> Iterator[tuple[Page, list[tuple[Axes, str, Curves]]]]:
-    """Make panels one above another, each with the coordinate and the curves that it is to show.
+    """Make stacked panels, and yield each with its coordinate and its curves.
 
-    Those are all without and with pitch error, or the torsional one at growing ones.
+    Without ``growing``, one panel per coordinate without and with pitch error; otherwise one panel
+    of the torsion per pitch error.
     """
     shown: list[tuple[str, Curves]] = [(n, WITHOUT_AND_WITH) for n in coordinates_of(response)]
     if growing:
@@ -168,16 +169,16 @@ def _stack(
 
 
 def diagram_page(found: Reproduction) -> Page:
-    """Draw bifurcation diagram and exponent; ticks where the paper has boundaries and the hop."""
+    """Draw bifurcation diagram and exponent, with ticks at the paper's boundaries and hop."""
     boundaries = [after.first for _, after in pairwise(published().stages)]
     places = [published().numbers.hop.value, *boundaries]
     return bifurcation_page(found.sweep, stages=found.lanes, marked=("changes in Pan 2021", places))
 
 
 def hop_page(found: Reproduction) -> Page:
-    """Draw the two coexisting motions of the hop; ticks where starts change from one to the other.
+    """Draw the two coexisting motions of the hop, with ticks where starts change between them.
 
-    Not a figure of the paper.
+    This is not a figure of the paper.
     """
     places = [after for _, after in found.hop.changes.values()]
     words = f"starts change at {', '.join(f'{place:.2f}' for place in places)}"

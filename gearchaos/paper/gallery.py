@@ -1,4 +1,4 @@
-"""The folder of a gallery: figures, results, and a report, `report_text.md` with its numbers."""
+"""The folder of a gallery: figures, results, and the report from `report_text.md`."""
 
 import re
 from collections import Counter
@@ -29,12 +29,12 @@ from gearchaos.version import software_version
 REPORT = "report.md"
 DPI = 200
 RESULTS = {"sweep.h5": "sweep", "accelerations.h5": "response", "motions.h5": "motions"}
-"""Result files by name, and the attributes of `Reproduction` that they hold."""
+"""Attributes of `Reproduction` by the name of their result file."""
 
 TOLERANCE_MM = 0.011  # Single pitch deviation of the driving gear in grade 7 (ISO 1328-1).
 
 KINDS = ("derived", "fitted", "predicted")
-"""What it is worth if a printed number agrees: `published.toml` says which is which."""
+"""Kinds of printed numbers, which decide what an agreement proves; see `published.toml`."""
 
 TABLE_HEAD = (
     "| | where | kind | Pan 2021 | here | difference | verdict |\n|---|---|---|---|---|---|---|\n"
@@ -42,9 +42,9 @@ TABLE_HEAD = (
 
 
 def pictures() -> list[tuple[str, str, Callable[[Reproduction], Page]]]:
-    """List all figures: the name of the files without ending, the title, and how it is drawn.
+    """List all figures in the paper's order: file name without ending, title, drawing function.
 
-    In the paper's order; `report_text.md` holds their captions.
+    Their captions are in `report_text.md`.
     """
     draw = figures.motion_page
     numbered: dict[int, Callable[[Reproduction], Page]] = {
@@ -62,10 +62,19 @@ def pictures() -> list[tuple[str, str, Callable[[Reproduction], Page]]]:
 
 
 def check_folder(folder: Path, overwrite: bool) -> None:
-    """Make the folder, and make sure that nothing in it is replaced unasked.
+    """Create the folder, and check that the gallery can be written to it.
 
-    Raises FileError if it holds a gallery that may not be replaced, is a file, or cannot be written
-    to.
+    Parameters
+    ----------
+    folder : Path
+        The folder.
+    overwrite : bool
+        Whether to replace existing files of a gallery.
+
+    Raises
+    ------
+    FileError
+        If it contains files that must not be replaced, is a file, or is not writable.
     """
     if folder.exists() and not folder.is_dir():
         raise FileError(f"{folder}: is a file; give the name of a folder as --output")
@@ -80,10 +89,28 @@ def check_folder(folder: Path, overwrite: bool) -> None:
 def write_gallery(
     found: Reproduction, folder: Path, *, overwrite: bool = False, formats: Sequence[str] = FORMATS
 ) -> Path:
-    """Write everything, say what comes next, and return the path of the report, which comes last.
+    """Write results, figures and, last, the report; report progress.
 
-    ``formats``: of the figures, ``"png"`` among them: that is what the report shows. Raises
-    FileError if a file cannot be written.
+    Parameters
+    ----------
+    found : Reproduction
+        The results to show.
+    folder : Path
+        An existing folder.
+    overwrite : bool
+        Whether to replace existing files.
+    formats : sequence of str
+        Formats of the figures; the report needs ``"png"``.
+
+    Returns
+    -------
+    Path
+        The report.
+
+    Raises
+    ------
+    FileError
+        If a file cannot be written.
     """
     for name, attribute in RESULTS.items():
         say(f"writing {name}")

@@ -1,4 +1,4 @@
-"""What Pan 2021 prints, read from `published.toml`, which says what each entry is."""
+"""The numbers printed in Pan 2021, read from `published.toml`, which describes each entry."""
 
 import json
 import tomllib
@@ -18,7 +18,7 @@ Printed: TypeAlias = SimpleNamespace
 
 @cache
 def published() -> Printed:
-    """Read all that the paper prints."""
+    """Read all printed numbers."""
     text = files("gearchaos.paper").joinpath("published.toml").read_text(encoding="utf-8")
     tables = json.dumps(tomllib.loads(text))
     read: Printed = json.loads(tables, object_hook=lambda table: Printed(**table))
@@ -26,7 +26,7 @@ def published() -> Printed:
 
 
 def contact_line_stiffness() -> TrapezoidalStiffness:
-    """Return the mesh stiffness of the contact lines as the paper counts them (eqs 15 to 18)."""
+    """Return the mesh stiffness from the paper's lengths of contact lines (eqs 15 to 18)."""
     lines = published().contact_lines
     # Half of the variation relative to its mean, with equal rise and fall.
     half_height = (lines.longest - lines.shortest) / (lines.longest + lines.shortest)

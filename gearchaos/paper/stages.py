@@ -1,9 +1,9 @@
-"""The stages of Pan 2021, and the third one: two bands visited in turn, until a crisis widens them.
+"""Labels for the third stage of Pan 2021: two bands visited in turn, until a crisis widens them.
 
 The paper's "two-times quasi-periodic" motion (its figure 10: two closed bands of curves, two sets
-of section points) is read as what a cascade of period doublings leaves behind: first motions of
-longer periods, then chaos on bands that are visited in turn, and that grow until they touch. An
-interior crisis ends it: the attractor takes in at once what was beside it.
+of section points) is interpreted as the end of a cascade of period doublings: motions of longer
+periods, then chaos on bands that are visited in turn and grow until they touch. An interior crisis
+ends this stage: the attractor suddenly grows.
 """
 
 from typing import NamedTuple
@@ -18,11 +18,11 @@ TWO_BANDS = "two bands"
 TOUCHING = "two bands that touch"
 
 OUT_OF_TURN = 0.25
-"""Largest share of points out of turn: half of that of a coin, below the third of a period 3."""
+"""Largest share of points out of turn: half of a random sequence's, below a period 3's third."""
 
 
 class Widening(NamedTuple):
-    """Where a section widens at once: ``before``, the widest up to there, and ``after``, there."""
+    """Swept value at which the section suddenly widens, and its widths before and after."""
 
     value: float
     before: float
@@ -30,9 +30,9 @@ class Widening(NamedTuple):
 
 
 def crisis_of(sweep: Result) -> Widening:
-    """Find the greatest growth, from a lane to the next, of the widest section so far.
+    """Find the largest growth from one lane to the next of the running maximum of the width.
 
-    Among the lanes from the first motion on two bands to the first that no longer takes turns.
+    The lanes are those from the first motion on two bands to the last that visits them in turn.
     """
     lanes, section = labelled_lanes(sweep), sweep["section_delta_5"]
     shares = out_of_turn(section)
@@ -45,10 +45,10 @@ def crisis_of(sweep: Result) -> Widening:
 
 
 def lanes_as_printed(result: Result, crisis: Widening, *, strictly: bool = False) -> LabelledLanes:
-    """Label as two bands what has more than two points, takes turns, and is as before a crisis.
+    """Label motions on two bands: more than two points, visited in turn, narrow as before a crisis.
 
-    Narrower, that is, than the mean of the two widths of the crisis. If ``strictly``, bands that
-    are not visited strictly in turn touch: the two of a single motion, as in figure 10, lie apart.
+    Narrow means below the mean of the two widths of the crisis. If ``strictly``, bands that are not
+    visited strictly in turn are labelled as touching; the bands of figure 10 are apart.
     """
     lanes, section = labelled_lanes(result), result["section_delta_5"]
     widest = (crisis.before + crisis.after) / 2.0
@@ -61,14 +61,14 @@ def lanes_as_printed(result: Result, crisis: Widening, *, strictly: bool = False
 
 
 def out_of_turn(section: Floats) -> Floats:
-    """Return the share of points on the same side of the median as the one before, (lanes,).
+    """Return the share of points on the same side of the median as their predecessor, (lanes,).
 
-    It is zero for two bands in turn, and a half where the next point could be on either side.
+    It is zero for two bands visited in turn, and a half for a random sequence.
     """
     above = section > np.median(section, axis=1, keepdims=True)
     return np.asarray(np.mean(above[:, 1:] == above[:, :-1], axis=1))
 
 
 def _longer(lanes: LabelledLanes) -> Mask:
-    # What is unresolved may be a period 2 that is slow to settle.
+    # Unresolved motions are left out: they may be a period 2 with a long transient.
     return np.asarray((lanes.period > 2) | np.isin(lanes.labels, ("chaotic", "quasi-periodic")))
