@@ -1,4 +1,4 @@
-"""The page of a result: diagrams to zoom into, and the motion of the lane that is clicked."""
+"""The explorer: a web page with diagrams to zoom into, and the motion of the clicked lane."""
 
 HOST = "127.0.0.1"
-"""The address of the page: that of this machine, which others do not reach."""
+"""Address of the page: the loopback interface, which other machines cannot reach."""

@@ -1,4 +1,4 @@
-"""Diagram, exponent chart and map of a sweep, which are drawn anew at every zoom."""
+"""Diagram, exponent chart and map of a sweep, redrawn at every zoom."""
 
 import re
 from typing import Any
@@ -21,28 +21,28 @@ from gearchaos.outputs.names import LARGEST_EXPONENT
 from gearchaos.results.reading.result import Result
 
 Charts = tuple[list[Any], dict[str, str]]
-"""Panels, of which the first is zoomed into, and the colours of kinds by their names."""
+"""Panels, the first of which can be zoomed into, and the colours of kinds by name."""
 
 GREYS = [f"#{3 * f'{shade:02x}'}" for shade in range(176, -1, -1)]
-"""From pixels that are visited rarely to those where all points of a motion lie."""
+"""Greys of pixels, from few points to many."""
 
-COLOURS = 256
+COLOURS = 256  # Most colours of a map.
 
 FILLED = 0.05
-"""Share of the pixels of a diagram below which dots take those beside them too."""
+"""Share of filled pixels of a diagram below which dots are enlarged by one pixel."""
 
 VALUE = "z"
-"""Name that HoloViews gives to what is drawn over two axes."""
+"""Name that HoloViews gives to a variable over two axes."""
 
 DRAWN = 4000
-"""Points of a line, which follow its outline where there are more."""
+"""Most points of a line; a longer line is reduced to its outline."""
 
 _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 _LOWERED = str.maketrans("0123456789aehikmnprstx", "₀₁₂₃₄₅₆₇₈₉ₐₑₕᵢₖₘₙₚᵣₛₜₓ")
 
 
 def diagram(result: Result, variable: str) -> Charts:
-    """Draw the points of a variable over one swept parameter, and the largest exponent if known."""
+    """Draw a variable over one swept parameter, and the largest exponent if the result has it."""
     lanes, drawn = diagram_lanes(result), [variable]
     if LARGEST_EXPONENT in result:
         drawn.append(LARGEST_EXPONENT)
@@ -67,7 +67,7 @@ def diagram(result: Result, variable: str) -> Charts:
 
 
 def two_parameter_map(result: Result, variable: str) -> Charts:
-    """Draw a variable of the lanes over two swept parameters, as `figures.parameter_map` does."""
+    """Draw a variable over two swept parameters, as `figures.parameter_map` does."""
     axes, names = Figure().subplots(), map_axes(result)
     image: Any = parameter_map(axes, result, variable)
     legend, colours = axes.get_legend(), image.cmap
@@ -82,7 +82,7 @@ def two_parameter_map(result: Result, variable: str) -> Charts:
 
 
 def plain_text(label: str) -> str:
-    """Word a label in Unicode, as δ₅' for ``$\\delta_5'$``: nothing then takes it for a formula."""
+    """Write a label in Unicode without formulae, such as δ₅' for ``$\\delta_5'$``."""
     text = re.sub(r"\\([A-Za-z]+)", lambda found: _letter(found[1]), label)
     text = re.sub(r"\^\{?(-?\d+)\}?", lambda found: found[1].translate(_RAISED), text)
     text = re.sub(r"_\{?([\daehikmnprstx]+)\}?", lambda found: found[1].translate(_LOWERED), text)
@@ -98,9 +98,9 @@ def _letter(name: str) -> str:
 
 
 def _thickened(image: hv.Image) -> hv.Image:
-    """Let pixels take the highest count beside them where they are too few to be seen.
+    """Enlarge dots by one pixel if there are too few to be visible.
 
-    Datashader's own way to do it is compiled whenever a page is begun, for seconds.
+    Datashader's own function for this is compiled for seconds whenever a page is opened.
     """
     (count,) = image.vdims
     counts = image.data[count.name]
@@ -109,19 +109,19 @@ def _thickened(image: hv.Image) -> hv.Image:
         wide = np.pad(thick, 1)
         tall = np.maximum.reduce([wide[:-2], wide[1:-1], wide[2:]])
         thick = np.maximum.reduce([tall[:, :-2], tall[:, 1:-1], tall[:, 2:]])
-    # As large as the picture is, half of it need not be sent.
+    # float32 halves the size of the picture that is sent to the browser.
     shown = np.where(thick, thick, np.nan).astype(np.float32)
     data = image.data.assign({count.name: (counts.dims, shown)})
     return image.clone(data, vdims=[count.clone(nodata=None)])
 
 
 def _dimensions(result: Result, *names: str) -> list[Any]:
-    # Of the axis upwards there is less room.
+    # The vertical axis has less room.
     labels = [
         axis_label(result, name, length) for name, length in zip(names, (60, 26), strict=True)
     ]
     texts = [plain_text(label) for label in labels]
-    # HoloViews takes axes for one if the label of the first is label or name of the second.
+    # HoloViews merges two axes if the label of one is the label or the name of the other.
     if len({*texts, *names, VALUE}) < len([*texts, *names, VALUE]):
         texts = [f"{text} [{name}]" for text, name in zip(texts, names, strict=True)]
     return [hv.Dimension(n, label=one) for n, one in zip(names, texts, strict=True)]

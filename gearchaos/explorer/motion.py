@@ -1,4 +1,4 @@
-"""The motion of a lane in panels to look into, which show what the figures draw."""
+"""The motion of a lane in interactive panels with the content of the figures."""
 
 from typing import Any
 
@@ -19,7 +19,7 @@ from gearchaos.results.reading.result import Result
 
 FORCE = f"{MESH_FORCE}tangential"
 SCALES = ("linear", "linear", "log", "linear")
-"""Of the panels of `show`."""
+"""Vertical scales of the panels of `show`."""
 LOOK = {
     "height": 290,
     "sizing_mode": "stretch_width",
@@ -28,7 +28,7 @@ LOOK = {
 
 
 def empty_panel(scale: str) -> Any:
-    """Make a panel for `show`, with a linear or a logarithmic ("log") axis upwards."""
+    """Make a panel for `show`; ``scale`` of the vertical axis: "linear" or "log"."""
     panel = figure(y_axis_type=scale, tooltips="$x, $y", **LOOK)
     panel.toolbar.logo, panel.toolbar.autohide = None, True
     panel.axis.axis_label_text_font_style = "normal"
@@ -40,7 +40,19 @@ def empty_panel(scale: str) -> Any:
 def show(shown: list[Any], motion: Result, coordinate: str) -> None:
     """Show the lane of a response: time history, phase portrait with section, spectrum, mesh force.
 
-    Raises FigureError if it diverged.
+    Parameters
+    ----------
+    shown : list
+        Four panels from `empty_panel`, with `SCALES`.
+    motion : Result
+        A response with one lane.
+    coordinate : str
+        Such as ``"delta_5"``.
+
+    Raises
+    ------
+    FigureError
+        If the lane diverged.
     """
     history, portrait, spectrum, force = drawn = Figure().subplots(1, 4)
     late: Any = {"between": (max(0.0, motion[TIME][-1] - SHOWN_PERIODS), None)}
@@ -55,7 +67,7 @@ def show(shown: list[Any], motion: Result, coordinate: str) -> None:
 
 
 def _show(shown: Any, axes: Axes) -> None:
-    """Show what was drawn into axes of matplotlib, in the place of what the panel showed."""
+    """Replace the content of a panel by that of axes of matplotlib."""
     shown.xaxis.axis_label = plain_text(axes.get_xlabel())
     shown.yaxis.axis_label = plain_text(axes.get_ylabel())
     shown.renderers, items = [], []

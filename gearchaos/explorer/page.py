@@ -1,4 +1,4 @@
-"""The page of one result: what it shows, and what switches, clicks and links change."""
+"""The page of one result, and its reactions to switches, clicks and links."""
 
 import shlex
 from collections.abc import Callable, Mapping, Sequence
@@ -36,9 +36,16 @@ HALF = {"flex": "1 1 560px", "min-width": "0"}  # Side by side where the window 
 
 
 class ExplorerPage:
-    """What a visitor sees of a result, whose file is ``path``.
+    """The page of one visitor.
 
-    ``draw`` runs the command `plot` with its arguments, and raises FigureError if that fails.
+    Parameters
+    ----------
+    result : Result
+        The result to show.
+    path : str
+        Its file, for texts and commands.
+    draw : callable
+        Runs the command `plot` with a list of arguments; raises FigureError if that fails.
     """
 
     def __init__(self, result: Result, path: str, draw: Callable[[Sequence[str]], None]) -> None:
@@ -60,7 +67,7 @@ class ExplorerPage:
             given = {"value": float(result[axis][result[axis].size // 2]), "format": "0.[000000]"}
             self._switches[axis] = pn.widgets.FloatInput(**given, **_named(axis))
         self._window = pn.widgets.LiteralInput(value=[], visible=False)
-        # A line of its own from the beginning: what is below would move under the pointer.
+        # Every text has its line from the beginning: a new line would move the charts below it.
         texts = (pn.pane.HTML("&nbsp;", **WIDE) for _ in range(5))
         self._pointed, self._lane, self._fault, self._kinds, self._commands = texts
         self._charts, self._panels = pn.Column(**WIDE), [*map(empty_panel, SCALES)]
@@ -72,7 +79,7 @@ class ExplorerPage:
         self._refused: dict[str, str] = {}
 
     def view(self) -> Any:
-        """Compose what the link asks for; from then on the link follows what is changed."""
+        """Compose the page from its link; afterwards the link follows the switches."""
         pn.config.exception_handler = self._say_fault
         for name, switch in (*self._switches.items(), ("window", self._window)):
             wrong = partial(self._refuse, name)
@@ -112,7 +119,7 @@ class ExplorerPage:
         )
 
     def _variables(self) -> list[str]:
-        """Name what can be drawn of the sweep, first what is drawn unless another is chosen."""
+        """Return the names of all variables to draw, the default first."""
         of_lanes = [one for one in self._result.variables.values() if one.dims == self._result.axes]
         if len(self._swept) > 1:
             return sorted((one.name for one in of_lanes), key=lambda name: name != LABELS[0])
@@ -121,7 +128,7 @@ class ExplorerPage:
 
     @property
     def _ends(self) -> list[float]:
-        """The ends of both axes of the first chart, empty where all of it is seen."""
+        """Limits of both axes of the first chart; empty if it is not zoomed."""
         ends = self._window.value
         given = isinstance(ends, list) and len(ends) == 4
         return ends if given and all(map(_is_number, ends)) else []
@@ -133,14 +140,14 @@ class ExplorerPage:
         return result.physical() if self._value("units") == "physical" else result
 
     def _change(self, name: str, show: Callable[[], None], _event: Any) -> None:
-        """Show what another value of a switch asks for."""
+        """Update the page after a switch has changed."""
         if self._steady and self._allowed(name):
             if show == self._redraw:
                 self._window.value = []
             show()
 
     def _allowed(self, name: str) -> bool:
-        """Tell whether a switch has one of its values; if a link gave another, take the first."""
+        """Whether a switch has a valid value; an invalid one from a link becomes the first."""
         choices = getattr(self._switches[name], "values", None)
         if self._value(name) in choices if choices else _is_number(self._value(name)):
             return True
@@ -153,7 +160,7 @@ class ExplorerPage:
         self._say(f"the link asks for what there is not: {', '.join(self._refused)}")
 
     def _redraw(self) -> None:
-        """Draw the sweep, of which another variable, branch or unit may be wanted, and a motion."""
+        """Draw the sweep with the variable, axis values and units of the switches, and a motion."""
         chosen = self._result.sel(None, **{axis: self._value(axis) for axis in self._others})
         draw = two_parameter_map if len(self._swept) > 1 else diagram
         try:
@@ -173,7 +180,7 @@ class ExplorerPage:
             charts[0].opts(ylim=tuple(ends[2:]))
         for chart in charts:
             chart.opts(**({"xlim": tuple(ends[:2])} if ends else {}))
-            # Below the diagram there is the chart of exponents.
+            # The second chart shows exponents, and has a line at zero.
             lines = self._marks if chart is charts[0] else [zero, *self._marks]
             chart.opts(tools=[CrosshairTool(overlay=line)], hooks=[partial(_marked, lines)])
             chart.opts(active_tools=["box_zoom"])
@@ -187,7 +194,7 @@ class ExplorerPage:
         self._move()
 
     def _nearest(self, x: float | None, y: float | None) -> dict[str, int]:
-        """Return the number of the value next to a place in a chart, for each swept axis."""
+        """Return the number of the value nearest to a place in a chart, for each swept axis."""
         if x is None or y is None:
             return {}
         pairs = zip(self._swept, (x, y), strict=False)
@@ -215,7 +222,7 @@ class ExplorerPage:
             self._say_commands()
 
     def _move(self) -> None:
-        """Show the motion of the lane next to the values that the switches give."""
+        """Show the motion of the lane nearest to the values of the switches."""
         fault, self._motion, start = "", None, self._value("motion_from")
         try:
             lane = self._result.sel("within", **{a: self._value(a) for a in self._result.axes})
@@ -228,8 +235,8 @@ class ExplorerPage:
             self._say_commands()
             config = continued(lane, self._path, start)
             with compiling():
-                told = prepared(config, self._periods), self._periods, ""
-                motion = compute_response(*told, str(lane.metadata["fixed"]))
+                given = prepared(config, self._periods), self._periods, ""
+                motion = compute_response(*given, str(lane.metadata["fixed"]))
             with pn.io.unlocked(), pn.state.curdoc.models.freeze():
                 show(self._panels, self._in_units(motion), self._coordinate)
             self._motion = motion
@@ -239,35 +246,35 @@ class ExplorerPage:
 
     @property
     def _coordinate(self) -> str:
-        """The coordinate that is drawn of the sweep, or else the torsion."""
+        """The coordinate of the drawn section, or the torsion."""
         name = str(self._value("variable"))
         of_section = name.startswith(SECTION)
         return name.removeprefix(SECTION).removesuffix("_rate") if of_section else COORDINATE
 
     def _words(self, at: Mapping[str, float]) -> str:
-        """Name value, motion, period, exponent and the chosen number of a lane."""
+        """Word the swept value, motion, period, exponent and chosen variable of a lane."""
         lane = self._shown.sel(None, **at)
-        told = ["diverged"] if lane[STATUS] else []
-        if LABELS[0] in lane and not told:
+        words = ["diverged"] if lane[STATUS] else []
+        if LABELS[0] in lane and not words:
             motion, period = (int(lane[name]) for name in LABELS)
-            told.append(label_text(lane.variables[LABELS[0]].flags[motion], period))
+            words.append(label_text(lane.variables[LABELS[0]].flags[motion], period))
         for name in dict.fromkeys([LARGEST_EXPONENT, self._value("variable")]):
             if name in lane and lane.dims(name) == () and lane[name].dtype == float:
                 symbol = lane.attributes(name).get("symbol") or name.replace("_", " ")
-                told.append(plain_text(f"{symbol} = {lane[name]:.4g} {unit_of(lane, name)}"))
-        return f"<b>{escape(plain_text(in_words(self._shown, at)))}</b> {escape(', '.join(told))}"
+                words.append(plain_text(f"{symbol} = {lane[name]:.4g} {unit_of(lane, name)}"))
+        return f"<b>{escape(plain_text(in_words(self._shown, at)))}</b> {escape(', '.join(words))}"
 
     def _say(self, text: str) -> None:
         self._fault.object = f"<b style='color:{VERMILION}'>{escape(text)}</b>" if text else ""
 
     def _say_fault(self, error: Exception) -> None:
-        """Say on the page what went wrong; the traceback of a defect goes to the terminal too."""
+        """Show an error on the page; the traceback of a defect also goes to the terminal."""
         self._say(_reason(error))
         if not isinstance(error, GearchaosError | MemoryError):
             raise error
 
     def _arguments(self) -> dict[str, list[str]]:
-        """Return the words of the commands that make what is shown, by the name of the figure."""
+        """Return the arguments of the commands that reproduce the page, by figure."""
         ends, motion = self._ends, f"{Path(self._path).stem}_response.h5"
         units = ["--units", "physical"] if self._value("units") == "physical" else []
         at = {a: f"--at={a}={coordinate_text(a, value)}" for a, value in self._fixed.items()}
@@ -287,8 +294,8 @@ class ExplorerPage:
         self._commands.object = f"<pre>{escape(''.join(lines))}</pre>"
 
     def _saved(self, name: str, kind: str) -> BytesIO:
-        """Draw a figure as the command that is shown does, and return its file."""
-        # The result that is open: its file may have been removed or replaced.
+        """Draw a figure as the displayed command does, and return its file."""
+        # From the result in memory: its file may have been removed or replaced.
         drawn = self._result if name == "sweep" else self._motion
         if drawn is None:
             raise FigureError("there is no motion to draw")
@@ -300,20 +307,20 @@ class ExplorerPage:
 
 
 def _named(switch: str) -> dict[str, Any]:
-    """Return name and width of a switch: some versions of panel keep the name once it is made."""
+    """Return name and width of a switch; some versions of panel cannot change the name later."""
     return {"name": switch.replace("_", " ").capitalize(), "width": 170}
 
 
 def _marked(marks: Sequence[Span], plot: Any, _element: Any) -> None:
-    """Draw marks into the panel of a chart, whenever it is drawn anew, and keep its frame."""
-    # Numbers of another length would move the frame, and all of it were drawn a second time.
+    """Draw marks into a chart whenever it is redrawn, and keep its frame."""
+    # A fixed border: longer tick labels would move the frame and redraw the chart.
     plot.state.min_border_left = 130
     if marks[0] not in plot.state.center:
         plot.state.center = [*plot.state.center, *marks]
 
 
 def _is_number(value: object) -> bool:
-    """Whether a link or a switch holds a number that sweeps can reach."""
+    """Whether a value is a number within the range of sweeps."""
     return isinstance(value, float | int) and -LARGEST_VALUE <= value <= LARGEST_VALUE
 
 

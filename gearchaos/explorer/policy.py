@@ -1,8 +1,8 @@
-"""Which requests the page answers, and what a browser may do with the answers.
+"""Rules for the requests that the page answers, and for the use of its answers by a browser.
 
-A page of another site that is open in the same browser can send requests to this machine. A browser
-adds ``Origin`` to those that scripts send and ``Sec-Fetch-Site`` to all, and a site cannot change
-either. A link that a person opens is answered, wherever it stands.
+A page of another site in the same browser can send requests to this machine. The browser adds
+``Origin`` to the requests of scripts and ``Sec-Fetch-Site`` to all requests, and a site can change
+neither. A link opened by a person is always answered.
 """
 
 from typing import Any
@@ -20,20 +20,28 @@ NAMES = (HOST, "localhost")
 
 
 def origins(port: int) -> list[str]:
-    """Return the names under which the page is served, with its port."""
-    # Browsers leave the port of HTTP out.
+    """Return the hosts under which the page is served, with the port."""
+    # Browsers omit port 80.
     return [f"{name}:{port}" for name in NAMES] + (list(NAMES) if port == 80 else [])
 
 
 def protect(application: Application, port: int) -> None:
-    """Refuse requests of other sites with code 403, and send a policy with every answer."""
+    """Reject requests of other sites with code 403, and send a policy with every answer.
+
+    Parameters
+    ----------
+    application : Application
+        The server's application, which is changed.
+    port : int
+        Port of the server.
+    """
     refused = Rule(_Foreign(port), ErrorHandler, {"status_code": 403})
     application.default_router.rules[:0] = [refused, Rule(_Unreadable(), _BadLink)]
     application.transforms.append(_policy(port))
 
 
 class _Foreign(Matcher):  # type: ignore[misc]
-    """Matches requests under another name and those that a page of another site has caused."""
+    """Matches requests for another host and requests from a page of another site."""
 
     def __init__(self, port: int) -> None:
         self._port = port
@@ -41,7 +49,7 @@ class _Foreign(Matcher):  # type: ignore[misc]
     def match(self, request: HTTPServerRequest) -> dict[str, Any] | None:
         """Return an empty mapping where the request is foreign, None otherwise."""
         headers, own = request.headers, origins(self._port)
-        # A site can give its own name to this address: the host has to be one of ours.
+        # Another site can let its own name resolve to this address: check the host.
         foreign = request.host.lower() not in own
         if "Origin" in headers:
             foreign |= headers["Origin"].lower() not in [f"http://{name}" for name in own]
@@ -52,7 +60,7 @@ class _Foreign(Matcher):  # type: ignore[misc]
 
 
 class _Unreadable(Matcher):  # type: ignore[misc]
-    """Matches links that panel fails to read, such as one with a number of 5,000 digits."""
+    """Matches links that panel fails to parse, such as a number of 5,000 digits."""
 
     def match(self, request: HTTPServerRequest) -> dict[str, Any] | None:
         """Return an empty mapping where the link cannot be read, None otherwise."""
@@ -65,7 +73,7 @@ class _Unreadable(Matcher):  # type: ignore[misc]
 
 class _BadLink(RequestHandler):  # type: ignore[misc]
     def prepare(self) -> None:
-        """Answer with code 400 and what to do."""
+        """Answer with code 400 and a remedy."""
         raise HTTPError(400, reason="the link cannot be read: open the address without it")
 
 
@@ -73,8 +81,8 @@ def _policy(port: int) -> type[OutputTransform]:
     sockets = " ".join(f"ws://{name}" for name in origins(port))
     content = {
         "default-src": "'self'",
-        # Panel starts its page in a script of the page, compiles its templates there, and styles
-        # its parts one by one.
+        # Panel starts its page from an inline script, compiles templates in the browser, and uses
+        # inline styles.
         "script-src": "'self' 'unsafe-inline' 'unsafe-eval' blob:",
         "style-src": "'self' 'unsafe-inline'",
         "img-src": "'self' data: blob:",
@@ -94,7 +102,7 @@ def _policy(port: int) -> type[OutputTransform]:
     }
 
     class Policy(OutputTransform):  # type: ignore[misc]
-        """Adds the policy to an answer, and takes back what bokeh allows to every site."""
+        """Adds the policy to an answer, and removes the access that bokeh grants to all sites."""
 
         def transform_first_chunk(
             self,
