@@ -113,7 +113,7 @@ def test_one_direction_alone_is_not_refined(folder):
     arguments = "both.h5", "--at", "direction=upwards", "--refine", "0.01"
     ended = run_module("gearchaos.stages", *arguments, cwd=folder)
     assert (ended.code, ended.out) == (2, "")
-    assert "nor between lanes whose starts are carried on" in ended.err
+    assert "nothing lies between lanes whose starts are carried on" in ended.err
 
 
 def test_the_response_and_the_system_of_a_lane_are_on_its_branch(folder, result):

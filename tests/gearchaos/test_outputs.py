@@ -8,6 +8,7 @@ import h5py
 import numpy as np
 import pytest
 
+from gearchaos.engine.computing import EndStates, compute
 from gearchaos.engine.running import result_of
 from gearchaos.errors import ConfigurationError
 from gearchaos.models.gear_pair.outputs import CATALOGUE, FORCES_PART, LOADS_PART
@@ -196,7 +197,7 @@ def test_a_file_with_an_array_too_many_is_not_written(tmp_path):
 
 def test_a_result_with_an_array_too_many_is_not_made():
     found = unlabelled("sweep.count=2")
-    arrays = found.compute(0, 2)
+    arrays = compute(found, (0, 2), EndStates(found).before(0))
     assert result_of(found, [arrays], {}).axes == ("pitch_error",)
     with pytest.raises(ValueError, match=r"^noise: would not be written"):
         result_of(found, [{**arrays, "noise": np.zeros(2)}], {})

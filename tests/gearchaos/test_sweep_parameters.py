@@ -21,6 +21,9 @@ SPANS = {
     "pitch_error_phase_deg": (10.0, 90.0),
     "pitch_error.grade": (5.0, 9.0),
     "pitch_error.eccentricity": (0.0, 1.0),
+    "friction_coefficient": (0.05, 0.2),
+    "mesh.friction_coefficient": (0.05, 0.2),
+    "pitch_point_phase_deg": (10.0, 90.0),
     "operation.speed_rpm": (8000.0, 9000.0),
     "operation.torque_Nm": (40.0, 60.0),
     "mesh.mean_stiffness_N_per_um_mm": (12.0, 14.0),
@@ -32,6 +35,9 @@ SPANS = {
 }
 
 SINE = "amplitude_um = 11.0\nmean_um = 2.0\nphase_deg = 30.0"
+
+SOME_FRICTION = {"[groups]": "[groups]\nfriction_coefficient = 0.1"}
+WITH_FRICTION = {'"transverse", "axial"]': '"transverse", "axial", "friction"]'}
 
 # What the small sweep has to give in another way for a parameter to act, or to act alone.
 CHANGES = {
@@ -47,6 +53,10 @@ CHANGES = {
     "mesh.mean_stiffness_N_per_um_mm": {"[groups]": "[groups]\nstiffness_cosine = [-0.09]"},
     "pitch_error.grade": {SINE: 'kind = "grade"\ngrade = 7'},
     "pitch_error.eccentricity": {SINE: 'kind = "grade"\ngrade = 7'},
+    "friction_coefficient": WITH_FRICTION,
+    "mesh.friction_coefficient": WITH_FRICTION,
+    "friction_lever": {**WITH_FRICTION, **SOME_FRICTION},
+    "pitch_point_phase_deg": {**WITH_FRICTION, **SOME_FRICTION},
 }
 
 

@@ -181,7 +181,7 @@ def test_stages_are_those_of_the_slice_that_is_named(path, result, load, row):
 def test_lanes_of_random_starts_are_not_refined(path):
     ended = run_module("gearchaos.stages", path.name, "--refine", "0.1", cwd=path.parent)
     assert (ended.code, ended.out) == (2, "")
-    assert "nor between lanes whose starts are carried on, random" in ended.err
+    assert "nothing lies between lanes whose starts are carried on, random" in ended.err
 
 
 def test_a_slice_is_refined_like_the_sweep_of_one_parameter_that_it_is(tmp_path):

@@ -178,7 +178,8 @@ def test_plain_steps_predict_their_error_where_nothing_is_crossed(number):
 WRONG_BY = {
     name: 0.1 if "axial_damping" in name or "transverse_damping" in name else 1e-3
     for name in Groups._fields
-    if name not in ("error_mean", "error_phase")
+    # The reference solutions have neither a mean error, a phase nor friction.
+    if name not in ("error_mean", "error_phase", "pitch_point_phase") and "friction" not in name
 }
 
 
