@@ -1,10 +1,10 @@
 """Eigenfrequencies of a system with all its elements in contact."""
 
 import numpy as np
-from gearchaos_kernels import LaneSystem, jacobian
+from gearchaos_kernels import LaneSystem
 
 from gearchaos.arrays import Complex, Floats
-from gearchaos.dynamics.stability import in_contact
+from gearchaos.dynamics.stability import contact_jacobian
 
 
 # Parameters so large that the matrix overflows have no eigenvalues.
@@ -23,8 +23,7 @@ def eigenfrequencies(system: LaneSystem) -> Floats:
         Angular frequencies of the damped system per unit of tau, ascending: the imaginary parts of
         the eigenvalues of its Jacobian. Modes that do not oscillate are NaN and come last.
     """
-    matrices = jacobian(system, in_contact(system))
-    frequencies = np.stack([_eigenvalues(matrix).imag for matrix in matrices])
+    frequencies = np.stack([_eigenvalues(matrix).imag for matrix in contact_jacobian(system)])
     # One of each conjugate pair: the lower half of the sorted values are the others, or zeros.
     upper = np.sort(frequencies, axis=1)[:, frequencies.shape[1] // 2 :]
     return np.sort(np.where(upper > 0.0, upper, np.nan), axis=1)

@@ -7,10 +7,10 @@ of contact, the decay of a fast mode is nearly the same on all branches.
 """
 
 import numpy as np
-from gearchaos_kernels import METHODS, LaneSystem, jacobian
+from gearchaos_kernels import METHODS, LaneSystem
 
 from gearchaos.arrays import Complex, Floats, Mask
-from gearchaos.dynamics.stability import ROUNDING, in_contact
+from gearchaos.dynamics.stability import ROUNDING, branch_jacobians, contact_jacobian
 
 MOST_SHIFT = 0.05
 """Largest relative change of a decay rate by half the step that counts as resolved."""
@@ -30,7 +30,7 @@ def memory(system: LaneSystem) -> Floats:
         Mesh periods, infinite without damping. Modes of independent states are left out, because
         they do not act on other states.
     """
-    matrix = jacobian(system.measurable(), in_contact(system))
+    matrix = contact_jacobian(system.measurable())
     independent = system.independent_states
     acting = [n for n, name in enumerate(system.states) if name not in independent]
     modes = np.linalg.eigvals(matrix[:, acting][:, :, acting])
@@ -76,7 +76,7 @@ def hidden_decay(system: LaneSystem, steps: int, method: str) -> Floats:
 
 def _of_branches(system: LaneSystem) -> Complex:
     """Return the eigenvalues on every branch, shape (lanes, branches, states)."""
-    system = system.measurable()
-    held = [jacobian(system, stiffnesses) for stiffnesses in system.branch_stiffnesses()]
-    modes: Complex = np.linalg.eigvals(np.stack(held, axis=1)).astype(np.complex128)
+    modes: Complex = np.linalg.eigvals(np.stack(list(branch_jacobians(system)), axis=1)).astype(
+        np.complex128
+    )
     return modes

@@ -5,6 +5,8 @@ of their Jacobian lies outside the stable region of the method, the computed mot
 true motion decays, see `gearchaos_kernels.methods.rk4.stability`.
 """
 
+from collections.abc import Iterator
+
 import numpy as np
 from gearchaos_kernels import METHODS, LaneSystem, jacobian
 
@@ -34,33 +36,33 @@ def fewest_stable_steps(system: LaneSystem, method: str = "rk4") -> Integers:
 
     Notes
     -----
-    The branches are all combinations of contact and no contact, with the stiffness at its minimum
-    and at its maximum, see `LaneSystem.branch_stiffnesses`. A motion that visits a branch only for
-    part of the time may need fewer steps. Eigenvalues with a positive real part grow by themselves
-    and set no limit.
+    The branches have all elements in contact, with the stiffness at its minimum or at its maximum,
+    or none, see `LaneSystem.branch_stiffnesses`. A motion that visits a branch only for part of the
+    time may need fewer steps. Eigenvalues with a positive real part grow by themselves and set no
+    limit.
     """
-    system = system.measurable()
-    held = (jacobian(system, stiffnesses) for stiffnesses in system.branch_stiffnesses())
-    demand = np.max([_demand(matrix, method) for matrix in held], axis=0)
+    demand = np.max([_demand(matrix, method) for matrix in branch_jacobians(system)], axis=0)
     with np.errstate(over="ignore"):
         steps: Floats = np.ceil(demand * (1.0 - ROUNDING) * system.mesh_period)
     return np.clip(steps, 1.0, STEPS_CEILING).astype(np.intp)
 
 
-def in_contact(system: LaneSystem) -> Floats:
-    """Return the relative stiffnesses of all elements in contact at their mean, all 1.
+def branch_jacobians(system: LaneSystem) -> Iterator[Floats]:
+    """Yield the Jacobian of each contact branch, shape (lanes, states, states).
 
-    Parameters
-    ----------
-    system : LaneSystem
-        The system of the lanes.
-
-    Returns
-    -------
-    array, shape (lanes, elements)
-        Ones.
+    The branches are those of `LaneSystem.branch_stiffnesses`, and parameters are `measurable`.
     """
-    return np.ones((system.lanes, system.elements))
+    system = system.measurable()
+    for stiffnesses in system.branch_stiffnesses():
+        yield jacobian(system, stiffnesses)
+
+
+def contact_jacobian(system: LaneSystem) -> Floats:
+    """Return the Jacobian with all elements in contact at their mean stiffness.
+
+    Shape (lanes, states, states), per unit of tau.
+    """
+    return jacobian(system, np.ones((system.lanes, system.elements)))
 
 
 def exponent_bias(system: LaneSystem, steps: int, method: str) -> tuple[Floats, Floats]:
@@ -85,8 +87,8 @@ def exponent_bias(system: LaneSystem, steps: int, method: str) -> tuple[Floats, 
     With constant stiffnesses, the equations are linear. In each step the method multiplies the mode
     of an eigenvalue lambda by R(h lambda) instead of exp(h lambda).
     """
-    step, contact = system.mesh_period[:, np.newaxis] / steps, in_contact(system)
-    eigenvalues = np.linalg.eigvals(jacobian(system, contact)).astype(np.complex128)
+    step = system.mesh_period[:, np.newaxis] / steps
+    eigenvalues = np.linalg.eigvals(contact_jacobian(system)).astype(np.complex128)
     true = np.max(eigenvalues.real, axis=1)
     computed = np.max(np.log(METHODS[method].amplification(step * eigenvalues)) / step, axis=1)
     return computed - true, true

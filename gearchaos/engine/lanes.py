@@ -78,14 +78,19 @@ class Lanes:
         return math.prod(self.shape)
 
     @cached_property
+    def _first(self) -> LaneSystem:
+        """The system of the first lane, for what all lanes have in common."""
+        return self.system_of(np.arange(1))
+
+    @property
     def repeats_after(self) -> int:
         """Mesh periods per excitation period, for all lanes."""
-        return self.system_of(np.arange(1)).repeats_after
+        return self._first.repeats_after
 
-    @cached_property
+    @property
     def clearance(self) -> bool:
         """Whether the elements have clearance."""
-        return self.system_of(np.arange(1)).clearance
+        return self._first.clearance
 
     @property
     def side_by_side(self) -> int:
@@ -131,7 +136,7 @@ class Lanes:
         chosen = np.linspace(0, len(self) - 1, min(count, len(self)))
         return np.unique(chosen.round().astype(np.intp))
 
-    @property
+    @cached_property
     def parameters(self) -> dict[str, Variable]:
         """Parameters of the model that its effects need, with their origin."""
         names = [axis_name(parameter) for parameter in self._values]

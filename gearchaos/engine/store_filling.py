@@ -14,7 +14,7 @@ from gearchaos.engine.provenance import SOFTWARE
 from gearchaos.engine.run_plan import RunPlan
 from gearchaos.errors import ConfigurationError
 from gearchaos.progress import complain
-from gearchaos.results.files.block_store import BlockStore
+from gearchaos.results.files.block_store import BlockStore, OwnBlocks
 
 BLOCKS_PER_SHARD = 4
 """Smallest number of blocks per shard, given enough lanes: shards then end together."""
@@ -77,8 +77,7 @@ def open_store(
         SOFTWARE,
         text=run.config.text,
         resume=resume,
-        blocks=shard and shard.blocks(len(run.lanes)),
-        shards=shard and shard.of,
+        own=shard and OwnBlocks(shard.blocks(len(run.lanes)), shard.of),
     )
 
 

@@ -20,7 +20,7 @@ from gearchaos.outputs import catalogue
 from gearchaos.outputs.listing import Details
 from gearchaos.outputs.variable import Variable, coordinate
 from gearchaos.results.files.block_folder import StoreLock, read_manifest, require_same
-from gearchaos.results.files.block_store import BlockStore
+from gearchaos.results.files.block_store import BlockStore, OwnBlocks
 from gearchaos.results.reading.result import Result, open_result
 from gearchaos.version import Software
 
@@ -446,11 +446,12 @@ print(memory() - before)
 
 
 HALVES = [[(0, 30), (60, 90)], [(30, 60), (90, 100)]]
+OWN = OwnBlocks(HALVES[0], 2)
 
 
 def open_shard(output: Path, number: int, **options: Any) -> BlockStore:
     return BlockStore(
-        output, VARIABLES, CONFIGURATION, SOFTWARE, blocks=HALVES[number], shards=2, resume=True,
+        output, VARIABLES, CONFIGURATION, SOFTWARE, own=OwnBlocks(HALVES[number], 2), resume=True,
         **options,
     )  # fmt: skip
 
@@ -496,7 +497,7 @@ def test_a_refused_shard_leaves_nothing_behind(output: Path) -> None:
     for options in ({"configuration": "title = 'other'"}, {"resume": False}):
         given = {"configuration": CONFIGURATION, "resume": True, **options}
         with pytest.raises(FileError):
-            BlockStore(output, VARIABLES, software=SOFTWARE, **given, blocks=HALVES[0], shards=2)
+            BlockStore(output, VARIABLES, software=SOFTWARE, **given, own=OWN)
         assert names() == before
 
 

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
-from gearchaos.arrays import Array, Integers
+from gearchaos.arrays import Array, Arrays, Integers
 from gearchaos.errors import FileError
 from gearchaos.outputs.variable import Variable, lane_axes, require_listed
 from gearchaos.results.files.atomic_file import PARTIAL, reason, replacing, unlinked_content
@@ -27,7 +27,6 @@ from gearchaos.results.files.block_folder import (
 from gearchaos.results.files.result_file import Metadata, write_result
 from gearchaos.version import Software
 
-Arrays: TypeAlias = Mapping[str, Array]
 Bounds: TypeAlias = tuple[int, int]  # First lane of a range, and the one after its last.
 
 PIECE_BYTES = 1 << 28
@@ -43,6 +42,13 @@ class Finished(NamedTuple):
 
     bounds: list[Bounds]
     problems: list[str]
+
+
+class OwnBlocks(NamedTuple):
+    """The blocks of one shard, and how many shards share the sweep."""
+
+    blocks: Sequence[Bounds]
+    shards: int
 
 
 class BlockStore(AbstractContextManager["BlockStore"]):
@@ -65,11 +71,9 @@ class BlockStore(AbstractContextManager["BlockStore"]):
         The configuration as it was written.
     resume : bool
         Whether own blocks of an earlier run are kept. Otherwise they are refused.
-    blocks : sequence of (int, int), optional
-        First and last lane (excluded) of the own blocks, if this is a shard; other shards may be
-        computed in the same folder. By default all lanes are own.
-    shards : int, optional
-        Number of shards of the sweep.
+    own : OwnBlocks, optional
+        The own blocks, if this is a shard; other shards may be computed in the same folder. By
+        default all lanes are own.
 
     Raises
     ------
@@ -87,8 +91,7 @@ class BlockStore(AbstractContextManager["BlockStore"]):
         *,
         text: str = "",
         resume: bool = False,
-        blocks: Sequence[Bounds] | None = None,
-        shards: int | None = None,
+        own: OwnBlocks | None = None,
     ) -> None:
         self.output, self.folder = Path(output), folder_of(output)
         self.lanes, self._record = lanes_and_record(variables)
@@ -97,19 +100,19 @@ class BlockStore(AbstractContextManager["BlockStore"]):
         self._owner = json.dumps(facts)
         # Through JSON, since a manifest that is read has lists in place of tuples.
         decisive = json.loads(self._owner)
-        shared = blocks is not None
-        self._blocks = [(0, self.lanes)] if blocks is None else list(blocks)
+        shared = own is not None
+        self._blocks = [(0, self.lanes)] if own is None else list(own.blocks)
         self._lock = StoreLock(self.folder, self.output, shared)
         try:
-            own = self._own_blocks()
-            beside = {"text": text, "shards": shards}
+            finished = self._own_blocks()
+            beside = {"text": text, "shards": own and own.shards}
             # The first of several shards writes the manifest.
-            how = {"write": shared or not own, "overwrite": not shared}
+            how = {"write": shared or not finished, "overwrite": not shared}
             settle_manifest(self.folder, decisive, beside, **how)
-            if own and not resume:
+            if finished and not resume:
                 raise FileError(
-                    f"{self.folder}: holds {len(own)} finished blocks of an earlier run; continue "
-                    "it with --resume, or delete this folder"
+                    f"{self.folder}: holds {len(finished)} finished blocks of an earlier run; "
+                    "continue it with --resume, or delete this folder"
                 )
         except BaseException:
             if self._lock.new and self._lock.alone():
