@@ -5,6 +5,7 @@ import math
 import os
 import sys
 import time
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import replace
 from datetime import timedelta
@@ -51,9 +52,16 @@ class Estimate(NamedTuple):
     memory_bytes: int
 
 
-def describe(run: RunPlan, output: str, shard: Shard | None, as_json: bool) -> None:
-    """Print what a run, or one shard of it, would compute, and an estimate of time and memory."""
+def describe(
+    run: RunPlan, output: str, shard: Shard | None, as_json: bool, others: Sequence[RunPlan] = ()
+) -> None:
+    """Print what a run, or one shard of it, would compute, and an estimate of time and memory.
+
+    ``others``: the same run with other methods, whose time is printed for comparison.
+    """
     estimate, resonant = _estimated(run, shard), resonances(run.lanes)
+    seconds = {run.plan.method: estimate.seconds}
+    seconds |= {one.plan.method: _estimated(one, shard).seconds for one in others}
     if as_json:
         facts = {
             "output": output,
@@ -62,6 +70,8 @@ def describe(run: RunPlan, output: str, shard: Shard | None, as_json: bool) -> N
             "lanes": estimate.lanes,
             "steps": estimate.steps,
             "seconds": estimate.seconds,
+            "method": run.plan.method,
+            "seconds_of_methods": seconds,
             "threads": estimate.threads,
             "file_bytes": estimate.file_bytes,
             "memory_bytes": estimate.memory_bytes,
@@ -71,7 +81,11 @@ def describe(run: RunPlan, output: str, shard: Shard | None, as_json: bool) -> N
         print(json.dumps(facts, indent=1))
         return
     first = {"output": f"{output}{' (exists)' if os.path.exists(output) else ''}"}
-    for key, value in {**first, **resonant.texts, **_words(run, estimate)}.items():
+    compared = {
+        "compared": ", ".join(f"{name} about {_duration(time)}" for name, time in seconds.items())
+    }
+    words = _words(run, estimate) | (compared if others else {})
+    for key, value in {**first, **resonant.texts, **words}.items():
         sys.stderr.write(f"{key + ':':12}{value}\n")
 
 
@@ -92,8 +106,7 @@ def _estimated(run: RunPlan, shard: Shard | None) -> Estimate:
 
 def _words(run: RunPlan, estimate: Estimate) -> dict[str, str]:
     """Return the lines about effects, states, lanes and the estimate, each with its heading."""
-    config, lanes, seconds = run.config, run.lanes, estimate.seconds
-    duration = f"{seconds:.1f} s" if seconds < 100 else str(timedelta(seconds=round(seconds)))
+    config, lanes = run.config, run.lanes
     spans = [
         f"{axis.values.size} values of {axis.name} from {axis.values[0]:g} to {axis.values[-1]:g}"
         for axis in lanes.axes
@@ -115,8 +128,13 @@ def _words(run: RunPlan, estimate: Estimate) -> dict[str, str]:
         "file": f"about {tqdm.format_sizeof(estimate.file_bytes, 'B')} before compression",
         "memory": f"about {tqdm.format_sizeof(estimate.memory_bytes, 'B')} at the peak of the "
         "process",
-        "time": f"about {duration} with {threads}",
+        "time": f"about {_duration(estimate.seconds)} with {threads}",
     }
+
+
+def _duration(seconds: float) -> str:
+    """Return a duration in words."""
+    return f"{seconds:.1f} s" if seconds < 100 else str(timedelta(seconds=round(seconds)))
 
 
 def _seconds_per_lane(run: RunPlan) -> float:

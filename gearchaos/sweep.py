@@ -79,12 +79,27 @@ def _sweep(options: SweepOptions) -> int:
     if options.dry_run:
         from gearchaos.dry_run import describe
 
-        describe(prepare(run), output, shard, options.json)
+        run = prepare(run)
+        describe(run, output, shard, options.json, _others(run, config))
         return OK
     code = None
     if options.resume and not options.overwrite:
         code = complete_already(run, output)
     return _compute(run, output, shard, options) if code is None else code
+
+
+def _others(run: "RunPlan", config: "Configuration") -> list["RunPlan"]:
+    """Return a run with each method that was not chosen, if the configuration names none."""
+    from gearchaos.engine.method_choice import other_methods
+    from gearchaos.engine.run_plan import plan_run
+    from gearchaos.engine.running import prepare
+
+    found = []
+    for other in other_methods(config, run.plan.method):
+        # Steps that were given may be too few for another method.
+        with suppress(ConfigurationError):
+            found.append(prepare(plan_run(other)))
+    return found
 
 
 def _check_sharing(options: SweepOptions, config: "Configuration") -> None:

@@ -30,6 +30,7 @@ from gearchaos.dynamics.stability import fewest_stable_steps
 from gearchaos.dynamics.stability_loss import STABILITY_LOSS_TEXTS, StabilityLoss
 from gearchaos.engine.choosing import with_chosen_steps
 from gearchaos.engine.lanes import Lanes, start_states
+from gearchaos.engine.method_choice import with_method
 from gearchaos.engine.recomputing import computable
 from gearchaos.engine.response import respond
 from gearchaos.engine.run_plan import plan_run
@@ -97,7 +98,7 @@ class System:
     ) -> None:
         config = configuration_of(config)
         values = coordinates("at", at or {}) | coordinates("groups", groups)
-        self.config = config.at(values)
+        self.config, _ = with_method(config.at(values))
         for sweep in self.config.sweeps.values():
             if swept_values(sweep).size > 1:
                 raise ConfigurationError(
@@ -106,7 +107,7 @@ class System:
                     f'{{"{sweep.parameter}": ...}})'
                 )
         lanes = Lanes(self.config)
-        self._first_steps, _ = stable_steps(lanes, self.config.integration.steps_per_period)
+        self._first_steps, _ = stable_steps(lanes, self.config.integration.fixed_steps)
         self._record = self._at({})
         self.state = start_states(self.config, self._record, np.zeros(1, dtype=np.intp))[0]
 
@@ -397,7 +398,7 @@ class System:
     @cached_property
     def _steps(self) -> int:
         """Steps per mesh period: as configured, raised where allowed, or chosen for the scene."""
-        if self.config.integration.steps_per_period is not None:
+        if self.config.integration.fixed_steps is not None:
             return self._first_steps
         # The same choice as in `run` of this configuration.
         return with_chosen_steps(plan_run(self.config)).plan.steps_per_period

@@ -11,6 +11,7 @@ from gearchaos.arguments import path_text
 from gearchaos.arguments import texts as texts_of
 from gearchaos.configuration.keys import Key, keys_of
 from gearchaos.configuration.messages import Fault, faults_of, texts
+from gearchaos.configuration.methods import METHODS
 from gearchaos.configuration.rules import GENERIC_RULES, Rule, unknown_parameter
 from gearchaos.configuration.tables import Tables
 from gearchaos.configuration.toml_text import (
@@ -189,6 +190,33 @@ class Configuration(Tables):
         except KeyError as error:
             raise ConfigurationError(f"{self.source}: {error.args[0]} is not a table") from None
         return type(self).from_tables(tables, self.source, self._folder)
+
+    def integrated_by(self, method: str) -> Self:
+        """Return a copy with the same text and another method of integration.
+
+        Parameters
+        ----------
+        method : str
+            Name of the method. If it has a number of steps of its own, that replaces the given one.
+
+        Returns
+        -------
+        Configuration
+            The changed copy.
+
+        Raises
+        ------
+        ConfigurationError
+            If the method cannot integrate the scene.
+        """
+        tables = self.tables()
+        integration = {**tables["integration"], "method": method}
+        if METHODS[method].steps is not None:
+            integration.pop("steps_per_period", None)
+        tables["integration"] = integration
+        changed = type(self).from_tables(tables, self.source, self._folder)
+        changed._text = self._text
+        return changed
 
     def at(self, values: Mapping[str, float]) -> Self:
         """Return a copy with parameters fixed at values.

@@ -35,8 +35,11 @@ class Method:
     shares_maps: bool = False
 
 
-FLOW_MAP_STEPS = 24
+FLOW_MAP_STEPS = 12
 """Steps per period of flow maps: fewer take longer at crossings, more between them."""
+
+AUTO = "auto"
+"""Name of the method that stands for the faster one of the others."""
 
 METHODS = {
     one.name: one
@@ -50,6 +53,7 @@ METHODS = {
             always_resolved=True,
             shares_maps=True,
         ),
+        Method(AUTO, "whichever of the others is estimated to be faster"),
     )
 }
 """All methods by name; the first is the default."""

@@ -2,12 +2,12 @@
 
 import math
 from fractions import Fraction
-from typing import TYPE_CHECKING, Annotated, Any, Generic, Literal, Self, TypeAlias, TypeVar
+from typing import TYPE_CHECKING, Annotated, Generic, Literal, Self, TypeAlias, TypeVar
 
 from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 
 from gearchaos.configuration.keys import AS_LIST, Numbers, Table, key
-from gearchaos.configuration.methods import EXACT, METHODS
+from gearchaos.configuration.methods import AUTO, EXACT, METHODS
 
 MOST_RUN_LANES = 100_000_000
 """Largest number of lanes of one run, limited by files and memory."""
@@ -114,10 +114,11 @@ else:
 class Integration(Table):
     """The method, on a fixed grid over the mesh period."""
 
-    method: MethodName = key(", or ".join(one.words for one in METHODS.values()), default="rk4")
+    method: MethodName = key("; ".join(one.words for one in METHODS.values()), default="rk4")
     steps_per_period: int | None = key(
         f"steps per mesh period; by default {DEFAULT_STEPS}, doubled until the scene is resolved, "
-        f'and {EXACT.steps} with method = "{EXACT.name}"',
+        f'and {EXACT.steps} with method = "{EXACT.name}"; with method = "{AUTO}" a given number is '
+        "for Runge-Kutta steps",
         example=400,
         default=None,
         ge=1,
@@ -141,14 +142,11 @@ class Integration(Table):
     """mesh periods recorded after the transient; both lengths are raised to whole periods of the
     excitation where these are longer than a mesh period"""
 
-    @model_validator(mode="before")
-    @classmethod
-    def _steps_of_the_method(cls, given: Any) -> Any:
-        """Set the default steps of the method, if it has any."""
-        method = METHODS.get(str(given.get("method"))) if isinstance(given, dict) else None
-        if method is not None and method.steps is not None:
-            return {"steps_per_period": method.steps, **given}
-        return given
+    @property
+    def fixed_steps(self) -> int | None:
+        """Steps per mesh period as given, or those of the method; None if they are chosen."""
+        given = self.steps_per_period
+        return METHODS[self.method].steps if given is None else given
 
 
 class Outputs(Table, Generic[State]):

@@ -35,7 +35,7 @@ def plan_of(config: Configuration, **others: Any) -> Plan:
         raise ExecutionError(str(error)) from None
     integration = config.integration
     configured = Plan(
-        integration.steps_per_period or DEFAULT_STEPS,
+        integration.fixed_steps or DEFAULT_STEPS,
         integration.transient_periods,
         integration.recorded_periods,
         section_points=0,

@@ -34,7 +34,7 @@ def whole_lengths(lanes: Lanes) -> dict[str, int]:
     }
     orders, record = lanes.config.outputs.mesh_orders, lengths["recorded_periods"]
     # A chosen number of steps is never smaller.
-    most = (integration.steps_per_period or DEFAULT_STEPS) / 2
+    most = (integration.fixed_steps or DEFAULT_STEPS) / 2
     if unfit := [str(one) for one in orders if record % one.denominator or one >= most]:
         whole = math.lcm(repeats, *(order.denominator for order in orders))
         raise ConfigurationError(

@@ -8,6 +8,7 @@ import gearchaos_kernels as kernels
 from gearchaos.dynamics.plans import plan_of
 from gearchaos.engine.excitation import remarks, whole_lengths
 from gearchaos.engine.lanes import Lanes
+from gearchaos.engine.method_choice import with_method
 from gearchaos.engine.step_choice import steps_for_exponents
 from gearchaos.engine.steps import coarse_steps, needless_maps, stable_steps
 from gearchaos.models import Configuration
@@ -110,10 +111,11 @@ def plan_run(config: Configuration) -> RunPlan:
         If the number of steps per period is unstable and must not be raised, or if the excitation
         or the record does not suit the outputs.
     """
+    config, reason = with_method(config)
     lanes, integration, outputs = Lanes(config), config.integration, config.outputs
-    steps, note = stable_steps(lanes, integration.steps_per_period)
+    steps, note = stable_steps(lanes, integration.fixed_steps)
     judged = outputs.lyapunov and integration.tolerance is None
-    if judged and integration.steps_per_period is None:
+    if judged and integration.fixed_steps is None:
         steps = steps_for_exponents(lanes, steps)
     lengths = whole_lengths(lanes)
     plan = plan_of(
@@ -128,5 +130,5 @@ def plan_run(config: Configuration) -> RunPlan:
         orders=outputs.mesh_orders,
     )
     coarse = coarse_steps(lanes, steps) if judged else ""
-    notes = [note, coarse, needless_maps(lanes, plan), *remarks(lanes, lengths)]
+    notes = [reason, note, coarse, needless_maps(lanes, plan), *remarks(lanes, lengths)]
     return RunPlan(config, lanes, plan, tuple(text for text in notes if text))

@@ -157,7 +157,7 @@ def judged_steps(lanes: Lanes, plan: Plan) -> tuple[Plan, str]:
     Configured steps are kept; the note then reports whether they are too coarse.
     """
     trial = Trial(lanes, plan)
-    if lanes.config.integration.steps_per_period is None:
+    if lanes.config.integration.fixed_steps is None:
         chosen = trial.chosen(plan.steps_per_period)
         return plan._replace(steps_per_period=chosen.steps), choice_note(chosen, trial.limit)
     given = trial.verdict(plan.steps_per_period)

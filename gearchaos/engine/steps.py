@@ -95,6 +95,8 @@ def stable_steps(lanes: Lanes, given: int | None) -> tuple[int, str]:
         return steps, ""
     integration, beyond = lanes.config.integration, limit > MOST_STEPS_PER_PERIOD
     if METHODS[integration.method].exact and not beyond:
+        if integration.steps_per_period is None and limit <= DEFAULT_STEPS:
+            return steps, ""
         return steps, (
             f"integration.steps_per_period = {steps}: RK4 would need {limit} steps to be "
             "stable; flow maps have no such limit"

@@ -237,7 +237,7 @@ def test_more_flow_maps_than_are_kept_are_told():
     finer = "integration.steps_per_period=200"
     for settings, many in (
         ([swept, finer], True),
-        ([swept, "integration.steps_per_period=24"], False),
+        ([swept, "integration.steps_per_period=12"], False),
         ([finer], False),
         # Not even where those of one lane are more: all lanes share them.
         (["integration.steps_per_period=25000"], False),

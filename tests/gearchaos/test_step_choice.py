@@ -117,8 +117,15 @@ def test_flow_maps_have_their_own_number():
     config = Configuration.from_toml(random_configuration(104))
     simulation = plan_run(config.replace("integration", {"method": "flow_map"}))
     simulation = with_chosen_steps(simulation)
-    assert simulation.plan.steps_per_period == 24
+    assert simulation.plan.steps_per_period == 12
     assert not told(simulation, "chosen") and not told(simulation, "coarse")
+
+
+def test_a_tolerance_leaves_the_number_of_flow_maps():
+    config = gearchaos.load_config(PAN2021, ["sweep.count=5", "outputs.lyapunov=false"])
+    integration = {"method": "flow_map", "tolerance": 1e-6}
+    chosen = with_chosen_steps(plan_run(config.replace("integration", integration)))
+    assert chosen.plan.steps_per_period == 12
 
 
 def test_a_motion_at_rest_has_no_error_to_judge():

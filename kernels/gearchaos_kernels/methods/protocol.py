@@ -56,6 +56,9 @@ class Method:
     memory : callable
         ``memory(system, plan, scene, stable)``: estimated bytes of what is prepared; ``stable``
         (lanes,): steps per period with which RK4 is stable.
+    work : callable
+        ``work(system, plan, stable)``: estimated time of the integration, in the time that RK4
+        takes for one step of one lane; ``stable`` as above.
     amplification : callable
         ``amplification(z)``: factor by which one step multiplies the modulus of a mode; z: step
         length times eigenvalue.
@@ -86,6 +89,7 @@ class Method:
     rows: Callable[[Scene], int]
     prepare: Callable[[Any, Plan, Scene], Iterator[Share]]
     memory: Callable[[Any, Plan, Scene, NDArray[np.int64]], int]
+    work: Callable[[Any, Plan, NDArray[np.int64]], float]
     amplification: Callable[[NDArray[np.complex128]], Floats]
     stable_reach: Callable[[Floats], Floats] | None
     is_kept: Callable[[Any, Plan, Scene], bool]

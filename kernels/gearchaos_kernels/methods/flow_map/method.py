@@ -18,6 +18,7 @@ from gearchaos_kernels.methods.flow_map.store import (
     maps_memory,
     maps_of,
     sharing,
+    work,
 )
 from gearchaos_kernels.methods.protocol import Method, Share, cut
 from gearchaos_kernels.models.interfaces import grid_within
@@ -89,6 +90,7 @@ FLOW_MAP = Method(
     rows=rows_needed,
     prepare=prepare,
     memory=maps_memory,
+    work=work,
     # A map is the exponential itself.
     amplification=lambda z: np.exp(z.real),
     stable_reach=None,

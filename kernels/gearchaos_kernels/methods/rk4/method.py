@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gearchaos_kernels.compilation import scalar
 from gearchaos_kernels.contact.branches import suspects_of
@@ -45,6 +46,12 @@ def prepare(system: Any, plan: Plan, _scene: Scene) -> Iterator[Share]:
     lanes, steps = system.lanes, plan.steps_per_period
     blocks = cut(np.array([lanes]), np.array([steps]), np.array([0]))
     yield Share(np.arange(lanes), blocks, np.zeros(0), np.full(lanes, steps))
+
+
+def work(system: Any, plan: Plan, stable: NDArray[np.int64]) -> float:
+    """Return the number of steps of all lanes; lanes take as many as they need to be stable."""
+    steps = np.maximum(plan.steps_per_period, np.max(stable))
+    return float(system.lanes * steps * (plan.transient_periods + plan.recorded_periods))
 
 
 @scalar
@@ -144,6 +151,7 @@ RK4 = Method(
     rows=lambda _scene: 0,
     prepare=prepare,
     memory=lambda _system, _plan, _scene, _stable: 0,
+    work=work,
     amplification=amplification,
     stable_reach=stable_reach,
     is_kept=lambda _system, _plan, _scene: True,
