@@ -96,7 +96,7 @@ def _estimated(run: RunPlan, shard: Shard | None) -> Estimate:
     seconds = own * _seconds_per_lane(run)
     file_bytes, kept = own * record.itemsize, [record[name] for name in record.names or ()]
     memory = _memory(run) + sum(min(CACHE_BYTES, every * one.itemsize) for one in kept)
-    memory += min(PIECE_BYTES, file_bytes) if run.carried else 0
+    memory += min(PIECE_BYTES, file_bytes) if run.lanes.reordered else 0
     # An allowance: the memory of HDF5 and the allocator during writing is not known beforehand.
     memory += memory // 20
     steps = own * (plan.transient_periods + plan.recorded_periods) * plan.steps_per_period

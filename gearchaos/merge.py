@@ -73,7 +73,8 @@ def _merge(options: MergeOptions) -> int:
         # Only the shards know their threads and how long they took.
         del facts["threads"], facts["wall_time_seconds"]
         told = variables_of(run), run.lanes.parameters, facts
-        store.merge(*told, overwrite=options.overwrite, found=found)
+        order = run.lanes.computed_at if run.lanes.reordered else None
+        store.merge(*told, overwrite=options.overwrite, found=found, computed_at=order)
     text = f"{store.lanes} lanes, {tally.diverged} diverged"
     return ending(run, output, tally.diverged, text, *tally.remarks)
 

@@ -140,7 +140,7 @@ def _compute(run: "RunPlan", output: str, shard: "Shard | None", options: SweepO
             if shard is None:
                 facts = {**metadata(run, seconds), **performed_by}
                 told = variables_of(run), run.lanes.parameters, facts
-                order = run.lanes.computed_at if run.carried else None
+                order = run.lanes.computed_at if run.lanes.reordered else None
                 store.merge(*told, overwrite=options.overwrite, computed_at=order)
         except (KeyboardInterrupt, FileError, ExecutionError, OSError) as fault:
             _add_remedy(fault, store, output, options)

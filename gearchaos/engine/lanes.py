@@ -7,7 +7,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from gearchaos_kernels import LaneSystem
+from gearchaos_kernels import METHODS, LaneSystem
 
 from gearchaos.arrays import Array, Floats, Integers
 from gearchaos.configuration.tables import Parameter
@@ -102,11 +102,15 @@ class Lanes:
         """Return the lanes at positions (lanes,) in the order of computation.
 
         A carried sweep computes the first lane of every line along the first swept parameter, then
-        the second of every line, and so on. Other sweeps are computed in the order of the list.
+        the second of every line, and so on. In other sweeps lanes that share what the method
+        prepares are neighbours; apart from that, the order is that of the list.
         """
         carry, values = self.config.start.carry, swept_values(self.config.sweep).size
         if carry == "none":
-            return places
+            order = self._slowest_first
+            index = np.unravel_index(places, [self.shape[axis] for axis in order])
+            by_axis = dict(zip(order, index, strict=True))
+            return np.ravel_multi_index([by_axis[n] for n in range(len(order))], self.shape)
         directions, repeats = self.directions, self.repeats // self.directions
         lines = self.side_by_side // self.repeats
         shape = (values, directions, lines, repeats)
@@ -115,6 +119,25 @@ class Lanes:
         value = np.where(downwards, values - 1 - step, step)
         place = (line, value, repeat, direction)
         return np.ravel_multi_index(place, (lines, values, repeats, directions))
+
+    @property
+    def reordered(self) -> bool:
+        """Whether the lanes are computed in another order than that of the list."""
+        carried = self.config.start.carry != "none"
+        return carried or self._slowest_first != list(range(len(self.shape)))
+
+    @cached_property
+    def _slowest_first(self) -> list[int]:
+        """The axes in the order of computation: first those on which prepared maps depend."""
+        sharing = METHODS[self.config.integration.method].sharing
+        every = range(len(self.shape))
+        alone: dict[int, bool] = {}
+        for axis in every:
+            # The lanes along this axis, from the first lane on.
+            step = math.prod(self.shape[axis + 1 :])
+            ends = step * np.unique([0, self.shape[axis] // 2, self.shape[axis] - 1])
+            alone[axis] = bool(np.ptp(sharing(self.system_of(ends))))
+        return sorted(every, key=lambda axis: not alone[axis])
 
     def values_of(self, lanes: Integers) -> dict[str, Floats]:
         """Return the value of each swept parameter, and the realisation, of some lanes (lanes,)."""

@@ -94,7 +94,7 @@ def result_of(
     contain any other variable.
     """
     lanes = run.lanes
-    order = np.argsort(lanes.computed_at(np.arange(len(lanes)))) if run.carried else ...
+    order = np.argsort(lanes.computed_at(np.arange(len(lanes)))) if lanes.reordered else ...
     data = {name: np.concatenate([arrays[name] for arrays in blocks])[order] for name in blocks[0]}
     axes = [axis.name for axis in lanes.axes]
     variables = [*variables_of(run), *more]

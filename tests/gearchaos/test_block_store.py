@@ -239,9 +239,9 @@ def test_blocks_of_a_newer_format_are_refused_in_a_clear_sentence(output: Path) 
     with open_store(output) as store:
         fill(store)
     manifest = output.with_name("sweep.h5.blocks") / "manifest.json"
-    newer = manifest.read_text(encoding="utf-8").replace('"4.0"', '"5.0"')
+    newer = manifest.read_text(encoding="utf-8").replace('"5.0"', '"6.0"')
     manifest.write_text(newer, encoding="utf-8")
-    with pytest.raises(FileError, match=r"differs in schema_version \(5\.0, now 4\.0\); go back"):
+    with pytest.raises(FileError, match=r"differs in schema_version \(6\.0, now 5\.0\); go back"):
         open_store(output, resume=True)
 
 

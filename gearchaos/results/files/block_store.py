@@ -32,7 +32,7 @@ Bounds: TypeAlias = tuple[int, int]  # First lane of a range, and the one after 
 PIECE_BYTES = 1 << 28
 """Memory for sorting lanes that were computed in another order than that of the file."""
 
-SCHEMA = {"schema": "gearchaos-blocks", "schema_version": "4.0"}
+SCHEMA = {"schema": "gearchaos-blocks", "schema_version": "5.0"}
 _DIGEST = hashlib.sha256().digest_size
 _NAME = re.compile(r"\d{12}-\d{12}\.block")
 

@@ -56,6 +56,9 @@ class Method:
     memory : callable
         ``memory(system, plan, scene, stable)``: estimated bytes of what is prepared; ``stable``
         (lanes,): steps per period with which RK4 is stable.
+    sharing : callable
+        ``sharing(system)``: numbers of groups, shape (lanes,). Lanes of a group share what is
+        prepared, and take least time next to each other.
     work : callable
         ``work(system, plan, stable)``: estimated time of the integration, in the time that RK4
         takes for one step of one lane; ``stable`` as above.
@@ -89,6 +92,7 @@ class Method:
     rows: Callable[[Scene], int]
     prepare: Callable[[Any, Plan, Scene], Iterator[Share]]
     memory: Callable[[Any, Plan, Scene, NDArray[np.int64]], int]
+    sharing: Callable[[Any], Integers]
     work: Callable[[Any, Plan, NDArray[np.int64]], float]
     amplification: Callable[[NDArray[np.complex128]], Floats]
     stable_reach: Callable[[Floats], Floats] | None

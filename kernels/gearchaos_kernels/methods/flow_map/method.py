@@ -90,6 +90,7 @@ FLOW_MAP = Method(
     rows=rows_needed,
     prepare=prepare,
     memory=maps_memory,
+    sharing=sharing,
     work=work,
     # A map is the exponential itself.
     amplification=lambda z: np.exp(z.real),

@@ -151,6 +151,7 @@ RK4 = Method(
     rows=lambda _scene: 0,
     prepare=prepare,
     memory=lambda _system, _plan, _scene, _stable: 0,
+    sharing=lambda system: np.zeros(system.lanes, dtype=np.intp),
     work=work,
     amplification=amplification,
     stable_reach=stable_reach,
