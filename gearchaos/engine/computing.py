@@ -140,15 +140,19 @@ def integrate(
     if run.carried:
         missing = np.full((many - len(earlier), len(run.lanes.states)), np.nan)
         earlier = np.concatenate([missing, earlier])
-    for some in np.split(places, range(many, places.size, many)):
-        lanes = run.lanes.computed_at(some)
-        starts.append(run.lanes.start_of(lanes))
+    # A carried sweep integrates few lanes at once. Preparing all of them here takes less time.
+    lanes = run.lanes.computed_at(places)
+    system = run.lanes.system_of(lanes)
+    configured = run.lanes.start_of(lanes, system)
+    for some in np.split(np.arange(places.size), range(many, places.size, many)):
+        starts.append(configured[some])
         if run.carried:
             ends = earlier[: some.size]
             # A lane that diverged has no end state: its successor has the configured start.
             on = np.isfinite(ends).all(axis=1)
             starts[-1][on] = ends[on]
-        outcomes.append(kernels.integrate(run.lanes.system_of(lanes), starts[-1], plan))
+        own = system.of(some) if run.carried else system
+        outcomes.append(kernels.integrate(own, starts[-1], plan))
         if run.carried:
             earlier = np.concatenate([earlier, outcomes[-1].end_state])[some.size :]
     if len(outcomes) == 1:

@@ -149,10 +149,14 @@ class Lanes:
         """Return the system of some lanes."""
         return system_of(self.config, self.values_of(lanes), self.effects)
 
-    def start_of(self, lanes: Integers) -> Floats:
-        """Return the configured start states of some lanes, shape (lanes, states)."""
+    def start_of(self, lanes: Integers, system: LaneSystem | None = None) -> Floats:
+        """Return the configured start states of some lanes, shape (lanes, states).
+
+        ``system``: their system, if it is known.
+        """
+        system = self.system_of(lanes) if system is None else system
         # Both directions of a carried sweep have the same start.
-        return start_states(self.config, self.system_of(lanes), lanes // self.directions)
+        return start_states(self.config, system, lanes // self.directions)
 
     def spread(self, count: int) -> Integers:
         """Return the numbers of at most ``count`` lanes, spread evenly over the sweep."""
