@@ -17,6 +17,8 @@ if (
     and signal.getsignal(signal.SIGINT) is signal.default_int_handler
 ):
     signal.signal(signal.SIGINT, signal.SIG_DFL)
+    # Commands multiply no large matrices; waiting threads of NumPy would only take time.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 from typing import Any
 

@@ -9,6 +9,7 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 from pydantic.fields import FieldInfo
 
+from gearchaos.configuration.docstrings import docstring_of
 from gearchaos.configuration.ranges import Range
 from gearchaos.configuration.toml_text import toml_literal
 
@@ -23,7 +24,6 @@ class Table(BaseModel):
         allow_inf_nan=False,
         validate_default=True,
         protected_namespaces=(),
-        use_attribute_docstrings=True,
     )
 
     @model_validator(mode="before")
@@ -69,11 +69,15 @@ def key(
 
 @dataclass(frozen=True)
 class Key:
-    """One key: its dotted path, its declaration, and the tables that its value may be."""
+    """One key: its dotted path, its declaration, and the tables that its value may be.
+
+    ``place``: the table in which it is declared, and the name of its attribute.
+    """
 
     path: str
     field: FieldInfo
     tables: tuple[type[Table], ...]
+    place: tuple[type[Table], str]
 
     @property
     def units(self) -> str:
@@ -89,7 +93,8 @@ class Key:
     @property
     def _described(self) -> str:
         """The description on one line."""
-        return " ".join((self.field.description or "").split())
+        text = self.field.description or docstring_of(*self.place)
+        return " ".join(text.split())
 
     @property
     def is_number(self) -> bool:
@@ -122,7 +127,7 @@ def keys_of(model: type[Table], path: str = "") -> Iterator[Key]:
         here = f"{path}.{field.alias or name}".lstrip(".")
         parts = _parts(field.annotation)
         tables = tuple(part for part in parts if isinstance(part, type) and issubclass(part, Table))
-        yield Key(here, field, tables)
+        yield Key(here, field, tables, (model, name))
         for table in tables:
             yield from keys_of(table, here)
 

@@ -3,6 +3,7 @@
 from typing import Any
 
 from gearchaos.configuration.base import Configuration, configuration_keys
+from gearchaos.configuration.docstrings import docstring_of
 from gearchaos.configuration.keys import Key
 from gearchaos.configuration.messages import shown
 
@@ -10,9 +11,23 @@ from gearchaos.configuration.messages import shown
 def json_schema(kind: type[Configuration]) -> dict[str, Any]:
     """Return the JSON Schema of a configuration file of this kind."""
     schema: dict[str, Any] = _without_null(kind.model_json_schema())
+    _describe(schema, kind)
     parameter = schema["$defs"]["Sweep"]["properties"]["parameter"]
     parameter["enum"] = list(kind.parameters)
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema}
+
+
+def _describe(schema: dict[str, Any], kind: type[Configuration]) -> None:
+    """Add the descriptions that are docstrings to the properties of a schema."""
+    declared: dict[str, list[Key]] = {}
+    for key in configuration_keys(kind).values():
+        declared.setdefault(key.place[0].__name__, []).append(key)
+    for table in (schema, *schema["$defs"].values()):
+        for key in declared.get(table["title"], ()):
+            text = docstring_of(*key.place)
+            name = key.path.rpartition(".")[2]
+            if text:
+                table["properties"][name].setdefault("description", text)
 
 
 def _without_null(node: Any) -> Any:
