@@ -10,7 +10,12 @@ import numpy as np
 from gearchaos_kernels import METHODS, LaneSystem
 
 from gearchaos.arrays import Complex, Floats, Mask
-from gearchaos.dynamics.stability import ROUNDING, branch_jacobians, contact_jacobian
+from gearchaos.dynamics.stability import (
+    ROUNDING,
+    branch_jacobians,
+    contact_jacobian,
+    distinct_matrices,
+)
 
 MOST_SHIFT = 0.05
 """Largest relative change of a decay rate by half the step that counts as resolved."""
@@ -33,8 +38,10 @@ def memory(system: LaneSystem) -> Floats:
     matrix = contact_jacobian(system.measurable())
     independent = system.independent_states
     acting = [n for n, name in enumerate(system.states) if name not in independent]
-    modes = np.linalg.eigvals(matrix[:, acting][:, :, acting])
-    slowest = -np.max(modes.real, axis=1) * system.mesh_period
+    coupled = matrix[:, acting][:, :, acting]
+    distinct, kind = distinct_matrices(coupled)
+    modes = np.linalg.eigvals(coupled[distinct])
+    slowest = -np.max(modes.real, axis=1)[kind] * system.mesh_period
     with np.errstate(divide="ignore"):
         periods: Floats = np.where(slowest > 0.0, 1.0 / slowest, np.inf)
     return periods

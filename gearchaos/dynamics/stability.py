@@ -108,12 +108,31 @@ def steps_per_time(eigenvalues: Complex, method: str = "rk4") -> Floats:
     return np.where(eigenvalues.real <= ROUNDING * size, size / ray, 0.0)
 
 
-def _demand(matrix: Floats, method: str) -> Floats:
-    """Return the smallest stable number of steps per unit of tau of every matrix, (lanes,)."""
+def distinct_matrices(matrix: Floats) -> tuple[Integers, Integers]:
+    """Find the matrices that differ, because many lanes have the same one.
+
+    Parameters
+    ----------
+    matrix : array, shape (lanes, rows, columns)
+        One matrix per lane.
+
+    Returns
+    -------
+    distinct : array of int, shape (kinds,)
+        One lane of each kind.
+    kind : array of int, shape (lanes,)
+        The kind of every lane.
+    """
     # Sorted as bytes: much faster than rows of numbers.
     rows = np.ascontiguousarray(matrix).reshape(matrix.shape[0], -1)
     every = rows.view(np.dtype((np.void, rows.itemsize * rows.shape[1])))[:, 0]
     _, distinct, kind = np.unique(every, return_index=True, return_inverse=True)
+    return distinct, kind
+
+
+def _demand(matrix: Floats, method: str) -> Floats:
+    """Return the smallest stable number of steps per unit of tau of every matrix, (lanes,)."""
+    distinct, kind = distinct_matrices(matrix)
     # Where parameters are so large that their products overflow, no number of steps is enough.
     demand = np.full(distinct.size, np.inf)
     computable = np.isfinite(matrix[distinct]).all(axis=(1, 2))

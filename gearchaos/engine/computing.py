@@ -17,6 +17,10 @@ Bounds = tuple[int, int]
 """Number of the first lane of a block, and of the lane after its last, in computing order."""
 
 
+BLOCK_PERIODS = 256
+"""Mesh periods below which a block has more lanes, so that preparing it takes a small share."""
+
+
 class EndStates:
     """The end states of the lanes of a carried sweep, in the order of computation.
 
@@ -78,7 +82,8 @@ def _maps_memory(run: RunPlan, lanes: int) -> int:
 
 def block_lanes(run: RunPlan, threads: int) -> int:
     """Return the lanes of a block: enough for every thread, few enough to show progress."""
-    lanes = kernels.LANES * max(8, 2 * threads)
+    periods = run.plan.transient_periods + run.plan.recorded_periods
+    lanes = kernels.LANES * max(8, 2 * threads) * max(1, BLOCK_PERIODS // max(1, periods))
     # A block with the remainder of the lanes side by side would not fill a vector.
     return lanes - lanes % min(lanes, run.lanes.side_by_side)
 

@@ -117,7 +117,7 @@ def test_a_line_of_two_parameters_is_the_sweep_of_that_line_bit_for_bit(override
         if "random" in str(overrides):
             # The draws of a lane follow its number, which is another one here.
             starts = both.lanes.start_of(np.arange(number * line, (number + 1) * line))
-            one.lanes.start_of = lambda lanes, starts=starts: starts[lanes].copy()
+            one.lanes.start_of = lambda lanes, _system, starts=starts: starts[lanes].copy()
         mine = {name: array[number * line : (number + 1) * line] for name, array in whole.items()}
         assert_same(mine, computed(one))
 
