@@ -17,6 +17,7 @@ from gearchaos_kernels.memory.block_memory import (
     aligned_memory,
     fill,
     fill_lane,
+    slots_of,
     state_of,
     store,
     take,
@@ -134,8 +135,8 @@ def integrate_block(number_of_block, batch, tables, plan, outcome, scene):
 
 @scalar
 def start_period(memory, block, batch, tables, period, scene):
-    """Prepare every slot for a mesh period."""
-    for slot in range(LANES):
+    """Prepare the slots of all lanes for a mesh period."""
+    for slot in range(slots_of(block.lanes)):
         index = batch.order[block.first + min(slot, block.lanes - 1)]
         begin_period(memory, slot, index, period, tables, scene)
 
@@ -175,9 +176,9 @@ def begin(memory, block, batch, tables, period, scene):
 @scalar
 def scale_tangents(memory, block, batch, steps_done, last, scene):
     """Scale the tangent vectors that are due to length 1, and add the logarithm of their growth."""
-    # In empty slots as well: denormal numbers there would slow down the whole vector.
+    # In empty slots of a vector as well: denormal numbers there would slow down the whole vector.
     first = rows(scene).tangent
-    for slot in range(LANES):
+    for slot in range(slots_of(block.lanes)):
         index = batch.order[block.first + min(slot, block.lanes - 1)]
         if steps_done % batch.steps_between_scalings[index] != 0 and not last:
             continue
@@ -190,7 +191,8 @@ def scale_tangents(memory, block, batch, steps_done, last, scene):
             part = memory[(first + column) * STRIDE + slot] / length
             # Flush tiny components before they become denormal.
             memory[(first + column) * STRIDE + slot] = part if abs(part) > NEGLIGIBLE else 0.0
-        memory[rows(scene).growth * STRIDE + slot] += math.log(length)
+        if slot < block.lanes:
+            memory[rows(scene).growth * STRIDE + slot] += math.log(length)
 
 
 @scalar

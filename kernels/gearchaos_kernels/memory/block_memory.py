@@ -9,7 +9,17 @@ from numba import types
 from numba.extending import intrinsic
 
 from gearchaos_kernels.compilation import CACHE_LINE, first_element, part, scalar
-from gearchaos_kernels.memory.rows import BRANCH, STATE, STRIDE, Branch, State, rows, rows_of
+from gearchaos_kernels.memory.rows import (
+    BRANCH,
+    LANES,
+    STATE,
+    STRIDE,
+    VECTOR,
+    Branch,
+    State,
+    rows,
+    rows_of,
+)
 from gearchaos_kernels.scene import Scene, provider_of
 
 _ITEM = np.dtype(np.float64).itemsize
@@ -22,6 +32,17 @@ def aligned_memory(count):
     memory = np.empty(size + CACHE_LINE // _ITEM)
     misfit = (CACHE_LINE - memory.ctypes.data % CACHE_LINE) % CACHE_LINE // _ITEM
     return memory[misfit : misfit + size]
+
+
+@scalar
+def slots_of(lanes):
+    """Return the number of slots in as many whole vectors as the lanes of a block need.
+
+    The slots after those are neither stepped nor scaled.
+    """
+    vectors = (lanes + VECTOR - 1) // VECTOR
+    # The mask changes no value. It bounds loops over slots, which are not vectorised otherwise.
+    return VECTOR * (1 + ((vectors - 1) & (LANES // VECTOR - 1)))
 
 
 def _pointer(context: Any, builder: Any, kind: Any, memory: Any, at: tuple[Any, Any, int]) -> Any:

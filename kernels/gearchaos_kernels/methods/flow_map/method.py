@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 
 from gearchaos_kernels.compilation import part, scalar
-from gearchaos_kernels.memory.block_memory import aligned_memory
-from gearchaos_kernels.memory.rows import LANES, VECTOR
+from gearchaos_kernels.memory.block_memory import aligned_memory, slots_of
+from gearchaos_kernels.memory.rows import LANES
 from gearchaos_kernels.methods.flow_map.crossings import resolve
 from gearchaos_kernels.methods.flow_map.layout import Work, aside_rows, layout, rows_needed
 from gearchaos_kernels.methods.flow_map.steps import begin_lane, move_block
@@ -68,8 +68,8 @@ def workspace(scene):
 @scalar
 def step(memory, lanes, at, given, scene):
     """Take one step in every slot; return how many lanes may have left a contact branch."""
-    # Up to eight lanes fit into one vector; a single lane is faster along its state.
-    slots = 1 if lanes == 1 else VECTOR if lanes <= VECTOR else LANES
+    # A single lane is faster along its state.
+    slots = 1 if lanes == 1 else slots_of(lanes)
     return move_block(memory, given.maps, at.maps_at, slots, given.work.numbers, scene)
 
 

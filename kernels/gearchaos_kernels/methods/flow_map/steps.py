@@ -9,7 +9,7 @@ import math
 from gearchaos_kernels.compilation import scalar
 from gearchaos_kernels.contact.branches import suspects_of
 from gearchaos_kernels.memory.block_memory import read_branches, read_lane, state_before, state_of
-from gearchaos_kernels.memory.rows import LANES, STATE, STRIDE, VECTOR, Branch, rows
+from gearchaos_kernels.memory.rows import STATE, STRIDE, VECTOR, Branch, rows
 from gearchaos_kernels.memory.tuples import each
 from gearchaos_kernels.methods.flow_map import vectors
 from gearchaos_kernels.methods.flow_map.layout import layout, method_rows, waves_at
@@ -83,10 +83,7 @@ def move_block(memory, maps, maps_at, slots, numbers, scene):
         vectors.keep_before(memory, slot, scene)
         vectors.bound_bends(memory, slot, maps, maps_at, scene)
         vectors.move(memory, slot, maps, maps_at, scene)
-    # The compiler vectorises a loop over a constant number of slots only.
-    if slots == VECTOR:
-        return count_suspects(memory, VECTOR, maps, maps_at, scene)
-    return count_suspects(memory, LANES, maps, maps_at, scene)
+    return count_suspects(memory, slots, maps, maps_at, scene)
 
 
 @scalar

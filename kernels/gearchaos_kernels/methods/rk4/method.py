@@ -13,10 +13,11 @@ from gearchaos_kernels.memory.block_memory import (
     read_branches,
     read_lane,
     read_state,
+    slots_of,
     state_of,
     write_state,
 )
-from gearchaos_kernels.memory.rows import LANES, STATE, STRIDE, VECTOR, rows
+from gearchaos_kernels.memory.rows import STATE, STRIDE, rows
 from gearchaos_kernels.methods.protocol import Method, Share, cut
 from gearchaos_kernels.methods.rk4 import steps as rk4
 from gearchaos_kernels.methods.rk4.splitting import split_step
@@ -117,14 +118,6 @@ def step(memory, lanes, at, given, scene):
         if switching > 0:
             switch_lanes(memory, lanes, at, given.tables, scene)
     return suspects
-
-
-@scalar
-def slots_of(lanes):
-    """Return the number of slots in as many whole vectors as the lanes of a block need."""
-    vectors = (lanes + VECTOR - 1) // VECTOR
-    # The mask changes no value. It bounds the loop over slots, which is not vectorised otherwise.
-    return VECTOR * (1 + ((vectors - 1) & (LANES // VECTOR - 1)))
 
 
 @scalar
