@@ -26,10 +26,11 @@ from numba import config
 try:
     from numba.core.caching import NullCache
     from numba.core.compiler import CompileResult
+    from numba.core.runtime import rtsys
     from numba.core.serialize import dumps
 except ImportError:
     NullCache = object
-    CompileResult = dumps = None
+    CompileResult = dumps = rtsys = None
 try:
     from numba.misc.appdirs import user_cache_dir
 except ImportError:
@@ -118,7 +119,8 @@ class KernelCache(NullCache):  # type: ignore[misc]
 
     def _load(self, sig: Any, target_context: Any) -> Any:
         """Return the cached code of a signature, or None; the errors are those of Numba."""
-        target_context.refresh()
+        # Loaded code needs only this part of `refresh`, which imports all that compilation needs.
+        rtsys.initialize(target_context)
         path = self._path(sig, target_context.codegen())
         try:
             content = path.read_bytes()

@@ -14,6 +14,9 @@ from gearchaos_kernels.plan import Floats
 Complex = NDArray[np.complex128]
 
 _RAYS = 2**14
+_BUNDLE = 2**6
+"""Rays whose lengths are computed at once: a program needs few of all rays."""
+
 _HALVINGS = 52
 
 
@@ -28,17 +31,28 @@ def stable_reach(angles: Floats) -> Floats:
     Along a ray abs(R) is not always monotonic: on the negative real axis it first decreases. But it
     passes 1 only once, so all steps shorter than the longest stable one are stable.
     """
-    known, lengths = _reach()
+    known, lengths = _rays()
+    before = np.searchsorted(known, angles)
+    around = np.clip([before - 1, before, before + 1], 0, _RAYS - 1)
+    for bundle in np.unique(around // _BUNDLE):
+        rays = slice(bundle * _BUNDLE, (bundle + 1) * _BUNDLE)
+        if np.isnan(lengths[rays.start]):
+            lengths[rays] = _reach(known[rays])
     return np.interp(angles, known, lengths)
 
 
 @cache
-def _reach() -> tuple[Floats, Floats]:
-    """Return angles and the lengths of the rays there, which are all between 2.5 and 3."""
-    angles = np.linspace(0.5 * np.pi, np.pi, _RAYS)
+def _rays() -> tuple[Floats, Floats]:
+    """Return angles, and the lengths of the rays there: NaN until they are needed."""
+    return np.linspace(0.5 * np.pi, np.pi, _RAYS), np.full(_RAYS, np.nan)
+
+
+def _reach(angles: Floats) -> Floats:
+    """Return the lengths of the rays at some angles, which are all between 2.5 and 3."""
     inside, outside = np.full_like(angles, 2.5), np.full_like(angles, 3.0)
+    direction = np.exp(1j * angles)
     for _ in range(_HALVINGS):
         middle = 0.5 * (inside + outside)
-        stable = amplification(middle * np.exp(1j * angles)) <= 1.0
+        stable = amplification(middle * direction) <= 1.0
         inside, outside = np.where(stable, middle, inside), np.where(stable, outside, middle)
-    return angles, inside
+    return inside
