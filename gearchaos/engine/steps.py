@@ -147,7 +147,7 @@ def needless_maps(lanes: Lanes, plan: Plan) -> str:
         return ""
     return (
         f"integration.steps_per_period = {plan.steps_per_period}: lanes that differ in more than "
-        f"pitch error, load and clearance do not share flow maps, and there are too many to keep: "
+        f"{lanes.model.shared_inputs} do not share flow maps, and there are too many to keep: "
         f"each integration makes them again; {enough} steps are as exact and much faster"
     )
 

@@ -73,6 +73,8 @@ class Model(ABC):
         What the eigenfrequencies and the static deflection are those of, in a sentence.
     excitation_words, shorter_excitation : str
         What repeats after several mesh periods, with its verb, and how it repeats earlier.
+    shared_inputs : str
+        The parameters in which lanes may differ that share flow maps, in words.
     """
 
     catalogue: Catalogue
@@ -82,6 +84,7 @@ class Model(ABC):
     deflection_words: str = "under the static load"
     excitation_words: str = "excitation repeats"
     shorter_excitation: str = "choose an excitation that repeats earlier"
+    shared_inputs: str = "excitation and clearance"
 
     @abstractmethod
     def system(

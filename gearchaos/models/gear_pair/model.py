@@ -46,6 +46,7 @@ class GearPairModel(Model):
 
     excitation_words = "pitch errors repeat"
     shorter_excitation = "give one gear deviations, or other teeth"
+    shared_inputs = "pitch error, load and clearance"
 
     def system(
         self,
