@@ -24,7 +24,7 @@ pytest.importorskip("distributed")
 
 BLOCKS = "gears.h5.blocks"
 # Eight blocks of lanes that take a tenth of a second or more each.
-LONG = ("--set", "sweep.count=2000", "--set", "integration.transient_periods=250")
+LONG = ("--set", "sweep.count=2000", "--set", "integration.transient_periods=1000")
 LONG += ("--set", "outputs.motion=false")
 # Many more of them, for what is not waited for: a busy machine does not finish them meanwhile.
 ENDLESS = ("--set", "sweep.count=100000")

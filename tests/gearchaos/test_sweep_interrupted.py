@@ -172,7 +172,7 @@ def is_locked(output):
 @pytest.mark.skipif(not HELD_LOCKS.exists(), reason="the system does not tell which locks are held")
 def test_twenty_kills_at_random_moments_cost_no_bit(tmp_path):
     # Sixty-three blocks, of which every attempt finishes a few; the last ones meet the merging.
-    wide = ("--threads", "1", *LINEAR, "--set", "sweep.count=16000", "--quiet")
+    wide = ("--threads", "1", *LINEAR, "--set", "sweep.count=32000", "--quiet")
     wide += ("--set", "integration.transient_periods=100")
     (tmp_path / "undisturbed").mkdir()
     assert sweep(tmp_path / "undisturbed", *wide).code == 0
