@@ -78,30 +78,37 @@ def band_count(section: Floats) -> Counts:
 
 def _may_have_bands(section: Floats) -> Mask:
     """Whether subsequences explain much of a state's variance, (lanes,): a cheap first test."""
-    lanes, points, states = section.shape
+    lanes, points, _ = section.shape
     found = np.zeros(lanes, dtype=np.bool_)
+    series = np.ascontiguousarray(section.transpose(0, 2, 1))
     for stride in (2, 3, 5, 7, 11, 13):
-        turns = points // stride
+        turns, rest = points // stride, np.flatnonzero(~found)
         if turns < FEWEST:
             break
-        dealt = section[:, -turns * stride :].reshape(lanes, turns, stride, states)
-        variance = np.var(dealt, axis=(1, 2))
-        between = np.var(np.mean(dealt, axis=1), axis=1)
-        found |= np.any(between > EXPLAINED * variance, axis=1)
+        dealt = series[rest, :, -turns * stride :]
+        means = [np.mean(dealt[:, :, first::stride], axis=2) for first in range(stride)]
+        variance, between = np.var(dealt, axis=2), np.var(means, axis=0)
+        found[rest] = np.any(between > EXPLAINED * variance, axis=1)
     return found
 
 
 def _common_step(points: Floats) -> int:
     """Return the greatest common divisor of the steps in time between nearest neighbours."""
     every, common = np.arange(points.shape[0]), 0
+    coordinates = np.ascontiguousarray(points.T)
     for some in np.split(every, every[::PORTION][1:]):
         apart = np.zeros((some.size, every.size))
-        for coordinate in points.T:
-            apart += np.subtract.outer(coordinate[some], coordinate) ** 2
-        apart[np.arange(some.size), some] = np.inf
-        nearest = np.argpartition(apart, NEIGHBOURS, axis=1)[:, :NEIGHBOURS]
-        steps = np.abs(nearest - some[:, np.newaxis])
-        common = int(np.gcd.reduce(steps, axis=None, initial=common))
+        along = np.empty_like(apart)
+        for coordinate in coordinates:
+            np.subtract.outer(coordinate[some], coordinate, out=along)
+            apart += np.square(along, out=along)
+        rows, nearest = np.arange(some.size), some
+        for _ in range(NEIGHBOURS):
+            # Not the point itself, nor the neighbour before.
+            apart[rows, nearest] = np.inf
+            # The smallest element is found much faster than a partition.
+            nearest = np.argmin(apart, axis=1)
+            common = int(np.gcd.reduce(np.abs(nearest - some), initial=common))
         if common == 1:
             break
     return common
