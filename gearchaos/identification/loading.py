@@ -17,6 +17,7 @@ from gearchaos.configuration.toml_text import (
     toml_literal,
     with_overrides,
 )
+from gearchaos.engine.method_choice import with_method
 from gearchaos.errors import ConfigurationError
 from gearchaos.identification.observations import Observation, observations_of
 from gearchaos.identification.targets import Targets
@@ -78,7 +79,7 @@ def load_targets(file: str | os.PathLike[str], overrides: Iterable[str] = ()) ->
     section = [*dict.fromkeys(("delta_5", *(one.coordinate for one in targets.increment)))]
     outputs = {"section": section, "section_points": 1, "lyapunov": bool(targets.exponent)}
     replaced = [*targets.set, f"outputs={toml_literal(outputs)}"]
-    config = load_config(Path(source).parent / targets.configuration, replaced)
+    config, _ = with_method(load_config(Path(source).parent / targets.configuration, replaced))
     observations = observations_of(targets, states_of(config.needed_effects)[::2])
     if not observations:
         rule = "observes nothing; give at least one of stage, jump, crisis, exponent, increment"

@@ -8,6 +8,7 @@ import pytest
 import gearchaos
 from gearchaos.engine.method_choice import with_method
 from gearchaos.engine.run_plan import plan_run
+from gearchaos.identification.loading import load_targets
 
 from .commands import run_module
 from .short_sweeps import PAN2021, SHORT
@@ -95,3 +96,10 @@ def test_a_dry_run_compares_both_methods(tmp_path):
     facts = json.loads(ended.out)
     assert set(facts["seconds_of_methods"]) == {"rk4", "flow_map"}
     assert facts["seconds_of_methods"][facts["method"]] == facts["seconds"]
+
+
+def test_an_identification_takes_a_method_as_well():
+    targets = PAN2021.with_name("pan2021_targets.toml")
+    given = gearchaos.load_config(PAN2021.with_name("pan2021.toml")).integration.method
+    problem = load_targets(targets, [f'set=["{AUTO}"]'])
+    assert given == "rk4" and problem.config.integration.method in ("rk4", "flow_map")
