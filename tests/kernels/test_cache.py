@@ -133,6 +133,21 @@ def test_a_second_process_compiles_only_scenes_that_none_has_seen(cache, first):
 
 
 @pytest.mark.slow
+def test_kept_code_runs_without_the_imports_of_a_compiler(tmp_path):
+    # Not in `numba_server`, which has imported all of them.
+    imported = "[name for name in ('numba.np.linalg', 'scipy.linalg') if name in sys.modules]"
+    words = [sys.executable, "-c", PROGRAM, json.dumps([0, TORSIONAL, imported])]
+    folders = {"NUMBA_CACHE_DIR": str(tmp_path), "PYTHONPATH": str(PACKAGE.parent)}
+    for hits, misses in (0, 1), (1, 0):
+        said = subprocess.run(words, env={**os.environ, **folders}, capture_output=True, check=True)
+        outcome = json.loads(said.stdout)
+        assert (outcome["hits"], outcome["misses"]) == (hits, misses)
+        # The first process compiles, with all that this needs.
+        assert ("numba.np.linalg" in outcome["values"][1]) == (misses == 1)
+    assert outcome["values"][1] == []
+
+
+@pytest.mark.slow
 def test_an_edited_formula_in_another_file_is_never_served_from_the_cache(cache, first, tmp_path):
     package = tmp_path / "gearchaos_kernels"
     shutil.copytree(PACKAGE, package, ignore=shutil.ignore_patterns("__pycache__"))
@@ -190,6 +205,7 @@ def test_a_full_disk_does_not_stop_a_computation(tmp_path):
         "numba.core.caching.NullCache",
         "numba.core.compiler:CompileResult._reduce",
         "numba.core.codegen:CPUCodegen.magic_tuple",
+        "numba.core.runtime.rtsys",
     ],
 )
 def test_a_numba_whose_code_cannot_be_kept_computes_the_same(hook, tmp_path):
