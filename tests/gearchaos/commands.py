@@ -140,6 +140,7 @@ def begin(
     The latter has a function ``said``, which returns what has been written to stderr by now.
     A command that was begun before and not waited for, as of a test that has failed, is killed,
     unless this one runs ``beside`` it. ``imported``: modules that only some commands import.
+    The way to wait refuses tracebacks; its ``unjudged``, for programs of others, does not.
     """
     server, folder = _server(*imported), Path(mkdtemp(dir=_folder().name))
     files = [folder / name for name in ("in", "out", "err")]
@@ -149,13 +150,17 @@ def begin(
     words = [module, arguments, str(cwd), [*map(str, files)], variables or {}, largest_file]
     request, process = server.begin(words, beside)
 
-    def ended() -> Ended:
-        ended = Ended(server.end(request), out.read_text(), err.read_text())
+    def unjudged() -> Ended:
+        done = Ended(server.end(request), out.read_text(), err.read_text())
         shutil.rmtree(folder)
-        assert "Traceback" not in ended.err, ended.err
-        return ended
+        return done
 
-    ended.said = err.read_text
+    def ended() -> Ended:
+        done = unjudged()
+        assert "Traceback" not in done.err, done.err
+        return done
+
+    ended.said, ended.unjudged = err.read_text, unjudged
     return process, ended
 
 
