@@ -38,7 +38,8 @@ def _integrate_blocks(threads, next_block, batch, tables, plan, outcome, scene):
 def scene_of(system: LaneSystem, plan: Plan) -> Scene:
     """Return the scene that a system and a plan need."""
     method, flags = METHODS[plan.method], system.flags()
-    switches = provider_of(flags).switches(flags)
+    model = provider_of(flags)
+    switches = model.switches(flags)
     resolved = system.clearance and (plan.resolved or method.always_resolved)
     wanted = [one for one in RECORDERS if one.wanted(plan, resolved)]
     return Scene(
@@ -50,6 +51,7 @@ def scene_of(system: LaneSystem, plan: Plan) -> Scene:
         tangent=flag(plan.tangent),
         before=flag(resolved or any(one.reads_before for one in wanted)),
         switches=flag(switches),
+        jumps=flag(resolved and any(kind.damped_in_contact for kind in model.kinds_of(flags))),
     )
 
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from gearchaos_kernels.batch import scene_of
 from gearchaos_kernels.compilation import evaluator, scalar
 from gearchaos_kernels.contact.branches import flank_at
+from gearchaos_kernels.contact.kinds import kinds
 from gearchaos_kernels.contact.elements import Push, pushes_of, tangent_pushes
 from gearchaos_kernels.memory.block_memory import (
     aligned_memory,
@@ -115,7 +116,8 @@ def _differentiate(coefficients, scales, slopes, result, scene):
         scale = scales[index]
         lane = fill_lane(memory, 0, coefficients[index], scene)
         elements = elements_at(lane, unforced(lane, scene), scene)
-        held = each(push_of_share, elements, numbers_of_elements(slopes[index], 0, scene))
+        shares = numbers_of_elements(slopes[index], 0, scene)
+        held = each(push_of_share, elements, shares, kinds(scene))
         for column in range(scale.shape[0]):
             unit = np.zeros(scale.shape[0])
             unit[column] = 1.0
@@ -128,9 +130,10 @@ def _differentiate(coefficients, scales, slopes, result, scene):
 
 
 @scalar
-def push_of_share(element, share):
+def push_of_share(element, share, kind):
     """Return a push whose slope is a share of the mean stiffness of an element."""
-    return Push(0.0, element.stiffness * share)
+    damped = share != 0.0 or not kind.damped_in_contact
+    return Push(0.0, element.stiffness * share, element.damping if damped else 0.0)
 
 
 def evaluate(
@@ -233,7 +236,7 @@ def _follow(coefficients, scales, tables, steps, first_period, states, motion, s
                 motion.forces[index, sample, element] = pushes[element].force
                 half_clearance = 0.0 if scene.clearance is None else clearances[element]
                 motion.contact[index, sample, element] = flank_at(
-                    gaps[element].value, half_clearance
+                    gaps[element].value, half_clearance, kinds(scene)[element]
                 )
             signals = observed_at(state, lane, point, scene)
             for number in range(len(signals)):

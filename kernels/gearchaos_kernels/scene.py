@@ -23,6 +23,8 @@ from numba.extending import NativeValue, models, register_model, typeof_impl, un
 class Scene:
     """What a compiled loop contains. A flag is True if it is contained, otherwise None.
 
+    A flag of a model may also be a frozen dataclass that describes what the formulas contain.
+
     Attributes
     ----------
     model, method, recorders : records of flags
@@ -38,6 +40,8 @@ class Scene:
         Whether the state before a step is kept until its end.
     switches : True or None
         Whether the equations of a lane switch at known moments of the mesh period.
+    jumps : True or None
+        Whether the force of some element jumps where a contact begins or ends.
     """
 
     model: Any
@@ -48,6 +52,7 @@ class Scene:
     tangent: Any
     before: Any
     switches: Any = None
+    jumps: Any = None
 
     def bare(self) -> "Scene":
         """Return the scene without tangent vector and recorders, which do not affect flow maps."""
@@ -96,10 +101,10 @@ register_model(SceneType)(models.OpaqueModel)
 
 @typeof_impl.register(Scene)
 def _typeof_scene(scene: Scene, _context: Any) -> SceneType:
-    """Return the Numba type of a scene; raise TypeError if a flag is not True or None."""
+    """Return the Numba type of a scene; raise TypeError if a flag is none."""
     for part in (scene.model, scene.method, scene.recorders):
         for name, value in vars(part).items():
-            if value is not None and value is not True:
+            if not (value is None or value is True or is_dataclass(value)):
                 raise TypeError(f"{type(part).__qualname__}.{name}: is {value!r}, not True or None")
     return SceneType(scene)
 
@@ -148,8 +153,10 @@ def implement(flags: type, provider: Any) -> None:
     ----------
     flags : type
         Class of the flags, a frozen dataclass.
-    provider : object
-        Its method ``function(name, scene)`` returns the compiled function of an interface.
+    provider : object or callable
+        Its method ``function(name, scene)`` returns the compiled function of an interface. If the
+        implementation depends on the flags, a function that returns it for flags, always the same
+        one for equal flags.
 
     Raises
     ------
@@ -171,7 +178,8 @@ def implement(flags: type, provider: Any) -> None:
 
 def provider_of(flags: Any) -> Any:
     """Return the implementation for flags."""
-    return _IMPLEMENTATIONS[type(flags)]
+    provider = _IMPLEMENTATIONS[type(flags)]
+    return provider(flags) if callable(provider) else provider
 
 
 def flag(present: object) -> bool | None:

@@ -9,6 +9,7 @@ import math
 from typing import NamedTuple
 
 from gearchaos_kernels.compilation import scalar
+from gearchaos_kernels.contact.kinds import kinds
 from gearchaos_kernels.contact.leaving import may_leave
 from gearchaos_kernels.memory.block_memory import store
 from gearchaos_kernels.memory.rows import BRANCH, STRIDE, Branch, rows
@@ -63,8 +64,10 @@ class Crossing(NamedTuple):
 
 
 @scalar
-def branch_at(gap, half_clearance):
+def branch_at(gap, half_clearance, kind):
     """Return the branch of a gap, given as a number."""
+    if kind.one_sided:
+        return one_sided_branch(1.0 if gap >= half_clearance else 0.0, half_clearance)
     if half_clearance == 0.0:
         return Branch(1.0, 0.0, -math.inf, math.inf)
     if gap >= half_clearance:
@@ -75,30 +78,43 @@ def branch_at(gap, half_clearance):
 
 
 @scalar
+def one_sided_branch(engaged, half_clearance):
+    """Return the branch of an element without a back flank: 1 in contact, 0 apart."""
+    return Branch(
+        engaged,
+        engaged * half_clearance,
+        half_clearance if engaged != 0.0 else -math.inf,
+        math.inf if engaged != 0.0 else half_clearance,
+    )
+
+
+@scalar
 def branches_at(gaps, lane, scene):
     """Return the branches of the gaps of a lane."""
-    return each(branch_of, gaps, half_clearances(lane, scene))
+    return each(branch_of, gaps, half_clearances(lane, scene), kinds(scene))
 
 
 @scalar
-def branch_of(gap, half_clearance):
+def branch_of(gap, half_clearance, kind):
     """Return the branch of a `Gap`."""
-    return branch_at(gap.value, half_clearance)
+    return branch_at(gap.value, half_clearance, kind)
 
 
 @scalar
-def flank_at(gap, half_clearance):
-    """Return 0 between the flanks, 1 on the driving flank, 2 on the back flank."""
+def flank_at(gap, half_clearance, kind):
+    """Return 0 without contact, 1 on the driving flank, 2 on the back flank."""
     if gap > half_clearance:
         return 1
-    return 2 if gap < -half_clearance else 0
+    return 2 if gap < -half_clearance and not kind.one_sided else 0
 
 
 @scalar
-def next_branch(branch, gap, half_clearance):
+def next_branch(branch, gap, half_clearance, kind):
     """Return the branch after the one that a gap leaves."""
     # Branch-free: the direction is unpredictable.
     meets = 1.0 - branch.engaged
+    if kind.one_sided:
+        return one_sided_branch(meets, half_clearance)
     offset = meets * math.copysign(half_clearance, gap)
     end = offset if meets != 0.0 else half_clearance
     floor = -math.inf if offset < 0.0 else -end if meets == 0.0 else end
@@ -111,7 +127,7 @@ def leave(memory, slot, element, gap, branches, lane, moment, scene):
     """Put a lane on the next branch where the gap of an element leaves one; record the crossing."""
     # The branches are an argument: reading them here slows down the loop over slots.
     branch = branches[element]
-    following = next_branch(branch, gap.value, half_clearances(lane, scene)[element])
+    following = next_branch_of(branch, gap.value, element, lane, scene)
     store(memory, rows(scene).branches + BRANCH * element, slot, following)
     if moment.recorded:
         scale = gap_speeds(lane, scene)[element]
@@ -123,6 +139,12 @@ def leave(memory, slot, element, gap, branches, lane, moment, scene):
         speed = scale * abs(gap.closing)
         crossing = Crossing(element, moment.steps, gap.closing, offset, following.engaged, speed)
         record_crossing(memory, slot, crossing, lane, scene)
+
+
+@scalar
+def next_branch_of(branch, gap, element, lane, scene):
+    """Return the branch of an element after the one that its gap leaves."""
+    return next_branch(branch, gap, half_clearances(lane, scene)[element], kinds(scene)[element])
 
 
 @scalar

@@ -29,10 +29,13 @@ def may_leave(begin, end, branch, margin=0.0):
 
 
 @scalar
-def leaving_fraction(begin, end, length, branch, half_clearance):
+def leaving_fraction(begin, end, length, branch, half_clearance, kind):
     """Return the fraction of a piece, ``length`` steps long, at which a gap leaves its branch."""
     # The gap is taken as the cubic through its values and rates at both ends. The field is
     # continuous, so an error of the moment changes the state by its square only.
+    if kind.one_sided:
+        side = 1.0 if branch.engaged != 0.0 else -1.0
+        return first_fall_of(begin, end, length, side, -side * half_clearance)
     if half_clearance == 0.0:
         return NEVER
     # One formula for a motion and its mirror image, so that both are rounded alike.

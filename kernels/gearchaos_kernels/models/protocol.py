@@ -39,8 +39,24 @@ class Gap(NamedTuple):
     closing: float
 
 
+class Kind(NamedTuple):
+    """What kind of clearance an element has.
+
+    Attributes
+    ----------
+    one_sided : bool
+        Whether the spring acts on positive gaps only; there is no back flank.
+    damped_in_contact : bool
+        Whether the damper acts only while the element is in contact. Its force then jumps where a
+        contact begins or ends.
+    """
+
+    one_sided: bool = False
+    damped_in_contact: bool = False
+
+
 class Element(NamedTuple):
-    """A clearance element: a spring behind a clearance, and a damper that always acts.
+    """A clearance element: a spring behind a clearance, and a damper; see `Kind` for when it acts.
 
     Attributes
     ----------
@@ -82,6 +98,9 @@ class Model:
         Named tuple of the coefficients of one lane.
     elements : callable, optional
         ``elements(flags)``: number of clearance elements, 1 by default.
+    kinds : callable, optional
+        ``kinds(flags)``: the `Kind` of each element, a tuple; by default all are two-sided, with a
+        damper that always acts.
     rows : callable, optional
         ``rows(flags)``: rows of a block that the model uses for itself, 0 by default.
     observed : tuple of str
@@ -137,6 +156,7 @@ class Model:
     coordinates_of: Callable[[Any], tuple[bool, ...]] | None = None
     lane: Any
     elements: Callable[[Any], int] = lambda _flags: 1
+    kinds: Callable[[Any], tuple[Kind, ...]] | None = None
     rows: Callable[[Any], int] = lambda _flags: 0
     observed: tuple[str, ...]
     begin_period: Any = defaults.prepare_nothing
@@ -172,6 +192,10 @@ class Model:
         if self.coordinates_of is None:
             return (True,) * len(self.coordinates._fields)
         return self.coordinates_of(flags)
+
+    def kinds_of(self, flags: Any) -> tuple[Kind, ...]:
+        """Return the kind of each element of a scene with these flags."""
+        return self.kinds(flags) if self.kinds else (Kind(),) * self.elements(flags)
 
     def states(self, flags: Any) -> int:
         """Return the number of states of a scene with these flags."""

@@ -16,7 +16,7 @@ from gearchaos_kernels.contact.branches import (
     Moment,
     branches_at,
     leave,
-    next_branch,
+    next_branch_of,
 )
 from gearchaos_kernels.contact.leaving import may_leave
 from gearchaos_kernels.memory.block_memory import read_branches, read_lane, store, write_branches
@@ -25,7 +25,6 @@ from gearchaos_kernels.methods.flow_map import vectors
 from gearchaos_kernels.methods.flow_map.layout import LastCrossing, aside_rows, layout, method_rows
 from gearchaos_kernels.methods.flow_map.moments import find_moments
 from gearchaos_kernels.methods.flow_map.steps import gaps_at_ends, store_offsets
-from gearchaos_kernels.models.interfaces import half_clearances
 from gearchaos_kernels.models.protocol import Gap
 
 
@@ -96,7 +95,7 @@ def cross_over(aside, scene):
         for element in range(place.elements):
             branch = read_branches(aside, n, scene)[element]
             gap = crossed_at(aside, n, element, scene)
-            following = next_branch(branch, gap.value, half_clearances(lane, scene)[element])
+            following = next_branch_of(branch, gap.value, element, lane, scene)
             here = crosses & (first == element)
             factor = branch.engaged - following.engaged if here else factor
             # One of the two offsets is that of the flank, the other is 0.

@@ -9,6 +9,7 @@ that no lane depends on its neighbours. All others are searched piece by piece (
 import math
 
 from gearchaos_kernels.compilation import part, scalar
+from gearchaos_kernels.contact.kinds import kinds
 from gearchaos_kernels.contact.leaving import LAST_CORRECTION, NEVER, falling_root
 from gearchaos_kernels.memory.block_memory import read_branches, read_lane, store
 from gearchaos_kernels.memory.rows import STRIDE, VECTOR, rows
@@ -58,6 +59,9 @@ def find_side_by_side(aside, element, scene):
         # A flank is left towards the middle; a lane between the flanks most likely meets the one
         # on the side where the step ends.
         side = math.copysign(1.0, branch.offset if branch.engaged != 0.0 else -even - odd)
+        one_sided = kinds(scene)[element].one_sided
+        if one_sided:
+            side = 1.0 if branch.engaged != 0.0 else -1.0
         distance = half_clearances(lane, scene)[element] * (1.0 - 2.0 * branch.engaged)
         # A step that begins at the boundary, where the last one ended, begins on its right side.
         value_left = max(side * (even - odd) + distance, 0.0)
@@ -68,7 +72,7 @@ def find_side_by_side(aside, element, scene):
         lowest, highest, steepest = bounds_of(ends, 2.0, bend)
         stays = lowest >= 0.0 and value_right >= 0.0
         # A lane between the flanks may meet either: this one must be out of reach of the other.
-        one_way = distance < 0.0 or max(highest, value_right) <= 2.0 * distance
+        one_way = one_sided or distance < 0.0 or max(highest, value_right) <= 2.0 * distance
         falls = steepest < 0.0 and value_right < 0.0
         at = min(max(guess_fall(ends, 2.0) - 1.0, -1.0), 1.0)
         at, correction, value, slope = refined_fall(aside, first, side * distance, at)
@@ -175,7 +179,7 @@ def find_in_pieces(aside, element, n, scene):
     side, distance = aside[first + at_rows.side * STRIDE], aside[first + at_rows.distance * STRIDE]
     after, bend = aside[at_rows.after * STRIDE + n], aside[first + at_rows.bend * STRIDE]
     moment = first_below((aside, first, side, distance), bend, after)
-    if distance > 0.0:
+    if distance > 0.0 and not kinds(scene)[element].one_sided:
         # A lane between the flanks may meet either flank.
         moment = min(moment, first_below((aside, first, -side, distance), bend, after))
     value, slope, _ = gap_along(aside, first, moment)

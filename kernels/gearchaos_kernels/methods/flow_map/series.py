@@ -104,7 +104,7 @@ def differentiate(coefficients, matrices, scene):
 @scalar
 def unit_push(gap, element, share, unit):
     """Return the push of the damper of an element, plus a force times its relative stiffness."""
-    return Push(element.damping * gap.closing + share * unit, 0.0)
+    return Push(element.damping * gap.closing + share * unit, 0.0, element.damping)
 
 
 @driver

@@ -7,6 +7,8 @@ repeated up to the crossing, then continued on the next branch, until it crosses
 
 from gearchaos_kernels.compilation import scalar
 from gearchaos_kernels.contact.branches import MOST_CROSSINGS, Moment, branches_at, leave
+from gearchaos_kernels.contact.elements import jumped
+from gearchaos_kernels.contact.kinds import kinds
 from gearchaos_kernels.contact.leaving import NEVER, leaving_fraction
 from gearchaos_kernels.memory.block_memory import (
     read_branches,
@@ -78,6 +80,10 @@ def split_part(memory, slot, at, first, last, tables, scene):
         gaps = gaps_at(state, lane, begin, scene)
         moment = Moment(number + done, at.recorded)
         leave(memory, slot, element, gaps[element], branches, lane, moment, scene)
+        if scene.jumps is not None:
+            if scene.tangent is not None:
+                following = read_branches(memory, slot, scene)
+                tangent = jumped(tangent, element, gaps, branches, following, lane, scene)
         branches = read_branches(memory, slot, scene)
 
         left = until - done
@@ -120,7 +126,8 @@ def forcing_within(memory, slot, lane, tables, number, fraction, scene):
 @scalar
 def first_crossing(begin, end, length, branches, lane, scene):
     """Return at which fraction of a piece, ``length`` steps long, which element leaves first."""
-    fractions = each(leaving_fraction, begin, end, length, branches, half_clearances(lane, scene))
+    clearances = half_clearances(lane, scene)
+    fractions = each(leaving_fraction, begin, end, length, branches, clearances, kinds(scene))
     first = NEVER
     element = 0
     for number in range(len(fractions)):

@@ -1,0 +1,33 @@
+"""The kinds of the elements of a scene, as constants of compiled code."""
+
+from typing import Any
+
+from llvmlite import ir
+from numba import types
+from numba.extending import intrinsic
+
+from gearchaos_kernels.models.protocol import Kind
+from gearchaos_kernels.scene import Scene, provider_of
+
+
+def kinds_of(scene: Scene) -> tuple[Kind, ...]:
+    """Return the kind of each element of a scene."""
+    found: tuple[Kind, ...] = provider_of(scene.model).kinds_of(scene.model)
+    return found
+
+
+@intrinsic
+def kinds(_typing_context: Any, scene: Any) -> Any:
+    """Return the `Kind` of each element of a scene, a tuple of constants."""
+    found = kinds_of(scene.scene)
+    kind = types.NamedUniTuple(types.boolean, len(Kind._fields), Kind)
+    returned = types.UniTuple(kind, len(found))
+
+    def generate(context: Any, builder: Any, _signature: Any, _arguments: Any) -> Any:
+        each_kind = [
+            context.make_tuple(builder, kind, [ir.Constant(ir.IntType(1), int(one)) for one in of])
+            for of in found
+        ]
+        return context.make_tuple(builder, returned, each_kind)
+
+    return returned(scene), generate

@@ -1,0 +1,1 @@
+"""Any piecewise-linear system: matrices, clearance elements, and harmonics that excite them."""

@@ -1,0 +1,365 @@
+"""Piecewise-linear systems as a model: their flags and their entries in the model protocol."""
+
+from collections import namedtuple
+from dataclasses import dataclass
+from functools import cache
+from typing import Any, NamedTuple
+
+from llvmlite import ir
+from numba import types
+from numba.extending import intrinsic
+
+from gearchaos_kernels.compilation import scalar
+from gearchaos_kernels.memory.tuples import each
+from gearchaos_kernels.models.linear.structure import Structure, numbered, places_of
+from gearchaos_kernels.models.linear.sums import Terms, sums
+from gearchaos_kernels.models.mesh_phase import nearest_row, turned
+from gearchaos_kernels.models.protocol import Element, Gap, Kind, Model
+from gearchaos_kernels.scene import implement
+
+
+@dataclass(frozen=True)
+class Linear:
+    """Flags of a piecewise-linear system.
+
+    Attributes
+    ----------
+    structure : Structure
+        What its equations contain.
+    """
+
+    structure: Structure
+
+
+class Forcing(NamedTuple):
+    """What acts on a lane at a mesh phase; each entry is a tuple.
+
+    Attributes
+    ----------
+    forces : tuple of float
+        Force on each coordinate over its mass, per step squared.
+    stiffness : tuple of float
+        Stiffness of each element, per step squared.
+    motion, motion_rate : tuple of float
+        By how much the excitation reduces each gap, and its rate per step.
+    """
+
+    forces: Any
+    stiffness: Any
+    motion: Any
+    motion_rate: Any
+
+
+@cache
+def coordinates_of(structure: Structure) -> Any:
+    """Return the type of the coordinates of a structure."""
+    return _numbered_type("Coordinates", structure.coordinates)
+
+
+@cache
+def _numbered_type(name: str, count: int) -> Any:
+    return namedtuple(name, [f"x{number}" for number in range(count)])
+
+
+def _rows(
+    structure: Structure, names: tuple[str, ...], rows: int, widths: tuple[int, ...]
+) -> Terms:
+    """Return the products of matrices with factors that follow each other, row by row."""
+    terms: list[list[tuple[int | None, int]]] = [[] for _ in range(rows)]
+    first = 0
+    for name, width in zip(names, widths, strict=True):
+        for coefficient, row, column in numbered(structure, name):
+            terms[row].append((coefficient, first + column))
+        first += width
+    return terms
+
+
+def _acceleration_terms(structure: Structure) -> Terms:
+    """Return the terms of the accelerations: forces, positions, rates, and pushes of elements."""
+    count = structure.coordinates
+    products = _rows(
+        structure,
+        ("position", "rate", "reaction"),
+        count,
+        (count, count, structure.elements),
+    )
+    # The forces come last among the factors and first in the sum.
+    first = 2 * count + structure.elements
+    return [[(None, first + row), *terms] for row, terms in enumerate(products)]
+
+
+def _of_waves(name: str, rows: str) -> Any:
+    """Return sums over the waves, the constant 1 first, for all coordinates or elements."""
+    return sums(lambda given: _rows(given, (name,), getattr(given, rows), (1 + given.waves,)))
+
+
+def _of_coordinates(structure: Structure) -> Terms:
+    """Return the terms of the gaps."""
+    return _rows(structure, ("gap",), structure.elements, (structure.coordinates,))
+
+
+_forces = _of_waves("force", "coordinates")
+_stiffnesses = _of_waves("stiffness", "elements")
+_motions = _of_waves("motion", "elements")
+_motion_rates = _of_waves("motion_rate", "elements")
+_gap_sums = sums(_of_coordinates)
+_accelerations = sums(_acceleration_terms, coordinates_of)
+
+
+def _picked(name: str) -> Any:
+    """Return an intrinsic that returns one coefficient of a lane for each element."""
+
+    @intrinsic
+    def picked(_typing_context: Any, lane: Any, scene: Any) -> Any:
+        structure = scene.scene.model.structure
+        first = getattr(places_of(structure), name)
+        returned = types.UniTuple(types.float64, structure.elements)
+
+        def generate(context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
+            found = [
+                builder.extract_value(arguments[0], first + element)
+                for element in range(structure.elements)
+            ]
+            return context.make_tuple(builder, returned, found)
+
+        return returned(lane, scene), generate
+
+    return picked
+
+
+_half_clearances = _picked("half_clearance")
+_dampings = _picked("damping")
+
+
+@scalar
+def half_clearances(lane, scene):
+    """Return the half clearance of each element."""
+    return _half_clearances(lane, scene)
+
+
+@intrinsic
+def _speed_of(_typing_context: Any, lane: Any, scene: Any) -> Any:
+    """Return the steps per unit of tau of a lane."""
+    at = places_of(scene.scene.model.structure).speed
+
+    def generate(_context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
+        return builder.extract_value(arguments[0], at)
+
+    return types.float64(lane, scene), generate
+
+
+@intrinsic
+def _waves_in_row(_typing_context: Any, table: Any, row: Any, scene: Any) -> Any:
+    """Return a row of a table as a tuple."""
+    count = scene.scene.model.structure.waves
+    returned = types.UniTuple(types.float64, count)
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        array = context.make_array(signature.args[0])(context, builder, arguments[0])
+        integer = ir.IntType(types.intp.bitwidth)
+        first = builder.mul(arguments[1], integer(count))
+        found = [
+            builder.load(builder.gep(array.data, [builder.add(first, integer(number))]))
+            for number in range(count)
+        ]
+        return context.make_tuple(builder, returned, found)
+
+    return returned(table, types.intp, scene), generate
+
+
+@intrinsic
+def _paired(_typing_context: Any, values: Any) -> Any:
+    """Return the cosines and the sines among the values of the waves, two tuples."""
+    half = types.UniTuple(types.float64, len(values) // 2)
+    returned = types.UniTuple(half, 2)
+
+    def generate(context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
+        numbers = [builder.extract_value(arguments[0], at) for at in range(len(values))]
+        halves = [context.make_tuple(builder, half, numbers[at::2]) for at in range(2)]
+        return context.make_tuple(builder, returned, halves)
+
+    return returned(values), generate
+
+
+@intrinsic
+def _harmonics(_typing_context: Any, scene: Any) -> Any:
+    """Return the harmonics of the waves, a tuple of constants."""
+    numbers = scene.scene.model.structure.orders
+    returned = types.UniTuple(types.float64, len(numbers))
+
+    def generate(context: Any, builder: Any, _signature: Any, _arguments: Any) -> Any:
+        found = [ir.Constant(ir.DoubleType(), float(number)) for number in numbers]
+        return context.make_tuple(builder, returned, found)
+
+    return returned(scene), generate
+
+
+@intrinsic
+def _interleaved(_typing_context: Any, pairs: Any) -> Any:
+    """Return the numbers of a tuple of (sine, cosine) as cosine, sine, cosine, sine, ..."""
+    returned = types.UniTuple(types.float64, 2 * len(pairs))
+
+    def generate(context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
+        numbers = []
+        for at in range(len(pairs)):
+            pair = builder.extract_value(arguments[0], at)
+            numbers += [builder.extract_value(pair, 1), builder.extract_value(pair, 0)]
+        return context.make_tuple(builder, returned, numbers)
+
+    return returned(pairs), generate
+
+
+@scalar
+def grid_at(table, row, scene):
+    """Return the waves at a row of the grid of half steps, a tuple."""
+    return _waves_in_row(table, row, scene)
+
+
+@scalar
+def grid_within(table, number, fraction, scene):
+    """Return the waves at a fraction of a step, from the nearest row of the grid."""
+    row, angle = nearest_row(number, fraction, table.shape[0])
+    cosines, sines = _paired(_waves_in_row(table, row, scene))
+    return _interleaved(each(_turned_harmonic, sines, cosines, _harmonics(scene), angle))
+
+
+@scalar
+def _turned_harmonic(sine, cosine, harmonic, angle):
+    """Return sine and cosine of a harmonic of a phase that is an angle further on."""
+    return turned(sine, cosine, harmonic * angle)
+
+
+@scalar
+def point_within(memory, slot, table, number, fraction, scene):
+    """Return the waves at a fraction of a step, the same for all lanes."""
+    return grid_within(table, number, fraction, scene)
+
+
+@scalar
+def forcing_at(lane, point, scene):
+    """Return what acts on a lane at these values of the waves."""
+    return Forcing(
+        _forces(lane, scene, 1.0, point),
+        _stiffnesses(lane, scene, 1.0, point),
+        _motions(lane, scene, 1.0, point),
+        _motion_rates(lane, scene, 1.0, point),
+    )
+
+
+@intrinsic
+def _no_waves(_typing_context: Any, scene: Any) -> Any:
+    """Return values of 0 for all waves."""
+    returned = types.UniTuple(types.float64, scene.scene.model.structure.waves)
+
+    def generate(context: Any, builder: Any, _signature: Any, _arguments: Any) -> Any:
+        return context.get_constant_null(returned)
+
+    return returned(scene), generate
+
+
+@scalar
+def unforced(lane, scene):
+    """Return what acts without excitation, with the mean stiffness of every element."""
+    nothing = _no_waves(scene)
+    return Forcing(
+        _forces(lane, scene, 0.0, nothing),
+        _stiffnesses(lane, scene, 1.0, nothing),
+        _motions(lane, scene, 0.0, nothing),
+        _motion_rates(lane, scene, 0.0, nothing),
+    )
+
+
+@scalar
+def elements_at(lane, forcing, scene):
+    """Return the clearance elements."""
+    return each(_element, forcing.stiffness, _dampings(lane, scene), half_clearances(lane, scene))
+
+
+@scalar
+def _element(stiffness, damping, half_clearance):
+    """Return an element."""
+    return Element(stiffness, damping, half_clearance)
+
+
+@scalar
+def gap_speeds(lane, scene):
+    """Return the factor from the rate of each gap per step to its rate per unit of tau."""
+    return each(_second, half_clearances(lane, scene), _speed_of(lane, scene))
+
+
+@scalar
+def _second(_first, second):
+    """Return the second one of two numbers."""
+    return second
+
+
+@scalar
+def gaps_at(state, lane, forcing, scene):
+    """Return the gaps y_j = n_j x - e_j."""
+    values = _gap_sums(lane, scene, state.position)
+    rates = _gap_sums(lane, scene, state.rate)
+    return each(_gap, values, rates, forcing.motion, forcing.motion_rate)
+
+
+@scalar
+def _gap(value, rate, motion, motion_rate):
+    """Return a gap less its excitation."""
+    return Gap(value - motion, rate - motion_rate, rate - motion_rate)
+
+
+@scalar
+def _force_of(push):
+    """Return the force of a push."""
+    return push.force
+
+
+@scalar
+def accelerations(state, pushes, forcing, lane, scene):
+    """Return the accelerations; coefficients of springs, dampers and reactions are negative."""
+    forces = each(_force_of, pushes)
+    return _accelerations(lane, scene, state.position, state.rate, forces, forcing.forces)
+
+
+@scalar
+def observed_at(state, lane, point, scene):
+    """Return the gaps: the observed signals."""
+    return each(_value_of, gaps_at(state, lane, forcing_at(lane, point, scene), scene))
+
+
+@scalar
+def _value_of(gap):
+    """Return the value of a gap."""
+    return gap.value
+
+
+def _kinds(flags: Linear) -> tuple[Kind, ...]:
+    """Return the kind of each element."""
+    of = flags.structure
+    return tuple(Kind(*one) for one in zip(of.one_sided, of.damped_in_contact, strict=True))
+
+
+@cache
+def model_of(flags: Linear) -> Model:
+    """Return the model of systems of one structure."""
+    structure = flags.structure
+    return Model(
+        coordinates=coordinates_of(structure),
+        lane=_numbered_type("Coefficients", places_of(structure).total),
+        elements=lambda flags: flags.structure.elements,
+        kinds=_kinds,
+        observed=tuple(f"gap_{number}" for number in range(structure.elements)),
+        grid_at=grid_at,
+        grid_within=grid_within,
+        point_within=point_within,
+        forcing_at=forcing_at,
+        unforced=unforced,
+        elements_at=elements_at,
+        half_clearances=half_clearances,
+        gap_speeds=gap_speeds,
+        gaps_at=gaps_at,
+        accelerations=accelerations,
+        observed_at=observed_at,
+    )
+
+
+implement(Linear, model_of)

@@ -1,0 +1,125 @@
+"""Which numbers of a piecewise-linear system are not zero.
+
+The equations of motion of n coordinates x with m clearance elements are::
+
+    x'' + C x' + K x = f(phi) - sum_j u_j [k_j(phi) D(y_j; b_j) + c_j y_j'],   y_j = n_j x - e_j(phi)
+
+after a multiplication by the inverse of the mass matrix. f, k_j and e_j are sums of waves: the
+constant 1, then cosine and sine of each harmonic of the mesh phase phi. The compiled formulas
+contain only the terms that a `Structure` lists.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, fields
+from hashlib import sha256
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+Entries = tuple[tuple[int, int], ...]
+
+
+def entries_of(matrices: NDArray[np.float64]) -> Entries:
+    """Return the places (row, column) where a matrix is not 0; shape (lanes, rows, columns)."""
+    there = np.any(matrices != 0.0, axis=0)
+    return tuple((int(row), int(column)) for row, column in np.argwhere(there))
+
+
+@dataclass(frozen=True)
+class Structure:
+    """What the equations of a system contain; every entry is a place (row, column) of a matrix.
+
+    Attributes
+    ----------
+    coordinates, elements : int
+        Numbers of coordinates and of clearance elements.
+    orders : tuple of int
+        The orders of the harmonics of the mesh phase whose cosine and sine are waves.
+    position, rate : tuple of entries
+        K and C, (coordinate, coordinate).
+    reaction : tuple of entries
+        The reactions u_j, (coordinate, element).
+    force : tuple of entries
+        f, (coordinate, wave).
+    gap : tuple of entries
+        The rows n_j, (element, coordinate).
+    motion : tuple of entries
+        e_j, (element, wave).
+    motion_rate : tuple of entries
+        e_j', (element, wave).
+    stiffness : tuple of entries
+        k_j, (element, wave).
+    one_sided, damped_in_contact : tuple of bool
+        See `Kind`.
+    """
+
+    coordinates: int
+    elements: int
+    orders: tuple[int, ...]
+    position: Entries
+    rate: Entries
+    reaction: Entries
+    force: Entries
+    gap: Entries
+    motion: Entries
+    motion_rate: Entries
+    stiffness: Entries
+    one_sided: tuple[bool, ...]
+    damped_in_contact: tuple[bool, ...]
+
+    @property
+    def waves(self) -> int:
+        """Number of waves without the constant."""
+        return 2 * len(self.orders)
+
+    def __repr__(self) -> str:
+        """Return a short text that names the structure: it is part of the names of compiled code."""
+        text = ",".join(str(getattr(self, field.name)) for field in fields(self))
+        return f"{self.coordinates}x{self.elements}:{sha256(text.encode()).hexdigest()[:16]}"
+
+
+MATRICES = (
+    "position",
+    "rate",
+    "reaction",
+    "force",
+    "gap",
+    "motion",
+    "motion_rate",
+    "stiffness",
+)
+"""The sparse matrices of a lane, in the order of its coefficients."""
+
+
+class Places(NamedTuple):
+    """Numbers of the first coefficients of a lane, after those of the matrices.
+
+    Attributes
+    ----------
+    damping, half_clearance : int
+        Damping and half clearance of each element.
+    speed : int
+        Steps per unit of tau.
+    total : int
+        Number of coefficients.
+    """
+
+    damping: int
+    half_clearance: int
+    speed: int
+    total: int
+
+
+def places_of(structure: Structure) -> Places:
+    """Return where the coefficients of a lane are that belong to no matrix."""
+    first = sum(len(getattr(structure, name)) for name in MATRICES)
+    after = first + 2 * structure.elements
+    return Places(first, first + structure.elements, after, after + 1)
+
+
+def numbered(structure: Structure, name: str) -> Iterator[tuple[int, int, int]]:
+    """Yield the number of the coefficient, row and column of every entry of a matrix."""
+    first = sum(len(getattr(structure, one)) for one in MATRICES[: MATRICES.index(name)])
+    for number, (row, column) in enumerate(getattr(structure, name)):
+        yield first + number, row, column

@@ -1,0 +1,204 @@
+"""A batch of piecewise-linear systems: their matrices, and what the engine derives from them."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from functools import cached_property
+from typing import ClassVar, Self
+
+import numpy as np
+
+from gearchaos_kernels.models.lane_system import LaneSystem
+from gearchaos_kernels.models.linear.model import Linear
+from gearchaos_kernels.models.linear.structure import MATRICES, Structure, entries_of
+from gearchaos_kernels.models.mesh_phase import half_step_angles, harmonic_series
+from gearchaos_kernels.plan import Floats
+
+
+@dataclass(frozen=True)
+class LinearSystems(LaneSystem):
+    """A batch of piecewise-linear systems with n coordinates and m clearance elements.
+
+    All matrices are those after a multiplication by the inverse of the mass matrix M. Waves are the
+    constant 1, then cosine and sine of each harmonic, w = 1 + 2 (number of harmonics).
+
+    Attributes
+    ----------
+    frequency : array, shape (lanes,)
+        Angular frequency of the excitation, whose period is the mesh period.
+    position, rate : array, shape (lanes, n, n)
+        M^-1 K and M^-1 C.
+    reaction : array, shape (lanes, n, m)
+        M^-1 r_j, the accelerations by a unit force of each element with opposite sign.
+    force : array, shape (lanes, n, w)
+        M^-1 f, as parts of the waves.
+    gap : array, shape (lanes, m, n)
+        The rows n_j.
+    motion, stiffness : array, shape (lanes, m, w)
+        e_j and k_j, as parts of the waves.
+    damping, half_clearance : array, shape (lanes, m)
+        Damping coefficient and half clearance of each element.
+    orders : tuple of int
+        Orders of the harmonics that excite the systems, of the fundamental one with ``frequency``.
+    one_sided, damped_in_contact : tuple of bool
+        See `Kind`.
+    names : tuple of str
+        Names of the coordinates; by default x0, x1 and so on.
+
+    Examples
+    --------
+    x'' + 0.1 x' + D(x; 1) = 0.1 + 0.1 cos(0.7 tau)::
+
+        LinearSystems(
+            frequency=np.array([0.7]),
+            position=np.zeros((1, 1, 1)), rate=np.zeros((1, 1, 1)),
+            reaction=np.ones((1, 1, 1)), gap=np.ones((1, 1, 1)),
+            force=np.array([[[0.1, 0.1, 0.0]]]), motion=np.zeros((1, 1, 3)),
+            stiffness=np.array([[[1.0, 0.0, 0.0]]]),
+            damping=np.array([[0.1]]), half_clearance=np.ones((1, 1)), orders=(1,),
+        )
+    """
+
+    frequency: Floats
+    position: Floats
+    rate: Floats
+    reaction: Floats
+    force: Floats
+    gap: Floats
+    motion: Floats
+    stiffness: Floats
+    damping: Floats
+    half_clearance: Floats
+    orders: tuple[int, ...] = ()
+    one_sided: tuple[bool, ...] = ()
+    damped_in_contact: tuple[bool, ...] = ()
+    names: tuple[str, ...] = ()
+
+    unit_inputs: ClassVar[Mapping[str, float]] = {}
+
+    @property
+    def mesh_period(self) -> Floats:
+        """Duration of a period of the excitation in units of tau, shape (lanes,)."""
+        period: Floats = 2.0 * np.pi / self.frequency
+        return period
+
+    @cached_property
+    def structure(self) -> Structure:
+        """Which numbers of the systems are not zero in some lane."""
+        count = self.gap.shape[1]
+        return Structure(
+            coordinates=self.gap.shape[2],
+            elements=count,
+            orders=self.orders,
+            one_sided=self.one_sided or (False,) * count,
+            damped_in_contact=self.damped_in_contact or (False,) * count,
+            **{name: entries_of(self._matrix(name)) for name in MATRICES},
+        )
+
+    def flags(self) -> Linear:
+        """Return the structure, for which a loop is compiled."""
+        return Linear(self.structure)
+
+    @property
+    def states(self) -> tuple[str, ...]:
+        """Names of the states: each coordinate, followed by its rate."""
+        names = self.names or tuple(f"x{number}" for number in range(self.gap.shape[2]))
+        return tuple(name + kind for name in names for kind in ("", "_rate"))
+
+    @property
+    def clearance(self) -> bool:
+        """Whether some element has a clearance or only one side."""
+        return bool(np.any(self.half_clearance)) or any(self.one_sided)
+
+    def coefficients(self, step: Floats) -> Floats:
+        """Return the coefficients of every lane, in the order of `MATRICES` and `Places`."""
+        once, twice = step[:, np.newaxis], step[:, np.newaxis] ** 2
+        # Forces of springs and elements decelerate.
+        factors = {
+            "position": -twice,
+            "rate": -once,
+            "reaction": -1.0,
+            "force": twice,
+            "motion_rate": once,
+            "stiffness": twice,
+        }
+        columns = []
+        for name in MATRICES:
+            places = getattr(self.structure, name)
+            rows, entries = [list(one) for one in zip(*places, strict=True)] or ([], [])
+            columns.append(self._matrix(name)[:, rows, entries] * factors.get(name, 1.0))
+        return np.concatenate(
+            [*columns, self.damping * once, self.half_clearance, 1.0 / once], axis=1
+        )
+
+    def _matrix(self, name: str) -> Floats:
+        """Return the matrix of every lane, shape (lanes, rows, columns)."""
+        if name != "motion_rate":
+            matrix: Floats = getattr(self, name)
+            return matrix
+        speeds = np.multiply.outer(self.frequency, self.orders)[:, np.newaxis]
+        rates = np.zeros_like(self.motion)
+        rates[..., 1::2] = speeds * self.motion[..., 2::2]
+        rates[..., 2::2] = -speeds * self.motion[..., 1::2]
+        return rates
+
+    def growth_rates(self) -> Floats:
+        """Return a bound on the rate of tangent vectors: of the stiffest branch, and of damping."""
+        engaged = self.reaction * self._stiffest()[:, np.newaxis]
+        springs = np.abs(self.position).sum(axis=2) + np.abs(engaged @ self.gap).sum(axis=2)
+        dampers = np.abs(self.rate).sum(axis=2)
+        dampers += np.abs((self.reaction * self.damping[:, np.newaxis]) @ self.gap).sum(axis=2)
+        rates: Floats = np.sqrt(springs.max(axis=1)) + dampers.max(axis=1)
+        return rates
+
+    def _stiffest(self) -> Floats:
+        """Return an upper bound of the stiffness of each element, shape (lanes, elements)."""
+        bound: Floats = np.abs(self.stiffness).sum(axis=2)
+        return bound
+
+    def branch_stiffnesses(self) -> Floats:
+        """Return relative stiffnesses of the elements: both extremes in contact, and none."""
+        mean = self.stiffness[:, :, 0]
+        spread = np.abs(self.stiffness[:, :, 1:]).sum(axis=2) / np.where(mean, mean, 1.0)
+        contact = [1.0 + spread, 1.0 - spread]
+        return np.stack([*contact, np.zeros_like(spread)] if self.clearance else contact)
+
+    def contact_state(self) -> Floats:
+        """Return the state at rest under the mean forces with all elements in contact."""
+        mean = self.stiffness[:, :, 0]
+        pull = self.reaction * mean[:, np.newaxis]
+        # In contact on the driving flank the deflection is the gap less the half clearance.
+        held = self.half_clearance + self.motion[:, :, 0]
+        force = self.force[:, :, 0] + np.einsum("lnm,lm->ln", pull, held)
+        state = np.zeros((self.lanes, len(self.states)))
+        for lane, matrix in enumerate(self.position + pull @ self.gap):
+            state[lane, ::2] = np.linalg.lstsq(matrix, force[lane])[0]
+        return state
+
+    def tables(self, steps_per_period: int) -> Floats:
+        """Return cosine and sine of every harmonic, shape (2 steps + 1, 2 harmonics)."""
+        angles = half_step_angles(steps_per_period)
+        turns = np.outer(angles, self.orders)
+        waves = np.stack([np.cos(turns), np.sin(turns)], axis=2)
+        return np.ascontiguousarray(waves.reshape(len(angles), 2 * len(self.orders)))
+
+    def wave_series(self, steps: int, terms: int) -> Floats:
+        """Return Taylor coefficients of a stiffness variation, which is 0, and of the waves."""
+        series = [np.zeros((terms, steps))]
+        for order in self.orders:
+            wave = harmonic_series(order, steps, terms)
+            series += [wave.real, wave.imag]
+        return np.stack(series)
+
+    def harmonics(self) -> int:
+        """Return the highest order of a harmonic."""
+        return max(self.orders, default=0)
+
+    def wave_values(self, phase: Floats) -> Floats:
+        """Return the waves at mesh phases in rad, shape (phases, waves)."""
+        turns = np.outer(phase, self.orders)
+        values: Floats = np.stack([np.cos(turns), np.sin(turns)], axis=2).reshape(phase.size, -1)
+        return values
+
+    def _parameters(self) -> list[str]:
+        """Return the names of the fields that are arrays over the lanes."""
+        return [one.name for one in fields(self) if isinstance(getattr(self, one.name), np.ndarray)]
