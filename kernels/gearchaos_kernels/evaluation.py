@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from gearchaos_kernels.batch import scene_of
 from gearchaos_kernels.compilation import evaluator, scalar
 from gearchaos_kernels.contact.branches import flank_at
-from gearchaos_kernels.contact.kinds import kinds
 from gearchaos_kernels.contact.elements import Push, pushes_of, tangent_pushes
+from gearchaos_kernels.contact.kinds import kinds
 from gearchaos_kernels.memory.block_memory import (
     aligned_memory,
     fill,

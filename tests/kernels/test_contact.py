@@ -8,17 +8,32 @@ import pytest
 from gearchaos_kernels.contact import branches, leaving
 from gearchaos_kernels.contact.leaving import NEVER
 from gearchaos_kernels.memory.rows import Branch
-from gearchaos_kernels.models.protocol import Gap
+from gearchaos_kernels.models.protocol import Gap, Kind
 from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 
 from .reference import from_python
 
-branch_at = from_python(branches.branch_at)
+branch_of_kind = from_python(branches.branch_at)
 first_fall = from_python(leaving.first_fall)
-leaving_fraction = from_python(leaving.leaving_fraction)
+fraction_of_kind = from_python(leaving.leaving_fraction)
 may_leave = from_python(leaving.may_leave)
-next_branch = from_python(branches.next_branch)
+next_of_kind = from_python(branches.next_branch)
+
+TWO_SIDED, ONE_SIDED = Kind(), Kind(one_sided=True)
+
+
+def branch_at(gap, half_clearance, kind=TWO_SIDED):
+    return branch_of_kind(gap, half_clearance, kind)
+
+
+def next_branch(branch, gap, half_clearance, kind=TWO_SIDED):
+    return next_of_kind(branch, gap, half_clearance, kind)
+
+
+def leaving_fraction(begin, end, length, branch, half_clearance, kind=TWO_SIDED):
+    return fraction_of_kind(begin, end, length, branch, half_clearance, kind)
+
 
 settings.register_profile("contact", derandomize=True, deadline=None, max_examples=150)
 PROPERTY = settings.get_profile("contact")
@@ -273,6 +288,28 @@ def test_from_a_flank_a_gap_comes_between_the_flanks_and_from_there_to_the_flank
     assert next_branch(branch_at(-b, b), -b, b) == free
     assert next_branch(free, b, b) == branch_at(b, b)
     assert next_branch(free, -b, b) == branch_at(-b, b)
+
+
+@pytest.mark.parametrize("b", [0.0, HALF_BACKLASH])
+def test_a_one_sided_element_has_two_branches_that_follow_each_other(b):
+    free, engaged = (branch_at(gap, b, ONE_SIDED) for gap in (-9.0 * (1.0 + b), b))
+    assert free == Branch(0.0, 0.0, -math.inf, b)
+    assert engaged == Branch(1.0, b, b, math.inf)
+    assert next_branch(free, b, b, ONE_SIDED) == engaged
+    assert next_branch(engaged, math.nextafter(b, -1.0), b, ONE_SIDED) == free
+
+
+@pytest.mark.parametrize("b", [0.0, HALF_BACKLASH])
+def test_a_one_sided_element_is_left_on_its_side_only(b):
+    def fraction(first, last):
+        branch = branch_at(first, b, ONE_SIDED)
+        ends = moving(first, last - first), moving(last, last - first)
+        return leaving_fraction(*ends, 1.0, branch, b, ONE_SIDED)
+
+    assert fraction(b + 1.0, b - 3.0) == pytest.approx(0.25)
+    assert fraction(b - 1.0, b + 3.0) == pytest.approx(0.25)
+    assert fraction(b - 1.0, -b - 30.0) == NEVER
+    assert fraction(b + 1.0, b + 30.0) == NEVER
 
 
 def test_neighbouring_branches_meet_at_the_boundary():

@@ -2,7 +2,9 @@
 
 The equations of motion of n coordinates x with m clearance elements are::
 
-    x'' + C x' + K x = f(phi) - sum_j u_j [k_j(phi) D(y_j; b_j) + c_j y_j'],   y_j = n_j x - e_j(phi)
+    x'' + C x' + K x = f(phi) - sum_j u_j [k_j(phi) D(y_j; b_j) + c_j y_j']
+
+    y_j = n_j x - e_j(phi)
 
 after a multiplication by the inverse of the mass matrix. f, k_j and e_j are sums of waves: the
 constant 1, then cosine and sine of each harmonic of the mesh phase phi. The compiled formulas
@@ -74,7 +76,7 @@ class Structure:
         return 2 * len(self.orders)
 
     def __repr__(self) -> str:
-        """Return a short text that names the structure: it is part of the names of compiled code."""
+        """Return a short name of the structure, which compiled code has in its names."""
         text = ",".join(str(getattr(self, field.name)) for field in fields(self))
         return f"{self.coordinates}x{self.elements}:{sha256(text.encode()).hexdigest()[:16]}"
 

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from functools import cached_property
-from typing import ClassVar, Self
+from typing import ClassVar
 
 import numpy as np
 
@@ -125,7 +125,8 @@ class LinearSystems(LaneSystem):
         for name in MATRICES:
             places = getattr(self.structure, name)
             rows, entries = [list(one) for one in zip(*places, strict=True)] or ([], [])
-            columns.append(self._matrix(name)[:, rows, entries] * factors.get(name, 1.0))
+            factor = np.asarray(factors.get(name, 1.0))
+            columns.append(self._matrix(name)[:, rows, entries] * factor)
         return np.concatenate(
             [*columns, self.damping * once, self.half_clearance, 1.0 / once], axis=1
         )
