@@ -150,7 +150,7 @@ class Configuration(Tables):
             With one message per fault, all faults at once.
         """
         if cls is Configuration:
-            chosen: Any = cls.kinds[DEFAULT_KIND]
+            chosen: Any = _kind_of(tables, source)
             return chosen.from_tables(tables, source, folder)  # type: ignore[no-any-return]
         tables, faults = cls.with_files(tables, folder)
         if faults:
@@ -320,6 +320,24 @@ def configuration_of(given: Given) -> Configuration:
             "gearchaos.Configuration.from_tables"
         )
     return given if isinstance(given, Configuration) else load_config(given)
+
+
+def _kind_of(tables: Mapping[str, Any], source: str) -> type[Configuration]:
+    """Return the class of configurations that tables name by ``model.kind``.
+
+    Raises
+    ------
+    ConfigurationError
+        If there is no model of this kind.
+    """
+    model = tables.get("model")
+    kind = model.get("kind", DEFAULT_KIND) if isinstance(model, Mapping) else DEFAULT_KIND
+    chosen = Configuration.kinds.get(kind) if isinstance(kind, str) else None
+    if chosen is None or not kind:
+        known = ", ".join(f'"{one}"' for one in Configuration.kinds if one)
+        fault = Fault("model.kind", "is the name of no model", f"there are {known}", kind)
+        raise ConfigurationError(texts([fault], source))
+    return chosen
 
 
 @cache

@@ -34,7 +34,7 @@ Order: TypeAlias = Annotated[
 class Scene(Table):
     """The included effects; all others are left out."""
 
-    effects: tuple[str, ...] = ()
+    effects: Annotated[tuple[str, ...], AS_LIST] = key("the effects that exist", default=())
 
     def refuses_maps(self) -> str:
         """Return the effect that flow maps cannot compute, empty without one; by default none."""

@@ -118,10 +118,9 @@ class Tables(Titled):
         """Return the default of a key, None where it has none."""
         return None if key.field.is_required() else key.field.default
 
-    @classmethod
-    def parameter_remedy(cls, unknown: str) -> str:
+    def parameter_remedy(self, unknown: str) -> str:
         """Return which parameter to sweep instead of an unknown one."""
-        return suggestion(unknown, cls.parameters) or f"parameters: {', '.join(cls.parameters)}"
+        return suggestion(unknown, self.parameters) or f"parameters: {', '.join(self.parameters)}"
 
     def lane_faults(self) -> Iterator[Fault]:
         """Yield the faults of parameters of the lanes, once each table is free of faults."""

@@ -9,5 +9,6 @@ from gearchaos.configuration import (
     swept_values,
 )
 
-# It makes gear pairs known to `Configuration`.
+# These make their models known to `Configuration`.
 from gearchaos.models.gear_pair.configuration import GearPairConfiguration
+from gearchaos.models.linear.configuration import LinearConfiguration

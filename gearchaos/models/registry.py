@@ -1,20 +1,28 @@
 """The models by the kind of their configuration."""
 
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Mapping
+from typing import Any
 
 from gearchaos_kernels import LaneSystem
 
 from gearchaos.arrays import Floats
 from gearchaos.configuration.base import Configuration
 from gearchaos.models.gear_pair.model import GearPairModel
+from gearchaos.models.linear.model import MachineModel
 from gearchaos.models.protocol import Model
 
-MODELS: dict[str, Model] = {"gear_pair": GearPairModel()}
+GEAR_PAIR = GearPairModel()
+
+MODELS: dict[str, Callable[[Any], Model]] = {
+    "gear_pair": lambda _config: GEAR_PAIR,
+    "linear": MachineModel,
+}
+"""For each kind of configurations a function that returns the model of one of them."""
 
 
 def model_of(config: Configuration) -> Model:
     """Return the model of a configuration."""
-    return MODELS[config.kind]
+    return MODELS[config.kind](config)
 
 
 def system_of(

@@ -49,4 +49,4 @@ class OscillatorModel(Model):
         return (STOP.name,)
 
 
-MODELS[OscillatorConfiguration.kind] = OscillatorModel()
+MODELS[OscillatorConfiguration.kind] = lambda _config: OscillatorModel()

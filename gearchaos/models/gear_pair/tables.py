@@ -140,8 +140,7 @@ class GearPairTables(Tables, PhysicalTables):
         table, _, name = key.path.rpartition(".")
         return GROUPS_BY_NAME[name].default if table == "groups" else super().default_of(key)
 
-    @classmethod
-    def parameter_remedy(cls, unknown: str) -> str:
+    def parameter_remedy(self, unknown: str) -> str:
         """Return what to sweep instead of an unknown parameter."""
         if unknown.startswith("bearings."):
             return "sweep the group of one gear, such as axial_damping_p"

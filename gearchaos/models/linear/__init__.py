@@ -1,0 +1,1 @@
+"""Any piecewise-linear machine: matrices, clearance elements and forces from a configuration."""

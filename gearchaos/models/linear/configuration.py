@@ -1,0 +1,318 @@
+"""The configuration of a machine that is given by its matrices."""
+
+import csv
+import os
+from abc import abstractmethod
+from collections.abc import Callable, Iterator, Mapping
+from functools import cached_property
+from io import StringIO
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+
+from gearchaos.arrays import Floats
+from gearchaos.configuration.base import Configuration
+from gearchaos.configuration.keys import key
+from gearchaos.configuration.messages import Fault, suggestion
+from gearchaos.configuration.ranges import Range
+from gearchaos.configuration.rules import GENERIC_RULES, Rules
+from gearchaos.configuration.tables import Parameter
+from gearchaos.configuration.toml_text import text_of_file
+from gearchaos.errors import GearchaosError
+from gearchaos.models.linear.machine import Kinds, Machine, without_drift
+from gearchaos.models.linear.tables import (
+    Clearance,
+    ClearanceTables,
+    ForceTables,
+    Fourier,
+    MachineTable,
+    Row,
+    Shares,
+    wave_of,
+)
+from gearchaos.outputs.names import rate_of
+
+MATRICES = ("mass", "stiffness", "damping")
+
+RULES = Rules()
+
+
+class MachineConfiguration(Configuration):
+    """A machine with any number of coordinates and clearance elements, and the sweeps of it."""
+
+    kind = "machine"
+
+    @cached_property
+    @abstractmethod
+    def kinds_of_elements(self) -> Kinds:
+        """Names, orders and kinds that all lanes share."""
+
+    @abstractmethod
+    def machine(self, values: Mapping[str, float]) -> Machine:
+        """Return the machine with these values of the swept parameters."""
+
+    @property
+    def states(self) -> tuple[str, ...]:
+        """States, each coordinate followed by its rate."""
+        names = self.kinds_of_elements.coordinates
+        return tuple(state for name in names for state in (name, rate_of(name)))
+
+
+class LinearConfiguration(MachineConfiguration):
+    """A machine that is given by its matrices, its clearance elements and its forces."""
+
+    kind = "linear"
+    model: MachineTable = key("the matrices of the machine")
+    clearance: ClearanceTables = key("the clearance elements by name", default={})
+    force: ForceTables = key("the forces by name", default={})
+
+    @classmethod
+    def with_files(
+        cls, tables: Mapping[str, Any], folder: str | None
+    ) -> tuple[Mapping[str, Any], list[Fault]]:
+        """Return tables with the matrices of the files that they name, and the faults of these.
+
+        The texts of the files are kept in ``files``.
+        """
+        model = tables.get("model")
+        model = dict(model) if isinstance(model, Mapping) else {}
+        given = tables.get("files")
+        files, faults = dict(given) if isinstance(given, Mapping) else {}, []
+        for name in MATRICES:
+            file = model.get(name)
+            if isinstance(file, str):
+                try:
+                    if not isinstance(files.get(file), str):
+                        files[file] = _text_beside(folder, file)
+                    model[name] = _rows_of(files[file])
+                except (GearchaosError, ValueError, csv.Error) as fault:
+                    rule, remedy = [*map(str, fault.args), ""][:2]
+                    faults.append(Fault(f"model.{name}", rule, remedy, file))
+        return ({**tables, "model": model, "files": files} if files else tables), faults
+
+    @property
+    def parameters(self) -> Mapping[str, Parameter]:  # type: ignore[override]
+        """The numbers that a sweep can vary, by their dotted path."""
+        found = [Parameter("frequency", "model.frequency", Range(gt=0), long_name="frequency")]
+        for name, one in self.clearance.items():
+            keys = ["half_clearance", "damping"]
+            keys.append("stiffness.mean" if isinstance(one.stiffness, Fourier) else "stiffness")
+            found += [_parameter(f"clearance.{name}.{key}", Range(ge=0)) for key in keys]
+        for name in self.force:
+            paths = (f"force.{name}.{key}" for key in ("mean", "amplitude", "phase_deg"))
+            found += [_parameter(path, Range()) for path in paths]
+        return MappingProxyType({one.name: one for one in found})
+
+    @cached_property
+    def kinds_of_elements(self) -> Kinds:
+        """Names, orders and kinds that all lanes share."""
+        return Kinds(
+            self.model.coordinates,
+            tuple(self.clearance),
+            self._orders(),
+            tuple(one.one_sided for one in self.clearance.values()),
+            tuple(one.damping_acts == "in_contact" for one in self.clearance.values()),
+        )
+
+    def _orders(self) -> tuple[int, ...]:
+        """Return the orders of all waves, ascending; at least the first one."""
+        found = {1} | {one.order for one in self.force.values()}
+        for one in self.clearance.values():
+            for waves in (one.stiffness, one.motion):
+                if isinstance(waves, Fourier):
+                    found |= set(range(1, 1 + max(len(waves.cosine), len(waves.sine))))
+        return tuple(sorted(found))
+
+    def machine(self, values: Mapping[str, float]) -> Machine:
+        """Return the machine with these values of the swept parameters."""
+        value = _values(values)
+        frequency = value("frequency", self.model.frequency)
+        mass, stiffness, damping = self.matrices()
+        elements = [(f"clearance.{name}", one) for name, one in self.clearance.items()]
+        return Machine(
+            frequency=frequency,
+            mass=mass,
+            damping=damping,
+            stiffness=stiffness,
+            reaction=self._rows(one.reaction or one.gap for _, one in elements).T,
+            gap=self._rows(one.gap for _, one in elements),
+            force=self._forces(value, frequency),
+            motion=self._waves([one.motion for _, one in elements]),
+            contact_stiffness=self._waves([_stiffness(path, one, value) for path, one in elements]),
+            contact_damping=_array(value(f"{path}.damping", one.damping) for path, one in elements),
+            half_clearance=_array(
+                value(f"{path}.half_clearance", one.half_clearance) for path, one in elements
+            ),
+        )
+
+    def matrices(self) -> tuple[Floats, Floats, Floats]:
+        """Return the mass, stiffness and damping matrices as given, each of shape (n, n)."""
+        mass, stiffness = (_matrix(getattr(self.model, name)) for name in MATRICES[:2])
+        damping = self.model.damping
+        if isinstance(damping, Shares):
+            return mass, stiffness, damping.mass * mass + damping.stiffness * stiffness
+        return mass, stiffness, _matrix(damping)
+
+    def _rows(self, rows: Any) -> Floats:
+        """Return rows of coordinates with factors, shape (rows, n)."""
+        names = self.model.coordinates
+        found = [[row.get(name, 0.0) for name in names] for row in rows]
+        return np.array(found, dtype=np.float64).reshape(-1, len(names))
+
+    def _waves(self, given: list[Fourier | None]) -> Floats:
+        """Return sums of waves by order, shape (sums, w)."""
+        orders = self._orders()
+        waves = np.zeros((len(given), 1 + 2 * len(orders)))
+        for row, one in zip(waves, given, strict=True):
+            if one is not None:
+                row[0] = one.mean
+                for part, amplitudes in enumerate((one.cosine, one.sine)):
+                    for order, amplitude in enumerate(amplitudes, 1):
+                        row[1 + 2 * orders.index(order) + part] = amplitude
+        return waves
+
+    def _forces(self, value: Callable[[str, float], float], frequency: float) -> Floats:
+        """Return the forces on all coordinates, shape (n, w)."""
+        orders = self._orders()
+        forces = np.zeros((len(self.model.coordinates), 1 + 2 * len(orders)))
+        for name, one in self.force.items():
+            keys = ("mean", "amplitude", "phase_deg")
+            new = {key: value(f"force.{name}.{key}", getattr(one, key)) for key in keys}
+            one = one.model_copy(update=new)
+            at = 1 + 2 * orders.index(one.order)
+            wave = np.zeros(forces.shape[1])
+            wave[0], wave[at], wave[at + 1] = wave_of(one, frequency)
+            forces += np.outer(self._rows([one.on])[0], wave)
+        return forces
+
+
+def _values(values: Mapping[str, float]) -> Callable[[str, float], float]:
+    """Return a function that gives the swept value of a key, or the given one."""
+    return lambda path, given: float(values.get(path, given))
+
+
+def _stiffness(path: str, one: Clearance, value: Callable[[str, float], float]) -> Fourier:
+    """Return the stiffness of an element as a sum of waves."""
+    given = one.stiffness
+    if isinstance(given, Fourier):
+        return given.model_copy(update={"mean": value(f"{path}.stiffness.mean", given.mean)})
+    return Fourier(mean=value(f"{path}.stiffness", given))
+
+
+def _parameter(path: str, valid: Range) -> Parameter:
+    """Return a parameter that has the name of its path, worded as its path is."""
+    return Parameter(path, path, valid, long_name=path.replace(".", " ").replace("_", " "))
+
+
+def _array(numbers: Iterator[float]) -> Floats:
+    return np.array(list(numbers), dtype=np.float64)
+
+
+def _matrix(given: Any) -> Floats:
+    """Return the matrix of a diagonal or of rows."""
+    array = np.array(given, dtype=np.float64)
+    return np.diag(array) if array.ndim == 1 else array
+
+
+def _text_beside(folder: str | None, name: str) -> str:
+    """Read the text of a file in the folder of the configuration."""
+    if folder is None:
+        rule = "is not kept under [files], and other files are not read here"
+        raise ValueError(rule, "run the sweep again, or read the configuration with load_config")
+    path = os.path.join(folder, name)
+    try:
+        return text_of_file(path, "file with a matrix")
+    except GearchaosError as fault:
+        # The fault names the file.
+        raise ValueError(str(fault).removeprefix(f"{path}: ")) from None
+
+
+def _rows_of(text: str) -> list[list[float]]:
+    """Return the rows of numbers in CSV text."""
+    rows = [row for row in csv.reader(StringIO(text)) if any(cell.strip() for cell in row)]
+    try:
+        return [[float(cell) for cell in row] for row in rows]
+    except ValueError as fault:
+        rule = f"has a cell that is not a number ({fault})"
+        raise ValueError(rule, "give one row of the matrix per line, with commas between") from None
+
+
+@RULES.reads("model")
+def _matrices_have_the_size_of_the_machine(config: LinearConfiguration) -> Iterator[Fault]:
+    """Every matrix has one row and one column for each coordinate."""
+    count = len(config.model.coordinates)
+    for name in MATRICES:
+        given = getattr(config.model, name)
+        if isinstance(given, Shares):
+            continue
+        lengths = {len(row) for row in given if isinstance(row, tuple)}
+        if len(given) != count or lengths - {count}:
+            rule = f"must have {count} rows and columns, one for each of model.coordinates"
+            yield Fault(f"model.{name}", rule, "give its rows, or its diagonal", given)
+
+
+@RULES.reads("model", "clearance", "force")
+def _rows_name_coordinates(config: LinearConfiguration) -> Iterator[Fault]:
+    """Gaps, reactions and forces are rows of coordinates that exist."""
+    names = config.model.coordinates
+    rows: list[tuple[str, Row | None]] = []
+    for name, one in config.clearance.items():
+        rows += [(f"clearance.{name}.gap", one.gap), (f"clearance.{name}.reaction", one.reaction)]
+    rows += [(f"force.{name}.on", one.on) for name, one in config.force.items()]
+    for path, row in rows:
+        for unknown in (row or {}).keys() - set(names):
+            rule = "is none of model.coordinates"
+            remedy = suggestion(unknown, names) or f"there are {', '.join(names)}"
+            yield Fault(path, f"names {unknown}, which {rule}", remedy, row)
+
+
+@RULES.reads("model", "clearance", "force")
+def _the_machine_can_move_and_is_held(config: LinearConfiguration) -> Iterator[Fault]:
+    """The mass matrix is not singular, and springs hold every coordinate."""
+    faults = (_matrices_have_the_size_of_the_machine, _rows_name_coordinates)
+    if any(True for check in faults for _ in check(config)):
+        return
+    machine, names = config.machine({}), config.model.coordinates
+    if np.linalg.matrix_rank(machine.mass) < len(names):
+        rule = "is singular, so that some acceleration is not determined"
+        yield Fault("model.mass", rule, "give every coordinate a mass", config.model.mass)
+        return
+    for name, one in config.clearance.items():
+        mean = one.stiffness.mean if isinstance(one.stiffness, Fourier) else one.stiffness
+        if mean == 0.0:
+            rule = "must be greater than 0, otherwise the element is no spring"
+            yield Fault(f"clearance.{name}.stiffness", rule, "give it a stiffness", mean)
+    loose = without_drift(machine, names)
+    if loose:
+        rule = f"no spring holds {', '.join(loose)}, even with all elements in contact"
+        remedy = "tie one of them to the ground, or describe the machine by relative coordinates"
+        yield Fault("model.stiffness", rule, remedy)
+
+
+@RULES.reads("scene")
+def _there_are_no_effects(config: LinearConfiguration) -> Iterator[Fault]:
+    """A machine that is given by its matrices has no effects that could be left out."""
+    if config.scene.effects:
+        rule = "has no meaning for a machine that is given by its matrices"
+        yield Fault("scene.effects", rule, "leave it out", config.scene.effects)
+
+
+def _known_states(table: str, name: str) -> Callable[[LinearConfiguration], Iterator[Fault]]:
+    """Return a rule that the states named by a key exist."""
+
+    def check(config: LinearConfiguration) -> Iterator[Fault]:
+        states = config.states
+        given = tuple(getattr(getattr(config, table), name))
+        for unknown in dict.fromkeys(one for one in given if one not in states):
+            remedy = suggestion(unknown, states) or f"there are {', '.join(states)}"
+            yield Fault(f"{table}.{name}", f"the machine has no state `{unknown}`", remedy, given)
+
+    return check
+
+
+for _table, _keys in (("outputs", ("section", "states")), ("start", ("state", "box", "drawn"))):
+    for _key in _keys:
+        RULES.reads("model", _table)(_known_states(_table, _key))
+
+LinearConfiguration.rules = (*RULES, *GENERIC_RULES)

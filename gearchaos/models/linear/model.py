@@ -1,0 +1,66 @@
+"""A machine as the engine sees it: systems, parameters, loads and motions."""
+
+from collections.abc import Collection, Mapping
+
+import numpy as np
+from gearchaos_kernels import LaneSystem, evaluate
+
+from gearchaos.arrays import Array, Floats
+from gearchaos.models.linear.configuration import MachineConfiguration
+from gearchaos.models.linear.machine import systems_of
+from gearchaos.models.linear.outputs import FORCE, FORCES_PART, GAP, catalogue_of
+from gearchaos.models.protocol import Model, accelerations
+
+
+class MachineModel(Model):
+    """A piecewise-linear machine; every configuration has its own names."""
+
+    load_parts = (FORCES_PART,)
+    shared_inputs = "nothing but their start"
+
+    def __init__(self, config: MachineConfiguration) -> None:
+        self._kinds = config.kinds_of_elements
+        self.catalogue = catalogue_of(self._kinds)
+        self.signals = tuple(f"{GAP}{name}" for name in self._kinds.elements)
+
+    def system(
+        self, config: MachineConfiguration, values: Mapping[str, Floats], effects: Collection[str]
+    ) -> LaneSystem:
+        """Return the machines of some lanes."""
+        del effects
+        given = {name: value for name, value in values.items() if name in config.parameters}
+        lanes = np.broadcast_shapes(*(np.shape(value) for value in values.values()))
+        columns = np.stack([np.broadcast_to(value, lanes) for value in given.values()], axis=-1)
+        different, number = np.unique(columns.reshape(-1, len(given)), axis=0, return_inverse=True)
+        machines = [config.machine(dict(zip(given, row, strict=True))) for row in different]
+        return systems_of(machines, self._kinds).of(number.reshape(-1))
+
+    def elements(self, effects: Collection[str]) -> tuple[str, ...]:
+        """Return the names of the clearance elements."""
+        del effects
+        return self._kinds.elements
+
+    def loads(self, loads: Floats, system: LaneSystem) -> dict[str, Floats]:
+        """Return forces and gaps of each element by name."""
+        del system
+        told: dict[str, Floats] = {}
+        count = len(self._kinds.elements)
+        for number, name in enumerate(self._kinds.elements):
+            largest, smallest, mean, square = np.moveaxis(loads[:, number], 1, 0)
+            told |= {f"force_largest_{name}": largest, f"force_smallest_{name}": smallest}
+            told |= {f"force_mean_{name}": mean, f"force_rms_{name}": np.sqrt(square)}
+            largest, smallest, mean, square = np.moveaxis(loads[:, count + number], 1, 0)
+            told |= {f"gap_mean_{name}": mean, f"gap_peak_to_peak_{name}": largest - smallest}
+            told[f"gap_rms_{name}"] = np.sqrt(np.maximum(square - mean**2, 0.0))
+        return told
+
+    def motion(
+        self, system: LaneSystem, states: Floats, steps_per_period: int, first_period: int
+    ) -> dict[str, Array]:
+        """Return accelerations, forces and contact along a motion, by name."""
+        found = evaluate(system, states, steps_per_period, first_period)
+        motion = accelerations(system, found.accelerations)
+        for number, name in enumerate(self._kinds.elements):
+            motion[f"{FORCE}{name}"] = found.forces[:, :, number].copy()
+            motion[f"contact_{name}"] = found.contact[:, :, number].copy()
+        return motion
