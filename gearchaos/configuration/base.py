@@ -59,8 +59,9 @@ class Configuration(Tables):
 
     @classmethod
     def __pydantic_init_subclass__(cls, **_: Any) -> None:
-        """Register the class of a model by its kind."""
-        Configuration.kinds[cls.kind] = cls
+        """Register the class of a model by its kind; a class without one is not complete."""
+        if "kind" in cls.__dict__:
+            Configuration.kinds[cls.kind] = cls
 
     @classmethod
     def with_files(
@@ -333,8 +334,8 @@ def _kind_of(tables: Mapping[str, Any], source: str) -> type[Configuration]:
     model = tables.get("model")
     kind = model.get("kind", DEFAULT_KIND) if isinstance(model, Mapping) else DEFAULT_KIND
     chosen = Configuration.kinds.get(kind) if isinstance(kind, str) else None
-    if chosen is None or not kind:
-        known = ", ".join(f'"{one}"' for one in Configuration.kinds if one)
+    if chosen is None:
+        known = ", ".join(f'"{one}"' for one in Configuration.kinds)
         fault = Fault("model.kind", "is the name of no model", f"there are {known}", kind)
         raise ConfigurationError(texts([fault], source))
     return chosen

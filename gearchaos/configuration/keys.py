@@ -44,6 +44,9 @@ class Table(BaseModel):
         return self.model_dump(include=names, exclude_none=True, by_alias=True)
 
 
+NAME = "NAME"
+"""Stands in the path of a key for the name that a file gives one of several tables."""
+
 # TOML has lists, the tables have tuples; entries are still checked strictly.
 AS_LIST = Field(strict=False)
 Numbers: TypeAlias = Annotated[tuple[float, ...], AS_LIST]
@@ -125,11 +128,12 @@ def keys_of(model: type[Table], path: str = "") -> Iterator[Key]:
     """List the keys of a model and of the tables inside it, in the order of declaration."""
     for name, field in model.model_fields.items():
         here = f"{path}.{field.alias or name}".lstrip(".")
-        parts = _parts(field.annotation)
+        parts = tuple(_parts(field.annotation))
         tables = tuple(part for part in parts if isinstance(part, type) and issubclass(part, Table))
         yield Key(here, field, tables, (model, name))
+        named = any(typing.get_origin(part) is dict for part in parts)
         for table in tables:
-            yield from keys_of(table, here)
+            yield from keys_of(table, f"{here}.{NAME}" if named else here)
 
 
 def _parts(annotation: Any) -> Iterator[Any]:

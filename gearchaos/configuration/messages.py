@@ -2,13 +2,13 @@
 
 import difflib
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from typing import NamedTuple
 
 from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
-from gearchaos.configuration.keys import Key
+from gearchaos.configuration.keys import NAME, Key
 from gearchaos.configuration.toml_text import quoted_key, toml_literal
 
 MOST_SHOWN = 100
@@ -109,10 +109,10 @@ def _fault_of(error: ErrorDetails, keys: Mapping[str, Key]) -> Fault:
     if kind.startswith("union_tag"):
         names.append(error["ctx"]["discriminator"].strip("'"))
         value = value.get(names[-1])
-    path = ".".join(name for name in names if isinstance(name, str))
+    path = declared_path([name for name in names if isinstance(name, str)], keys)
     remedy = keys[path].remedy if path in keys and kind != "value_error" else ""
     if kind == "extra_forbidden":
-        table = ".".join(map(str, names[:-1]))
+        table = path.rpartition(".")[0]
         remedy = _elsewhere(str(names[-1]), table, keys)
         if path in keys:
             # Another kind of this table has the key; in pydantic the kind precedes the key.
@@ -129,6 +129,17 @@ def _fault_of(error: ErrorDetails, keys: Mapping[str, Key]) -> Fault:
         f"[{name}]" if isinstance(name, int) else f".{quoted_key(name)}" for name in names
     )
     return Fault(dotted.lstrip("."), rule, remedy, value)
+
+
+def declared_path(names: Sequence[str], keys: Collection[str]) -> str:
+    """Return the path under which a key is declared: tables that a file names are called NAME."""
+    path = ""
+    for name in names:
+        here = f"{path}.{name}".lstrip(".")
+        named = f"{path}.{NAME}."
+        known = here in keys or not any(key.startswith(named) for key in keys)
+        path = here if known else named.rstrip(".")
+    return path
 
 
 def _names(error: ErrorDetails, keys: Mapping[str, Key]) -> list[int | str]:

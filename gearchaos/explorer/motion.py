@@ -13,11 +13,9 @@ from matplotlib.figure import Figure
 from gearchaos.explorer.charts import plain_text
 from gearchaos.figures import response as figures
 from gearchaos.figures.response_page import SHOWN_PERIODS
-from gearchaos.models.gear_pair.outputs import MESH_FORCE
 from gearchaos.outputs.names import TIME, acceleration_of
 from gearchaos.results.reading.result import Result
 
-FORCE = f"{MESH_FORCE}tangential"
 SCALES = ("linear", "linear", "log", "linear")
 """Vertical scales of the panels of `show`."""
 LOOK = {
@@ -38,7 +36,7 @@ def empty_panel(scale: str) -> Any:
 
 
 def show(shown: list[Any], motion: Result, coordinate: str) -> None:
-    """Show the lane of a response: time history, phase portrait with section, spectrum, mesh force.
+    """Show the lane of a response: history, phase portrait with section, spectrum, first force.
 
     Parameters
     ----------
@@ -60,8 +58,9 @@ def show(shown: list[Any], motion: Result, coordinate: str) -> None:
     figures.phase_portrait(portrait, motion, 0, coordinate)
     figures.poincare_section(portrait, motion, 0, coordinate)
     figures.amplitude_spectrum(spectrum, motion, 0, acceleration_of(coordinate))
-    figures.time_history(force, motion, 0, FORCE, **late)
-    figures.contact_strip(force, motion, 0, FORCE)
+    for name in figures.forces_of(motion)[:1]:
+        figures.time_history(force, motion, 0, name, **late)
+        figures.contact_strip(force, motion, 0, name)
     for panel, axes in zip(shown, drawn, strict=True):
         _show(panel, axes)
 

@@ -20,14 +20,21 @@ from gearchaos.engine.response import compute_response, prepared
 from gearchaos.engine.running import compiling
 from gearchaos.errors import ConfigurationError, FigureError, GearchaosError
 from gearchaos.explorer.charts import diagram, plain_text, two_parameter_map
-from gearchaos.explorer.motion import FORCE, SCALES, empty_panel, show
+from gearchaos.explorer.motion import SCALES, empty_panel, show
 from gearchaos.figures.labels import in_words, unit_of
 from gearchaos.figures.lanes import diagram_lanes, swept_axes
 from gearchaos.figures.page import FORMATS
-from gearchaos.figures.response import COORDINATE
+from gearchaos.figures.response import forces_of
 from gearchaos.figures.style import GREY, VERMILION
 from gearchaos.outputs.catalogue import DEFAULT_PERIODS
-from gearchaos.outputs.names import LABELS, LARGEST_EXPONENT, SECTION, STATUS, coordinate_text
+from gearchaos.outputs.names import (
+    LABELS,
+    LARGEST_EXPONENT,
+    SECTION,
+    STATE,
+    STATUS,
+    coordinate_text,
+)
 from gearchaos.results.reading.result import Result, section_variables
 from gearchaos.results.reading.stage_table import label_text
 
@@ -93,7 +100,7 @@ class ExplorerPage:
             self._allowed(name)
         for name in self._refused:
             self._refuse(name)
-        files = [(name, kind) for name in ("sweep", "motion", "mesh_force") for kind in FORMATS]
+        files = [(name, kind) for name in ("sweep", "motion", "force") for kind in FORMATS]
         saves = [
             pn.widgets.FileDownload(
                 callback=partial(self._saved, name, kind),
@@ -246,10 +253,16 @@ class ExplorerPage:
 
     @property
     def _coordinate(self) -> str:
-        """The coordinate of the drawn section, or the torsion."""
+        """The coordinate of the drawn section, or the first one of the machine."""
         name = str(self._value("variable"))
         of_section = name.startswith(SECTION)
-        return name.removeprefix(SECTION).removesuffix("_rate") if of_section else COORDINATE
+        first: str = self._result.variables[STATE].flags[0]
+        return name.removeprefix(SECTION).removesuffix("_rate") if of_section else first
+
+    @property
+    def _force(self) -> str:
+        """The force of the first clearance element of the shown motion, "" without one."""
+        return next(iter(forces_of(self._motion) if self._motion is not None else ()), "")
 
     def _words(self, at: Mapping[str, float]) -> str:
         """Word the swept value, motion, period, exponent and chosen variable of a lane."""
@@ -286,7 +299,7 @@ class ExplorerPage:
             "sweep": ["plot", self._path, *here, *between, *shown, *units],
             "lane": ["response", self._path, *at.values(), *how],
             "motion": ["plot", motion, "--variable", self._coordinate, *units],
-            "mesh_force": ["plot", motion, "--variable", FORCE, *units],
+            "force": ["plot", motion, "--variable", self._force, *units],
         }
 
     def _say_commands(self) -> None:

@@ -22,12 +22,15 @@ from gearchaos.figures.page import Page, few_ticks, footnote, page
 from gearchaos.figures.panel import robust_limits
 from gearchaos.figures.stages import look_of
 from gearchaos.figures.style import BLACK, LEGEND, SINGLE_COLUMN_MM, SMALL_FONT_PT
-from gearchaos.models.gear_pair.outputs import DIRECTIONS
 from gearchaos.outputs.names import LABELS, LARGEST_EXPONENT, STATUS
 from gearchaos.results.reading.ensembles import motion_kinds
 from gearchaos.results.reading.result import Result
 
-SHOWN = (LABELS[0], LARGEST_EXPONENT, *(f"contact_state_{way}" for way in DIRECTIONS))
+CONTACT_STATE = "contact_state_"
+"""Beginning of the names of contact states; the name of an element follows."""
+
+MOST_SHOWN = 4
+"""Largest number of maps on a page where none is chosen."""
 """Variables of the panels of a page, if the result has them."""
 
 NO_VALUE = "no value"  # Legend entry of lanes that did not diverge but have no number.
@@ -170,7 +173,8 @@ def map_page(
     result, between
         As for `parameter_map`.
     variable : str, optional
-        Draw one panel of this variable. By default all three, as far as the result has them.
+        Draw one panel of this variable. By default motion, exponent and contact states, as far as
+        the result has them.
     marked : mapping of str to float, optional
         Values of the two parameters, each marked by a line across the maps.
     width_mm, height_mm : float
@@ -181,9 +185,10 @@ def map_page(
     FigureError, FileError
         As for `parameter_map`; FigureError also if there is nothing to draw.
     """
-    names = [name for name in SHOWN if name in result] if variable is None else [variable]
+    names = _shown_by_default(result) if variable is None else [variable]
     if not names:
-        raise FigureError(f"nothing to draw: the result has none of {', '.join(SHOWN)}; name one")
+        looked = ", ".join((LABELS[0], LARGEST_EXPONENT, f"{CONTACT_STATE}ELEMENT"))
+        raise FigureError(f"nothing to draw: the result has none of {looked}; name one")
     map_axes(result)  # Raises FigureError before a page is made.
     beside = width_mm >= NARROWEST_MM * len(names)
     shape = (1, len(names)) if beside else (len(names), 1)
@@ -298,3 +303,9 @@ def _outline(mask: Mask, x: Floats, y: Floats) -> Path:
     across, up = (left, right, right, left, left), (bottom, bottom, top, top, bottom)
     codes = np.tile([Path.MOVETO, *[Path.LINETO] * 3, Path.CLOSEPOLY], row.size)
     return Path(np.array([across, up]).T.reshape(-1, 2), codes)
+
+
+def _shown_by_default(result: Result) -> list[str]:
+    """Return the variables of the maps of a page where none is chosen."""
+    states = (name for name in result if name.startswith(CONTACT_STATE))
+    return [n for n in (LABELS[0], LARGEST_EXPONENT, *states) if n in result][:MOST_SHOWN]

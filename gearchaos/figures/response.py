@@ -14,7 +14,6 @@ from gearchaos.figures.labels import axis_label, check_variable, place_of, plain
 from gearchaos.figures.lanes import Between
 from gearchaos.figures.page import remark
 from gearchaos.figures.style import BLACK, BLUE, LEGEND, ORANGE, VERMILION
-from gearchaos.models.gear_pair.outputs import MESH_FORCE
 from gearchaos.outputs.names import TIME, acceleration_of
 from gearchaos.records.amplitude_spectrum import spectral_lines
 from gearchaos.records.period import motion_period
@@ -82,14 +81,14 @@ def contact_strip(axes: Axes, result: Result, lane: int, variable: str) -> list[
     axes, result, lane
         As for `time_history`; the figure needs the constrained layout for its legend.
     variable : str
-        ``"mesh_force_tangential"`` or ``"mesh_force_axial"``.
+        Force of an element, such as ``"mesh_force_tangential"``.
 
     Returns
     -------
     list of PolyCollection
         Bars of each contact state that occurs.
     """
-    name, time = f"contact_{variable.removeprefix(MESH_FORCE)}", result[TIME]
+    name, time = f"contact_{element_of(result, variable)}", result[TIME]
     states, strips = result.lanes(name)[lane], []
     first = np.flatnonzero(np.diff(states, prepend=-1))
     begin, lengths = time[first], np.diff(time[first], append=time[-1])
@@ -222,7 +221,8 @@ def amplitude_spectrum(
     axes.set_xlabel("Frequency over mesh frequency")
     axes.xaxis.set_major_locator(MaxNLocator(9, integer=True))
     symbol = result.attributes(variable).get("symbol") or plain(variable)
-    axes.set_ylabel(f"Amplitude of {symbol} ({unit_of(result, variable)})")
+    unit = unit_of(result, variable)
+    axes.set_ylabel(f"Amplitude of {symbol}" + (f" ({unit})" if unit else ""))
     remark(axes, window)
     return lines
 
@@ -269,9 +269,20 @@ def response_variables_of(result: Result) -> tuple[str, ...]:
 
 
 def coordinates_of(result: Result) -> tuple[str, ...]:
-    """Return the coordinates of a response that have accelerations, `delta_5` first."""
+    """Return the coordinates of a response that have accelerations, in the order of the file."""
     names = response_variables_of(result)
     return tuple(name for name in names if acceleration_of(name) in names)
+
+
+def element_of(result: Result, variable: str) -> str:
+    """Return the clearance element of which a variable over time is the force, "" for others."""
+    _, force, element = variable.rpartition("force_")
+    return element if force and f"contact_{element}" in result else ""
+
+
+def forces_of(result: Result) -> tuple[str, ...]:
+    """Return the forces of the clearance elements among the variables over time."""
+    return tuple(name for name in response_variables_of(result) if element_of(result, name))
 
 
 def repeats_after(result: Result, lane: int) -> int:

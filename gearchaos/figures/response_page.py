@@ -16,7 +16,7 @@ from gearchaos.figures import response
 from gearchaos.figures.labels import form_in_words, in_words, place_of
 from gearchaos.figures.page import Page, few_ticks, footnote, letter, page, remark
 from gearchaos.figures.style import BLACK, BLUE, DOUBLE_COLUMN_MM, LEGEND, VERMILION
-from gearchaos.models.gear_pair.outputs import MESH_ERROR, MESH_FORCE
+from gearchaos.models.gear_pair.outputs import MESH_ERROR
 from gearchaos.outputs.names import TIME, acceleration_of
 from gearchaos.results.reading.excitation import Excitation, excitation_of
 from gearchaos.results.reading.result import Result
@@ -55,8 +55,9 @@ def response_page(
     result, lane
         As for `time_history`.
     coordinate : str, optional
-        Such as ``"delta_1"``; by default ``"delta_5"``, the torsion. Another variable over time,
-        such as ``"mesh_force_tangential"``, gives time history and spectrum only.
+        Such as ``"delta_1"``; by default the first one, ``"delta_5"`` of a gear pair. Another
+        variable over time, such as ``"mesh_force_tangential"``, gives only time history and
+        spectrum.
     width_mm, height_mm : float
         Size of the page. Below 120 mm, as in one column of a journal, the panels are stacked.
 
@@ -77,7 +78,8 @@ def response_page(
     error over revolutions of the driving gear, in um where b' is known. The section then also shows
     the points once a mesh period.
     """
-    motion = _motion(result, lane, response.COORDINATE if coordinate is None else coordinate)
+    first = next(iter(response.coordinates_of(result)), response.COORDINATE)
+    motion = _motion(result, lane, first if coordinate is None else coordinate)
     layout, heights = _layout(motion, width_mm >= SIDE_BY_SIDE_MM)
     with page(width_mm, height_mm or sum(heights)) as figure:
         panels = figure.subplot_mosaic(layout, height_ratios=heights)
@@ -139,7 +141,7 @@ def _draw_panels(panels: dict[str, Axes], motion: _Motion) -> None:
     result, lane, variable = motion.result, motion.lane, motion.variable
     history = panels["h"]
     response.time_history(history, result, lane, variable, between=motion.shown)
-    if variable.startswith(MESH_FORCE):
+    if response.element_of(result, variable):
         response.contact_strip(history, result, lane, variable)
     few_ticks(history, None if motion.teeth else 6, 6)
     remark(panels["e" if motion.teeth else "h"], in_words(result, place_of(result, lane)))

@@ -282,7 +282,7 @@ def test_a_zoom_is_drawn_anew_a_link_brings_it_back_and_a_command_its_figure(
         seen = page.evaluate(f"({FIGURES})().slice(0, 2).map(one => one.x_range.{end})")
         np.testing.assert_allclose(seen, wanted, rtol=1e-5)
     saved = {}
-    for name in ("sweep", "mesh_force"):
+    for name in ("sweep", "force"):
         with page.expect_download() as download:
             page.get_by_text(f"{name.replace('_', ' ').capitalize()} as PNG").click()
         assert download.value.suggested_filename == f"pair_{name}.png"
@@ -294,7 +294,7 @@ def test_a_zoom_is_drawn_anew_a_link_brings_it_back_and_a_command_its_figure(
         module, *arguments = shlex.split(line.removeprefix("python -m "))
         assert import_module(module).main(arguments) == 0
     of_sweep, _, _, of_force, _ = map(Path, capsys.readouterr().out.splitlines())
-    assert saved == {"sweep": of_sweep.read_bytes(), "mesh_force": of_force.read_bytes()}
+    assert saved == {"sweep": of_sweep.read_bytes(), "force": of_force.read_bytes()}
 
 
 @needs_browser

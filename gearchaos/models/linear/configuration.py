@@ -14,34 +14,29 @@ import numpy as np
 from gearchaos.arrays import Floats
 from gearchaos.configuration.base import Configuration
 from gearchaos.configuration.keys import key
-from gearchaos.configuration.messages import Fault, suggestion
+from gearchaos.configuration.messages import Fault
 from gearchaos.configuration.ranges import Range
-from gearchaos.configuration.rules import GENERIC_RULES, Rules
+from gearchaos.configuration.rules import GENERIC_RULES
 from gearchaos.configuration.tables import Parameter
 from gearchaos.configuration.toml_text import text_of_file
 from gearchaos.errors import GearchaosError
-from gearchaos.models.linear.machine import Kinds, Machine, without_drift
+from gearchaos.models.linear.machine import Kinds, Machine
+from gearchaos.models.linear.rules import RULES
 from gearchaos.models.linear.tables import (
+    MATRICES,
     Clearance,
     ClearanceTables,
     ForceTables,
     Fourier,
     MachineTable,
-    Row,
     Shares,
     wave_of,
 )
 from gearchaos.outputs.names import rate_of
 
-MATRICES = ("mass", "stiffness", "damping")
-
-RULES = Rules()
-
 
 class MachineConfiguration(Configuration):
     """A machine with any number of coordinates and clearance elements, and the sweeps of it."""
-
-    kind = "machine"
 
     @cached_property
     @abstractmethod
@@ -63,6 +58,8 @@ class LinearConfiguration(MachineConfiguration):
     """A machine that is given by its matrices, its clearance elements and its forces."""
 
     kind = "linear"
+    rules = (*RULES, *GENERIC_RULES)
+
     model: MachineTable = key("the matrices of the machine")
     clearance: ClearanceTables = key("the clearance elements by name", default={})
     force: ForceTables = key("the forces by name", default={})
@@ -236,83 +233,3 @@ def _rows_of(text: str) -> list[list[float]]:
     except ValueError as fault:
         rule = f"has a cell that is not a number ({fault})"
         raise ValueError(rule, "give one row of the matrix per line, with commas between") from None
-
-
-@RULES.reads("model")
-def _matrices_have_the_size_of_the_machine(config: LinearConfiguration) -> Iterator[Fault]:
-    """Every matrix has one row and one column for each coordinate."""
-    count = len(config.model.coordinates)
-    for name in MATRICES:
-        given = getattr(config.model, name)
-        if isinstance(given, Shares):
-            continue
-        lengths = {len(row) for row in given if isinstance(row, tuple)}
-        if len(given) != count or lengths - {count}:
-            rule = f"must have {count} rows and columns, one for each of model.coordinates"
-            yield Fault(f"model.{name}", rule, "give its rows, or its diagonal", given)
-
-
-@RULES.reads("model", "clearance", "force")
-def _rows_name_coordinates(config: LinearConfiguration) -> Iterator[Fault]:
-    """Gaps, reactions and forces are rows of coordinates that exist."""
-    names = config.model.coordinates
-    rows: list[tuple[str, Row | None]] = []
-    for name, one in config.clearance.items():
-        rows += [(f"clearance.{name}.gap", one.gap), (f"clearance.{name}.reaction", one.reaction)]
-    rows += [(f"force.{name}.on", one.on) for name, one in config.force.items()]
-    for path, row in rows:
-        for unknown in (row or {}).keys() - set(names):
-            rule = "is none of model.coordinates"
-            remedy = suggestion(unknown, names) or f"there are {', '.join(names)}"
-            yield Fault(path, f"names {unknown}, which {rule}", remedy, row)
-
-
-@RULES.reads("model", "clearance", "force")
-def _the_machine_can_move_and_is_held(config: LinearConfiguration) -> Iterator[Fault]:
-    """The mass matrix is not singular, and springs hold every coordinate."""
-    faults = (_matrices_have_the_size_of_the_machine, _rows_name_coordinates)
-    if any(True for check in faults for _ in check(config)):
-        return
-    machine, names = config.machine({}), config.model.coordinates
-    if np.linalg.matrix_rank(machine.mass) < len(names):
-        rule = "is singular, so that some acceleration is not determined"
-        yield Fault("model.mass", rule, "give every coordinate a mass", config.model.mass)
-        return
-    for name, one in config.clearance.items():
-        mean = one.stiffness.mean if isinstance(one.stiffness, Fourier) else one.stiffness
-        if mean == 0.0:
-            rule = "must be greater than 0, otherwise the element is no spring"
-            yield Fault(f"clearance.{name}.stiffness", rule, "give it a stiffness", mean)
-    loose = without_drift(machine, names)
-    if loose:
-        rule = f"no spring holds {', '.join(loose)}, even with all elements in contact"
-        remedy = "tie one of them to the ground, or describe the machine by relative coordinates"
-        yield Fault("model.stiffness", rule, remedy)
-
-
-@RULES.reads("scene")
-def _there_are_no_effects(config: LinearConfiguration) -> Iterator[Fault]:
-    """A machine that is given by its matrices has no effects that could be left out."""
-    if config.scene.effects:
-        rule = "has no meaning for a machine that is given by its matrices"
-        yield Fault("scene.effects", rule, "leave it out", config.scene.effects)
-
-
-def _known_states(table: str, name: str) -> Callable[[LinearConfiguration], Iterator[Fault]]:
-    """Return a rule that the states named by a key exist."""
-
-    def check(config: LinearConfiguration) -> Iterator[Fault]:
-        states = config.states
-        given = tuple(getattr(getattr(config, table), name))
-        for unknown in dict.fromkeys(one for one in given if one not in states):
-            remedy = suggestion(unknown, states) or f"there are {', '.join(states)}"
-            yield Fault(f"{table}.{name}", f"the machine has no state `{unknown}`", remedy, given)
-
-    return check
-
-
-for _table, _keys in (("outputs", ("section", "states")), ("start", ("state", "box", "drawn"))):
-    for _key in _keys:
-        RULES.reads("model", _table)(_known_states(_table, _key))
-
-LinearConfiguration.rules = (*RULES, *GENERIC_RULES)

@@ -1,10 +1,9 @@
-"""One piecewise-linear machine as matrices, and many of them as lanes."""
+"""One piecewise-linear machine as matrices."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from gearchaos_kernels.models.linear.system import LinearSystems
 
 from gearchaos.arrays import Floats
 
@@ -53,9 +52,7 @@ class Machine(NamedTuple):
     @property
     def held(self) -> Floats:
         """K with all elements in contact at their mean stiffness, shape (n, n)."""
-        held: Floats = self.stiffness + self.reaction @ (
-            self.contact_stiffness[:, :1] * self.gap
-        )
+        held: Floats = self.stiffness + self.reaction @ (self.contact_stiffness[:, :1] * self.gap)
         return held
 
 
@@ -79,30 +76,6 @@ class Kinds(NamedTuple):
     damped_in_contact: tuple[bool, ...]
 
 
-def systems_of(machines: Sequence[Machine], kinds: Kinds) -> LinearSystems:
-    """Return machines as lanes; the mass matrices must not be singular."""
-    columns = Machine(*(np.array(one, dtype=np.float64) for one in zip(*machines, strict=True)))
-    over_mass = {
-        "position": columns.stiffness,
-        "rate": columns.damping,
-        "reaction": columns.reaction,
-        "force": columns.force,
-    }
-    return LinearSystems(
-        frequency=columns.frequency,
-        **{name: np.linalg.solve(columns.mass, matrix) for name, matrix in over_mass.items()},
-        gap=columns.gap,
-        motion=columns.motion,
-        stiffness=columns.contact_stiffness,
-        damping=columns.contact_damping,
-        half_clearance=columns.half_clearance,
-        orders=kinds.orders,
-        one_sided=kinds.one_sided,
-        damped_in_contact=kinds.damped_in_contact,
-        names=kinds.coordinates,
-    )
-
-
 def without_drift(machine: Machine, names: Sequence[str]) -> list[str]:
     """Return the names of the coordinates that nothing holds, even with all elements in contact.
 
@@ -112,4 +85,8 @@ def without_drift(machine: Machine, names: Sequence[str]) -> list[str]:
     scaled = machine.held / np.maximum(np.abs(machine.held).max(initial=0.0), 1e-300)
     _, sizes, motions = np.linalg.svd(scaled)
     free = motions[sizes < 1e-12 * sizes.max(initial=1.0)]
-    return [name for name, part in zip(names, np.abs(free).max(axis=0, initial=0.0), strict=True) if part > 1e-6]
+    return [
+        name
+        for name, part in zip(names, np.abs(free).max(axis=0, initial=0.0), strict=True)
+        if part > 1e-6
+    ]

@@ -1,13 +1,15 @@
 """A machine as the engine sees it: systems, parameters, loads and motions."""
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 from gearchaos_kernels import LaneSystem, evaluate
+from gearchaos_kernels.models.linear.system import LinearSystems
 
 from gearchaos.arrays import Array, Floats
 from gearchaos.models.linear.configuration import MachineConfiguration
-from gearchaos.models.linear.machine import systems_of
+from gearchaos.models.linear.machine import Kinds, Machine
 from gearchaos.models.linear.outputs import FORCE, FORCES_PART, GAP, catalogue_of
 from gearchaos.models.protocol import Model, accelerations
 
@@ -64,3 +66,27 @@ class MachineModel(Model):
             motion[f"{FORCE}{name}"] = found.forces[:, :, number].copy()
             motion[f"contact_{name}"] = found.contact[:, :, number].copy()
         return motion
+
+
+def systems_of(machines: Sequence[Machine], kinds: Kinds) -> LinearSystems:
+    """Return machines as lanes; the mass matrices must not be singular."""
+    columns: Any = Machine._make(map(np.array, zip(*machines, strict=True)))
+    over_mass = {
+        "position": columns.stiffness,
+        "rate": columns.damping,
+        "reaction": columns.reaction,
+        "force": columns.force,
+    }
+    return LinearSystems(
+        frequency=columns.frequency,
+        **{name: np.linalg.solve(columns.mass, matrix) for name, matrix in over_mass.items()},
+        gap=columns.gap,
+        motion=columns.motion,
+        stiffness=columns.contact_stiffness,
+        damping=columns.contact_damping,
+        half_clearance=columns.half_clearance,
+        orders=kinds.orders,
+        one_sided=kinds.one_sided,
+        damped_in_contact=kinds.damped_in_contact,
+        names=kinds.coordinates,
+    )

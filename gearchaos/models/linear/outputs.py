@@ -43,7 +43,7 @@ FORCES_IN_TIME_PART = Part(
 
 def catalogue_of(kinds: Kinds) -> Catalogue:
     """Return the outputs of machines with these coordinates and elements."""
-    motions = [motion_of(name, symbol_of(name), f"{{}} of {name}") for name in kinds.coordinates]
+    motions = [motion_of(name, symbol_of(name), f"{{}} {name}") for name in kinds.coordinates]
     elements = tuple(
         Subject(name, name.replace("_", " "), rf"$F_{{\mathrm{{{_plain(name)}}}}}$")
         for name in kinds.elements

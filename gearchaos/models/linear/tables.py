@@ -16,6 +16,9 @@ Matrix: TypeAlias = (
 )
 """The diagonal of a matrix, all of its rows, or the name of a CSV file with the rows."""
 
+MATRICES = ("mass", "stiffness", "damping")
+"""Keys of the matrices of a machine."""
+
 MOST_ORDER = 1000
 
 
@@ -55,7 +58,7 @@ class Clearance(Table):
     """whether the damper acts all the time, or only while the element is in contact"""
     half_clearance: float = key("distance from the middle to each flank", default=0.0, ge=0)
     one_sided: bool = key(default=False)
-    """whether the element pushes only where the gap exceeds half_clearance, and has no back flank"""
+    """whether the element pushes only where the gap exceeds half_clearance; it has no back flank"""
     motion: Fourier | None = key(default=None)
     """a prescribed motion that reduces the gap, such as a pitch error"""
 
@@ -69,9 +72,7 @@ class Force(Table):
     mean: float = key("constant part", default=0.0)
     amplitude: float = key("amplitude of the wave", default=0.0)
     order: int = key("order of the wave", default=1, ge=1, le=MOST_ORDER)
-    phase_deg: float = key(
-        "phase of the wave cos(order * phi + phase)", units="deg", default=0.0
-    )
+    phase_deg: float = key("phase of the wave cos(order * phi + phase)", units="deg", default=0.0)
     times_frequency_squared: bool = key(default=False)
     """whether the amplitude is multiplied by the square of the frequency, as that of an error of
     the gears or of an imbalance is"""
@@ -106,9 +107,9 @@ class MachineTable(Table):
     """A machine by its matrices: M x'' + C x' + K x = forces."""
 
     kind: Literal["linear"] = key("which model the file describes", default="linear")
-    coordinates: Annotated[
-        tuple[Name, ...], AS_LIST, AfterValidator(_one_number_each)
-    ] = key("names of the coordinates", example=["x1", "x2"], min_length=1, max_length=64)
+    coordinates: Annotated[tuple[Name, ...], AS_LIST, AfterValidator(_one_number_each)] = key(
+        "names of the coordinates", example=["x1", "x2"], min_length=1, max_length=64
+    )
     mass: Matrix = key(
         "mass matrix: its diagonal, its rows, or a CSV file with the rows", example=[1.0, 1.0]
     )
