@@ -12,3 +12,4 @@ from gearchaos.configuration import (
 # These make their models known to `Configuration`.
 from gearchaos.models.gear_pair.configuration import GearPairConfiguration
 from gearchaos.models.linear.configuration import LinearConfiguration
+from gearchaos.models.train.configuration import TrainConfiguration

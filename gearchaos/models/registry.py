@@ -10,12 +10,14 @@ from gearchaos.configuration.base import Configuration
 from gearchaos.models.gear_pair.model import GearPairModel
 from gearchaos.models.linear.model import MachineModel
 from gearchaos.models.protocol import Model
+from gearchaos.models.train.model import TrainModel
 
 GEAR_PAIR = GearPairModel()
 
 MODELS: dict[str, Callable[[Any], Model]] = {
     "gear_pair": lambda _config: GEAR_PAIR,
     "linear": MachineModel,
+    "train": TrainModel,
 }
 """For each kind of configurations a function that returns the model of one of them."""
 

@@ -49,6 +49,8 @@ class Catalogue:
         Scales that turn results into physical units; quantities without one stay as they are.
     parameters : mapping of str to Quantity
         Quantities of the parameters of the model that are no pure numbers, by name.
+    units : mapping of Quantity to str
+        Units of quantities that the model computes in physical units; all others are pure numbers.
     long_names : mapping of str to str
         Wordings in place of generic ones, by the name of the output.
 
@@ -77,6 +79,7 @@ class Catalogue:
     subjects: Mapping[Kind, tuple[Subject, ...]]
     scales: Mapping[Quantity, Scale] = field(default_factory=dict)
     parameters: Mapping[str, Quantity] = field(default_factory=dict)
+    units: Mapping[Quantity, str] = field(default_factory=dict)
     long_names: Mapping[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -244,7 +247,7 @@ class Catalogue:
             name=output.name_for(subject),
             dims=output.dims_over(axes),
             dtype=output.dtype,
-            units="1",
+            units=self.units.get(_quantity(output, subject), "1"),
             long_name=long_name.replace(SUBJECT, wording),
             symbol=output.symbol.replace(SUBJECT, subject.symbol),
             fill_value=None if output.fill_value is None else number(output.fill_value),

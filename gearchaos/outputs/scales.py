@@ -19,6 +19,9 @@ class Quantity(Enum):
     FORCE = auto()
     GROWTH_RATE = auto()
     MESH_FREQUENCY = auto()
+    ANGLE = auto()
+    ANGULAR_SPEED = auto()
+    ANGULAR_ACCELERATION = auto()
 
 
 @dataclass(frozen=True)

@@ -3,7 +3,7 @@
 import csv
 import os
 from abc import abstractmethod
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Mapping
 from functools import cached_property
 from io import StringIO
 from types import MappingProxyType
@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 
 from gearchaos.arrays import Floats
-from gearchaos.configuration.base import Configuration
+from gearchaos.configuration.base import Configuration, configuration_keys
 from gearchaos.configuration.keys import key
-from gearchaos.configuration.messages import Fault
+from gearchaos.configuration.messages import Fault, declared_path
 from gearchaos.configuration.ranges import Range
 from gearchaos.configuration.rules import GENERIC_RULES
 from gearchaos.configuration.tables import Parameter
@@ -26,17 +26,24 @@ from gearchaos.models.linear.tables import (
     MATRICES,
     Clearance,
     ClearanceTables,
+    Force,
     ForceTables,
     Fourier,
     MachineTable,
     Shares,
     wave_of,
 )
+from gearchaos.models.linear.values import numbers_in, with_numbers
 from gearchaos.outputs.names import rate_of
 
 
 class MachineConfiguration(Configuration):
     """A machine with any number of coordinates and clearance elements, and the sweeps of it."""
+
+    @property
+    def is_complete(self) -> bool:
+        """Whether the parts of the machine are named and connected, so that its states follow."""
+        return True
 
     @cached_property
     @abstractmethod
@@ -91,15 +98,9 @@ class LinearConfiguration(MachineConfiguration):
     @property
     def parameters(self) -> Mapping[str, Parameter]:  # type: ignore[override]
         """The numbers that a sweep can vary, by their dotted path."""
-        found = [Parameter("frequency", "model.frequency", Range(gt=0), long_name="frequency")]
-        for name, one in self.clearance.items():
-            keys = ["half_clearance", "damping"]
-            keys.append("stiffness.mean" if isinstance(one.stiffness, Fourier) else "stiffness")
-            found += [_parameter(f"clearance.{name}.{key}", Range(ge=0)) for key in keys]
-        for name in self.force:
-            paths = (f"force.{name}.{key}" for key in ("mean", "amplitude", "phase_deg"))
-            found += [_parameter(path, Range()) for path in paths]
-        return MappingProxyType({one.name: one for one in found})
+        frequency = Parameter("frequency", "model.frequency", Range(gt=0), long_name="frequency")
+        found = parameters_in(type(self), {"clearance": self.clearance, "force": self.force})
+        return MappingProxyType({"frequency": frequency, **found})
 
     @cached_property
     def kinds_of_elements(self) -> Kinds:
@@ -123,24 +124,24 @@ class LinearConfiguration(MachineConfiguration):
 
     def machine(self, values: Mapping[str, float]) -> Machine:
         """Return the machine with these values of the swept parameters."""
-        value = _values(values)
-        frequency = value("frequency", self.model.frequency)
+        frequency = float(values.get("frequency", self.model.frequency))
+        given = {"clearance": self.clearance, "force": self.force}
+        swept = {path: value for path, value in values.items() if path != "frequency"}
+        tables = with_numbers(given, swept)
+        elements: list[Clearance] = [*tables["clearance"].values()]
         mass, stiffness, damping = self.matrices()
-        elements = [(f"clearance.{name}", one) for name, one in self.clearance.items()]
         return Machine(
             frequency=frequency,
             mass=mass,
             damping=damping,
             stiffness=stiffness,
-            reaction=self._rows(one.reaction or one.gap for _, one in elements).T,
-            gap=self._rows(one.gap for _, one in elements),
-            force=self._forces(value, frequency),
-            motion=self._waves([one.motion for _, one in elements]),
-            contact_stiffness=self._waves([_stiffness(path, one, value) for path, one in elements]),
-            contact_damping=_array(value(f"{path}.damping", one.damping) for path, one in elements),
-            half_clearance=_array(
-                value(f"{path}.half_clearance", one.half_clearance) for path, one in elements
-            ),
+            reaction=self._rows(one.reaction or one.gap for one in elements).T,
+            gap=self._rows(one.gap for one in elements),
+            force=self._forces(tables["force"], frequency),
+            motion=self._waves([one.motion for one in elements]),
+            contact_stiffness=self._waves([one.waves for one in elements]),
+            contact_damping=np.array([one.damping for one in elements], dtype=np.float64),
+            half_clearance=np.array([one.half_clearance for one in elements], dtype=np.float64),
         )
 
     def matrices(self) -> tuple[Floats, Floats, Floats]:
@@ -169,14 +170,11 @@ class LinearConfiguration(MachineConfiguration):
                         row[1 + 2 * orders.index(order) + part] = amplitude
         return waves
 
-    def _forces(self, value: Callable[[str, float], float], frequency: float) -> Floats:
+    def _forces(self, given: Mapping[str, Force], frequency: float) -> Floats:
         """Return the forces on all coordinates, shape (n, w)."""
         orders = self._orders()
         forces = np.zeros((len(self.model.coordinates), 1 + 2 * len(orders)))
-        for name, one in self.force.items():
-            keys = ("mean", "amplitude", "phase_deg")
-            new = {key: value(f"force.{name}.{key}", getattr(one, key)) for key in keys}
-            one = one.model_copy(update=new)
+        for one in given.values():
             at = 1 + 2 * orders.index(one.order)
             wave = np.zeros(forces.shape[1])
             wave[0], wave[at], wave[at + 1] = wave_of(one, frequency)
@@ -184,26 +182,14 @@ class LinearConfiguration(MachineConfiguration):
         return forces
 
 
-def _values(values: Mapping[str, float]) -> Callable[[str, float], float]:
-    """Return a function that gives the swept value of a key, or the given one."""
-    return lambda path, given: float(values.get(path, given))
-
-
-def _stiffness(path: str, one: Clearance, value: Callable[[str, float], float]) -> Fourier:
-    """Return the stiffness of an element as a sum of waves."""
-    given = one.stiffness
-    if isinstance(given, Fourier):
-        return given.model_copy(update={"mean": value(f"{path}.stiffness.mean", given.mean)})
-    return Fourier(mean=value(f"{path}.stiffness", given))
-
-
-def _parameter(path: str, valid: Range) -> Parameter:
-    """Return a parameter that has the name of its path, worded as its path is."""
-    return Parameter(path, path, valid, long_name=path.replace(".", " ").replace("_", " "))
-
-
-def _array(numbers: Iterator[float]) -> Floats:
-    return np.array(list(numbers), dtype=np.float64)
+def parameters_in(kind: type[Configuration], tables: Mapping[str, Any]) -> dict[str, Parameter]:
+    """Return the numbers inside tables of a configuration as parameters, by their dotted path."""
+    keys, found = configuration_keys(kind), {}
+    for path, _, _ in numbers_in(tables):
+        key = keys[declared_path(path.split("."), keys)]
+        words = f"{key.wording} of {path.split('.')[1]}" if path.count(".") > 1 else key.wording
+        found[path] = Parameter(path, path, key.valid, key.units or "1", words)
+    return found
 
 
 def _matrix(given: Any) -> Floats:

@@ -1,6 +1,7 @@
 """A machine as the engine sees it: systems, parameters, loads and motions."""
 
 from collections.abc import Collection, Mapping, Sequence
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,7 @@ from gearchaos.models.linear.configuration import MachineConfiguration
 from gearchaos.models.linear.machine import Kinds, Machine
 from gearchaos.models.linear.outputs import FORCE, FORCES_PART, GAP, catalogue_of
 from gearchaos.models.protocol import Model, accelerations
+from gearchaos.outputs.scales import Quantity
 
 
 class MachineModel(Model):
@@ -19,10 +21,12 @@ class MachineModel(Model):
 
     load_parts = (FORCES_PART,)
     shared_inputs = "nothing but their start"
+    units: Mapping[Quantity, str] = MappingProxyType({})
+    angle = ""
 
     def __init__(self, config: MachineConfiguration) -> None:
         self._kinds = config.kinds_of_elements
-        self.catalogue = catalogue_of(self._kinds)
+        self.catalogue = catalogue_of(self._kinds, self.units, self.angle)
         self.signals = tuple(f"{GAP}{name}" for name in self._kinds.elements)
 
     def system(

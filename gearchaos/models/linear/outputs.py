@@ -1,5 +1,8 @@
 """Outputs of a machine, named after its coordinates and its clearance elements."""
 
+from collections.abc import Mapping
+from dataclasses import replace
+
 from gearchaos.models.linear.machine import Kinds
 from gearchaos.outputs import catalogue
 from gearchaos.outputs.entries import (
@@ -13,6 +16,7 @@ from gearchaos.outputs.entries import (
 )
 from gearchaos.outputs.listing import Catalogue
 from gearchaos.outputs.names import TIME
+from gearchaos.outputs.scales import Quantity
 
 FORCE, GAP = "force_", "gap_"
 """Beginnings of the names of forces and gaps; the name of an element follows."""
@@ -20,20 +24,20 @@ FORCE, GAP = "force_", "gap_"
 FORCES_PART = Part(
     "with loads, for each element",
     (
-        Output("force_largest_@", "largest force, @"),
-        Output("force_smallest_@", "smallest force, @"),
-        Output("force_mean_@", "mean force, @"),
-        Output("force_rms_@", "root mean square of the force, @"),
-        Output("gap_mean_@", "mean gap, @"),
-        Output("gap_peak_to_peak_@", "gap, peak to peak, @"),
-        Output("gap_rms_@", "root mean square of the gap about its mean, @"),
+        Output("force_largest_@", "largest force, @", scale=Quantity.FORCE),
+        Output("force_smallest_@", "smallest force, @", scale=Quantity.FORCE),
+        Output("force_mean_@", "mean force, @", scale=Quantity.FORCE),
+        Output("force_rms_@", "root mean square of the force, @", scale=Quantity.FORCE),
+        Output("gap_mean_@", "mean gap, @", scale=Quantity.LENGTH),
+        Output("gap_peak_to_peak_@", "gap, peak to peak, @", scale=Quantity.LENGTH),
+        Output("gap_rms_@", "root mean square of the gap about its mean, @", scale=Quantity.LENGTH),
     ),
     repeated_for=(Kind.ELEMENT,),
 )
 FORCES_IN_TIME_PART = Part(
     "in a response, for each element",
     (
-        Output(f"{FORCE}@", "force, @", "@", dims=(LANE_AXES, TIME)),
+        Output(f"{FORCE}@", "force, @", "@", dims=(LANE_AXES, TIME), scale=Quantity.FORCE),
         *catalogue.CONTACT_IN_TIME_PART.outputs,
     ),
     repeated_for=(Kind.ELEMENT,),
@@ -41,9 +45,13 @@ FORCES_IN_TIME_PART = Part(
 )
 
 
-def catalogue_of(kinds: Kinds) -> Catalogue:
-    """Return the outputs of machines with these coordinates and elements."""
-    motions = [motion_of(name, symbol_of(name), f"{{}} {name}") for name in kinds.coordinates]
+def catalogue_of(kinds: Kinds, units: Mapping[Quantity, str], angle: str = "") -> Catalogue:
+    """Return the outputs of machines with these coordinates and elements.
+
+    ``units``: of each quantity, none for pure numbers; ``angle``: end of the names of coordinates
+    that are angles.
+    """
+    motions = [_motion(name, bool(angle) and name.endswith(angle)) for name in kinds.coordinates]
     elements = tuple(
         Subject(name, name.replace("_", " "), rf"$F_{{\mathrm{{{_plain(name)}}}}}$")
         for name in kinds.elements
@@ -61,16 +69,30 @@ def catalogue_of(kinds: Kinds) -> Catalogue:
             Kind.ACCELERATION: tuple(motion[2] for motion in motions),
             Kind.ELEMENT: elements,
             Kind.SIGNAL: tuple(
-                Subject(f"{GAP}{one.name}", f"gap, {one.long_name}") for one in elements
+                Subject(f"{GAP}{one.name}", f"gap, {one.long_name}", scale=Quantity.LENGTH)
+                for one in elements
             ),
         },
+        units=units,
     )
 
 
+def _motion(name: str, is_angle: bool) -> tuple[Subject, Subject, Subject]:
+    """Return displacement, velocity and acceleration of a coordinate as subjects."""
+    subjects = motion_of(name, symbol_of(name), f"{{}} of {name.replace('_', ' ')}")
+    if not is_angle:
+        return subjects
+    scales = (Quantity.ANGLE, Quantity.ANGULAR_SPEED, Quantity.ANGULAR_ACCELERATION)
+    turned = [replace(one, scale=scale) for one, scale in zip(subjects, scales, strict=True)]
+    return turned[0], turned[1], turned[2]
+
+
 def symbol_of(name: str) -> str:
-    """Return the TeX symbol of a coordinate: its first letter, with the rest as an index."""
+    """Return the TeX symbol of a coordinate: a letter with an index, such as x_1, or the name."""
     first, rest = name[0], name[1:].strip("_")
-    return rf"{first}_{{\mathrm{{{_plain(rest)}}}}}" if rest else first
+    if rest.isdecimal() or name[1:2] == "_":
+        return rf"{first}_{{\mathrm{{{_plain(rest)}}}}}"
+    return name if not rest else rf"\mathrm{{{_plain(name)}}}"
 
 
 def _plain(text: str) -> str:

@@ -1,6 +1,6 @@
 """Rules that tie several keys of a machine together."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -8,7 +8,7 @@ import numpy as np
 from gearchaos.configuration.messages import Fault, suggestion
 from gearchaos.configuration.rules import Rules
 from gearchaos.models.linear.machine import without_drift
-from gearchaos.models.linear.tables import MATRICES, Fourier, Row, Shares
+from gearchaos.models.linear.tables import MATRICES, Row, Shares
 
 if TYPE_CHECKING:
     from gearchaos.models.linear.configuration import LinearConfiguration
@@ -57,8 +57,8 @@ def _the_machine_can_move_and_is_held(config: "LinearConfiguration") -> Iterator
         yield Fault("model.mass", rule, "give every coordinate a mass", config.model.mass)
         return
     for name, one in config.clearance.items():
-        mean = one.stiffness.mean if isinstance(one.stiffness, Fourier) else one.stiffness
-        if mean == 0.0:
+        mean = one.waves.mean
+        if mean <= 0.0:
             rule = "must be greater than 0, otherwise the element is no spring"
             yield Fault(f"clearance.{name}.stiffness", rule, "give it a stiffness", mean)
     loose = without_drift(machine, names)
@@ -80,6 +80,8 @@ def _known_states(table: str, name: str) -> Callable[["LinearConfiguration"], It
     """Return a rule that the states named by a key exist."""
 
     def check(config: "LinearConfiguration") -> Iterator[Fault]:
+        if not config.is_complete:
+            return
         states = config.states
         given = tuple(getattr(getattr(config, table), name))
         for unknown in dict.fromkeys(one for one in given if one not in states):
@@ -89,6 +91,15 @@ def _known_states(table: str, name: str) -> Callable[["LinearConfiguration"], It
     return check
 
 
-for _table, _keys in (("outputs", ("section", "states")), ("start", ("state", "box", "drawn"))):
-    for _key in _keys:
-        RULES.reads("model", _table)(_known_states(_table, _key))
+def add_rules_of_states(rules: Rules, tables: Sequence[str]) -> None:
+    """Add rules that the states that [outputs] and [start] name exist.
+
+    ``tables``: those on which the states depend.
+    """
+    named = (("outputs", ("section", "states")), ("start", ("state", "box", "drawn")))
+    for table, keys in named:
+        for key in keys:
+            rules.reads(*tables, table)(_known_states(table, key))
+
+
+add_rules_of_states(RULES, ["model"])

@@ -52,15 +52,21 @@ class Clearance(Table):
     reaction: Row | None = key(default=None)
     """factor of the force in the equation of each coordinate; by default those of the gap, as for
     any real spring"""
-    stiffness: float | Fourier = key("stiffness, a number or mean, cosine and sine", example=100.0)
+    stiffness: float | Fourier = key("stiffness", example=100.0)
     damping: float = key("damping coefficient", default=0.0, ge=0)
     damping_acts: Literal["always", "in_contact"] = key(default="always")
     """whether the damper acts all the time, or only while the element is in contact"""
-    half_clearance: float = key("distance from the middle to each flank", default=0.0, ge=0)
+    half_clearance: float = key("half clearance", default=0.0, ge=0)
     one_sided: bool = key(default=False)
     """whether the element pushes only where the gap exceeds half_clearance; it has no back flank"""
     motion: Fourier | None = key(default=None)
     """a prescribed motion that reduces the gap, such as a pitch error"""
+
+    @property
+    def waves(self) -> Fourier:
+        """The stiffness as a sum of waves."""
+        given = self.stiffness
+        return given if isinstance(given, Fourier) else Fourier(mean=given)
 
 
 class Force(Table):
@@ -72,7 +78,7 @@ class Force(Table):
     mean: float = key("constant part", default=0.0)
     amplitude: float = key("amplitude of the wave", default=0.0)
     order: int = key("order of the wave", default=1, ge=1, le=MOST_ORDER)
-    phase_deg: float = key("phase of the wave cos(order * phi + phase)", units="deg", default=0.0)
+    phase_deg: float = key("phase of the wave", units="deg", default=0.0)
     times_frequency_squared: bool = key(default=False)
     """whether the amplitude is multiplied by the square of the frequency, as that of an error of
     the gears or of an imbalance is"""
@@ -119,7 +125,7 @@ class MachineTable(Table):
     )
     damping: Matrix | Shares = key(default=Shares())
     """damping matrix in one of the same forms, or its shares of the mass and stiffness matrices"""
-    frequency: float = key("angular frequency of the excitation", default=1.0, gt=0)
+    frequency: float = key("frequency", default=1.0, gt=0)
 
 
 ClearanceTables: TypeAlias = Annotated[dict[Name, Clearance], NAMED]

@@ -1,0 +1,188 @@
+"""The configuration of a gear train or a planetary set."""
+
+import math
+from collections.abc import Iterator, Mapping
+from fractions import Fraction
+from functools import cached_property
+from types import MappingProxyType
+
+from gearchaos.configuration.keys import key
+from gearchaos.configuration.messages import Fault, suggestion
+from gearchaos.configuration.rules import GENERIC_RULES, Rules
+from gearchaos.configuration.tables import Parameter
+from gearchaos.models.linear.configuration import MachineConfiguration, parameters_in
+from gearchaos.models.linear.machine import Kinds, Machine, without_drift
+from gearchaos.models.linear.rules import add_rules_of_states
+from gearchaos.models.linear.values import with_numbers
+from gearchaos.models.train import planetary, shafts
+from gearchaos.models.train.assembly import Assembly
+from gearchaos.models.train.tables import (
+    Gears,
+    Meshes,
+    ModelTable,
+    Operation,
+    Planetary,
+    Scene,
+    Shafts,
+)
+from gearchaos.models.train.waves import MOST_ORDER
+
+RULES = Rules()
+
+PARTS = ("operation", "shaft", "gear", "mesh", "planetary")
+"""Tables that describe the train."""
+
+
+class TrainConfiguration(MachineConfiguration):
+    """A gear train of shafts, gears and meshes, or a planetary set."""
+
+    kind = "train"
+    rules = RULES
+
+    model: ModelTable = key("which model the file describes")
+    scene: Scene = key("which effects exist", default=Scene())
+    operation: Operation = key("how the train runs")
+    shaft: Shafts = key("the shafts by name", default={})
+    gear: Gears = key("the gears by name", default={})
+    mesh: Meshes = key("the meshes by name", default={})
+    planetary: Planetary | None = key("a planetary set", default=None)
+
+    @property
+    def parameters(self) -> Mapping[str, Parameter]:  # type: ignore[override]
+        """The numbers that a sweep can vary, by their dotted path."""
+        tables = {name: getattr(self, name) for name in PARTS}
+        return MappingProxyType(parameters_in(type(self), tables))
+
+    @property
+    def is_complete(self) -> bool:
+        """Whether the parts of the train are named and connected, so that its states follow."""
+        checks = (_there_is_one_train, _names_exist, _the_train_is_connected)
+        return not any(True for check in checks for _ in check(self))
+
+    @cached_property
+    def kinds_of_elements(self) -> Kinds:
+        """Names, orders and kinds that all lanes share."""
+        return self._assembled({}).kinds()
+
+    def machine(self, values: Mapping[str, float]) -> Machine:
+        """Return the machine with these values of the swept parameters."""
+        return self._assembled(values).machine(self._frequency(values))
+
+    def _frequency(self, values: Mapping[str, float]) -> float:
+        """Return the angular frequency of the excitation in rad/ms."""
+        speed = values.get("operation.speed_rpm", self.operation.speed_rpm)
+        if self.planetary is not None:
+            per_turn = float(planetary.mesh_rate(self.planetary))
+        else:
+            first = next(iter(self.mesh))
+            rate = shafts.first_mesh_rate(self.gear, self.mesh, self.speeds())
+            per_turn = float(rate / self.orders()[first])
+        return 2.0 * math.pi * per_turn * speed / 60.0 * 1e-3
+
+    def _assembled(self, values: Mapping[str, float]) -> Assembly:
+        """Return the parts of the train with these values of the swept parameters."""
+        tables = with_numbers({name: getattr(self, name) for name in PARTS}, values)
+        effects = self.scene.effects
+        if self.planetary is not None:
+            return planetary.assembled(tables["planetary"], effects)
+        return shafts.assembled(
+            tables["shaft"], tables["gear"], tables["mesh"], self.orders(), effects
+        )
+
+    def speeds(self) -> dict[str, Fraction]:
+        """Return the speed of each shaft relative to the driven one."""
+        driven = next((name for name, one in self.shaft.items() if one.uniform), "")
+        driven = driven or next(iter(self.shaft), "")
+        return shafts.speeds_of(self.shaft, self.gear, self.mesh, driven)
+
+    def orders(self) -> dict[str, int]:
+        """Return for each mesh its mesh periods within the common period."""
+        return shafts.mesh_orders(self.gear, self.mesh, self.speeds())
+
+
+@RULES.reads("shaft", "gear", "mesh", "planetary")
+def _there_is_one_train(config: TrainConfiguration) -> Iterator[Fault]:
+    """The file describes either shafts and meshes, or a planetary set."""
+    if config.planetary is None and not config.mesh:
+        rule = "is missing: the train has no mesh"
+        yield Fault("mesh", rule, "give [shaft.NAME], [gear.NAME] and [mesh.NAME], or [planetary]")
+    elif config.planetary is not None and (config.shaft or config.gear or config.mesh):
+        rule = "cannot be combined with [shaft], [gear] and [mesh]"
+        yield Fault("planetary", rule, "keep one of the two")
+
+
+@RULES.reads("shaft", "gear", "mesh")
+def _names_exist(config: TrainConfiguration) -> Iterator[Fault]:
+    """Gears name shafts, and meshes name gears; the meshes connect all shafts."""
+    for name, gear in config.gear.items():
+        if gear.shaft not in config.shaft:
+            remedy = suggestion(gear.shaft, config.shaft) or f"there are {', '.join(config.shaft)}"
+            yield Fault(f"gear.{name}.shaft", "is the name of no shaft", remedy, gear.shaft)
+    for name, mesh in config.mesh.items():
+        for one in mesh.gears:
+            if one not in config.gear:
+                remedy = suggestion(one, config.gear) or f"there are {', '.join(config.gear)}"
+                yield Fault(f"mesh.{name}.gears", f"names {one}, which is no gear", remedy)
+
+
+@RULES.reads("shaft", "gear", "mesh")
+def _the_train_is_connected(config: TrainConfiguration) -> Iterator[Fault]:
+    """Meshes connect all shafts, and their excitation has a period of reasonable length."""
+    if not config.mesh or any(True for _ in _names_exist(config)):
+        return
+    apart = config.shaft.keys() - config.speeds().keys()
+    if apart:
+        rule = f"no mesh connects {', '.join(sorted(apart))} with the other shafts"
+        yield Fault("mesh", rule, "add the mesh, or remove the shaft")
+        return
+    orders = config.orders()
+    highest = max(config.mesh[name].harmonics * order for name, order in orders.items())
+    if highest > MOST_ORDER:
+        periods = ", ".join(f"{order} of {name}" for name, order in orders.items())
+        rule = f"the meshes repeat together only after {periods} mesh periods"
+        remedy = f"choose numbers of teeth with common factors, or fewer harmonics; {highest} times"
+        yield Fault("mesh", rule, f"{remedy} the common frequency exceed {MOST_ORDER}")
+
+
+@RULES.reads("shaft", "gear", "mesh", "planetary", "scene")
+def _the_train_is_held(config: TrainConfiguration) -> Iterator[Fault]:
+    """Something keeps every part of the train in place."""
+    if not config.is_complete or any(True for _ in _planets_can_be_assembled(config)):
+        return
+    loose = without_drift(config.machine({}), config.kinds_of_elements.coordinates)
+    if loose:
+        rule = f"nothing holds {', '.join(loose)}, even with all teeth in contact"
+        remedy = "set uniform = true for the driven shaft"
+        where = "planetary" if config.planetary is not None else "shaft"
+        yield Fault(where, rule, remedy if where == "shaft" else "give rotation_N_per_um")
+
+
+@RULES.reads("planetary")
+def _planets_can_be_assembled(config: TrainConfiguration) -> Iterator[Fault]:
+    """Equally spaced planets fit between sun and ring, and the members have different tasks."""
+    given = config.planetary
+    if given is None:
+        return
+    both = given.sun_teeth + given.ring_teeth
+    if both % given.planets:
+        rule = f"{given.planets} equally spaced planets need sun_teeth + ring_teeth = {both} to be "
+        fitting = [n for n in range(2, 13) if both % n == 0]
+        remedy = f"choose {', '.join(map(str, fitting)) or 'other'} planets, or other teeth"
+        yield Fault("planetary.planets", rule + "a multiple of their number", remedy, given.planets)
+    tasks = (given.driven, given.fixed, given.loaded)
+    if len(set(tasks)) < len(tasks):
+        rule = "driven, fixed and loaded must be three different members"
+        yield Fault("planetary", rule, "give each of sun, ring and carrier one of them", tasks)
+
+
+@RULES.reads("shaft")
+def _bearings_need_a_mass(config: TrainConfiguration) -> Iterator[Fault]:
+    """A shaft that a bearing lets move has a mass."""
+    for name, shaft in config.shaft.items():
+        if shaft.bearing_N_per_um is not None and shaft.mass_kg is None:
+            rule = "is missing for a shaft with a bearing"
+            yield Fault(f"shaft.{name}.mass_kg", rule, "give the mass of the shaft with its gears")
+
+
+add_rules_of_states(RULES, PARTS)
+RULES.extend(GENERIC_RULES)

@@ -1,0 +1,63 @@
+"""Waves of the excitation: stiffness and error of a mesh over a common period."""
+
+import math
+from collections.abc import Iterable, Sequence
+from fractions import Fraction
+
+import numpy as np
+
+from gearchaos.arrays import Floats
+from gearchaos.models.train.tables import MeshStiffness
+
+MOST_ORDER = 400
+"""Highest order of a wave in the common period of all meshes."""
+
+
+def common_orders(frequencies: Sequence[Fraction]) -> tuple[int, ...]:
+    """Return the order of each frequency in their common period, as small as possible.
+
+    ``frequencies``: in any common unit, such as that of the first mesh.
+    """
+    denominator = math.lcm(*(one.denominator for one in frequencies))
+    whole = [int(one * denominator) for one in frequencies]
+    divisor = math.gcd(*whole)
+    return tuple(one // divisor for one in whole)
+
+
+def orders_of(meshes: Iterable[tuple[MeshStiffness, int]]) -> tuple[int, ...]:
+    """Return the orders of all waves of meshes with these orders, ascending."""
+    found = {1}
+    for mesh, order in meshes:
+        found |= {order * number for number in range(1, mesh.harmonics + 1)}
+    return tuple(sorted(found))
+
+
+def stiffness_waves(
+    mesh: MeshStiffness, order: int, orders: Sequence[int], *, varies: bool, phase: float = 0.0
+) -> Floats:
+    """Return the stiffness of a mesh as parts of the waves, in N/um.
+
+    The number of tooth pairs in contact is a sum of rectangles, one for each pair, as long as the
+    contact ratio. Its Fourier series is cut. ``phase``: share of a mesh period, beside its own.
+    """
+    waves = np.zeros(1 + 2 * len(orders))
+    waves[0] = mesh.stiffness_N_per_um
+    for number in range(1, mesh.harmonics + 1) if varies else ():
+        turns = math.pi * number * mesh.contact_ratio
+        size = 2.0 * mesh.stiffness_N_per_um * math.sin(turns) / turns
+        at = 1 + 2 * orders.index(order * number)
+        angle = 2.0 * math.pi * number * (phase + mesh.phase_turns)
+        waves[at : at + 2] = size * math.cos(angle), -size * math.sin(angle)
+    return waves
+
+
+def error_waves(
+    mesh: MeshStiffness, order: int, orders: Sequence[int], phase: float = 0.0
+) -> Floats:
+    """Return the transmission error of a mesh as parts of the waves, in um."""
+    waves = np.zeros(1 + 2 * len(orders))
+    at = 1 + 2 * orders.index(order)
+    angle = 2.0 * math.pi * (phase + mesh.phase_turns)
+    size = mesh.transmission_error_um
+    waves[at : at + 2] = size * math.sin(angle), size * math.cos(angle)
+    return waves

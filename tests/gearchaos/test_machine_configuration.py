@@ -1,0 +1,115 @@
+"""Machines from their matrices: what a file may say, and the message for what it may not."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import gearchaos
+
+from .commands import run_module
+
+TEXT = (Path(__file__).parents[2] / "sweeps" / "two_masses.toml").read_text()
+SHORT = {"outputs.section_points": 20, "integration.steps_per_period": 200}
+SHORT |= {"integration.transient_periods": 20, "integration.recorded_periods": 20}
+
+
+def read(text, folder=None):
+    return gearchaos.Configuration.from_toml(text, "my.toml", (), folder)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("mass = [1.0, 1.0]", "mass = [1.0, 0.0]", "model.mass = [1.0, 0.0]: is singular"),
+        ("mass = [1.0, 1.0]", "mass = [1.0]", "must have 2 rows and columns"),
+        ("[-1.0, 2.0]]", "[-1.0]]", "model.stiffness = [[1.0, -1.0], [-1.0]]: must have 2 rows"),
+        ("stiffness = 100.0\n", "", "clearance.stop.stiffness: is missing"),
+        ("stiffness = 100.0", "stiffness = 0.0", "must be greater than 0, otherwise"),
+        ("gap = { x1", "gap = { x3", "names x3, which is none of model.coordinates"),
+        ("on = { x2", "on = { y2", "force.drive.on"),
+        ("half_clearance = 1.0", "half_clearance = -1.0", "must be at least 0"),
+        ('parameter = "frequency"', 'parameter = "frequenzy"', "did you mean `frequency`?"),
+        ('["x1", "x2"]\ncontact', '["x1", "y2"]\ncontact', "the machine has no state `y2`"),
+        ('kind = "linear"', 'kind = "liner"', "is the name of no model"),
+        ("[clearance.stop]", "[[clearance]]", "entry 1 has no name"),
+        ("mass = [1.0, 1.0]", 'mass = "none.csv"', "check the path of the file with a matrix"),
+        ("one_sided = true", "onesided = true", "did you mean `one_sided`?"),
+        ('coordinates = ["x1", "x2"]', 'coordinates = ["x1", "x1"]', "is listed twice"),
+        ("[start]", '[scene]\neffects = ["backlash"]\n[start]', "leave it out"),
+        ("[-1.0, 2.0]]", "[-1.0, 1.0]]", None),
+    ],
+)
+def test_a_machine_that_cannot_be_is_refused_in_a_sentence(tmp_path, old, new, message):
+    assert TEXT.count(old) >= 1
+    if message is None:
+        # The stop alone holds the machine, which is enough.
+        read(TEXT.replace(old, new, 1))
+        return
+    with pytest.raises(gearchaos.ConfigurationError) as refused:
+        read(TEXT.replace(old, new, 1), str(tmp_path))
+    assert message in str(refused.value)
+    assert len(str(refused.value).splitlines()) == 1
+
+
+def test_a_machine_that_nothing_holds_is_refused():
+    free = TEXT.replace("[-1.0, 2.0]]", "[-1.0, 1.0]]").replace(
+        "{ x1 = 1.0 }", "{ x1 = 1.0, x2 = -1.0 }"
+    )
+    with pytest.raises(gearchaos.ConfigurationError, match="no spring holds x1, x2"):
+        read(free)
+
+
+def test_a_matrix_may_be_a_file_and_an_element_an_entry_of_a_list(tmp_path):
+    (tmp_path / "stiffness.csv").write_text("1.0,-1.0\n-1.0,2.0\n")
+    text = TEXT.replace("[[1.0, -1.0], [-1.0, 2.0]]", '"stiffness.csv"')
+    text = text.replace("[clearance.stop]", '[[clearance]]\nname = "stop"')
+    config, given = read(text, str(tmp_path)), read(TEXT)
+    assert config.model == given.model and config.clearance == given.clearance
+    # A result keeps the file, so that it can be read without it.
+    assert read(config.text).model == given.model
+
+
+def test_a_result_names_coordinates_and_elements(tmp_path):
+    (tmp_path / "machine.toml").write_text(TEXT)
+    short = [f"--set={path}={value}" for path, value in SHORT.items()]
+    options = ["--set=sweep.count=3", "--set=outputs.loads=true", "--quiet", *short]
+    ended = run_module("gearchaos.sweep", "machine.toml", *options, cwd=tmp_path)
+    assert ended.code == 0, ended.err
+    result = gearchaos.open_result(tmp_path / "machine.h5")
+    assert result.axes == ("frequency", "direction")
+    wanted = {"section_x1", "section_x2", "force_largest_stop", "gap_mean_stop"}
+    assert wanted | {"contact_state_stop"} <= {*result}
+    ended = run_module(
+        "gearchaos.response",
+        "machine.h5",
+        "--at=frequency=0.8",
+        "--at=direction=upwards",
+        "--periods=8",
+        "-o",
+        "r.h5",
+        cwd=tmp_path,
+    )
+    assert ended.code == 0, ended.err
+    motion = gearchaos.open_result(tmp_path / "r.h5")
+    assert {"x1", "x1_rate", "x1_acceleration", "force_stop", "contact_stop"} <= {*motion}
+    ended = run_module("gearchaos.plot", "r.h5", "-o", "r.png", cwd=tmp_path)
+    assert ended.code == 0, ended.err
+
+
+def test_any_number_of_a_machine_can_be_swept():
+    config = read(TEXT)
+    assert {"frequency", "clearance.stop.half_clearance", "force.drive.amplitude"} <= {
+        *config.parameters
+    }
+    for path, value in SHORT.items():
+        config = config.replace(path, value)
+    config = config.replace("start.carry", "none").replace("outputs.lyapunov", False)
+    stop = {"parameter": "clearance.stop.half_clearance", "values": [0.5, 1e9]}
+    drive = {"parameter": "force.drive.amplitude", "values": [0.05, 0.1]}
+    config = config.replace("sweep", stop).replace("second_sweep", drive)
+    result = gearchaos.run(config.replace("model.frequency", 0.5))
+    section = result["section_x1"]
+    assert section.shape[:2] == (2, 2)
+    # A stop that is never met leaves a linear machine, whose motion is proportional to the force.
+    np.testing.assert_allclose(section[1, 1], 2.0 * section[0, 1], rtol=1e-9)

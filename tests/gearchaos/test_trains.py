@@ -1,0 +1,121 @@
+"""Gear trains and planetary sets: natural frequencies, equilibrium, symmetry, and bad input."""
+
+import json
+from fractions import Fraction
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.linalg import eigh
+
+import gearchaos
+from gearchaos.models.train import planetary
+from gearchaos.models.train.waves import common_orders
+
+ROOT = Path(__file__).parents[2]
+EXACT = json.loads((ROOT / "tests" / "data" / "planetary.json").read_text())
+SHORT = {"outputs.section_points": 20}
+SHORT |= {"integration.transient_periods": 60, "integration.recorded_periods": 20}
+
+
+def configured(name, changes):
+    """Return an example with some keys changed."""
+    config = gearchaos.load_config(ROOT / "sweeps" / f"{name}.toml")
+    for path, value in changes.items():
+        config = config.replace(path, value)
+    return config
+
+
+@pytest.mark.parametrize("planets", [3, 5])
+def test_natural_frequencies_of_a_planetary_set(planets):
+    exact = EXACT[str(planets)]
+    given = configured("planetary", {}).planetary.model_copy(update={"planets": planets})
+    machine = planetary.assembled(given, ("translation",), free=True).machine(1.0)
+    squares = eigh(machine.held, machine.mass, eigvals_only=True)
+    # Angular frequencies are per ms.
+    found = np.sort(np.sqrt(np.abs(squares)) * 1e3 / (2.0 * np.pi))
+    expected = np.sort(
+        [*exact["rotational"], *(2 * exact["translational"]), *(2 * exact.get("planet", []))]
+    )
+    assert found == pytest.approx(expected, abs=0.3)
+
+
+def test_the_torque_is_shared_by_the_planets_at_rest():
+    config = configured("planetary", {"scene.effects": ["translation"], **SHORT})
+    config = config.replace("sweep", {"parameter": "operation.speed_rpm", "values": [3000.0]})
+    result = gearchaos.run(config)
+    given = config.planetary
+    share = 1e3 * given.torque_Nm / given.sun_base_radius_mm / given.planets
+    for gear in ("sun", "ring"):
+        for number in range(1, 4):
+            force = result[f"force_mean_{gear}_planet_{number}"]
+            assert force == pytest.approx(share, rel=1e-6)
+
+
+def test_a_symmetric_set_stays_symmetric():
+    # 27 and 99 teeth are multiples of 3, so that all planets mesh alike.
+    speeds = {"parameter": "operation.speed_rpm", "values": [1400.0, 2500.0, 3500.0]}
+    result = gearchaos.run(configured("planetary", {"sweep": speeds, **SHORT}))
+    state = dict(zip(result.variables["state"].flags, result["end_state"].T, strict=True))
+    for name in ("carrier_x", "ring_y", "sun_x"):
+        assert np.abs(state[name]).max() < 1e-8
+    for gear in ("sun", "ring"):
+        forces = [result[f"force_rms_{gear}_planet_{number}"] for number in (1, 2, 3)]
+        assert forces[1] == pytest.approx(forces[0], rel=1e-9)
+        assert forces[2] == pytest.approx(forces[0], rel=1e-9)
+
+
+def test_a_planetary_set_can_be_purely_torsional():
+    effects = ["stiffness_variation", "backlash", "transmission_error"]
+    config = configured("planetary", {"scene.effects": effects, **SHORT})
+    names = config.kinds_of_elements.coordinates
+    assert [name for name in names if name.endswith(("_x", "_y", "_radial"))] == []
+    assert len(names) == 8
+
+
+def test_mesh_frequency_follows_from_the_teeth():
+    given = configured("planetary", {}).planetary
+    # Ring fixed: f_m = n_s z_s z_r / (z_s + z_r).
+    assert planetary.mesh_rate(given) == pytest.approx(27 * 99 / 126)
+    held = given.model_copy(update={"fixed": "carrier", "loaded": "ring"})
+    assert planetary.mesh_rate(held) == pytest.approx(27)
+
+
+def test_meshes_of_different_frequency_repeat_after_their_common_period():
+    assert common_orders([Fraction(24), Fraction(12)]) == (2, 1)
+    assert common_orders([Fraction(24), Fraction(24 * 23, 48)]) == (48, 23)
+    config = configured("two_stage", {})
+    assert config.orders() == {"first": 2, "second": 1}
+    # 24 teeth at 3000 rpm are 1200 Hz; the common period is that of the second mesh.
+    frequency = config.machine({}).frequency
+    assert frequency == pytest.approx(2.0 * np.pi * 0.6)
+
+
+def test_a_train_at_rest_carries_its_load():
+    changes = {"scene.effects": ["translation"], "start.carry": "none", **SHORT}
+    speeds = {"parameter": "operation.speed_rpm", "values": [2000.0]}
+    result = gearchaos.run(configured("two_stage", {"sweep": speeds, **changes}))
+    assert result["force_mean_second"] == pytest.approx(900e3 / 101.5, rel=1e-6)
+    assert result["force_mean_first"] == pytest.approx(900e3 / 101.5 * 33.8 / 67.7, rel=1e-6)
+    assert result.variables["force_mean_first"].units == "N"
+    assert result.variables["section_output_angle"].units == "mrad"
+
+
+@pytest.mark.parametrize(
+    ("name", "path", "value", "message"),
+    [
+        ("planetary", "planetary.planets", 4, "choose 2, 3, 6, 7, 9 planets, or other teeth"),
+        ("planetary", "planetary.fixed", "sun", "three different members"),
+        ("two_stage", "gear.wheel_2.shaft", "outptu", "did you mean `output`"),
+        ("two_stage", "mesh.second", None, "no mesh connects output with the other shafts"),
+        ("two_stage", "mesh.first.gears", ["pinion_1", "wheel"], "names wheel, which is no gear"),
+        ("two_stage", "gear.wheel_1.teeth", 4801, "the meshes repeat together only after"),
+        ("two_stage", "mesh.first.half_backlash_um", -1.0, "must be at least 0"),
+        ("two_stage", "shaft.input.uniform", False, "nothing holds input_angle"),
+        ("two_stage", "shaft.middle.mass_kg", None, "is missing for a shaft with a bearing"),
+        ("two_stage", "outputs.section", ["output"], "the machine has no state `output`"),
+    ],
+)
+def test_a_train_that_cannot_be_is_refused_in_a_sentence(name, path, value, message):
+    with pytest.raises(gearchaos.ConfigurationError, match=message):
+        configured(name, {path: value})
