@@ -80,11 +80,9 @@ def split_part(memory, slot, at, first, last, tables, scene):
         gaps = gaps_at(state, lane, begin, scene)
         moment = Moment(number + done, at.recorded)
         leave(memory, slot, element, gaps[element], branches, lane, moment, scene)
-        if scene.jumps is not None:
-            if scene.tangent is not None:
-                following = read_branches(memory, slot, scene)
-                tangent = jumped(tangent, element, gaps, branches, following, lane, scene)
-        branches = read_branches(memory, slot, scene)
+        following = read_branches(memory, slot, scene)
+        tangent = jumped(tangent, element, gaps, branches, following, lane, scene)
+        branches = following
 
         left = until - done
         middle = forcing_within(memory, slot, lane, tables, number, done + 0.5 * left, scene)
