@@ -93,8 +93,8 @@ def jumped(tangent, element, gaps, before, after, lane, scene):
 
     The force of a damper that acts in contact only jumps there, from f- to f+. The neighbouring
     motion crosses earlier or later, so the tangent vector z becomes z + (f+ - f-) (n z) / (n f-),
-    where n f- is the rate of the gap (Leine and Nijmeijer 2004, chapter 7). Without jumps or without
-    a tangent vector, this changes nothing.
+    where n f- is the rate of the gap (Leine and Nijmeijer 2004, chapter 7). Without jumps, or
+    without a tangent vector, this changes nothing.
     """
     if scene.jumps is None:
         return tangent

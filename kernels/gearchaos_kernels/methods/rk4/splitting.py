@@ -79,10 +79,8 @@ def split_part(memory, slot, at, first, last, tables, scene):
         crossings += 1
         gaps = gaps_at(state, lane, begin, scene)
         moment = Moment(number + done, at.recorded)
-        leave(memory, slot, element, gaps[element], branches, lane, moment, scene)
-        following = read_branches(memory, slot, scene)
-        tangent = jumped(tangent, element, gaps, branches, following, lane, scene)
-        branches = following
+        tangent = pass_crossing(memory, slot, element, gaps, tangent, branches, moment, scene)
+        branches = read_branches(memory, slot, scene)
 
         left = until - done
         middle = forcing_within(memory, slot, lane, tables, number, done + 0.5 * left, scene)
@@ -96,6 +94,15 @@ def split_part(memory, slot, at, first, last, tables, scene):
         write_branches(memory, slot, branches_at(gaps_after, lane, scene), scene)
     if fraction <= 1.0:
         memory[(rows(scene).crossings + 2) * STRIDE + slot] += 1.0
+
+
+@scalar
+def pass_crossing(memory, slot, element, gaps, tangent, branches, moment, scene):
+    """Put a lane on the branch after a crossing; return its tangent vector there."""
+    lane = read_lane(memory, slot, scene)
+    leave(memory, slot, element, gaps[element], branches, lane, moment, scene)
+    following = read_branches(memory, slot, scene)
+    return jumped(tangent, element, gaps, branches, following, lane, scene)
 
 
 @scalar
