@@ -25,6 +25,8 @@ class Method:
         Whether every crossing is resolved, whatever ``integration.crossings`` is.
     shares_maps : bool
         Whether maps are computed in advance; they take memory, and lanes share them.
+    most_elements : int or None
+        Largest number of clearance elements of a machine of any number of coordinates; None: any.
     """
 
     name: str
@@ -33,6 +35,7 @@ class Method:
     exact: bool = False
     always_resolved: bool = False
     shares_maps: bool = False
+    most_elements: int | None = None
 
 
 FLOW_MAP_STEPS = 12
@@ -52,6 +55,7 @@ METHODS = {
             exact=True,
             always_resolved=True,
             shares_maps=True,
+            most_elements=4,
         ),
         Method(AUTO, "whichever of the others is estimated to be faster"),
     )

@@ -17,8 +17,8 @@ from gearchaos.models.registry import model_of, system_of
 from gearchaos.outputs.names import DIRECTION, HARMONIC, REALISATION, START, axis_name
 from gearchaos.outputs.variable import Variable, coordinate
 
-_DRAWS_PER_LANE = 12
-"""Random numbers reserved per lane, a multiple of `_PHILOX_WIDTH`."""
+_FEWEST_DRAWS = 12
+"""Fewest random numbers that are reserved per lane, a multiple of `_PHILOX_WIDTH`."""
 
 _PHILOX_WIDTH = 4
 """Random numbers per Philox counter."""
@@ -219,7 +219,8 @@ def start_states(config: Configuration, system: LaneSystem, numbers: Integers) -
         box = dict.fromkeys(config.states, (-spread, spread))
     if box:
         runs = np.split(numbers, np.flatnonzero(np.diff(numbers) != 1) + 1)
-        draws = np.concatenate([_draws(config.start.seed, run) for run in runs])
+        count = len(config.states)
+        draws = np.concatenate([_draws(config.start.seed, run, count) for run in runs])
         for name, (low, high) in box.items():
             place = draws[:, config.states.index(name)]
             values[name] = (low + high) / 2.0 + (high - low) / 2.0 * place
@@ -228,9 +229,10 @@ def start_states(config: Configuration, system: LaneSystem, numbers: Integers) -
     return np.stack(columns, axis=1).astype(np.float64)
 
 
-def _draws(seed: int, run: Integers) -> Floats:
-    """Draw the random numbers of consecutive lanes, shape (lanes, draws)."""
+def _draws(seed: int, run: Integers, count: int) -> Floats:
+    """Draw random numbers for consecutive lanes, at least ``count`` for each."""
+    counters = -(-max(count, _FEWEST_DRAWS) // _PHILOX_WIDTH)
     generator = np.random.Philox(seed)
-    generator.advance(int(run[0]) * (_DRAWS_PER_LANE // _PHILOX_WIDTH))
-    shape = run.size, _DRAWS_PER_LANE
+    generator.advance(int(run[0]) * counters)
+    shape = run.size, counters * _PHILOX_WIDTH
     return np.random.Generator(generator).uniform(-1.0, 1.0, shape)

@@ -5,9 +5,11 @@ import re
 import numpy as np
 import pytest
 
+from gearchaos.engine.lanes import Lanes
 from gearchaos.errors import ConfigurationError
+from gearchaos.models import load_config
 
-from .short_sweeps import RANDOM, simulation, starts_of
+from .short_sweeps import PAN2021, RANDOM, simulation, starts_of
 
 
 def test_lanes_start_at_rest_unless_told_otherwise():
@@ -121,3 +123,14 @@ def test_random_starts_fill_a_box_and_leave_other_states_as_given():
         low, high = inside.get(name, (0.3, 0.3) if name == "delta_1" else (0.0, 0.0))
         assert low <= column.min() <= low + 0.01 * (high - low)
         assert high - 0.01 * (high - low) <= column.max() <= high
+
+
+def test_random_starts_fill_the_states_of_a_large_machine_whatever_the_block():
+    options = ["start={kind='random', count=3, spread=0.1, seed=4}", "sweep.count=5"]
+    config = load_config(PAN2021.with_name("planetary.toml"), options)
+    lanes = Lanes(config)
+    together = lanes.start_of(np.arange(15))
+    assert together.shape == (15, 34)
+    assert np.unique(together).size == 15 * 34 and (np.abs(together) <= 0.1).all()
+    for number in (0, 7, 14):
+        assert np.array_equal(lanes.start_of(np.array([number]))[0], together[number])

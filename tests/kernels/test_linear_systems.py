@@ -115,3 +115,32 @@ def test_the_state_in_contact_is_at_rest():
     for machine, state in zip(still, lanes_of(still).contact_state(), strict=True):
         z = np.concatenate([state[::2], state[1::2]])
         assert machine.change(0.0, z, [1, 1]) == pytest.approx(0.0, abs=1e-12)
+
+
+def test_flow_maps_are_exact_where_elements_of_every_kind_cross(exact):
+    machines, start, section, growth, crossings = exact
+    plan = Plan(60, 0, PERIODS, PERIODS, tangent=True, contact=True, method="flow_map")
+    found = integrate(lanes_of(machines), start, plan)
+    assert found.crossings.tolist() == crossings.tolist()
+    assert found.section == pytest.approx(section, abs=1e-11)
+    assert found.growth == pytest.approx(growth, abs=1e-11)
+
+
+def test_lanes_of_flow_maps_do_not_depend_on_their_neighbours(exact):
+    machines, start, _, _, _ = exact
+    plan = Plan(60, 0, PERIODS, PERIODS, tangent=True, method="flow_map")
+    # The same maps for many lanes, which move eight at a time, and for one.
+    system = lanes_of(machines[:1] * 9)
+    starts = start[0] * np.linspace(0.5, 1.0, 9)[:, np.newaxis]
+    together = integrate(system, starts, plan)
+    for lane in (0, 4, 8):
+        alone = integrate(system.of([lane]), starts[lane : lane + 1], plan)
+        assert np.array_equal(alone.section[0], together.section[lane])
+        assert np.array_equal(alone.growth[0], together.growth[lane])
+
+
+def test_flow_maps_refuse_more_elements_than_they_have_maps_for():
+    system = lanes_of([random_machine(1, 6, 5)])
+    plan = Plan(60, 0, 1, 1, method="flow_map")
+    with pytest.raises(ValueError, match="5 clearance elements would need maps for 32 sets"):
+        integrate(system, np.zeros((1, 12)), plan)

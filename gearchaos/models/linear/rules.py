@@ -6,12 +6,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from gearchaos.configuration.messages import Fault, suggestion
+from gearchaos.configuration.methods import METHODS
 from gearchaos.configuration.rules import Rules
 from gearchaos.models.linear.machine import without_drift
 from gearchaos.models.linear.tables import MATRICES, Row, Shares
 
 if TYPE_CHECKING:
-    from gearchaos.models.linear.configuration import LinearConfiguration
+    from gearchaos.models.linear.configuration import LinearConfiguration, MachineConfiguration
 
 RULES = Rules()
 
@@ -91,15 +92,31 @@ def _known_states(table: str, name: str) -> Callable[["LinearConfiguration"], It
     return check
 
 
-def add_rules_of_states(rules: Rules, tables: Sequence[str]) -> None:
-    """Add rules that the states that [outputs] and [start] name exist.
+def _maps_of_all_branches_fit(config: "MachineConfiguration") -> Iterator[Fault]:
+    """Flow maps have as few elements as they can make maps for."""
+    method = config.integration.method
+    most = METHODS[method].most_elements
+    if most is None or not config.is_complete:
+        return
+    count = len(config.kinds_of_elements.elements)
+    if count > most:
+        rule = (
+            f"takes up to {most} clearance elements, because it needs maps for every set of "
+            f"contact branches; this machine has {count} elements, and {2**count} sets"
+        )
+        yield Fault("integration.method", rule, 'set it to "rk4"', method)
 
-    ``tables``: those on which the states depend.
+
+def add_rules_of_machines(rules: Rules, tables: Sequence[str]) -> None:
+    """Add rules on the states that [outputs] and [start] name, and on the number of elements.
+
+    ``tables``: those on which states and elements depend.
     """
+    rules.reads(*tables, "integration")(_maps_of_all_branches_fit)
     named = (("outputs", ("section", "states")), ("start", ("state", "box", "drawn")))
     for table, keys in named:
         for key in keys:
             rules.reads(*tables, table)(_known_states(table, key))
 
 
-add_rules_of_states(RULES, ["model"])
+add_rules_of_machines(RULES, ["model"])

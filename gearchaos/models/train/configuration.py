@@ -12,7 +12,7 @@ from gearchaos.configuration.rules import GENERIC_RULES, Rules
 from gearchaos.configuration.tables import Parameter
 from gearchaos.models.linear.configuration import MachineConfiguration, parameters_in
 from gearchaos.models.linear.machine import Kinds, Machine, without_drift
-from gearchaos.models.linear.rules import add_rules_of_states
+from gearchaos.models.linear.rules import add_rules_of_machines
 from gearchaos.models.linear.values import with_numbers
 from gearchaos.models.train import planetary, shafts
 from gearchaos.models.train.assembly import Assembly
@@ -71,13 +71,14 @@ class TrainConfiguration(MachineConfiguration):
     def _frequency(self, values: Mapping[str, float]) -> float:
         """Return the angular frequency of the excitation in rad/ms."""
         speed = values.get("operation.speed_rpm", self.operation.speed_rpm)
+        order = 1 if self.planetary is not None else self.orders()[next(iter(self.mesh))]
+        return 2.0 * math.pi * float(self.mesh_rate() / order) * speed / 60.0 * 1e-3
+
+    def mesh_rate(self) -> Fraction:
+        """Return the mesh periods of the first mesh in a turn of the driven member."""
         if self.planetary is not None:
-            per_turn = float(planetary.mesh_rate(self.planetary))
-        else:
-            first = next(iter(self.mesh))
-            rate = shafts.first_mesh_rate(self.gear, self.mesh, self.speeds())
-            per_turn = float(rate / self.orders()[first])
-        return 2.0 * math.pi * per_turn * speed / 60.0 * 1e-3
+            return planetary.mesh_rate(self.planetary)
+        return shafts.first_mesh_rate(self.gear, self.mesh, self.speeds())
 
     def _assembled(self, values: Mapping[str, float]) -> Assembly:
         """Return the parts of the train with these values of the swept parameters."""
@@ -184,5 +185,5 @@ def _bearings_need_a_mass(config: TrainConfiguration) -> Iterator[Fault]:
             yield Fault(f"shaft.{name}.mass_kg", rule, "give the mass of the shaft with its gears")
 
 
-add_rules_of_states(RULES, PARTS)
+add_rules_of_machines(RULES, PARTS)
 RULES.extend(GENERIC_RULES)

@@ -207,11 +207,20 @@ class Model:
         names = named(flags) if named else self.lane._fields
         return [self.lane._fields.index(name) for name in names]
 
-    def stiffness(self, coefficients: Floats) -> Floats:
-        """Return mean and variation of the stiffness of every lane, shape (lanes, 2)."""
-        stiffness = np.zeros((len(coefficients), 2))
+    def stiffness(self, flags: Any, coefficients: Floats) -> Floats:
+        """Return the parts of the stiffness of every element, shape (lanes, elements, parts).
+
+        The parts are those of the constant 1, of the shared variation, and of the waves. In a model
+        whose elements share their stiffness, only the first two are not 0.
+        """
+        if self.maps and self.maps.stiffness_parts is not None:
+            parts: Floats = self.maps.stiffness_parts(flags, coefficients)
+            return parts
+        waves = len(self.maps.waves) if self.maps else 0
+        stiffness = np.zeros((len(coefficients), self.elements(flags), 2 + waves))
         for number, name in enumerate(self.maps.stiffness if self.maps else ()):
-            stiffness[:, number] = coefficients[:, self.lane._fields.index(name)]
+            column = coefficients[:, self.lane._fields.index(name)]
+            stiffness[:, :, number] = column[:, np.newaxis]
         return stiffness
 
 
@@ -238,6 +247,9 @@ class MapFormulas:
     stiffness : tuple of str, optional
         Names of the coefficients that are mean and variation of the stiffness that all elements
         share; only ``stiffness``, which is constant, by default.
+    stiffness_parts : callable, optional
+        ``stiffness_parts(flags, coefficients)``: see `Model.stiffness`, for a model whose elements
+        have stiffnesses of their own.
     point_of_waves(waves, scene)
         The mesh phase at which the waves have these values, by default a `MeshPhase`.
     unit_forcing(lane, drive, waves, scene)
@@ -260,6 +272,7 @@ class MapFormulas:
     )
     gap_coefficients: Callable[[Any], tuple[str, ...]] | None = None
     stiffness: tuple[str, ...] = ("stiffness",)
+    stiffness_parts: Callable[[Any, Floats], Floats] | None = None
     point_of_waves: Any = mesh_phase.point_of_waves
     unit_forcing: Any = defaults.drive_with_waves
     mobility_forces: Any = defaults.equal_shares

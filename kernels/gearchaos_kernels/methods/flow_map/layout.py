@@ -56,9 +56,10 @@ class Layout(NamedTuple):
         Length of a column of the state, padded to fill vector registers.
     elements, branches : int
         Number of elements, and of sets of branches that differ in which elements are engaged.
-    gap, switch : int
-        Where the gaps and the switch terms of all elements begin within the maps of a set of
-        branches; the map of the state comes first.
+    gap, switch, damper : int
+        Where the gaps, the switch terms of springs, and those of dampers that act in contact only
+        begin within the maps of a set of branches; the map of the state comes first. Without such
+        dampers, ``damper`` equals ``size``.
     size, step_size : int
         Size of the maps of one set of branches, and of all numbers of a step.
     waves, bounds, bound_size, header : int
@@ -78,6 +79,7 @@ class Layout(NamedTuple):
     branches: int
     gap: int
     switch: int
+    damper: int
     size: int
     step_size: int
     waves: int
@@ -108,7 +110,8 @@ def layout_of(scene: Scene) -> Layout:
     width = _padded(states)
     gap = columns * width
     switch = gap + elements * columns * TERMS
-    size = switch + elements * TERMS * width
+    damper = switch + elements * TERMS * width
+    size = damper + (elements * TERMS * width if scene.jumps else 0)
     branches = 2**elements if scene.resolved else 1
     bounds = -(-2 * waves // _VECTOR) * _VECTOR
     bound_size = -(-columns // _VECTOR) * _VECTOR
@@ -124,6 +127,7 @@ def layout_of(scene: Scene) -> Layout:
         branches=branches,
         gap=gap,
         switch=switch,
+        damper=damper,
         size=size,
         step_size=header + branches * size,
         waves=waves,
@@ -202,7 +206,7 @@ class Aside(NamedTuple):
         The `LastCrossing`.
     sums, tangent_sums : int
         Integrals that transfer state and tangent vector to the next branch; see
-        `vectors.sum_along`.
+        `vectors.sum_along`. Those of springs come first, then those of dampers.
     total : int
         Number of rows.
     """
@@ -232,6 +236,7 @@ def aside_of(scene: Scene) -> Aside:
     gap_rows = -(-(moment + 6) // _VECTOR) * _VECTOR
     after = gaps + elements * gap_rows
     sums = after + len(LastCrossing._fields)
+    count = 2 * TERMS if scene.jumps else TERMS
     return Aside(
         gaps=gaps,
         gap_rows=gap_rows,
@@ -246,8 +251,8 @@ def aside_of(scene: Scene) -> Aside:
         edge=after + 2,
         element=after + 3,
         sums=sums,
-        tangent_sums=sums + TERMS,
-        total=sums + 2 * TERMS,
+        tangent_sums=sums + count,
+        total=sums + 2 * count,
     )
 
 

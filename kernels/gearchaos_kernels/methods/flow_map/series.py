@@ -10,6 +10,7 @@ from numpy.polynomial import chebyshev
 
 from gearchaos_kernels.compilation import driver, evaluator, part, scalar
 from gearchaos_kernels.contact.elements import Push
+from gearchaos_kernels.contact.kinds import kinds
 from gearchaos_kernels.memory.block_memory import (
     aligned_memory,
     fill_lane,
@@ -69,12 +70,15 @@ _ENDS = np.stack([(-1.0) ** np.arange(ORDER + 1), np.ones(ORDER + 1)])
 
 
 @evaluator
-def differentiate(coefficients, matrices, scene):
+def differentiate(coefficients, matrices, dampers, scene):
     """Apply the formulas of a model to unit vectors, lane by lane, and write the matrices.
 
     ``matrices`` has the shape (lanes, states + elements, states + 1 + waves + elements). Its rows
     are the rates of the states, without the springs of the elements, and the gaps. Its columns are
     the states, the drive, the waves, and a unit force of each element times its relative stiffness.
+    ``dampers`` (lanes, elements, states + 1 + waves + 1) receives the forces of those dampers that
+    act in contact only, which are not in the rates, as multiples of the last columns; its own last
+    column is their force at unit rate.
     """
     memory = aligned_memory(rows(scene).total)
     place = layout(scene)
@@ -92,80 +96,117 @@ def differentiate(coefficients, matrices, scene):
             gaps = gaps_at(state, lane, acting, scene)
             elements, shares = elements_at(lane, acting, scene), mobility_forces(lane, scene)
             units = numbers_of_elements(unit, forced, scene)
-            pushes = each(unit_push, gaps, elements, shares, units)
+            pushes = each(unit_push, gaps, elements, kinds(scene), shares, units)
             change = accelerations(state, pushes, acting, lane, scene)
             write_state(memory, STATE, 0, State(state.rate, change), scene)
             for line in range(states):
                 matrix[line, column] = memory[(STATE + line) * STRIDE]
             for element in range(place.elements):
                 matrix[states + element, column] = gaps[element].value
+                if kinds(scene)[element].damped_in_contact:
+                    damping = elements[element].damping / shares[element]
+                    dampers[number, element, forced] = damping
+                    if column < forced:
+                        dampers[number, element, column] = damping * gaps[element].closing
 
 
 @scalar
-def unit_push(gap, element, share, unit):
-    """Return the push of the damper of an element, plus a force times its relative stiffness."""
+def unit_push(gap, element, kind, share, unit):
+    """Return a force times the relative stiffness, plus that of a damper that always acts."""
+    if kind.damped_in_contact:
+        return Push(share * unit, 0.0, 0.0)
     return Push(element.damping * gap.closing + share * unit, 0.0, element.damping)
 
 
 @driver
-def make_maps(matrices, stiffness, inputs, forcing, tables, tails, place):
+def make_maps(matrices, elements_on, inputs, forcing, tables, tails, place):
     """Compute the maps of lanes and their truncation errors; all scenes share the compiled code.
 
     ``tables`` (lanes, steps, size of a step) and ``tails`` (lanes,) are written. ``matrices``: see
-    `differentiate`; ``stiffness`` (lanes, 2): mean and variation; ``inputs``: see `MapFormulas`;
-    ``forcing`` (1 + waves, `ORDER`, steps): Taylor coefficients of the stiffness variation and of
-    the waves about the middle of every step; ``place``: the `Layout`.
+    `differentiate`; ``elements_on``: its ``dampers``, and the stiffness of the elements as
+    `Model.stiffness` returns it; ``inputs``: see `MapFormulas`; ``forcing`` (1 + waves, `ORDER`,
+    steps): Taylor coefficients of the stiffness variation and of the waves about the middle of
+    every step; ``place``: the `Layout`.
     """
+    dampers, stiffness = elements_on
     for number in prange(tables.shape[0]):
         # The index of a parallel loop has another type; without the cast, two versions of
         # `fill_maps` are compiled.
         lane = np.int64(number)
-        tails[lane] = fill_maps(
-            matrices[lane], stiffness[lane], inputs, forcing, tables[lane], place
-        )
+        of_lane = dampers[lane], stiffness[lane]
+        tails[lane] = fill_maps(matrices[lane], of_lane, inputs, forcing, tables[lane], place)
 
 
 @part
-def fill_maps(matrix, stiffness, inputs, forcing, table, place):
+def fill_maps(matrix, elements_on, inputs, forcing, table, place):
     """Write the maps of a lane, shape (steps, size of a step); return the truncation error."""
+    dampers, stiffness = elements_on
     tail = 0.0
-    for first in range(0, table.shape[0], TOGETHER):
-        some = table[first : first + TOGETHER]
-        near = forcing[:, :, first : first + TOGETHER]
-        width = place.branches * some.shape[0]
-        engaged = np.empty((place.elements, width))
-        acting = np.empty((forcing.shape[0], ORDER, width))
-        for at in range(width):
-            number, step = divmod(at, some.shape[0])
-            for element in range(place.elements):
-                engaged[element, at] = 1.0 - (number >> element) % 2
-            for term in range(ORDER):
-                acting[0, term, at] = stiffness[1] * near[0, term, step]
-                for wave in range(1, forcing.shape[0]):
-                    acting[wave, term, at] = near[wave, term, step]
-            acting[0, 0, at] += stiffness[0]
-        tail = np.maximum(tail, fill_steps(matrix, engaged, inputs, acting, some, place))
-        if not tail < TAIL:
-            break
+    for number in range(place.branches):
+        engaged = 1.0 - (number >> np.arange(place.elements)) % 2
+        damped = with_dampers(matrix, engaged, dampers)
+        for first in range(0, table.shape[0], TOGETHER):
+            some = table[first : first + TOGETHER]
+            near = forcing[:, :, first : first + TOGETHER].copy()
+            springs = spring_series(stiffness, near)
+            on_branches = engaged, springs, dampers[:, -1]
+            begin = place.header + number * place.size
+            lost = fill_steps(damped, on_branches, inputs, near, (some, begin), place)
+            tail = np.maximum(tail, lost)
+            if not tail < TAIL:
+                return tail
     return tail
 
 
 @part
-def fill_steps(matrix, engaged, inputs, forcing, table, place):
-    """Write the maps of some steps on all sets of branches; return the truncation error.
+def with_dampers(matrix, engaged, dampers):
+    """Return a matrix of `differentiate` with the dampers of the engaged elements."""
+    damped = matrix.copy()
+    forced = dampers.shape[1] - 1
+    for element in range(engaged.size):
+        for line in range(matrix.shape[0] - engaged.size):
+            for column in range(forced):
+                force = engaged[element] * dampers[element, column]
+                damped[line, column] += matrix[line, forced + element] * force
+    return damped
 
-    The last axis of every array runs over these steps, one set of branches after the other. Arrays
-    are written in loops, because for a slice Numba also compiles a check of the shapes.
+
+@part
+def spring_series(stiffness, forcing):
+    """Return the series of the stiffness of every element, shape (elements, ORDER, steps)."""
+    springs = np.zeros((stiffness.shape[0], forcing.shape[1], forcing.shape[2]))
+    for element in range(stiffness.shape[0]):
+        for wave in range(forcing.shape[0]):
+            part = stiffness[element, 1 + wave]
+            if part != 0.0:
+                for term in range(forcing.shape[1]):
+                    for at in range(forcing.shape[2]):
+                        springs[element, term, at] += part * forcing[wave, term, at]
+        for at in range(forcing.shape[2]):
+            springs[element, 0, at] += stiffness[element, 0]
+    return springs
+
+
+@part
+def fill_steps(matrix, on_branches, inputs, forcing, target, place):
+    """Write the maps of some steps on one set of branches; return the truncation error.
+
+    ``on_branches``: for each element whether it is engaged, the series of its stiffness, and its
+    damping if that acts in contact only. ``target``: the table of the steps, and where the maps
+    begin in each of them. The last axis of every array runs over these steps. Arrays are written in
+    loops, because for a slice Numba also compiles a check of the shapes.
     """
     states, columns, elements = place.states, place.columns, place.elements
-    width = engaged.shape[1]
+    engaged, springs, damping = on_branches
+    width = springs.shape[2]
     functions = 1 + place.waves
     rates = matrix[:states, : states + functions].copy()
     gaps = matrix[states:, : states + functions].copy()
     mobility = matrix[:states, states + functions :].copy()
-    psi, gap = motion_series((rates, mobility, gaps), engaged, inputs, forcing, place)
+    acting = engaged, springs
+    psi, gap = motion_series((rates, mobility, gaps), acting, inputs, forcing, place)
     backward = np.ascontiguousarray(rates[:, :states].T), gaps.T.copy(), mobility.T.copy()
-    inverse, switch = inverse_series(backward, engaged, forcing[0], place)
+    inverse, moved, switch = inverse_series(backward, acting, place)
 
     # Values at both ends of the step, s = -1 and 1.
     ends = combined(_ENDS, psi).reshape((2, states + functions, columns, width))
@@ -178,12 +219,17 @@ def fill_steps(matrix, engaged, inputs, forcing, table, place):
     traced = multiplied(traced.reshape((TERMS * elements, states, width)), first)
     for left in (lost, largest(psi[ORDER, :states]), largest(inverse[ORDER])):
         tail = np.maximum(tail, left)
-    write_maps(end, along, traced, table, place)
+    write_maps(end, along, traced, target, place)
+    if place.damper < place.size:
+        kept, lost = economised(moved)
+        kept = multiplied(kept.reshape((TERMS * elements, states, width)), first)
+        write_dampers(kept, damping, target, place)
+        tail = np.maximum(tail, lost)
     return tail
 
 
 @part
-def motion_series(matrices, engaged, inputs, forcing, place):
+def motion_series(matrices, acting, inputs, forcing, place):
     """Return the series of the motion and of the gaps about the middle of some steps, by column.
 
     Shapes: (ORDER + 1, states + functions, columns * width), where drive and waves follow the
@@ -191,7 +237,7 @@ def motion_series(matrices, engaged, inputs, forcing, place):
     """
     states, columns, elements = place.states, place.columns, place.elements
     functions = 1 + place.waves
-    width = engaged.shape[1]
+    width = forcing.shape[2]
     psi = np.zeros((ORDER + 1, states + functions, columns * width))
     gap = np.zeros((ORDER, elements, columns * width))
     force = np.zeros((ORDER, elements, columns * width))
@@ -213,7 +259,7 @@ def motion_series(matrices, engaged, inputs, forcing, place):
     # An offset reduces the deflection, but is no part of the gap: it is added for `solve` alone.
     for element in range(elements):
         gap[0, element, (states + 1 + element) * width : (states + 2 + element) * width] = -1.0
-    solve(0.5, matrices, forcing[0], engaged, psi, gap, force)
+    solve(0.5, matrices, acting, psi, gap, force)
     for element in range(elements):
         for at in range((states + 1 + element) * width, (states + 2 + element) * width):
             gap[0, element, at] += 1.0
@@ -221,19 +267,20 @@ def motion_series(matrices, engaged, inputs, forcing, place):
 
 
 @part
-def inverse_series(matrices, engaged, stiffness, place):
-    """Return the series of the inverse flow, transposed, and of its product with K and mobilities.
+def inverse_series(matrices, acting, place):
+    """Return the series of the inverse flow, transposed, of its product with the mobilities, and K.
 
-    Shapes: (ORDER + 1, states, states * width) and (ORDER, elements, states * width).
+    The third one is the second one times K. Shapes: (ORDER + 1, states, states * width), and twice
+    (ORDER, elements, states * width).
     """
-    states, width = place.states, engaged.shape[1]
+    states, width = place.states, acting[1].shape[2]
     inverse = np.zeros((ORDER + 1, states, states * width))
     moved = np.zeros((ORDER, place.elements, states * width))
     switch = np.zeros((ORDER, place.elements, states * width))
     for line in range(states):
         inverse[0, line, line * width : (line + 1) * width] = 1.0
-    solve(-0.5, matrices, stiffness, engaged, inverse, moved, switch)
-    return inverse, switch
+    solve(-0.5, matrices, acting, inverse, moved, switch)
+    return inverse, moved, switch
 
 
 @part
@@ -262,13 +309,13 @@ def at_beginning(begin, back, place):
 
 
 @part
-def write_maps(end, along, traced, table, place):
+def write_maps(end, along, traced, target, place):
     """Write maps, gaps and switches of some steps into a table, and how much the gaps bend."""
     states, columns, elements = place.states, place.columns, place.elements
+    table, begin = target
     for at in range(end.shape[2]):
-        number, step = divmod(at, table.shape[0])
-        row = table[step]
-        piece = row[place.header + number * place.size :]
+        row = table[at]
+        piece = row[begin:]
         for column in range(columns):
             for line in range(states):
                 piece[column * place.width + line] = end[line, column, at]
@@ -288,14 +335,28 @@ def write_maps(end, along, traced, table, place):
 
 
 @part
-def solve(scale, matrices, stiffness, engaged, terms, seen, pulled):
+def write_dampers(kept, damping, target, place):
+    """Write what transfers the force of dampers that act in contact only."""
+    table, begin = target
+    for at in range(kept.shape[2]):
+        piece = table[at, begin + place.damper :]
+        for element in range(place.elements):
+            for term in range(TERMS):
+                for line in range(place.states):
+                    value = damping[element] * kept[term * place.elements + element, line, at]
+                    piece[(element * TERMS + term) * place.width + line] = value
+
+
+@part
+def solve(scale, matrices, acting, terms, seen, pulled):
     """Solve terms' = scale (rates + outer K engaged inner) terms for the terms of a series.
 
     ``seen`` and ``pulled`` receive inner terms, and K inner terms.
     """
     rates, outer, inner = matrices
-    width = engaged.shape[1]
-    acting = np.zeros(seen.shape[1:])
+    engaged, stiffness = acting
+    width = stiffness.shape[2]
+    forces = np.zeros(seen.shape[1:])
     for k in range(ORDER):
         add_product(1.0, inner, terms[k], seen[k])
         for element in range(seen.shape[1]):
@@ -303,11 +364,11 @@ def solve(scale, matrices, stiffness, engaged, terms, seen, pulled):
                 part = pulled[k, element, begin : begin + width]
                 for j in range(k + 1):
                     for at in range(width):
-                        part[at] += stiffness[k - j, at] * seen[j, element, begin + at]
+                        part[at] += stiffness[element, k - j, at] * seen[j, element, begin + at]
                 for at in range(width):
-                    acting[element, begin + at] = engaged[element, at] * part[at]
+                    forces[element, begin + at] = engaged[element] * part[at]
         add_product(scale / (k + 1), rates, terms[k], terms[k + 1])
-        add_product(scale / (k + 1), outer, acting, terms[k + 1])
+        add_product(scale / (k + 1), outer, forces, terms[k + 1])
 
 
 @part

@@ -191,10 +191,11 @@ def _make(system: Any, steps: int, scene: Scene) -> list[Floats]:
         tables[:, :, place.waves : 2 * place.waves] = edges[1:]
         width = place.states + 1 + place.waves + place.elements
         matrices = np.zeros((left.size, place.states + place.elements, width))
-        differentiate(coefficients, matrices, scene)
-        stiffness = model.stiffness(coefficients)
+        dampers = np.zeros((left.size, place.elements, width - place.elements + 1))
+        differentiate(coefficients, matrices, dampers, scene)
+        elements_on = dampers, model.stiffness(scene.model, coefficients)
         forcing = system.wave_series(count, ORDER)
-        make_maps(matrices, stiffness, inputs, forcing, tables, tails, place)
+        make_maps(matrices, elements_on, inputs, forcing, tables, tails, place)
         for number in np.flatnonzero(tails < TAIL):
             made[left[number]] = tables[number].copy()
         left = left[~(tails < TAIL) & np.isfinite(coefficients).all(axis=1)]

@@ -5,11 +5,12 @@ Maps and switch terms are applied to eight lanes at once, with the same map for 
 columns (`_combination`).
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import Any
 
 from llvmlite import ir
 from numba import types
+from numba.core.cgutils import for_range
 from numba.extending import intrinsic
 
 from gearchaos_kernels.compilation import FASTMATH, first_element
@@ -19,6 +20,9 @@ from gearchaos_kernels.scene import Scene, provider_of
 
 _DOUBLE, _INTEGER, _INDEX = ir.DoubleType(), ir.IntType(types.intp.bitwidth), ir.IntType(32)
 _FLAGS = tuple(sorted(FASTMATH))
+
+_MOST_UNROLLED = 4
+"""Largest number of sets of branches whose code is written once for each of them."""
 
 
 def _inputs(scene: Scene) -> list[int]:
@@ -74,6 +78,21 @@ class _Writer:
         given = self.load(vector, row * STRIDE)
         return self.builder.fcmp_ordered("==", given, self.constant(number))
 
+    def on_branches(self, number: Any, engaged: Sequence[Any]) -> Any:
+        """Return the mask of those of eight lanes that are on a set of branches.
+
+        ``number``: the bits of the set, 0 for an engaged element; ``engaged``: for each element
+        whether it is engaged, 1 or 0.
+        """
+        mask = None
+        for element, there in enumerate(engaged):
+            bit = self.builder.and_(number, _INTEGER(1 << element))
+            apart = self.builder.icmp_unsigned("!=", bit, _INTEGER(0))
+            expected = self.builder.select(apart, self.constant(0.0), self.constant(1.0))
+            those = self.builder.fcmp_ordered("==", there, expected)
+            mask = those if mask is None else self.builder.and_(mask, those)
+        return mask
+
     def spread(self, pointer: Any, at: int, width: int = VECTOR) -> Any:
         """Load a number and return a vector whose components all equal it."""
         return self.splat(self.builder.load(self.builder.gep(pointer, [_INTEGER(at)])), width)
@@ -113,6 +132,21 @@ class _Writer:
         for number, factor in factors:
             parts[number % 2] = self.multiply_add(factor, terms[number], parts[number % 2])
         return self.builder.fadd(*parts, flags=_FLAGS)
+
+    def slopes(
+        self, terms: list[Any], powers: dict[int, Any], integrals: list[Any], deviates: bool
+    ) -> Iterator[Any]:
+        """Yield the integrals of the slope of a polynomial times s^k, one for each of its terms.
+
+        ``deviates``: whether the value of the polynomial at the end, times s^k, is subtracted.
+        """
+        scaled = [(j, self.constant(float(j))) for j in range(1, TERMS)]
+        slope = [self.builder.fmul(terms[j], factor, flags=_FLAGS) for j, factor in scaled]
+        value = self.sum(enumerate(terms), [powers[j] for j in range(TERMS)])
+        end = self.builder.fneg(value)
+        for k in range(TERMS):
+            total = self.sum(enumerate(slope), integrals[k:])
+            yield self.multiply_add(end, powers[k], total) if deviates else total
 
 
 @intrinsic
@@ -162,20 +196,25 @@ def _on_branches(scene: Scene, apply: Any) -> Any:
     def generate(context, builder, signature, arguments):
         w = _Writer(context, builder, signature, arguments)
         vector = w.element(0, arguments[1])
-        for number in range(place.branches):
-            at = builder.add(arguments[3], _INTEGER(place.header + number * place.size))
-            branch_maps = w.element(2, at)
-            if place.branches == 1:
-                apply(w, vector, branch_maps, None)
-                break
-            mask = None
-            for element in range(place.elements):
-                engaged = 1.0 - (number >> element) % 2
-                those = w.equal(vector, first + BRANCH * element, engaged)
-                mask = those if mask is None else builder.and_(mask, those)
+        maps = builder.add(arguments[3], _INTEGER(place.header))
+        if place.branches == 1:
+            apply(w, vector, w.element(2, maps), None)
+            return context.get_dummy_value()
+
+        def apply_on(number):
+            engaged = [w.load(vector, (first + BRANCH * n) * STRIDE) for n in range(place.elements)]
+            mask = w.on_branches(number, engaged)
             bits = builder.bitcast(mask, ir.IntType(VECTOR))
             with builder.if_then(builder.icmp_unsigned("!=", bits, bits.type(0))):
-                apply(w, vector, branch_maps, mask)
+                at = builder.add(maps, builder.mul(number, _INTEGER(place.size)))
+                apply(w, vector, w.element(2, at), mask)
+
+        if place.branches <= _MOST_UNROLLED:
+            for number in range(place.branches):
+                apply_on(_INTEGER(number))
+        else:
+            with for_range(builder, _INTEGER(place.branches)) as loop:
+                apply_on(loop.index)
         return context.get_dummy_value()
 
     return generate
@@ -238,23 +277,28 @@ def add_switch(_typing, aside, slot, maps, maps_at, scene):
     """Transfer eight lanes to their new branches, at the beginning of the step.
 
     State and tangent vector change by the integral of the switch terms of the new branch times the
-    gap, from -1 to the moment of crossing: sum_k p_k times the integrals of `sum_along`.
+    gap, from -1 to the moment of crossing: sum_k p_k times the integrals of `sum_along`. Dampers
+    that act in contact only have terms and integrals of their own.
     """
     place, at, block = layout_of(scene.scene), aside_of(scene.scene), rows_of(scene.scene)
 
     def apply(w, vector, branch_maps, mask):
-        given = {block.state_before: w.rows(vector, range(at.sums, at.sums + TERMS))}
+        parts = [place.switch, place.damper] if place.damper < place.size else [place.switch]
+        count = TERMS * len(parts)
+        given = {block.state_before: w.rows(vector, range(at.sums, at.sums + count))}
         if scene.scene.tangent is not None:
-            sums = range(at.tangent_sums, at.tangent_sums + TERMS)
+            sums = range(at.tangent_sums, at.tangent_sums + count)
             given[block.tangent_before] = w.rows(vector, sums)
         for element in range(place.elements):
             those = mask
             if place.elements > 1:
                 those = w.builder.and_(mask, w.equal(vector, at.element, float(element)))
-            first = place.switch + element * TERMS * place.width
+            starts = [
+                part + (element * TERMS + k) * place.width for part in parts for k in range(TERMS)
+            ]
             for line in range(place.states):
                 factors = [
-                    (k, w.spread(branch_maps, first + k * place.width + line)) for k in range(TERMS)
+                    (k, w.spread(branch_maps, start + line)) for k, start in enumerate(starts)
                 ]
                 for target, sums in given.items():
                     before = w.load(vector, (target + line) * STRIDE)
@@ -269,7 +313,10 @@ def add_switch(_typing, aside, slot, maps, maps_at, scene):
 def sum_along(_typing, aside, scene):
     """Store the integrals of gap times s^k from -1 to the moment of crossing, for eight lanes.
 
-    For every k this is the sum over the terms j of the gap times the integral of s^(j + k).
+    For every k this is the sum over the terms j of the gap times the integral of s^(j + k). For
+    dampers that act in contact only it is the same with the rate of the gap, which is twice its
+    slope. Their force jumps at the crossing, whose moment varies along a tangent vector z by
+    -n z / slope: this subtracts 2 n z s^k at the crossing.
     """
     place, at = layout_of(scene.scene), aside_of(scene.scene)
 
@@ -277,7 +324,7 @@ def sum_along(_typing, aside, scene):
         w = _Writer(context, builder, signature, arguments)
         vector = w.element(0, _INTEGER(0))
         after, factor, edge = w.rows(vector, (at.after, at.factor, at.edge))
-        powers, integrals = {1: after}, []
+        powers, integrals = {0: w.constant(1.0), 1: after}, []
         for n in range(1, 2 * TERMS):
             if n > 1:
                 powers[n] = builder.fmul(powers[n // 2], powers[n - n // 2])
@@ -298,6 +345,11 @@ def sum_along(_typing, aside, scene):
             for k in range(TERMS):
                 value = w.sum(enumerate(terms), integrals[k:])
                 w.put(builder.fmul(value, factor, flags=_FLAGS), vector, target + k, None)
+            if place.damper < place.size:
+                twice = builder.fmul(factor, w.constant(2.0), flags=_FLAGS)
+                for k, value in enumerate(w.slopes(terms, powers, integrals, source != 0)):
+                    rate = builder.fmul(value, twice, flags=_FLAGS)
+                    w.put(rate, vector, target + TERMS + k, None)
         return context.get_dummy_value()
 
     return types.void(aside, scene), generate

@@ -5,16 +5,19 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Any, NamedTuple
 
+import numpy as np
 from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic
+from numpy.typing import NDArray
 
 from gearchaos_kernels.compilation import scalar
 from gearchaos_kernels.memory.tuples import each
 from gearchaos_kernels.models.linear.structure import Structure, numbered, places_of
 from gearchaos_kernels.models.linear.sums import Terms, sums
 from gearchaos_kernels.models.mesh_phase import nearest_row, turned
-from gearchaos_kernels.models.protocol import Element, Gap, Kind, Model
+from gearchaos_kernels.models.protocol import Element, Gap, Kind, MapFormulas, Model
+from gearchaos_kernels.plan import Floats
 from gearchaos_kernels.scene import implement
 
 
@@ -332,6 +335,55 @@ def _value_of(gap):
     return gap.value
 
 
+@scalar
+def unit_forcing(lane, drive, waves, scene):
+    """Return what acts on a lane by a share of its steady forces and by these values of waves."""
+    return Forcing(
+        _forces(lane, scene, drive, waves),
+        _stiffnesses(lane, scene, 1.0, _no_waves(scene)),
+        _motions(lane, scene, 0.0, waves),
+        _motion_rates(lane, scene, 0.0, waves),
+    )
+
+
+@scalar
+def point_of_waves(waves, scene):
+    """Return the waves themselves."""
+    return waves
+
+
+@scalar
+def inputs_of(lane, scene):
+    """Return the inputs: the maps of a lane already contain its forces and waves."""
+    return 1.0, 1.0
+
+
+@scalar
+def mean_gaps(lane, scene):
+    """Return the constant part of the excitation of each gap."""
+    return _motions(lane, scene, 1.0, _no_waves(scene))
+
+
+def _inputs(flags: Linear) -> NDArray[Any]:
+    """Return the inputs of the maps: the steady forces, and all waves."""
+    functions = 1 + flags.structure.waves
+    inputs = np.zeros((2, functions, functions))
+    inputs[0, 0, 0] = 1.0
+    for wave in range(1, functions):
+        inputs[1, wave, wave] = 1.0
+    return inputs
+
+
+def _stiffness_parts(flags: Linear, coefficients: Floats) -> Floats:
+    """Return the stiffness of every element as parts of the waves; see `Model.stiffness`."""
+    structure = flags.structure
+    parts = np.zeros((len(coefficients), structure.elements, 2 + structure.waves))
+    for coefficient, element, wave in numbered(structure, "stiffness"):
+        # No variation is shared.
+        parts[:, element, wave + 1 if wave else 0] = coefficients[:, coefficient]
+    return parts
+
+
 def _kinds(flags: Linear) -> tuple[Kind, ...]:
     """Return the kind of each element."""
     of = flags.structure
@@ -359,6 +411,15 @@ def model_of(flags: Linear) -> Model:
         gaps_at=gaps_at,
         accelerations=accelerations,
         observed_at=observed_at,
+        maps=MapFormulas(
+            waves=tuple(f"wave_{number}" for number in range(structure.waves)),
+            inputs=_inputs,
+            stiffness_parts=_stiffness_parts,
+            point_of_waves=point_of_waves,
+            unit_forcing=unit_forcing,
+            inputs_of=inputs_of,
+            mean_gaps=mean_gaps,
+        ),
     )
 
 

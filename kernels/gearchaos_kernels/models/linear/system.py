@@ -1,9 +1,8 @@
 """A batch of piecewise-linear systems: their matrices, and what the engine derives from them."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
-from typing import ClassVar
+from typing import Self
 
 import numpy as np
 
@@ -12,6 +11,9 @@ from gearchaos_kernels.models.linear.model import Linear
 from gearchaos_kernels.models.linear.structure import MATRICES, Structure, entries_of
 from gearchaos_kernels.models.mesh_phase import half_step_angles, harmonic_series
 from gearchaos_kernels.plan import Floats
+
+MOST_MAPPED = 4
+"""Largest number of clearance elements of a system that flow maps integrate."""
 
 
 @dataclass(frozen=True)
@@ -72,8 +74,6 @@ class LinearSystems(LaneSystem):
     one_sided: tuple[bool, ...] = ()
     damped_in_contact: tuple[bool, ...] = ()
     names: tuple[str, ...] = ()
-
-    unit_inputs: ClassVar[Mapping[str, float]] = {}
 
     @property
     def mesh_period(self) -> Floats:
@@ -181,6 +181,31 @@ class LinearSystems(LaneSystem):
         turns = np.outer(angles, self.orders)
         waves = np.stack([np.cos(turns), np.sin(turns)], axis=2)
         return np.ascontiguousarray(waves.reshape(len(angles), 2 * len(self.orders)))
+
+    def refuses_maps(self) -> str:
+        """Return why flow maps cannot integrate the systems, or an empty text."""
+        elements = self.gap.shape[1]
+        if elements > MOST_MAPPED:
+            return (
+                f"a system with {elements} clearance elements would need maps for {2**elements} "
+                f"sets of contact branches; flow maps take up to {MOST_MAPPED} elements"
+            )
+        return ""
+
+    def of_unit_inputs(self) -> Self:
+        """Return the systems without clearance, on which flow maps do not depend."""
+        return replace(self, half_clearance=np.zeros_like(self.half_clearance))
+
+    def map_parameters(self) -> Floats:
+        """Return all numbers on which the flow maps of a lane depend, shape (lanes, numbers)."""
+        names = [name for name in self._parameters() if name != "half_clearance"]
+        return np.concatenate(
+            [getattr(self, name).reshape(self.lanes, -1) for name in names], axis=1
+        )
+
+    def map_constants(self) -> tuple[object, ...]:
+        """Return what else the flow maps depend on, the same for all lanes."""
+        return self.orders
 
     def wave_series(self, steps: int, terms: int) -> Floats:
         """Return Taylor coefficients of a stiffness variation, which is 0, and of the waves."""
