@@ -22,7 +22,12 @@ from gearchaos.arguments import (
 )
 from gearchaos.arguments import state as checked_state
 from gearchaos.arrays import Floats
-from gearchaos.dynamics.exponents import Exponents, exponents, sum_of_exponents
+from gearchaos.dynamics.exponents import (
+    Exponents,
+    contact_shares,
+    exponents,
+    sum_of_exponents,
+)
 from gearchaos.dynamics.following import Branch, Followed, Orbit, follow
 from gearchaos.dynamics.orbits import Orbits, polish
 from gearchaos.dynamics.plans import plan_of
@@ -337,12 +342,29 @@ class System:
         found = exponents(self._record, self._start(start), self._plan)
         return Exponents(*(values[0] for values in found))
 
-    def sum_of_exponents(self) -> float:
+    def sum_of_exponents(self, start: Floats | None = None) -> float:
         """Return the exact sum of all Lyapunov exponents per unit of tau.
 
-        The sum follows from the damping alone.
+        The sum follows from the damping alone, and from the shares of contact in the configured
+        record where a damper acts in contact only.
+
+        Parameters
+        ----------
+        start : array, shape (states,), optional
+            Dimensionless state at mesh phase 0, from which that record is computed; by default
+            `state`.
+
+        Returns
+        -------
+        float
+            The sum.
         """
-        return float(sum_of_exponents(self._record)[0])
+        shares = None
+        if any(self._record.damped_in_contact):
+            plan = self._plan._replace(contact=True)
+            outcome = kernels.integrate(self._record, self._start(start), plan)
+            shares = contact_shares(outcome, plan)
+        return float(sum_of_exponents(self._record, shares)[0])
 
     def spectrum(self, state: str = "delta_5", periods: int = 64) -> SpectralLines:
         """Return the amplitude spectrum of a state after the configured transient.

@@ -8,7 +8,7 @@ of tangent vectors are Euclidean in the dimensionless states.
 from typing import NamedTuple, Self
 
 import numpy as np
-from gearchaos_kernels import LaneSystem, Plan, integrate, jacobian
+from gearchaos_kernels import LaneSystem, Outcome, Plan, integrate, jacobian
 
 from gearchaos.arrays import Floats
 from gearchaos.dynamics.modes import memory
@@ -102,31 +102,55 @@ def _stretches(system: LaneSystem, start: Floats, plan: Plan) -> Floats:
     return logarithms
 
 
-def sum_of_exponents(system: LaneSystem) -> Floats:
+def sum_of_exponents(system: LaneSystem, contact: Floats | None = None) -> Floats:
     """Return the sum of all Lyapunov exponents of every lane.
 
     Parameters
     ----------
     system : LaneSystem
         The system of the lanes.
+    contact : array, shape (lanes, elements), optional
+        The share of the time in which each element is in contact. Only dampers that act in contact
+        only need it.
 
     Returns
     -------
     array, shape (lanes,)
-        Sum per unit of tau.
+        Sum per unit of tau; NaN if it depends on shares of contact that are not given.
 
     Notes
     -----
-    The sum is the trace of the Jacobian. Damping is constant and also acts out of contact, so that
-    the trace depends neither on contact nor on stiffness or excitation. For the full scene of eq.
-    13 of Pan, Li, Wang 2021 it is::
+    The sum is the mean trace of the Jacobian. A damper that always acts has a constant share in it,
+    which depends neither on contact nor on stiffness or excitation. For the full scene of eq. 13 of
+    Pan, Li, Wang 2021 the trace is::
 
         -2 xi [cos(beta_b) (1 + m_e/m_p + m_e/m_g) + sin(beta_b) (m_e/m_p + m_e/m_g)]
         -2 (eta_11 + eta_21 + eta_12 + eta_22)
+
+    A damper that acts in contact only has its share in proportion to the time of contact. The jump
+    of its force adds nothing: the saltation matrix changes rates in proportion to displacements, so
+    that its determinant is 1.
     """
-    apart = np.zeros((system.lanes, system.elements))
-    trace: Floats = np.trace(jacobian(system, apart), axis1=1, axis2=2)
-    return trace
+    touching = np.ones((system.lanes, system.elements))
+    trace: Floats = np.trace(jacobian(system, touching), axis1=1, axis2=2)
+    total = trace.copy()
+    for element in np.flatnonzero(system.damped_in_contact):
+        apart = touching.copy()
+        apart[:, element] = 0.0
+        lost = np.trace(jacobian(system, apart), axis1=1, axis2=2) - trace
+        total += lost * (1.0 - (np.nan if contact is None else contact[:, element]))
+    return total
+
+
+def contact_shares(outcome: Outcome, plan: Plan) -> Floats | None:
+    """Return the share of the record in which each element is in contact, (lanes, elements).
+
+    None if the record does not tell it.
+    """
+    if not (plan.contact and outcome.contact.shape[1]):
+        return None
+    shares: Floats = (outcome.contact[..., 0] + outcome.contact[..., 2]) / plan.recorded_periods
+    return shares
 
 
 def period_jacobian(system: LaneSystem, start: Floats, plan: Plan) -> Floats:

@@ -94,7 +94,7 @@ def _label_record(
 ) -> label.Labels:
     """Return the labels from one record, with the last ``most_points`` section points."""
     section, diverged = outcome.section[:, -most_points:], outcome.status != Status.OK
-    record = label.Record(section, outcome.growth, diverged, _admits_tori(system))
+    record = label.Record(section, outcome.growth, diverged, admits_tori(system))
     labels = label.label(record)
     if not system.clearance:
         _label_linear(system, plan, labels)
@@ -134,15 +134,16 @@ def _measure_return(labels: label.Labels, section: Floats, lanes: Integers) -> N
     labels.return_distance[lanes] = distances[np.arange(lanes.size), labels.period[lanes] - 1]
 
 
-def _admits_tori(system: LaneSystem) -> Mask:
+def admits_tori(system: LaneSystem) -> Mask:
     """Whether quasi-periodic motion can exist, (lanes,).
 
     With two states and damping, the period map contracts every area by the same factor. The area
-    enclosed by an invariant closed curve would stay the same, so that there is no such curve.
+    enclosed by an invariant closed curve would stay the same, so that there is no such curve. Nor
+    is there one if a damper acts in contact only: some areas shrink, and none grows.
     """
     if len(system.states) > 2:
         return np.ones(system.lanes, dtype=np.bool_)
-    return sum_of_exponents(system) >= 0.0
+    return sum_of_exponents(system, np.ones((system.lanes, system.elements))) >= 0.0
 
 
 def _settle(

@@ -7,7 +7,7 @@ import gearchaos_kernels as kernels
 import numpy as np
 
 from gearchaos.arrays import Array, Floats, Integers
-from gearchaos.dynamics.exponents import exponents, sum_of_exponents
+from gearchaos.dynamics.exponents import contact_shares, exponents, sum_of_exponents
 from gearchaos.dynamics.labelling import Labelled, labels_of
 from gearchaos.dynamics.largest_exponents import RECORD_MEANINGS, largest_exponents
 from gearchaos.engine import error_check
@@ -105,7 +105,7 @@ def arrays_of(
             spectrum = spectrum.given(largest.of_orbit)
         arrays["lyapunov_exponents"] = spectrum.values
         arrays["lyapunov_exponents_standard_error"] = spectrum.standard_errors
-        arrays["lyapunov_sum"] = sum_of_exponents(system)
+        arrays["lyapunov_sum"] = sum_of_exponents(system, contact_shares(outcome, plan))
     if run.config.integration.error_check > 0.0:
         arrays |= _check(run, lanes, start, outcome, labelled)
     return arrays

@@ -5,10 +5,18 @@ import pytest
 from gearchaos_kernels import Effects, Groups, Plan, integrate, jacobian
 from gearchaos_kernels.methods.rk4.stability import amplification
 
-from gearchaos.dynamics.exponents import exponents, period_jacobian, sum_of_exponents
+from gearchaos.dynamics.exponents import (
+    contact_shares,
+    exponents,
+    period_jacobian,
+    sum_of_exponents,
+)
+from gearchaos.dynamics.labelling import admits_tori
 from gearchaos.dynamics.largest_exponents import largest_exponents
 from gearchaos.records.lyapunov import largest_exponent
 
+from ..kernels.piecewise import lanes_of as machines_of
+from ..kernels.piecewise import random_machine
 from ..kernels.reference import (
     FULL,
     LINEAR,
@@ -247,3 +255,28 @@ def test_two_standard_errors_cover_the_exponent_of_a_weakly_damped_pair():
     _, blind = largest_exponent(outcome.growth, system.mesh_period)
     assert np.mean(np.abs(found.values - mean) <= 2.0 * blind) < 0.9
     assert np.median(found.standard_errors / blind) < 2.2
+
+
+@pytest.mark.parametrize(("method", "steps"), [("rk4", 3200), ("flow_map", 60)])
+def test_dampers_that_act_in_contact_only_add_to_the_sum_in_proportion_to_the_contact(
+    method, steps
+):
+    system = machines_of([random_machine(seed, 3, 2) for seed in range(6)])
+    assert any(system.damped_in_contact) and np.isnan(sum_of_exponents(system)).all()
+    start = 0.5 * np.random.default_rng(3).normal(size=(6, 6))
+    record = Plan(steps, 0, 4, 4, contact=True, method=method)
+    outcome = integrate(system, start, record)
+    shares = contact_shares(outcome, record)
+    assert ((shares > 0.1) & (shares < 0.9)).any(axis=0).all() and outcome.crossings.sum() > 20
+    points = [start, *np.moveaxis(outcome.section, 1, 0)[:-1]]
+    once = record._replace(recorded_periods=1, section_points=1, contact=False)
+    volumes = [np.linalg.slogdet(period_jacobian(system, point, once))[1] for point in points]
+    wanted = np.sum(volumes, axis=0) / (4 * system.mesh_period)
+    assert sum_of_exponents(system, shares) == pytest.approx(wanted, abs=1e-9)
+
+
+def test_a_pair_of_two_states_with_a_damper_in_contact_only_has_no_torus():
+    pairs = system_of(pan2021([0.5, 5.86]), TORSION_ONLY).replace(damped_in_contact_only=True)
+    assert not admits_tori(pairs).any()
+    undamped = pairs.replace(groups=pairs.groups._replace(damping_ratio=np.zeros(2)))
+    assert admits_tori(undamped).all()

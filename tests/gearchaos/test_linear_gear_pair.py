@@ -57,20 +57,26 @@ def as_machine(pairs):
         damping=shares * lane.mesh_damping[:, np.newaxis],
         half_clearance=np.tile(lane.half_backlash[:, np.newaxis], 2),
         orders=tuple(orders),
+        damped_in_contact=(pairs.damped_in_contact_only,) * 2,
     )
 
 
-def test_a_gear_pair_as_a_machine_moves_as_the_gear_pair():
+@pytest.mark.parametrize("method", ["rk4", "flow_map"])
+@pytest.mark.parametrize("in_contact", [False, True])
+def test_a_gear_pair_as_a_machine_moves_as_the_gear_pair(method, in_contact):
     config = gearchaos.load_config(SWEEPS / "pan2021_full.toml")
     effects = ("pitch_error", "stiffness_variation", "backlash", "transverse", "axial")
     pairs = system_of(config, {"pitch_error": VALUES}, effects)
+    pairs = pairs.replace(damped_in_contact_only=in_contact)
     scales = pairs.scales(np.ones(VALUES.size))
     start = np.random.default_rng(1).uniform(-0.3, 0.3, scales.shape)
-    plan = Plan(200, 0, 20, 20, tangent=True, contact=True)
+    plan = Plan(200, 0, 20, 20, tangent=True, contact=True, method=method)
     expected, found = (
         integrate(system, state, plan)
         for system, state in ((pairs, start), (as_machine(pairs), start / scales))
     )
     assert (found.crossings == expected.crossings).all() and found.crossings.min() > 5
-    assert found.section * scales[:, np.newaxis] == pytest.approx(expected.section, abs=1e-10)
+    # The last lane is chaotic: it amplifies rounding, more so with less damping.
+    error = np.abs(found.section * scales[:, np.newaxis] - expected.section).max(axis=(1, 2))
+    assert error[:-1].max() < 1e-12 and error[-1] < (1e-8 if in_contact else 1e-10)
     assert found.contact[:, :, :4] == pytest.approx(expected.contact[:, :, :4], abs=1e-8)

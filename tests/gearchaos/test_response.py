@@ -124,6 +124,19 @@ def test_a_carried_sweep_keeps_the_motion_of_every_lane(result):
     assert np.isfinite(carried["delta_5"][1]).all()
 
 
+@pytest.mark.parametrize("method", ["rk4", "flow_map"])
+def test_teeth_that_are_apart_carry_a_force_only_if_the_damper_always_acts(method):
+    for acts in ("always", "in_contact"):
+        options = (f"mesh.damping_acts={acts}", f"integration.method={method}", *at(12.97))
+        found = respond(load_config(FULL, options), PERIODS)
+        for way in ("tangential", "axial"):
+            apart = found[f"contact_{way}"] == 0
+            force = found[f"mesh_force_{way}"][apart]
+            assert apart.any() and not apart.all()
+            assert (np.abs(force).max() > 0.01) == (acts == "always")
+            assert acts == "always" or not force.any()
+
+
 def test_a_lane_that_diverged_has_no_motion():
     diverging = respond(load_config(FULL, (*at(0.2), "groups.load=1e150")), PERIODS)
     assert diverging["status"].tolist() == [1]

@@ -144,3 +144,15 @@ def test_flow_maps_refuse_more_elements_than_they_have_maps_for():
     plan = Plan(60, 0, 1, 1, method="flow_map")
     with pytest.raises(ValueError, match="5 clearance elements would need maps for 32 sets"):
         integrate(system, np.zeros((1, 12)), plan)
+
+
+def test_a_lane_may_lack_a_term_that_its_neighbours_have():
+    machines = [random_machine(seed, 3, 2) for seed in range(3)]
+    machines[1] = replace(machines[1], motion=np.zeros_like(machines[1].motion))
+    system = lanes_of(machines)
+    start = 0.3 * np.random.default_rng(5).normal(size=(3, 6))
+    for method in ("rk4", "flow_map"):
+        plan = Plan(240, 0, 2, 2, method=method)
+        together, alone = integrate(system, start, plan), lanes_of(machines[1:2])
+        expected = integrate(alone, start[1:2], plan)
+        assert together.section[1] == pytest.approx(expected.section[0], abs=1e-12)

@@ -86,6 +86,8 @@ class GearPairModel(Model):
             sine,
             physical=config.formulation == "physical",
             teeth=_teeth(config, values, complex(*cosine[:1], *-sine[:1])),
+            damped_in_contact_only=config.mesh is not None
+            and config.mesh.damping_acts == "in_contact",
         )
 
     def elements(self, effects: Collection[str]) -> tuple[str, ...]:

@@ -110,6 +110,8 @@ class Mesh(Table):
     damping_N_s_per_m: float | None = _optional(
         "mesh damping, instead of damping_ratio", "N s/m", 247.0, ge=0
     )
+    damping_acts: Literal["always", "in_contact"] = key(default="always")
+    """whether the damper of the mesh acts always, as in Pan 2021, or only while teeth touch"""
     friction_coefficient: float | None = _optional(
         "coefficient of friction between the teeth", "1", 0.06, ge=0, lt=1
     )

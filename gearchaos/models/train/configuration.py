@@ -72,13 +72,13 @@ class TrainConfiguration(MachineConfiguration):
         """Return the angular frequency of the excitation in rad/ms."""
         speed = values.get("operation.speed_rpm", self.operation.speed_rpm)
         order = 1 if self.planetary is not None else self.orders()[next(iter(self.mesh))]
-        return 2.0 * math.pi * float(self.mesh_rate() / order) * speed / 60.0 * 1e-3
+        return 2.0 * math.pi * self.mesh_rate() / order * speed / 60.0 * 1e-3
 
-    def mesh_rate(self) -> Fraction:
+    def mesh_rate(self) -> float:
         """Return the mesh periods of the first mesh in a turn of the driven member."""
         if self.planetary is not None:
             return planetary.mesh_rate(self.planetary)
-        return shafts.first_mesh_rate(self.gear, self.mesh, self.speeds())
+        return float(shafts.first_mesh_rate(self.gear, self.mesh, self.speeds()))
 
     def _assembled(self, values: Mapping[str, float]) -> Assembly:
         """Return the parts of the train with these values of the swept parameters."""

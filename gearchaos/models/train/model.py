@@ -33,4 +33,4 @@ class TrainModel(MachineModel):
     def scales(self, config: TrainConfiguration, values: Mapping[str, Floats]) -> Scales:
         """Return the scales of frequency and speed; the latter is that of the first mesh."""
         lanes = np.broadcast_shapes(*(np.shape(value) for value in values.values()))
-        return Scales(np.full(lanes, 1e3), 60.0 / float(config.mesh_rate()))
+        return Scales(np.full(lanes, 1e3), 60.0 / config.mesh_rate())

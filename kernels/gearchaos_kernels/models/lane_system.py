@@ -122,6 +122,13 @@ class LaneSystem(ABC):
         return True
 
     @property
+    def damped_in_contact(self) -> tuple[bool, ...]:
+        """Whether the damper of each element acts only while the element is in contact."""
+        flags = self.flags()
+        kinds = provider_of(flags).kinds_of(flags)
+        return tuple(kind.damped_in_contact and self.clearance for kind in kinds)
+
+    @property
     def repeats_after(self) -> int:
         """Number of mesh periods after which the excitation repeats, by default 1."""
         return 1

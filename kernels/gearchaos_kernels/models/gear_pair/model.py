@@ -10,7 +10,7 @@ from gearchaos_kernels.compilation import scalar
 from gearchaos_kernels.models.gear_pair import equations, forcing, teeth
 from gearchaos_kernels.models.gear_pair.coefficients import Lane
 from gearchaos_kernels.models.gear_pair.forcing import Forcing, Phase, forcing_at
-from gearchaos_kernels.models.protocol import MapFormulas, Model
+from gearchaos_kernels.models.protocol import Kind, MapFormulas, Model
 from gearchaos_kernels.scene import implement
 
 
@@ -20,6 +20,8 @@ class GearPair:
 
     Attributes
     ----------
+    damped_in_contact : True or None
+        The damper of the mesh acts only while teeth are in contact.
     pitch_error, stiffness_variation, transverse, axial, friction : True or None
         The effects of these names; see `Effects`.
     phase : True or None
@@ -41,6 +43,7 @@ class GearPair:
     transverse: Any
     axial: Any
     friction: Any
+    damped_in_contact: Any = None
 
 
 def _coordinates_of(flags: GearPair) -> tuple[bool, ...]:
@@ -52,6 +55,11 @@ def _coordinates_of(flags: GearPair) -> tuple[bool, ...]:
 def _elements(flags: GearPair) -> int:
     """Return the number of directions of the mesh: tangential, and axial in a scene with it."""
     return 2 if flags.axial else 1
+
+
+def _kinds(flags: GearPair) -> tuple[Kind, ...]:
+    """Return the kind of each direction of the mesh."""
+    return (Kind(damped_in_contact=bool(flags.damped_in_contact)),) * _elements(flags)
 
 
 def _inputs(flags: GearPair) -> NDArray[Any]:
@@ -158,6 +166,7 @@ MODEL = Model(
     coordinates_of=_coordinates_of,
     lane=Lane,
     elements=_elements,
+    kinds=_kinds,
     rows=lambda flags: teeth.ROWS if flags.teeth else 0,
     observed=("transmission_error",),
     begin_period=teeth.begin_period,

@@ -57,6 +57,9 @@ class GearPairs(LaneSystem):
         eqs 6 and 7.
     teeth : Teeth or None
         Pitch errors tooth by tooth, in place of the sine of eq. 14.
+    damped_in_contact_only : bool
+        Whether the damper of the mesh acts only while teeth are in contact. In Pan 2021 it always
+        acts.
 
     Notes
     -----
@@ -82,6 +85,7 @@ class GearPairs(LaneSystem):
     stiffness_sine: Floats
     physical: bool = True
     teeth: Teeth | None = None
+    damped_in_contact_only: bool = False
 
     @property
     def states(self) -> tuple[str, ...]:
@@ -120,6 +124,7 @@ class GearPairs(LaneSystem):
             transverse=flag(effects.transverse),
             axial=flag(effects.axial),
             friction=flag(effects.friction),
+            damped_in_contact=flag(self.damped_in_contact_only),
         )
 
     def coefficients(self, step: Floats) -> Floats:
@@ -200,7 +205,13 @@ class GearPairs(LaneSystem):
 
     def map_constants(self) -> tuple[object, ...]:
         """Return what else the flow maps depend on, the same for all lanes."""
-        return self.physical, self.stiffness_cosine.tobytes(), self.stiffness_sine.tobytes()
+        damping = self.damped_in_contact_only
+        return (
+            self.physical,
+            damping,
+            self.stiffness_cosine.tobytes(),
+            self.stiffness_sine.tobytes(),
+        )
 
     def harmonics(self) -> int:
         """Return the highest harmonic of the mesh frequency in the coefficients."""

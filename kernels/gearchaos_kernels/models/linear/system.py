@@ -5,6 +5,7 @@ from functools import cached_property
 from typing import Self
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gearchaos_kernels.models.lane_system import LaneSystem
 from gearchaos_kernels.models.linear.model import Linear
@@ -192,9 +193,21 @@ class LinearSystems(LaneSystem):
             )
         return ""
 
+    def of(self, chosen: slice | NDArray[np.intp] | list[int]) -> Self:
+        """Return the systems of some lanes, in the given order."""
+        return self._alike(super().of(chosen))
+
+    def _alike(self, other: Self) -> Self:
+        """Return systems with the structure of these, though some terms of theirs may be zero.
+
+        Compiled code, and the order of coefficients, belong to a structure.
+        """
+        vars(other)["structure"] = self.structure
+        return other
+
     def of_unit_inputs(self) -> Self:
         """Return the systems without clearance, on which flow maps do not depend."""
-        return replace(self, half_clearance=np.zeros_like(self.half_clearance))
+        return self._alike(replace(self, half_clearance=np.zeros_like(self.half_clearance)))
 
     def map_parameters(self) -> Floats:
         """Return all numbers on which the flow maps of a lane depend, shape (lanes, numbers)."""
