@@ -34,6 +34,7 @@ PHYSICAL = {
     "mesh.normal_backlash_um": None,
     "mesh.damping_ratio": 0.1,
     "mesh.damping_N_s_per_m": None,
+    "mesh.damping_acts": "always",
     "mesh.friction_coefficient": 0.06,
     "mesh.stiffness.shape": "fourier",
     "mesh.stiffness.cosine_N_per_um_mm": (-1.202, 0.0, -0.1339),
