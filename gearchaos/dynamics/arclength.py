@@ -9,10 +9,9 @@ from collections.abc import Callable
 from typing import NamedTuple, Self
 
 import numpy as np
-from gearchaos_kernels import LaneSystem, Plan, integrate
+from gearchaos_kernels import LaneSystem, Outcome, Plan, integrate
 
 from gearchaos.arrays import Complex, Floats
-from gearchaos.dynamics.exponents import period_jacobian
 from gearchaos.dynamics.orbits import CLOSED, NEWTON_STEPS
 from gearchaos.records.period import TOLERANCE, coordinate_scale
 
@@ -38,6 +37,9 @@ DIFFERENCE = 1e-6
 """Share of the way used for the difference quotient of the map by the parameter."""
 
 
+ROUNDING = 1e-15
+"""Return distance that rounding leaves, relative to the largest entry of the Jacobian."""
+
 HALF_RETURN = 1e-2
 """Half-period return distance below which a curve ends in an orbit of half the period.
 
@@ -59,15 +61,24 @@ class CurvePoint(NamedTuple):
         Floquet multipliers, largest modulus first.
     residual : float
         Return distance, in the scales of the states.
-    half_return : float
-        Return distance after half the period, infinite for an odd period.
+    halfway : array, shape (states,) or (0,)
+        State after half the period minus the state, in the scales; empty for an odd period.
+    impacts : tuple of int
+        Impacts in a period of the orbit, on both flanks of each element in turn; empty if the curve
+        does not count them.
     """
 
     place: Floats
     tangent: Floats
     multipliers: Complex
     residual: float
-    half_return: float
+    halfway: Floats
+    impacts: tuple[int, ...]
+
+    @property
+    def half_return(self) -> float:
+        """Return distance after half the period, infinite for an odd period."""
+        return float(np.max(np.abs(self.halfway))) if self.halfway.size else np.inf
 
     @property
     def share(self) -> float:
@@ -142,11 +153,16 @@ class Curve(NamedTuple):
         periods: int,
         point: Floats,
         share: float,
+        contact: bool = False,
     ) -> Self:
-        """Return the curve through the orbit with state ``point`` (states,) at a share of it."""
+        """Return the curve through the orbit with state ``point`` (states,) at a share of it.
+
+        ``contact``: whether the impacts of every orbit are counted.
+        """
         system = system_at(np.array([share]))
         whole = periods * system.repeats_after
-        plan = Plan(plan.steps_per_period, 0, whole, whole, tangent=True, method=plan.method)
+        steps, method = plan.steps_per_period, plan.method
+        plan = Plan(steps, 0, whole, whole, tangent=True, contact=contact, method=method)
         section = integrate(system, point[np.newaxis], plan).every(system.repeats_after).section
         return cls(system_at, plan, periods, coordinate_scale(section)[0])
 
@@ -158,12 +174,13 @@ class Curve(NamedTuple):
         """
         place, last = guess, np.inf
         for _ in range(NEWTON_STEPS):
-            defect, slopes, half_return = self._defect(place)
+            defect, slopes, passed = self._defect(place)
             size = float(np.max(np.abs(defect)))
-            if size <= CLOSED:
+            # Rounding of the state grows with the largest multiplier.
+            if size <= max(CLOSED, ROUNDING * float(np.max(np.abs(slopes)))):
                 if not np.isfinite(slopes).all():
                     break
-                return self._point(place, slopes, direction, (size, half_return))
+                return self._point(place, slopes, direction, size, passed)
             # The size is also NaN where the motion diverged.
             if not size < 0.5 * last:
                 break
@@ -175,34 +192,59 @@ class Curve(NamedTuple):
             last = size
         return None
 
-    def _defect(self, place: Floats) -> tuple[Floats, Floats, float]:
-        """Return P(x) - x in the scales, its derivatives by place, half-period return distance."""
-        point = place[:-1] * self.scale
+    def doubled(self) -> Self:
+        """Return the curve of orbits of twice the period, with the same scales."""
+        whole = 2 * self.plan.recorded_periods
+        plan = self.plan._replace(recorded_periods=whole, section_points=whole)
+        return self._replace(periods=2 * self.periods, plan=plan)
+
+    def section(self, point: CurvePoint) -> Floats:
+        """Return all section points of the orbit of a point, shape (periods, states)."""
+        system = self.system_at(np.array([point.share]))
+        start = (point.place[:-1] * self.scale)[np.newaxis]
+        section: Floats = integrate(system, start, self.plan).every(system.repeats_after).section[0]
+        return section
+
+    def jacobian(self, place: Floats) -> Floats:
+        """Return the Jacobian of the map over the period, in the scales, (states, states)."""
+        slopes: Floats = self._defect(place)[1][:, :-1]
+        return slopes + np.eye(self.scale.size)
+
+    def _defect(self, place: Floats) -> tuple[Floats, Floats, Outcome]:
+        """Return P(x) - x in the scales, its derivatives by place, and the motion."""
+        states = self.scale.size
         # Beyond the ends of the way the value of the parameter may be invalid.
         shares = np.clip(place[-1] + DIFFERENCE * np.array([0.0, -1.0, 1.0]), 0.0, 1.0)
         system = self.system_at(shares)
-        start = np.repeat(point[np.newaxis], 3, axis=0)
-        section = integrate(system, start, self.plan).every(system.repeats_after).section
-        ends = section[:, -1] / self.scale
-        jacobian = period_jacobian(system.of([0]), point[np.newaxis], self.plan)[0]
-        by_state = jacobian * self.scale / self.scale[:, np.newaxis] - np.eye(self.scale.size)
+        # One lane for each column of the Jacobian, and two for the difference by the parameter.
+        lanes = system.of(np.repeat([0, 1, 2], [states, 1, 1]))
+        start = np.repeat((place[:-1] * self.scale)[np.newaxis], states + 2, axis=0)
+        tangents = np.eye(states)[[*range(states), 0, 0]]
+        passed = integrate(lanes, start, self.plan, tangent_start=tangents)
+        passed = passed.every(system.repeats_after)
+        ends = passed.section[:, -1] / self.scale
+        columns = passed.end_tangent * np.exp(np.sum(passed.growth, axis=1))[:, np.newaxis]
+        jacobian = columns[:states].T * self.scale / self.scale[:, np.newaxis]
         with np.errstate(invalid="ignore", divide="ignore"):
-            by_share = (ends[2] - ends[1]) / (shares[2] - shares[1])
-        half_return = np.inf
-        if self.periods % 2 == 0:
-            halfway = section[0, self.periods // 2 - 1] / self.scale
-            half_return = float(np.max(np.abs(halfway - place[:-1])))
-        return ends[0] - place[:-1], np.column_stack([by_state, by_share]), half_return
+            by_share = (ends[-1] - ends[-2]) / (shares[2] - shares[1])
+        slopes = np.column_stack([jacobian - np.eye(states), by_share])
+        return ends[0] - place[:-1], slopes, passed
 
     def _point(
-        self, place: Floats, slopes: Floats, direction: Floats, distances: tuple[float, float]
+        self, place: Floats, slopes: Floats, direction: Floats, size: float, passed: Outcome
     ) -> CurvePoint:
-        """Return the point of the curve at a place where the orbit is closed."""
+        """Return the point of the curve at a place where the orbit is closed to a distance."""
         tangent = np.linalg.svd(slopes)[2][-1]
         tangent = tangent * np.sign(tangent @ direction)
         multipliers = np.linalg.eigvals(slopes[:, :-1] + np.eye(self.scale.size))
         order = np.argsort(-np.abs(multipliers), kind="stable")
-        return CurvePoint(place, tangent, multipliers[order].astype(np.complex128), *distances)
+        halfway = np.zeros(0)
+        if self.periods % 2 == 0:
+            halfway = passed.section[0, self.periods // 2 - 1] / self.scale - place[:-1]
+        impacts = tuple(passed.contact[0, :, [1, 3]].T.astype(int).ravel().tolist())
+        return CurvePoint(
+            place, tangent, multipliers[order].astype(np.complex128), size, halfway, impacts
+        )
 
 
 def end_of_curve(curve: Curve, point: Floats, share: float, limit: float, width: float) -> End:
