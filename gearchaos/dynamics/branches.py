@@ -1,9 +1,9 @@
-"""Whole branches of periodic orbits over a parameter, stable and unstable, and their special points.
+"""Whole branches of periodic orbits over a parameter, stable and unstable, and special points.
 
-A branch is one curve of orbits of one period (`arclength`). It is followed in both directions, round
-its folds and through losses of stability, until it leaves the range, closes on itself, or meets the
-orbit of half its period. Between two of its points, a test function that changes its sign betrays a
-special point, which is then located on the curve:
+A branch is one curve of orbits of one period (`arclength`). It is followed in both directions,
+around its folds and through losses of stability, until it leaves the range, closes on itself, or
+meets the orbit of half its period. Where a test function changes its sign between two points of a
+branch, there is a special point between them, which is then located on the curve:
 
 - fold: the parameter turns back;
 - branch point: a real multiplier passes +1 without a fold;
@@ -21,12 +21,14 @@ import numpy as np
 from gearchaos.arrays import Complex, Floats
 from gearchaos.dynamics.arclength import (
     FIRST_STEP,
-    LONGEST_CURVE_STEP,
     SHORTEST_STEP,
     STRAIGHT,
     Curve,
     CurvePoint,
 )
+
+LONGEST = 0.15
+"""Longest step along a branch."""
 
 MOST_POINTS = 4000
 """Largest number of points computed along one direction of a branch."""
@@ -248,7 +250,7 @@ def _half(curve: Curve, start: CurvePoint) -> tuple[list[CurvePoint], str]:
         bend = (trial.tangent - here.tangent) / length
         if len(points) > 3 and _meets(trial, start, step):
             return points, CLOSED_CURVE
-        step = min(2.0 * step, LONGEST_CURVE_STEP)
+        step = min(2.0 * step, LONGEST)
     return points, TOO_MANY
 
 
@@ -321,7 +323,11 @@ def _specials_between(
         if kind == BRANCH_POINT and before[FOLD] * after[FOLD] < 0.0:
             # A multiplier passes +1 at every fold.
             continue
-        point = _located(curve, one, other, lambda at, kind=kind: _test_functions(at)[kind])
+
+        def test_function(at: CurvePoint, kind: str = kind) -> float:
+            return _test_functions(at)[kind]
+
+        point = _located(curve, one, other, test_function)
         if point is not None and (kind != NEIMARK_SACKER or _has_pair_on_circle(point.multipliers)):
             found.append((kind, point, -1))
     found += [(GRAZING, *graze) for graze in _grazings(curve, one, other)]

@@ -1,4 +1,4 @@
-"""The branches of a sweep: whole curves of the periodic orbits that it found, and of their doublings."""
+"""The branches of a sweep: the curves of the periodic orbits it found, and their doublings."""
 
 from collections import deque
 from collections.abc import Iterator
@@ -134,7 +134,9 @@ class _Search:
     def _system_at(self, shares: Floats) -> LaneSystem:
         """Return the systems at shares of the way (lanes,)."""
         values = self.low + shares * (self.high - self.low)
-        return system_of(self.config, {self.config.sweep.parameter: values}, self.config.needed_effects)
+        return system_of(
+            self.config, {self.config.sweep.parameter: values}, self.config.needed_effects
+        )
 
     def motions(self, result: Result, axis: str) -> Iterator[_Motion]:
         """Yield the periodic motions of the result, in the order of the parameter."""
@@ -210,7 +212,6 @@ class _Search:
     def _known(self, motion: _Motion, tolerance: float) -> bool:
         """Whether a motion lies on a branch that has been found."""
         return any(
-            branch.period == motion.period
-            and branch.holds(motion.share, motion.section, tolerance)
+            branch.period == motion.period and branch.holds(motion.share, motion.section, tolerance)
             for branch in self.found
         )
