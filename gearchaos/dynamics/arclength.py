@@ -36,7 +36,6 @@ NEAR_ON_CURVE = 1e-4
 DIFFERENCE = 1e-6
 """Share of the way used for the difference quotient of the map by the parameter."""
 
-
 ROUNDING = 1e-15
 """Return distance that rounding leaves, relative to the largest entry of the Jacobian."""
 
@@ -66,6 +65,9 @@ class CurvePoint(NamedTuple):
     impacts : tuple of int
         Impacts in a period of the orbit, on both flanks of each element in turn; empty if the curve
         does not count them.
+    section : array, shape (periods, states)
+        States at the ends of the excitation periods of the orbit, dimensionless; the last one is
+        the state of the place.
     """
 
     place: Floats
@@ -74,6 +76,7 @@ class CurvePoint(NamedTuple):
     residual: float
     halfway: Floats
     impacts: tuple[int, ...]
+    section: Floats
 
     @property
     def half_return(self) -> float:
@@ -173,8 +176,9 @@ class Curve(NamedTuple):
         converge.
         """
         place, last = guess, np.inf
+        by_share: Floats | None = None
         for _ in range(NEWTON_STEPS):
-            defect, slopes, passed = self._defect(place)
+            defect, slopes, passed = self._defect(place, by_share)
             size = float(np.max(np.abs(defect)))
             # Rounding of the state grows with the largest multiplier.
             if size <= max(CLOSED, ROUNDING * float(np.max(np.abs(slopes)))):
@@ -189,7 +193,9 @@ class Curve(NamedTuple):
                 place = place - np.linalg.solve(bordered, np.append(defect, 0.0))
             except np.linalg.LinAlgError:
                 break
-            last = size
+            # Later steps are so short that the derivative by the parameter changes little. To
+            # compute it costs as much as the orbit if the parameter changes the flow maps.
+            last, by_share = size, slopes[:, -1]
         return None
 
     def doubled(self) -> Self:
@@ -198,35 +204,36 @@ class Curve(NamedTuple):
         plan = self.plan._replace(recorded_periods=whole, section_points=whole)
         return self._replace(periods=2 * self.periods, plan=plan)
 
-    def section(self, point: CurvePoint) -> Floats:
-        """Return all section points of the orbit of a point, shape (periods, states)."""
-        system = self.system_at(np.array([point.share]))
-        start = (point.place[:-1] * self.scale)[np.newaxis]
-        section: Floats = integrate(system, start, self.plan).every(system.repeats_after).section[0]
-        return section
-
     def jacobian(self, place: Floats) -> Floats:
         """Return the Jacobian of the map over the period, in the scales, (states, states)."""
-        slopes: Floats = self._defect(place)[1][:, :-1]
-        return slopes + np.eye(self.scale.size)
+        states = self.scale.size
+        slopes: Floats = self._defect(place, np.zeros(states))[1][:, :-1]
+        return slopes + np.eye(states)
 
-    def _defect(self, place: Floats) -> tuple[Floats, Floats, Outcome]:
-        """Return P(x) - x in the scales, its derivatives by place, and the motion."""
+    def _defect(
+        self, place: Floats, by_share: Floats | None = None
+    ) -> tuple[Floats, Floats, Outcome]:
+        """Return P(x) - x in the scales, its derivatives by place, and the motion.
+
+        ``by_share`` (states,): the derivative by the share of the way, if it is known.
+        """
         states = self.scale.size
         # Beyond the ends of the way the value of the parameter may be invalid.
-        shares = np.clip(place[-1] + DIFFERENCE * np.array([0.0, -1.0, 1.0]), 0.0, 1.0)
-        system = self.system_at(shares)
-        # One lane for each column of the Jacobian, and two for the difference by the parameter.
-        lanes = system.of(np.repeat([0, 1, 2], [states, 1, 1]))
-        start = np.repeat((place[:-1] * self.scale)[np.newaxis], states + 2, axis=0)
-        tangents = np.eye(states)[[*range(states), 0, 0]]
-        passed = integrate(lanes, start, self.plan, tangent_start=tangents)
+        share = min(max(float(place[-1]), 0.0), 1.0)
+        beside = share + (DIFFERENCE if share < 0.5 else -DIFFERENCE)
+        shares = np.array([share] if by_share is not None else [share, beside])
+        # One lane for each column of the Jacobian, and one for the difference by the parameter.
+        lanes = np.repeat([0, 1], [states, 1])[: states + shares.size - 1]
+        start = np.repeat((place[:-1] * self.scale)[np.newaxis], lanes.size, axis=0)
+        tangents = np.eye(states)[[*range(states), 0]][: lanes.size]
+        system = self.system_at(shares).of(lanes)
+        passed = integrate(system, start, self.plan, tangent_start=tangents)
         passed = passed.every(system.repeats_after)
         ends = passed.section[:, -1] / self.scale
         columns = passed.end_tangent * np.exp(np.sum(passed.growth, axis=1))[:, np.newaxis]
         jacobian = columns[:states].T * self.scale / self.scale[:, np.newaxis]
-        with np.errstate(invalid="ignore", divide="ignore"):
-            by_share = (ends[-1] - ends[-2]) / (shares[2] - shares[1])
+        if by_share is None:
+            by_share = (ends[-1] - ends[0]) / (beside - share)
         slopes = np.column_stack([jacobian - np.eye(states), by_share])
         return ends[0] - place[:-1], slopes, passed
 
@@ -242,9 +249,9 @@ class Curve(NamedTuple):
         if self.periods % 2 == 0:
             halfway = passed.section[0, self.periods // 2 - 1] / self.scale - place[:-1]
         impacts = tuple(passed.contact[0, :, [1, 3]].T.astype(int).ravel().tolist())
-        return CurvePoint(
-            place, tangent, multipliers[order].astype(np.complex128), size, halfway, impacts
-        )
+        multipliers = multipliers[order].astype(np.complex128)
+        section = passed.section[0]
+        return CurvePoint(place, tangent, multipliers, size, halfway, impacts, section)
 
 
 def end_of_curve(curve: Curve, point: Floats, share: float, limit: float, width: float) -> End:

@@ -26,6 +26,18 @@ from gearchaos.dynamics.arclength import (
     Curve,
     CurvePoint,
 )
+from gearchaos.records.branch import (
+    BRANCH_POINT,
+    CLOSED_CURVE,
+    EDGE,
+    FOLD,
+    GRAZING,
+    HALVING,
+    LOST,
+    NEIMARK_SACKER,
+    PERIOD_DOUBLING,
+    TOO_MANY,
+)
 
 LONGEST = 0.15
 """Longest step along a branch."""
@@ -57,17 +69,11 @@ UNDECIDED = 5e-3
 Next to a fold or a period doubling the equations are nearly singular.
 """
 
+SAME_PLACE = 1e-7
+"""Largest distance between two corrections of one point of a branch."""
+
 SIDEWAYS = 2e-3
 """Distance at which a doubled branch is entered, in the scales of the states."""
-
-FOLD, BRANCH_POINT = "fold", "branch point"
-PERIOD_DOUBLING, NEIMARK_SACKER = "period doubling", "Neimark-Sacker"
-GRAZING = "grazing"
-
-EDGE, CLOSED_CURVE = "edge of the range", "closes on itself"
-HALVING = "meets the orbit of half its period"
-TOO_MANY = f"not followed beyond {MOST_POINTS} points"
-LOST = "no orbit found however short the step"
 
 
 class Special(NamedTuple):
@@ -76,7 +82,7 @@ class Special(NamedTuple):
     Attributes
     ----------
     kind : str
-        One of the kinds of this module.
+        One of `SPECIAL_KINDS`.
     point : CurvePoint
         The point of the curve.
     flank : int
@@ -248,7 +254,7 @@ def _half(curve: Curve, start: CurvePoint) -> tuple[list[CurvePoint], str]:
         if leaves:
             return points, EDGE
         bend = (trial.tangent - here.tangent) / length
-        if len(points) > 3 and _meets(trial, start, step):
+        if len(points) > 3 and _meets(curve, here, trial, start):
             return points, CLOSED_CURVE
         step = min(2.0 * step, LONGEST)
     return points, TOO_MANY
@@ -292,11 +298,17 @@ def _passes_half(here: CurvePoint, trial: CurvePoint) -> bool:
     return bool(here.halfway.size and here.halfway @ trial.halfway <= 0.0)
 
 
-def _meets(trial: CurvePoint, start: CurvePoint, step: float) -> bool:
-    """Whether a point has come back to the first one, in its direction."""
-    away = trial.place - start.place
-    near = np.linalg.norm(away) < step
-    return bool(near and trial.tangent @ start.tangent > STRAIGHT and away @ start.tangent > -step)
+def _meets(curve: Curve, here: CurvePoint, trial: CurvePoint, start: CurvePoint) -> bool:
+    """Whether the first point of a branch lies between two successive ones, in its direction."""
+    chord, away = trial.place - here.place, start.place - here.place
+    share = float(away @ chord) / float(chord @ chord)
+    aside = np.linalg.norm(away - share * chord)
+    if not 0.0 <= share <= 1.0 or aside > NEIGHBOURING or trial.tangent @ start.tangent < STRAIGHT:
+        return False
+    guess = here.place + share * chord
+    guess = guess - ((guess - start.place) @ start.tangent) * start.tangent
+    found = curve.corrected(guess, start.tangent)
+    return found is not None and bool(np.max(np.abs(found.place - start.place)) < SAME_PLACE)
 
 
 def _test_functions(point: CurvePoint) -> dict[str, float]:

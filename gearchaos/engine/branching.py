@@ -2,29 +2,31 @@
 
 from collections import deque
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from gearchaos_kernels import LaneSystem, integrate
+from gearchaos_kernels import LaneSystem, Plan, integrate
 
 from gearchaos.arrays import Floats
 from gearchaos.dynamics.arclength import Curve, CurvePoint
-from gearchaos.dynamics.branches import (
-    HALVING,
-    PERIOD_DOUBLING,
-    TracedBranch,
-    doubled_start,
-    trace,
-)
-from gearchaos.dynamics.plans import plan_of
+from gearchaos.dynamics.branches import TracedBranch, doubled_start, trace
+from gearchaos.engine.kept import recorded_quantities, variables_of
+from gearchaos.engine.provenance import provenance
 from gearchaos.engine.recomputing import computable
+from gearchaos.engine.run_plan import RunPlan, plan_run
 from gearchaos.engine.running import choose_threads
 from gearchaos.errors import ConfigurationError
 from gearchaos.interrupts import check
 from gearchaos.models import Configuration, swept_values
 from gearchaos.models.registry import system_of
 from gearchaos.outputs import names as known
+from gearchaos.outputs.catalogue import SECTION_PART
+from gearchaos.outputs.variable import Variable
 from gearchaos.progress import say
+from gearchaos.records.branch import HALVING, PERIOD_DOUBLING, PeriodicBranch, SpecialPoint
+from gearchaos.records.period import coordinate_scale
+from gearchaos.results.files.branch_file import BranchSet
 from gearchaos.results.reading.result import Result
 from gearchaos.results.reading.stage_table import require_labels
 
@@ -33,32 +35,6 @@ MOST_PERIODS = 8
 
 NEAR, SAME = 0.02, 1e-4
 """Largest distance of a motion, and of a closed orbit, from a branch on which it lies."""
-
-
-class Branches(NamedTuple):
-    """The branches of a sweep.
-
-    Attributes
-    ----------
-    config : Configuration
-        The configuration with which they were computed.
-    parameter : str
-        Name of the swept parameter.
-    low, high : float
-        The range of the parameter; shares of the way run from the first to the second.
-    found : list of TracedBranch
-        The branches.
-    """
-
-    config: Configuration
-    parameter: str
-    low: float
-    high: float
-    found: list[TracedBranch]
-
-    def value(self, share: float) -> float:
-        """Return the value of the parameter at a share of the way."""
-        return self.low + share * (self.high - self.low)
 
 
 class _Motion(NamedTuple):
@@ -74,7 +50,7 @@ def find_branches(
     name: str = "the result",
     longest: int = MOST_PERIODS,
     threads: int | None = None,
-) -> Branches:
+) -> BranchSet:
     """Follow every periodic motion that a sweep found, through the whole range of the sweep.
 
     Parameters
@@ -90,9 +66,10 @@ def find_branches(
 
     Returns
     -------
-    Branches
+    BranchSet
         The branches, those of the lowest values of the parameter first, each followed by those that
-        begin at its period doublings.
+        begin at its period doublings. Contact and loads of the orbits are computed if the sweep has
+        them.
 
     Raises
     ------
@@ -116,43 +93,82 @@ def find_branches(
         )
     choose_threads(threads)
     values = np.unique(swept_values(config.sweep))
-    search = _Search(config, float(values[0]), float(values[-1]), longest)
+    search = _Search(BranchRange(config, float(values[0]), float(values[-1])), longest)
     for motion in search.motions(result, swept[0]):
         check()
         search.follow(motion)
-    return Branches(config, parameter, search.low, search.high, search.found)
+    return _described(search, result.variables[swept[0]])
+
+
+class BranchRange(NamedTuple):
+    """The range of a parameter over which branches are followed.
+
+    Attributes
+    ----------
+    config : Configuration
+        The configuration with which orbits are computed.
+    low, high : float
+        The range; shares of the way run from the first to the second.
+    """
+
+    config: Configuration
+    low: float
+    high: float
+
+    def value(self, share: Floats) -> Floats:
+        """Return the values of the parameter at shares of the way."""
+        return self.low + share * (self.high - self.low)
+
+    def share(self, value: Floats) -> Floats:
+        """Return the shares of the way at values of the parameter."""
+        return (value - self.low) / (self.high - self.low)
+
+    def system_at(self, shares: Floats) -> LaneSystem:
+        """Return the systems at shares of the way (lanes,)."""
+        values = {self.config.sweep.parameter: self.value(shares)}
+        return system_of(self.config, values, self.config.needed_effects)
+
+    def curve(self, plan: Plan, period: int, scale: Floats) -> Curve:
+        """Return the curve of orbits of a period, with scales (states,) of the states."""
+        whole = period * self.system_at(np.zeros(1)).repeats_after
+        steps, method = plan.steps_per_period, plan.method
+        plan = Plan(steps, 0, whole, whole, tangent=True, contact=True, method=method)
+        return Curve(self.system_at, plan, period, scale)
 
 
 class _Search:
-    """The branches that are known so far; arguments as in `Branches`."""
+    """The branches that are known so far; arguments as in `find_branches`."""
 
-    def __init__(self, config: Configuration, low: float, high: float, longest: int) -> None:
-        self.config, self.low, self.high, self.longest = config, low, high, longest
+    def __init__(self, over: BranchRange, longest: int) -> None:
+        self.over, self.longest = over, longest
         self.found: list[TracedBranch] = []
-        self._plan = plan_of(config)
-
-    def _system_at(self, shares: Floats) -> LaneSystem:
-        """Return the systems at shares of the way (lanes,)."""
-        values = self.low + shares * (self.high - self.low)
-        return system_of(
-            self.config, {self.config.sweep.parameter: values}, self.config.needed_effects
-        )
+        self.run = plan_run(over.config)
+        self._scale = np.ones(len(self.run.lanes.states))
 
     def motions(self, result: Result, axis: str) -> Iterator[_Motion]:
         """Yield the periodic motions of the result, in the order of the parameter."""
         period = result.lanes("period")
         (lanes,) = np.nonzero((period > 0) & (period <= self.longest))
-        shares = (result.along(axis)[lanes] - self.low) / (self.high - self.low)
+        shares = self.over.share(result.along(axis)[lanes])
         lanes, shares = lanes[np.argsort(shares, kind="stable")], np.sort(shares, kind="stable")
         if not lanes.size:
             return
         states = result.lanes("end_state")[lanes]
-        system = self._system_at(shares)
+        system = self.over.system_at(shares)
         periods = int(period[lanes].max()) * system.repeats_after
-        plan = self._plan._replace(
-            transient_periods=0, recorded_periods=periods, section_points=periods
+        plan = self.run.plan._replace(
+            transient_periods=0,
+            recorded_periods=periods,
+            section_points=periods,
+            tangent=False,
+            contact=False,
+            loads=False,
+            states=(),
+            orders=(),
         )
         sections = integrate(system, states, plan).every(system.repeats_after).section
+        # One scale for all branches: that of one motion would be too small along the branch.
+        self._scale = coordinate_scale(sections.reshape(1, -1, states.shape[1]))[0]
         for lane, share, section in zip(lanes, shares, sections, strict=True):
             n = int(period[lane])
             yield _Motion(float(share), section[:n], n)
@@ -164,10 +180,10 @@ class _Search:
         waiting = deque([motion])
         while waiting:
             motion = waiting.popleft()
-            curve = self._curve(motion)
+            curve = self.over.curve(self.run.plan, motion.period, self._scale)
             guess = np.append(motion.section[-1] / curve.scale, motion.share)
             start = curve.corrected(guess, np.append(np.zeros(guess.size - 1), 1.0))
-            if start is None or self._known(self._motion_at(curve, start), SAME):
+            if start is None or self._known(_motion_at(curve, start), SAME):
                 continue
             self._add(trace(curve, start), waiting)
 
@@ -191,22 +207,13 @@ class _Search:
             check()
             if special.kind == PERIOD_DOUBLING:
                 start, doubled = doubled_start(branch.curve, special.point), branch.curve.doubled()
-                if start is not None and not self._known(self._motion_at(doubled, start), SAME):
+                if start is not None and not self._known(_motion_at(doubled, start), SAME):
                     self._add(trace(doubled, start, one_way=True), waiting)
-
-    def _curve(self, motion: _Motion) -> Curve:
-        """Return the curve of orbits of the period of a motion."""
-        given = self._system_at, self._plan, motion.period, motion.section[-1], motion.share
-        return Curve.through(*given, contact=True)
-
-    def _motion_at(self, curve: Curve, point: CurvePoint) -> _Motion:
-        """Return the motion of a point of a curve."""
-        return _Motion(point.share, curve.section(point), curve.periods)
 
     def _found_before(self, branch: TracedBranch) -> bool:
         """Whether most of some points in the middle of a branch lie on a branch that is known."""
         chosen = np.unique(np.linspace(0, len(branch.points) - 1, 7).astype(int)[1:-1])
-        motions = [self._motion_at(branch.curve, branch.points[at]) for at in chosen]
+        motions = [_motion_at(branch.curve, branch.points[at]) for at in chosen]
         return 2 * sum(self._known(one, SAME) for one in motions) > len(motions)
 
     def _known(self, motion: _Motion, tolerance: float) -> bool:
@@ -215,3 +222,87 @@ class _Search:
             branch.period == motion.period and branch.holds(motion.share, motion.section, tolerance)
             for branch in self.found
         )
+
+
+def _motion_at(curve: Curve, point: CurvePoint) -> _Motion:
+    """Return the motion of a point of a curve."""
+    return _Motion(point.share, point.section, curve.periods)
+
+
+def _described(search: _Search, parameter: Variable) -> BranchSet:
+    """Return the branches of a search as arrays with their descriptions."""
+    run = search.run
+    catalogue = run.lanes.model.catalogue
+    sections = catalogue.variables((), {SECTION_PART: run.lanes.states})
+    states = [one for one in sections if one.name.startswith(known.SECTION)]
+    branches = tuple(arrays_of_branch(search.over, one, run) for one in search.found)
+    of_orbits = {name for one in branches for name in one.quantities}
+    quantities = tuple(one for one in variables_of(run) if one.name in of_orbits)
+    facts = {
+        "title": run.config.title,
+        "effects": " ".join(run.config.scene.effects),
+        "method": run.config.integration.method,
+        "steps_per_period": run.plan.steps_per_period,
+        "excitation_period": run.lanes.repeats_after,
+        "longest_period": search.longest,
+        **provenance(0.0),
+        "configuration_resolved": run.config.resolved_toml(),
+    }
+    del facts["wall_time_seconds"]
+    return BranchSet(parameter, tuple(states), branches, facts, quantities)
+
+
+def arrays_of_branch(over: BranchRange, branch: TracedBranch, run: RunPlan) -> PeriodicBranch:
+    """Return a traced branch as arrays, with contact and loads if the plan of the run has them."""
+    points, shares = branch.points, branch.places[:, -1]
+    system = over.system_at(shares)
+    multipliers = np.array([one.multipliers for one in points])
+    duration = branch.period * system.excitation_period
+    return PeriodicBranch(
+        branch.period,
+        over.value(shares),
+        branch.positions,
+        np.array([one.section for one in points]),
+        multipliers,
+        np.log(np.abs(multipliers[:, 0])) / duration,
+        tuple(
+            SpecialPoint(
+                one.kind,
+                float(over.value(np.array(one.point.share))),
+                one.position,
+                one.point.section,
+                one.point.multipliers,
+                _flank(run, one.flank),
+            )
+            for one in branch.specials
+        ),
+        branch.ends,
+        _quantities(run, system, branch),
+    )
+
+
+def _flank(run: RunPlan, number: int) -> str:
+    """Return the name of a flank of an element, such as "mesh, back flank"; empty for none."""
+    if number < 0:
+        return ""
+    element, back = divmod(number, 2)
+    return f"{run.elements[element]}, {'back' if back else 'driving'} flank"
+
+
+def _quantities(run: RunPlan, system: LaneSystem, branch: TracedBranch) -> dict[str, Floats]:
+    """Return contact and loads of all orbits of a branch by output, each (points,)."""
+    if not (run.plan.contact or run.plan.loads):
+        return {}
+    whole = branch.curve.plan.recorded_periods
+    plan = run.plan._replace(
+        transient_periods=0,
+        recorded_periods=whole,
+        section_points=0,
+        tangent=False,
+        states=(),
+        orders=(),
+    )
+    states = branch.places[:, :-1] * branch.curve.scale
+    outcome = integrate(system, states, plan)
+    found = recorded_quantities(replace(run, plan=plan), system, outcome)
+    return {name: values.astype(np.float64) for name, values in found.items()}

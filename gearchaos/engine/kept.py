@@ -82,7 +82,7 @@ def arrays_of(
         slowest = np.where(outcome.crossings > 0, outcome.slowest_crossing, np.nan)
         arrays["slowest_crossing"] = np.where(sound, slowest, np.nan)
         arrays["unsplit_steps"] = outcome.overflows
-    arrays |= _recorded_quantities(run, system, outcome)
+    arrays |= recorded_quantities(run, system, outcome)
     for name in outputs.section:
         points = outcome.section[:, -plan.section_points :, system.states.index(name)]
         # A copy: a view would keep the whole record in memory.
@@ -111,7 +111,7 @@ def arrays_of(
     return arrays
 
 
-def _recorded_quantities(
+def recorded_quantities(
     run: RunPlan, system: kernels.LaneSystem, outcome: kernels.Outcome
 ) -> dict[str, Array]:
     """Return contact, loads and state summaries by variable; NaN in lanes that diverged."""

@@ -84,8 +84,8 @@ def write_result(
             Sink(partial) as sink,
             h5py.File(sink, "w", track_order=True, rdcc_nbytes=CACHE_BYTES) as file,
         ):
-            _write_metadata(file, {**metadata, **own_metadata(lane_axes(variables))})
-            of_the_lanes = _create_all(file, everything, parameters)
+            write_metadata(file, {**metadata, **own_metadata(lane_axes(variables))})
+            of_the_lanes = create_all(file, everything, parameters)
             for first, last, arrays in blocks:
                 require_listed(arrays, [variable.name for variable in everything])
                 _write_lanes(of_the_lanes, first, last, arrays)
@@ -171,7 +171,8 @@ class Sink(FileIO):
             self._error = self._error or error
 
 
-def _write_metadata(file: h5py.File, metadata: Metadata) -> None:
+def write_metadata(file: h5py.File, metadata: Metadata) -> None:
+    """Write root attributes; a long text becomes a dataset."""
     for name, value in metadata.items():
         if isinstance(value, str) and len(content := _plain(value)) > _LONGEST_ATTRIBUTE:
             # As ASCII of fixed length, which Octave requires.
@@ -187,7 +188,7 @@ def _harmonics(parameters: Mapping[str, Variable]) -> list[Variable]:
     return GENERIC.variables((), {HARMONICS_PART: numbers.size > 0}, Details({HARMONIC: numbers}))
 
 
-def _create_all(
+def create_all(
     file: h5py.File, variables: Sequence[Variable], parameters: Mapping[str, Variable]
 ) -> dict[str, h5py.Dataset]:
     """Create the datasets of all variables and parameters.

@@ -1,0 +1,88 @@
+"""Branches of periodic orbits over a parameter, as they are computed, stored and drawn."""
+
+from typing import NamedTuple
+
+from gearchaos.arrays import Complex, Floats, Mask
+
+FOLD, BRANCH_POINT = "fold", "branch point"
+PERIOD_DOUBLING, NEIMARK_SACKER = "period doubling", "Neimark-Sacker"
+GRAZING = "grazing"
+SPECIAL_KINDS = (FOLD, BRANCH_POINT, PERIOD_DOUBLING, NEIMARK_SACKER, GRAZING)
+"""Kinds of special points of a branch."""
+
+EDGE, CLOSED_CURVE = "edge of the range", "closes on itself"
+HALVING = "meets the orbit of half its period"
+TOO_MANY = "too many points"
+LOST = "no orbit found however short the step"
+BRANCH_ENDS = (EDGE, CLOSED_CURVE, HALVING, TOO_MANY, LOST)
+"""Reasons why a branch ends."""
+
+
+class SpecialPoint(NamedTuple):
+    """A special point of a branch.
+
+    Attributes
+    ----------
+    kind : str
+        One of `SPECIAL_KINDS`.
+    value : float
+        Value of the parameter.
+    arclength : float
+        Where it lies on the branch.
+    section : array, shape (period, states)
+        Section points of the orbit, dimensionless; the last one is the state at mesh phase 0.
+    multipliers : array of complex, shape (states,)
+        Floquet multipliers, largest modulus first.
+    flank : str
+        For a grazing, the element and the flank that it begins or ceases to meet; else empty.
+    """
+
+    kind: str
+    value: float
+    arclength: float
+    section: Floats
+    multipliers: Complex
+    flank: str = ""
+
+
+class PeriodicBranch(NamedTuple):
+    """A branch of periodic orbits of one period, stable and unstable.
+
+    Attributes
+    ----------
+    period : int
+        Period in excitation periods.
+    value : array, shape (points,)
+        Values of the parameter, in the order of the branch.
+    arclength : array, shape (points,)
+        Length of the branch up to each point: states relative to the largest ones of the sweep,
+        the parameter relative to its range.
+    section : array, shape (points, period, states)
+        Section points of each orbit, dimensionless; the last one is the state at mesh phase 0.
+    multipliers : array of complex, shape (points, states)
+        Floquet multipliers, largest modulus first.
+    exponent : array, shape (points,)
+        Largest Lyapunov exponent of each orbit, per unit of tau.
+    specials : tuple of SpecialPoint
+        Its special points, in the order of the branch.
+    ends : tuple of str
+        Why it ends at its first and at its last point, each one of `BRANCH_ENDS`.
+    quantities : dict of str to array, shape (points,)
+        Contact and loads of each orbit, by the name of the output.
+    """
+
+    period: int
+    value: Floats
+    arclength: Floats
+    section: Floats
+    multipliers: Complex
+    exponent: Floats
+    specials: tuple[SpecialPoint, ...]
+    ends: tuple[str, str]
+    quantities: dict[str, Floats]
+
+    @property
+    def stable(self) -> Mask:
+        """Whether all multipliers of an orbit lie inside the unit circle, (points,)."""
+        inside: Mask = abs(self.multipliers[:, 0]) < 1.0
+        return inside
