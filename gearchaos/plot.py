@@ -2,7 +2,8 @@
 
 A sweep of one parameter becomes its bifurcation diagram above its Lyapunov chart. A sweep of two
 parameters becomes maps of motion, exponent and contact. A response becomes one page for each lane,
-with time history, phase portrait, Poincare section and amplitude spectrum.
+with time history, phase portrait, Poincare section and amplitude spectrum. A file of branches
+becomes a page of its orbits above their Floquet multipliers.
 
 --variable names what is drawn. For a sweep it is a section variable (default: section_delta_5), any
 variable with one number per lane, or an amplitude such as amplitude_transmission_error. For a map
@@ -100,6 +101,14 @@ class PlotOptions(NamedTuple):
             "draw the share of gear pairs and starts that settles on each motion, at each value"
         ),
     ] = False
+    branches: Annotated[
+        Path | None,
+        Option(
+            "draw the branches of this file of gearchaos branches into the diagram",
+            "BRANCHES.h5",
+            file=True,
+        ),
+    ] = None
     width: Annotated[
         float | None,
         Option(
@@ -120,21 +129,40 @@ class PlotOptions(NamedTuple):
 
 
 def _plot(options: PlotOptions) -> None:
-    from gearchaos.figures.page import check_figures, save_figure
     from gearchaos.figures.response import is_response
+    from gearchaos.results.files.branch_reader import is_branch_file
 
+    if any(map(is_branch_file, options.results)):
+        _plot_branches(options)
+        return
     results = [_opened(path, options.at) for path in options.results]
     if options.units == "physical":
         results = [one.physical() for one in results]
     responses = [is_response(one) for one in results]
     if any(responses):
-        flags = {"--stages": options.stages, "--shares": options.shares, "--mark": options.mark}
+        flags = {
+            "--stages": options.stages,
+            "--shares": options.shares,
+            "--mark": options.mark,
+            "--branches": options.branches,
+        }
         _draws_alone("a response", options, flags)
     sheets = (_response_sheets if responses[0] else _sweep_sheets)(results, options)
     if options.units == "physical":
         sheets = [(f"{name}_physical", draw) for name, draw in sheets]
     targets = [_targets(options, name, len(sheets) == 1) for name, _ in sheets]
-    check_figures([path for paths in targets for path in paths], options.results, options.overwrite)
+    size = _write(sheets, targets, options)
+    say(f"{'; '.join(map(_lanes_in_words, results))}, {size}")
+
+
+def _write(
+    sheets: "Sequence[Sheet]", targets: Sequence[Sequence[Path]], options: PlotOptions
+) -> str:
+    """Draw and write pages in their formats, and return the size of the last one in words."""
+    from gearchaos.figures.page import check_figures, save_figure
+
+    sources = [*options.results, *([options.branches] if options.branches else [])]
+    check_figures([path for paths in targets for path in paths], sources, options.overwrite)
     with progress(len(sheets), unit="pages") as bar:
         for (_, draw), paths in zip(sheets, targets, strict=True):
             figure = draw()
@@ -143,8 +171,61 @@ def _plot(options: PlotOptions) -> None:
                 bar.write(str(path))
             bar.update()
     width, height = (25.4 * inches for inches in figure.get_size_inches())
-    size = f"{width:.0f} mm x {height:.0f} mm at {options.dpi} dpi"
-    say(f"{'; '.join(map(_lanes_in_words, results))}, {size}")
+    return f"{width:.0f} mm x {height:.0f} mm at {options.dpi} dpi"
+
+
+def _plot_branches(options: PlotOptions) -> None:
+    """Draw the page of a file of branches."""
+    from gearchaos.figures.branches import branches_page
+    from gearchaos.figures.style import SINGLE_COLUMN_MM
+    from gearchaos.results.files.branch_reader import read_branches
+
+    flags: dict[str, object] = {
+        "--stages": options.stages,
+        "--shares": options.shares,
+        "--mark": options.mark,
+        "--at": options.at,
+        "--branches": options.branches,
+        "--units": options.units == "physical",
+    }
+    _draws_alone("a file of branches", options, flags)
+    found = read_branches(options.results[0])
+    name = "" if options.variable is None else f"_{options.variable}"
+    width, between = options.width or SINGLE_COLUMN_MM, (options.low, options.high)
+    size: dict[str, Any] = {"between": between, "width_mm": width, "height_mm": options.height}
+    draw = partial(branches_page, found, options.variable, **size)
+    drawn = _write([(name, draw)], [_targets(options, name, alone=True)], options)
+    orbits = sum(one.value.size for one in found.branches)
+    say(f"{len(found.branches)} branches, {orbits} orbits over {found.parameter.name}, {drawn}")
+
+
+def _with_branches(
+    results: "Sequence[Result]", options: PlotOptions, draw: "Callable[[], Page]"
+) -> "Callable[[], Page]":
+    """Return the function that draws a diagram with the branches of --branches."""
+    if options.branches is None:
+        return draw
+    from gearchaos.figures.branches import add_branches
+    from gearchaos.results.files.branch_reader import read_branches
+
+    found, axis = read_branches(options.branches), results[0].axis
+    if found.parameter.name != axis:
+        raise FigureError(
+            f"--branches {options.branches}: holds branches over {found.parameter.name}, and the "
+            f"diagram is over {axis}; give the branches of this sweep"
+        )
+    if options.units == "physical":
+        raise FigureError(
+            "--branches: branches are dimensionless; leave --units physical out, or the branches"
+        )
+
+    def drawn() -> "Page":
+        figure = draw()
+        between = (options.low, options.high)
+        add_branches(figure, found, options.variable, between=between)
+        return figure
+
+    return drawn
 
 
 def _draws_alone(page: str, options: PlotOptions, flags: Mapping[str, object]) -> None:
@@ -178,21 +259,27 @@ def _sweep_sheets(results: "Sequence[Result]", options: PlotOptions) -> "list[Sh
     width, height = options.width or SINGLE_COLUMN_MM, options.height
     between = (options.low, options.high)
     if options.shares:
-        flags = {"--variable": options.variable, "--stages": options.stages}
+        flags: dict[str, object] = {
+            "--variable": options.variable,
+            "--stages": options.stages,
+            "--branches": options.branches,
+        }
         _draws_alone("a figure of shares", options, flags)
         return [(f"{name}_shares", partial(shares_page, results[0], between, width, height))]
     size: dict[str, Any] = {"between": between, "width_mm": width, "height_mm": height}
     maps = [axes for axes in map(swept_axes, results) if len(axes) > 1]
     if maps:
         page = f"a map, of which --at {maps[0][0]}=VALUE makes a diagram"
-        _draws_alone(page, options, {"--stages": options.stages})
+        _draws_alone(page, options, {"--stages": options.stages, "--branches": options.branches})
         draw = partial(map_page, results[0], options.variable, marked=marked, **size)
         return [(name, draw)]
     name += "_stages" if options.stages else ""
     shown: dict[str, Any] = {"stages": options.stages, "labels": _titles(results, options.results)}
     if marked:
         shown["marked"] = (in_words(results[0], marked), [*marked.values()])
-    return [(name, partial(bifurcation_page, results, options.variable, **shown, **size))]
+    draw = partial(bifurcation_page, results, options.variable, **shown, **size)
+    name += "_with_branches" if options.branches else ""
+    return [(name, _with_branches(results, options, draw))]
 
 
 def _detail(result: "Result", options: PlotOptions) -> str:

@@ -33,11 +33,14 @@ APART = 1e-6
 NEAR_ON_CURVE = 1e-4
 """Largest distance along the curve between both sides of a located end."""
 
-DIFFERENCE = 1e-6
+DIFFERENCE = 1e-8
 """Share of the way used for the difference quotient of the map by the parameter."""
 
 ROUNDING = 1e-15
 """Return distance that rounding leaves, relative to the largest entry of the Jacobian."""
+
+NEAR_ENOUGH = 1e-5
+"""Distance from a guess up to which its derivative by the parameter is used for the tangent."""
 
 HALF_RETURN = 1e-2
 """Half-period return distance below which a curve ends in an orbit of half the period.
@@ -182,6 +185,8 @@ class Curve(NamedTuple):
             size = float(np.max(np.abs(defect)))
             # Rounding of the state grows with the largest multiplier.
             if size <= max(CLOSED, ROUNDING * float(np.max(np.abs(slopes)))):
+                if by_share is not None and np.linalg.norm(place - guess) > NEAR_ENOUGH:
+                    slopes = self._defect(place)[1]
                 if not np.isfinite(slopes).all():
                     break
                 return self._point(place, slopes, direction, size, passed)

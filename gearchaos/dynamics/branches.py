@@ -39,8 +39,11 @@ from gearchaos.records.branch import (
     TOO_MANY,
 )
 
-LONGEST = 0.15
+LONGEST = 0.1
 """Longest step along a branch."""
+
+SMOOTH = 0.97
+"""Least cosine between tangents of successive points: lines through them look smooth."""
 
 MOST_POINTS = 4000
 """Largest number of points computed along one direction of a branch."""
@@ -197,16 +200,28 @@ def trace(curve: Curve, start: CurvePoint, one_way: bool = False) -> TracedBranc
         behind, first = _half(curve, start._replace(tangent=-start.tangent))
     points = [one._replace(tangent=-one.tangent) for one in behind[:0:-1]] + ahead
     ends = (last, last) if last == CLOSED_CURVE else (first, last)
-    places = np.array([one.place for one in points])
+    return _with_specials(curve, points, ends)
+
+
+def _with_specials(curve: Curve, points: list[CurvePoint], ends: tuple[str, str]) -> TracedBranch:
+    """Return the branch through points, with its special points located and among its points."""
+    found: list[tuple[int, tuple[str, CurvePoint, int]]] = []
+    joined = points[:1]
+    for one, other in pairwise(points):
+        chord = other.place - one.place
+        between = _specials_between(curve, one, other)
+        between.sort(key=lambda special: float((special[1].place - one.place) @ chord))
+        for special in between:
+            found.append((len(joined), special))
+            joined.append(special[1])
+        joined.append(other)
+    places = np.array([one.place for one in joined])
     lengths = np.linalg.norm(np.diff(places, axis=0), axis=1)
     positions = np.concatenate([[0.0], np.cumsum(lengths)])
-    specials: list[Special] = []
-    for (one, other), position in zip(pairwise(points), positions, strict=False):
-        for kind, point, flank in _specials_between(curve, one, other):
-            at = float(position + np.linalg.norm(point.place - one.place))
-            specials.append(Special(kind, point, flank, at))
-    specials.sort(key=lambda one: one.position)
-    return TracedBranch(curve, points, places, positions, specials, ends)
+    specials = [
+        Special(kind, point, flank, float(positions[at])) for at, (kind, point, flank) in found
+    ]
+    return TracedBranch(curve, joined, places, positions, specials, ends)
 
 
 def doubled_start(curve: Curve, doubling: CurvePoint) -> CurvePoint | None:
@@ -290,7 +305,7 @@ def _succeeds(here: CurvePoint, trial: CurvePoint, step: float) -> bool:
     """Whether a point may be the next one: the curve is straight, the multipliers change little."""
     before, after = (float(np.sum(one.multipliers).real) for one in (here, trial))
     calm = abs(after - before) <= CALM * (1.0 + abs(before))
-    return bool(trial.tangent @ here.tangent >= STRAIGHT and (calm or step <= FIRST_STEP))
+    return bool(trial.tangent @ here.tangent >= SMOOTH and (calm or step <= FIRST_STEP))
 
 
 def _passes_half(here: CurvePoint, trial: CurvePoint) -> bool:

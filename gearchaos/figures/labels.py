@@ -33,9 +33,13 @@ def axis_label(result: Result, name: str, line_length: int = 60) -> str:
         Such as ``Largest Lyapunov exponent, $\\lambda_1$ (per unit of $\\tau$)``. Pure numbers have
         no unit.
     """
-    variable = result.variables[name]
-    wording = " ".join((variable.long_name or name).split())
-    symbol, unit = _formula(variable.symbol), unit_of(result, name)
+    return label_of(result.variables[name], line_length)
+
+
+def label_of(variable: Variable, line_length: int = 60) -> str:
+    """Compose the label of a variable as `axis_label` does, from its description alone."""
+    wording = " ".join((variable.long_name or variable.name).split())
+    symbol, unit = _formula(variable.symbol), _unit(variable)
     words = [plain(word) for word in (wording[:1].upper() + wording[1:]).split(" ")]
     # The symbol stays on the line of the last word.
     if symbol:
@@ -49,7 +53,11 @@ def axis_label(result: Result, name: str, line_length: int = 60) -> str:
 
 def unit_of(result: Result, name: str) -> str:
     """Word the unit or the scale of a variable; the empty string for a pure number."""
-    variable = _known(result)[name]
+    return _unit(_known(result)[name])
+
+
+def _unit(variable: Variable) -> str:
+    """Word the unit or the scale of a variable from its description."""
     if variable.units in ("", "1"):
         return variable.scale.stands_for
     words = plain(re.sub(r"\bum\b", "\N{MICRO SIGN}m", variable.units))

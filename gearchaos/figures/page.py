@@ -78,13 +78,28 @@ def page(width_mm: float, height_mm: float) -> Iterator[Page]:
         canvas: Any = FigureCanvasAgg(figure)
         canvas.get_renderer().mathtext_parser = FORMULAE
         yield figure
-        for axes in figure.axes:
-            light(axes)
-        # Ticks are created when they are first measured, in the style of that moment.
-        layout.execute(figure)
-        # Repeating the layout takes longer than the drawing itself. With the engine "none",
-        # matplotlib would draw each page twice.
-        figure.set_layout_engine(None)
+        _lay_out(figure, layout)
+
+
+@contextmanager
+def continued(figure: Page) -> Iterator[None]:
+    """Draw more into a finished page, which is then laid out again."""
+    layout = ConstrainedLayoutEngine()
+    with styled():
+        figure.set_layout_engine(layout)
+        yield
+        _lay_out(figure, layout)
+
+
+def _lay_out(figure: Page, layout: ConstrainedLayoutEngine) -> None:
+    """Place the parts of a drawn page once and for all."""
+    for axes in figure.axes:
+        light(axes)
+    # Ticks are created when they are first measured, in the style of that moment.
+    layout.execute(figure)
+    # Repeating the layout takes longer than the drawing itself. With the engine "none",
+    # matplotlib would draw each page twice.
+    figure.set_layout_engine(None)
 
 
 column = partial(page, SINGLE_COLUMN_MM)

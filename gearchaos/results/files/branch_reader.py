@@ -10,6 +10,7 @@ import numpy as np
 
 from gearchaos.arrays import Array, Floats
 from gearchaos.errors import FileError
+from gearchaos.models.catalogues import scale_of
 from gearchaos.outputs.names import SECTION, STATE
 from gearchaos.outputs.variable import Variable
 from gearchaos.records.branch import BRANCH_ENDS, SPECIAL_KINDS, PeriodicBranch, SpecialPoint
@@ -139,7 +140,8 @@ def _described(name: str, dataset: h5py.Dataset, notes: Mapping[str, Any]) -> Va
     """Return the description of a variable without its values."""
     units, long_name, symbol = (str(notes.get(key, "")) for key in ("units", "long_name", "symbol"))
     dims = stored.dims_of(name, dataset, notes, {})
-    return Variable(name, dims, stored.dtype_of(name, dataset), units, long_name, symbol)
+    dtype, scale = stored.dtype_of(name, dataset), scale_of(name.removeprefix(OF_SPECIAL))
+    return Variable(name, dims, dtype, units, long_name, symbol, scale=scale)
 
 
 def _section(

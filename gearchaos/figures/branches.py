@@ -1,0 +1,262 @@
+"""Branches of periodic orbits: into a bifurcation diagram, and on a page of their own."""
+
+from collections.abc import Iterator, Sequence
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.lines import Line2D
+
+from gearchaos.arrays import Floats
+from gearchaos.errors import FigureError
+from gearchaos.figures.labels import check_variable, label_of
+from gearchaos.figures.lanes import Between
+from gearchaos.figures.page import Page, continued, footnote, legend_below, letter, page
+from gearchaos.figures.style import BLUE, GREEN, GREY, ORANGE, PURPLE, SINGLE_COLUMN_MM, VERMILION
+from gearchaos.models.gear_pair.outputs import DEFAULT_VARIABLE
+from gearchaos.outputs.variable import Variable
+from gearchaos.records.branch import (
+    BRANCH_POINT,
+    FOLD,
+    GRAZING,
+    NEIMARK_SACKER,
+    PERIOD_DOUBLING,
+    PeriodicBranch,
+)
+from gearchaos.results.files.branch_file import BranchSet
+
+MARKERS: dict[str, dict[str, Any]] = {
+    FOLD: {"marker": "o", "color": ORANGE},
+    BRANCH_POINT: {"marker": "*", "color": PURPLE},
+    PERIOD_DOUBLING: {"marker": "s", "color": BLUE},
+    NEIMARK_SACKER: {"marker": "D", "color": PURPLE},
+    GRAZING: {"marker": "x", "color": GREY},
+}
+"""Marker and colour of each kind of special point."""
+
+STABLE: dict[str, Any] = {"color": GREEN, "linestyle": "-", "linewidth": 0.9}
+UNSTABLE: dict[str, Any] = {"color": VERMILION, "linestyle": (0, (4, 1.5)), "linewidth": 0.6}
+ON_CIRCLE = 1e-6
+"""Distance of a multiplier from the unit circle within which its side is not known."""
+
+LEAST_MODULUS = 1e-4
+"""Smallest modulus of a multiplier that a page shows."""
+
+
+def draw_branches(
+    axes: Axes,
+    found: BranchSet,
+    variable: str | None = None,
+    *,
+    between: Between = (None, None),
+) -> list[Line2D]:
+    """Draw branches into axes over the swept parameter, with their special points.
+
+    Parameters
+    ----------
+    axes : Axes
+        Axes with the parameter along x, such as those of `bifurcation`. Their limits along x stay;
+        those along y grow where branches need it.
+    found : BranchSet
+        The branches.
+    variable : str, optional
+        A section variable, by default that of the first state that the diagram would show, or an
+        output of the orbits, such as ``"load_factor_largest"``.
+    between : (float or None, float or None)
+        Part of the parameter range whose branches are drawn.
+
+    Returns
+    -------
+    list of Line2D
+        One entry for the legend for each kind of line and marker.
+
+    Raises
+    ------
+    FigureError
+        If the branches have no such variable.
+
+    Notes
+    -----
+    Stable orbits are solid lines, unstable ones dashed lines. A branch of period n is n lines, one
+    for each of its section points. Lines and markers are as in `MARKERS`.
+    """
+    name = checked_variable(found, variable)
+    low, high = between
+    limits = (-np.inf if low is None else low, np.inf if high is None else high)
+    heights: list[Floats] = []
+    kinds: dict[str, Line2D] = {}
+    for branch in found.branches:
+        rows = _rows(found, branch, name)
+        inside = (limits[0] <= branch.value) & (branch.value <= limits[1])
+        heights.append(rows[inside].ravel())
+        for piece, stable in _pieces(branch):
+            label = "stable orbits" if stable else "unstable orbits"
+            look = STABLE if stable else UNSTABLE
+            # Below the markers, above the dots of the sweep.
+            lines = axes.plot(branch.value[piece], rows[piece], zorder=3.0 + stable / 10, **look)
+            kinds.setdefault(label, lines[0]).set_label(label)
+        for kind, line in _draw_specials(axes, found, branch, name, limits):
+            kinds.setdefault(kind, line).set_label(kind)
+    _include(axes, np.concatenate([np.zeros(0), *heights]))
+    order = ["stable orbits", "unstable orbits", *MARKERS]
+    return [kinds[kind] for kind in order if kind in kinds]
+
+
+def checked_variable(found: BranchSet, variable: str | None) -> str:
+    """Return the name of a section or an output of the orbits, or the default."""
+    sections = [one.name for one in found.states]
+    default = DEFAULT_VARIABLE if DEFAULT_VARIABLE in sections else sections[0]
+    there = (*sections, *(one.name for one in found.quantities))
+    check_variable(variable or default, there, "of the branches")
+    return variable or default
+
+
+def _described(found: BranchSet, name: str) -> Variable:
+    """Return the description of a variable of the branches."""
+    return next(one for one in (*found.states, *found.quantities) if one.name == name)
+
+
+def _rows(found: BranchSet, branch: PeriodicBranch, name: str) -> Floats:
+    """Return the values to draw of a branch, (points, lines)."""
+    sections = [one.name for one in found.states]
+    if name in sections:
+        return branch.section[:, :, sections.index(name)]
+    return branch.quantities[name][:, np.newaxis]
+
+
+def _pieces(branch: PeriodicBranch) -> Iterator[tuple[slice, bool]]:
+    """Cut the points of a branch into pieces of one stability that share their end points."""
+    # At a special point a modulus is 1 but for rounding; it belongs to the pieces on both sides.
+    unstable = np.abs(branch.multipliers[:, 0]) > 1.0 + ON_CIRCLE
+    stable = ~(unstable[1:] | unstable[:-1])
+    changes = np.flatnonzero(np.diff(stable)) + 1
+    for begin, end in pairwise([0, *changes.tolist(), stable.size]):
+        if end > begin:
+            yield slice(begin, end + 1), bool(stable[begin])
+
+
+def _draw_specials(
+    axes: Axes, found: BranchSet, branch: PeriodicBranch, name: str, limits: tuple[float, float]
+) -> Iterator[tuple[str, Line2D]]:
+    """Draw the special points of a branch within limits; yield the kind and the line of each."""
+    sections = [one.name for one in found.states]
+    rows = _rows(found, branch, name)
+    for special in branch.specials:
+        if not limits[0] <= special.value <= limits[1]:
+            continue
+        if name in sections:
+            heights = special.section[:, sections.index(name)]
+        else:
+            order = np.interp(special.arclength, branch.arclength, rows[:, 0])
+            heights = np.array([order])
+        look: dict[str, Any] = {"ms": 2.5, "mew": 0.6, "mfc": "white", "ls": "none", "zorder": 4.0}
+        values = np.full(heights.size, special.value)
+        (line,) = axes.plot(values, heights, **look, **MARKERS[special.kind])
+        yield special.kind, line
+
+
+def _include(axes: Axes, heights: Floats) -> None:
+    """Extend the limits along y by a margin beyond heights, some of which may be NaN."""
+    if not np.isfinite(heights).any():
+        return
+    low, high = axes.get_ylim()
+    least, most = float(np.nanmin(heights)), float(np.nanmax(heights))
+    pad = 0.04 * (max(high, most) - min(low, least))
+    axes.set_ylim(min(low, least - pad), max(high, most + pad))
+
+
+def add_branches(
+    figure: Page, found: BranchSet, variable: str | None = None, *, between: Between = (None, None)
+) -> None:
+    """Draw branches into the upper panel of a page of `bifurcation_page`, with a legend below.
+
+    Parameters
+    ----------
+    figure : Page
+        The page.
+    found, variable, between
+        As for `draw_branches`.
+
+    Raises
+    ------
+    FigureError
+        If the branches have no such variable.
+    """
+    with continued(figure):
+        handles = draw_branches(figure.axes[0], found, variable, between=between)
+        # The legend takes the place of the footnote, which becomes its title.
+        legend_below(figure, handles, figure.get_supxlabel() or None, 4)
+        footnote(figure, " ")
+
+
+def branches_page(
+    found: BranchSet,
+    variable: str | None = None,
+    *,
+    between: Between = (None, None),
+    width_mm: float = SINGLE_COLUMN_MM,
+    height_mm: float | None = None,
+) -> Page:
+    """Draw branches over the parameter (a) above their Floquet multipliers over the arclength (b).
+
+    Parameters
+    ----------
+    found : BranchSet
+        The branches.
+    variable, between
+        As for `draw_branches`.
+    width_mm, height_mm : float
+        Size of the page.
+
+    Returns
+    -------
+    Page
+        A figure unknown to pyplot.
+
+    Raises
+    ------
+    FigureError
+        If there are no branches, or no such variable.
+    """
+    if not found.branches:
+        raise FigureError("nothing to draw: the file holds no branch")
+    name = checked_variable(found, variable)
+    with page(width_mm, height_mm or 55.0 + 0.55 * width_mm) as figure:
+        upper, lower = figure.subplots(2, 1, height_ratios=(1.6, 1.0))
+        values = np.concatenate([one.value for one in found.branches])
+        low, high = between
+        upper.set_xlim(values.min() if low is None else low, values.max() if high is None else high)
+        rows = np.concatenate([_rows(found, one, name).ravel() for one in found.branches])
+        upper.set_ylim(float(np.nanmin(rows)), float(np.nanmax(rows)))
+        handles = draw_branches(upper, found, name, between=between)
+        upper.set_xlabel(label_of(found.parameter))
+        upper.set_ylabel(label_of(_described(found, name), 34))
+        _draw_multipliers(lower, found.branches)
+        for axes in (upper, lower):
+            axes.yaxis.label.set_linespacing(1.0)
+        legend_below(figure, handles, str(found.metadata.get("title", "")) or None, 3)
+        letter((upper, lower))
+    return figure
+
+
+def _draw_multipliers(axes: Axes, branches: Sequence[PeriodicBranch]) -> list[Artist]:
+    """Draw the moduli of all multipliers over the arclength, one branch beside the other."""
+    drawn: list[Artist] = [axes.axhline(1.0, color=GREY, linewidth=0.5, linestyle=(0, (4, 2)))]
+    offset, places, names = 0.0, [], []
+    least = min(float(np.abs(one.multipliers).min()) for one in branches)
+    for branch in branches:
+        moduli = np.maximum(np.abs(branch.multipliers), LEAST_MODULUS)
+        drawn += axes.plot(offset + branch.arclength, moduli, color="black", linewidth=0.6)
+        length = float(branch.arclength[-1])
+        places.append(offset + length / 2.0)
+        names.append(str(branch.period))
+        offset += length
+        drawn.append(axes.axvline(offset, color="0.8", linewidth=0.5, zorder=0.0))
+    axes.set(yscale="log", xlim=(0.0, offset), ylim=(max(least / 2.0, LEAST_MODULUS), None))
+    axes.set_xticks(places, names)
+    axes.tick_params(axis="x", which="both", length=0.0)
+    axes.set_xlabel("Period of the branch; along its arclength")
+    axes.set_ylabel("Modulus of the\nFloquet multipliers")
+    return drawn
