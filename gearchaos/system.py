@@ -7,7 +7,7 @@
 
 from collections.abc import Mapping
 from functools import cached_property
-from typing import NamedTuple, Self
+from typing import Any, NamedTuple, Self
 
 import gearchaos_kernels as kernels
 import numpy as np
@@ -22,6 +22,8 @@ from gearchaos.arguments import (
 )
 from gearchaos.arguments import state as checked_state
 from gearchaos.arrays import Floats
+from gearchaos.dynamics.branches import trace
+from gearchaos.dynamics.embedded import CLOSE_RETURN_RECORD, embedded_orbits
 from gearchaos.dynamics.exponents import (
     Exponents,
     contact_shares,
@@ -33,6 +35,7 @@ from gearchaos.dynamics.orbits import Orbits, polish
 from gearchaos.dynamics.plans import plan_of
 from gearchaos.dynamics.stability import fewest_stable_steps
 from gearchaos.dynamics.stability_loss import STABILITY_LOSS_TEXTS, StabilityLoss
+from gearchaos.engine.branching import BranchRange, arrays_of_branch
 from gearchaos.engine.choosing import with_chosen_steps
 from gearchaos.engine.lanes import Lanes, start_states
 from gearchaos.engine.method_choice import with_method
@@ -45,6 +48,8 @@ from gearchaos.models import Given, axis_values, configuration_of, swept_values
 from gearchaos.models.registry import system_of
 from gearchaos.outputs.catalogue import DEFAULT_PERIODS
 from gearchaos.records.amplitude_spectrum import SpectralLines, spectral_lines
+from gearchaos.records.branch import PeriodicBranch
+from gearchaos.records.period import coordinate_scale
 from gearchaos.results.reading.result import Result
 
 
@@ -212,12 +217,7 @@ class System:
             transient_periods=transient, recorded_periods=periods, history_periods=periods
         )
         outcome = kernels.integrate(self._record, self._start(start), plan)
-        if outcome.status[0] != Status.OK:
-            raise ConfigurationError(
-                f"{self.config.source}: the motion {kernels.STATUS_TEXTS[outcome.status[0]]} in "
-                f"mesh period {outcome.diverged_period[0]}; raise integration.steps_per_period or "
-                "check the load and the start state"
-            )
+        self._require_sound(outcome)
         states = outcome.history[0]
         return Trajectory(np.arange(states.shape[0]) / plan.steps_per_period, states, transient)
 
@@ -326,6 +326,106 @@ class System:
         )
         return self._branch(followed, orbit.period)
 
+    def branch(self, orbit: Orbit, parameter: str, first: float, last: float) -> PeriodicBranch:
+        """Follow an orbit over a parameter as a whole branch, stable and unstable.
+
+        Parameters
+        ----------
+        orbit : Orbit
+            The orbit of this system.
+        parameter : str
+            Name of a group, or path of a physical key.
+        first, last : float
+            Ends of the range, in the unit of the parameter; the value of this system lies between.
+
+        Returns
+        -------
+        PeriodicBranch
+            The branch through the orbit, around its folds, with its special points. It ends where
+            it leaves the range, closes on itself, or meets the orbit of half its period.
+
+        Raises
+        ------
+        ConfigurationError
+            If the parameter is unknown, if a value is out of its range, or if the orbit is not one
+            of this system.
+
+        Examples
+        --------
+        >>> system = System("sweeps/pan2021.toml", pitch_error=1.2)
+        >>> branch = system.branch(system.orbit(), "pitch_error", 0.5, 2.0)
+        >>> [special.kind for special in branch.specials]
+        ['grazing', 'fold', 'fold']
+        """
+        instance("orbit", orbit, Orbit, "System.orbit finds it")
+        instance("parameter", parameter, str, "name a group, or a key by its path")
+        low, high = finite_number("first", first), finite_number("last", last)
+        for end in (low, high):
+            self.config.at(coordinates("parameter", {parameter: end}))
+        over = BranchRange(lambda values: self._at({parameter: values}), low, high)
+        here = self._value(parameter)
+        if not min(low, high) < here < max(low, high):
+            raise ConfigurationError(
+                f"{parameter} = {here:g}: must lie between first = {low:g} and last = {high:g}"
+            )
+        point = checked_state("orbit.point", orbit.point, self.states)
+        curve = over.curve(self._plan, orbit.period, coordinate_scale(point[np.newaxis])[0])
+        share = float(over.share(np.array(here)))
+        guess = np.append(point[0] / curve.scale, share)
+        start = curve.corrected(guess, np.append(np.zeros(guess.size - 1), 1.0))
+        if start is None:
+            raise ConfigurationError(
+                f"{self.config.source}: the orbit is none of this system at {parameter} = {here:g};"
+                " find it with System.orbit of the same system"
+            )
+        return arrays_of_branch(over, trace(curve, start), plan_run(self.config))
+
+    def orbits(self, period: int, record: int = CLOSE_RETURN_RECORD) -> list[Orbit]:
+        """Find the periodic orbits that the motion comes near, also unstable ones within chaos.
+
+        Parameters
+        ----------
+        period : int
+            Period in excitation periods; orbits that repeat earlier are left out.
+        record : int
+            Excitation periods of the record, after the configured transient.
+
+        Returns
+        -------
+        list of Orbit
+            Each orbit once, the least unstable first.
+
+        Raises
+        ------
+        ConfigurationError
+            If the motion leaves the range of numbers.
+
+        Notes
+        -----
+        Section points that nearly return after the period are guesses for Newton's method, see
+        `embedded_orbits`.
+
+        Examples
+        --------
+        >>> system = System("sweeps/pan2021.toml", pitch_error=12.47)
+        >>> system.orbits(1)[0].stable
+        False
+        """
+        period = whole_number("period", period, least=1)
+        record = whole_number("record", record, least=period + 1)
+        repeats = self.repeats_after
+        transient = self.config.integration.transient_periods
+        plan = self._plan._replace(
+            transient_periods=-(-transient // repeats) * repeats,
+            recorded_periods=record * repeats,
+            section_points=record * repeats,
+        )
+        outcome = kernels.integrate(self._record, self._start(None), plan)
+        self._require_sound(outcome)
+        section = outcome.every(repeats).section[0]
+        found = embedded_orbits(self._record, section, period, self._plan)
+        return [self._orbit(found.of(lane), period) for lane in range(found.converged.size)]
+
     def exponents(self, start: Floats | None = None) -> Exponents:
         """Compute all Lyapunov exponents over the configured record, after its transient.
 
@@ -429,6 +529,27 @@ class System:
     def _plan(self) -> Plan:
         """The plan of an integration with these steps."""
         return plan_of(self.config, steps_per_period=self._steps)
+
+    def _require_sound(self, outcome: kernels.Outcome) -> None:
+        """Raise a ConfigurationError if the motion of the only lane diverged."""
+        if outcome.status[0] != Status.OK:
+            raise ConfigurationError(
+                f"{self.config.source}: the motion {kernels.STATUS_TEXTS[outcome.status[0]]} in "
+                f"mesh period {outcome.diverged_period[0]}; raise integration.steps_per_period or "
+                "check the load and the start state"
+            )
+
+    def _value(self, parameter: str) -> float:
+        """Return the value of a parameter in this system; ConfigurationError if it is derived."""
+        value: Any = self.config.tables()
+        for name in self.config.parameters[parameter].path.split("."):
+            value = value.get(name) if isinstance(value, dict) else None
+        if not isinstance(value, int | float):
+            raise ConfigurationError(
+                f"{parameter}: has no value of its own in {self.config.source}, it is derived; "
+                f"give it, such as System(config, {parameter}=...)"
+            )
+        return float(value)
 
     def _at(self, values: Mapping[str, Floats]) -> kernels.LaneSystem:
         """Return the system at values of parameters, one lane per value."""

@@ -1,6 +1,6 @@
 """Periodic orbits and their Floquet multipliers, found by Newton's method on the resolved map."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 from gearchaos_kernels import LaneSystem, Plan, integrate
@@ -46,6 +46,11 @@ class Orbits(NamedTuple):
     residual: Floats
     converged: Mask
 
+    def of(self, lanes: Any) -> Self:
+        """Return the orbits of some lanes; a single number gives one lane."""
+        chosen = np.atleast_1d(lanes)
+        return type(self)(*(array[chosen] for array in self))
+
     @property
     def stable(self) -> Mask:
         """Whether there is an orbit whose multipliers all lie inside the unit circle, (lanes,)."""
@@ -53,7 +58,9 @@ class Orbits(NamedTuple):
         return inside
 
 
-def polish(system: LaneSystem, guess: Floats, period: Counts, plan: Plan) -> Orbits:
+def polish(
+    system: LaneSystem, guess: Floats, period: Counts, plan: Plan, scale: Floats | None = None
+) -> Orbits:
     """Find the periodic orbit next to the guess of every lane.
 
     Parameters
@@ -66,6 +73,8 @@ def polish(system: LaneSystem, guess: Floats, period: Counts, plan: Plan) -> Orb
         Period in excitation periods, 0 for lanes without a search.
     plan : Plan
         Method and steps per period; crossings are always resolved.
+    scale : array, shape (states,), optional
+        Scales of the states; by default those of the section of each lane, see the notes.
 
     Returns
     -------
@@ -91,19 +100,19 @@ def polish(system: LaneSystem, guess: Floats, period: Counts, plan: Plan) -> Orb
         # With a tangent: map and Jacobian then share one kernel and agree bit for bit.
         whole = n * system.repeats_after
         once = Plan(plan.steps_per_period, 0, whole, whole, tangent=True, method=plan.method)
-        polished = _polish(system.of(chosen), guess[chosen], once)
+        polished = _polish(system.of(chosen), guess[chosen], once, scale)
         for all_lanes, some in zip(found, polished, strict=True):
             all_lanes[chosen] = some
     return found
 
 
-def _polish(system: LaneSystem, guess: Floats, plan: Plan) -> Orbits:
-    """Find the orbits of lanes with one period; ``guess`` (lanes, states)."""
+def _polish(system: LaneSystem, guess: Floats, plan: Plan, given: Floats | None) -> Orbits:
+    """Find the orbits of lanes with one period; ``guess`` (lanes, states), ``given`` scales."""
     lanes = np.arange(guess.shape[0])
     start, points = guess, guess.copy()
     repeats = system.repeats_after
     section = integrate(system, points, plan).every(repeats).section
-    scale = coordinate_scale(section)
+    scale = coordinate_scale(section) if given is None else np.tile(given, (lanes.size, 1))
     residual = _distance(section[:, -1], points, scale)
     searching = np.isfinite(residual)
     for _ in range(NEWTON_STEPS):

@@ -1,7 +1,7 @@
 """The branches of a sweep: the curves of the periodic orbits it found, and their doublings."""
 
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -18,7 +18,7 @@ from gearchaos.engine.run_plan import RunPlan, plan_run
 from gearchaos.engine.running import choose_threads
 from gearchaos.errors import ConfigurationError
 from gearchaos.interrupts import check
-from gearchaos.models import Configuration, swept_values
+from gearchaos.models import swept_values
 from gearchaos.models.registry import system_of
 from gearchaos.outputs import names as known
 from gearchaos.outputs.catalogue import SECTION_PART
@@ -93,7 +93,12 @@ def find_branches(
         )
     choose_threads(threads)
     values = np.unique(swept_values(config.sweep))
-    search = _Search(BranchRange(config, float(values[0]), float(values[-1])), longest)
+
+    def systems(at: Floats) -> LaneSystem:
+        return system_of(config, {parameter: at}, config.needed_effects)
+
+    over = BranchRange(systems, float(values[0]), float(values[-1]))
+    search = _Search(over, plan_run(config), longest)
     for motion in search.motions(result, swept[0]):
         check()
         search.follow(motion)
@@ -105,13 +110,13 @@ class BranchRange(NamedTuple):
 
     Attributes
     ----------
-    config : Configuration
-        The configuration with which orbits are computed.
+    system_of : callable
+        Returns the systems of the lanes at values (lanes,) of the parameter.
     low, high : float
         The range; shares of the way run from the first to the second.
     """
 
-    config: Configuration
+    system_of: Callable[[Floats], LaneSystem]
     low: float
     high: float
 
@@ -125,8 +130,7 @@ class BranchRange(NamedTuple):
 
     def system_at(self, shares: Floats) -> LaneSystem:
         """Return the systems at shares of the way (lanes,)."""
-        values = {self.config.sweep.parameter: self.value(shares)}
-        return system_of(self.config, values, self.config.needed_effects)
+        return self.system_of(self.value(shares))
 
     def curve(self, plan: Plan, period: int, scale: Floats) -> Curve:
         """Return the curve of orbits of a period, with scales (states,) of the states."""
@@ -139,10 +143,9 @@ class BranchRange(NamedTuple):
 class _Search:
     """The branches that are known so far; arguments as in `find_branches`."""
 
-    def __init__(self, over: BranchRange, longest: int) -> None:
-        self.over, self.longest = over, longest
+    def __init__(self, over: BranchRange, run: RunPlan, longest: int) -> None:
+        self.over, self.run, self.longest = over, run, longest
         self.found: list[TracedBranch] = []
-        self.run = plan_run(over.config)
         self._scale = np.ones(len(self.run.lanes.states))
 
     def motions(self, result: Result, axis: str) -> Iterator[_Motion]:
