@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 from gearchaos.command_line import Command
-from gearchaos.options import Option, Overwrite, Place, Threads, coordinates
+from gearchaos.options import Option, Overwrite, Place, coordinates
 from gearchaos.progress import say
 
 if TYPE_CHECKING:
@@ -58,7 +58,6 @@ class BranchesOptions(NamedTuple):
         Option("use the nearest value of this axis; may be repeated", "NAME=VALUE"),
     ] = ()
     overwrite: Overwrite = False
-    threads: Threads = None
 
 
 def _branches(options: BranchesOptions) -> None:
@@ -70,18 +69,18 @@ def _branches(options: BranchesOptions) -> None:
     source = Path(options.source)
     output = options.output or Path(f"{source.stem}_branches.h5")
     check_output(output, options.overwrite)
-    result = _result(source, options.threads)
+    result = _result(source)
     places = coordinates(options.at, result.axes, result.axis)
     result = result.sel("within", **places) if places else result
     with compiling():
-        found = find_branches(result, options.source, options.periods, options.threads)
+        found = find_branches(result, options.source, options.periods)
     for line in table(found):
         say(line)
     write_branches(output, found, options.overwrite)
     print(output, flush=True)
 
 
-def _result(source: Path, threads: int | None) -> "Result":
+def _result(source: Path) -> "Result":
     """Return the result of a file, or of a configuration, which is computed."""
     from gearchaos.results.reading.result import open_result
 
@@ -90,7 +89,7 @@ def _result(source: Path, threads: int | None) -> "Result":
     from gearchaos.engine.running import run
     from gearchaos.models import load_config
 
-    return run(load_config(source), threads=threads)
+    return run(load_config(source))
 
 
 def table(found: "BranchSet") -> list[str]:

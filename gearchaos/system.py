@@ -42,6 +42,7 @@ from gearchaos.engine.method_choice import with_method
 from gearchaos.engine.recomputing import computable
 from gearchaos.engine.response import respond
 from gearchaos.engine.run_plan import plan_run
+from gearchaos.engine.running import one_thread
 from gearchaos.engine.steps import stable_steps
 from gearchaos.errors import ConfigurationError
 from gearchaos.models import Given, axis_values, configuration_of, swept_values
@@ -368,15 +369,19 @@ class System:
             raise ConfigurationError(
                 f"{parameter} = {here:g}: must lie between first = {low:g} and last = {high:g}"
             )
+        with one_thread():
+            return self._traced(over, orbit, float(over.share(np.array(here))))
+
+    def _traced(self, over: BranchRange, orbit: Orbit, share: float) -> PeriodicBranch:
+        """Return the branch through an orbit at a share of the range."""
         point = checked_state("orbit.point", orbit.point, self.states)
         curve = over.curve(self._plan, orbit.period, coordinate_scale(point[np.newaxis])[0])
-        share = float(over.share(np.array(here)))
         guess = np.append(point[0] / curve.scale, share)
         start = curve.corrected(guess, np.append(np.zeros(guess.size - 1), 1.0))
         if start is None:
             raise ConfigurationError(
-                f"{self.config.source}: the orbit is none of this system at {parameter} = {here:g};"
-                " find it with System.orbit of the same system"
+                f"{self.config.source}: the orbit is none of this system; find it with "
+                "System.orbit of the same system"
             )
         return arrays_of_branch(over, trace(curve, start), plan_run(self.config))
 

@@ -15,7 +15,7 @@ from gearchaos.engine.kept import recorded_quantities, variables_of
 from gearchaos.engine.provenance import provenance
 from gearchaos.engine.recomputing import computable
 from gearchaos.engine.run_plan import RunPlan, plan_run
-from gearchaos.engine.running import choose_threads
+from gearchaos.engine.running import one_thread
 from gearchaos.errors import ConfigurationError
 from gearchaos.interrupts import check
 from gearchaos.models import swept_values
@@ -46,10 +46,7 @@ class _Motion(NamedTuple):
 
 
 def find_branches(
-    result: Result,
-    name: str = "the result",
-    longest: int = MOST_PERIODS,
-    threads: int | None = None,
+    result: Result, name: str = "the result", longest: int = MOST_PERIODS
 ) -> BranchSet:
     """Follow every periodic motion that a sweep found, through the whole range of the sweep.
 
@@ -61,8 +58,6 @@ def find_branches(
         Name of the result in messages.
     longest : int
         Longest period, in excitation periods.
-    threads : int, optional
-        Number of threads; by default all cores.
 
     Returns
     -------
@@ -91,7 +86,6 @@ def find_branches(
         raise ConfigurationError(
             f"{name}: nothing lies between two values of {parameter}; sweep another parameter"
         )
-    choose_threads(threads)
     values = np.unique(swept_values(config.sweep))
 
     def systems(at: Floats) -> LaneSystem:
@@ -99,10 +93,11 @@ def find_branches(
 
     over = BranchRange(systems, float(values[0]), float(values[-1]))
     search = _Search(over, plan_run(config), longest)
-    for motion in search.motions(result, swept[0]):
-        check()
-        search.follow(motion)
-    return _described(search, result.variables[swept[0]])
+    with one_thread():
+        for motion in search.motions(result, swept[0]):
+            check()
+            search.follow(motion)
+        return _described(search, result.variables[swept[0]])
 
 
 class BranchRange(NamedTuple):

@@ -149,6 +149,17 @@ def choose_threads(threads: int | None) -> None:
     numba.set_num_threads(most if threads is None else threads)
 
 
+@contextmanager
+def one_thread() -> Iterator[None]:
+    """Integrate few lanes in one thread; others would cost more than they save."""
+    before = numba.get_num_threads()
+    numba.set_num_threads(1)
+    try:
+        yield
+    finally:
+        numba.set_num_threads(before)
+
+
 def metadata(run: RunPlan, seconds: float) -> Mapping[str, Any]:
     """Return the metadata of a result, which took a number of seconds."""
     config, repeats = run.config, run.lanes.repeats_after
