@@ -71,6 +71,7 @@ def describe(
             "steps": estimate.steps,
             "seconds": estimate.seconds,
             "method": run.plan.method,
+            "method_description": run.method_description,
             "seconds_of_methods": seconds,
             "threads": estimate.threads,
             "file_bytes": estimate.file_bytes,
@@ -124,6 +125,7 @@ def _words(run: RunPlan, estimate: Estimate) -> dict[str, str]:
         "effects": ", ".join(config.scene.effects) or "none",
         "states": f"{len(lanes.states)}{unused}",
         "lanes": f"{estimate.lanes}{of_all} ({', '.join(spans)})",
+        "method": run.method_description,
         "steps": f"{estimate.steps:.3g} ({run.plan.steps_per_period} per period)",
         "file": f"about {tqdm.format_sizeof(estimate.file_bytes, 'B')} before compression",
         "memory": f"about {tqdm.format_sizeof(estimate.memory_bytes, 'B')} at the peak of the "
@@ -150,7 +152,7 @@ def _seconds_per_lane(run: RunPlan) -> float:
     periods, whole = plan.transient_periods + plan.recorded_periods, run.lanes.repeats_after
     with notice("computing some lanes to estimate the time"):
         # The first, short round loads the kernels. It takes one step more per period, so that the
-        # second round has to make its own flow maps, whose time does not grow with the periods.
+        # second round has to make its own maps, whose time does not grow with the periods.
         for more, length in (1, min(1.0, 8.0 / periods)), (0, min(1.0, SAMPLE_PERIODS / periods)):
             transient, recorded = (
                 whole * math.ceil(length * every / whole)
@@ -158,7 +160,7 @@ def _seconds_per_lane(run: RunPlan) -> float:
             )
             shorter = plan._replace(
                 steps_per_period=steps + more,
-                # The share of flow maps that are kept is that of the whole run.
+                # The share of maps that are kept is that of the whole run.
                 map_bytes=int(plan.map_bytes / finer),
                 transient_periods=transient,
                 recorded_periods=recorded,
@@ -178,8 +180,8 @@ def _seconds_per_lane(run: RunPlan) -> float:
 def _sampled_steps(run: RunPlan, places: Integers) -> int:
     """Return the steps per period of a sample; the time is proportional to them.
 
-    They are few, so that a sample takes seconds, but enough for RK4 to be stable and for no flow
-    map to be divided.
+    They are few, so that a sample takes seconds, but enough to be stable and for no map to be
+    divided.
     """
     steps = run.plan.steps_per_period
     if steps <= SAMPLE_STEPS:

@@ -500,7 +500,7 @@ class System:
     def stability_limit(self) -> int:
         """Return the smallest number of steps per mesh period for a stable integration.
 
-        For flow maps the limit is 1.
+        With an exact method the limit is 1.
         """
         return int(fewest_stable_steps(self._record, self.config.integration.method)[0])
 

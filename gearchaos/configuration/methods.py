@@ -1,4 +1,4 @@
-"""Properties of the integration methods for configurations, messages and the choice of steps.
+"""The table of integration methods: their words and properties for everything above the kernels.
 
 The compiled part of a method and its stability limits are in the kernels, under the same name.
 """
@@ -14,8 +14,10 @@ class Method:
     ----------
     name : str
         Value of ``integration.method``.
+    title : str
+        Name in messages and figures.
     words : str
-        Description for the table of keys.
+        Description for the table of keys, the dry run and the metadata of results.
     steps : int or None
         Default steps per mesh period; None: chosen for the scene.
     exact : bool
@@ -30,6 +32,7 @@ class Method:
     """
 
     name: str
+    title: str
     words: str
     steps: int | None = None
     exact: bool = False
@@ -37,30 +40,48 @@ class Method:
     shares_maps: bool = False
     most_elements: int | None = None
 
+    def description(self, steps: int, crossings: str) -> str:
+        """Return the method with its settings in words, for the dry run and the metadata.
 
-FLOW_MAP_STEPS = 12
-"""Steps per period of flow maps: fewer take longer at crossings, more between them."""
+        ``steps``: steps per mesh period; ``crossings``: value of ``integration.crossings``.
+        """
+        kind = "resolved" if self.always_resolved else crossings
+        return f"{self.title}: {self.words}; {steps} steps per period, {kind} crossings"
+
 
 AUTO = "auto"
-"""Name of the method that stands for the faster one of the others."""
+"""Name of the method that stands for the fastest one of the others."""
+
+INTEGRATORS = (
+    Method("rk4", "RK4", "classical Runge-Kutta of order 4"),
+    Method(
+        "flow_map",
+        "flow maps",
+        "maps of whole steps that are exact between crossings and at them",
+        # Fewer steps take longer at crossings, more steps take longer between them.
+        steps=12,
+        exact=True,
+        always_resolved=True,
+        shares_maps=True,
+        most_elements=4,
+    ),
+)
+"""The methods that integrate lanes."""
 
 METHODS = {
     one.name: one
     for one in (
-        Method("rk4", "classical Runge-Kutta of order 4"),
-        Method(
-            "flow_map",
-            "maps of whole steps that are exact between crossings and at them",
-            steps=FLOW_MAP_STEPS,
-            exact=True,
-            always_resolved=True,
-            shares_maps=True,
-            most_elements=4,
-        ),
-        Method(AUTO, "whichever of the others is estimated to be faster"),
+        *INTEGRATORS,
+        Method(AUTO, AUTO, "whichever of the others is estimated to be faster"),
     )
 }
-"""All methods by name; the first is the default."""
+"""All values of ``integration.method``."""
 
-EXACT = next(one for one in METHODS.values() if one.exact)
+DEFAULT = INTEGRATORS[0]
+"""The method that can integrate every scene."""
+
+EXACT = next(one for one in INTEGRATORS if one.exact)
 """The method to which others are compared."""
+
+EXACT_STEPS = EXACT.steps or 1
+"""Default steps per mesh period of the exact method."""

@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterator
 from typing import Any, TypeAlias
 
 from gearchaos.configuration.messages import Fault
-from gearchaos.configuration.methods import METHODS
+from gearchaos.configuration.methods import DEFAULT, METHODS
 from gearchaos.configuration.ranges import LARGEST_VALUE
 from gearchaos.configuration.run_tables import MOST_RUN_LANES, Start
 from gearchaos.configuration.tables import Tables
@@ -84,21 +84,24 @@ def _exponents_are_not_carried(config: Tables) -> Iterator[Fault]:
 
 
 @GENERIC_RULES.reads("integration")
-def _plain_steps_are_those_of_rk4(config: Tables) -> Iterator[Fault]:
+def _plain_steps_need_a_method_with_a_choice(config: Tables) -> Iterator[Fault]:
     """Plain steps need a method that does not resolve every crossing."""
     method = config.integration.method
     if METHODS[method].always_resolved and config.integration.crossings == "plain":
         rule = f'has no meaning with integration.method = "{method}", which resolves every crossing'
-        yield Fault("integration.crossings", rule, 'it goes with method = "rk4"', "plain")
+        yield Fault(
+            "integration.crossings", rule, f'it goes with method = "{DEFAULT.name}"', "plain"
+        )
 
 
 @GENERIC_RULES.reads("scene", "integration")
 def _maps_know_the_effects(config: Tables) -> Iterator[Fault]:
-    """Flow maps can compute all effects of the scene."""
+    """A method with maps can compute all effects of the scene."""
     effect, method = config.scene.refuses_maps(), config.integration.method
     if effect and METHODS[method].shares_maps:
         rule = f'"{effect}" cannot be computed with integration.method = "{method}"'
-        yield Fault("scene.effects", rule, 'set integration.method = "rk4"', config.scene.effects)
+        remedy = f'set integration.method = "{DEFAULT.name}"'
+        yield Fault("scene.effects", rule, remedy, config.scene.effects)
 
 
 @GENERIC_RULES.reads("outputs", "integration")

@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING, Annotated, Generic, Literal, Self, TypeAlias, 
 from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 
 from gearchaos.configuration.keys import AS_LIST, Numbers, Table, key
-from gearchaos.configuration.methods import AUTO, EXACT, METHODS
+from gearchaos.configuration.methods import AUTO, DEFAULT, EXACT, METHODS
 
 MOST_RUN_LANES = 100_000_000
 """Largest number of lanes of one run, limited by files and memory."""
 MOST_STEPS_PER_PERIOD = 1_000_000
 DEFAULT_STEPS = 200
-"""Smallest number of Runge-Kutta steps per period that is chosen for a scene."""
+"""Smallest number of steps per period that is chosen for a scene."""
 _MOST_VALUES = 10_000_000
 _MOST_STARTS = 1_000_000
 
@@ -37,7 +37,7 @@ class Scene(Table):
     effects: Annotated[tuple[str, ...], AS_LIST] = key("the effects that exist", default=())
 
     def refuses_maps(self) -> str:
-        """Return the effect that flow maps cannot compute, empty without one; by default none."""
+        """Return the effect that a method with maps cannot compute; by default none, empty."""
         return ""
 
 
@@ -114,28 +114,36 @@ else:
 class Integration(Table):
     """The method, on a fixed grid over the mesh period."""
 
-    method: MethodName = key("; ".join(one.words for one in METHODS.values()), default="rk4")
+    method: MethodName = key("; ".join(one.words for one in METHODS.values()), default=DEFAULT.name)
     steps_per_period: int | None = key(
         f"steps per mesh period; by default {DEFAULT_STEPS}, doubled until the scene is resolved, "
         f'and {EXACT.steps} with method = "{EXACT.name}"; with method = "{AUTO}" a given number is '
-        "for Runge-Kutta steps",
+        f"for {DEFAULT.title}",
         example=400,
         default=None,
         ge=1,
         le=MOST_STEPS_PER_PERIOD,
     )
-    tolerance: float | None = key(example=1e-6, default=None, gt=0)
-    """largest error of section and exponent; steps_per_period are doubled until trial lanes of the
-    sweep reach it, and transient_periods are raised where the section is still settling; flow maps
-    are tried once"""
+    tolerance: float | None = key(
+        "largest error of section and exponent; steps_per_period are doubled until trial lanes of "
+        "the sweep reach it, and transient_periods are raised where the section is still settling; "
+        f"{EXACT.title} are tried once",
+        example=1e-6,
+        default=None,
+        gt=0,
+    )
     error_check: float = key(units="1", default=0.0, ge=0, le=1)
     """share of the lanes that are computed again with half the step, to measure their error"""
-    crossings: Literal["resolved", "plain"] = key(default="resolved")
-    """whether a step that crosses a clearance boundary is split there, which keeps the order of the
-    method, or is a plain step; flow maps resolve every crossing"""
-    unstable: Literal["refuse", "raise"] = key(default="refuse")
-    """whether a number of steps below the stability limit of a lane is refused, or raised to it;
-    flow maps have no such limit"""
+    crossings: Literal["resolved", "plain"] = key(
+        "whether a step that crosses a clearance boundary is split there, which keeps the order of "
+        f"the method, or is a plain step; {EXACT.title} resolve every crossing",
+        default="resolved",
+    )
+    unstable: Literal["refuse", "raise"] = key(
+        "whether a number of steps below the stability limit of a lane is refused, or raised to "
+        f"it; {EXACT.title} have no such limit",
+        default="refuse",
+    )
     transient_periods: int = key(default=500, ge=0, le=1_000_000_000)
     """mesh periods discarded before anything is recorded"""
     recorded_periods: int = key(default=500, ge=1, le=1_000_000_000)

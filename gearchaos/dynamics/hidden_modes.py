@@ -1,6 +1,6 @@
 """The error of an exponent that halving the step does not show.
 
-Close to its stability limit, the Runge-Kutta method damps fast modes that hardly decay. The largest
+Close to its stability limit, a method damps fast modes that hardly decay. The largest
 exponent with N and with 2 N steps is then that of another mode. The difference between the two
 results does not contain the error.
 """
@@ -9,7 +9,7 @@ import numpy as np
 from gearchaos_kernels import LaneSystem, Plan
 
 from gearchaos.arrays import Counts, Floats
-from gearchaos.configuration.methods import EXACT, FLOW_MAP_STEPS, METHODS
+from gearchaos.configuration.methods import EXACT, EXACT_STEPS, METHODS
 from gearchaos.dynamics.modes import hidden_decay
 from gearchaos.dynamics.orbits import polish
 
@@ -40,8 +40,9 @@ def hidden_error(
     Notes
     -----
     Where half the step changes the decay of a mode (`modes.hidden_decay`), the exponent is compared
-    with that of the orbit of exact flow maps. Without flow maps or without an orbit, it is compared
-    with the decay of the slowest such mode, because the orbit does not decay faster.
+    with that of the orbit of the exact method. If that method refuses the system, or without an
+    orbit, it is compared with the decay of the slowest such mode, because the orbit does not decay
+    faster.
     """
     error = np.zeros(period.size)
     if METHODS[plan.method].exact:
@@ -53,7 +54,7 @@ def hidden_error(
     error[lanes] = np.maximum(decay[lanes] - exponent[lanes], 0.0)
     if system.refuses_maps():
         return error
-    exact = plan._replace(method=EXACT.name, steps_per_period=FLOW_MAP_STEPS)
+    exact = plan._replace(method=EXACT.name, steps_per_period=EXACT_STEPS)
     orbits = polish(system.of(lanes), state[lanes], period[lanes], exact)
     known = orbits.stable & (np.abs(orbits.multipliers[:, 0]) > 0.0)
     lanes, size = lanes[known], np.abs(orbits.multipliers[known, 0])

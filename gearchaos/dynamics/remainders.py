@@ -111,8 +111,8 @@ def _decay_and_rounding(
     Each of the N steps of a period has a rounding error of about eps relative to the motion x. With
     J the monodromy matrix, the errors add up to N eps |x| |(1 - J)^-1| on the orbit. The largest
     multiplier mu has an error of about N eps |J|, and the exponent an error of N eps |J| / |mu|
-    over the period. Flow maps are computed in smaller steps, so that N is at least the stability
-    limit of RK4. ``orbit`` (lanes, points, states): section over one period.
+    over the period. An exact method computes in smaller steps, so that N is at least the stability
+    limit of the default method. ``orbit`` (lanes, points, states): section over one period.
     """
     periods = orbit.shape[1] * system.repeats_after
     largest = np.abs(orbits.multipliers[:, 0])

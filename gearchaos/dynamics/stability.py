@@ -2,7 +2,7 @@
 
 On a contact branch with constant stiffnesses, the equations of motion are linear. If an eigenvalue
 of their Jacobian lies outside the stable region of the method, the computed motion grows where the
-true motion decays, see `gearchaos_kernels.methods.rk4.stability`.
+true motion decays, see `gearchaos_kernels.methods.protocol.Method.stable_reach`.
 """
 
 from collections.abc import Iterator
@@ -11,6 +11,7 @@ import numpy as np
 from gearchaos_kernels import METHODS, LaneSystem, jacobian
 
 from gearchaos.arrays import Complex, Floats, Integers
+from gearchaos.configuration.methods import DEFAULT
 
 STEPS_CEILING = 2**53
 """Largest number of steps that is returned; it also represents all larger numbers."""
@@ -19,7 +20,7 @@ ROUNDING = 1e-9
 """Relative error of eigenvalues: undamped modes lie on the imaginary axis up to this error."""
 
 
-def fewest_stable_steps(system: LaneSystem, method: str = "rk4") -> Integers:
+def fewest_stable_steps(system: LaneSystem, method: str = DEFAULT.name) -> Integers:
     """Return the smallest number of steps per period that is stable on every branch.
 
     Parameters
@@ -94,7 +95,7 @@ def exponent_bias(system: LaneSystem, steps: int, method: str) -> tuple[Floats, 
     return computed - true, true
 
 
-def steps_per_time(eigenvalues: Complex, method: str = "rk4") -> Floats:
+def steps_per_time(eigenvalues: Complex, method: str = DEFAULT.name) -> Floats:
     """Return the smallest stable number of steps per unit of time for every eigenvalue.
 
     This is abs(lambda) divided by the length of the ray through lambda within the stable region. It

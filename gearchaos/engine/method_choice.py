@@ -1,9 +1,11 @@
 """The choice of a method where the configuration leaves it to the program."""
 
+from typing import NamedTuple
+
 import numpy as np
 from gearchaos_kernels import METHODS
 
-from gearchaos.configuration.methods import AUTO, EXACT
+from gearchaos.configuration.methods import AUTO, DEFAULT, INTEGRATORS
 from gearchaos.dynamics.plans import plan_of
 from gearchaos.dynamics.stability import fewest_stable_steps
 from gearchaos.engine.lanes import Lanes
@@ -13,33 +15,40 @@ from gearchaos.models import Configuration
 LANES_ESTIMATED = 2**14
 """Largest number of lanes from which the time of the methods is estimated."""
 
-FIXED_STEPS = "rk4"
-"""The method that can integrate every scene."""
 
+class Alternatives(NamedTuple):
+    """The methods of a configuration.
 
-def alternatives(config: Configuration) -> tuple[dict[str, Configuration], str]:
-    """Return the configuration with every method that can integrate it, and a reason.
-
-    Parameters
+    Attributes
     ----------
-    config : Configuration
-        A configuration, whatever its method.
-
-    Returns
-    -------
-    configurations : dict of str to Configuration
-        By the name of the method.
-    reason : str
-        Why flow maps are not among them; empty if they are.
+    possible : dict of str to Configuration
+        The configuration with every method that can integrate it, by the name of the method.
+    refused : dict of str to str
+        Why each of the other methods cannot, by the name of the method.
     """
-    fixed = config.integrated_by(FIXED_STEPS)
-    try:
-        exact = config.integrated_by(EXACT.name)
-    except ConfigurationError as error:
-        return {FIXED_STEPS: fixed}, str(error).removeprefix(f"{config.source}: ")
-    if refusal := Lanes(exact).system_of(np.arange(1)).refuses_maps():
-        return {FIXED_STEPS: fixed}, refusal
-    return {FIXED_STEPS: fixed, EXACT.name: exact}, ""
+
+    possible: dict[str, Configuration]
+    refused: dict[str, str]
+
+
+def alternatives(config: Configuration) -> Alternatives:
+    """Return the methods that can integrate a configuration, and why the others cannot.
+
+    Raises ConfigurationError if the default method cannot.
+    """
+    found = Alternatives({DEFAULT.name: config.integrated_by(DEFAULT.name)}, {})
+    for method in INTEGRATORS:
+        try:
+            one = config.integrated_by(method.name)
+        except ConfigurationError as error:
+            found.refused[method.name] = str(error).removeprefix(f"{config.source}: ")
+            continue
+        system = Lanes(one).system_of(np.arange(1)) if method.shares_maps else None
+        if system is not None and (refusal := system.refuses_maps()):
+            found.refused[method.name] = refusal
+        else:
+            found.possible[method.name] = one
+    return found
 
 
 def other_methods(config: Configuration, chosen: str) -> list[Configuration]:
@@ -59,7 +68,7 @@ def other_methods(config: Configuration, chosen: str) -> list[Configuration]:
     """
     if config.integration.method != AUTO:
         return []
-    possible, _ = alternatives(config)
+    possible = alternatives(config).possible
     return [one for name, one in possible.items() if name != chosen]
 
 
@@ -88,16 +97,17 @@ def with_method(config: Configuration) -> tuple[Configuration, str]:
     """
     if config.integration.method != AUTO:
         return config, ""
-    possible, reason = alternatives(config)
-    if reason:
-        note = f'integration.method = "{AUTO}": {FIXED_STEPS} is taken; with {EXACT.name}: {reason}'
-        return possible[FIXED_STEPS], note
-    work = {name: _work(one) for name, one in possible.items()}
-    chosen, other = sorted(work, key=lambda name: work[name])
-    return possible[chosen], (
-        f'integration.method = "{AUTO}": {chosen} is taken; {other} is estimated to take '
-        f"{work[other] / work[chosen]:.2g} times as long"
-    )
+    possible, refused = alternatives(config)
+    # Estimates take time, and a single method needs none.
+    work = {name: _work(one) for name, one in possible.items()} if len(possible) > 1 else {}
+    chosen, *others = sorted(work, key=lambda name: work[name]) or [*possible]
+    reasons = [
+        f"{other} is estimated to take {work[other] / work[chosen]:.2g} times as long"
+        for other in others
+    ]
+    reasons += [f"with {name}: {reason}" for name, reason in refused.items()]
+    note = "; ".join([f'integration.method = "{AUTO}": {chosen} is taken', *reasons])
+    return possible[chosen], note
 
 
 def _work(config: Configuration) -> float:

@@ -5,6 +5,7 @@ from typing import NamedTuple, Self
 
 import gearchaos_kernels as kernels
 
+from gearchaos.configuration.methods import METHODS
 from gearchaos.dynamics.plans import plan_of
 from gearchaos.engine.excitation import remarks, whole_lengths
 from gearchaos.engine.lanes import Lanes
@@ -56,6 +57,12 @@ class RunPlan:
     def chosen(self) -> Chosen:
         """The part of the plan that trials choose, for all processes that compute its lanes."""
         return Chosen(self.plan.steps_per_period, self.plan.transient_periods)
+
+    @property
+    def method_description(self) -> str:
+        """The method with its steps and its crossings, in words."""
+        crossings = self.config.integration.crossings
+        return METHODS[self.plan.method].description(self.plan.steps_per_period, crossings)
 
     @property
     def carried(self) -> bool:

@@ -169,6 +169,7 @@ def metadata(run: RunPlan, seconds: float) -> Mapping[str, Any]:
         "start": config.start.kind,
         "carry": config.start.carry,
         **config.integration.tables(),
+        "method_description": run.method_description,
         "steps_per_period": run.plan.steps_per_period,
         "transient_periods": run.plan.transient_periods,
         "recorded_periods": run.plan.recorded_periods,

@@ -1,4 +1,4 @@
-"""The number of Runge-Kutta steps per mesh period that a scene needs, from trials on some lanes.
+"""The number of steps per mesh period that a scene needs, from trials on some lanes.
 
 Some lanes are integrated from their start over a few mesh periods with N and with 2 N steps. The
 difference is the error of N steps. It decreases by a factor of 16 when N is doubled.
@@ -11,7 +11,7 @@ import numpy as np
 from gearchaos_kernels import Plan, Status, integrate
 
 from gearchaos.arrays import Floats, Integers, Mask
-from gearchaos.configuration.methods import EXACT
+from gearchaos.configuration.methods import DEFAULT, EXACT
 from gearchaos.dynamics.stability import fewest_stable_steps
 from gearchaos.engine.lanes import Lanes
 from gearchaos.engine.steps import coarse_steps
@@ -93,7 +93,7 @@ class Trial:
 
     ``plan``: plan of the sweep, whose kernel is used, so that no other kernel is compiled. The
     trial lanes depend on the sweep only; shards, workers and threads therefore choose the same
-    steps. ``limit``: stability limit of RK4 in steps.
+    steps. ``limit``: stability limit in steps per period.
     """
 
     def __init__(self, lanes: Lanes, plan: Plan) -> None:
@@ -172,7 +172,7 @@ def choice_note(verdict: Verdict, limit: int) -> str:
     if not verdict.within(WANTED):
         chosen = f'the most that are chosen; integration.method = "{EXACT.name}" is more exact'
     return (
-        f"integration.steps_per_period = {verdict.steps}, {chosen}: RK4 is stable "
+        f"integration.steps_per_period = {verdict.steps}, {chosen}: {DEFAULT.title} is stable "
         f"from {limit} on, and after {PERIODS} mesh periods {_off(verdict)} in {_tried(lanes)}"
         f"{_sensitive_ones(verdict)}"
     )

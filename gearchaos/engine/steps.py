@@ -9,7 +9,7 @@ from gearchaos_kernels import LaneSystem, Outcome, Plan, Status, integrate, maps
 
 from gearchaos.arrays import Integers, Mask
 from gearchaos.configuration.messages import Fault
-from gearchaos.configuration.methods import METHODS
+from gearchaos.configuration.methods import DEFAULT, METHODS
 from gearchaos.configuration.run_tables import DEFAULT_STEPS, MOST_STEPS_PER_PERIOD
 from gearchaos.dynamics import stability
 from gearchaos.dynamics.hidden_modes import hidden_error
@@ -94,12 +94,13 @@ def stable_steps(lanes: Lanes, given: int | None) -> tuple[int, str]:
     if limit <= steps:
         return steps, ""
     integration, beyond = lanes.config.integration, limit > MOST_STEPS_PER_PERIOD
-    if METHODS[integration.method].exact and not beyond:
+    method = METHODS[integration.method]
+    if method.exact and not beyond:
         if integration.steps_per_period is None and limit <= DEFAULT_STEPS:
             return steps, ""
         return steps, (
-            f"integration.steps_per_period = {steps}: RK4 would need {limit} steps to be "
-            "stable; flow maps have no such limit"
+            f"integration.steps_per_period = {steps}: {DEFAULT.title} would need {limit} steps to "
+            f"be stable; {method.title} have no such limit"
         )
     if integration.unstable == "refuse" or beyond:
         raise ConfigurationError(_fault(lanes, limit, unstable, given).text(lanes.config.source))
@@ -139,15 +140,15 @@ def coarse_steps(lanes: Lanes, steps: int) -> str:
 
 
 def needless_maps(lanes: Lanes, plan: Plan) -> str:
-    """Return a note that there are more flow maps than can be kept, and fewer would be enough."""
-    enough = METHODS[plan.method].steps
+    """Return a note that there are more maps than can be kept, and fewer would be enough."""
+    method, enough = METHODS[plan.method], METHODS[plan.method].steps
     if enough is None or plan.records_steps or plan.steps_per_period <= enough:
         return ""
     if maps_are_kept(lanes.system_of(np.arange(min(len(lanes), LANES_AT_ONCE))), plan):
         return ""
     return (
         f"integration.steps_per_period = {plan.steps_per_period}: lanes that differ in more than "
-        f"{lanes.model.shared_inputs} do not share flow maps, and there are too many to keep: "
+        f"{lanes.model.shared_inputs} do not share {method.title}, and there are too many to keep: "
         f"each integration makes them again; {enough} steps are as exact and much faster"
     )
 
@@ -167,8 +168,8 @@ def _fault(lanes: Lanes, limit: int, unstable: Integers, steps: int | None) -> F
         remedy = f"check the magnitudes behind it: there are at most {MOST_STEPS_PER_PERIOD} steps"
     return Fault(
         "integration.steps_per_period",
-        f"RK4 is unstable below {limit} steps per period for {unstable.size * lanes.repeats} "
-        f"of {len(lanes)} lanes ({', '.join(places)})",
+        f"{DEFAULT.title} is unstable below {limit} steps per period for "
+        f"{unstable.size * lanes.repeats} of {len(lanes)} lanes ({', '.join(places)})",
         remedy,
         steps,
     )

@@ -9,11 +9,11 @@ from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
 from gearchaos.figures.page import Page, column, letter
 from gearchaos.figures.style import BLACK, BLUE, LEGEND, ORANGE
 
-LOOKS: dict[str, dict[str, Any]] = {
-    "plain": {"color": ORANGE, "marker": "o"},
-    "resolved": {"color": BLUE, "marker": "s"},
-    "flow map": {"color": BLACK, "marker": "^"},
-}
+LOOKS: tuple[dict[str, Any], ...] = (
+    {"color": ORANGE, "marker": "o"},
+    {"color": BLUE, "marker": "s"},
+    {"color": BLACK, "marker": "^"},
+)
 HEIGHT_MM = 65.0
 
 
@@ -23,17 +23,17 @@ def work_precision_page(modes: Mapping[str, Sequence[tuple[int, float, float]]])
     Parameters
     ----------
     modes : mapping of str to sequence of (int, float, float)
-        Steps per mesh period, time in s and error by mode, one of `LOOKS`. Points whose error is
-        zero or not finite are left out.
+        Steps per mesh period, time in s and error by mode; at most as many modes as `LOOKS`. Points
+        whose error is zero or not finite are left out.
     """
     with column(HEIGHT_MM) as figure:
         panels = figure.subplots(1, 2, sharey=True)
         for cost, label in enumerate(("Steps per mesh period", "Time (s)")):
             axes, lines = panels[cost], []
-            for mode, points in modes.items():
+            for (mode, points), look in zip(modes.items(), LOOKS, strict=False):
                 known = [(one[cost], one[2]) for one in points if 0.0 < one[2] < np.inf]
                 columns = zip(*known, strict=True) if known else ([], [])
-                lines += axes.plot(*columns, label=mode, ms=3, lw=0.8, **LOOKS[mode])
+                lines += axes.plot(*columns, label=mode, ms=3, lw=0.8, **look)
             axes.set(xlabel=label, xscale="log", yscale="log")
             axes.margins(0.08)
             axes.xaxis.set_major_formatter(StrMethodFormatter("{x:g}"))

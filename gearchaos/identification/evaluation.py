@@ -99,7 +99,7 @@ def evaluate(
 
 
 def require_stable(config: Configuration, values: Floats, parameters: dict[str, Floats]) -> None:
-    """Reject steps with which RK4 is unstable at the ends of the swept values.
+    """Reject steps that are unstable at the ends of the swept values.
 
     Parameters
     ----------
@@ -109,22 +109,25 @@ def require_stable(config: Configuration, values: Floats, parameters: dict[str, 
     Raises
     ------
     ConfigurationError
-        If the method is RK4 and a candidate needs more steps per period than configured.
+        If a candidate needs more steps per period than configured, with a method that can be
+        unstable.
     """
     steps, ends = plan_of(config).steps_per_period, values[[0, -1]]
-    if METHODS[config.integration.method].exact:
+    method = METHODS[config.integration.method]
+    if method.exact:
         return
     candidates = len(next(iter(parameters.values())))
     swept = {config.sweep.parameter: np.tile(ends, candidates)}
     fixed = {key: np.repeat(value, ends.size) for key, value in parameters.items()}
-    fewest = fewest_stable_steps(system_of(config, swept | fixed, config.needed_effects))
+    system = system_of(config, swept | fixed, config.needed_effects)
+    fewest = fewest_stable_steps(system, method.name)
     worst = np.argmax(fewest)
     if fewest[worst] > steps:
         where = ", ".join(f"{key} = {value[worst]:.6g}" for key, value in (swept | fixed).items())
         raise ConfigurationError(
-            f"{config.source}: integration.steps_per_period = {steps}: RK4 is unstable below "
-            f"{fewest[worst]} steps per period with {where}; raise it in `set` of the targets "
-            "file, or narrow the bounds there"
+            f"{config.source}: integration.steps_per_period = {steps}: {method.title} is unstable "
+            f"below {fewest[worst]} steps per period with {where}; raise it in `set` of the "
+            "targets file, or narrow the bounds there"
         )
 
 

@@ -74,7 +74,7 @@ class Model(ABC):
     excitation_words, shorter_excitation : str
         What repeats after several mesh periods, with its verb, and how it repeats earlier.
     shared_inputs : str
-        The parameters in which lanes may differ that share flow maps, in words.
+        The parameters in which lanes may differ that share maps, in words.
     """
 
     catalogue: Catalogue

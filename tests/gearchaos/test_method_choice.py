@@ -4,8 +4,10 @@ import json
 
 import numpy as np
 import pytest
+from gearchaos_kernels import METHODS
 
 import gearchaos
+from gearchaos.configuration.methods import INTEGRATORS
 from gearchaos.engine.method_choice import with_method
 from gearchaos.engine.run_plan import plan_run
 from gearchaos.identification.loading import load_targets
@@ -77,6 +79,19 @@ def test_the_result_is_that_of_the_chosen_method():
     # The text stays as given; the configuration that was computed has the chosen method.
     assert 'method = "auto"' not in auto.metadata["configuration_resolved"]
     assert auto.metadata["method"] == "flow_map"
+    assert auto.metadata["method_description"] == (
+        "flow maps: maps of whole steps that are exact between crossings and at them; 12 steps per "
+        "period, resolved crossings"
+    )
+
+
+def test_kernels_and_configurations_know_the_same_methods():
+    assert [*METHODS] == [one.name for one in INTEGRATORS]
+    for one in INTEGRATORS:
+        compiled = METHODS[one.name]
+        assert compiled.always_resolved == one.always_resolved
+        # A step without an error is stable whatever its length.
+        assert (compiled.stable_reach is None) == one.exact
 
 
 def test_a_system_takes_the_method_as_well():

@@ -123,6 +123,7 @@ def test_a_dry_run_tells_lanes_steps_memory_and_time_and_writes_nothing(tmp_path
         "output": "gears.h5",
         "states": "10",
         "lanes": "120 (40 values of pitch_error from 0 to 5, 3 starts each)",
+        "method": "RK4: classical Runge-Kutta of order 4; 40 steps per period, resolved crossings",
         "steps": "7.2e+04 (40 per period)",
     }
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from gearchaos.arrays import Floats
 from gearchaos.configuration.messages import NUMBER, Fault, shown
-from gearchaos.configuration.methods import METHODS
+from gearchaos.configuration.methods import DEFAULT, METHODS
 from gearchaos.configuration.tables import swept_values
 from gearchaos.configuration.toml_text import text_of_file
 from gearchaos.errors import GearchaosError
@@ -158,7 +158,8 @@ def _unsound(table: GearDeviations, teeth: int, module_mm: float) -> Iterator[tu
 def _maps_know_the_sine(config: GearPairTables) -> Iterator[Fault]:
     if _kind(config) != "sine" and METHODS[config.integration.method].shares_maps:
         rule = f'cannot be computed with integration.method = "{config.integration.method}"'
-        yield Fault("pitch_error.kind", rule, 'set integration.method = "rk4"', _kind(config))
+        remedy = f'set integration.method = "{DEFAULT.name}"'
+        yield Fault("pitch_error.kind", rule, remedy, _kind(config))
 
 
 @RULES.reads("pitch_error", "groups")

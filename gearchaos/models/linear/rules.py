@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from gearchaos.configuration.messages import Fault, suggestion
-from gearchaos.configuration.methods import METHODS
+from gearchaos.configuration.methods import DEFAULT, METHODS
 from gearchaos.configuration.rules import Rules
 from gearchaos.models.linear.machine import without_drift
 from gearchaos.models.linear.tables import MATRICES, Row, Shares
@@ -93,7 +93,7 @@ def _known_states(table: str, name: str) -> Callable[["LinearConfiguration"], It
 
 
 def _maps_of_all_branches_fit(config: "MachineConfiguration") -> Iterator[Fault]:
-    """Flow maps have as few elements as they can make maps for."""
+    """A machine has at most as many elements as the method can integrate."""
     method = config.integration.method
     most = METHODS[method].most_elements
     if most is None or not config.is_complete:
@@ -104,7 +104,7 @@ def _maps_of_all_branches_fit(config: "MachineConfiguration") -> Iterator[Fault]
             f"takes up to {most} clearance elements, because it needs maps for every set of "
             f"contact branches; this machine has {count} elements, and {2**count} sets"
         )
-        yield Fault("integration.method", rule, 'set it to "rk4"', method)
+        yield Fault("integration.method", rule, f'set it to "{DEFAULT.name}"', method)
 
 
 def add_rules_of_machines(rules: Rules, tables: Sequence[str]) -> None:

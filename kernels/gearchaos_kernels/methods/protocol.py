@@ -55,13 +55,13 @@ class Method:
         raises ValueError if the method cannot integrate the system.
     memory : callable
         ``memory(system, plan, scene, stable)``: estimated bytes of what is prepared; ``stable``
-        (lanes,): steps per period with which RK4 is stable.
+        (lanes,): steps per period with which the default method is stable.
     sharing : callable
         ``sharing(system)``: numbers of groups, shape (lanes,). Lanes of a group share what is
         prepared, and take least time next to each other.
     work : callable
-        ``work(system, plan, stable)``: estimated time of the integration, in the time that RK4
-        takes for one step of one lane; ``stable`` as above.
+        ``work(system, plan, stable)``: estimated time of the integration, in the time that
+        the default method takes for one step of one lane; ``stable`` as above.
     amplification : callable
         ``amplification(z)``: factor by which one step multiplies the modulus of a mode; z: step
         length times eigenvalue.
