@@ -17,7 +17,7 @@ import numba
 from machine import machine_facts, print_machine
 
 from gearchaos import load_config
-from gearchaos.engine.computing import EndStates, block_lanes, compute, rehearse
+from gearchaos.engine.computing import EndStates, block_lanes, compute_block, rehearse
 from gearchaos.engine.computing import blocks as blocks_of
 from gearchaos.engine.executors import LocalExecutor, compute_blocks
 from gearchaos.engine.run_plan import RunPlan, plan_run
@@ -43,7 +43,7 @@ def main() -> None:
     lanes: dict[tuple[int, str], list[float]] = {key: [] for key in simulations}
     for one in simulations.values():
         rehearse(one)
-        compute(one, (0, 1), EndStates(one).before(0))
+        compute_block(one, (0, 1), EndStates(one).before(0))
     for _ in range(options.rounds):
         for key, one in simulations.items():
             lanes[key].append(lanes_per_second(one))

@@ -144,7 +144,7 @@ def _reader(kind: type, option: Option) -> Callable[[str], Any]:
         return partial(whole_numbers, low=low, high=high)
     readers: dict[type, Callable[[str], Any]] = {
         float: partial(number, low=low, high=high),
-        int: partial(whole_number, low=low, high=high),
+        int: partial(read_whole_number, low=low, high=high),
         Place: place,
         Path: Path,
         str: str,
@@ -166,7 +166,7 @@ def number(text: str, low: float = -math.inf, high: float = math.inf) -> float:
     return value
 
 
-def whole_number(text: str, low: float = -math.inf, high: float = math.inf) -> int:
+def read_whole_number(text: str, low: float = -math.inf, high: float = math.inf) -> int:
     """Read a whole number within bounds."""
     value = number(text, low, high)
     if value % 1.0:
@@ -176,7 +176,7 @@ def whole_number(text: str, low: float = -math.inf, high: float = math.inf) -> i
 
 def whole_numbers(text: str, low: float, high: float) -> tuple[int, ...]:
     """Read whole numbers within bounds, with commas between them, in ascending order."""
-    return tuple(sorted({whole_number(one, low, high) for one in text.split(",")}))
+    return tuple(sorted({read_whole_number(one, low, high) for one in text.split(",")}))
 
 
 def place(text: str) -> Place:

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 from gearchaos.command_line import Command
-from gearchaos.options import Option, Overwrite, Place, Threads, coordinates
+from gearchaos.options import Option, Overwrite, Place, Threads, placed_coordinates
 
 if TYPE_CHECKING:
     from gearchaos.results.reading.ensembles import Basins
@@ -57,21 +57,21 @@ def _basins(options: BasinsOptions) -> None:
     from gearchaos.figures import basins_page
     from gearchaos.figures.page import check_figures, save_figure
     from gearchaos.outputs.names import REPEATS, START
-    from gearchaos.results.reading.overview import plain, slice_lines
+    from gearchaos.results.reading.overview import json_values, slice_lines
     from gearchaos.results.reading.result import open_result
     from gearchaos.results.reading.stage_table import slice_facts
 
     whole = open_result(options.result)
     if options.output:
         check_figures([options.output], [options.result], options.overwrite)
-    part = whole.sel("within", **coordinates(options.at, whole.axes, whole.axis))
+    part = whole.sel("within", **placed_coordinates(options.at, whole.axes, whole.axis))
     kept = {START} | ({part.axis} - {*REPEATS})
     part = part.sel(**{axis: part[axis][0] for axis in part.axes if axis not in kept})
     with compiling():
         found = find_basins(part, options.result, options.threads)
     where = slice_facts(whole, part)
     if options.json:
-        print(json.dumps(plain(_facts(found, where)), indent=1))
+        print(json.dumps(json_values(_facts(found, where)), indent=1))
     else:
         print("\n".join([*table(found, slice_lines(where))]))
     if options.output:

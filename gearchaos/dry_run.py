@@ -19,7 +19,7 @@ from tqdm import tqdm
 
 from gearchaos.arrays import Integers
 from gearchaos.dynamics.stability import fewest_stable_steps
-from gearchaos.engine.computing import block_lanes, block_memory, integrate
+from gearchaos.engine.computing import block_lanes, block_memory, integrate_places
 from gearchaos.engine.kept import arrays_of, variables_of
 from gearchaos.engine.resonances import resonances
 from gearchaos.engine.run_plan import RunPlan
@@ -168,9 +168,11 @@ def _seconds_per_lane(run: RunPlan) -> float:
             )
             sample = replace(run, plan=shorter)
             began = time.perf_counter()
-            integrate(sample, places, shorter._replace(transient_periods=0, recorded_periods=0))
+            integrate_places(
+                sample, places, shorter._replace(transient_periods=0, recorded_periods=0)
+            )
             made = time.perf_counter()
-            found = integrate(sample, places, sample.recording)
+            found = integrate_places(sample, places, sample.recording)
             arrays_of(sample, sample.lanes.computed_at(places), *found)
             scale = periods / (transient + recorded)
             seconds = (made - began + scale * (time.perf_counter() - made)) / places.size

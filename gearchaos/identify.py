@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 from gearchaos.command_line import Command
 from gearchaos.finishing import output_of
-from gearchaos.options import Option, Output, Overwrite, Threads
+from gearchaos.options import Option, OutputFile, Overwrite, Threads
 from gearchaos.progress import progress, say
 
 if TYPE_CHECKING:
@@ -45,7 +45,7 @@ class IdentifyOptions(NamedTuple):
             ("--set",),
         ),
     ] = ()
-    output: Output = None
+    output: OutputFile = None
     overwrite: Overwrite = False
     threads: Threads = None
 

@@ -61,7 +61,7 @@ ConfigFile = Annotated[str, Option("configuration file", "config.toml", position
 ResultFile = Annotated[
     str, Option("result file of a sweep", "RESULT.h5", positional=True, file=True)
 ]
-Output = Annotated[
+OutputFile = Annotated[
     str | None,
     Option(
         "result file (default: named after the configuration, in the current folder)",
@@ -87,7 +87,7 @@ Units = Annotated[
 ]
 
 
-def coordinates(
+def placed_coordinates(
     places: Iterable[Place], axes: Sequence[str], free: str = "", option: str = "--at"
 ) -> dict[str, float]:
     """Return the value of each axis that an option names.

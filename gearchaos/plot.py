@@ -24,7 +24,7 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 from gearchaos.command_line import Command
 from gearchaos.errors import FigureError
-from gearchaos.options import Option, Overwrite, Place, Units, coordinates
+from gearchaos.options import Option, Overwrite, Place, Units, placed_coordinates
 from gearchaos.progress import progress, say
 
 if TYPE_CHECKING:
@@ -297,7 +297,7 @@ def _detail(result: "Result", options: PlotOptions) -> str:
 
 def _marked(options: PlotOptions, swept: Sequence[str]) -> dict[str, float]:
     """Return the value of --mark for each axis; raise a FigureError if an axis is not swept."""
-    marked = coordinates(options.mark, swept, option="--mark")
+    marked = placed_coordinates(options.mark, swept, option="--mark")
     if unknown := [axis for axis in marked if axis not in swept]:
         raise FigureError(
             f"--mark {unknown[0]}: is no swept parameter of the figure, which are "
@@ -339,7 +339,7 @@ def _opened(path: Path, at: Sequence[Place]) -> "Result":
 
     for rows in (False, True):  # Sections are the largest part of a file.
         result = open_result(path, rows=rows)
-        fixed = coordinates(at, result.axes, result.axis)
+        fixed = placed_coordinates(at, result.axes, result.axis)
         left = {*swept_axes(result)} - {*fixed}
         if fixed and not left:
             raise FigureError(

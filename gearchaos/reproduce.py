@@ -33,7 +33,7 @@ class ReproduceOptions(NamedTuple):
 def _reproduce(options: ReproduceOptions) -> None:
     from gearchaos.engine.running import choose_threads
     from gearchaos.models import load_config
-    from gearchaos.paper.computation import compute
+    from gearchaos.paper.computation import compute_gallery
     from gearchaos.paper.gallery import check_folder, write_gallery
 
     began = time.monotonic()
@@ -42,7 +42,7 @@ def _reproduce(options: ReproduceOptions) -> None:
     names = (f"{options.paper}.toml", f"{options.paper}_full.toml")
     configs = [load_config(SWEEPS / name) for name in names]
     choose_threads(options.threads)
-    found = compute(*configs, threads=options.threads)
+    found = compute_gallery(*configs, threads=options.threads)
     print(write_gallery(found, folder, overwrite=options.overwrite), flush=True)
     say(f"done in {time.monotonic() - began:.0f} s")
 

@@ -17,12 +17,12 @@ from gearchaos.errors import ConfigurationError
 from gearchaos.finishing import ending, output_of
 from gearchaos.options import (
     Option,
-    Output,
+    OutputFile,
     Overwrite,
     Place,
     Settings,
     Threads,
-    coordinates,
+    placed_coordinates,
 )
 
 if TYPE_CHECKING:
@@ -62,7 +62,7 @@ class ResponseOptions(NamedTuple):
         ),
     ] = "end"
     periods: Annotated[int | None, Option("mesh periods to keep (default: 32)", "N")] = None
-    output: Output = None
+    output: OutputFile = None
     overwrite: Overwrite = False
     threads: Threads = None
     settings: Settings = ()
@@ -112,7 +112,7 @@ def _lane(options: ResponseOptions) -> "Asked":
         rule = "is a result, and continues with its own configuration; leave --set out"
         raise ConfigurationError(f"{options.config}: {rule}")
     result = open_result(options.config)
-    lane = result.sel("within", **coordinates(options.places, result.axes))
+    lane = result.sel("within", **placed_coordinates(options.places, result.axes))
     if lane.axes:
         rest = " and ".join(f"--at {axis}=VALUE" for axis in lane.axes)
         raise ConfigurationError(f"{options.config}: name one lane, with {rest} as well")

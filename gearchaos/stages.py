@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 from gearchaos.command_line import Command
 from gearchaos.errors import ConfigurationError
-from gearchaos.options import Option, Place, ResultFile, Threads, coordinates
+from gearchaos.options import Option, Place, ResultFile, Threads, placed_coordinates
 
 if TYPE_CHECKING:
     from gearchaos.engine.recomputing import Survival
@@ -80,14 +80,14 @@ class Listing(NamedTuple):
 
 def _stages(options: StagesOptions) -> None:
     from gearchaos.outputs.names import DIRECTION, REPEATS, UNSWEPT
-    from gearchaos.results.reading.overview import plain
+    from gearchaos.results.reading.overview import json_values
     from gearchaos.results.reading.result import open_result
     from gearchaos.results.reading.stage_table import one_axis, require_labels
 
     whole = open_result(options.result)
     # Lanes are computed again for one pair and one start.
     kept = REPEATS if options.refine is None and options.survival is None else ()
-    places = coordinates(options.at, whole.axes, whole.axis)
+    places = placed_coordinates(options.at, whole.axes, whole.axis)
     part = one_axis(whole, (*kept, DIRECTION), **places)
     require_labels(whole, options.result)
     if options.refine is not None and not options.at and {*whole.axes} - {whole.axis, *UNSWEPT}:
@@ -95,7 +95,7 @@ def _stages(options: StagesOptions) -> None:
         return
     listing = _listing(whole, part, kept, options)
     if options.json:
-        print(json.dumps(plain(_facts(listing)), indent=1))
+        print(json.dumps(json_values(_facts(listing)), indent=1))
     else:
         print(_text(listing))
 
@@ -178,7 +178,7 @@ def _map_boundaries(result: "Result", options: StagesOptions, width: float) -> N
     from gearchaos.engine.recomputing import refinable
     from gearchaos.engine.refinement import refined_map
     from gearchaos.engine.running import choose_threads, compiling
-    from gearchaos.results.reading.overview import plain
+    from gearchaos.results.reading.overview import json_values
 
     choose_threads(options.threads)
     config = refinable(result, options.result)
@@ -201,7 +201,7 @@ def _map_boundaries(result: "Result", options: StagesOptions, width: float) -> N
             "lanes": lanes,
             "lanes_of_a_map_as_fine": fine,
         }
-        print(json.dumps(plain(facts), indent=1))
+        print(json.dumps(json_values(facts), indent=1))
         return
     for value, found in rows.items():
         print(f"{second} = {value:.6g}", *boundary_list(found), sep="\n")

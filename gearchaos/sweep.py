@@ -18,7 +18,7 @@ from gearchaos.finishing import complete_already, ending, output_of
 from gearchaos.options import (
     Arguments,
     Option,
-    Output,
+    OutputFile,
     Overwrite,
     Settings,
     Threads,
@@ -54,7 +54,7 @@ class SweepOptions(NamedTuple):
         False
     )
     json: Annotated[bool, Option("with --dry-run: print the estimate as JSON")] = False
-    output: Output = None
+    output: OutputFile = None
     overwrite: Overwrite = False
     threads: Threads = None
     settings: Settings = ()

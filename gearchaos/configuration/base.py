@@ -7,10 +7,9 @@ from typing import Any, ClassVar, Self, TypeAlias
 
 from pydantic import PrivateAttr, TypeAdapter, ValidationError, ValidationInfo, model_validator
 
-from gearchaos.arguments import path_text
-from gearchaos.arguments import texts as texts_of
+from gearchaos.arguments import path_text, texts
 from gearchaos.configuration.keys import Key, keys_of
-from gearchaos.configuration.messages import Fault, faults_of, texts
+from gearchaos.configuration.messages import Fault, fault_texts, faults_of
 from gearchaos.configuration.methods import METHODS
 from gearchaos.configuration.rules import GENERIC_RULES, Rule, unknown_parameter
 from gearchaos.configuration.tables import Tables
@@ -155,14 +154,14 @@ class Configuration(Tables):
             return chosen.from_tables(tables, source, folder)  # type: ignore[no-any-return]
         tables, faults = cls.with_files(tables, folder)
         if faults:
-            raise ConfigurationError(texts(faults, source))
+            raise ConfigurationError(fault_texts(faults, source))
         try:
             config = cls.model_validate(dict(tables), context={"source": source})
         except ValidationError as error:
             own, more = faults_of(error, configuration_keys(cls))
             unreadable = {str(one["loc"][0]) for one in error.errors(include_url=False)}
             shared = _broken_rules(_readable(cls, tables, unreadable), unreadable)
-            raise ConfigurationError(texts([*own, *shared], source, more)) from None
+            raise ConfigurationError(fault_texts([*own, *shared], source, more)) from None
         config._source, config._folder = source, folder
         return config
 
@@ -247,7 +246,7 @@ class Configuration(Tables):
         if unknown := [
             fault for name in names for fault in unknown_parameter(self, "parameter", name)
         ]:
-            raise ConfigurationError(texts(unknown, self.source))
+            raise ConfigurationError(fault_texts(unknown, self.source))
         tables = self.tables()
         for path, value in (key for name in values for key in fixed[name].items()):
             tables = with_value(tables, path.split("."), value)
@@ -267,7 +266,9 @@ class Configuration(Tables):
         """Raise ConfigurationError if a rule between tables is broken."""
         faults = list(_broken_rules(self, set()))
         if faults:
-            raise ConfigurationError(texts(faults, (info.context or {}).get("source", "<python>")))
+            raise ConfigurationError(
+                fault_texts(faults, (info.context or {}).get("source", "<python>"))
+            )
         return self
 
     # Configurations are equal whatever their source.
@@ -308,7 +309,7 @@ def load_config(path: str | os.PathLike[str], overrides: Iterable[str] = ()) -> 
     >>> config.sweep.count
     31
     """
-    source, overrides = path_text(path, "a TOML file"), texts_of("overrides", overrides)
+    source, overrides = path_text(path, "a TOML file"), texts("overrides", overrides)
     folder = os.path.dirname(source) or "."
     return Configuration.from_toml(text_of_file(source), source, overrides, folder)
 
@@ -337,7 +338,7 @@ def _kind_of(tables: Mapping[str, Any], source: str) -> type[Configuration]:
     if chosen is None:
         known = ", ".join(f'"{one}"' for one in Configuration.kinds)
         fault = Fault("model.kind", "is the name of no model", f"there are {known}", kind)
-        raise ConfigurationError(texts([fault], source))
+        raise ConfigurationError(fault_texts([fault], source))
     return chosen
 
 

@@ -59,7 +59,7 @@ class Fault(NamedTuple):
         return f"{source}: {self.key}{value}: {self.rule}{remedy}"
 
 
-def texts(faults: Iterable[Fault], source: str, more: int = 0) -> list[str]:
+def fault_texts(faults: Iterable[Fault], source: str, more: int = 0) -> list[str]:
     """Return the first hundred faults as lines, without repetitions.
 
     ``more``: number of further faults that have no words.

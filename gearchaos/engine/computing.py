@@ -94,7 +94,7 @@ def blocks(run: RunPlan, size: int) -> list[Bounds]:
     return [(n, min(n + size, lanes)) for n in range(0, lanes, size)]
 
 
-def compute(run: RunPlan, block: Bounds, before: Floats) -> dict[str, Any]:
+def compute_block(run: RunPlan, block: Bounds, before: Floats) -> dict[str, Any]:
     """Compute a block of lanes.
 
     Parameters
@@ -112,11 +112,11 @@ def compute(run: RunPlan, block: Bounds, before: Floats) -> dict[str, Any]:
         All variables by name.
     """
     places = np.arange(*block)
-    start, outcome = integrate(run, places, run.recording, before)
+    start, outcome = integrate_places(run, places, run.recording, before)
     return arrays_of(run, run.lanes.computed_at(places), start, outcome)
 
 
-def integrate(
+def integrate_places(
     run: RunPlan, places: Integers, plan: kernels.Plan, before: Floats | None = None
 ) -> tuple[Floats, kernels.Outcome]:
     """Integrate some lanes of a run with a plan.
@@ -130,7 +130,7 @@ def integrate(
     plan : gearchaos_kernels.Plan
         Plan of the integration.
     before : array, shape (lanes, states), optional
-        As in `compute`; without it a carried sweep starts from the configured start.
+        As in `compute_block`; without it a carried sweep starts from the configured start.
 
     Returns
     -------

@@ -17,7 +17,7 @@ import numba
 from dask.utils import parse_timedelta
 
 from gearchaos.arrays import Arrays
-from gearchaos.engine.computing import Bounds, EndStates, compute
+from gearchaos.engine.computing import Bounds, EndStates, compute_block
 from gearchaos.engine.provenance import SOFTWARE
 from gearchaos.engine.run_plan import Chosen, RunPlan, plan_run
 from gearchaos.errors import ConfigurationError, ExecutionError
@@ -94,7 +94,7 @@ class DaskExecutor(ExitStack):
         future: Future[Arrays] = Future()
         # Only the workers know which blocks run: all submitted blocks are finished.
         future.set_running_or_notify_cancel()
-        inner = self._executor.submit(compute_block, SOFTWARE, *self._recipe, block)
+        inner = self._executor.submit(compute_on_worker, SOFTWARE, *self._recipe, block)
         inner.add_done_callback(lambda done: _settle(future, done.result, self._worded))
         return future
 
@@ -125,7 +125,7 @@ class DaskExecutor(ExitStack):
         return ExecutionError(f"{self._address}: {text}")
 
 
-def compute_block(
+def compute_on_worker(
     software: Software, configuration: str, chosen: Chosen, block: Bounds
 ) -> dict[str, Any]:
     """Compute a block on a worker; ExecutionError if its software is not that of the client.
@@ -143,7 +143,7 @@ def compute_block(
         tasks, most = distributed.get_worker().state.nthreads, numba.config.NUMBA_NUM_THREADS
         numba.set_num_threads(min(tasks, most) if tasks > 1 else most)
         run = _run_plan(configuration, chosen)
-        return compute(run, block, EndStates(run).before(0))
+        return compute_block(run, block, EndStates(run).before(0))
 
 
 _ONE_AT_A_TIME = Lock()

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, TypeAlias
 import numba
 
 from gearchaos.arrays import Arrays
-from gearchaos.engine.computing import Bounds, EndStates, compute
+from gearchaos.engine.computing import Bounds, EndStates, compute_block
 from gearchaos.engine.error_check import Tally
 from gearchaos.engine.run_plan import RunPlan
 from gearchaos.errors import GearchaosError
@@ -57,7 +57,7 @@ class LocalExecutor(ExitStack):
 
     def _compute(self, block: Bounds) -> Arrays:
         """Compute a block and store its end states."""
-        arrays = compute(self._run, block, self._ends.before(block[0]))
+        arrays = compute_block(self._run, block, self._ends.before(block[0]))
         self._ends.keep(block[0], arrays["end_state"])
         return arrays
 

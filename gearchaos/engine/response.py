@@ -8,7 +8,7 @@ from gearchaos_kernels import LaneSystem, Outcome, Plan, Status
 from gearchaos.arguments import whole_number
 from gearchaos.arrays import Array
 from gearchaos.engine.choosing import with_chosen_steps
-from gearchaos.engine.computing import integrate
+from gearchaos.engine.computing import integrate_places
 from gearchaos.engine.kept import arrays_of
 from gearchaos.engine.run_plan import RunPlan, plan_run
 from gearchaos.engine.running import choose_threads, metadata, require_memory, result_of
@@ -84,7 +84,7 @@ def compute_response(run: RunPlan, periods: int, text: str, fixed: str = "") -> 
     require_memory(run, size, f"{what}steps", "request fewer periods or values")
     began = time.monotonic()
     places = run.lanes.computed_at(np.arange(lanes))
-    start, outcome = integrate(run, np.arange(lanes), plan)
+    start, outcome = integrate_places(run, np.arange(lanes), plan)
     system = run.lanes.system_of(places)
     arrays = {
         **arrays_of(run, places, start, outcome),

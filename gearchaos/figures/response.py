@@ -62,7 +62,7 @@ def time_history(
     FigureError
         If the result is not a response, the variable is missing, or the lane diverged.
     """
-    values = motion_of(result, lane, variable)
+    values = motion_over_time(result, lane, variable)
     time = result[TIME]
     low = time[0] if between[0] is None else between[0]
     high = time[-1] if between[1] is None else between[1]
@@ -127,7 +127,7 @@ def phase_portrait(
         As for `time_history`.
     """
     plane = coordinate, f"{coordinate}_rate"
-    displacement, velocity = (motion_of(result, lane, name) for name in plane)
+    displacement, velocity = (motion_over_time(result, lane, name) for name in plane)
     (curve,) = axes.plot(displacement, velocity, color=BLACK, linewidth=0.4)
     steps = samples_per_period(result)
     strobe = displacement[::steps], velocity[::steps]
@@ -160,7 +160,7 @@ def poincare_section(axes: Axes, result: Result, lane: int, coordinate: str = CO
     coincide.
     """
     plane = coordinate, f"{coordinate}_rate"
-    curve = np.array([motion_of(result, lane, name) for name in plane])
+    curve = np.array([motion_over_time(result, lane, name) for name in plane])
     section = np.array([result.lanes(f"section_{name}")[lane] for name in plane])
     reach = (0.5 + _MARGIN) * np.maximum(np.ptp(section, 1), _SMALLEST_SHARE * np.ptp(curve, 1))
     reach[reach == 0.0] = 1.0
@@ -229,7 +229,7 @@ def amplitude_spectrum(
 
 def _spectrum(result: Result, lane: int, variable: str) -> tuple[Floats, Floats, str]:
     """Return orders and amplitudes, each (lines,), and the window in words."""
-    values, steps = motion_of(result, lane, variable), samples_per_period(result)
+    values, steps = motion_over_time(result, lane, variable), samples_per_period(result)
     held, excitation = values.size // steps, excitation_of(result.metadata).excitation_period
     repeats = repeats_after(result, lane)
     period = next((n for n in (repeats, excitation) if 0 < n <= held), 1)
@@ -310,7 +310,7 @@ def samples_per_period(result: Result) -> int:
     return int(np.searchsorted(result[TIME], 1.0))
 
 
-def motion_of(result: Result, lane: int, variable: str) -> Floats:
+def motion_over_time(result: Result, lane: int, variable: str) -> Floats:
     """Return a variable of one lane over time, shape (samples,).
 
     Raises

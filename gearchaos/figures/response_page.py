@@ -112,7 +112,7 @@ class _Motion(NamedTuple):
 
 def _motion(result: Result, lane: int, variable: str) -> _Motion:
     """Check that the lane has the variable, and choose which periods to show."""
-    response.motion_of(result, lane, variable)
+    response.motion_over_time(result, lane, variable)
     whole = variable in response.coordinates_of(result)
     excitation, last = excitation_of(result.metadata), float(result[TIME][-1])
     teeth = excitation.driving_teeth if excitation.of_teeth else 0

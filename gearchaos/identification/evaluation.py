@@ -29,7 +29,7 @@ FINER = 4
 MOTIONS_AT_ONCE = 2**8  # Lanes with a finer motion at a time: all its samples are in memory.
 
 
-class Records(NamedTuple):
+class CandidateRecords(NamedTuple):
     """Results of the lanes of some candidates.
 
     Attributes
@@ -52,15 +52,15 @@ class Records(NamedTuple):
     acceleration: Floats
     sound: Mask
 
-    def at(self, values: Integers) -> "Records":
+    def at(self, values: Integers) -> "CandidateRecords":
         """Return the results at some of the swept values, by their numbers."""
         arrays: Any = (array[:, values] for array in self)
-        return Records(*arrays)
+        return CandidateRecords(*arrays)
 
 
-def evaluate(
+def evaluate_candidates(
     config: Configuration, values: Floats, parameters: dict[str, Floats], accelerated: Mask
-) -> Records:
+) -> CandidateRecords:
     """Integrate every candidate at every swept value.
 
     Parameters
@@ -95,7 +95,7 @@ def evaluate(
         parts.append([one.reshape(candidates, line.size, *one.shape[1:]) for one in found])
     order = np.argsort(np.ravel(lines))
     joined: Any = (np.concatenate(arrays, axis=1) for arrays in zip(*parts, strict=True))
-    return Records(*joined).at(order)
+    return CandidateRecords(*joined).at(order)
 
 
 def require_stable(config: Configuration, values: Floats, parameters: dict[str, Floats]) -> None:
@@ -104,7 +104,7 @@ def require_stable(config: Configuration, values: Floats, parameters: dict[str, 
     Parameters
     ----------
     config, values, parameters
-        As for `evaluate`.
+        As for `evaluate_candidates`.
 
     Raises
     ------
@@ -131,7 +131,9 @@ def require_stable(config: Configuration, values: Floats, parameters: dict[str, 
         )
 
 
-def _records(system: LaneSystem, outcome: Outcome, looked_at: Integers, plan: Plan) -> Records:
+def _records(
+    system: LaneSystem, outcome: Outcome, looked_at: Integers, plan: Plan
+) -> CandidateRecords:
     """Return the results of lanes, each array with the lanes first."""
     sound = outcome.status == Status.OK
     # Torsion and its rate are enough: the other coordinates are periodic when these are.
@@ -152,4 +154,4 @@ def _records(system: LaneSystem, outcome: Outcome, looked_at: Integers, plan: Pl
         motion = integrate(some, outcome.end_state[lanes], finer)
         found = kernels.evaluate(some, motion.history, finer.steps_per_period).accelerations
         acceleration[lanes] = np.max(found, axis=1)
-    return Records(outcome.section[..., 0], period, exponent, acceleration, sound)
+    return CandidateRecords(outcome.section[..., 0], period, exponent, acceleration, sound)

@@ -10,7 +10,7 @@ from pydantic import ValidationError
 
 from gearchaos.arrays import Floats
 from gearchaos.configuration.keys import keys_of
-from gearchaos.configuration.messages import faults_of, texts
+from gearchaos.configuration.messages import fault_texts, faults_of
 from gearchaos.configuration.toml_text import (
     tables_from_toml,
     text_of_file,
@@ -74,7 +74,7 @@ def load_targets(file: str | os.PathLike[str], overrides: Iterable[str] = ()) ->
         targets = Targets.model_validate(tables)
     except ValidationError as error:
         worded, more = faults_of(error, {one.path: one for one in keys_of(Targets)})
-        raise ConfigurationError(texts(worded, source, more)) from None
+        raise ConfigurationError(fault_texts(worded, source, more)) from None
     # Only observed coordinates: axial motion does not act back, and is computed only if observed.
     section = [*dict.fromkeys(("delta_5", *(one.coordinate for one in targets.increment)))]
     outputs = {"section": section, "section_points": 1, "lyapunov": bool(targets.exponent)}

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gearchaos.arrays import Floats, Mask
-from gearchaos.identification.evaluation import Records
+from gearchaos.identification.evaluation import CandidateRecords
 from gearchaos.identification.targets import (
     Exponent,
     Increment,
@@ -43,7 +43,7 @@ class Observation:
     wanted: float
     width: float
     values: Floats
-    computed: Callable[[Records], Floats]
+    computed: Callable[[CandidateRecords], Floats]
     missing: float = NOWHERE
 
     def residual(self, computed: Floats) -> Floats:
@@ -61,7 +61,7 @@ def stage_length(stage: ObservedStage) -> Observation:
     half = _spaced(length / 2.0, stage.width / 2.0, 1.5)
     edges = np.concatenate([stage.from_ + half, stage.to - half[-2::-1]])
 
-    def computed(records: Records) -> Floats:
+    def computed(records: CandidateRecords) -> Floats:
         wrong = ~has_motion(records, stage.motion)
         return np.asarray(np.sum(wrong * np.diff(edges), axis=1))
 
@@ -81,7 +81,7 @@ def change_place(kind: str, place: ObservedPlace) -> Observation:
     around = np.concatenate([place.at - half - below, place.at + half + above])
     values = np.unique(np.clip(around, low, high))
 
-    def computed(records: Records) -> Floats:
+    def computed(records: CandidateRecords) -> Floats:
         steps = _growth(records) if kind == "crisis" else _jumps(records, np.diff(values))
         middle = (values[1:] + values[:-1]) / 2.0
         there = np.max(steps, axis=1) > 0.0
@@ -91,7 +91,7 @@ def change_place(kind: str, place: ObservedPlace) -> Observation:
     return Observation(f"{kind} at {place.at:g}", place.at, place.width, values, computed, missing)
 
 
-def _jumps(records: Records, cells: Floats) -> Floats:
+def _jumps(records: CandidateRecords, cells: Floats) -> Floats:
     """Return the sizes of jumps between neighbouring values, 0 where there is none.
 
     Shape (candidates, values - 1); ``cells`` (values - 1,): distances of the values.
@@ -103,7 +103,7 @@ def _jumps(records: Records, cells: Floats) -> Floats:
     return np.stack([*sizes])
 
 
-def _growth(records: Records) -> Floats:
+def _growth(records: CandidateRecords) -> Floats:
     """Return 1 where the section of a motion first passes half of its total growth, else 0.
 
     Close to a crisis bursts are rare, and the record of a single lane may miss them. The growth is
@@ -131,7 +131,7 @@ def acceleration_increment(increment: Increment, coordinates: Sequence[str]) -> 
     ends, column = (increment.from_, increment.to), coordinates.index(increment.coordinate)
     sign = 1.0 if ends[0] <= ends[1] else -1.0
 
-    def computed(records: Records) -> Floats:
+    def computed(records: CandidateRecords) -> Floats:
         first, last = records.acceleration[:, :, column].T
         return np.asarray(sign * (last - first))
 
@@ -154,7 +154,7 @@ def observations_of(targets: Targets, coordinates: Sequence[str]) -> list[Observ
     ]
 
 
-def has_motion(records: Records, motion: str) -> Mask:
+def has_motion(records: CandidateRecords, motion: str) -> Mask:
     """Return which lanes have a motion of this kind, shape (candidates, values).
 
     A motion on n bands visits n parts of the section in turn whose ranges of delta_5 do not

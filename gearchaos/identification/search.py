@@ -16,7 +16,7 @@ from gearchaos.arrays import Floats
 from gearchaos.configuration.toml_text import toml_text
 from gearchaos.engine.provenance import SOFTWARE
 from gearchaos.errors import FileError
-from gearchaos.identification.evaluation import evaluate
+from gearchaos.identification.evaluation import evaluate_candidates
 from gearchaos.identification.flat_directions import (
     ONE_UNIT,
     Proposals,
@@ -78,7 +78,7 @@ def judge(problem: Problem, run: int, parameters: dict[str, Floats]) -> Tried:
     """Compute candidates and their misfits; ``parameters`` are (candidates,) by key."""
     ends = [end for one in problem.targets.increment for end in (one.from_, one.to)]
     accelerated = np.isin(problem.values, ends)
-    records = evaluate(problem.config, problem.values, parameters, accelerated)
+    records = evaluate_candidates(problem.config, problem.values, parameters, accelerated)
     computed, residuals = [], []
     for one in problem.observations:
         places = np.searchsorted(problem.values, one.values)

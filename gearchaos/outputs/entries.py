@@ -146,7 +146,7 @@ def rearranged(parts: Iterable[Part], instead: Mapping[Part, Sequence[Part]]) ->
     return tuple(new for part in parts for new in instead.get(part, (part,)))
 
 
-def motion_of(name: str, symbol: str, wording: str) -> tuple[Subject, Subject, Subject]:
+def motion_subjects(name: str, symbol: str, wording: str) -> tuple[Subject, Subject, Subject]:
     """Return the displacement, the velocity and the acceleration of a coordinate as subjects.
 
     ``symbol`` is the TeX symbol of the displacement. ``wording`` has ``{}`` in place of the words

@@ -63,8 +63,8 @@ class Catalogue:
     Examples
     --------
     >>> from gearchaos.outputs import catalogue
-    >>> from gearchaos.outputs.entries import Kind, motion_of
-    >>> x, x_rate, x_acceleration = motion_of("x", "x", "{} of the mass")
+    >>> from gearchaos.outputs.entries import Kind, motion_subjects
+    >>> x, x_rate, x_acceleration = motion_subjects("x", "x", "{} of the mass")
     >>> oscillator = Catalogue(
     ...     parts=catalogue.PARTS,
     ...     subjects={Kind.STATE: (x, x_rate), Kind.ACCELERATION: (x_acceleration,)},

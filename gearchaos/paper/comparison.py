@@ -20,7 +20,7 @@ WINDOW = 0.1
 NONE = "–"
 
 
-class Verdict(StrEnum):
+class Agreement(StrEnum):
     """Result of a comparison."""
 
     AGREES = "agrees"
@@ -28,10 +28,10 @@ class Verdict(StrEnum):
     DOES_NOT = "does not agree"
 
 
-RULES = vars(published().rules)
+AGREEMENT_RULES = vars(published().rules)
 
 
-class Row(NamedTuple):
+class ComparisonRow(NamedTuple):
     """One row of the comparison as text."""
 
     quantity: str
@@ -40,10 +40,10 @@ class Row(NamedTuple):
     published: str
     ours: str
     difference: str
-    verdict: Verdict
+    verdict: Agreement
 
 
-def compare(found: Reproduction) -> dict[str, list[Row]]:
+def compare(found: Reproduction) -> dict[str, list[ComparisonRow]]:
     """Compare a reproduction with all printed numbers; return the report's tables by name."""
     printed, ours = published(), found.numbers
     numbers = defaultdict(list)
@@ -63,7 +63,7 @@ def compare(found: Reproduction) -> dict[str, list[Row]]:
     }
 
 
-def _harmonics() -> Iterator[Row]:
+def _harmonics() -> Iterator[ComparisonRow]:
     table, mean = published().harmonics, published().numbers.mean_stiffness.value
     ours = mean * contact_line_stiffness().coefficients(len(table.cosine))
     first = math.hypot(table.cosine[0], table.sine[0])
@@ -72,7 +72,7 @@ def _harmonics() -> Iterator[Row]:
             yield _row(f"{letter}<sub>{n}</sub>", table, one, other, size=first, digits=4)
 
 
-def _increments(found: Reproduction) -> Iterator[Row]:
+def _increments(found: Reproduction) -> Iterator[ComparisonRow]:
     table = published().increments
     for (low, high), value in zip(pairwise(table.pitch_errors), table.values, strict=True):
         before, after = (largest_acceleration(found.response, p) for p in (low, high))
@@ -80,10 +80,12 @@ def _increments(found: Reproduction) -> Iterator[Row]:
         yield _row(quantity, table, value, after - before)
 
 
-def _stages(found: Reproduction, pairs: list[tuple[Printed, Stage | None]]) -> Iterator[Row]:
+def _stages(
+    found: Reproduction, pairs: list[tuple[Printed, Stage | None]]
+) -> Iterator[ComparisonRow]:
     labels, kind = found.lanes.labels, published().kinds.stages
     for printed, stage in pairs:
-        mine, difference, judged = NONE, NONE, Verdict.DOES_NOT
+        mine, difference, judged = NONE, NONE, Agreement.DOES_NOT
         if stage is not None:
             share = np.mean(labels[stage.first : stage.last + 1] == stage.label)
             mine = f"{stage.start:.2f} – {stage.end:.2f}"
@@ -94,10 +96,10 @@ def _stages(found: Reproduction, pairs: list[tuple[Printed, Stage | None]]) -> I
             difference = ", ".join(map(signed, ends))
             judged = overlap_verdict((printed.first, printed.last), (stage.start, stage.end))
         theirs = f"{printed.first:.2f} – {printed.last:.2f}"
-        yield Row(printed.printed, "figure 7", kind, theirs, mine, difference, judged)
+        yield ComparisonRow(printed.printed, "figure 7", kind, theirs, mine, difference, judged)
 
 
-def _boundaries(pairs: list[tuple[Printed, Stage | None]]) -> Iterator[Row]:
+def _boundaries(pairs: list[tuple[Printed, Stage | None]]) -> Iterator[ComparisonRow]:
     for (before, ended), (after, begun) in pairwise(pairs):
         # A boundary needs a stage on either side.
         mine = math.nan if ended is None or begun is None else begun.start
@@ -105,8 +107,8 @@ def _boundaries(pairs: list[tuple[Printed, Stage | None]]) -> Iterator[Row]:
         yield _row(quantity, published().boundaries, after.first, mine, unit="e(τ)", digits=2)
 
 
-def _motions(found: Reproduction) -> Iterator[Row]:
-    reach = RULES["boundary"].in_kind
+def _motions(found: Reproduction) -> Iterator[ComparisonRow]:
+    reach = AGREEMENT_RULES["boundary"].in_kind
     for shown in published().motions:
         p = shown.pitch_error
         ours = found.motion_at(p)
@@ -114,7 +116,7 @@ def _motions(found: Reproduction) -> Iterator[Row]:
         near = found.lanes.labels[np.abs(found.lanes.values - p) <= reach + 1e-9]
         judged = motion_verdict(shown.motion, ours, near.tolist())
         place = f"motion at {p:g} e(τ)", f"figure {shown.figure}", published().kinds.motions
-        yield Row(*place, shown.printed, ours, NONE, judged)
+        yield ComparisonRow(*place, shown.printed, ours, NONE, judged)
 
 
 def counterparts(printed: Sequence[Printed], lanes: LabelledLanes) -> list[Stage | None]:
@@ -128,12 +130,12 @@ def counterparts(printed: Sequence[Printed], lanes: LabelledLanes) -> list[Stage
         alike = [stage for stage in stages if stage.label == one.motion]
         common = [min(s.end, one.last) - max(s.start, one.first) for s in alike]
         most = max(common, default=-np.inf)
-        near = most >= -RULES["boundary"].in_kind
+        near = most >= -AGREEMENT_RULES["boundary"].in_kind
         found.append(alike[common.index(most)] if near else None)
     return found
 
 
-def verdict(rule: Printed, published: float, ours: float, size: float | None = None) -> Verdict:
+def verdict(rule: Printed, published: float, ours: float, size: float | None = None) -> Agreement:
     """Judge a number by a rule; NaN does not agree.
 
     For a relative rule the distance is divided by ``size``, by default the printed number.
@@ -144,22 +146,22 @@ def verdict(rule: Printed, published: float, ours: float, size: float | None = N
     # The tolerance includes distances at the limit despite rounding.
     within = distance * (1.0 - 1e-9)
     if within <= rule.agrees:
-        return Verdict.AGREES
-    return Verdict.IN_KIND if within <= rule.in_kind else Verdict.DOES_NOT
+        return Agreement.AGREES
+    return Agreement.IN_KIND if within <= rule.in_kind else Agreement.DOES_NOT
 
 
-def overlap_verdict(published: tuple[float, float], ours: tuple[float, float]) -> Verdict:
+def overlap_verdict(published: tuple[float, float], ours: tuple[float, float]) -> Agreement:
     """Judge an interval (first, last) by the ratio of intersection to union."""
     common = min(published[1], ours[1]) - max(published[0], ours[0])
     together = max(published[1], ours[1]) - min(published[0], ours[0])
-    return verdict(RULES["stage"], 1.0, max(common, 0.0) / together)
+    return verdict(AGREEMENT_RULES["stage"], 1.0, max(common, 0.0) / together)
 
 
-def motion_verdict(published: str, ours: str, near: Sequence[str]) -> Verdict:
+def motion_verdict(published: str, ours: str, near: Sequence[str]) -> Agreement:
     """Judge the motion at one pitch error; ``near``: motions within reach of the boundary rule."""
     if ours == published:
-        return Verdict.AGREES
-    return Verdict.IN_KIND if published in near else Verdict.DOES_NOT
+        return Agreement.AGREES
+    return Agreement.IN_KIND if published in near else Agreement.DOES_NOT
 
 
 def signed(value: float, digits: int = 2) -> str:
@@ -177,9 +179,9 @@ def _row(
     unit: str = "",
     size: float | None = None,
     digits: int | None = None,
-) -> Row:
+) -> ComparisonRow:
     """Compare two numbers; ``size``: divisor of a relative rule, if not the printed number."""
-    rule, mine, difference = RULES[printed.rule], NONE, NONE
+    rule, mine, difference = AGREEMENT_RULES[printed.rule], NONE, NONE
     if math.isfinite(ours):
         mine = f"{_number(ours if digits is None else round(ours, digits))} {unit}".rstrip()
         difference = signed(ours - theirs)
@@ -188,7 +190,7 @@ def _row(
             difference = f"{signed(share, 1 if abs(share) >= 1.0 else 3)} %"
     where, kind, judged = printed.where, printed.kind, verdict(rule, theirs, ours, size)
     printed_number = f"{_number(theirs)} {unit}".rstrip()
-    return Row(quantity, where, kind, printed_number, mine, difference, judged)
+    return ComparisonRow(quantity, where, kind, printed_number, mine, difference, judged)
 
 
 def _number(value: float) -> str:

@@ -155,7 +155,7 @@ def physical(config: Configuration) -> Mapping[str, Any]:
     return config.physical()
 
 
-def compute(
+def compute_gallery(
     config: Configuration,
     full: Configuration,
     *,

@@ -17,7 +17,14 @@ from gearchaos.figures.page import FORMATS, Page, save_figure
 from gearchaos.figures.response import coordinates_of
 from gearchaos.outputs.names import CROSSINGS, acceleration_of
 from gearchaos.paper import figures
-from gearchaos.paper.comparison import RULES, WINDOW, Row, Verdict, compare, signed
+from gearchaos.paper.comparison import (
+    AGREEMENT_RULES,
+    WINDOW,
+    Agreement,
+    ComparisonRow,
+    compare,
+    signed,
+)
 from gearchaos.paper.computation import Reproduction, lane_of, largest_acceleration
 from gearchaos.paper.published import published
 from gearchaos.paper.stages import OUT_OF_TURN, TWO_BANDS
@@ -137,7 +144,7 @@ def _report(found: Reproduction) -> str:
         rows=len(rows),
         counts=Counter(row.verdict for row in rows),
         kinds={kind: _counts(row for row in rows if row.kind == kind) for kind in KINDS},
-        rules=RULES,
+        rules=AGREEMENT_RULES,
         window=WINDOW,
         out_of_turn=OUT_OF_TURN,
         tables={name: _table(table) for name, table in tables.items()},
@@ -153,15 +160,15 @@ def _report(found: Reproduction) -> str:
     )
 
 
-def _counts(rows: Iterable[Row]) -> str:
+def _counts(rows: Iterable[ComparisonRow]) -> str:
     counts = Counter(row.verdict for row in rows)
-    return " | ".join(map(str, (counts.total(), *(counts[verdict] for verdict in Verdict))))
+    return " | ".join(map(str, (counts.total(), *(counts[verdict] for verdict in Agreement))))
 
 
-def _table(rows: Iterable[Row]) -> str:
+def _table(rows: Iterable[ComparisonRow]) -> str:
     lines = []
     for row in rows:
-        verdict = f"**{row.verdict}**" if row.verdict is Verdict.DOES_NOT else row.verdict
+        verdict = f"**{row.verdict}**" if row.verdict is Agreement.DOES_NOT else row.verdict
         lines.append(_line(*row[:-1], verdict))
     return TABLE_HEAD + "\n".join(lines)
 

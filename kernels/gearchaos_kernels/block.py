@@ -25,8 +25,8 @@ from gearchaos_kernels.memory.block_memory import (
 )
 from gearchaos_kernels.memory.rows import LANES, STATE, STRIDE, rows
 from gearchaos_kernels.methods.protocol import (
-    Given,
     StepAt,
+    StepInputs,
     begin_lane,
     maps_per_step,
     resolve,
@@ -104,7 +104,7 @@ def integrate_block(number_of_block, batch, tables, plan, outcome, scene):
     align_stack()
     first, lanes, steps, maps_at = batch.blocks[number_of_block]
     memory = aligned_memory(rows(scene).total + plan.more_rows)
-    given = Given(tables, batch.maps, workspace(scene))
+    given = StepInputs(tables, batch.maps, workspace(scene))
     records = Records(given, batch, outcome)
     block = Block(first, lanes)
     substeps = steps // plan.steps_per_period

@@ -11,12 +11,12 @@ from gearchaos.configuration.tables import Parameter
 from gearchaos.models.protocol import Model
 from gearchaos.models.registry import MODELS
 from gearchaos.outputs import catalogue
-from gearchaos.outputs.entries import Kind, Subject, motion_of
+from gearchaos.outputs.entries import Kind, Subject, motion_subjects
 from gearchaos.outputs.listing import Catalogue
 
 from ..kernels.oscillator import Oscillators
 
-X, X_RATE, X_ACCELERATION = motion_of("x", "x", "{} of the mass")
+X, X_RATE, X_ACCELERATION = motion_subjects("x", "x", "{} of the mass")
 NAMES = [field.name for field in fields(Oscillators)]
 STATES = {Kind.STATE: (X, X_RATE), Kind.ACCELERATION: (X_ACCELERATION,)}
 STOP = Subject("stop", "stop", "$F$")

@@ -13,7 +13,7 @@ from gearchaos.engine.steps import Candidate, pilot
 from ..kernels.reference import SOLUTIONS
 from .commands import names_in, run_module
 from .short_sweeps import PAN2021
-from .test_contact_told import AXIAL
+from .test_contact_outputs import AXIAL
 
 PLAIN = tuple(word for one in AXIAL for word in ("--set", one))
 """The scene whose plain steps other tests have compiled."""

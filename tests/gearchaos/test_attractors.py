@@ -51,7 +51,7 @@ def test_lanes_that_are_still_far_are_polished_to_the_same_orbit():
     assert number.tolist() == [0, 0, 0]
 
 
-def test_a_lane_that_a_longer_look_told_goes_on_until_it_is_there():
+def test_a_lane_that_a_longer_record_labels_goes_on_until_it_is_there():
     one, _ = np.array(DOUBLED["section_points"])
     found, number = found_from(DOUBLED["pitch_error"], [0.5 * one, one], PERIODIC, 2)
     assert len(found) == 1
@@ -65,7 +65,7 @@ def test_lanes_of_other_parameters_share_no_attractor():
     assert number.tolist() == [0, 1]
 
 
-def test_starts_on_one_chaotic_attractor_are_told_by_where_it_goes():
+def test_starts_on_one_chaotic_attractor_are_reported_by_where_it_goes():
     states = ends(12.5, 24, 300)
     found, number = found_from(12.5, states, CHAOTIC, 0)
     assert len(found) == 1

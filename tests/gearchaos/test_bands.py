@@ -65,7 +65,7 @@ def test_a_long_period_of_small_factors_is_not_a_torus(period):
     assert apart(np.tile(once, (POINTS // period + 1, 1))[:POINTS]) > max(WHOLE, 0.25)
 
 
-def test_too_few_points_tell_nothing():
+def test_too_few_points_report_nothing():
     assert apart(torus(GOLDEN, points=111)) == np.inf
     assert apart(torus(GOLDEN, points=112)) < np.inf
     # Sixteen curves take more points than these.
@@ -118,5 +118,5 @@ def test_noise_a_point_at_rest_and_too_few_points_are_one_band():
     assert bands(np.full((512, 2), np.nan)) == 1
 
 
-def test_more_bands_than_are_counted_are_told_as_a_divisor():
+def test_more_bands_than_are_counted_are_reported_as_a_divisor():
     assert bands(logistic(3.5701, 512)) == 16  # There are 32.

@@ -172,7 +172,7 @@ def test_the_table_lists_every_basin_within_80_columns(folder):
     assert list(shares.values()) == pytest.approx([1.0] * 5)
 
 
-def test_one_value_is_told_with_entropy_and_the_means_of_its_basins(folder):
+def test_one_value_is_reported_with_entropy_and_the_means_of_its_basins(folder):
     out = run(folder, "grid.h5").out
     assert "basin entropy" in out
     told = " ".join(out.split())
@@ -182,7 +182,7 @@ def test_one_value_is_told_with_entropy_and_the_means_of_its_basins(folder):
     assert at[1] == "slice pitch_error = 1.2; others with --at pitch_error=VALUE"
 
 
-def test_json_tells_all_of_it(folder, grid):
+def test_json_reports_all_of_it(folder, grid):
     told = json.loads(run(folder, "grid.h5", "--json").out)
     found = find_basins(grid)
     assert (told["parameter"], told["starts"]) == ("pitch_error", 121)

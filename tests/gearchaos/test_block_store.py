@@ -160,7 +160,7 @@ def test_files_of_the_user_in_the_folder_stay(output: Path) -> None:
     assert [path.name for path in folder.iterdir()] == ["notes.txt"]
 
 
-def test_finished_blocks_are_not_thrown_away_without_being_told(output: Path) -> None:
+def test_finished_blocks_are_not_thrown_away_without_a_message(output: Path) -> None:
     with open_store(output) as store:
         fill(store)
     with pytest.raises(FileError, match=r"holds 4 finished blocks .* --resume, or delete"):
@@ -214,7 +214,7 @@ def test_a_store_of_another_gearchaos_is_refused_with_both_values(output: Path) 
         assert store.finished().bounds == BLOCKS
 
 
-def test_types_and_nans_are_told_apart_where_they_matter() -> None:
+def test_types_and_nans_are_distinguished_where_they_matter() -> None:
     earlier, now = ({"configuration": f"a = nan\nb = {b}"} for b in ("1", "1.0"))
     require_same("this", earlier, earlier)
     with pytest.raises(FileError, match=r"differs in b \(1, now 1\.0\); go back"):

@@ -77,7 +77,7 @@ def test_both_directions_differ_between_the_folds_of_the_coexisting_motions(resu
     assert stretch.upper == pytest.approx(folds[1], abs=STEP / 2)
 
 
-def test_narrow_stretches_and_those_of_one_direction_are_not_told(result):
+def test_narrow_stretches_and_those_of_one_direction_are_not_reported(result):
     assert apart(result, 0.95) == []
     assert apart(result.sel(direction="upwards")) == []
     assert refined_jumps(computable(result, "both.h5"), result, [], 1e-3) == []
@@ -97,7 +97,7 @@ def test_refined_jumps_are_the_folds(folder, folds):
         assert jump["multiplier"][0] > 0.9
 
 
-def test_the_table_tells_where_directions_differ_within_80_columns(folder):
+def test_the_table_reports_where_directions_differ_within_80_columns(folder):
     ended = run_module("gearchaos.stages", "both.h5", cwd=folder)
     assert (ended.code, ended.err) == (0, "")
     assert "slice direction = upwards; others with --at direction=VALUE" in ended.out

@@ -96,7 +96,7 @@ def result(backwards: bool) -> Result:
 
 
 @pytest.mark.parametrize("backwards", [False, True])
-def test_a_crisis_tells_what_the_section_spans_on_both_sides(backwards):
+def test_a_crisis_reports_what_the_section_spans_on_both_sides(backwards):
     (crisis,) = crises(result(backwards))
     spacing = GROWTH[1] - GROWTH[0]
     merging = GROWTH[0] + GROWTH[-1] - MERGING if backwards else MERGING

@@ -110,7 +110,7 @@ def test_the_summary_counts_what_was_measured():
     )
 
 
-def test_the_file_tells_the_errors_and_what_they_mean(tmp_path):
+def test_the_file_reports_the_errors_and_what_they_mean(tmp_path):
     config = simulation("integration.error_check=0.5").config
     gearchaos.run(config).save(tmp_path / "checked.h5")
     result = gearchaos.open_result(tmp_path / "checked.h5")

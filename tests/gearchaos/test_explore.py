@@ -335,7 +335,7 @@ def test_no_other_origin_is_served(address):
         other.connect(("127.0.0.2", int(port)))
 
 
-def test_what_is_wrong_is_told_in_a_sentence(path, tmp_path, monkeypatch, capsys):
+def test_what_is_wrong_is_reported_in_a_sentence(path, tmp_path, monkeypatch, capsys):
     def said(*arguments: str) -> tuple[int, str]:
         return main([*arguments, "--no-browser"]), capsys.readouterr().err
 
@@ -448,7 +448,7 @@ def test_axes_with_the_same_label_stay_two_axes(path, monkeypatch):
 
 
 @needs_browser
-def test_a_link_to_a_number_that_no_sweep_reaches_is_told(page, address):
+def test_a_link_to_a_number_that_no_sweep_reaches_is_reported(page, address):
     look(page, address, "?pitch_error=1e999&window=[1,2,3,1e999]&direction=1.0")
     page.get_by_text("the link asks for what there is not: pitch_error").wait_for()
     page.wait_for_url(lambda url: lane_in(url) == "0.0")

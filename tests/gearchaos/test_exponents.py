@@ -175,7 +175,7 @@ def test_a_lane_that_diverges_has_no_spectrum_and_leaves_the_others_alone():
     assert np.array_equal(found.values[[0, 2]], alone.values)
 
 
-def test_directions_that_become_parallel_within_a_period_are_not_told_apart():
+def test_directions_that_become_parallel_within_a_period_are_not_distinguished():
     # 63 units of tau contract one direction by e^-100 and more against the slowest.
     model = pan2021(0.0, mesh_frequency=0.1, damping_ratio=1.5)
     found = exponents_of(TORSION_ONLY, model, 1000, 20, 5).values[0]

@@ -93,7 +93,9 @@ def test_matlab_gets_every_array_by_its_name(path):
     ("target", "code", "message"),
     [("r.xlsx", 2, "must end in .csv"), ("r.h5", 2, "must end in"), ("old.csv", 4, "--overwrite")],
 )
-def test_what_cannot_be_written_is_told_and_nothing_is_lost(path, target, code, message, capsys):
+def test_what_cannot_be_written_is_reported_and_nothing_is_lost(
+    path, target, code, message, capsys
+):
     (path.parent / "old.csv").write_text("mine")
     assert main([str(path), str(path.parent / target)]) == code
     assert message in capsys.readouterr().err

@@ -133,7 +133,7 @@ def test_the_command_draws_the_slice_it_names(axes, at, name, tmp_path, capsys):
         (["--at", "load=0.1", "--at", "pitch_error=1"], "nothing is left to draw against"),
     ],
 )
-def test_a_slice_that_cannot_be_drawn_is_told(arguments, message, tmp_path, capsys):
+def test_a_slice_that_cannot_be_drawn_is_reported(arguments, message, tmp_path, capsys):
     BOTH.save(tmp_path / "r.h5")
     assert main([str(tmp_path / "r.h5"), *arguments]) == 2
     out, err = capsys.readouterr()

@@ -176,7 +176,7 @@ def test_three_lengths_of_a_piecewise_linear_pair_are_not_determined(tmp_path):
     assert "flat over" in ended.out
 
 
-def test_too_few_candidates_to_move_the_best_set_are_told(tmp_path):
+def test_too_few_candidates_to_move_the_best_set_are_reported(tmp_path):
     (tmp_path / "pair.toml").write_text(PAIR)
     (tmp_path / "targets.toml").write_text(SCALED)
     few = ("search.candidates=120", "search.drawn=90")

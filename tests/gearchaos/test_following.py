@@ -86,7 +86,7 @@ def followed(begin) -> Followed:
         ([-0.99, 0.98], [1.01, -0.99], StabilityLoss.FOLD, 1.01),
     ],
 )
-def test_the_multiplier_that_leaves_the_unit_circle_tells_the_kind(
+def test_the_multiplier_that_leaves_the_unit_circle_reports_the_kind(
     stable, beyond, kind, multiplier
 ):
     sides = (np.array([side], dtype=complex) for side in (stable, beyond))
@@ -228,7 +228,7 @@ def test_the_boundary_is_the_same_from_wherever_the_orbit_is_followed(followed, 
     assert further.stable_value == pytest.approx(followed.stable_value[doubling], abs=2 * WIDTH)
 
 
-def test_where_there_is_no_orbit_at_the_beginning_nothing_is_told(begin):
+def test_where_there_is_no_orbit_at_the_beginning_nothing_is_reported(begin):
     start = np.concatenate([begin[:1], np.full((1, 6), 5.0)])
     none = followed_from(start, [0, 1], [10.2, 10.2], [10.3, 10.3])
     assert np.all(none.loss == StabilityLoss.NOT_FOLLOWED)

@@ -169,7 +169,7 @@ class TestALinearPair:
         assert (tried["run"] == 0).sum() == 40
         assert facts["targets"] == TARGETS
 
-    def test_the_report_tells_what_the_targets_determine(self, identified):
+    def test_the_report_reports_what_the_targets_determine(self, identified):
         tried, _ = tried_of(identified)
         found = reach(tried, budget_of(problem_of(identified).targets.search, 2).rungs)
         best = tried["values"][np.argmin(tried["misfit"])]

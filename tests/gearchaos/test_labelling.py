@@ -7,8 +7,7 @@ from gearchaos_kernels import Plan, Status
 from gearchaos.dynamics.exponents import period_jacobian
 from gearchaos.dynamics.largest_exponents import MIXED
 from gearchaos.dynamics.orbits import polish
-from gearchaos.engine.computing import block_memory
-from gearchaos.engine.computing import integrate as integrate_lanes
+from gearchaos.engine.computing import block_memory, integrate_places
 from gearchaos.engine.error_check import Tally
 from gearchaos.engine.kept import variables_of
 from gearchaos.engine.run_plan import RunPlan, plan_run
@@ -36,7 +35,7 @@ from .short_sweeps import (
     listing,
     simulation,
 )
-from .test_contact_told import AXIAL
+from .test_contact_outputs import AXIAL
 
 LONG = (
     "integration.steps_per_period=200",
@@ -85,7 +84,7 @@ def test_an_orbit_that_hardly_attracts_is_found_by_a_longer_record(multiplier, m
         "outputs.section_points=60",
     )
     lanes = np.arange(2)
-    _, outcome = integrate_lanes(sweep, lanes, sweep.recording)
+    _, outcome = integrate_places(sweep, lanes, sweep.recording)
     record = Record(outcome.section, outcome.growth, lanes < 0, lanes < 0)
     assert label(record).motion.tolist() == [UNRESOLVED] * 2
     arrays = computed(sweep, 2)
@@ -100,7 +99,7 @@ SLOW_TORI = "sweep={parameter='mesh_frequency', values=[1.121, 1.15, 1.424]}"
 def test_a_rotation_slower_than_its_record_is_resolved_by_a_longer_one():
     sweep = plan_run(load_config(SPEEDS, (SLOW_TORI, *SOFT_BEARINGS)))
     lanes = np.arange(3)
-    _, outcome = integrate_lanes(sweep, lanes, sweep.recording)
+    _, outcome = integrate_places(sweep, lanes, sweep.recording)
     record = Record(outcome.section, outcome.growth, lanes < 0, lanes >= 0)
     assert label(record).motion.tolist() == [UNRESOLVED, QUASI_PERIODIC, UNRESOLVED]
     arrays = computed(sweep, 3)

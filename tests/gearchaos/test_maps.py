@@ -188,7 +188,7 @@ def test_the_page_has_a_panel_for_each_of_motion_exponent_and_contact(width, sha
         assert not any(box.overlaps(axes.bbox.padded(-1.0)) for axes in page.axes)
 
 
-def test_one_start_of_several_is_chosen_and_told():
+def test_one_start_of_several_is_chosen_and_reported():
     several = result_over(ERRORS, SPEEDS, CATALOGUE.axis("start", np.arange(2)))
     with pytest.raises(FigureError, match=r"along start, of which.*--at start=0"):
         map_page(several)
@@ -239,7 +239,7 @@ def test_a_pdf_has_its_cells_as_images_and_its_words_as_text(path):
         (["--shares"], "fix others with --at NAME=VALUE"),
     ],
 )
-def test_what_no_map_can_be_is_told(path, arguments, message, capsys):
+def test_what_no_map_can_be_is_reported(path, arguments, message, capsys):
     assert main([str(path), *(text.format(path) for text in arguments)]) == 2
     out, err = capsys.readouterr()
     assert out == "" and message in err

@@ -78,7 +78,7 @@ def test_a_coordinate_that_is_not_looked_at_alone_can_break_the_period():
     assert labelled(np.hstack([section, other]))[:2] == (PERIODIC, 12)
 
 
-def test_a_period_beyond_the_longest_is_unresolved_and_tells_its_distance():
+def test_a_period_beyond_the_longest_is_unresolved_and_reports_its_distance():
     section = np.resize(RANDOM.uniform(-1.0, 1.0, (17, 2)), (POINTS, 2))
     motion, period, distance = labelled(section, np.full(POINTS, -0.1))
     assert (motion, period) == (UNRESOLVED, 0)
@@ -152,7 +152,7 @@ def test_without_an_exponent_a_motion_is_periodic_or_unresolved():
         assert labels.motion.tolist() == [wanted]
 
 
-def test_a_diverged_lane_is_told_as_such_and_its_neighbours_keep_their_labels():
+def test_a_diverged_lane_is_reported_as_such_and_its_neighbours_keep_their_labels():
     section = np.stack([circle(GOLDEN), np.full((POINTS, 2), np.nan), circle(0.25)])
     growth = np.zeros((3, POINTS))
     diverged = np.array([False, True, False])
@@ -163,7 +163,7 @@ def test_a_diverged_lane_is_told_as_such_and_its_neighbours_keep_their_labels():
     assert np.isnan(labels.return_distance).tolist() == [False, True, False]
 
 
-def test_a_slow_approach_is_told_with_the_period_on_which_it_settles():
+def test_a_slow_approach_is_reported_with_the_period_on_which_it_settles():
     orbit = np.resize(RANDOM.uniform(1.0, 2.0, (3, 2)), (POINTS, 2))
     slowly = 0.05 * 0.998 ** np.arange(POINTS)[:, np.newaxis]
     settling = record(orbit + slowly, np.full(POINTS, np.log(0.998)))
@@ -206,7 +206,7 @@ def in_doubt(section: np.ndarray, growth: np.ndarray | None = None) -> bool:
     return bool(doubtful(one.growth, label(one))[0])
 
 
-def test_a_turn_as_long_as_the_record_is_for_a_longer_one_to_tell():
+def test_a_turn_as_long_as_the_record_needs_a_longer_record():
     slow = GOLDEN / POINTS
     assert labelled(circle(slow))[0] == UNRESOLVED
     assert in_doubt(circle(slow))
@@ -231,6 +231,6 @@ def test_chaos_is_doubted_as_long_as_it_is_within_six_standard_errors(errors, do
     assert in_doubt(section, growth) is doubted
 
 
-def test_without_an_exponent_a_longer_record_would_tell_nothing_of_chaos():
+def test_without_an_exponent_a_longer_record_would_not_show_chaos():
     without = record(circle(GOLDEN / POINTS))._replace(growth=np.zeros((1, 0)))
     assert not doubtful(without.growth, label(without)).any()

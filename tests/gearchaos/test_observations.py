@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from gearchaos.identification.evaluation import RETURN, Records
+from gearchaos.identification.evaluation import RETURN, CandidateRecords
 from gearchaos.identification.observations import (
     change_place,
     has_motion,
@@ -23,7 +23,7 @@ def records(*sections, exponent=-0.1):
     returns = return_distances(section[0][..., np.newaxis]) <= RETURN
     period = np.where(returns.any(axis=1), np.argmax(returns, axis=1) + 1, 0)
     shape = section.shape[:2]
-    return Records(
+    return CandidateRecords(
         section,
         period.reshape(shape).astype(np.int32),
         np.where(period == 0, abs(exponent), exponent).reshape(shape),
@@ -51,7 +51,7 @@ TWO_BANDS = np.where(POINTS % 2, 2.0, 0.0) + chaos(1.0)
         ("aperiodic", [0, 0, 0, 0, 1, 1]),
     ],
 )
-def test_motions_are_told_apart(motion, lanes):
+def test_motions_are_distinguished(motion, lanes):
     seen = records(CYCLES[1], CYCLES[2], CYCLES[4], CYCLES[6], TWO_BANDS, chaos(3.0))
     assert has_motion(seen, motion)[0].tolist() == [bool(one) for one in lanes]
 

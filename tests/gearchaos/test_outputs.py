@@ -8,12 +8,12 @@ import h5py
 import numpy as np
 import pytest
 
-from gearchaos.engine.computing import EndStates, compute
+from gearchaos.engine.computing import EndStates, compute_block
 from gearchaos.engine.running import result_of
 from gearchaos.errors import ConfigurationError
 from gearchaos.models.gear_pair.outputs import CATALOGUE, FORCES_PART, LOADS_PART
 from gearchaos.outputs import catalogue, listing
-from gearchaos.outputs.entries import Kind, Output, Part, Subject, motion_of, rearranged
+from gearchaos.outputs.entries import Kind, Output, Part, Subject, motion_subjects, rearranged
 from gearchaos.outputs.listing import Catalogue, Details
 from gearchaos.outputs.scales import PURE, BaseScale, Quantity, scales_of
 from gearchaos.outputs.variable import coordinate, require_listed
@@ -27,7 +27,7 @@ from .test_block_store import CONFIGURATION, LANES, PARAMETERS, SOFTWARE, VARIAB
 
 EVERY = {catalogue.EVERY_SWEEP_PART: True}
 AXIS = coordinate("force", "1", "amplitude of the force", "$F$", np.array([1.0, 2.0]))
-X = motion_of("x", "x", "{} of the mass")
+X = motion_subjects("x", "x", "{} of the mass")
 PUSH = Part(
     "with pushes", (Output("push_@", "push on the @", scale=Quantity.FORCE),), (Kind.ELEMENT,)
 )
@@ -197,7 +197,7 @@ def test_a_file_with_an_array_too_many_is_not_written(tmp_path):
 
 def test_a_result_with_an_array_too_many_is_not_made():
     found = unlabelled("sweep.count=2")
-    arrays = compute(found, (0, 2), EndStates(found).before(0))
+    arrays = compute_block(found, (0, 2), EndStates(found).before(0))
     assert result_of(found, [arrays], {}).axes == ("pitch_error",)
     with pytest.raises(ValueError, match=r"^noise: would not be written"):
         result_of(found, [{**arrays, "noise": np.zeros(2)}], {})

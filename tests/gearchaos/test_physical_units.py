@@ -36,7 +36,7 @@ def result(path):
     return gearchaos.open_result(path)
 
 
-def test_what_a_mistaken_unit_makes_of_a_pair_is_told(tmp_path):
+def test_what_a_mistaken_unit_makes_of_a_pair_is_reported(tmp_path):
     def notes(*overrides: str) -> str:
         given = (*ASKED, "integration.unstable=raise", *overrides)
         return " ".join(plan_run(gearchaos.load_config(small_config(tmp_path), given)).notes)
@@ -50,7 +50,7 @@ def test_what_a_mistaken_unit_makes_of_a_pair_is_told(tmp_path):
     assert "static deflection" in notes("mesh.mean_stiffness_N_per_um_mm=0.01")
 
 
-def test_a_dry_run_tells_frequency_and_deflection_of_the_pair(path, result, capsys):
+def test_a_dry_run_reports_frequency_and_deflection_of_the_pair(path, result, capsys):
     assert sweep([str(small_config(path.parent)), "--dry-run"]) == 0
     groups = result.parameters
     found = eigenfrequencies(

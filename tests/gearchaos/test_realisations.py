@@ -151,7 +151,7 @@ def test_a_response_holds_all_gear_pairs(tmp_path):
     )
 
 
-def test_a_dry_run_tells_how_many_there_are(tmp_path):
+def test_a_dry_run_reports_how_many_there_are(tmp_path):
     (tmp_path / "gears.toml").write_text(text_of(DRAWN, "[21, 38]"))
     ended = run_module("gearchaos.sweep", "gears.toml", "--dry-run", cwd=tmp_path)
     assert ended.code == 0

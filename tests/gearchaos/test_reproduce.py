@@ -12,9 +12,9 @@ from gearchaos.command_line import SWEEPS
 from gearchaos.figures.response import coordinates_of
 from gearchaos.models.gear_pair.contact_lines import series_table
 from gearchaos.paper.comparison import (
-    RULES,
+    AGREEMENT_RULES,
     WINDOW,
-    Verdict,
+    Agreement,
     compare,
     counterparts,
     motion_verdict,
@@ -23,7 +23,7 @@ from gearchaos.paper.comparison import (
 from gearchaos.paper.comparison import (
     verdict as verdict_of,
 )
-from gearchaos.paper.computation import compute, lane_of, largest_acceleration
+from gearchaos.paper.computation import compute_gallery, lane_of, largest_acceleration
 from gearchaos.paper.gallery import KINDS, check_folder, pictures, write_gallery
 from gearchaos.paper.published import contact_line_stiffness, printed_coefficients, published
 from gearchaos.paper.stages import OUT_OF_TURN, out_of_turn
@@ -31,7 +31,7 @@ from gearchaos.results.reading.stage_table import stage_table
 
 from .commands import run_module
 
-AGREES, IN_KIND, DOES_NOT = Verdict
+AGREES, IN_KIND, DOES_NOT = Agreement
 COARSE = (
     "integration.transient_periods=100",
     "integration.recorded_periods=200",
@@ -71,16 +71,16 @@ def numbers(text: str | list[str]) -> list[float]:
     [(10.0, AGREES), (10.5, AGREES), (9.4, IN_KIND), (12.5, IN_KIND), (7.4, DOES_NOT)],
 )
 def test_a_relative_rule_judges_by_shares_of_the_printed_number(ours, verdict):
-    assert verdict_of(RULES["amplitude"], 10.0, ours) is verdict
-    assert verdict_of(RULES["amplitude"], -10.0, -ours) is verdict
+    assert verdict_of(AGREEMENT_RULES["amplitude"], 10.0, ours) is verdict
+    assert verdict_of(AGREEMENT_RULES["amplitude"], -10.0, -ours) is verdict
 
 
-def test_a_relative_rule_tells_signs_apart():
-    assert verdict_of(RULES["exponent"], -0.0043, 0.0043) is DOES_NOT
+def test_a_relative_rule_distinguishes_signs():
+    assert verdict_of(AGREEMENT_RULES["exponent"], -0.0043, 0.0043) is DOES_NOT
 
 
 def test_small_harmonics_are_judged_by_the_first_one():
-    rule = RULES["coefficient"]
+    rule = AGREEMENT_RULES["coefficient"]
     assert verdict_of(rule, 1e-4, 0.0) is DOES_NOT
     assert verdict_of(rule, 1e-4, 0.0, size=1.7) is AGREES
 
@@ -89,10 +89,10 @@ def test_small_harmonics_are_judged_by_the_first_one():
     ("ours", "verdict"), [(1.22, AGREES), (1.23, IN_KIND), (1.62, IN_KIND), (1.63, DOES_NOT)]
 )
 def test_a_boundary_is_judged_by_its_distance(ours, verdict):
-    assert verdict_of(RULES["boundary"], 1.12, ours) is verdict
+    assert verdict_of(AGREEMENT_RULES["boundary"], 1.12, ours) is verdict
 
 
-@pytest.mark.parametrize("rule", RULES.values())
+@pytest.mark.parametrize("rule", AGREEMENT_RULES.values())
 def test_what_was_not_found_does_not_agree(rule):
     assert verdict_of(rule, 1.0, math.nan) is DOES_NOT
     assert 0.0 < rule.agrees < rule.in_kind
@@ -170,7 +170,7 @@ def test_stages_follow_one_another_and_every_rule_is_known():
     printed = published()
     for before, after in zip(printed.stages, printed.stages[1:], strict=False):
         assert after.first == pytest.approx(before.last + 0.01)
-    assert {number.rule for number in vars(printed.numbers).values()} <= set(RULES)
+    assert {number.rule for number in vars(printed.numbers).values()} <= set(AGREEMENT_RULES)
     assert len(printed.increments.pitch_errors) == len(printed.increments.values) + 1
 
 
@@ -197,7 +197,9 @@ def found():
     coarse = ["sweep.count=76", *COARSE]
     # Of the soft axial bearings the transient is a long one.
     full = load_config(SWEEPS / "pan2021_full.toml", ["sweep.count=1", *COARSE[1:]])
-    return compute(load_config(SWEEPS / "pan2021.toml", coarse), full, hop_step=0.1, periods=8)
+    return compute_gallery(
+        load_config(SWEEPS / "pan2021.toml", coarse), full, hop_step=0.1, periods=8
+    )
 
 
 @pytest.fixture(scope="module")
@@ -207,7 +209,7 @@ def folder(found, tmp_path_factory):
     return folder
 
 
-def test_bands_that_take_turns_are_told_from_what_does_not():
+def test_bands_that_take_turns_are_distinguished_from_what_does_not():
     """The logistic map has two bands up to 3.6786; at 4 the sides are those of a fair coin."""
     rates = np.array([3.2, 3.5, 3.6, 3.67, 3.84, 4.0])
     section = [np.full(rates.size, 0.3)]
@@ -467,7 +469,7 @@ def test_every_stage_in_the_report_is_one_of_the_stage_table(report, found):
         firsts.append(first)
         if span == "–":
             # Nowhere within reach is there a lane with the motion.
-            reach = RULES["boundary"].in_kind
+            reach = AGREEMENT_RULES["boundary"].in_kind
             lanes = zip(values, labels, strict=True)
             assert stage.motion not in [
                 label for v, label in lanes if stage.first - reach < v < stage.last + reach
@@ -513,7 +515,7 @@ def test_the_verdicts_of_the_report_are_counted(report):
     counts = re.search(r"Of (\d+) printed .* (\d+) agree, (\d+) .* and (\d+) do not", report)
     assert [int(count) for count in counts.groups()] == [
         len(compared),
-        *(verdicts.count(verdict) for verdict in Verdict),
+        *(verdicts.count(verdict) for verdict in Agreement),
     ]
 
 
@@ -523,7 +525,7 @@ def test_the_report_counts_apart_what_was_derived_fitted_and_predicted(report):
     assert {row[2] for row in compared} == {*KINDS}
     for row, kind in zip(tables(report)["In short"], KINDS, strict=True):
         own = [r[6].strip("*") for r in compared if r[2] == kind]
-        assert [int(cell) for cell in row[1:]] == [len(own), *(own.count(v) for v in Verdict)]
+        assert [int(cell) for cell in row[1:]] == [len(own), *(own.count(v) for v in Agreement)]
     # Twelve harmonics, six of them zero but for rounding, take no motion to compute.
     (derived, *_), harmonics = (
         tables(report)["In short"],

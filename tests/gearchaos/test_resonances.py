@@ -147,7 +147,7 @@ def test_a_static_deflection_in_micrometres_is_load_over_stiffness_along_the_lin
     assert "along the transverse line of action" in found.texts["deflection"]
 
 
-def test_what_varies_over_the_sweep_is_told_from_the_smallest_to_the_largest():
+def test_what_varies_over_the_sweep_is_reported_from_the_smallest_to_the_largest():
     swept = "sweep={parameter='transverse_stiffness_g', from=1.0, to=4.0, count=31}"
     found = known(PAN2021, swept, "groups.pitch_error=1.0")
     ends = [
@@ -173,7 +173,7 @@ def test_a_dry_run_prints_modes_orders_and_deflection_for_people_and_programs(tm
     assert facts["steps_per_period"] == 40
 
 
-def test_a_dimensionless_scene_is_told_in_mesh_frequencies():
+def test_a_dimensionless_scene_is_reported_in_mesh_frequencies():
     found = known(PAN2021.with_name("spur_pair.toml"))
     assert found.hertz is None and found.rpm is None and found.micrometres is None
     assert found.facts["resonant_mesh_frequencies"]["3"] == (found.frequencies / 3).tolist()

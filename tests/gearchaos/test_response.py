@@ -235,7 +235,7 @@ def test_at_takes_values_of_the_parameter_that_is_swept(tmp_path, capsys):
     assert same_data(open_result(output), found)
 
 
-def test_diverged_lanes_are_kept_and_told(tmp_path, capsys):
+def test_diverged_lanes_are_kept_and_reported(tmp_path, capsys):
     output = str(tmp_path / "diverged.h5")
     asked = command("--pitch-error", "1", "--set", "groups.load=1e150", "-o", output)
     assert main(asked) == 3

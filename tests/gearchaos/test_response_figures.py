@@ -170,7 +170,7 @@ def test_a_motion_that_does_not_repeat_is_transformed_as_a_whole(axes, result):
         (1, "delta_5", "pitch_error = 12.5: the lane diverged"),
     ],
 )
-def test_what_cannot_be_drawn_is_told(axes, lane, variable, message):
+def test_what_cannot_be_drawn_is_reported(axes, lane, variable, message):
     with pytest.raises(FigureError, match=message):
         time_history(axes, known_response(diverged=(1,)), lane, variable)
 

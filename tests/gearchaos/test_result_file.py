@@ -134,7 +134,7 @@ def test_a_dotted_parameter_gives_its_axis_underscores(tmp_path: Path) -> None:
     assert speed.dims("status") == ("operation_speed_rpm",)
 
 
-def test_a_name_that_is_not_there_is_told_with_those_that_are(result: Result) -> None:
+def test_a_name_that_is_not_there_is_reported_with_those_that_are(result: Result) -> None:
     with pytest.raises(KeyError, match=r"'delta'.*pitch_error, section_point"):
         result["delta"]
 
@@ -338,7 +338,7 @@ def test_xarray_may_write_the_file_anew(engine: Any, length: int, tmp_path: Path
             np.testing.assert_equal(anew.attributes(name), small.attributes(name))
 
 
-def test_what_has_an_error_names_where_it_is_told(path: Path) -> None:
+def test_what_has_an_error_names_where_it_is_reported(path: Path) -> None:
     with xr.open_dataset(path) as dataset:
         named = {
             name: variable.attrs["ancillary_variables"].split()

@@ -75,7 +75,7 @@ def result() -> Result:
     return Result(["load"], variables, data | {"end_state": np.ones((3, 1))}, {}, {})
 
 
-def test_an_existing_result_is_replaced_only_when_told(result: Result, tmp_path: Path) -> None:
+def test_an_existing_result_is_replaced_only_with_overwrite(result: Result, tmp_path: Path) -> None:
     path = tmp_path / "sweep.h5"
     path.write_bytes(b"earlier")
     for refuse in (check_output, result.save):

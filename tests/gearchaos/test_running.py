@@ -61,7 +61,7 @@ def test_a_run_says_nothing_unless_it_is_asked_to(config, capfd):
     assert "40 of 40 lanes" in err
 
 
-def test_what_a_silent_run_has_to_note_is_told_by_its_result(tmp_path, config, capfd):
+def test_what_a_silent_run_has_to_note_is_reported_by_its_result(tmp_path, config, capfd):
     overrides = ["groups.stiffness_variation_scale=9.0", "integration.steps_per_period=24"]
     result = gearchaos.run(config(*overrides, 'integration.unstable="raise"'))
     assert capfd.readouterr() == ("", "")

@@ -84,7 +84,7 @@ def test_a_file_of_it_has_its_own_names(tmp_path):
     assert np.array_equal(again["section_x"], result["section_x"])
 
 
-def test_its_eigenfrequency_is_told_before_a_run():
+def test_its_eigenfrequency_is_reported_before_a_run():
     (found,) = resonances(plan_run(configured("rk4")).lanes).frequencies
     assert found == pytest.approx(np.sqrt(1.0 - 0.05**2))
 

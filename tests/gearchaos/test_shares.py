@@ -106,7 +106,7 @@ def test_motions_of_all_pairs_and_starts_are_counted_by_value():
     np.testing.assert_array_equal(counted.other.intervals, wilson_interval([0, 10, 14], 20))
 
 
-def test_a_lane_that_diverged_tells_nothing_of_contact():
+def test_a_lane_that_diverged_reports_nothing_of_contact():
     counted = motion_shares(known_motions())
     np.testing.assert_array_equal(counted.apart.counts, STARTS * np.array([0, 2, 4]))
     np.testing.assert_array_equal(counted.apart.lanes, STARTS * np.array([10, 10, 9]))
@@ -133,7 +133,7 @@ def test_pairs_alone_count_as_pairs_with_starts(kept):
         ({"starts": 1, "pairs": 1}, ConfigurationError, r"set pitch_error\.realisations or start"),
     ],
 )
-def test_what_cannot_be_counted_is_told(made, fault, message):
+def test_what_cannot_be_counted_is_reported(made, fault, message):
     result = (
         known_motions(**made)
         if made.get("pairs") != 1

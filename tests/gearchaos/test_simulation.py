@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from gearchaos.engine.computing import block_lanes, compute
+from gearchaos.engine.computing import block_lanes, compute_block
 from gearchaos.engine.kept import variables_of
 
 from .short_sweeps import (
@@ -79,17 +79,17 @@ def test_all_lines_of_a_carried_sweep_are_computed_side_by_side():
 
 def test_every_array_of_a_block_is_a_variable_of_the_sweep():
     sweep = simulation(*RANDOM)
-    arrays = compute(sweep, (3, 10), NO_ENDS)
+    arrays = compute_block(sweep, (3, 10), NO_ENDS)
     assert {name: array.shape[0] for name, array in arrays.items()} == dict.fromkeys(arrays, 7)
     axes = tuple(axis.name for axis in sweep.lanes.axes)
     assert {*arrays} == {v.name for v in variables_of(sweep) if v.dims[: len(axes)] == axes}
-    without = compute(unlabelled("outputs.lyapunov=false"), (0, 2), NO_ENDS)
+    without = compute_block(unlabelled("outputs.lyapunov=false"), (0, 2), NO_ENDS)
     assert not [name for name in without if "lyapunov" in name]
 
 
 def test_all_exponents_come_with_the_sum_that_the_damping_gives():
     sweep = unlabelled("outputs.exponents=true", "integration.steps_per_period=800")
-    arrays = compute(sweep, (0, 3), NO_ENDS)
+    arrays = compute_block(sweep, (0, 3), NO_ENDS)
     assert arrays["lyapunov_exponents"].shape == (3, len(sweep.lanes.states))
     total = arrays["lyapunov_exponents"].sum(axis=1)
     assert np.allclose(total, arrays["lyapunov_sum"], rtol=0.0, atol=1e-6)

@@ -245,7 +245,7 @@ def test_at_twice_the_resonance_the_stiffness_drives_a_motion_of_two_periods():
     assert np.ptp(points[::2]) < APART < 0.05 < abs(points[1] - points[0])
 
 
-def test_a_resonance_that_outgrows_the_clearance_is_told_from_chaos():
+def test_a_resonance_that_outgrows_the_clearance_is_distinguished_from_chaos():
     frequency, stiffness, damping = 1.9, 0.6, 0.02
 
     def linear(time, flow):

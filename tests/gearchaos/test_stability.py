@@ -148,7 +148,7 @@ def test_a_lane_does_not_depend_on_its_neighbours_or_their_number():
     assert np.array_equal(fewest(FULL, lanes_of(pairs, many)), alone[many])
 
 
-def test_lanes_that_share_some_groups_but_not_all_are_told_apart():
+def test_lanes_that_share_some_groups_but_not_all_are_distinguished():
     p, g = np.array([5.0, 5.0, 50.0, 50.0]), np.array([5.0, 500.0, 500.0, 2000.0])
     grid = pan2021(1.0, transverse_stiffness_p=p, transverse_stiffness_g=g)
     stiffest = np.sqrt(np.maximum.reduce([p, g, np.full(4, 36.315)]))
@@ -232,7 +232,7 @@ def test_a_state_at_rest_without_load_stays_there_with_any_number_of_steps():
     assert np.all(outcome.end_state == 0.0)
 
 
-def test_more_flow_maps_than_are_kept_are_told():
+def test_more_flow_maps_than_are_kept_are_reported():
     swept = "sweep={parameter='mesh_frequency',from=0.5,to=1.5,count=1000}"
     finer = "integration.steps_per_period=200"
     for settings, many in (
@@ -256,7 +256,7 @@ def test_flow_maps_have_no_limit_and_say_so():
 
 
 @pytest.mark.parametrize(("steps", "warned"), [(16, True), (25, True), (64, False), (200, False)])
-def test_steps_that_are_stable_but_too_few_for_exponents_are_told(steps, warned):
+def test_steps_that_are_stable_but_too_few_for_exponents_are_reported(steps, warned):
     sweep = simulation("integration.unstable='raise'", f"integration.steps_per_period={steps}")
     assert any("shift Lyapunov exponents" in note for note in sweep.notes) == warned
 

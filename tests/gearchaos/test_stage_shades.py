@@ -124,7 +124,7 @@ def lab(colour: str, seen_through: np.ndarray) -> np.ndarray:
     return np.array([116.0 * y - 16.0, 500.0 * (x - y), 200.0 * (y - z)])
 
 
-def test_shades_without_the_same_hatching_are_told_apart_in_grey_and_by_the_colour_blind():
+def test_shades_without_the_same_hatching_are_distinguished_in_grey_and_by_the_colour_blind():
     """A difference of 2.3 is just noticeable side by side; three of them are seen across a page."""
     hatches = [HATCHES.get(kind) for kind in SHADES]
     assert len({*hatches}) == len(HATCHES) + 1

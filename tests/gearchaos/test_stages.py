@@ -61,7 +61,7 @@ def test_the_table_needs_no_engine(folder):
 
 
 @pytest.mark.slow
-def test_boundaries_are_refined_and_the_period_doubling_is_told(folder):
+def test_boundaries_are_refined_and_the_period_doubling_is_reported(folder):
     ended = stages(folder, "pan.h5", "--refine", "0.002", "--json")
     assert ended.code == 0
     facts = json.loads(ended.out)
@@ -130,7 +130,7 @@ def test_lanes_that_do_not_stand_for_themselves_are_not_refined(result, tmp_path
     assert "nothing lies between lanes whose starts are carried on, random or drawn" in ended.err
 
 
-def test_a_file_without_labels_or_without_its_configuration_is_told(result, tmp_path):
+def test_a_file_without_labels_or_without_its_configuration_is_reported(result, tmp_path):
     labels = ("motion", "period", "return_distance", "bands")
     without = Result(
         result.axes,

@@ -12,7 +12,7 @@ from gearchaos.models import load_config
 from .short_sweeps import PAN2021, RANDOM, simulation, starts_of
 
 
-def test_lanes_start_at_rest_unless_told_otherwise():
+def test_lanes_start_at_rest_by_default():
     assert not starts_of(simulation()).any()
 
 

@@ -68,7 +68,7 @@ def test_no_pair_is_wrong_with_the_steps_that_are_chosen_for_it(number):
 
 
 @pytest.mark.parametrize("number", COARSE)
-def test_a_given_number_that_is_too_coarse_is_told_with_one_that_is_not(number):
+def test_a_given_number_that_is_too_coarse_is_reported_with_one_that_is_not(number):
     simulation = prepared(number, 200)
     assert simulation.plan.steps_per_period == 200
     (note,) = told(simulation, "integration.steps_per_period = 200 is too coarse")
@@ -84,7 +84,7 @@ def test_a_given_number_that_is_fine_enough_is_not_spoken_of(number):
 
 
 @pytest.mark.parametrize("number", [104, 149])
-def test_the_error_that_is_told_is_that_against_much_finer_steps(number):
+def test_the_error_that_is_reported_is_that_against_much_finer_steps(number):
     simulation = prepared(number)
     trial = Trial(simulation.lanes, simulation.plan)
     # Twice the steps leave a sixteenth of the error, or more where they are not yet fine enough.
@@ -93,7 +93,7 @@ def test_the_error_that_is_told_is_that_against_much_finer_steps(number):
         assert found == pytest.approx(error_with(simulation, steps), rel=0.1)
 
 
-def test_chaos_is_told_and_does_not_ask_for_ever_more_steps():
+def test_chaos_is_reported_and_does_not_ask_for_ever_more_steps():
     simulation = prepared(356)
     trial = Trial(simulation.lanes, simulation.plan)
     verdict = trial.verdict(200)

@@ -45,7 +45,7 @@ def test_a_sweep_writes_its_result_whatever_becomes_of_its_messages(tmp_path, re
         (("gearchaos",), 2),
     ],
 )
-def test_the_exit_code_is_told_without_stderr(tmp_path, redirection, arguments, code):
+def test_the_exit_code_is_reported_without_stderr(tmp_path, redirection, arguments, code):
     ended = shell(tmp_path, redirection, *arguments)
     assert (ended.returncode, ended.stderr) == (code, "")
     assert bool(ended.stdout) == (code == 0)

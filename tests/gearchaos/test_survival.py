@@ -36,7 +36,7 @@ def stages(folder, *arguments: str):
     return run_module("gearchaos.stages", "chaos.h5", "--quiet", *arguments, cwd=folder)
 
 
-def test_the_share_of_chaotic_lanes_that_outlast_many_records_is_told(tmp_path):
+def test_the_share_of_chaotic_lanes_that_outlast_many_records_is_reported(tmp_path):
     chaotic = saved(tmp_path, [LASTING, *FADING])
     assert chaotic > 1
     told = json.loads(stages(tmp_path, "--survival", "30", "--json").out)["survival"]

@@ -40,7 +40,7 @@ def test_the_path_of_the_result_is_all_that_stdout_holds(tmp_path):
     assert re.fullmatch(r"gearchaos sweep: 40 lanes, 0 diverged, \d+\.\d s", lines[1])
 
 
-def test_the_output_goes_where_it_is_told_to_and_the_path_is_printed_as_given(tmp_path):
+def test_the_output_goes_to_the_given_path_and_the_path_is_printed_as_given(tmp_path):
     (tmp_path / "results").mkdir()
     ended = sweep(tmp_path, "--output", "results/grün und gut.hdf5", "--quiet")
     assert ended == (0, "results/grün und gut.hdf5\n", "")
@@ -104,7 +104,7 @@ def test_help_and_version_come_at_once_on_stdout(tmp_path):
     assert "Exit codes: 0 done 2 the command line or " in " ".join(ended.out.split())
 
 
-def test_a_dry_run_tells_lanes_steps_memory_and_time_and_writes_nothing(tmp_path):
+def test_a_dry_run_reports_lanes_steps_memory_and_time_and_writes_nothing(tmp_path):
     ended = sweep(tmp_path, "--dry-run", "--set", "start.kind=random", "--set", "start.count=3")
     assert (ended.code, ended.out) == (0, "")
     assert names_in(tmp_path) == ["gears.toml"]
@@ -128,7 +128,7 @@ def test_a_dry_run_tells_lanes_steps_memory_and_time_and_writes_nothing(tmp_path
     }
 
 
-def test_a_dry_run_tells_a_scheduler_as_json_what_one_shard_takes(tmp_path):
+def test_a_dry_run_reports_to_a_scheduler_as_json_what_one_shard_takes(tmp_path):
     ended = sweep(
         tmp_path, "--dry-run", "--json", "--shard", "2/3", "--set", "sweep.count=700", "-q"
     )
@@ -188,7 +188,7 @@ def test_a_configuration_comes_from_standard_input(tmp_path):
     assert piped.metadata["configuration"] == SMALL
 
 
-def test_what_standard_input_lacks_is_told_of_it(tmp_path):
+def test_what_standard_input_lacks_is_reported_with_its_name(tmp_path):
     broken = SMALL.replace("count = 40", "count = 0")
     ended = run_module("gearchaos.sweep", "-", cwd=tmp_path, stdin=broken)
     assert ended.code == 2
@@ -209,7 +209,7 @@ def test_a_dry_run_says_that_the_output_exists_and_leaves_it_alone(tmp_path):
     assert (tmp_path / "gears.h5").read_bytes() == b"precious"
 
 
-def test_lanes_too_fast_for_flow_maps_are_told_apart_from_diverged_ones(tmp_path):
+def test_lanes_too_fast_for_flow_maps_are_distinguished_from_diverged_ones(tmp_path):
     # Twice as many steps would be more than are tried.
     how = "integration={method='flow_map', steps_per_period=2100, recorded_periods=5}"
     slow = 'sweep={parameter="mesh_frequency", values=[1e-4, 0.8]}'

@@ -48,7 +48,7 @@ def test_a_fault_of_the_configuration_is_one_line_and_code_2(tmp_path, fault):
     assert names_in(tmp_path) == ["gears.toml"]
 
 
-def test_all_faults_of_a_configuration_are_told_at_once(tmp_path):
+def test_all_faults_of_a_configuration_are_reported_at_once(tmp_path):
     text = small_config(tmp_path).read_text()
     for right, wrong in {
         "teeth": "theet",
@@ -66,7 +66,7 @@ def test_all_faults_of_a_configuration_are_told_at_once(tmp_path):
     assert len(lines) == 4
 
 
-def test_two_faults_in_overrides_are_told_at_once(tmp_path):
+def test_two_faults_in_overrides_are_reported_at_once(tmp_path):
     ended = sweep(tmp_path, "--set", "sweep.count=0", "--set", "start.kind=rset")
     assert ended.code == 2
     first, second = sorted(ended.err.splitlines())

@@ -211,7 +211,9 @@ def blocks_in(folder):
     return len(list((folder / BLOCKS).glob("*.block")))
 
 
-def test_damaged_foreign_and_ill_dated_blocks_are_told_and_computed_again(tmp_path, undisturbed):
+def test_damaged_foreign_and_ill_dated_blocks_are_reported_and_computed_again(
+    tmp_path, undisturbed
+):
     (tmp_path / "other").mkdir()
     all_blocks = (*LONG, "--shard", "1/1", "--quiet")
     assert sweep(tmp_path, *all_blocks).code == 0

@@ -182,7 +182,7 @@ def test_a_system_that_cannot_be_is_refused_in_words(values, message):
         gearchaos.System(PAN2021, **values)
 
 
-def test_a_motion_that_leaves_the_numbers_is_told():
+def test_a_motion_that_leaves_the_numbers_is_reported():
     system = gearchaos.System(PAN2021, pitch_error=1.0, load=1e150)
     with pytest.raises(gearchaos.ConfigurationError, match="left the range of numbers"):
         system.integrate(5)

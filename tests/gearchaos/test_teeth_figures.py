@@ -108,7 +108,7 @@ def known_teeth(
         ({"excitation_period": 2.5, "driving_teeth": 21}, Excitation(1, 21, 0)),
     ],
 )
-def test_what_attributes_tell_of_the_excitation(given, understood):
+def test_what_attributes_report_of_the_excitation(given, understood):
     assert excitation_of(given) == understood
 
 

@@ -84,7 +84,7 @@ class TestProcesses:
         assert found == {"forked in a turn": True, "threads": True, "fork": True}
 
     @pytest.mark.skipif(sys.platform != "linux", reason="elsewhere OpenMP survives a fork")
-    def test_openmp_works_in_spawned_processes_and_forked_ones_are_told_so(self):
+    def test_openmp_works_in_spawned_processes_and_forked_ones_get_a_message(self):
         found = in_a_process("omp", "fork", "spawn")
         assert found["threads"] and found["spawn"] is True
         wanted = r"process \d+ was forked from .* had computed before.* the method 'spawn', such as"

@@ -141,7 +141,7 @@ def test_xarray_finds_the_nearest_lanes(engine, path, result):
         assert np.array_equal(lane["section_delta_5"], part["section_delta_5"])
 
 
-def test_info_tells_every_axis_and_which_slice_its_stages_are_of(path, result):
+def test_info_reports_every_axis_and_which_slice_its_stages_are_of(path, result):
     words = " ".join(of_the_file("info", path).split())
     for text in (
         "axis load (static load), 5 values, 0.1 to 0.5",

@@ -99,7 +99,7 @@ def test_they_change_nothing_else(told):
     assert_same_bits(told._replace(**nothing), without)
 
 
-def test_flow_maps_tell_the_same_whatever_steps_are_asked_for(told):
+def test_flow_maps_report_the_same_whatever_steps_are_asked_for(told):
     plan = TOLD._replace(steps_per_period=24, method="flow_map")
     exact = integrate(system_of(MODEL), np.zeros((4, 10)), plan)
     fine = integrate(system_of(MODEL), np.zeros((4, 10)), TOLD._replace(steps_per_period=800))

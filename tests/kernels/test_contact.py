@@ -8,7 +8,7 @@ import pytest
 from gearchaos_kernels.contact import branches, leaving
 from gearchaos_kernels.contact.leaving import NEVER
 from gearchaos_kernels.memory.rows import Branch
-from gearchaos_kernels.models.protocol import Gap, Kind
+from gearchaos_kernels.models.protocol import ElementKind, Gap
 from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 
@@ -20,7 +20,7 @@ fraction_of_kind = from_python(leaving.leaving_fraction)
 may_leave = from_python(leaving.may_leave)
 next_of_kind = from_python(branches.next_branch)
 
-TWO_SIDED, ONE_SIDED = Kind(), Kind(one_sided=True)
+TWO_SIDED, ONE_SIDED = ElementKind(), ElementKind(one_sided=True)
 
 
 def branch_at(gap, half_clearance, kind=TWO_SIDED):

@@ -134,7 +134,7 @@ def test_the_axial_force_is_that_of_eq_13():
     np.testing.assert_allclose(motion.accelerations[..., 3], wanted, rtol=1e-12, atol=1e-14)
 
 
-def test_the_clearance_tells_the_contact():
+def test_the_clearance_reports_the_contact():
     groups = pan2021(0.0, stiffness_variation_scale=0.0)
     edge = float(groups.half_backlash[0] * np.cos(groups.base_helix_angle[0]))
     places = np.array([-2.0, -1.0 - 1e-9, -1.0 + 1e-9, 0.0, 1.0 - 1e-9, 1.0 + 1e-9, 2.0]) * edge

@@ -117,7 +117,7 @@ def test_lanes_share_maps_or_not_with_the_same_result():
 
 @pytest.mark.parametrize("scene", [TORSION_ONLY, NO_AXIAL])
 @pytest.mark.parametrize("steps", [1, STEPS])
-def test_the_memory_of_maps_is_foretold_within_a_factor_of_two(scene, steps):
+def test_the_memory_of_maps_is_predicted_within_a_factor_of_two(scene, steps):
     for frequency in (0.06, 0.3, 1.5):
         pair = system_of(pan2021(1.0, mesh_frequency=frequency), scene)
         plan = Plan(steps, 0, 1, 0, method=FLOW_MAP)

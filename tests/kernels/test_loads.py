@@ -85,7 +85,7 @@ def test_loads_and_contact_change_nothing_else_and_plain_steps_have_loads_too():
     assert plain.loads[0, FORCE] == pytest.approx(with_loads.loads[0, FORCE], rel=1e-6)
 
 
-def test_flow_maps_tell_them_as_well_as_200_runge_kutta_steps():
+def test_flow_maps_report_them_as_well_as_200_runge_kutta_steps():
     system, start = system_of(MODEL), np.zeros((4, 10))
     fine = integrate(system, start, PLAN._replace(steps_per_period=3200))
     # With extremes of a state: other tests have compiled this loop.

@@ -19,7 +19,7 @@ Origin: TypeAlias = Literal["given", "derived", "default"]
 
 
 @dataclass(frozen=True, eq=False)
-class Groups:
+class ResolvedGroups:
     """The dimensionless groups of the rows of `GROUP_TABLE`, each also an attribute by its name.
 
     ``values``: every group that is known, a number or an array over lanes; the stiffness harmonics
@@ -43,7 +43,7 @@ class Groups:
 
 # What is not finite is refused with its key, by the rules of the lanes.
 @np.errstate(all="ignore")
-def resolve_groups(physical: Mapping[str, Any], given: Mapping[str, Any]) -> Groups:
+def resolve_groups(physical: Mapping[str, Any], given: Mapping[str, Any]) -> ResolvedGroups:
     """Combine groups given directly with those that follow from physical data.
 
     A group given directly wins over a derived one, a derived one over the default. The harmonics of
@@ -73,7 +73,7 @@ def resolve_groups(physical: Mapping[str, Any], given: Mapping[str, Any]) -> Gro
             values[name] = [*known, *[0.0] * (harmonics - len(known))]
             origin.setdefault(name, "default")
     names = [row.name for row in GROUP_TABLE if row.name in values]
-    return Groups(
+    return ResolvedGroups(
         {name: _as_value(values[name]) for name in names}, {name: origin[name] for name in names}
     )
 

@@ -16,7 +16,7 @@ from gearchaos.models.gear_pair.group_table import (
     SWEEPABLE_GROUPS,
     GroupRow,
 )
-from gearchaos.models.gear_pair.groups import Groups
+from gearchaos.models.gear_pair.groups import ResolvedGroups
 from gearchaos.models.gear_pair.pitch_errors import OF_DRAWN_GEARS, grade_faults
 from gearchaos.models.gear_pair.tables import PHYSICAL_KEYS, GearPairTables, groups_at
 
@@ -56,7 +56,7 @@ def _some_values(sweep: Sweep) -> Floats:
     return np.unique(some) if values.size > 1 else some[:2]
 
 
-def _moved(config: GearPairTables, groups: Groups, axis: int, count: int) -> bool:
+def _moved(config: GearPairTables, groups: ResolvedGroups, axis: int, count: int) -> bool:
     """Whether a sweep, along this axis, changes a group on which what is kept depends."""
     for name, value in groups.values.items():
         row = GROUPS_BY_NAME[name]
@@ -107,7 +107,7 @@ def _is_unknown(config: GearPairTables, path: str) -> bool:
     return value is None and path not in config.swept and not has_default
 
 
-def _out_of_range(config: GearPairTables, groups: Groups) -> Iterator[Fault]:
+def _out_of_range(config: GearPairTables, groups: ResolvedGroups) -> Iterator[Fault]:
     for name, value in groups.values.items():
         row = GROUPS_BY_NAME[name]
         if groups.origin[name] == "derived" and not row.valid.admits(value):
@@ -118,7 +118,7 @@ def _out_of_range(config: GearPairTables, groups: Groups) -> Iterator[Fault]:
             yield Fault(f"groups.{name}", rule, remedy, float(worst))
 
 
-def _decoupled(config: GearPairTables, groups: Groups) -> Iterator[Fault]:
+def _decoupled(config: GearPairTables, groups: ResolvedGroups) -> Iterator[Fault]:
     effects, angle = config.scene.effects, groups.base_helix_angle_deg
     if "axial" in effects and angle is not None and np.all(np.equal(angle, 0.0)):
         rule = '"axial" needs a helix angle: in a spur pair nothing drives the axial motion'

@@ -7,7 +7,7 @@ import numpy as np
 from gearchaos.arrays import Floats
 
 
-def loads_told(loads: Floats, static: Floats, directions: Sequence[str]) -> dict[str, Floats]:
+def load_outputs(loads: Floats, static: Floats, directions: Sequence[str]) -> dict[str, Floats]:
     """Return the loads of lanes, each of shape (lanes,), by name.
 
     ``loads`` (lanes, directions + 1, 4) as in an `Outcome`; ``static`` (lanes,): the tangential

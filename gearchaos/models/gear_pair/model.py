@@ -19,7 +19,7 @@ from gearchaos.models.gear_pair.derivation import (
     derive_scales,
 )
 from gearchaos.models.gear_pair.group_table import GROUP_TABLE, GROUPS_BY_NAME
-from gearchaos.models.gear_pair.loads import loads_told
+from gearchaos.models.gear_pair.loads import load_outputs
 from gearchaos.models.gear_pair.outputs import (
     CATALOGUE,
     DIRECTIONS,
@@ -139,7 +139,7 @@ class GearPairModel(Model):
 
     def loads(self, loads: Floats, system: LaneSystem) -> dict[str, Floats]:
         """Return mesh forces, load factors and transmission error by name."""
-        return loads_told(loads, system.static_force(), DIRECTIONS[: system.elements])
+        return load_outputs(loads, system.static_force(), DIRECTIONS[: system.elements])
 
     def motion(
         self, system: LaneSystem, states: Floats, steps_per_period: int, first_period: int

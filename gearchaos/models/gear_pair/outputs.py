@@ -8,7 +8,7 @@ from gearchaos.outputs.entries import (
     Output,
     Part,
     Subject,
-    motion_of,
+    motion_subjects,
     rearranged,
 )
 from gearchaos.outputs.listing import Catalogue
@@ -20,11 +20,11 @@ MESH_FORCE = "mesh_force_"
 TRANSMISSION_ERROR = "transmission_error"
 
 _COORDINATES = [
-    motion_of("delta_5", r"\delta_5", "relative torsional {}"),
-    motion_of("delta_1", r"\delta_1", "transverse {} of the driving gear"),
-    motion_of("delta_2", r"\delta_2", "transverse {} of the driven gear"),
-    motion_of("delta_3", r"\delta_3", "axial {} of the driving gear"),
-    motion_of("delta_4", r"\delta_4", "axial {} of the driven gear"),
+    motion_subjects("delta_5", r"\delta_5", "relative torsional {}"),
+    motion_subjects("delta_1", r"\delta_1", "transverse {} of the driving gear"),
+    motion_subjects("delta_2", r"\delta_2", "transverse {} of the driven gear"),
+    motion_subjects("delta_3", r"\delta_3", "axial {} of the driving gear"),
+    motion_subjects("delta_4", r"\delta_4", "axial {} of the driven gear"),
 ]
 STATE_SUBJECTS = tuple(
     subject for displacement, rate, _ in _COORDINATES for subject in (displacement, rate)

@@ -19,7 +19,7 @@ from gearchaos.models.gear_pair.group_table import (
     SWEEPABLE_GROUPS,
     GroupRow,
 )
-from gearchaos.models.gear_pair.groups import Groups, resolve_groups
+from gearchaos.models.gear_pair.groups import ResolvedGroups, resolve_groups
 from gearchaos.models.gear_pair.physical_tables import (
     Bearings,
     GradeError,
@@ -177,7 +177,7 @@ class GearPairTables(Tables, PhysicalTables):
         return {"pitch_error.first_realisation": whole, "pitch_error.realisations": 1}
 
 
-def groups_at(config: GearPairTables, values: Mapping[str, npt.ArrayLike]) -> Groups:
+def groups_at(config: GearPairTables, values: Mapping[str, npt.ArrayLike]) -> ResolvedGroups:
     """Resolve the groups for given values of parameters.
 
     ``values``, by parameter and in its unit, are arrays that broadcast against each other. A group

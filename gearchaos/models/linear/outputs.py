@@ -11,7 +11,7 @@ from gearchaos.outputs.entries import (
     Output,
     Part,
     Subject,
-    motion_of,
+    motion_subjects,
     rearranged,
 )
 from gearchaos.outputs.listing import Catalogue
@@ -79,7 +79,7 @@ def catalogue_of(kinds: Kinds, units: Mapping[Quantity, str], angle: str = "") -
 
 def _motion(name: str, is_angle: bool) -> tuple[Subject, Subject, Subject]:
     """Return displacement, velocity and acceleration of a coordinate as subjects."""
-    subjects = motion_of(name, symbol_of(name), f"{{}} of {name.replace('_', ' ')}")
+    subjects = motion_subjects(name, symbol_of(name), f"{{}} of {name.replace('_', ' ')}")
     if not is_angle:
         return subjects
     scales = (Quantity.ANGLE, Quantity.ANGULAR_SPEED, Quantity.ANGULAR_ACCELERATION)

@@ -28,7 +28,7 @@ DIMS = "dims"
 """Attribute with the names of dimensions. HDF5's own list is in the global heap, which is slow and
 unsafe to read."""
 
-Block: TypeAlias = tuple[int, int, Mapping[str, Array]]
+BlockArrays: TypeAlias = tuple[int, int, Mapping[str, Array]]
 Metadata: TypeAlias = Mapping[str, str | int | float]
 
 _CHUNK_BYTES = 1 << 19
@@ -46,7 +46,7 @@ def own_metadata(axes: Sequence[str]) -> dict[str, str]:
 def write_result(
     path: str | os.PathLike[str],
     variables: Sequence[Variable],
-    blocks: Iterable[Block],
+    blocks: Iterable[BlockArrays],
     parameters: Mapping[str, Variable],
     metadata: Metadata,
     *,

@@ -83,18 +83,18 @@ def overview(path: str | os.PathLike[str]) -> dict[str, Any]:
         part = one_axis(result)
         stages = stage_table(labelled_lanes(part))
         summary |= {"slice": slice_facts(result, part), "stages": stages}
-    return dict(plain(summary))
+    return dict(json_values(summary))
 
 
-def plain(value: Any) -> Any:
+def json_values(value: Any) -> Any:
     """Turn records and complex numbers into values of JSON; infinities and NaN become None."""
     value = value._asdict() if hasattr(value, "_asdict") else value
     if isinstance(value, Mapping):
-        return {name: plain(entry) for name, entry in value.items()}
+        return {name: json_values(entry) for name, entry in value.items()}
     if isinstance(value, list | tuple):
-        return [*map(plain, value)]
+        return [*map(json_values, value)]
     if isinstance(value, complex):
-        return plain([value.real, value.imag])
+        return json_values([value.real, value.imag])
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 

@@ -1,7 +1,7 @@
 """The force of a clearance element, and its variation along a tangent vector.
 
 An element consists of a spring behind a clearance, and of a damper in parallel to both. The damper
-always acts, or only while the element is in contact; see `Kind`.
+always acts, or only while the element is in contact; see `ElementKind`.
 """
 
 from typing import NamedTuple

@@ -79,7 +79,7 @@ class Method:
         Prepares a lane before its first step.
     step(memory, lanes, at, given, scene)
         Takes one step in every slot; returns how many lanes may have left a contact branch.
-        ``lanes``: number of lanes of the block; ``at``: the `StepAt`; ``given``: the `Given`.
+        ``lanes``: number of lanes of the block; ``at``: the `StepAt`; ``given``: the `StepInputs`.
     resolve(memory, lanes, at, given, scene)
         Repeats the step of the lanes that may have left a branch, from crossing to crossing.
     grids(clock, given, scene)
@@ -127,7 +127,7 @@ class StepAt(NamedTuple):
     recorded: bool
 
 
-class Given(NamedTuple):
+class StepInputs(NamedTuple):
     """What the steps of a block read.
 
     Attributes

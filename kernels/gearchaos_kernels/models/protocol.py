@@ -39,7 +39,7 @@ class Gap(NamedTuple):
     closing: float
 
 
-class Kind(NamedTuple):
+class ElementKind(NamedTuple):
     """What kind of clearance an element has.
 
     Attributes
@@ -56,7 +56,7 @@ class Kind(NamedTuple):
 
 
 class Element(NamedTuple):
-    """A clearance element: a spring behind a clearance, and a damper; see `Kind` for when it acts.
+    """A clearance element: a spring behind a clearance, and a damper; see `ElementKind`.
 
     Attributes
     ----------
@@ -99,7 +99,7 @@ class Model:
     elements : callable, optional
         ``elements(flags)``: number of clearance elements, 1 by default.
     kinds : callable, optional
-        ``kinds(flags)``: the `Kind` of each element, a tuple; by default all are two-sided, with a
+        ``kinds(flags)``: the `ElementKind` of each element, a tuple; by default two-sided, with a
         damper that always acts.
     rows : callable, optional
         ``rows(flags)``: rows of a block that the model uses for itself, 0 by default.
@@ -156,7 +156,7 @@ class Model:
     coordinates_of: Callable[[Any], tuple[bool, ...]] | None = None
     lane: Any
     elements: Callable[[Any], int] = lambda _flags: 1
-    kinds: Callable[[Any], tuple[Kind, ...]] | None = None
+    kinds: Callable[[Any], tuple[ElementKind, ...]] | None = None
     rows: Callable[[Any], int] = lambda _flags: 0
     observed: tuple[str, ...]
     begin_period: Any = defaults.prepare_nothing
@@ -193,9 +193,9 @@ class Model:
             return (True,) * len(self.coordinates._fields)
         return self.coordinates_of(flags)
 
-    def kinds_of(self, flags: Any) -> tuple[Kind, ...]:
+    def kinds_of(self, flags: Any) -> tuple[ElementKind, ...]:
         """Return the kind of each element of a scene with these flags."""
-        return self.kinds(flags) if self.kinds else (Kind(),) * self.elements(flags)
+        return self.kinds(flags) if self.kinds else (ElementKind(),) * self.elements(flags)
 
     def states(self, flags: Any) -> int:
         """Return the number of states of a scene with these flags."""

@@ -121,7 +121,7 @@ class Records(NamedTuple):
 
     Attributes
     ----------
-    steps : Given
+    steps : StepInputs
         What the steps of the block read.
     batch : Batch
         What the blocks read.

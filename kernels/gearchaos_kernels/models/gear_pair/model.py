@@ -10,7 +10,7 @@ from gearchaos_kernels.compilation import scalar
 from gearchaos_kernels.models.gear_pair import equations, forcing, teeth
 from gearchaos_kernels.models.gear_pair.coefficients import Lane
 from gearchaos_kernels.models.gear_pair.forcing import Forcing, Phase, forcing_at
-from gearchaos_kernels.models.protocol import Kind, MapFormulas, Model
+from gearchaos_kernels.models.protocol import ElementKind, MapFormulas, Model
 from gearchaos_kernels.scene import implement
 
 
@@ -57,9 +57,9 @@ def _elements(flags: GearPair) -> int:
     return 2 if flags.axial else 1
 
 
-def _kinds(flags: GearPair) -> tuple[Kind, ...]:
+def _kinds(flags: GearPair) -> tuple[ElementKind, ...]:
     """Return the kind of each direction of the mesh."""
-    return (Kind(damped_in_contact=bool(flags.damped_in_contact)),) * _elements(flags)
+    return (ElementKind(damped_in_contact=bool(flags.damped_in_contact)),) * _elements(flags)
 
 
 def _inputs(flags: GearPair) -> NDArray[Any]:

@@ -15,7 +15,7 @@ from gearchaos_kernels.models.gear_pair.coefficients import (
 from gearchaos_kernels.models.gear_pair.forcing import wave_series
 from gearchaos_kernels.models.gear_pair.groups import Effects, Groups
 from gearchaos_kernels.models.gear_pair.model import GearPair
-from gearchaos_kernels.models.gear_pair.teeth import NARROW, Tables, tables_of
+from gearchaos_kernels.models.gear_pair.teeth import NARROW, ToothTables, tables_of
 from gearchaos_kernels.models.gear_pair.tooth_errors import Teeth
 from gearchaos_kernels.models.lane_system import LaneSystem
 from gearchaos_kernels.plan import Floats
@@ -135,7 +135,7 @@ class GearPairs(LaneSystem):
         """Return the factors from scaled states to those of eq. 13, shape (lanes, states)."""
         return state_scales(self, step)
 
-    def tables(self, steps_per_period: int) -> Tables:
+    def tables(self, steps_per_period: int) -> ToothTables:
         """Return the tables over one mesh period, on a grid of half steps."""
         return tables_of(self, steps_per_period)
 

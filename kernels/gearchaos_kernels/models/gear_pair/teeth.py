@@ -41,7 +41,7 @@ NO_TEETH = Teeth(np.zeros((1, 1)), np.zeros((1, 1)), np.zeros(1, np.intp), np.ze
 """Placeholder of a system whose pitch error is that of eq. 14."""
 
 
-class Tables(NamedTuple):
+class ToothTables(NamedTuple):
     """Tables over one mesh period on a grid of half steps, the same for all lanes.
 
     Attributes
@@ -64,13 +64,13 @@ class Tables(NamedTuple):
     ahead: int
 
 
-def tables_of(system: "GearPairs", steps_per_period: int) -> Tables:
+def tables_of(system: "GearPairs", steps_per_period: int) -> ToothTables:
     """Return the tables of a system; raise ValueError with too many tooth pairs in mesh."""
     waves = tuple(system.stiffness_cosine), tuple(system.stiffness_sine)
     phases = phase_table(*waves, steps_per_period)
     teeth = system.teeth if system.effects.pitch_error and system.teeth is not None else NO_TEETH
     ahead = 0 if teeth is NO_TEETH else teeth.ahead
-    return Tables(
+    return ToothTables(
         phases,
         share_table(teeth, steps_per_period),
         np.ascontiguousarray(teeth.driving, dtype=np.float64),

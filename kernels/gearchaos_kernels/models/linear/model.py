@@ -16,7 +16,7 @@ from gearchaos_kernels.memory.tuples import each
 from gearchaos_kernels.models.linear.structure import Structure, numbered, places_of
 from gearchaos_kernels.models.linear.sums import Terms, sums
 from gearchaos_kernels.models.mesh_phase import nearest_row, turned
-from gearchaos_kernels.models.protocol import Element, Gap, Kind, MapFormulas, Model
+from gearchaos_kernels.models.protocol import Element, ElementKind, Gap, MapFormulas, Model
 from gearchaos_kernels.plan import Floats
 from gearchaos_kernels.scene import implement
 
@@ -384,10 +384,10 @@ def _stiffness_parts(flags: Linear, coefficients: Floats) -> Floats:
     return parts
 
 
-def _kinds(flags: Linear) -> tuple[Kind, ...]:
+def _kinds(flags: Linear) -> tuple[ElementKind, ...]:
     """Return the kind of each element."""
     of = flags.structure
-    return tuple(Kind(*one) for one in zip(of.one_sided, of.damped_in_contact, strict=True))
+    return tuple(ElementKind(*one) for one in zip(of.one_sided, of.damped_in_contact, strict=True))
 
 
 @cache

@@ -53,7 +53,7 @@ class Structure:
     stiffness : tuple of entries
         k_j, (element, wave).
     one_sided, damped_in_contact : tuple of bool
-        See `Kind`.
+        See `ElementKind`.
     """
 
     coordinates: int

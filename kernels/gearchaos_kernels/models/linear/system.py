@@ -43,7 +43,7 @@ class LinearSystems(LaneSystem):
     orders : tuple of int
         Orders of the harmonics that excite the systems, of the fundamental one with ``frequency``.
     one_sided, damped_in_contact : tuple of bool
-        See `Kind`.
+        See `ElementKind`.
     names : tuple of str
         Names of the coordinates; by default x0, x1 and so on.
 

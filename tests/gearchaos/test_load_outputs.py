@@ -1,4 +1,4 @@
-"""The loads of a lane in a result: names, factors, and when they can be told."""
+"""The loads of a lane in a result: names, factors, and when they can be reported."""
 
 import numpy as np
 import pytest
@@ -6,31 +6,33 @@ import pytest
 import gearchaos
 from gearchaos import load_config
 from gearchaos.engine.kept import variables_of
-from gearchaos.models.gear_pair.loads import loads_told
+from gearchaos.models.gear_pair.loads import load_outputs
 
 from .commands import run_module
 from .short_sweeps import PAN2021, SHORT, simulation
-from .test_contact_told import AXIAL
+from .test_contact_outputs import AXIAL
 
 
 def test_factors_are_those_of_the_static_force_in_the_direction_of_the_load():
     record = [[3.0, -1.0, 2.0, 5.0], [0.5, -0.5, 0.0, 0.1], [4.0, 1.0, 2.0, 4.25]]
-    told = loads_told(np.array([record] * 3), np.array([2.0, -0.5, 0.0]), ["tangential", "axial"])
-    assert len(told) == 2 * 4 + 5
-    assert told["load_factor_largest"] == pytest.approx([1.5, 2.0, np.nan], nan_ok=True)
+    reported = load_outputs(
+        np.array([record] * 3), np.array([2.0, -0.5, 0.0]), ["tangential", "axial"]
+    )
+    assert len(reported) == 2 * 4 + 5
+    assert reported["load_factor_largest"] == pytest.approx([1.5, 2.0, np.nan], nan_ok=True)
     rms = np.sqrt(5.0)
-    assert told["load_factor_rms"] == pytest.approx([rms / 2.0, 2.0 * rms, np.nan], nan_ok=True)
-    assert told["mesh_force_rms_axial"] == pytest.approx([np.sqrt(0.1)] * 3)
-    assert told["transmission_error_peak_to_peak"] == pytest.approx([3.0] * 3)
-    assert told["transmission_error_rms"] == pytest.approx([0.5] * 3)
+    assert reported["load_factor_rms"] == pytest.approx([rms / 2.0, 2.0 * rms, np.nan], nan_ok=True)
+    assert reported["mesh_force_rms_axial"] == pytest.approx([np.sqrt(0.1)] * 3)
+    assert reported["transmission_error_peak_to_peak"] == pytest.approx([3.0] * 3)
+    assert reported["transmission_error_rms"] == pytest.approx([0.5] * 3)
 
 
-def test_a_sweep_tells_them_and_its_file_keeps_them(tmp_path):
+def test_a_sweep_reports_them_and_its_file_keeps_them(tmp_path):
     lengths = ("integration.transient_periods=60", "sweep.count=6")
     asked = (*SHORT, "outputs.loads=true", "outputs.contact=true", *lengths, *AXIAL)
     result = gearchaos.run(load_config(PAN2021, asked))
-    told = ("mesh_force", "load_factor", "transmission_error")
-    names = [name for name in result.variables if name.startswith(told)]
+    reported = ("mesh_force", "load_factor", "transmission_error")
+    names = [name for name in result.variables if name.startswith(reported)]
     assert len(names) == 2 * 4 + 5
     both = simulation("outputs.loads=true", "outputs.contact=true")
     without = [variable.name for variable in variables_of(both)]

@@ -12,7 +12,7 @@ from gearchaos.plot import main as plot
 
 from .commands import run_module
 from .short_sweeps import PAN2021, SHORT
-from .test_contact_told import AXIAL
+from .test_contact_outputs import AXIAL
 
 ASKED = (
     *SHORT,
@@ -40,7 +40,7 @@ def path(tmp_path_factory):
     return next(folder.glob("*.h5"))
 
 
-def test_a_file_keeps_what_is_told(result, path):
+def test_a_file_keeps_what_is_reported(result, path):
     kept = gearchaos.open_result(path)
     assert kept["order"].tolist() == [0.5, 1.0, 1.5, 2.0]
     names = [f"amplitude_{name}" for name in SIGNALS]
@@ -124,7 +124,7 @@ def test_the_waterfall_has_a_row_for_each_order(result, path, capsys):
         (["outputs.states=['delta_3']"], r'outputs\.states.*no state `delta_3`; add "axial"'),
     ],
 )
-def test_what_cannot_be_told_is_refused(settings, message):
+def test_what_cannot_be_reported_is_refused(settings, message):
     with pytest.raises(gearchaos.ConfigurationError, match=message):
         load_config(PAN2021, settings)
 

@@ -14,7 +14,7 @@ MODEL = pan2021([0.3, 2.0, 5.86, 10.75])
 METHODS = {"rk4": 200, FLOW_MAP: 24}
 
 
-def told(system, start, periods=PERIODS, **plan):
+def reported(system, start, periods=PERIODS, **plan):
     """Integrate, and return times in shares and numbers a period, (lanes, directions, 6)."""
     plan = {"transient_periods": 60, "recorded_periods": periods, "section_points": 1, **plan}
     # Loads, and by flow maps extremes, are recorded too: other tests have compiled these loops.
@@ -32,7 +32,7 @@ def fine_history(system, start):
 @pytest.mark.parametrize("method", METHODS)
 def test_shares_and_impacts_are_those_of_the_motion_at_sixteen_times_the_steps(method):
     system, start = system_of(MODEL), np.zeros((4, 10))
-    found = told(system, start, steps_per_period=METHODS[method], method=method)
+    found = reported(system, start, steps_per_period=METHODS[method], method=method)
     motion = mesh_motion(system, fine_history(system, start), 3200)
     for way, contact in enumerate((motion.contact_tangential, motion.contact_axial)):
         for flank, time, impacts in ((1, DRIVING, ON_DRIVING), (2, BACK, ON_BACK)):
@@ -46,7 +46,7 @@ def test_shares_and_impacts_are_those_of_the_motion_at_sixteen_times_the_steps(m
 
 def test_the_speed_of_approach_is_that_of_the_gap_where_it_meets_the_flank():
     system, start = system_of(MODEL), np.zeros((4, 10))
-    found = told(system, start, steps_per_period=3200)
+    found = reported(system, start, steps_per_period=3200)
     states = fine_history(system, start)[1:]
     step = system.of(slice(1, 4)).mesh_period[:, np.newaxis] / 3200
     # Printed gaps: delta_1 - delta_2 + delta_5 less cos(beta_b) e, which returns every period.
@@ -69,7 +69,7 @@ def test_teeth_that_never_part_are_held_and_teeth_in_the_middle_are_free(method)
     model = pan2021([0.0, 0.0, 0.0], load=[0.3, 0.0, -0.3], half_backlash=0.5)
     start = np.zeros((3, 10))
     start[:, 0] = [0.8, 0.0, -0.8]
-    found = told(system_of(model), start, steps_per_period=METHODS[method], method=method)
+    found = reported(system_of(model), start, steps_per_period=METHODS[method], method=method)
     shares = found[:, 0, TIMES] / PERIODS
     assert shares == pytest.approx(np.array([[1.0, 0.0], [0.0, 0.0], [0.0, 1.0]]))
     assert not found[:, 0, IMPACTS].any()
@@ -84,7 +84,7 @@ def test_a_free_flight_meets_the_flanks_when_it_should():
     system = system_of(pan2021(0.0, **dict.fromkeys(absent, 0.0), **own))
     start = np.pad([[0.0, speed]], ((0, 0), (0, 8)))
     periods = 20
-    found = told(system, start, periods, transient_periods=0, steps_per_period=400)
+    found = reported(system, start, periods, transient_periods=0, steps_per_period=400)
     # On a flank of stiffness 1 half a turn takes pi, between the flanks 2 b / v.
     flight, turn = 2.0 * clearance / speed, np.pi
     total = periods * system.mesh_period[0]

@@ -1,4 +1,4 @@
-"""The contact of a lane in a result: names, states in words, and when it can be told."""
+"""The contact of a lane in a result: names, states in words, and when it can be reported."""
 
 import numpy as np
 import pytest
@@ -53,12 +53,12 @@ def test_the_four_states_of_contact():
     assert np.isnan(found["approach_mean"][[0, 1, 5]]).all()
 
 
-def test_a_sweep_tells_the_contact_of_both_directions_and_its_file_keeps_it(tmp_path):
+def test_a_sweep_reports_the_contact_of_both_directions_and_its_file_keeps_it(tmp_path):
     config = load_config(PAN2021, [*SHORT, *ASKED])
     result = gearchaos.run(config)
-    told = [name for name in result.variables if not name.startswith(("mesh_force", "load_f"))]
-    names = [name for name in told if name.endswith("_tangential")]
-    assert len(names) == len([name for name in told if name.endswith("_axial")]) == 8
+    reported = [name for name in result.variables if not name.startswith(("mesh_force", "load_f"))]
+    names = [name for name in reported if name.endswith("_tangential")]
+    assert len(names) == len([name for name in reported if name.endswith("_axial")]) == 8
     without = [variable.name for variable in variables_of(simulation("outputs.contact=true"))]
     assert {*names} < {*without} and not any(name.endswith("_axial") for name in without)
     shares = sum(result[f"time_{where}_tangential"] for where in ("driving", "back", "apart"))
@@ -77,7 +77,7 @@ def test_a_sweep_tells_the_contact_of_both_directions_and_its_file_keeps_it(tmp_
     assert kept.variables["contact_state_tangential"].flags == CONTACT_STATES
 
 
-def test_what_is_told_of_each_lane_can_be_drawn_over_the_parameter():
+def test_what_is_reported_of_each_lane_can_be_drawn_over_the_parameter():
     result = gearchaos.run(load_config(PAN2021, [*SHORT, *ASKED]))
     axes = Figure().add_subplot()
     drawn = bifurcation(axes, result, "time_apart_tangential")
@@ -87,7 +87,7 @@ def test_what_is_told_of_each_lane_can_be_drawn_over_the_parameter():
         bifurcation(axes, result, "nothing")
 
 
-def test_contact_cannot_be_told_where_nothing_is_crossed():
+def test_contact_is_unknown_where_nothing_is_crossed():
     for other in ('scene.effects=["pitch_error"]', "integration.crossings=plain"):
         with pytest.raises(gearchaos.ConfigurationError, match=r"outputs\.contact = true: is told"):
             load_config(PAN2021, ["outputs.contact=true", other])
