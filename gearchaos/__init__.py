@@ -3,7 +3,8 @@
 >>> import gearchaos
 >>> config = gearchaos.load_config("sweeps/pan2021.toml")
 >>> result = gearchaos.run(config)
->>> result["lyapunov_exponent"]
+>>> result["lyapunov_exponent"].shape
+(1501,)
 """
 
 import os

@@ -6,8 +6,26 @@ from collections.abc import Iterable
 class GearchaosError(Exception):
     """A fault that is reported as plain text, never as a traceback.
 
-    ``problems``: one message or several, one per fault: what, where, the rule, the remedy. What is
-    endless in it is cut.
+    Parameters
+    ----------
+    problems : str or iterable of str
+        One message per fault: what is wrong, where, the rule and the remedy. Messages of more than
+        1200 characters are cut.
+
+    Attributes
+    ----------
+    problems : list of str
+        The messages.
+    exit_code : int
+        Exit code of a command that ends with this error.
+
+    Examples
+    --------
+    >>> try:
+    ...     gearchaos.load_config("sweeps/pan2021.toml", ["sweep.count=0"])
+    ... except gearchaos.GearchaosError as error:
+    ...     print(len(error.problems), error.exit_code)
+    1 2
     """
 
     exit_code = 1
@@ -20,12 +38,12 @@ class GearchaosError(Exception):
 
 
 def _cut(text: str) -> str:
-    # A key or value of 100 kB stands in the middle, between the file and the remedy.
+    # A key or value of 100 kB would be in the middle, between the file and the remedy.
     return text if len(text) <= 1200 else f"{text[:500]} [...] {text[-690:]}"
 
 
 class ConfigurationError(GearchaosError):
-    """The configuration or the command line asks for something that cannot be done."""
+    """The configuration or the command line requests something impossible."""
 
     exit_code = 2
 
@@ -41,7 +59,7 @@ class RangeError(ConfigurationError, ValueError):
 
 
 class FigureError(GearchaosError):
-    """What is asked of a figure cannot be drawn from the result."""
+    """The result does not contain what a figure needs."""
 
     exit_code = 2
 

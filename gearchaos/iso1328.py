@@ -21,7 +21,7 @@ _RANGES = {
     1995: (range(1, 13), _MODULES_MM, _DIAMETERS_MM),
     2013: (range(1, 12), (0.5, 70.0), (5, 15_000)),
 }
-"""Grades, and ends of the ranges of module and diameter, the upper one of which belongs to it."""
+"""Grades, and ends of the ranges of module and diameter; a range includes its upper end."""
 
 
 _GEARS_OF_2013 = {
@@ -33,11 +33,33 @@ _GEARS_OF_2013 = {
 
 
 def require_gear(teeth: int, helix_angle_deg: float, face_width_mm: float, edition: int) -> None:
-    """Raise ValueError if a gear is outside the ranges of the edition, whatever its deviations.
+    """Check that a gear is within the ranges of an edition.
 
+    Parameters
+    ----------
+    teeth : int
+        Number of teeth.
+    helix_angle_deg : float
+        Helix angle in degrees.
+    face_width_mm : float
+        Face width in mm.
+    edition : int
+        1995 or 2013.
+
+    Raises
+    ------
+    ValueError
+        If the gear is outside the ranges.
+
+    Notes
+    -----
     The edition of 2013 is for 5 to 1000 teeth, helix angles up to 45 degrees and face widths of 4
-    to 1200 mm; that of 1995 states limits of module and diameter alone for pitch deviations, which
+    to 1200 mm. That of 1995 limits only module and diameter for pitch deviations, which
     `single_pitch_um` checks.
+
+    Examples
+    --------
+    >>> gearchaos.iso1328.require_gear(21, 20.0, 15.0, 2013)
     """
     values = (teeth, abs(helix_angle_deg), face_width_mm)
     for (name, (low, high, unit)), value in zip(_GEARS_OF_2013.items(), values, strict=True):
@@ -49,11 +71,39 @@ def require_gear(teeth: int, helix_angle_deg: float, face_width_mm: float, editi
 def single_pitch_um(
     grade: float, normal_module_mm: float, reference_diameter_mm: float, edition: int = 1995
 ) -> float:
-    """Return the limit f_p of the amount of every single pitch deviation, in um.
+    """Return the limit f_p of the amount of every single pitch deviation.
 
-    Grades go from 1 to 12, to 11 in the edition of 2013; the grade 0 of 1995 is not offered.
-    Modules go from 0.5 to 70 mm, diameters from 5 to 10000 mm, to 15000 mm in the edition of 2013.
-    Raises RangeError, a ConfigurationError and a ValueError, outside of that.
+    Parameters
+    ----------
+    grade : float
+        Accuracy grade, 1 to 12; 1 to 11 in the edition of 2013.
+    normal_module_mm : float
+        Normal module in mm, 0.5 to 70.
+    reference_diameter_mm : float
+        Reference diameter in mm, 5 to 10000; 5 to 15000 in the edition of 2013.
+    edition : int
+        1995 or 2013.
+
+    Returns
+    -------
+    float
+        The limit in um.
+
+    Raises
+    ------
+    RangeError
+        If an argument is outside its range. It is a ConfigurationError and a ValueError.
+
+    Notes
+    -----
+    In grade 5, f_p = 0.3 (m + 0.4 sqrt(d)) + 4 by the edition of 1995, with the geometric means m
+    and d of the ranges of module and diameter, and f_p = 0.001 d + 0.4 m + 5 by that of 2013. Each
+    grade multiplies it by sqrt(2).
+
+    Examples
+    --------
+    >>> gearchaos.iso1328.single_pitch_um(7, 2.5, 40.0)
+    11.0
     """
     return _limits(grade, normal_module_mm, reference_diameter_mm, edition)[0]
 
@@ -61,7 +111,33 @@ def single_pitch_um(
 def cumulative_pitch_um(
     grade: float, normal_module_mm: float, reference_diameter_mm: float, edition: int = 1995
 ) -> float:
-    """Return the limit F_p of the range of the cumulative ones, as `single_pitch_um` does."""
+    """Return the limit F_p of the range of the cumulative pitch deviations.
+
+    Parameters
+    ----------
+    grade, normal_module_mm, reference_diameter_mm, edition
+        As for `single_pitch_um`.
+
+    Returns
+    -------
+    float
+        The limit in um.
+
+    Raises
+    ------
+    RangeError
+        As for `single_pitch_um`.
+
+    Notes
+    -----
+    In grade 5, F_p = 0.3 m + 1.25 sqrt(d) + 7 by the edition of 1995, and
+    F_p = 0.002 d + 0.55 sqrt(d) + 0.7 m + 12 by that of 2013.
+
+    Examples
+    --------
+    >>> gearchaos.iso1328.cumulative_pitch_um(7, 2.5, 40.0) > 11.0
+    True
+    """
     return _limits(grade, normal_module_mm, reference_diameter_mm, edition)[1]
 
 

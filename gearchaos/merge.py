@@ -91,7 +91,7 @@ def _require_some(config: "Configuration", folder: Path) -> None:
     if lanes > MANY_LANES and size < lanes:
         raise FileError(
             f"{folder}: holds blocks of {size} bytes for {lanes} lanes, so nearly all are missing; "
-            "go on with the sweep and --resume"
+            "continue the sweep with --resume"
         )
 
 
@@ -100,7 +100,7 @@ def _require_all(store: "BlockStore", found: "Finished", shards: object) -> None
     from gearchaos.engine.store_filling import shared_blocks
     from gearchaos.results.files.block_store import uncovered
 
-    remedy = "go on with the sweep and --resume"
+    remedy = "continue the sweep with --resume"
     if isinstance(shards, int) and shards > 0:
         blocks = enumerate(shared_blocks(store.lanes, shards))
         lacking = {n % shards + 1 for n, block in blocks if any(uncovered(block, found.bounds))}

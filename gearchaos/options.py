@@ -28,7 +28,7 @@ from gearchaos.errors import ConfigurationError
 class Option(NamedTuple):
     """How one field of a command's options is given on the command line.
 
-    ``help``: the text of --help; ``%(default)s`` stands for the default of the field.
+    ``help``: the text of --help; ``%(default)s`` is replaced by the default of the field.
     ``metavar``: name of the value in --help, by default that of the field.
     ``flags``: by default ``--`` and the name of the field, with hyphens.
     ``positional``: an argument without a flag; it is optional if the field has a default.

@@ -269,7 +269,7 @@ def _sweep_sheets(results: "Sequence[Result]", options: PlotOptions) -> "list[Sh
     size: dict[str, Any] = {"between": between, "width_mm": width, "height_mm": height}
     maps = [axes for axes in map(swept_axes, results) if len(axes) > 1]
     if maps:
-        page = f"a map, of which --at {maps[0][0]}=VALUE makes a diagram"
+        page = f"a map; --at {maps[0][0]}=VALUE makes a diagram of it"
         _draws_alone(page, options, {"--stages": options.stages, "--branches": options.branches})
         draw = partial(map_page, results[0], options.variable, marked=marked, **size)
         return [(name, draw)]

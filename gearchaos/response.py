@@ -116,7 +116,7 @@ def _lane(options: ResponseOptions) -> "Asked":
     if lane.axes:
         rest = " and ".join(f"--at {axis}=VALUE" for axis in lane.axes)
         raise ConfigurationError(f"{options.config}: name one lane, with {rest} as well")
-    note = f"goes on from the {options.begin} of the lane {lane.where} of {options.config}"
+    note = f"continues from the {options.begin} of the lane {lane.where} of {options.config}"
     config = continued(lane, options.config, options.begin)
     text = stored_text(lane, options.config, "configuration")
     return config, text, [note], lane.metadata["fixed"]

@@ -99,7 +99,7 @@ class System:
 
     Examples
     --------
-    >>> system = System("sweeps/pan2021.toml", pitch_error=10.75)
+    >>> system = gearchaos.System("sweeps/pan2021.toml", pitch_error=10.75)
     >>> system.orbit(period=2).stable
     True
     """
@@ -144,6 +144,13 @@ class System:
             If a coordinate is missing or names no axis.
         FileError
             If the result does not contain its configuration.
+
+        Examples
+        --------
+        >>> result = gearchaos.open_result("pan2021.h5")
+        >>> last = gearchaos.System.of_lane(result, pitch_error=5.0)
+        >>> bool((last.state == result.sel(pitch_error=5.0, method="nearest")["end_state"]).all())
+        True
         """
         instance("result", result, Result, "open_result reads it from a file")
         missing = [axis for axis in result.axes if axis not in coordinates]
@@ -211,6 +218,12 @@ class System:
         ------
         ConfigurationError
             If the motion leaves the range of numbers.
+
+        Examples
+        --------
+        >>> motion = system.integrate(periods=2, transient=10)
+        >>> motion.time[-1], motion.states.shape[1]
+        (np.float64(2.0), 6)
         """
         periods = whole_number("periods", periods, least=1)
         transient = whole_number("transient", transient, least=0)
@@ -239,6 +252,12 @@ class System:
         ------
         ConfigurationError
             If fewer periods are recorded.
+
+        Examples
+        --------
+        >>> response = system.response(periods=2)
+        >>> response.dims("delta_5")
+        ('pitch_error', 'time')
         """
         state = dict(zip(self.states, self.state.tolist(), strict=True))
         start = {"kind": "given", "state": state}
@@ -264,6 +283,17 @@ class System:
         ------
         ConfigurationError
             If there is no orbit with this period next to the guess.
+
+        Notes
+        -----
+        Newton's method solves P(x) - x = 0 for the map P over the period. The multipliers are the
+        eigenvalues of the monodromy matrix dP/dx.
+
+        Examples
+        --------
+        >>> orbit = system.orbit(period=2)
+        >>> orbit.point.shape, orbit.multipliers.shape
+        ((6,), (6,))
         """
         period = whole_number("period", period, least=1)
         if guess is None:
@@ -307,6 +337,12 @@ class System:
         ------
         ConfigurationError
             If the parameter is unknown or a value out of its range.
+
+        Examples
+        --------
+        >>> branch = system.follow(system.orbit(period=2), "pitch_error", 10.75, 11.6)
+        >>> branch.text
+        'period doubling: a real multiplier passes -1'
         """
         instance("orbit", orbit, Orbit, "System.orbit finds it")
         instance("parameter", parameter, str, "name a group, or a key by its path")
@@ -443,6 +479,12 @@ class System:
         -------
         Exponents
             Exponents per unit of tau, largest first, and standard errors, each of shape (states,).
+
+        Examples
+        --------
+        >>> found = system.exponents()
+        >>> found.values.shape
+        (6,)
         """
         found = exponents(self._record, self._start(start), self._plan)
         return Exponents(*(values[0] for values in found))
@@ -463,6 +505,15 @@ class System:
         -------
         float
             The sum.
+
+        Notes
+        -----
+        The sum is the mean of the trace of the Jacobian over the motion.
+
+        Examples
+        --------
+        >>> system.sum_of_exponents() < 0.0
+        True
         """
         shares = None
         if any(self._record.damped_in_contact):
@@ -491,6 +542,12 @@ class System:
         ------
         ConfigurationError
             If there is no such state.
+
+        Examples
+        --------
+        >>> lines = system.spectrum("delta_5", periods=16)
+        >>> lines.order[1]
+        np.float64(0.0625)
         """
         one_of("state", state, self.states)
         motion = self.integrate(periods, transient=self.config.integration.transient_periods)
@@ -500,7 +557,15 @@ class System:
     def stability_limit(self) -> int:
         """Return the smallest number of steps per mesh period for a stable integration.
 
-        With an exact method the limit is 1.
+        Returns
+        -------
+        int
+            Steps per mesh period; 1 with an exact method.
+
+        Examples
+        --------
+        >>> system.stability_limit() >= 1
+        True
         """
         return int(fewest_stable_steps(self._record, self.config.integration.method)[0])
 
@@ -516,6 +581,12 @@ class System:
         -------
         MeshMotion
             Dimensionless arrays of shape (samples,), accelerations of shape (samples, coordinates).
+
+        Examples
+        --------
+        >>> forces = system.mesh_motion(system.integrate(periods=2))
+        >>> forces.force_tangential.shape == forces.contact_tangential.shape
+        True
         """
         instance("motion", motion, Trajectory, "System.integrate gives it")
         states = motion.states[np.newaxis]

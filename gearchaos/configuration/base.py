@@ -43,7 +43,7 @@ class Configuration(Tables):
 
     Examples
     --------
-    >>> config = load_config("sweeps/pan2021.toml")
+    >>> config = gearchaos.load_config("sweeps/pan2021.toml")
     >>> config.replace("sweep.count", 31).sweep.count
     31
     """
@@ -66,7 +66,27 @@ class Configuration(Tables):
     def with_files(
         cls, tables: Mapping[str, Any], folder: str | None
     ) -> tuple[Mapping[str, Any], list[Fault]]:
-        """Return tables with the contents of the files that they name, and the faults of these."""
+        """Return tables with the contents of the files that they name.
+
+        Parameters
+        ----------
+        tables : mapping
+            The tables by name.
+        folder : str or None
+            Folder of the files; without it the tables must contain them as ``files``.
+
+        Returns
+        -------
+        tables : mapping
+            The tables, with ``files`` where there are any.
+        faults : list of Fault
+            What is wrong with the files.
+
+        Examples
+        --------
+        >>> gearchaos.Configuration.with_files({"title": "none named"}, None)
+        ({'title': 'none named'}, [])
+        """
         del folder
         return tables, []
 
@@ -115,6 +135,12 @@ class Configuration(Tables):
         ------
         ConfigurationError
             With one message per fault, all faults at once.
+
+        Examples
+        --------
+        >>> text = config.text
+        >>> gearchaos.Configuration.from_toml(text, overrides=["sweep.count=31"]).sweep.count
+        31
         """
         tables = with_overrides(tables_from_toml(text, source), overrides, source)
         config = cls.from_tables(tables, source, folder)
@@ -148,6 +174,11 @@ class Configuration(Tables):
         ------
         ConfigurationError
             With one message per fault, all faults at once.
+
+        Examples
+        --------
+        >>> gearchaos.Configuration.from_tables(config.tables()) == config
+        True
         """
         if cls is Configuration:
             chosen: Any = _kind_of(tables, source)
@@ -172,7 +203,7 @@ class Configuration(Tables):
         ----------
         path : str
             Dotted path of the key or table.
-        value
+        value : object
             The value, a mapping for a table; None removes the key.
 
         Returns
@@ -184,6 +215,11 @@ class Configuration(Tables):
         ------
         ConfigurationError
             If the changed configuration breaks a rule.
+
+        Examples
+        --------
+        >>> config.replace("integration.recorded_periods", 800).integration.recorded_periods
+        800
         """
         try:
             tables = with_value(self.tables(), path.split("."), value)
@@ -208,6 +244,11 @@ class Configuration(Tables):
         ------
         ConfigurationError
             If the method cannot integrate the scene.
+
+        Examples
+        --------
+        >>> config.integrated_by("flow_map").integration.fixed_steps
+        12
         """
         tables = self.tables()
         integration = {**tables["integration"], "method": method}
@@ -237,6 +278,11 @@ class Configuration(Tables):
         ------
         ConfigurationError
             If a parameter cannot be swept, or if a rule is broken.
+
+        Examples
+        --------
+        >>> config.at({"pitch_error": 5.0}).sweep.values
+        (5.0,)
         """
         fixed = {REALISATION: self.keys_of_realisation(values.get(REALISATION, 0.0))}
         for parameter in values:
@@ -258,7 +304,18 @@ class Configuration(Tables):
         return type(self).from_tables(tables, self.source, self._folder)
 
     def resolved_toml(self) -> str:
-        """Return TOML with all defaults; it loads to an equal configuration."""
+        """Return TOML with all defaults; it loads to an equal configuration.
+
+        Returns
+        -------
+        str
+            The TOML text.
+
+        Examples
+        --------
+        >>> gearchaos.Configuration.from_toml(config.resolved_toml()) == config
+        True
+        """
         return toml_text(self.tables())
 
     @model_validator(mode="after")
@@ -271,7 +328,7 @@ class Configuration(Tables):
             )
         return self
 
-    # Configurations are equal whatever their source.
+    # The source of a configuration does not matter.
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Configuration) and self.__dict__ == other.__dict__
 
@@ -305,7 +362,7 @@ def load_config(path: str | os.PathLike[str], overrides: Iterable[str] = ()) -> 
 
     Examples
     --------
-    >>> config = load_config("sweeps/pan2021.toml", ["sweep.count=31"])
+    >>> config = gearchaos.load_config("sweeps/pan2021.toml", ["sweep.count=31"])
     >>> config.sweep.count
     31
     """

@@ -45,7 +45,7 @@ class Table(BaseModel):
 
 
 NAME = "NAME"
-"""Stands in the path of a key for the name that a file gives one of several tables."""
+"""Part of the path of a key, in place of the name that a file gives one of several tables."""
 
 # TOML has lists, the tables have tuples; entries are still checked strictly.
 AS_LIST = Field(strict=False)

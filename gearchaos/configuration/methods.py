@@ -24,7 +24,7 @@ class Method:
         Whether steps have no error between crossings. No steps are then chosen, and any number of
         steps is stable.
     always_resolved : bool
-        Whether every crossing is resolved, whatever ``integration.crossings`` is.
+        Whether every crossing is resolved, also with ``integration.crossings = "plain"``.
     shares_maps : bool
         Whether maps are computed in advance; they take memory, and lanes share them.
     most_elements : int or None
@@ -50,7 +50,7 @@ class Method:
 
 
 AUTO = "auto"
-"""Name of the method that stands for the fastest one of the others."""
+"""Value of ``integration.method`` that selects the fastest one of the methods."""
 
 INTEGRATORS = (
     Method("rk4", "RK4", "classical Runge-Kutta of order 4"),

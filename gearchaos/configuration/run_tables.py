@@ -172,7 +172,7 @@ class Outputs(Table, Generic[State]):
     loads: bool = key(default=False)
     """whether mesh forces, load factors and the transmission error are kept"""
     states: Annotated[tuple[State, ...], AS_LIST, ONCE] = key(example=["delta_5"], default=())
-    """states of which extremes, and amplitudes at the orders, are kept"""
+    """states whose extremes, and amplitudes at the orders, are kept"""
     orders: Annotated[tuple[Order, ...], Field(strict=False, max_length=1000)] = key(
         "multiples of the mesh frequency, whole or fractions of two whole numbers, at which "
         "amplitudes of the transmission error are kept; the record has whole cycles of them",

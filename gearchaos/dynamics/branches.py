@@ -61,7 +61,7 @@ CALM = 0.5
 """Largest change of the sum of multipliers in a step, relative to 1 and the sum."""
 
 NEIGHBOURING = 0.2
-"""Distance from a branch up to which it is asked more closely whether an orbit lies on it."""
+"""Distance from a branch below which an orbit is compared with the branch more closely."""
 
 MARGIN = 1e-4
 """Share of the way by which an orbit may lie outside a stretch of a branch, next to a fold."""

@@ -145,7 +145,7 @@ def sum_of_exponents(system: LaneSystem, contact: Floats | None = None) -> Float
 def contact_shares(outcome: Outcome, plan: Plan) -> Floats | None:
     """Return the share of the record in which each element is in contact, (lanes, elements).
 
-    None if the record does not tell it.
+    None if the record does not contain them.
     """
     if not (plan.contact and outcome.contact.shape[1]):
         return None

@@ -63,6 +63,13 @@ def find_basins(result: Result, name: str = "the result", threads: int | None = 
         If the result has other axes.
     FileError
         If the result has no labels, or its configuration is missing or describes other lanes.
+
+    Examples
+    --------
+    >>> from gearchaos.engine.basins import find_basins
+    >>> found = find_basins(gearchaos.open_result("grid.h5"))
+    >>> found.numbers.shape
+    (1, 4)
     """
     require_labels(result, name)
     config = computable(result, name).replace("start.carry", "none")

@@ -34,7 +34,7 @@ MOST_PERIODS = 8
 """Default of the longest period that is followed, in excitation periods."""
 
 NEAR, SAME = 0.02, 1e-4
-"""Largest distance of a motion, and of a closed orbit, from a branch on which it lies."""
+"""Largest distance of a motion, and of a closed orbit, from its branch."""
 
 
 class _Motion(NamedTuple):

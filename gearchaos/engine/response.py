@@ -46,8 +46,10 @@ def respond(config: Given, periods: int = DEFAULT_PERIODS, threads: int | None =
 
     Examples
     --------
-    >>> result = gearchaos.respond("sweeps/pan2021.toml", periods=4)
-    >>> result["delta_5"]
+    >>> config = gearchaos.load_config("sweeps/pan2021.toml", ["sweep.count=2"])
+    >>> result = gearchaos.respond(config, periods=4)
+    >>> result.dims("delta_5"), result["time"][-1]
+    (('pitch_error', 'time'), np.float64(4.0))
     """
     choose_threads(threads)
     config, periods = configuration_of(config), whole_number("periods", periods)

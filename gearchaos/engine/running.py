@@ -65,8 +65,9 @@ def run(config: Given, threads: int | None = None, progress: bool = False) -> Re
 
     Examples
     --------
-    >>> result = gearchaos.run("sweeps/pan2021.toml")
-    >>> result["lyapunov_exponent"]
+    >>> config = gearchaos.load_config("sweeps/pan2021.toml", ["sweep.count=2"])
+    >>> gearchaos.run(config)["lyapunov_exponent"].shape
+    (2,)
     """
     choose_threads(threads)
     with speaking(quiet=not progress):

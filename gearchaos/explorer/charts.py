@@ -21,7 +21,7 @@ from gearchaos.outputs.names import LARGEST_EXPONENT
 from gearchaos.results.reading.result import Result
 
 Charts = tuple[list[Any], dict[str, str]]
-"""Panels, the first of which can be zoomed into, and the colours of kinds by name."""
+"""Panels, with the zoomable one first, and the colours of kinds by name."""
 
 GREYS = [f"#{3 * f'{shade:02x}'}" for shade in range(176, -1, -1)]
 """Greys of pixels, from few points to many."""

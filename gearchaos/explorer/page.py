@@ -164,7 +164,7 @@ class ExplorerPage:
 
     def _refuse(self, name: str) -> None:
         self._refused[name] = ""
-        self._say(f"the link asks for what there is not: {', '.join(self._refused)}")
+        self._say(f"the link names what does not exist: {', '.join(self._refused)}")
 
     def _redraw(self) -> None:
         """Draw the sweep with the variable, axis values and units of the switches, and a motion."""

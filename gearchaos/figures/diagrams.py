@@ -76,6 +76,12 @@ def bifurcation(
     Each section point is a translucent, rasterised dot. Points of a periodic motion coincide in a
     black line; chaos is grey, darker where visited more often. Above `figures.lanes.MOST_DOTS` the
     dots are counted per pixel. Diverged lanes get a red tick, lanes beyond the limits a triangle.
+
+    Examples
+    --------
+    >>> axes = Figure().subplots()
+    >>> result = gearchaos.open_result("pan2021.h5")
+    >>> drawn = figures.bifurcation(axes, result, "section_delta_5", between=(5.0, None))
     """
     variable = _diagram_variable(result, variable)
     lanes = diagram_lanes(result, between)
@@ -145,6 +151,13 @@ def lyapunov(
     Diverged lanes are gaps with a red tick at the bottom; lanes beyond robust limits get a
     triangle. Zero is always within the limits. Where a page cannot resolve all lanes
     (`figures.lanes.COLUMNS`), only the lowest and the highest exponent of each column are drawn.
+
+    Examples
+    --------
+    >>> axes = Figure().subplots()
+    >>> drawn = figures.lyapunov(axes, gearchaos.open_result("pan2021.h5"))
+    >>> axes.get_xlim()[0] < 5.0 < axes.get_xlim()[1]
+    True
     """
     shown = _exponents(result, between)
     look = {"color": color, "marker": marker, "label": label}
@@ -256,6 +269,12 @@ def waterfall(axes: Axes, result: Result, variable: str, *, between: Between = (
     FigureError
         If the amplitudes are missing, no lane is in the range, there are two swept parameters, or
         several lanes have the same value.
+
+    Examples
+    --------
+    >>> axes = Figure().subplots()
+    >>> result = gearchaos.open_result("speeds.h5")
+    >>> drawn = figures.waterfall(axes, result, "amplitude_transmission_error")
     """
     there = [name for name in result if result.dims(name) == (*result.axes, ORDER)]
     check_variable(variable, there, "over mesh orders")

@@ -65,6 +65,11 @@ def shares(
     -----
     The edge below period 1 is the share of all other motions, including diverged and unresolved
     lanes. Its 95 % confidence interval (Wilson 1927) assumes independent gear pairs and starts.
+
+    Examples
+    --------
+    >>> axes = Figure(layout="constrained").subplots()
+    >>> drawn = figures.shares(axes, gearchaos.open_result("starts.h5"))
     """
     limits, counted = diagram_lanes(result, between).limits, motion_shares(result)
     values, known = counted.values, list(dict.fromkeys([*SHADES, *counted.motions]))
@@ -101,10 +106,19 @@ def shares_page(
     width_mm, height_mm : float
         Size of the page.
 
+    Returns
+    -------
+    Page
+        A figure unknown to pyplot.
+
     Raises
     ------
     FigureError, ConfigurationError, FileError
         As for `shares`.
+
+    Examples
+    --------
+    >>> page = figures.shares_page(gearchaos.open_result("starts.h5"))
     """
     panels = 2 if motion_shares(result).apart else 1
     height = height_mm or (60.0 + 0.35 * width_mm) * (1.0 if panels == 2 else 0.7)
@@ -177,6 +191,12 @@ def basins(axes: Axes, found: Basins, value: int = 0) -> ScalarMappable:
     ------
     FigureError
         If the starts are not on a grid over two states.
+
+    Examples
+    --------
+    >>> from gearchaos.engine.basins import find_basins
+    >>> axes = Figure(layout="constrained").subplots()
+    >>> image = figures.basins(axes, find_basins(gearchaos.open_result("grid.h5")))
     """
     if len(found.grid) != 2:
         raise FigureError(
@@ -213,6 +233,12 @@ def fractions(axes: Axes, found: Basins) -> list[Drawn]:
     -------
     list of Artist or Container
         Drawn and labelled parts, in the order of the numbers.
+
+    Examples
+    --------
+    >>> from gearchaos.engine.basins import find_basins
+    >>> axes = Figure(layout="constrained").subplots()
+    >>> drawn = figures.fractions(axes, find_basins(gearchaos.open_result("starts.h5")))
     """
     numbers, looks = in_order(one.number for one in found.basins), []
     for number in numbers:
@@ -238,10 +264,20 @@ def basins_page(
     width_mm, height_mm : float
         Size of the page.
 
+    Returns
+    -------
+    Page
+        A figure unknown to pyplot.
+
     Raises
     ------
     FigureError
         As for `basins`, at one value.
+
+    Examples
+    --------
+    >>> from gearchaos.engine.basins import find_basins
+    >>> page = figures.basins_page(find_basins(gearchaos.open_result("grid.h5")))
     """
     several, fixed = found.values.size > 1, found.result.fixed
     with page(width_mm, height_mm or 20.0 + (0.55 if several else 0.85) * width_mm) as figure:

@@ -75,7 +75,7 @@ def diagram_lanes(result: Result, between: Between = (None, None)) -> ShownLanes
     swept = swept_axes(result)
     if len(swept) > 1:
         raise FigureError(
-            f"the result runs over {' and '.join(swept)}, of which a diagram shows one; choose a "
+            f"the result runs over {' and '.join(swept)}; a diagram shows one of them; choose a "
             f"value of the other with --at NAME=VALUE, such as --at {swept[0]}="
             f"{result[swept[0]][0]:g} (in Python: result.sel)"
         )
@@ -98,8 +98,8 @@ def map_axes(result: Result) -> tuple[str, str]:
     if more := [axis for axis in result.axes if axis not in swept]:
         where = " ".join(f"--at {axis}={result[axis][0]:g}" for axis in more)
         raise FigureError(
-            f"the result has several lanes for each pair of values, along {' and '.join(more)}, of "
-            f"which a map shows one; choose it, such as with {where} (in Python: result.sel)"
+            f"the result has several lanes for each pair of values, along {' and '.join(more)}; a "
+            f"map shows one of them; choose it, such as with {where} (in Python: result.sel)"
         )
     return swept[1], swept[0]
 

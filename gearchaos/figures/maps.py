@@ -86,6 +86,13 @@ def parameter_map(
     Each lane is a cell that ends halfway to its neighbours. The motion has the colours and hatches
     of the diagrams; exponents have colours that part at zero. Lanes without a number are grey or
     hatched, and the legend gives the reason. The cells are an image, so that a PDF stays small.
+
+    Examples
+    --------
+    >>> axes = Figure().subplots()
+    >>> image = figures.parameter_map(axes, gearchaos.open_result("chart.h5"), "period")
+    >>> image.get_array().shape
+    (2, 3)
     """
     grid = _grid(result, between)
     image, masks, looks = _draw_cells(axes, result, variable, grid)
@@ -180,10 +187,19 @@ def map_page(
     width_mm, height_mm : float
         Size of the page. Panels are side by side where each is at least 60 mm wide.
 
+    Returns
+    -------
+    Page
+        A figure unknown to pyplot.
+
     Raises
     ------
     FigureError, FileError
         As for `parameter_map`; FigureError also if there is nothing to draw.
+
+    Examples
+    --------
+    >>> page = figures.map_page(gearchaos.open_result("chart.h5"))
     """
     names = _shown_by_default(result) if variable is None else [variable]
     if not names:

@@ -164,6 +164,11 @@ def save_figure(
     -----
     The metadata contain the version of the software but no date: the same figure gives the same
     bytes. EPS has no transparency; its panels are pictures.
+
+    Examples
+    --------
+    >>> page = figures.bifurcation_page(gearchaos.open_result("pan2021.h5"))
+    >>> figures.save_figure(page, "page.svg")
     """
     kind = Path(path).suffix.lower().removeprefix(".")
     if kind not in ENDINGS:

@@ -57,10 +57,21 @@ def time_history(
     between : (float or None, float or None)
         First and last mesh period to show; None is the end of the record.
 
+    Returns
+    -------
+    Line2D
+        The curve.
+
     Raises
     ------
     FigureError
         If the result is not a response, the variable is missing, or the lane diverged.
+
+    Examples
+    --------
+    >>> axes = Figure().subplots()
+    >>> result = gearchaos.open_result("response.h5")
+    >>> line = figures.time_history(axes, result, lane=0, variable="delta_5")
     """
     values = motion_over_time(result, lane, variable)
     time = result[TIME]
@@ -87,6 +98,13 @@ def contact_strip(axes: Axes, result: Result, lane: int, variable: str) -> list[
     -------
     list of PolyCollection
         Bars of each contact state that occurs.
+
+    Examples
+    --------
+    >>> axes = Figure(layout="constrained").subplots()
+    >>> result = gearchaos.open_result("response.h5")
+    >>> line = figures.time_history(axes, result, 0, "mesh_force_tangential")
+    >>> bars = figures.contact_strip(axes, result, 0, "mesh_force_tangential")
     """
     name, time = f"contact_{element_of(result, variable)}", result[TIME]
     states, strips = result.lanes(name)[lane], []
@@ -125,6 +143,11 @@ def phase_portrait(
     ------
     FigureError
         As for `time_history`.
+
+    Examples
+    --------
+    >>> axes = Figure().subplots()
+    >>> curve, points = figures.phase_portrait(axes, gearchaos.open_result("response.h5"), lane=0)
     """
     plane = coordinate, f"{coordinate}_rate"
     displacement, velocity = (motion_over_time(result, lane, name) for name in plane)
@@ -158,6 +181,11 @@ def poincare_section(axes: Axes, result: Result, lane: int, coordinate: str = CO
     -----
     The axes cover at least a fifth of the phase portrait, so that the points of a periodic motion
     coincide.
+
+    Examples
+    --------
+    >>> axes = Figure().subplots()
+    >>> points = figures.poincare_section(axes, gearchaos.open_result("response.h5"), lane=0)
     """
     plane = coordinate, f"{coordinate}_rate"
     curve = np.array([motion_over_time(result, lane, name) for name in plane])
@@ -210,6 +238,11 @@ def amplitude_spectrum(
     A motion that repeats within the record is transformed over a whole number of its periods with
     a rectangular window. Any other motion is transformed over a whole number of excitation periods
     with a Hann window.
+
+    Examples
+    --------
+    >>> axes = Figure().subplots()
+    >>> lines = figures.amplitude_spectrum(axes, gearchaos.open_result("response.h5"), lane=0)
     """
     variable = variable or acceleration_of(COORDINATE)
     order, amplitude, window = _spectrum(result, lane, variable)
@@ -275,7 +308,7 @@ def coordinates_of(result: Result) -> tuple[str, ...]:
 
 
 def element_of(result: Result, variable: str) -> str:
-    """Return the clearance element of which a variable over time is the force, "" for others."""
+    """Return the clearance element whose force is a variable over time, "" for others."""
     _, force, element = variable.rpartition("force_")
     return element if force and f"contact_{element}" in result else ""
 

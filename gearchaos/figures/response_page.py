@@ -77,6 +77,12 @@ def response_page(
     a Hann window otherwise. Where each tooth has its own error, the page begins with the pitch
     error over revolutions of the driving gear, in um where b' is known. The section then also shows
     the points once a mesh period.
+
+    Examples
+    --------
+    >>> page = figures.response_page(gearchaos.open_result("response.h5"), lane=0)
+    >>> len(page.axes)
+    4
     """
     first = next(iter(response.coordinates_of(result)), response.COORDINATE)
     motion = _motion(result, lane, first if coordinate is None else coordinate)

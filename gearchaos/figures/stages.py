@@ -59,8 +59,15 @@ def shade_stages(
 
     Notes
     -----
-    "Several motions" are values whose starts or gear pairs have different motions, and stages of
-    which more than a quarter of the lanes are in stages narrower than a 150th of the axis.
+    "Several motions" are values whose starts or gear pairs have different motions, and stages
+    with more than a quarter of their lanes in stages narrower than a 150th of the axis.
+
+    Examples
+    --------
+    >>> axes = Figure(layout="constrained").subplots()
+    >>> result = gearchaos.open_result("pan2021.h5")
+    >>> drawn = figures.bifurcation(axes, result)
+    >>> rectangles = figures.shade_stages(axes, result)
     """
     diagram_lanes(result)  # Refuses two swept parameters.
     lanes = labelled_lanes(result, repeats=True) if lanes is None else lanes

@@ -66,6 +66,12 @@ def bifurcation_page(
         stages or amplitudes are requested for several results.
     FileError
         If stages are requested and the result has no labels of the motion.
+
+    Examples
+    --------
+    >>> page = figures.bifurcation_page(gearchaos.open_result("pan2021.h5"), stages=True)
+    >>> len(page.axes)
+    2
     """
     overlay = _overlay(result, variable, between, labels)
     overlay.check(bool(stages))

@@ -104,7 +104,7 @@ def _unfit(config: Configuration, targets: Targets, source: str, values: Floats)
     if config.integration.recorded_periods < POINTS_NEEDED:
         yield (
             f"{source}: integration.recorded_periods = {config.integration.recorded_periods}: must "
-            f"be at least {POINTS_NEEDED}, to tell every period; raise it in `set`"
+            f"be at least {POINTS_NEEDED}, to find every period; raise it in `set`"
         )
     if config.second_sweep is not None:
         return

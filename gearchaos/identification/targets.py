@@ -77,7 +77,7 @@ class ObservedPlace(_Observed):
 
     at: float = key("where, on the axis of the sweep", example=1.12)
     within: Interval = key(
-        "the span in which it is looked for, and must be alone", example=[0.6, 2.0]
+        "the search range of the value, which must be alone there", example=[0.6, 2.0]
     )
 
     @model_validator(mode="after")

@@ -11,9 +11,9 @@ from gearchaos.outputs.names import acceleration_of, rate_of
 from gearchaos.outputs.scales import Quantity
 
 SUBJECT = "@"
-"""Stands for the name, the wording or the symbol of the subject in the texts of an output."""
+"""Placeholder for name, wording or symbol of the subject in the texts of an output."""
 LANE_AXES = "lanes"
-"""Stands for all axes of a result in the dimensions of an output."""
+"""Placeholder for all axes of a result in the dimensions of an output."""
 
 Dtype: TypeAlias = Literal["float64", "int32", "uint8"]
 
@@ -58,17 +58,17 @@ class Output:
     Attributes
     ----------
     name : str
-        Name in the file. `SUBJECT` stands for the name of the subject.
+        Name in the file. `SUBJECT` is replaced by the name of the subject.
     long_name, symbol : str
-        Wording for people, and mathtext for axis labels. `SUBJECT` stands for those of the subject.
+        Wording for people, and mathtext for axis labels. `SUBJECT` is replaced by those.
     dims : tuple of str
-        Dimensions; `LANE_AXES` stands for all axes of the result.
+        Dimensions; `LANE_AXES` is replaced by all axes of the result.
     dtype : str
         ``"float64"``, ``"int32"`` or ``"uint8"``.
     scale : Quantity, optional
         The quantity that it measures. None: that of the subject.
     fill_value : float or int, optional
-        Value that stands for "none here". None: every value means something.
+        Value that marks "none here". None: every value means something.
     errors : tuple of str
         Names of the outputs that give the error of this one.
     meanings : tuple of str

@@ -23,7 +23,7 @@ class Details(NamedTuple):
     """What is known of outputs of a result beforehand, by their names in the catalogue.
 
     ``values``: arrays of coordinates. ``meanings``: of the values 0, 1, ... of enumerations.
-    ``wordings``: texts that stand in place of `SUBJECT` in the long name of an output without one.
+    ``wordings``: texts that replace `SUBJECT` in the long name of an output without one.
     """
 
     values: Mapping[str, ArrayLike] = _NOTHING
@@ -164,8 +164,8 @@ class Catalogue:
     ) -> Iterator[tuple[str, tuple[str, ...], str]]:
         """Give name, dimensions and type of all that a file with these variables must hold.
 
-        These are the axes, the parts that every sweep has, and all outputs of a part of which the
-        first one is there.
+        These are the axes, the parts that every sweep has, and all outputs of a part whose first
+        one is there.
         """
         for axis in axes:
             yield axis, (axis,), "int32" if axis in UNSWEPT else "float64"

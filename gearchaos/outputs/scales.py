@@ -10,7 +10,7 @@ import numpy as np
 
 
 class Quantity(Enum):
-    """The physical quantity that an output measures; `NONE` stands for a pure number."""
+    """The physical quantity that an output measures; `NONE` for a pure number."""
 
     NONE = auto()
     LENGTH = auto()

@@ -35,7 +35,7 @@ class Variable:
     long_name, symbol : str
         Wording for people, and mathtext for axis labels.
     fill_value : float or int, optional
-        Value that stands for "none here". None: every value means something.
+        Value that marks "none here". None: every value means something.
     flags : tuple of str
         Meanings of the values 0, 1, 2, ... of an enumeration, one word each.
     errors : tuple of str

@@ -1,1 +1,1 @@
-"""The gallery of Pan 2021: what the paper prints, the same computed, drawn, compared and told."""
+"""The gallery of Pan 2021: its printed numbers, the computed ones, figures and a comparison."""

@@ -81,7 +81,7 @@ class Batch(NamedTuple):
     order, blocks, maps : array
         See `methods.protocol.Share`.
     chosen : array of int, shape (states + 1,)
-        Rows of the states of which extremes are recorded, then the row of the observed signal.
+        Rows of the states whose extremes are recorded, then the row of the observed signal.
     turns : array, shape (lanes, orders, 2)
         Cosine and sine of the phase by which a mesh order advances in a step.
     """

@@ -29,9 +29,9 @@ class Plan(NamedTuple):
         Whether a tangent vector is integrated with every lane.
     resolved : bool
         Whether steps that cross a clearance boundary are resolved there. Flow maps resolve every
-        crossing, whatever this says.
+        crossing.
     history_periods : int
-        Number of mesh periods at the end of which every step is recorded.
+        Number of mesh periods at the end in which every step is recorded.
     method : str
         Name of the method: "rk4" or "flow_map".
     first_period : int
@@ -41,7 +41,7 @@ class Plan(NamedTuple):
     loads : bool
         Whether the forces of the elements and the observed signals are recorded.
     states : tuple of str
-        Names of the states of which extremes are recorded.
+        Names of the states whose extremes are recorded.
     orders : tuple of Fraction
         Mesh orders at which amplitudes of these states and of the first observed signal are
         recorded. The record must contain whole cycles of each.
@@ -175,5 +175,22 @@ class Outcome(NamedTuple):
     history: Floats
 
     def every(self, periods: int) -> Self:
-        """Return the outcome with every n-th section point, counted back from the last one."""
+        """Return the outcome with every n-th section point, counted back from the last one.
+
+        Parameters
+        ----------
+        periods : int
+            Mesh periods between two points that are kept.
+
+        Returns
+        -------
+        Outcome
+            The outcome with fewer section points.
+
+        Examples
+        --------
+        ::
+
+            once_per_excitation_period = outcome.every(system.repeats_after)
+        """
         return self._replace(section=self.section[:, ::-periods][:, ::-1])

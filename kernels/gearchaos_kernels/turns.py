@@ -66,6 +66,10 @@ def require_threads() -> None:
     ------
     ForkedProcessError
         If the process was forked from one in which kernels had already run with OpenMP.
+
+    Examples
+    --------
+    >>> require_threads()
     """
     if _turns.forked:
         raise ForkedProcessError(

@@ -89,7 +89,7 @@ def test_what_is_reported_of_each_lane_can_be_drawn_over_the_parameter():
 
 def test_contact_is_unknown_where_nothing_is_crossed():
     for other in ('scene.effects=["pitch_error"]', "integration.crossings=plain"):
-        with pytest.raises(gearchaos.ConfigurationError, match=r"outputs\.contact = true: is told"):
+        with pytest.raises(gearchaos.ConfigurationError, match=r"outputs\.contact = true: follows"):
             load_config(PAN2021, ["outputs.contact=true", other])
 
 

@@ -311,7 +311,7 @@ def test_a_lane_that_cannot_be_computed_says_so_and_the_page_goes_on(page, addre
 @needs_browser
 def test_what_a_file_or_a_link_says_is_shown_but_not_executed(page, address):
     look(page, address, "?units=furlongs&pitch_error=x&window=[1]&direction=1.0")
-    page.get_by_text("the link asks for what there is not").wait_for()
+    page.get_by_text("the link names what does not exist").wait_for()
     assert HOSTILE in texts(page) and page.evaluate("document.hacked") is None
     assert "--at=direction=downwards" in texts(page)
 
@@ -450,7 +450,7 @@ def test_axes_with_the_same_label_stay_two_axes(path, monkeypatch):
 @needs_browser
 def test_a_link_to_a_number_that_no_sweep_reaches_is_reported(page, address):
     look(page, address, "?pitch_error=1e999&window=[1,2,3,1e999]&direction=1.0")
-    page.get_by_text("the link asks for what there is not: pitch_error").wait_for()
+    page.get_by_text("the link names what does not exist: pitch_error").wait_for()
     page.wait_for_url(lambda url: lane_in(url) == "0.0")
 
 

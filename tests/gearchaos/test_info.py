@@ -108,7 +108,7 @@ def test_a_newer_format_is_refused_in_a_sentence(good):
         file.attrs["schema_version"] = "4.0"
     ended = info(good)
     assert ended.code == 4
-    assert "has version '4.0' of the file format, of which this gearchaos reads 3.x" in ended.err
+    assert "has version '4.0' of the file format; this gearchaos reads 3.x" in ended.err
 
 
 @pytest.mark.skipif(not Path("/proc/self/mem").is_file(), reason="there is no such file")

@@ -229,7 +229,7 @@ def test_a_pdf_has_its_cells_as_images_and_its_words_as_text(path):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["--stages"], "a map, of which --at pitch_error=VALUE makes a diagram"),
+        (["--stages"], "a map; --at pitch_error=VALUE makes a diagram of it"),
         (["{}"], "map.h5: only diagrams of sweeps are drawn over each other"),
         (["--variable", "section_delta_5"], "no variable 'section_delta_5' of each lane"),
         (["--variable", "end_state"], "no variable 'end_state' of each lane"),

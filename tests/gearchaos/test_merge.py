@@ -112,4 +112,4 @@ def test_a_manifest_that_declares_millions_of_lanes_is_refused_before_they_are_l
     path.write_text(json.dumps({**manifest, "configuration": text}))
     ended = merge(tmp_path, "gears.h5")
     assert ended.code == 4
-    assert "bytes for 9999999 lanes, so nearly all are missing; go on with the sweep" in ended.err
+    assert "bytes for 9999999 lanes, so nearly all are missing; continue the sweep" in ended.err

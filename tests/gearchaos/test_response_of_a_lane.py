@@ -1,4 +1,4 @@
-"""The time response of a lane of a result: it goes on from where the lane ended."""
+"""The time response of a lane of a result: it continues from where the lane ended."""
 
 from pathlib import Path
 
@@ -48,7 +48,7 @@ def test_the_motion_goes_on_bit_for_bit_on_the_branch_of_the_lane(tmp_path, carr
     np.testing.assert_array_equal(found["end_state"], onwards.end_state)
     np.testing.assert_array_equal(found["delta_5"][0, 0], onwards.section[0, -5, 0])
     assert found.metadata["transient_periods"] == 0
-    assert "goes on from the end of the lane pitch_error = " in found.metadata["notes"]
+    assert "continues from the end of the lane pitch_error = " in found.metadata["notes"]
     # What the file says of itself computes the same again.
     again = run(load_config(_resolved(tmp_path, found)))
     np.testing.assert_array_equal(again["end_state"], onwards.end_state)

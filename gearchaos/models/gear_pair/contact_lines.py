@@ -137,7 +137,7 @@ def contact_shares(
 
 
 def _contact_line(place: Floats, transverse: float, overlap: float) -> Floats:
-    """Length of the contact line of a pair, relative, so many mesh periods after its entry."""
+    """Relative length of the contact line of a pair, by mesh periods after its entry."""
     if overlap == 0.0:
         return np.where(place < transverse, 1.0, 0.0)
     left = transverse + overlap - place

@@ -23,7 +23,7 @@ BACKLASHES = (
     "mesh.circumferential_backlash_um",
     "mesh.normal_backlash_um",
 )
-"""Paths of the backlash, of which a configuration gives one."""
+"""Paths of the backlash; a configuration gives one of them."""
 
 _N_PER_UM_MM = 1e9  # stiffness per unit face width: 1 N/(um mm) = 1e9 N/m^2
 
@@ -31,7 +31,7 @@ _N_PER_UM_MM = 1e9  # stiffness per unit face width: 1 N/(um mm) = 1e9 N/m^2
 def derive_scales(physical: Mapping[str, Any], load: Value, frequency: Value) -> dict[str, Value]:
     """Compute those of the `SCALES` for which the physical data suffice; see `derive_groups`.
 
-    ``load``, ``frequency``: the groups of which two of them tell what they are in units.
+    ``load``, ``frequency``: two groups that connect dimensionless values with units.
     """
     found = _derive(physical, _SCALE_DERIVATIONS)
     with suppress(KeyError):
@@ -68,7 +68,7 @@ def _derive(
 def asked_for(group: str, physical: Mapping[str, Any]) -> Collection[str]:
     """Return the paths of the physical data from which a group follows.
 
-    ``physical`` is as `derive_groups` takes it; a one stands for what it does not know.
+    ``physical`` is as `derive_groups` takes it; an unknown value is replaced by 1.
     """
     quantities = Quantities(physical, np.ones(2))
     with suppress(ArithmeticError, ValueError):
@@ -121,7 +121,7 @@ class Quantities:
 
     @cached_property
     def half_backlash(self) -> Any:
-        """b_n of eq. 22 in m, of which y_1 along the transverse line of action has b_n cos(beta_b).
+        """b_n of eq. 22 in m; y_1 along the transverse line of action has b_n cos(beta_b).
 
         As given, or from a backlash j_t along the reference circle, j_t cos(alpha_t) along that
         line, or a normal one, j_bn = j_t cos(alpha_t) cos(beta_b).
@@ -169,8 +169,8 @@ class Quantities:
         """Lever of friction over that of the mesh force, tan(alpha_t) / cos(beta_b).
 
         At the pitch point the contact is as far from the foot of either perpendicular on the line
-        of action as r_b tan(alpha_t). Friction is that of the normal force, of which the line of
-        action in the transverse plane has cos(beta_b).
+        of action as r_b tan(alpha_t). Friction is that of the normal force, whose component
+        along the line of action in the transverse plane has the factor cos(beta_b).
         """
         tangent = np.tan(self.pair.transverse_pressure_angle)
         return tangent / np.cos(self.pair.base_helix_angle)
@@ -235,7 +235,7 @@ def common_contact_ratios(pair: HelicalPair) -> tuple[float, float] | None:
 def _common(value: Value, rounding: Value) -> float | None:
     """Return the value that all lanes share, each up to its rounding error, None if there is none.
 
-    Of values that differ by rounding the smallest stands for all.
+    Values that differ by rounding are replaced by the smallest.
     """
     values, bound = np.ravel(value), float(np.max(rounding))
     # Not a number where the pair is impossible; the rules of the lanes refuse it with its key.

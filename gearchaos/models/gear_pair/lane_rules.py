@@ -25,7 +25,7 @@ def lane_faults(config: GearPairTables) -> Iterator[Fault]:
     """Yield what is wrong with the groups of the lanes, where every table by itself is sound."""
     sweeps = config.sweeps
     # The groups are smooth in every parameter: both ends of a sweep and a value between them
-    # stand for millions of lanes. The axes are in the order of `axis_values`.
+    # represent millions of lanes. The axes are in the order of `axis_values`.
     by_parameter = {one.parameter: _some_values(one) for one in reversed(sweeps.values())}
     some = dict(zip(by_parameter, np.ix_(*by_parameter.values()), strict=True))
     try:

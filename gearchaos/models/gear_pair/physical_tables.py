@@ -89,7 +89,7 @@ class Mesh(Table):
         "mean mesh stiffness per unit face width", "N/(um mm)", 13.3548, gt=0
     )
     length_scale_um: float | None = _optional(
-        "length that one unit of displacement stands for, else the half backlash", "um", 50.0, gt=0
+        "length of one unit of displacement, else the half backlash", "um", 50.0, gt=0
     )
     half_backlash_um: float | None = _optional(
         "half the backlash, b_n of Pan 2021: b_n cos(beta_b) along the transverse line of action",

@@ -29,7 +29,7 @@ LISTS = {"cumulative": "cumulative_um", "single": "single_um"}
 """Keys of the lists of deviations by what a column holds."""
 
 OF_DRAWN_GEARS = ("pitch_error.grade", "pitch_error.eccentricity")
-"""Keys of which no group depends, but the gears that are drawn."""
+"""Keys that change the drawn gears, but no group."""
 
 _LARGEST_SUM_UM, _LARGEST_SUM_SHARE = 0.1, 0.01
 """What rounding in a list leaves of the sum of all single deviations, at most."""
@@ -83,7 +83,7 @@ def _table(tables: Mapping[str, Any], name: str) -> dict[str, Any]:
 
 def _column(text: str, column: object) -> list[float]:
     """Return the numbers of a column; ValueError with rule and remedy where they are none."""
-    # Notes become empty lines, of which there are no rows.
+    # Notes become empty lines, which are not rows.
     lines = [re.sub(r"^\s*(#.*)?$", "", line) for line in text.splitlines()]
     headline = next(filter(None, lines), "")
     delimiter = next((mark for mark in ";\t," if mark in headline), ",")

@@ -82,9 +82,9 @@ for _table, _keys in (("outputs", ("section", "states")), ("start", ("state", "b
 
 
 @RULES.reads("outputs", "scene", "integration")
-def _contact_is_told_by_crossings(config: GearPairTables) -> Iterator[Fault]:
+def _contact_follows_from_crossings(config: GearPairTables) -> Iterator[Fault]:
     crosses = "backlash" in config.scene.effects and config.integration.crossings == "resolved"
     if config.outputs.contact and not crosses:
-        rule = "is told by the crossings of clearance boundaries, and there are none"
+        rule = "follows from the crossings of clearance boundaries, and there are none"
         remedy = 'add "backlash" to scene.effects and set integration.crossings = "resolved"'
         yield Fault("outputs.contact", rule, remedy, True)

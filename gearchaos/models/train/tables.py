@@ -65,7 +65,7 @@ class Shaft(Table):
     inertia_kg_m2: float = key("moment of inertia", units="kg m2", example=0.002, gt=0)
     torque_Nm: float = key("external torque in the direction of rotation", units="N m", default=0.0)
     uniform: bool = key(default=False)
-    """whether the shaft rotates uniformly whatever acts on it: the driven shaft of a train"""
+    """whether the shaft rotates uniformly under any load: the driven shaft of a train"""
     mass_kg: float | None = key("mass", units="kg", default=None, gt=0)
     bearing_N_per_um: float | None = key("bearing stiffness", units="N/um", default=None, gt=0)
     """stiffness of the bearing in both directions; without it the shaft only rotates"""

@@ -182,7 +182,7 @@ def _check_schema(metadata: Mapping[str, Any]) -> None:
         )
     if version.split(".")[0] != own:
         raise UnfitError(
-            f"has version {version!r} of the file format, of which this gearchaos reads {own}.x",
+            f"has version {version!r} of the file format; this gearchaos reads {own}.x",
             "run the sweep again, or use the gearchaos that wrote it",
         )
 

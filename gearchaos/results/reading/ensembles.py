@@ -89,6 +89,13 @@ def motion_shares(result: Result) -> Shares:
         If the result has no labels.
     ConfigurationError
         If it has other axes.
+
+    Examples
+    --------
+    >>> from gearchaos.results.reading.ensembles import motion_shares
+    >>> counted = motion_shares(gearchaos.open_result("starts.h5"))
+    >>> counted.counts.shape[0], counted.other.intervals.shape
+    (2, (2, 2))
     """
     kinds, names = motion_kinds(result)
     if len(result.axes) < 2 or sum(axis not in REPEATS for axis in result.axes) != 1:

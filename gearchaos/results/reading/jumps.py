@@ -89,10 +89,21 @@ def jumps(result: Result) -> list[Jump]:
     result : Result
         A result with one axis and labels. Without a section no jump is found.
 
+    Returns
+    -------
+    list of Jump
+        The jumps in ascending order.
+
     Notes
     -----
     On one branch the points of a section move by similar steps from lane to lane. They move fastest
     towards a fold; even there each step is less than three times the one before.
+
+    Examples
+    --------
+    >>> from gearchaos.results.reading.jumps import jumps
+    >>> jumps(gearchaos.open_result("pan2021.h5"))
+    []
     """
     lanes = labelled_lanes(result)
     # A lane that has not converged to its orbit may be at any distance.
@@ -143,6 +154,11 @@ def jump_sizes(
     alone : float
         Distance that is assumed between lanes of different periods. With 0, two lanes without
         comparable lanes beside them may count as a jump.
+
+    Returns
+    -------
+    array, shape (lanes - 1,)
+        Distances of the sections, relative to the size of each state.
     """
     enough = (period[1:] > 0) & (period[1:] <= section.shape[1])
     common = np.where(enough & (period[1:] == period[:-1]), period[1:], 0).astype(np.int32)
@@ -160,6 +176,17 @@ def crises(result: Result) -> list[Crisis]:
     ----------
     result : Result
         A result with one axis and labels. Without a section no crisis is found.
+
+    Returns
+    -------
+    list of Crisis
+        The crises in ascending order.
+
+    Examples
+    --------
+    >>> from gearchaos.results.reading.jumps import crises
+    >>> crises(gearchaos.open_result("pan2021.h5"))
+    []
     """
     lanes = labelled_lanes(result)
     chaotic = lanes.labels == "chaotic"
@@ -189,6 +216,11 @@ def grows_at(extent: Floats, chaotic: Mask) -> Integers:
         Extent of the section in one coordinate, in the order of the swept value.
     chaotic : array of bool, shape (lanes,)
         Whether a lane is chaotic.
+
+    Returns
+    -------
+    array of int, shape (crises,)
+        Numbers of the lanes.
 
     Notes
     -----
@@ -231,6 +263,11 @@ def apart(result: Result, narrowest: float = 0.0) -> list[Apart]:
         is found.
     narrowest : float
         Narrower stretches, in units of the swept parameter, are left out.
+
+    Returns
+    -------
+    list of Apart
+        The stretches in ascending order.
 
     Notes
     -----

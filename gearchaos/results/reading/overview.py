@@ -56,6 +56,12 @@ def overview(path: str | os.PathLike[str]) -> dict[str, Any]:
     FileError
         If the file is missing or damaged, if it is no result, or if its format has another major
         version.
+
+    Examples
+    --------
+    >>> from gearchaos.results.reading.overview import overview
+    >>> [*overview("pan2021.h5")["axes"]]
+    ['pitch_error']
     """
     variables, data, parameters, metadata = read_result(path, rows=False)
     read = [variable for variable in variables if variable.name in data]

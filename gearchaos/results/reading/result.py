@@ -56,9 +56,12 @@ class Result:
 
     Examples
     --------
-    >>> result = gearchaos.open_result("pan2021.h5")  # doctest: +SKIP
-    >>> result["lyapunov_exponent"]  # doctest: +SKIP
-    >>> lane = result.sel(pitch_error=12.47, method="nearest")  # doctest: +SKIP
+    >>> result = gearchaos.open_result("pan2021.h5")
+    >>> result["lyapunov_exponent"].shape == result["pitch_error"].shape
+    True
+    >>> lane = result.sel(pitch_error=12.47, method="nearest")
+    >>> lane.axes
+    ()
     """
 
     def __init__(
@@ -133,15 +136,78 @@ class Result:
         return self._data[self._known(name)]
 
     def dims(self, name: str) -> tuple[str, ...]:
-        """Return the names of the dimensions of a variable; KeyError if there is none."""
+        """Return the names of the dimensions of a variable.
+
+        Parameters
+        ----------
+        name : str
+            Name of the variable.
+
+        Returns
+        -------
+        tuple of str
+            Names of the dimensions, in the order of the array.
+
+        Raises
+        ------
+        KeyError
+            If there is no such variable.
+
+        Examples
+        --------
+        >>> result.dims("section_delta_5")
+        ('pitch_error', 'section_point')
+        """
         return self.variables[self._known(name)].dims
 
     def attributes(self, name: str) -> dict[str, Any]:
-        """Return units, long_name, symbol and flags of a variable; KeyError if there is none."""
+        """Return units, long_name, symbol and flags of a variable.
+
+        Parameters
+        ----------
+        name : str
+            Name of the variable.
+
+        Returns
+        -------
+        dict of str to str or list
+            The attributes, as in the file.
+
+        Raises
+        ------
+        KeyError
+            If there is no such variable.
+
+        Examples
+        --------
+        >>> result.attributes("lyapunov_exponent")["units"]
+        '1'
+        """
         return self.variables[self._known(name)].attributes
 
     def lanes(self, name: str) -> Array:
-        """Return a variable of the lanes with all axes flattened into the first dimension."""
+        """Return a variable of the lanes with all axes flattened into the first dimension.
+
+        Parameters
+        ----------
+        name : str
+            Name of the variable.
+
+        Returns
+        -------
+        array, shape (lanes, ...)
+            The values in the order of the lanes.
+
+        Raises
+        ------
+        KeyError
+            If there is no such variable.
+
+        Examples
+        --------
+        >>> result.lanes("status").ndim
+        1
+        """
         values = self[name]
         count = math.prod(values.shape[: len(self.axes)])
         return values.reshape(count, *values.shape[len(self.axes) :])
@@ -149,14 +215,25 @@ class Result:
     def along(self, axis: str) -> Array:
         """Return the value of an axis for every lane in the order of `lanes`.
 
+        Parameters
+        ----------
+        axis : str
+            Name of the axis.
+
         Returns
         -------
         array, shape (lanes,)
+            Values in the unit of the axis.
 
         Raises
         ------
         ConfigurationError
             If the result has no such axis.
+
+        Examples
+        --------
+        >>> bool((result.along("pitch_error") == result["pitch_error"]).all())
+        True
         """
         if axis not in self.axes:
             there = ", ".join(self.axes) or "none: leave one in sel"
@@ -190,7 +267,8 @@ class Result:
 
         Examples
         --------
-        >>> result.sel(pitch_error=12.47, direction="upwards")  # doctest: +SKIP
+        >>> result.sel(pitch_error=12.47, method="nearest").fixed
+        {'pitch_error': 12.5}
         """
         one_of("method", method, (None, "nearest", "within"))
         at: dict[str, int] = {}
@@ -223,6 +301,11 @@ class Result:
         *names : str
             Names of the variables; by default all.
 
+        Returns
+        -------
+        Result
+            A result with the converted variables.
+
         Raises
         ------
         ConfigurationError
@@ -230,6 +313,12 @@ class Result:
             along an axis that a variable lacks.
         KeyError
             If there is no such variable.
+
+        Examples
+        --------
+        >>> result = gearchaos.open_result("speeds.h5")
+        >>> result.physical("section_delta_5").attributes("section_delta_5")["units"]
+        'um'
         """
         wanted = [self._known(name) for name in names or self]
         changed = {
@@ -256,6 +345,10 @@ class Result:
         FileError
             If the file exists and is not to be replaced, if it cannot be written, or if the result
             has no axis left.
+
+        Examples
+        --------
+        >>> result.save("copy.h5", overwrite=True)
         """
         path = path_text(path, "the file to be written")
         if not self.axes:
@@ -306,6 +399,7 @@ def open_result(path: str | os.PathLike[str], *, rows: bool = True) -> Result:
     Returns
     -------
     Result
+        The variables with their values and metadata.
 
     Raises
     ------
@@ -315,7 +409,9 @@ def open_result(path: str | os.PathLike[str], *, rows: bool = True) -> Result:
 
     Examples
     --------
-    >>> result = gearchaos.open_result("pan2021.h5")  # doctest: +SKIP
+    >>> result = gearchaos.open_result("pan2021.h5")
+    >>> result.axes
+    ('pitch_error',)
     """
     path = path_text(path, "a result file")
     variables, data, parameters, metadata = read_result(path, rows=rows)

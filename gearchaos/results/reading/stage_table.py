@@ -102,12 +102,23 @@ def labelled_lanes(
         Whether the result may also have several drawn pairs and starts. Where their labels differ,
         the label is "several motions", without a period, an exponent or bands.
 
+    Returns
+    -------
+    LabelledLanes
+        Value, label, period, exponent and bands of every lane.
+
     Raises
     ------
     FileError
         If the result has no labels.
     ConfigurationError
         If it does not have exactly one axis.
+
+    Examples
+    --------
+    >>> from gearchaos.results.reading.stage_table import labelled_lanes
+    >>> labelled_lanes(gearchaos.open_result("pan2021.h5")).values.ndim
+    1
     """
     require_labels(result, name)
     one = result.sel(**{axis: result[axis][0] for axis in REPEATS if repeats and axis in result})
@@ -166,10 +177,22 @@ def stage_table(lanes: LabelledLanes, narrowest: float = 0.0) -> list[Stage]:
         Stages narrower than this, in units of the swept parameter, are merged into their
         neighbours, beginning with the narrowest one.
 
+    Returns
+    -------
+    list of Stage
+        The stages, without gaps between them.
+
     Notes
     -----
     A stage reaches halfway to the lanes beside it. A merged stage joins both neighbours where these
     have the same label. Otherwise it joins the wider one, or the lower one of two equal widths.
+
+    Examples
+    --------
+    >>> from gearchaos.results.reading.stage_table import labelled_lanes, stage_table
+    >>> stages = stage_table(labelled_lanes(gearchaos.open_result("pan2021.h5")))
+    >>> stages[0].label
+    'period 1'
     """
     changes = np.flatnonzero(lanes.labels[1:] != lanes.labels[:-1]) + 1
     edges = [0, *changes.tolist(), lanes.values.size]

@@ -36,11 +36,17 @@ def to_xarray(result: "Result") -> Any:
     Returns
     -------
     xarray.Dataset
+        Variables, coordinates and attributes.
 
     Raises
     ------
     FileError
         If xarray is not installed.
+
+    Examples
+    --------
+    >>> dict(result.to_xarray().sizes)["pitch_error"] == result["pitch_error"].size
+    True
     """
     xarray = needed("xarray")
     arrays = {
@@ -70,6 +76,12 @@ def to_dataframe(result: "Result", *along: str) -> Any:
         If no variable has these dimensions.
     FileError
         If pandas is not installed.
+
+    Examples
+    --------
+    >>> frame = result.to_dataframe()
+    >>> frame.index.name
+    'pitch_error'
     """
     pandas, dims = needed("pandas"), (*result.axes, *along)
     columns: dict[str, Any] = {}

@@ -5,7 +5,7 @@ import math
 from gearchaos_kernels.compilation import scalar
 
 NEVER = 2.0
-"""Fraction of a step that stands for no crossing: it is beyond the end of the step."""
+"""Fraction of a step for no crossing: it is beyond the end of the step."""
 
 _THIRD = 1.0 / 3.0
 _ITERATIONS = 60

@@ -47,7 +47,7 @@ class Method:
     flags : type
         Frozen dataclass without fields that identifies the method in a scene.
     always_resolved : bool
-        Whether the method resolves every crossing, whatever the plan says.
+        Whether the method resolves every crossing, also where the plan has plain steps.
     rows : callable
         ``rows(scene)``: rows of a block that the method uses for itself.
     prepare : callable

@@ -176,15 +176,66 @@ class LaneSystem(ABC):
         return np.full(self.lanes, np.nan)
 
     def of(self, chosen: _Chosen) -> Self:
-        """Return the system of some lanes, in the given order."""
+        """Return the system of some lanes.
+
+        Parameters
+        ----------
+        chosen : array of int or slice
+            Numbers of the lanes, in the order of the new system.
+
+        Returns
+        -------
+        LaneSystem
+            A system of the same kind.
+
+        Examples
+        --------
+        ::
+
+            first = pairs.of(slice(0, 1))
+        """
         return self.replace(**{field: getattr(self, field)[chosen] for field in self._parameters()})
 
     def replace(self, **changes: Any) -> Self:
-        """Return the system with other values of some fields."""
+        """Return the system with other values of some fields.
+
+        Parameters
+        ----------
+        **changes
+            Values by the name of the field.
+
+        Returns
+        -------
+        LaneSystem
+            A system of the same kind.
+
+        Examples
+        --------
+        ::
+
+            wider = oscillators.replace(half_clearance=2.0 * oscillators.half_clearance)
+        """
         return replace(self, **changes)  # type: ignore[type-var]
 
     def repeated(self, times: int) -> Self:
-        """Return the system with every lane n times in a row."""
+        """Return the system with every lane n times in a row.
+
+        Parameters
+        ----------
+        times : int
+            How often each lane is repeated.
+
+        Returns
+        -------
+        LaneSystem
+            A system of the same kind, with ``times`` as many lanes.
+
+        Examples
+        --------
+        ::
+
+            pairs.repeated(2).lanes == 2 * pairs.lanes
+        """
         return self.of(np.repeat(np.arange(self.lanes), times))
 
     def _parameters(self) -> list[str]:

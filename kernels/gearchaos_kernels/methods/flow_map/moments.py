@@ -25,7 +25,7 @@ largest_bend = scalar(fourth_derivative)
 
 _THIRD = 1.0 / 3.0
 UNKNOWN = -2.0
-"""Stands for a moment that still has to be searched."""
+"""Marks a moment that still has to be searched."""
 
 _MOST_PIECES = 300
 _SHORTEST = 1e-9

@@ -36,7 +36,7 @@ from gearchaos_kernels.models.interfaces import (
 
 @scalar
 def split_step(memory, slot, at, tables, scene):
-    """Repeat a step of a lane in pieces, each of which stays on its contact branches."""
+    """Repeat a step of a lane in pieces; each piece stays on its contact branches."""
     lane = read_lane(memory, slot, scene)
     begin = forcing_on_grid(memory, slot, lane, tables, 2 * at.number, scene)
     end = forcing_on_grid(memory, slot, lane, tables, 2 * at.number + 2, scene)

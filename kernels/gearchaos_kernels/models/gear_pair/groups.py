@@ -49,7 +49,7 @@ class Effects(NamedTuple):
 class Groups(NamedTuple):
     """Dimensionless groups of eqs 8-13 of Pan 2021.
 
-    Every field is an array of shape (lanes,). The subscripts p and g stand for the driving and the
+    Every field is an array of shape (lanes,). The subscripts p and g denote the driving and the
     driven gear. Groups of an effect that is off do not enter the equations; fill them with 1 for
     mass ratios and with 0 otherwise.
 

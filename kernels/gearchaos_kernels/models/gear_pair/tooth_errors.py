@@ -26,7 +26,7 @@ class Teeth(NamedTuple):
     driven : array, shape (profiles, teeth of the driven gear)
         Errors of the driven gear.
     profile : array of int, shape (lanes,)
-        Which profile each lane has.
+        Number of the profile of each lane.
     share : array, shape (cells,)
         Mean share of one tooth pair in the mesh force over each cell, from its coming into mesh on.
     cells_per_period : int
